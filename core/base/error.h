@@ -1,0 +1,86 @@
+// Errors as values: the one closed enum of everything that can go wrong, and the
+// Result type every fallible function returns.
+//
+// No exception crosses a module. Failures of CGAL, SQLite, gRPC or the allocator are
+// translated to an Error where the library is called.
+#pragma once
+
+#include <string>
+#include <utility>
+
+#include <tl/expected.hpp>
+
+namespace shapedb {
+
+/// Every way a call can fail. The set is closed: adding a value makes each exhaustive
+/// switch (gRPC codes, exit codes, names) fail to compile until it is handled.
+/// The numeric values are not stored anywhere; the names (`errorCodeName`) are.
+enum class ErrorCode {
+    // The scan itself is unusable.
+    kNonFiniteCoordinate,   ///< a coordinate is NaN or infinite
+    kCoordinateOutOfRange,  ///< a magnitude or the whole extent is beyond single precision
+    kTooFewPoints,          ///< fewer than four distinct points
+    kAllPointsEqual,        ///< every point is the same point
+    kCollinear,             ///< all points lie on one line
+    kCoplanar,              ///< all points lie in one plane
+    kNoInterior,            ///< no closed interior: every big Delaunay ball is reached from outside
+    kPointLimitExceeded,    ///< more points than the configured limit
+    // A file cannot be read as what it says it is.
+    kFileNotReadable,    ///< missing, a folder, or no permission
+    kUnknownFileFormat,  ///< the ending names no format we read
+    kMalformedFile,      ///< header or body break the format, or the body is cut short
+    kFileNotWritable,    ///< output cannot be created or written in full
+    // The request is wrong.
+    kInvalidArgument,     ///< a parameter is outside its documented range
+    kMalformedFilter,     ///< a metadata filter does not parse
+    kMalformedCursor,     ///< a page cursor is damaged or belongs to another listing
+    kMalformedSignature,  ///< signature bytes are damaged or of an unknown version
+    kMalformedStream,     ///< messages of a stream come in an order that has no meaning
+    kChecksumMismatch,    ///< the received points do not have the announced checksum
+    kCountMismatch,       ///< the received points are not as many as announced
+    // The request is fine, the state does not allow it.
+    kNotFound,         ///< no such collection, shape, key or job
+    kAlreadyExists,    ///< insert-only and the key is taken, or the collection exists
+    kVersionConflict,  ///< the expected version is not the current one
+    kNotReady,         ///< the shape exists but has no signature (yet)
+    kRejected,         ///< the operation makes no sense in this state; the message says which
+    // The system cannot do it now.
+    kQueueFull,         ///< the ingest queue is at its bound; retry later
+    kUnavailable,       ///< shutting down, not started, or not reachable
+    kCancelled,         ///< the caller asked to stop
+    kDeadlineExceeded,  ///< the caller's deadline passed
+    kOutOfMemory,       ///< an allocation failed
+    kStorage,           ///< the database could not be read or written
+    kStorageFull,       ///< no room left on the device
+    kDataLoss,          ///< stored bytes are damaged
+    kSchemaTooNew,      ///< the database was written by a newer version
+    kInternal,          ///< a broken invariant; always a defect of ours
+};
+
+/// Stable snake_case name without the `k`, e.g. "non_finite_coordinate". Used in JSON
+/// output, in logs and in the database.
+const char* errorCodeName(ErrorCode code) noexcept;
+
+/// The inverse of `errorCodeName`; kInternal for a name it does not know (a name
+/// written by a newer version).
+ErrorCode errorCodeFromName(const std::string& name) noexcept;
+
+/// What went wrong and where, in words for the person who has to act on it: what was
+/// wrong, where, and what to do. No trailing full stop, no newline.
+struct Error {
+    ErrorCode code = ErrorCode::kInternal;
+    std::string message;
+};
+
+template <typename T>
+using Result = tl::expected<T, Error>;
+
+/// `return fail(ErrorCode::kNotFound, "...");` from any function returning a Result.
+inline tl::unexpected<Error> fail(ErrorCode code, std::string message) {
+    return tl::unexpected<Error>(Error{code, std::move(message)});
+}
+
+/// Passes on the error of another Result: `if (!r) return fail(r.error());`
+inline tl::unexpected<Error> fail(Error error) { return tl::unexpected<Error>(std::move(error)); }
+
+}  // namespace shapedb

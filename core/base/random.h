@@ -1,0 +1,54 @@
+// A small seeded generator whose stream is the same on every platform and library, so
+// that a seed in a test, a document or a bug report means the same points everywhere.
+// (std::normal_distribution and std::shuffle leave their results to the implementation.)
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+namespace shapedb {
+
+/// SplitMix64 (Steele, Lea, Flood 2014). Not for secrets. Not thread-safe: one per thread.
+class Random {
+  public:
+    explicit Random(std::uint64_t seed) : state_(seed) {}
+
+    std::uint64_t next() {
+        std::uint64_t z = (state_ += 0x9e3779b97f4a7c15ULL);
+        z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
+        z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
+        return z ^ (z >> 31);
+    }
+
+    /// Uniform in [0, 1), 53 random bits.
+    double uniform() { return static_cast<double>(next() >> 11) * 0x1.0p-53; }
+
+    /// Uniform in [low, high).
+    double uniform(double low, double high) { return low + (high - low) * uniform(); }
+
+    /// Uniform in [0, bound); bound > 0. The bias is below bound / 2^64.
+    std::uint64_t below(std::uint64_t bound) {
+        return static_cast<std::uint64_t>((static_cast<__extension__ unsigned __int128>(next()) * bound) >>
+                                          64);
+    }
+
+    /// Standard normal (Box-Muller; the second value of each pair is kept for the next call).
+    double normal() {
+        if (hasSpare_) {
+            hasSpare_ = false;
+            return spare_;
+        }
+        const double radius = std::sqrt(-2.0 * std::log(1.0 - uniform()));
+        const double angle = 6.283185307179586476925 * uniform();
+        spare_ = radius * std::sin(angle);
+        hasSpare_ = true;
+        return radius * std::cos(angle);
+    }
+
+  private:
+    std::uint64_t state_;
+    double spare_ = 0.0;
+    bool hasSpare_ = false;
+};
+
+}  // namespace shapedb
