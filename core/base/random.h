@@ -28,7 +28,7 @@ class Random {
 
     /// Uniform in [0, bound); bound > 0. The bias is below bound / 2^64.
     std::uint64_t below(std::uint64_t bound) {
-        return static_cast<std::uint64_t>((static_cast<__extension__ unsigned __int128>(next()) * bound) >>
+        return static_cast<std::uint64_t>((static_cast<Wide>(next()) * bound) >>
                                           64);
     }
 
@@ -46,6 +46,8 @@ class Random {
     }
 
   private:
+    __extension__ typedef unsigned __int128 Wide;
+
     std::uint64_t state_;
     double spare_ = 0.0;
     bool hasSpare_ = false;
