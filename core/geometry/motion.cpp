@@ -1,0 +1,77 @@
+#include "core/geometry/motion.h"
+
+#include <cmath>
+
+namespace shapedb {
+
+Point3 rotate(const Matrix3& r, const Point3& v) {
+    return {r[0][0] * v.x + r[0][1] * v.y + r[0][2] * v.z, r[1][0] * v.x + r[1][1] * v.y + r[1][2] * v.z,
+            r[2][0] * v.x + r[2][1] * v.y + r[2][2] * v.z};
+}
+
+double determinant(const Matrix3& m) {
+    const Point3 a{m[0][0], m[0][1], m[0][2]};
+    const Point3 b{m[1][0], m[1][1], m[1][2]};
+    const Point3 c{m[2][0], m[2][1], m[2][2]};
+    return dot(a, cross(b, c));
+}
+
+Point3 apply(const Motion& motion, const Point3& p) {
+    return motion.scale * rotate(motion.rotation, p) + motion.translation;
+}
+
+PointCloud applyToCloud(const Motion& motion, const PointCloud& points) {
+    PointCloud moved;
+    moved.reserve(points.size());
+    for (const Point3& p : points) moved.push_back(apply(motion, p));
+    return moved;
+}
+
+Motion inverse(const Motion& motion) {
+    Motion result;
+    result.scale = 1.0 / motion.scale;
+    result.reflected = motion.reflected;
+    for (std::size_t row = 0; row < 3; ++row) {
+        for (std::size_t column = 0; column < 3; ++column) {
+            result.rotation[row][column] = motion.rotation[column][row];
+        }
+    }
+    result.translation = -result.scale * rotate(result.rotation, motion.translation);
+    return result;
+}
+
+Motion compose(const Motion& second, const Motion& first) {
+    Motion result;
+    result.scale = second.scale * first.scale;
+    result.reflected = second.reflected != first.reflected;
+    for (std::size_t row = 0; row < 3; ++row) {
+        for (std::size_t column = 0; column < 3; ++column) {
+            double sum = 0.0;
+            for (std::size_t k = 0; k < 3; ++k) sum += second.rotation[row][k] * first.rotation[k][column];
+            result.rotation[row][column] = sum;
+        }
+    }
+    result.translation = apply(second, first.translation);
+    return result;
+}
+
+Matrix3 randomRotation(Random& random) {
+    // A vector of four normals has a direction uniform on the unit 3-sphere.
+    double w = 0.0, x = 0.0, y = 0.0, z = 0.0, norm = 0.0;
+    while (!(norm > 1e-6)) {
+        w = random.normal();
+        x = random.normal();
+        y = random.normal();
+        z = random.normal();
+        norm = std::sqrt(w * w + x * x + y * y + z * z);
+    }
+    w /= norm;
+    x /= norm;
+    y /= norm;
+    z /= norm;
+    return {{{1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)},
+             {2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)},
+             {2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)}}};
+}
+
+}  // namespace shapedb

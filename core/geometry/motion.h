@@ -1,0 +1,47 @@
+// Similarity motions: rotation or reflection, uniform scale, translation.
+#pragma once
+
+#include <array>
+
+#include "core/base/random.h"
+#include "core/geometry/point.h"
+
+namespace shapedb {
+
+/// Row-major: `matrix[row][column]`.
+using Matrix3 = std::array<std::array<double, 3>, 3>;
+
+/// The map y = scale * R x + t. Plain data; the functions below keep, and expect, these
+/// invariants: `scale` is finite and above 0, `rotation` (R) is orthonormal, and its
+/// determinant is -1 exactly when `reflected`, +1 otherwise. The default is the identity.
+struct Motion {
+    double scale = 1.0;      ///< ratio of lengths after to before
+    bool reflected = false;  ///< whether left and right are swapped
+    Matrix3 rotation = {{{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}}};  ///< R
+    Point3 translation;  ///< t, in the units of the result
+};
+
+/// R v: a direction through the rotation (and reflection) alone.
+[[nodiscard]] Point3 rotate(const Matrix3& rotation, const Point3& v);
+
+/// The determinant of a 3x3 matrix.
+[[nodiscard]] double determinant(const Matrix3& m);
+
+/// scale * R p + t.
+[[nodiscard]] Point3 apply(const Motion& motion, const Point3& p);
+
+/// `apply` to every point, in order. (Not an overload of `apply`: for a std::vector the
+/// compiler would also consider std::apply and stop there.)
+[[nodiscard]] PointCloud applyToCloud(const Motion& motion, const PointCloud& points);
+
+/// The motion that undoes `motion`, up to rounding.
+[[nodiscard]] Motion inverse(const Motion& motion);
+
+/// First `first`, then `second`: apply(compose(second, first), p) = apply(second, apply(first, p)).
+[[nodiscard]] Motion compose(const Motion& second, const Motion& first);
+
+/// A rotation (determinant +1) uniform over SO(3): the one of a uniform unit quaternion
+/// (Shoemake 1992). Advances `random`.
+[[nodiscard]] Matrix3 randomRotation(Random& random);
+
+}  // namespace shapedb
