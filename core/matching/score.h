@@ -1,0 +1,61 @@
+// How alike two signatures are: Section 4.2 of the paper. The score is the best over all
+// alignments of the two weighted point sets.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/geometry/motion.h"
+#include "core/signature/signature.h"
+
+namespace shapedb {
+
+struct ScoreOptions {
+    /// Try mirrored alignments too. False tells left from right.
+    bool reflection = true;
+    /// True compares sizes as well: shapes are not scaled to each other.
+    bool keepScale = false;
+    /// Distance, in units of the bounding-box diagonal, at which a pair of points counts for
+    /// exp(-1/2) of its weight. > 0. Smaller: stricter.
+    double kernelWidth = 0.1;
+};
+
+/// Score of the best alignment: similarity / (similarity + dissimilarity) in [0, 1]. 1
+/// exactly when `sameShape(a, b)` (with keepScale also the same scale), symmetric bit for
+/// bit. A pair in which one signature has a single point is capped at
+/// kDegenerateCeiling unless they are the same: one weighted point says too little.
+///
+/// Both must be valid (as made by makeSignature or decodeSignature). Thread-safe, allocates
+/// nothing.
+[[nodiscard]] double score(const Signature& a, const Signature& b, const ScoreOptions& options);
+
+constexpr double kDegenerateCeiling = 0.9;
+
+/// Never below `score` of the same arguments, and cheaper by the number of alignments:
+/// a motion keeps distances from the anchor, so each point can at best meet a point of the
+/// other at its own distance from the anchor.
+[[nodiscard]] double scoreUpperBound(const Signature& a, const Signature& b, const ScoreOptions& options);
+
+struct PointMatch {
+    std::uint32_t a = 0;    ///< index into a.points
+    std::uint32_t b = 0;    ///< index into b.points
+    double share = 0.0;     ///< of the similarity, (0, 1]; all matches sum to 1
+    double distance = 0.0;  ///< between the two after the motion, in units of a's scale
+};
+
+/// The alignment that achieves the score, and what it lays on what.
+struct Explanation {
+    double score = 0.0;               ///< as `score`
+    double similarity = 0.0;          ///< matched weight, each pair discounted by its distance
+    double dissimilarity = 0.0;       ///< weight of either side that found no match
+    Motion motion;                    ///< scan coordinates of b to scan coordinates of a
+    std::vector<PointMatch> matches;  ///< by falling share
+    std::vector<std::uint32_t> unmatchedA;
+    std::vector<std::uint32_t> unmatchedB;
+    bool degenerate = false;  ///< a single-point signature left the rotation open
+};
+
+/// As `score`, with its reasons. `explain(a, b).score == score(a, b)`, bit for bit.
+[[nodiscard]] Explanation explain(const Signature& a, const Signature& b, const ScoreOptions& options);
+
+}  // namespace shapedb

@@ -1,0 +1,46 @@
+// Metadata filters: which shapes a search or a listing considers at all.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/base/error.h"
+
+namespace shapedb {
+
+/// Conjunction of terms separated by commas: `key=value`, `key!=value`, `key` (present),
+/// `!key` (absent), and `key<v`, `key<=v`, `key>v`, `key>=v` (numbers). Blanks around keys,
+/// operators and values are ignored; a value with commas, blanks at its ends or operators is
+/// written in double quotes, with \" and \\ inside. A shape without the key never passes a
+/// comparison, except `!=`. An empty text accepts everything.
+///
+/// Immutable; safe to share between threads.
+class Filter {
+  public:
+    /// Accepts everything.
+    Filter() = default;
+
+    /// Errors: kMalformedFilter with the column (from 1) and what was expected there.
+    [[nodiscard]] static Result<Filter> parse(const std::string& text);
+
+    [[nodiscard]] bool matches(const std::map<std::string, std::string>& metadata) const;
+    [[nodiscard]] bool acceptsAll() const { return terms_.empty(); }
+
+  private:
+    enum class Operator { kEqual, kNotEqual, kPresent, kAbsent, kLess, kLessEqual, kGreater, kGreaterEqual };
+    struct Term {
+        std::string key;
+        Operator op = Operator::kEqual;
+        std::string value;
+        double number = 0.0;
+    };
+
+    static bool passes(const Term& term, const std::map<std::string, std::string>& metadata);
+
+    std::vector<Term> terms_;
+
+    friend class FilterParser;
+};
+
+}  // namespace shapedb

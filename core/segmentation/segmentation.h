@@ -1,0 +1,75 @@
+// From a noisy point cloud to the segments of the shape's interior: Sections 2 and 3 of
+// Dey and Goswami, "Shape Segmentation and Matching from Noisy Point Clouds" (2004).
+// The stages have a header each: core/geometry/sanitise.h, delaunay.h, point_scale.h,
+// interior.h, flow.h, segments.h; this one runs them in order.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/run_context.h"
+#include "core/geometry/point.h"
+#include "core/segmentation/delaunay.h"
+#include "core/segmentation/options.h"
+
+namespace shapedb {
+
+/// One segment: the stable manifold of a maximum of the distance function, after merging.
+struct Segment {
+    double volume = 0.0;      ///< of its tetrahedra, scan units cubed, > 0
+    Point3 centroid;          ///< volume-weighted mean of the tetrahedra's centroids (Section 4.1)
+    double peakRadius = 0.0;  ///< circumradius of the largest Delaunay ball, scan units
+    Point3 peak;              ///< centre of that ball
+    /// Second central moments of its matter per volume: xx, xy, xz, yy, yz, zz, scan units squared.
+    std::array<double, 6> covariance{};
+    std::uint64_t tetrahedra = 0;
+};
+
+struct StageTime {
+    const char* stage = "";  ///< static storage: "sanitise", "decimate", "delaunay", ...
+    double seconds = 0.0;
+};
+
+struct Segmentation {
+    /// By falling volume; equal volumes by centroid. Never empty.
+    std::vector<Segment> segments;
+
+    /// For each input point the index of its segment, -1 when it touches none: of the inner
+    /// tetrahedra around the point, the one with the largest ball decides.
+    std::vector<std::int32_t> pointSegment;
+
+    /// For each tetrahedron the index of its segment, -1 outside.
+    std::vector<std::int32_t> tetrahedronSegment;
+
+    /// The triangulation, over `sites`.
+    Tetrahedra tetrahedra;
+
+    /// Distinct (and decimated) points, scan units; `siteOfPoint` maps each input point to its site.
+    PointCloud sites;
+    std::vector<std::uint32_t> siteOfPoint;
+
+    double volume = 0.0;           ///< of all segments together, scan units cubed
+    std::uint64_t duplicates = 0;  ///< input points that repeated an earlier one
+    std::uint64_t bigBalls = 0;
+    std::uint64_t interiorTetrahedra = 0;
+    std::uint64_t maxima = 0;  ///< segments before merging
+
+    std::vector<StageTime> stages;  ///< in the order they ran
+    double delaunaySeconds = 0.0;
+    double totalSeconds = 0.0;
+};
+
+/// Segments the interior of the shape the points were sampled from.
+///
+/// Deterministic: the same points in any order give the same segments, bit for bit.
+/// Thread-safe (no shared state). Memory: about 600 bytes a distinct point at the peak.
+///
+/// Errors: those of `sanitise` and `triangulate`; kInvalidArgument (options); kNoInterior
+/// when the walk from outside reaches every big ball (an open surface, too much noise);
+/// kCancelled, kDeadlineExceeded; kOutOfMemory.
+[[nodiscard]] Result<Segmentation> segment(const PointCloud& points, const SegmentationOptions& options,
+                                           const RunContext& context = {});
+
+}  // namespace shapedb

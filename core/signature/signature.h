@@ -1,0 +1,58 @@
+// The signature of a shape: its heaviest segments as weighted points (Section 4.1),
+// scaled by the shape's bounding box (Section 4.2).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/geometry/point.h"
+#include "core/segmentation/segmentation.h"
+
+namespace shapedb {
+
+struct SignatureOptions {
+    /// Heaviest segments kept. The paper: "less than ten". 1 to kMaxSignaturePoints.
+    std::uint32_t maxPoints = 7;
+};
+
+constexpr std::uint32_t kMaxSignaturePoints = 32;
+
+/// Errors: kInvalidArgument naming the field, its value and its range.
+[[nodiscard]] Result<void> validate(const SignatureOptions& options);
+
+/// One weighted point with what its segment knows besides. Lengths are divided by
+/// Signature::scale. Single precision: what is scored is exactly what is stored.
+struct SignaturePoint {
+    /// Representative point g* minus the heaviest one's: the first point's is (0, 0, 0).
+    std::array<float, 3> position{};
+    float weight = 0.0f;       ///< volume of the segment / scale^3, > 0
+    float volumeShare = 0.0f;  ///< of the whole interior, (0, 1]
+    float peakRadius = 0.0f;   ///< circumradius of its largest Delaunay ball / scale
+    /// Second central moments / scale^2: xx, xy, xz, yy, yz, zz.
+    std::array<float, 6> covariance{};
+};
+
+struct Signature {
+    std::vector<SignaturePoint> points;  ///< by falling weight; 1 to kMaxSignaturePoints
+    double scale = 1.0;                  ///< diagonal of the bounding box, scan units, > 0
+    Point3 origin;                       ///< heaviest representative point, scan units
+    double volume = 0.0;                 ///< of the whole interior, scan units cubed
+};
+
+/// True when all numbers that enter a score are the same, bit for bit.
+[[nodiscard]] bool sameShape(const Signature& a, const Signature& b) noexcept;
+
+/// Scan units: position of point i of the signature.
+[[nodiscard]] Point3 pointPosition(const Signature& signature, std::size_t i);
+/// Scan units cubed: volume of the segment behind point i.
+[[nodiscard]] double pointVolume(const Signature& signature, std::size_t i);
+/// Scan units: standard deviations of the segment's matter along its principal axes, falling.
+[[nodiscard]] std::array<double, 3> pointExtents(const Signature& signature, std::size_t i);
+
+/// Errors: kInvalidArgument (options), kOutOfMemory.
+[[nodiscard]] Result<Signature> makeSignature(const Segmentation& segmentation,
+                                              const SignatureOptions& options);
+
+}  // namespace shapedb

@@ -1,0 +1,20 @@
+// The persisted byte form of a signature. docs/signature-format.md describes it; the
+// numbers below are persisted: never change them, add a version.
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+#include "core/base/error.h"
+#include "core/signature/signature.h"
+
+namespace shapedb {
+
+/// Little-endian on every machine; at most 64 + 48 * kMaxSignaturePoints bytes.
+[[nodiscard]] std::string encodeSignature(const Signature& signature);
+
+/// The exact inverse. Errors: kMalformedSignature (too short or long, wrong magic, unknown
+/// version, checksum, a number out of its range: the message says which).
+[[nodiscard]] Result<Signature> decodeSignature(const std::string& bytes);
+
+}  // namespace shapedb
