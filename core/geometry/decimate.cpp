@@ -1,0 +1,95 @@
+#include "core/geometry/decimate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/geometry/sanitise.h"
+
+namespace shapedb {
+
+namespace {
+
+// Finest grid: 2^20 cells along the unit cube's edge of 2, three indices in one 64-bit key.
+constexpr double kMinCell = 2.0 / (1 << 20);
+constexpr int kMaxSteps = 24;
+constexpr double kAcceptedShare = 0.9;
+
+using Keyed = std::pair<std::uint64_t, std::uint32_t>;  // cell, point
+
+std::uint64_t cellKey(const Point3& p, double cell) {
+    const auto index = [cell](double v) { return static_cast<std::uint64_t>((v + 1.0) / cell); };
+    return (index(p.x) << 42) | (index(p.y) << 21) | index(p.z);
+}
+
+std::vector<Keyed> sortedByCell(const PointCloud& points, double cell) {
+    std::vector<Keyed> keyed(points.size());
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        keyed[i] = {cellKey(points[i], cell), static_cast<std::uint32_t>(i)};
+    }
+    std::sort(keyed.begin(), keyed.end());
+    return keyed;
+}
+
+std::size_t countCells(const std::vector<Keyed>& keyed) {
+    std::size_t cells = keyed.empty() ? 0 : 1;
+    for (std::size_t i = 1; i < keyed.size(); ++i) cells += keyed[i].first != keyed[i - 1].first;
+    return cells;
+}
+
+DecimatedPoints averageCells(const PointCloud& points, const std::vector<Keyed>& keyed, double cell) {
+    PointCloud means;
+    std::vector<std::uint32_t> cellOfPoint(points.size());
+    for (std::size_t begin = 0; begin < keyed.size();) {
+        std::size_t end = begin;
+        Point3 sum;
+        for (; end < keyed.size() && keyed[end].first == keyed[begin].first; ++end) {
+            sum = sum + points[keyed[end].second];
+            cellOfPoint[keyed[end].second] = static_cast<std::uint32_t>(means.size());
+        }
+        means.push_back((1.0 / static_cast<double>(end - begin)) * sum);
+        begin = end;
+    }
+    MergedPoints merged = mergeDuplicates(means);
+    for (std::uint32_t& site : cellOfPoint) site = merged.siteOfPoint[site];
+    return {std::move(merged.points), std::move(cellOfPoint), cell};
+}
+
+}  // namespace
+
+Result<DecimatedPoints> decimate(const PointCloud& points, std::size_t target, const RunContext& context) {
+    if (target < 4) {
+        return fail(ErrorCode::kInvalidArgument, "the target of the decimation must be at least 4 points");
+    }
+    if (points.size() <= target) {
+        MergedPoints merged = mergeDuplicates(points);
+        return DecimatedPoints{std::move(merged.points), std::move(merged.siteOfPoint), 0.0};
+    }
+    // `fine` gives too many cells, `coarse` few enough.
+    double fine = kMinCell;
+    double coarse = 2.0;
+    double cell = std::clamp(2.0 / std::sqrt(static_cast<double>(target)), fine, coarse);
+    std::vector<Keyed> best;
+    double bestCell = coarse;
+    for (int step = 0; step < kMaxSteps; ++step) {
+        if (const auto go = context.checkpoint(); !go) return fail(go.error());
+        std::vector<Keyed> keyed = sortedByCell(points, cell);
+        const std::size_t cells = countCells(keyed);
+        const double share = static_cast<double>(cells) / static_cast<double>(target);
+        if (cells <= target) {
+            coarse = cell;
+            best = std::move(keyed);
+            bestCell = cell;
+            if (share >= kAcceptedShare || cell <= kMinCell) break;
+        } else {
+            fine = cell;
+        }
+        // Aim a little below the target; fall back to bisection when the step leaves the bracket.
+        const double guess = cell * std::sqrt(share / 0.96);
+        cell = guess > fine && guess < coarse ? guess : std::sqrt(fine * coarse);
+    }
+    if (best.empty()) best = sortedByCell(points, bestCell);
+    return averageCells(points, best, bestCell);
+}
+
+}  // namespace shapedb

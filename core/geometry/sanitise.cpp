@@ -1,0 +1,158 @@
+#include "core/geometry/sanitise.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <new>
+#include <numeric>
+#include <string>
+
+namespace shapedb {
+
+namespace {
+
+struct Box {
+    Point3 low{std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity(),
+               std::numeric_limits<double>::infinity()};
+    Point3 high{-std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity(),
+                -std::numeric_limits<double>::infinity()};
+};
+
+Box axisAlignedBox(const PointCloud& points) {
+    Box box;
+    for (const Point3& p : points) {
+        box.low = {std::min(box.low.x, p.x), std::min(box.low.y, p.y), std::min(box.low.z, p.z)};
+        box.high = {std::max(box.high.x, p.x), std::max(box.high.y, p.y), std::max(box.high.z, p.z)};
+    }
+    return box;
+}
+
+Result<void> checkCoordinates(const PointCloud& scan) {
+    for (std::size_t i = 0; i < scan.size(); ++i) {
+        const double coordinates[3] = {scan[i].x, scan[i].y, scan[i].z};
+        for (int axis = 0; axis < 3; ++axis) {
+            const double value = coordinates[axis];
+            const char name = static_cast<char>('x' + axis);
+            if (!std::isfinite(value)) {
+                return fail(ErrorCode::kNonFiniteCoordinate,
+                            "coordinate " + std::string(1, name) + " of point " + std::to_string(i) + " is " +
+                                (std::isnan(value) ? "NaN" : "infinite") +
+                                "; remove points without a position before uploading");
+            }
+            if (std::abs(value) > kMaxCoordinate) {
+                return fail(ErrorCode::kCoordinateOutOfRange,
+                            "coordinate " + std::string(1, name) + " of point " + std::to_string(i) +
+                                " exceeds the largest magnitude 3.4e38; choose a larger unit of length");
+            }
+        }
+    }
+    return {};
+}
+
+// The largest distance from `points` to where `distanceOf` measures from, and who has it.
+template <typename Distance>
+std::pair<double, std::size_t> farthest(const PointCloud& points, Distance distanceOf) {
+    double best = -1.0;
+    std::size_t at = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        const double d = distanceOf(points[i]);
+        if (d > best) {
+            best = d;
+            at = i;
+        }
+    }
+    return {best, at};
+}
+
+// Grows a simplex greedily: far point, far from the line, far from the plane. Within a factor
+// of two of the widest, which is all a tolerance needs.
+Result<void> checkSpansSpace(const PointCloud& points) {
+    const Point3& origin = points.front();
+    const auto [reach, b] = farthest(points, [&](const Point3& p) { return distance(p, origin); });
+    const Point3 axis = (1.0 / reach) * (points[b] - origin);
+    const auto [width, c] =
+        farthest(points, [&](const Point3& p) { return length(cross(axis, p - origin)); });
+    if (width <= kFlatnessTolerance) {
+        return fail(ErrorCode::kCollinear,
+                    "all points lie on one line; a shape needs points all around its surface");
+    }
+    const Point3 across = cross(axis, points[c] - origin);
+    const Point3 normal = (1.0 / length(across)) * across;
+    const auto height = farthest(points, [&](const Point3& p) { return std::abs(dot(normal, p - origin)); });
+    if (height.first <= kFlatnessTolerance) {
+        return fail(ErrorCode::kCoplanar,
+                    "all points lie in one plane; a shape needs points all around its surface");
+    }
+    return {};
+}
+
+Result<SanitisedPoints> sanitiseChecked(const PointCloud& scan) {
+    const Box box = axisAlignedBox(scan);
+    const Point3 half = 0.5 * box.high - 0.5 * box.low;
+    const double halfExtent = std::max({half.x, half.y, half.z});
+    if (halfExtent == 0.0) {
+        return fail(ErrorCode::kAllPointsEqual,
+                    "all " + std::to_string(scan.size()) + " points are the same point");
+    }
+    if (halfExtent < kMinHalfExtent) {
+        return fail(ErrorCode::kCoordinateOutOfRange,
+                    "the whole scan is smaller than 1.2e-38 units; choose a smaller unit of length");
+    }
+    SanitisedPoints result;
+    int exponent = 0;
+    std::frexp(halfExtent, &exponent);
+    result.frame = {0.5 * box.high + 0.5 * box.low, std::ldexp(1.0, exponent)};
+    const double inverse = 1.0 / result.frame.unit;  // exact: a power of two
+    PointCloud scaled(scan.size());
+    for (std::size_t i = 0; i < scan.size(); ++i) {
+        // Adding zero turns -0.0 into 0.0, so that equal points have equal bytes.
+        scaled[i] = inverse * (scan[i] - result.frame.centre) + Point3{};
+    }
+    MergedPoints merged = mergeDuplicates(scaled);
+    result.duplicates = scan.size() - merged.points.size();
+    result.points = std::move(merged.points);
+    result.siteOfPoint = std::move(merged.siteOfPoint);
+    if (result.points.size() < 4) {
+        return fail(ErrorCode::kTooFewPoints, "only " + std::to_string(result.points.size()) + " of " +
+                                                  std::to_string(scan.size()) +
+                                                  " points are distinct; at least 4 are needed");
+    }
+    if (const auto spans = checkSpansSpace(result.points); !spans) return fail(spans.error());
+    return result;
+}
+
+}  // namespace
+
+MergedPoints mergeDuplicates(const PointCloud& points) {
+    std::vector<std::uint32_t> order(points.size());
+    std::iota(order.begin(), order.end(), 0u);
+    std::sort(order.begin(), order.end(),
+              [&](std::uint32_t a, std::uint32_t b) { return lexicographicLess(points[a], points[b]); });
+    MergedPoints merged;
+    merged.points.reserve(points.size());
+    merged.siteOfPoint.resize(points.size());
+    for (const std::uint32_t i : order) {
+        if (merged.points.empty() || merged.points.back() != points[i]) merged.points.push_back(points[i]);
+        merged.siteOfPoint[i] = static_cast<std::uint32_t>(merged.points.size() - 1);
+    }
+    return merged;
+}
+
+Result<SanitisedPoints> sanitise(const PointCloud& scan) {
+    if (scan.size() < 4) {
+        return fail(ErrorCode::kTooFewPoints,
+                    "the scan has " + std::to_string(scan.size()) + " points; at least 4 are needed");
+    }
+    if (scan.size() >= std::numeric_limits<std::uint32_t>::max()) {
+        return fail(ErrorCode::kPointLimitExceeded, "the scan has more than 4,294,967,294 points");
+    }
+    if (const auto finite = checkCoordinates(scan); !finite) return fail(finite.error());
+    try {
+        return sanitiseChecked(scan);
+    } catch (const std::bad_alloc&) {
+        return fail(ErrorCode::kOutOfMemory,
+                    "not enough memory to sort " + std::to_string(scan.size()) + " points");
+    }
+}
+
+}  // namespace shapedb

@@ -1,0 +1,56 @@
+#include "core/segmentation/flow.h"
+
+#include <cmath>
+
+#include "core/segmentation/exact_geometry.h"
+
+namespace shapedb {
+
+namespace {
+
+// Rounding moves a barycentric coordinate of the circumcentre by a few units of 1e-16 times
+// the square of the inverse shape factor (the determinant against its edges); with a thousand
+// times that as a margin a wrong sign would need a thousandfold underestimate.
+constexpr double kRounding = 1e-13;
+
+// Signs of the circumcentre's barycentric coordinates, or false when one is too close to call.
+bool approximateFlowMask(const TetrahedronCorners& p, const Point3& centre, unsigned& mask) {
+    const Point3 a = p[1] - p[0];
+    const Point3 b = p[2] - p[0];
+    const Point3 c = p[3] - p[0];
+    const Point3 g = centre - p[0];
+    const Point3 bc = cross(b, c);
+    const double sixVolumes = dot(a, bc);
+    const double size = length(a) * length(b) * length(c);
+    if (!(sixVolumes > 1e-6 * size)) return false;
+    const double second = dot(g, bc);
+    const double third = dot(g, cross(c, a));
+    const double fourth = dot(g, cross(a, b));
+    const double coordinates[4] = {sixVolumes - second - third - fourth, second, third, fourth};
+    const double reach = length(g) * (length(bc) + length(a) * (length(b) + length(c))) + sixVolumes;
+    const double margin = kRounding * reach * (size / sixVolumes);
+    mask = 0;
+    for (unsigned i = 0; i < 4; ++i) {
+        if (std::abs(coordinates[i]) <= margin) return false;
+        if (coordinates[i] < 0.0) mask |= 1u << i;
+    }
+    return true;
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> flowMasks(const PointCloud& points, const Tetrahedra& tetrahedra,
+                                    const std::vector<std::uint8_t>& wanted) {
+    std::vector<std::uint8_t> masks(tetrahedra.size(), 0);
+    for (std::size_t t = 0; t < tetrahedra.size(); ++t) {
+        if (!wanted[t]) continue;
+        const auto& v = tetrahedra.vertices[t];
+        const TetrahedronCorners corners = {points[v[0]], points[v[1]], points[v[2]], points[v[3]]};
+        unsigned mask = 0;
+        if (!approximateFlowMask(corners, tetrahedra.circumcentres[t], mask)) mask = exactFlowMask(corners);
+        masks[t] = static_cast<std::uint8_t>(mask);
+    }
+    return masks;
+}
+
+}  // namespace shapedb

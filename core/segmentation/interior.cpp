@@ -1,0 +1,97 @@
+#include "core/segmentation/interior.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace shapedb {
+
+namespace {
+
+constexpr double kRadiansPerDegree = 3.14159265358979323846 / 180.0;
+constexpr std::size_t kStepsBetweenCheckpoints = 1 << 16;
+
+// The three corners of facet i.
+std::array<Point3, 3> facetCorners(const PointCloud& points, const std::array<std::uint32_t, 4>& vertices,
+                                   int i) {
+    std::array<Point3, 3> corners;
+    for (int k = 1; k < 4; ++k) {
+        corners[static_cast<std::size_t>(k - 1)] = points[vertices[static_cast<std::size_t>((i + k) % 4)]];
+    }
+    return corners;
+}
+
+// The ball behind a hull facet is nearly the half space beyond it: its centre lies outside the
+// hull, and the circle in which its sphere meets the plane of the facet is small against it.
+bool opensToOutside(const PointCloud& points, const Tetrahedra& tetrahedra, std::size_t t, int facet,
+                    double cosHullAngle) {
+    const auto corners = facetCorners(points, tetrahedra.vertices[t], facet);
+    const Point3 apex = points[tetrahedra.vertices[t][static_cast<std::size_t>(facet)]];
+    const Point3 normal = cross(corners[1] - corners[0], corners[2] - corners[0]);
+    const double inwards = dot(normal, apex - corners[0]) >= 0.0 ? 1.0 : -1.0;
+    const Point3 toCentre = tetrahedra.circumcentres[t] - corners[0];
+    // sin(angle) = r_facet / r_ball, so cos(angle) = distance of the centre from the plane / r_ball.
+    const double beyond = -inwards * dot(normal, toCentre);
+    return beyond > cosHullAngle * length(normal) * tetrahedra.circumradii[t];
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> bigBalls(const Tetrahedra& tetrahedra, const std::vector<double>& scales,
+                                   double bigBallRatio) {
+    std::vector<std::uint8_t> big(tetrahedra.size());
+    for (std::size_t t = 0; t < tetrahedra.size(); ++t) {
+        const auto& v = tetrahedra.vertices[t];
+        const double smallest = std::min({scales[v[0]], scales[v[1]], scales[v[2]], scales[v[3]]});
+        big[t] = tetrahedra.circumradii[t] > bigBallRatio * smallest ? 1 : 0;
+    }
+    return big;
+}
+
+double intersectionAngle(const Point3& centreA, const Point3& centreB, const Point3& shared) {
+    // The angle between the radii to a common point: the law of cosines on centres and radii
+    // gives the same, but cancels when balls are large.
+    const Point3 a = centreA - shared;
+    const Point3 b = centreB - shared;
+    return std::atan2(length(cross(a, b)), dot(a, b));
+}
+
+Result<std::vector<std::uint8_t>> interiorTetrahedra(const PointCloud& points, const Tetrahedra& tetrahedra,
+                                                     const std::vector<std::uint8_t>& big,
+                                                     const SegmentationOptions& options,
+                                                     const RunContext& context) {
+    const double deepAngle = options.deepAngleDegrees * kRadiansPerDegree;
+    const double cosHullAngle = std::cos(options.hullAngleDegrees * kRadiansPerDegree);
+    std::vector<std::uint8_t> inside = big;
+    std::vector<std::uint32_t> stack;
+    for (std::size_t t = 0; t < tetrahedra.size(); ++t) {
+        if (!big[t]) continue;
+        for (int facet = 0; facet < 4; ++facet) {
+            if (tetrahedra.neighbours[t][static_cast<std::size_t>(facet)] != kNoTetrahedron) continue;
+            if (!opensToOutside(points, tetrahedra, t, facet, cosHullAngle)) continue;
+            inside[t] = 0;
+            stack.push_back(static_cast<std::uint32_t>(t));
+            break;
+        }
+    }
+    for (std::size_t steps = 1; !stack.empty(); ++steps) {
+        if (steps % kStepsBetweenCheckpoints == 0) {
+            if (auto go = context.checkpoint(); !go) return fail(go.error());
+        }
+        const std::uint32_t t = stack.back();
+        stack.pop_back();
+        for (std::size_t facet = 0; facet < 4; ++facet) {
+            const std::uint32_t next = tetrahedra.neighbours[t][facet];
+            if (next == kNoTetrahedron || !inside[next]) continue;
+            const Point3& shared = points[tetrahedra.vertices[t][(facet + 1) % 4]];
+            if (intersectionAngle(tetrahedra.circumcentres[t], tetrahedra.circumcentres[next], shared) >=
+                deepAngle) {
+                continue;
+            }
+            inside[next] = 0;
+            stack.push_back(next);
+        }
+    }
+    return inside;
+}
+
+}  // namespace shapedb

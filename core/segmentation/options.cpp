@@ -1,0 +1,44 @@
+#include "core/segmentation/options.h"
+
+#include <cmath>
+#include <string>
+
+namespace shapedb {
+
+namespace {
+
+Result<void> require(bool holds, const char* field, double value, const char* range) {
+    if (holds) return {};
+    return fail(ErrorCode::kInvalidArgument,
+                std::string(field) + " is " + std::to_string(value) + "; it must be " + range);
+}
+
+}  // namespace
+
+Result<void> validate(const SegmentationOptions& options) {
+    const auto angle = [](double degrees) { return degrees > 0.0 && degrees < 90.0; };
+    if (auto r = require(options.bigBallRatio > 0.0 && std::isfinite(options.bigBallRatio), "big_ball_ratio",
+                         options.bigBallRatio, "above 0");
+        !r) {
+        return r;
+    }
+    if (auto r = require(angle(options.deepAngleDegrees), "deep_angle_degrees", options.deepAngleDegrees,
+                         "above 0 and below 90 degrees");
+        !r) {
+        return r;
+    }
+    if (auto r = require(angle(options.hullAngleDegrees), "hull_angle_degrees", options.hullAngleDegrees,
+                         "above 0 and below 90 degrees");
+        !r) {
+        return r;
+    }
+    if (auto r = require(options.mergeRatio >= 1.0 && std::isfinite(options.mergeRatio), "merge_ratio",
+                         options.mergeRatio, "at least 1");
+        !r) {
+        return r;
+    }
+    return require(options.decimateTo == 0 || options.decimateTo >= 4, "decimate_to",
+                   static_cast<double>(options.decimateTo), "0 (never) or at least 4 points");
+}
+
+}  // namespace shapedb

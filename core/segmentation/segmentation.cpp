@@ -1,0 +1,241 @@
+#include "core/segmentation/segmentation.h"
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+#include <new>
+#include <numeric>
+#include <string>
+#include <utility>
+
+#include "core/geometry/decimate.h"
+#include "core/geometry/sanitise.h"
+#include "core/segmentation/flow.h"
+#include "core/segmentation/interior.h"
+#include "core/segmentation/point_scale.h"
+#include "core/segmentation/segments.h"
+
+namespace shapedb {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double secondsSince(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+// Announces each stage, notes how long it took, and is where stages can be cancelled.
+class StageClock {
+  public:
+    StageClock(const RunContext& context, std::vector<StageTime>& stages)
+        : context_(context), stages_(stages), start_(Clock::now()) {}
+
+    Result<void> begin(const char* stage) {
+        end();
+        context_.report(stage, 0, 0);
+        stages_.push_back({stage, 0.0});
+        begun_ = Clock::now();
+        return context_.checkpoint();
+    }
+    void end() {
+        if (!stages_.empty() && stages_.back().seconds == 0.0) stages_.back().seconds = secondsSince(begun_);
+    }
+    double lastSeconds() const { return stages_.back().seconds; }
+    double totalSeconds() const { return secondsSince(start_); }
+
+  private:
+    const RunContext& context_;
+    std::vector<StageTime>& stages_;
+    Clock::time_point start_;
+    Clock::time_point begun_;
+};
+
+// Volume, first and second moments of one segment, added up tetrahedron by tetrahedron about
+// the origin of the unit frame.
+struct Moments {
+    double volume = 0.0;
+    Point3 first;
+    std::array<double, 6> second{};
+    std::uint64_t tetrahedra = 0;
+
+    void add(const std::array<Point3, 4>& p) {
+        const double v = std::max(0.0, dot(p[1] - p[0], cross(p[2] - p[0], p[3] - p[0])) / 6.0);
+        const Point3 sum = p[0] + p[1] + p[2] + p[3];
+        volume += v;
+        first = first + (0.25 * v) * sum;
+        // Integral of x y over a tetrahedron: v / 20 * (sum_i x_i y_i + sum_i x_i * sum_i y_i).
+        std::array<double, 6> products = {sum.x * sum.x, sum.x * sum.y, sum.x * sum.z,
+                                          sum.y * sum.y, sum.y * sum.z, sum.z * sum.z};
+        for (const Point3& c : p) {
+            const std::array<double, 6> own = {c.x * c.x, c.x * c.y, c.x * c.z,
+                                               c.y * c.y, c.y * c.z, c.z * c.z};
+            for (std::size_t i = 0; i < 6; ++i) products[i] += own[i];
+        }
+        for (std::size_t i = 0; i < 6; ++i) second[i] += v / 20.0 * products[i];
+        ++tetrahedra;
+    }
+};
+
+Segment toSegment(const Moments& m, std::uint32_t peak, const Tetrahedra& tetrahedra, const Frame& frame) {
+    Segment segment;
+    const double unit2 = frame.unit * frame.unit;
+    const Point3 mean = (1.0 / m.volume) * m.first;
+    segment.volume = m.volume * unit2 * frame.unit;
+    segment.centroid = frame.toScan(mean);
+    segment.peakRadius = tetrahedra.circumradii[peak] * frame.unit;
+    segment.peak = frame.toScan(tetrahedra.circumcentres[peak]);
+    const std::array<double, 6> square = {mean.x * mean.x, mean.x * mean.y, mean.x * mean.z,
+                                          mean.y * mean.y, mean.y * mean.z, mean.z * mean.z};
+    for (std::size_t i = 0; i < 6; ++i) segment.covariance[i] = (m.second[i] / m.volume - square[i]) * unit2;
+    segment.tetrahedra = m.tetrahedra;
+    return segment;
+}
+
+// Fills result.segments by falling volume and result.tetrahedronSegment to match. Segments
+// whose tetrahedra are all flat to the last digit have no volume and are left out.
+void describeSegments(const PointCloud& points, const SegmentLabels& labels, const Frame& frame,
+                      Segmentation& result) {
+    std::vector<Moments> moments(labels.peaks.size());
+    for (std::size_t t = 0; t < result.tetrahedra.size(); ++t) {
+        const std::int32_t segment = labels.ofTetrahedron[t];
+        if (segment < 0) continue;
+        const auto& v = result.tetrahedra.vertices[t];
+        moments[static_cast<std::size_t>(segment)].add(
+            {points[v[0]], points[v[1]], points[v[2]], points[v[3]]});
+        ++result.interiorTetrahedra;
+    }
+    std::vector<std::uint32_t> order;
+    for (std::uint32_t s = 0; s < moments.size(); ++s) {
+        if (moments[s].volume > 0.0) order.push_back(s);
+    }
+    std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+        if (moments[a].volume != moments[b].volume) return moments[a].volume > moments[b].volume;
+        return lexicographicLess(moments[a].first, moments[b].first);
+    });
+    std::vector<std::int32_t> rank(moments.size(), -1);
+    for (std::size_t i = 0; i < order.size(); ++i) {
+        const std::uint32_t s = order[i];
+        rank[s] = static_cast<std::int32_t>(i);
+        result.segments.push_back(toSegment(moments[s], labels.peaks[s], result.tetrahedra, frame));
+        result.volume += result.segments.back().volume;
+    }
+    result.tetrahedronSegment.reserve(labels.ofTetrahedron.size());
+    for (const std::int32_t segment : labels.ofTetrahedron) {
+        result.tetrahedronSegment.push_back(segment < 0 ? -1 : rank[static_cast<std::size_t>(segment)]);
+    }
+}
+
+// Segment of each site: that of the largest ball among the segmented tetrahedra around it.
+std::vector<std::int32_t> labelSites(std::size_t siteCount, const Segmentation& result) {
+    std::vector<std::int32_t> labels(siteCount, -1);
+    std::vector<double> largest(siteCount, -1.0);
+    for (std::size_t t = 0; t < result.tetrahedra.size(); ++t) {
+        if (result.tetrahedronSegment[t] < 0) continue;
+        for (const std::uint32_t v : result.tetrahedra.vertices[t]) {
+            if (result.tetrahedra.circumradii[t] <= largest[v]) continue;
+            largest[v] = result.tetrahedra.circumradii[t];
+            labels[v] = result.tetrahedronSegment[t];
+        }
+    }
+    return labels;
+}
+
+void toScanUnits(const Frame& frame, PointCloud sites, Segmentation& result) {
+    for (Point3& p : sites) p = frame.toScan(p);
+    result.sites = std::move(sites);
+    for (Point3& c : result.tetrahedra.circumcentres) c = frame.toScan(c);
+    for (double& r : result.tetrahedra.circumradii) r *= frame.unit;
+}
+
+struct Prepared {
+    PointCloud sites;  // unit frame
+    Frame frame;
+};
+
+Result<Prepared> prepare(const PointCloud& points, const SegmentationOptions& options,
+                         const RunContext& context, StageClock& clock, Segmentation& result) {
+    if (auto go = clock.begin("sanitise"); !go) return fail(go.error());
+    auto clean = sanitise(points);
+    if (!clean) return fail(clean.error());
+    result.duplicates = clean->duplicates;
+    result.siteOfPoint = std::move(clean->siteOfPoint);
+    Prepared prepared{std::move(clean->points), clean->frame};
+    if (options.decimateTo == 0 || prepared.sites.size() <= options.decimateTo) return prepared;
+    if (auto go = clock.begin("decimate"); !go) return fail(go.error());
+    auto thinned = decimate(prepared.sites, options.decimateTo, context);
+    if (!thinned) return fail(thinned.error());
+    for (std::uint32_t& site : result.siteOfPoint) site = thinned->siteOfPoint[site];
+    prepared.sites = std::move(thinned->points);
+    return prepared;
+}
+
+Result<SegmentLabels> findSegments(const PointCloud& sites, const SegmentationOptions& options,
+                                   const RunContext& context, StageClock& clock, Segmentation& result) {
+    const Tetrahedra& tetrahedra = result.tetrahedra;
+    if (auto go = clock.begin("point_scale"); !go) return fail(go.error());
+    const std::vector<double> scales = pointScales(sites, tetrahedra);
+    if (auto go = clock.begin("interior"); !go) return fail(go.error());
+    const std::vector<std::uint8_t> big = bigBalls(tetrahedra, scales, options.bigBallRatio);
+    result.bigBalls = static_cast<std::uint64_t>(std::count(big.begin(), big.end(), 1));
+    const auto interior = interiorTetrahedra(sites, tetrahedra, big, options, context);
+    if (!interior) return fail(interior.error());
+    if (auto go = clock.begin("flow"); !go) return fail(go.error());
+    const std::vector<std::uint8_t> flow = flowMasks(sites, tetrahedra, *interior);
+    if (auto go = clock.begin("segments"); !go) return fail(go.error());
+    const auto fine = stableManifolds(tetrahedra, *interior, flow, context);
+    if (!fine) return fail(fine.error());
+    result.maxima = fine->peaks.size();
+    if (auto go = clock.begin("merge"); !go) return fail(go.error());
+    return mergeSegments(sites, tetrahedra, *fine, options.mergeRatio);
+}
+
+Result<Segmentation> segmentOrThrow(const PointCloud& points, const SegmentationOptions& options,
+                                    const RunContext& context) {
+    Segmentation result;
+    StageClock clock(context, result.stages);
+    auto prepared = prepare(points, options, context, clock, result);
+    if (!prepared) return fail(prepared.error());
+    if (auto go = clock.begin("delaunay"); !go) return fail(go.error());
+    auto tetrahedra = triangulate(prepared->sites, context);
+    if (!tetrahedra) return fail(tetrahedra.error());
+    result.tetrahedra = std::move(*tetrahedra);
+    clock.end();
+    result.delaunaySeconds = clock.lastSeconds();
+    const auto labels = findSegments(prepared->sites, options, context, clock, result);
+    if (!labels) return fail(labels.error());
+    if (auto go = clock.begin("describe"); !go) return fail(go.error());
+    describeSegments(prepared->sites, *labels, prepared->frame, result);
+    if (result.segments.empty()) {
+        return fail(ErrorCode::kNoInterior,
+                    "no closed interior: the surface is open, too noisy or too thin for its sampling (" +
+                        std::to_string(prepared->sites.size()) + " distinct points, " +
+                        std::to_string(result.bigBalls) +
+                        " big Delaunay balls, all reached from outside); "
+                        "scan the shape from all sides or raise big_ball_ratio");
+    }
+    const std::vector<std::int32_t> siteLabels = labelSites(prepared->sites.size(), result);
+    result.pointSegment.reserve(points.size());
+    for (const std::uint32_t site : result.siteOfPoint) result.pointSegment.push_back(siteLabels[site]);
+    toScanUnits(prepared->frame, std::move(prepared->sites), result);
+    clock.end();
+    result.totalSeconds = clock.totalSeconds();
+    return result;
+}
+
+}  // namespace
+
+Result<Segmentation> segment(const PointCloud& points, const SegmentationOptions& options,
+                             const RunContext& context) {
+    if (auto valid = validate(options); !valid) return fail(valid.error());
+    try {
+        return segmentOrThrow(points, options, context);
+    } catch (const std::bad_alloc&) {
+        return fail(ErrorCode::kOutOfMemory,
+                    "not enough memory to segment " + std::to_string(points.size()) + " points");
+    } catch (const std::exception& e) {
+        return fail(ErrorCode::kInternal, std::string("segmentation: ") + e.what());
+    }
+}
+
+}  // namespace shapedb
