@@ -1,0 +1,121 @@
+// Wavefront OBJ: v and f lines; everything else of the format does not change the surface.
+//
+// Our own reader rather than tinyobjloader, which reads "v 1 abc nan" as (1, 0, 0) without an
+// error, overflows on long indices (atoi), loses the last digits of coordinates, and reports no
+// line for a face that names a missing vertex.
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <string_view>
+
+#include "client/io/formats.h"
+#include "client/io/text.h"
+
+namespace shapedb {
+
+namespace {
+
+class ObjReader {
+  public:
+    ObjReader(InputFile& file, std::size_t maxPoints)
+        : file_(file), sink_(file, content_.vertices, maxPoints), fan_(content_.triangles) {}
+
+    Result<ScanContent> read() {
+        file_.skipByteOrderMark();
+        while (nextLogicalLine()) {
+            std::string_view rest = withoutComment(line_);
+            const std::string_view keyword = nextWord(rest);
+            if (keyword == "v") {
+                if (const auto done = readVertex(rest); !done) return fail(done.error());
+            } else if (keyword == "f" || keyword == "fo") {
+                if (const auto done = readFace(rest); !done) return fail(done.error());
+            }
+        }
+        if (static_cast<std::uint64_t>(greatestIndex_) > content_.vertices.size()) {
+            return fail(missingVertex(greatestIndexLine_, std::to_string(greatestIndex_)));
+        }
+        if (content_.vertices.empty()) {
+            return fail(
+                file_.malformed("no vertex (a line 'v x y z') found; this is not a Wavefront OBJ file"));
+        }
+        content_.format = "OBJ";
+        return std::move(content_);
+    }
+
+  private:
+    // The next line, joined with those that follow a backslash at its end.
+    bool nextLogicalLine() {
+        if (!file_.readLine(line_)) return false;
+        if (line_.empty() || line_.back() != '\\') return true;
+        joined_.clear();
+        while (!line_.empty() && line_.back() == '\\') {
+            joined_.append(line_.substr(0, line_.size() - 1)).push_back(' ');
+            if (!file_.readLine(line_)) line_ = {};
+        }
+        joined_.append(line_);
+        line_ = joined_;
+        return true;
+    }
+
+    Result<void> readVertex(std::string_view rest) {
+        Point3 p;
+        // A weight or a colour may follow.
+        for (double* coordinate : {&p.x, &p.y, &p.z}) {
+            const std::string_view word = nextWord(rest);
+            if (!parseReal(word, *coordinate)) {
+                return fail(file_.malformedLine("expected three numbers after 'v' for vertex " +
+                                                std::to_string(content_.vertices.size()) + ", found " +
+                                                inQuotes(word)));
+            }
+        }
+        if (!sink_.add(p)) return fail(sink_.refusal(p, "line " + std::to_string(file_.lineNumber())));
+        return {};
+    }
+
+    // Corners are "7", "7/1", "7//3" or "7/1/3"; negative ones count back from the last vertex.
+    Result<void> readFace(std::string_view rest) {
+        fan_.begin();
+        for (std::string_view corner = nextWord(rest); !corner.empty(); corner = nextWord(rest)) {
+            std::int64_t index = 0;
+            if (!parseInteger(corner.substr(0, corner.find('/')), index) || index == 0) {
+                return fail(file_.malformedLine("expected vertex numbers from 1 after 'f', found " +
+                                                inQuotes(corner)));
+            }
+            const auto known = static_cast<std::int64_t>(content_.vertices.size());
+            if (index < -known || index > std::numeric_limits<std::uint32_t>::max()) {
+                return fail(missingVertex(file_.lineNumber(), std::to_string(index)));
+            }
+            if (index < 0) index += known + 1;
+            // The vertex may still come, so this is checked at the end.
+            if (index > greatestIndex_) {
+                greatestIndex_ = index;
+                greatestIndexLine_ = file_.lineNumber();
+            }
+            fan_.add(static_cast<std::uint32_t>(index - 1));
+        }
+        return {};
+    }
+
+    Error missingVertex(std::uint64_t line, const std::string& index) const {
+        return file_.malformed("line " + std::to_string(line) + ": a face names vertex " + index +
+                               ", but there are " + std::to_string(content_.vertices.size()) +
+                               " vertices, counted from 1");
+    }
+
+    InputFile& file_;
+    ScanContent content_;
+    VertexSink sink_;
+    PolygonFan fan_;
+    std::string_view line_;
+    std::string joined_;
+    std::int64_t greatestIndex_ = 0;
+    std::uint64_t greatestIndexLine_ = 0;
+};
+
+}  // namespace
+
+Result<ScanContent> readObj(InputFile& file, std::size_t maxPoints) {
+    return ObjReader(file, maxPoints).read();
+}
+
+}  // namespace shapedb

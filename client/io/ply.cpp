@@ -1,0 +1,358 @@
+// PLY: ASCII and both binary byte orders, any elements and properties in any order. Our own
+// reader because Debian has no PLY library that survives hostile headers.
+//
+// Elements are read one after the other as the header lists them. An element without lists has
+// records of one size and is read (vertex) or passed over in one go; everything else goes through
+// a record reader, TextRecord or BinaryRecord, which offer the same calls.
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <string_view>
+
+#include "client/io/formats.h"
+#include "client/io/ply_header.h"
+#include "client/io/scalar.h"
+#include "client/io/text.h"
+
+namespace shapedb {
+
+namespace {
+
+constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
+
+std::string recordName(const PlyElement& element, std::uint64_t index) {
+    return element.name + " " + std::to_string(index) + " of " + std::to_string(element.count);
+}
+
+// One element per line; blank lines do not count.
+class TextRecord {
+  public:
+    explicit TextRecord(InputFile& file) : file_(&file) {}
+
+    bool begin() {
+        do {
+            if (!file_->readLine(rest_)) {
+                ended_ = true;
+                return false;
+            }
+        } while (rest_.find_first_not_of(" \t\v\f") == std::string_view::npos);
+        return true;
+    }
+
+    bool real(ScalarType, double& value) { return parseReal(next(), value); }
+    bool integer(ScalarType, std::int64_t& value) { return parseInteger(next(), value); }
+    bool skip(ScalarType, std::uint64_t count) {
+        for (; count > 0; --count) {
+            if (next().empty()) return false;
+        }
+        return true;
+    }
+    bool end() { return next().empty(); }
+
+    std::string where() const { return "line " + std::to_string(file_->lineNumber()); }
+
+    Error error(const PlyElement& element, std::uint64_t index, const std::string& property) const {
+        if (ended_) {
+            return file_->malformed("the file ends after line " + std::to_string(file_->lineNumber()) +
+                                    ": expected " + recordName(element, index));
+        }
+        return file_->malformedLine("expected " + property + " of " + recordName(element, index) +
+                                    ", found " + inQuotes(word_));
+    }
+
+  private:
+    std::string_view next() { return word_ = nextWord(rest_); }
+
+    InputFile* file_;
+    std::string_view rest_;
+    std::string_view word_;
+    bool ended_ = false;
+};
+
+class BinaryRecord {
+  public:
+    BinaryRecord(InputFile& file, bool swapped) : file_(&file), swapped_(swapped) {}
+
+    bool begin() {
+        start_ = file_->offset();
+        return true;
+    }
+
+    bool real(ScalarType type, double& value) {
+        const std::size_t size = scalarSize(type);
+        if (!file_->fill(size)) return false;
+        value = loadScalar(file_->data(), type, swapped_);
+        file_->consume(size);
+        return true;
+    }
+    bool integer(ScalarType type, std::int64_t& value) {
+        double number = 0.0;
+        if (!real(type, number)) return false;
+        value = static_cast<std::int64_t>(number);
+        return true;
+    }
+    bool skip(ScalarType type, std::uint64_t count) { return file_->skip(count * scalarSize(type)); }
+    bool end() { return true; }
+
+    std::string where() const { return "byte " + std::to_string(start_); }
+
+    Error error(const PlyElement& element, std::uint64_t index, const std::string& property) const {
+        return file_->malformedByte(
+            start_, "the file ends inside " + recordName(element, index) + ": expected " + property);
+    }
+
+  private:
+    InputFile* file_;
+    bool swapped_;
+    std::uint64_t start_ = 0;
+};
+
+Error negativeLength(const InputFile& file, const std::string& where, const PlyElement& element,
+                     std::uint64_t index) {
+    return file.malformed(where + ": " + recordName(element, index) + " has a list of negative length");
+}
+
+// Passes over one property of the current record.
+template <typename Record>
+Result<void> skipProperty(const InputFile& file, Record& record, const PlyElement& element,
+                          std::uint64_t index, const PlyProperty& property) {
+    std::int64_t length = 1;
+    if (property.isList && !record.integer(property.countType, length)) {
+        return fail(record.error(element, index, "the length of list " + property.name));
+    }
+    if (length < 0) return fail(negativeLength(file, record.where(), element, index));
+    if (!record.skip(property.type, static_cast<std::uint64_t>(length))) {
+        return fail(record.error(element, index, property.name));
+    }
+    return {};
+}
+
+template <typename Record>
+Result<void> endRecord(Record& record, const PlyElement& element, std::uint64_t index) {
+    if (!record.end()) return fail(record.error(element, index, "the line end after the last value"));
+    return {};
+}
+
+// Which properties are x, y and z.
+Result<std::array<std::size_t, 3>> findCoordinates(const InputFile& file, const PlyElement& vertex) {
+    std::array<std::size_t, 3> at = {kNone, kNone, kNone};
+    for (std::size_t i = 0; i < vertex.properties.size(); ++i) {
+        const PlyProperty& property = vertex.properties[i];
+        if (property.name.size() != 1 || property.name[0] < 'x' || property.name[0] > 'z') continue;
+        std::size_t& place = at[static_cast<std::size_t>(property.name[0] - 'x')];
+        if (place != kNone || property.isList) {
+            return fail(file.malformed("header: element vertex needs one number '" + property.name +
+                                       "', not a list or two of them"));
+        }
+        place = i;
+    }
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        if (at[axis] == kNone) {
+            return fail(
+                file.malformed(std::string("header: element vertex has no property '") + "xyz"[axis] + "'"));
+        }
+    }
+    return at;
+}
+
+// Reads the elements of one file in order.
+class PlyBody {
+  public:
+    PlyBody(InputFile& file, const PlyHeader& header, ScanContent& content, std::size_t maxPoints)
+        : file_(file), header_(header), content_(content), sink_(file, content.vertices, maxPoints) {}
+
+    Result<void> read() {
+        if (const auto checked = findVertexElement(); !checked) return checked;
+        for (const PlyElement& element : header_.elements) {
+            // Such an element has no body, whatever its count says.
+            if (element.properties.empty()) continue;
+            if (const auto done = readElement(element); !done) return done;
+        }
+        if (!file_.onlyPaddingLeft()) {
+            return fail(file_.malformedByte(file_.offset(),
+                                            "data after the last element; the header announces too little"));
+        }
+        return {};
+    }
+
+  private:
+    bool isText() const { return header_.encoding == PlyEncoding::kAscii; }
+
+    Result<void> findVertexElement() {
+        const PlyElement* vertex = nullptr;
+        for (const PlyElement& element : header_.elements) {
+            if (element.name != "vertex") continue;
+            if (vertex != nullptr) return fail(file_.malformed("header: element vertex appears twice"));
+            vertex = &element;
+        }
+        if (vertex == nullptr) return fail(file_.malformed("header: there is no element vertex"));
+        const auto coordinates = findCoordinates(file_, *vertex);
+        if (!coordinates) return fail(coordinates.error());
+        coordinates_ = *coordinates;
+        vertexCount_ = vertex->count;
+        return {};
+    }
+
+    Result<void> readElement(const PlyElement& element) {
+        if (isText()) return readElementWith(TextRecord(file_), element);
+        const bool swapped = (header_.encoding == PlyEncoding::kLittleEndian) != machineIsLittleEndian();
+        const auto size = element.fixedSize();
+        if (!size) return readElementWith(BinaryRecord(file_, swapped), element);
+        const auto left = file_.remaining();
+        if (left && element.count > *left / *size) {
+            return fail(file_.malformedByte(
+                file_.offset(), "the header announces " + std::to_string(element.count) + " " + element.name +
+                                    " records of " + std::to_string(*size) +
+                                    " bytes, but the file has room for " + std::to_string(*left / *size)));
+        }
+        if (element.name == "vertex") return readFixedVertices(element, *size, swapped);
+        const std::uint64_t start = file_.offset();
+        if (element.count > std::numeric_limits<std::uint64_t>::max() / *size ||
+            !file_.skip(element.count * *size)) {
+            return fail(file_.malformedByte(start, "the file ends inside element " + element.name));
+        }
+        return {};
+    }
+
+    Result<void> readFixedVertices(const PlyElement& element, std::uint64_t size, bool swapped) {
+        std::array<std::size_t, 3> offset = {};
+        std::array<ScalarType, 3> type = {};
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            for (std::size_t i = 0; i < coordinates_[axis]; ++i) {
+                offset[axis] += scalarSize(element.properties[i].type);
+            }
+            type[axis] = element.properties[coordinates_[axis]].type;
+        }
+        const std::uint64_t start = file_.offset();
+        if (file_.remaining()) sink_.reserve(element.count);
+        Point3 p;
+        const std::uint64_t done = visitRecords(file_, element.count, size, [&](const char* record, auto) {
+            p = {loadScalar(record + offset[0], type[0], swapped),
+                 loadScalar(record + offset[1], type[1], swapped),
+                 loadScalar(record + offset[2], type[2], swapped)};
+            return sink_.add(p);
+        });
+        if (done == element.count) return {};
+        const std::uint64_t place = start + done * size;
+        if (!file_.fill(size)) {
+            return fail(file_.malformedByte(place, "the file ends inside " + recordName(element, done)));
+        }
+        return fail(sink_.refusal(p, "byte " + std::to_string(place)));
+    }
+
+    template <typename Record>
+    Result<void> readElementWith(Record record, const PlyElement& element) {
+        if (element.name == "vertex") return readVertices(record, element);
+        const bool strips = element.name == "tristrips";
+        std::size_t indices = kNone;
+        for (std::size_t i = 0; i < element.properties.size(); ++i) {
+            const PlyProperty& property = element.properties[i];
+            const bool named = property.name == "vertex_indices" || property.name == "vertex_index";
+            if ((strips || element.name == "face") && property.isList && named) indices = i;
+        }
+        if (indices != kNone && isFloating(element.properties[indices].type)) {
+            return fail(file_.malformed("header: the indices of element " + element.name +
+                                        " must be integers, not float or double"));
+        }
+        for (std::uint64_t i = 0; i < element.count; ++i) {
+            if (!record.begin()) return fail(record.error(element, i, ""));
+            for (std::size_t j = 0; j < element.properties.size(); ++j) {
+                const auto done =
+                    j != indices ? skipProperty(file_, record, element, i, element.properties[j])
+                    : strips     ? readIndices<TriangleStrip>(record, element, i, element.properties[j])
+                                 : readIndices<PolygonFan>(record, element, i, element.properties[j]);
+                if (!done) return done;
+            }
+            if (const auto done = endRecord(record, element, i); !done) return done;
+        }
+        return {};
+    }
+
+    template <typename Record>
+    Result<void> readVertices(Record& record, const PlyElement& element) {
+        if (const auto left = file_.remaining()) {
+            sink_.reserve(std::min(element.count, *left / element.leastSize(header_.encoding)));
+        }
+        for (std::uint64_t i = 0; i < element.count; ++i) {
+            if (!record.begin()) return fail(record.error(element, i, ""));
+            Point3 p;
+            for (std::size_t j = 0; j < element.properties.size(); ++j) {
+                const PlyProperty& property = element.properties[j];
+                double* axis = j == coordinates_[0]   ? &p.x
+                               : j == coordinates_[1] ? &p.y
+                               : j == coordinates_[2] ? &p.z
+                                                      : nullptr;
+                if (axis != nullptr) {
+                    if (!record.real(property.type, *axis)) {
+                        return fail(record.error(element, i, "the number " + property.name));
+                    }
+                } else if (const auto done = skipProperty(file_, record, element, i, property); !done) {
+                    return done;
+                }
+            }
+            if (const auto done = endRecord(record, element, i); !done) return done;
+            if (!sink_.add(p)) return fail(sink_.refusal(p, record.where()));
+        }
+        return {};
+    }
+
+    // Triangles are made while the indices arrive, so a list's announced length costs nothing.
+    template <typename Builder, typename Record>
+    Result<void> readIndices(Record& record, const PlyElement& element, std::uint64_t index,
+                             const PlyProperty& property) {
+        std::int64_t length = 0;
+        if (!record.integer(property.countType, length)) {
+            return fail(record.error(element, index, "the length of list " + property.name));
+        }
+        if (length < 0) return fail(negativeLength(file_, record.where(), element, index));
+        Builder builder(content_.triangles);
+        builder.begin();
+        for (std::int64_t i = 0; i < length; ++i) {
+            std::int64_t vertex = 0;
+            if (!record.integer(property.type, vertex)) {
+                return fail(
+                    record.error(element, index, "entry " + std::to_string(i) + " of " + property.name));
+            }
+            // -1 ends a strip and starts the next one in the same list.
+            if (vertex == -1 && std::is_same_v<Builder, TriangleStrip>) {
+                builder.begin();
+                continue;
+            }
+            if (vertex < 0 || static_cast<std::uint64_t>(vertex) >= vertexCount_ ||
+                vertex > std::numeric_limits<std::uint32_t>::max()) {
+                return fail(file_.malformed(record.where() + ": " + recordName(element, index) +
+                                            " names vertex " + std::to_string(vertex) +
+                                            ", but the file has " + std::to_string(vertexCount_) +
+                                            " vertices, counted from 0"));
+            }
+            builder.add(static_cast<std::uint32_t>(vertex));
+        }
+        return {};
+    }
+
+    InputFile& file_;
+    const PlyHeader& header_;
+    ScanContent& content_;
+    VertexSink sink_;
+    std::array<std::size_t, 3> coordinates_ = {kNone, kNone, kNone};
+    std::uint64_t vertexCount_ = 0;
+};
+
+}  // namespace
+
+Result<ScanContent> readPly(InputFile& file, std::size_t maxPoints) {
+    const auto header = readPlyHeader(file);
+    if (!header) return fail(header.error());
+    ScanContent content;
+    switch (header->encoding) {
+        case PlyEncoding::kAscii: content.format = "PLY ASCII"; break;
+        case PlyEncoding::kLittleEndian: content.format = "PLY binary little-endian"; break;
+        case PlyEncoding::kBigEndian: content.format = "PLY binary big-endian"; break;
+    }
+    PlyBody body(file, *header, content, maxPoints);
+    if (const auto done = body.read(); !done) return fail(done.error());
+    return content;
+}
+
+}  // namespace shapedb

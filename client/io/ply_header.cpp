@@ -1,0 +1,149 @@
+#include "client/io/ply_header.h"
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+#include <utility>
+
+#include "client/io/text.h"
+
+namespace shapedb {
+
+namespace {
+
+std::optional<ScalarType> scalarTypeFromName(std::string_view name) {
+    using Entry = std::pair<std::string_view, ScalarType>;
+    static constexpr std::array<Entry, 16> kNames = {{{"char", ScalarType::kInt8},
+                                                      {"int8", ScalarType::kInt8},
+                                                      {"uchar", ScalarType::kUint8},
+                                                      {"uint8", ScalarType::kUint8},
+                                                      {"short", ScalarType::kInt16},
+                                                      {"int16", ScalarType::kInt16},
+                                                      {"ushort", ScalarType::kUint16},
+                                                      {"uint16", ScalarType::kUint16},
+                                                      {"int", ScalarType::kInt32},
+                                                      {"int32", ScalarType::kInt32},
+                                                      {"uint", ScalarType::kUint32},
+                                                      {"uint32", ScalarType::kUint32},
+                                                      {"float", ScalarType::kFloat32},
+                                                      {"float32", ScalarType::kFloat32},
+                                                      {"double", ScalarType::kFloat64},
+                                                      {"float64", ScalarType::kFloat64}}};
+    const auto* entry =
+        std::find_if(kNames.begin(), kNames.end(), [&](const Entry& e) { return e.first == name; });
+    if (entry == kNames.end()) return std::nullopt;
+    return entry->second;
+}
+
+Error unknownType(const InputFile& file, std::string_view word) {
+    return file.malformedLine(
+        "expected a type (char uchar short ushort int uint float double, or int8 to float64), found " +
+        inQuotes(word));
+}
+
+// The rest of "format ascii 1.0".
+Result<PlyEncoding> parseFormat(const InputFile& file, std::string_view rest) {
+    const std::string_view word = nextWord(rest);
+    if (word == "ascii") return PlyEncoding::kAscii;
+    if (word == "binary_little_endian") return PlyEncoding::kLittleEndian;
+    if (word == "binary_big_endian") return PlyEncoding::kBigEndian;
+    return fail(file.malformedLine(
+        "expected format ascii, binary_little_endian or binary_big_endian, found " + inQuotes(word)));
+}
+
+// The rest of "element vertex 8".
+Result<PlyElement> parseElement(const InputFile& file, std::string_view rest) {
+    PlyElement element;
+    element.name = nextWord(rest);
+    const std::string_view count = nextWord(rest);
+    if (element.name.empty() || !parseCount(count, element.count)) {
+        return fail(file.malformedLine("expected 'element NAME COUNT', found count " + inQuotes(count)));
+    }
+    return element;
+}
+
+// The rest of "property float x" or "property list uchar int vertex_indices".
+Result<PlyProperty> parseProperty(const InputFile& file, std::string_view rest) {
+    PlyProperty property;
+    std::string_view word = nextWord(rest);
+    if (word == "list") {
+        property.isList = true;
+        word = nextWord(rest);
+        const auto countType = scalarTypeFromName(word);
+        if (!countType) return fail(unknownType(file, word));
+        if (isFloating(*countType)) {
+            return fail(file.malformedLine("expected an integer type for the length of a list, found " +
+                                           inQuotes(word)));
+        }
+        property.countType = *countType;
+        word = nextWord(rest);
+    }
+    const auto type = scalarTypeFromName(word);
+    if (!type) return fail(unknownType(file, word));
+    property.type = *type;
+    property.name = nextWord(rest);
+    if (property.name.empty()) return fail(file.malformedLine("expected a property name, found nothing"));
+    return property;
+}
+
+}  // namespace
+
+std::optional<std::uint64_t> PlyElement::fixedSize() const {
+    std::uint64_t size = 0;
+    for (const PlyProperty& property : properties) {
+        if (property.isList) return std::nullopt;
+        size += scalarSize(property.type);
+    }
+    return size;
+}
+
+std::uint64_t PlyElement::leastSize(PlyEncoding encoding) const {
+    // A number of text takes a digit and the blank or line end after it.
+    if (encoding == PlyEncoding::kAscii) return 2 * properties.size();
+    std::uint64_t size = 0;
+    for (const PlyProperty& property : properties) {
+        size += scalarSize(property.isList ? property.countType : property.type);
+    }
+    return size;
+}
+
+Result<PlyHeader> readPlyHeader(InputFile& file) {
+    // Checked before reading a line: a file of another kind may have no line ends.
+    if (!file.fill(4) || std::string_view(file.data(), 3) != "ply" ||
+        (file.data()[3] != '\n' && !isBlank(file.data()[3]))) {
+        return fail(file.malformed("line 1: expected 'ply'; this is not a PLY file"));
+    }
+    PlyHeader header;
+    bool hasFormat = false;
+    std::string_view line;
+    file.readLine(line);
+    while (file.readLine(line)) {
+        const std::string_view keyword = nextWord(line);
+        if (keyword == "end_header") {
+            if (!hasFormat) return fail(file.malformedLine("the header has no 'format' line"));
+            return header;
+        }
+        if (keyword == "format") {
+            const auto encoding = parseFormat(file, line);
+            if (!encoding) return fail(encoding.error());
+            header.encoding = *encoding;
+            hasFormat = true;
+        } else if (keyword == "element") {
+            auto element = parseElement(file, line);
+            if (!element) return fail(element.error());
+            header.elements.push_back(std::move(*element));
+        } else if (keyword == "property") {
+            if (header.elements.empty()) return fail(file.malformedLine("'property' before any 'element'"));
+            auto property = parseProperty(file, line);
+            if (!property) return fail(property.error());
+            header.elements.back().properties.push_back(std::move(*property));
+        } else if (!keyword.empty() && keyword != "comment" && keyword != "obj_info") {
+            return fail(file.malformedLine(
+                "expected format, element, property, comment, obj_info or end_header, found " +
+                inQuotes(keyword)));
+        }
+    }
+    return fail(file.malformedLine("the file ends before 'end_header'"));
+}
+
+}  // namespace shapedb

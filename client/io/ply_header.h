@@ -1,0 +1,44 @@
+// The header of a PLY file: which elements follow, made of which properties, in which encoding.
+// Private to client/io.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/io/input_file.h"
+#include "client/io/scalar.h"
+#include "core/base/error.h"
+
+namespace shapedb {
+
+enum class PlyEncoding { kAscii, kLittleEndian, kBigEndian };
+
+struct PlyProperty {
+    std::string name;
+    ScalarType type = ScalarType::kFloat32;  ///< of the value, or of each entry of the list
+    bool isList = false;
+    ScalarType countType = ScalarType::kUint8;  ///< of the number before a list
+};
+
+struct PlyElement {
+    std::string name;
+    std::uint64_t count = 0;  ///< as announced, not yet believed
+    std::vector<PlyProperty> properties;
+
+    /// Bytes of one binary record; nothing if there is a list among the properties.
+    std::optional<std::uint64_t> fixedSize() const;
+    /// Fewest bytes one record can take.
+    std::uint64_t leastSize(PlyEncoding encoding) const;
+};
+
+struct PlyHeader {
+    PlyEncoding encoding = PlyEncoding::kAscii;
+    std::vector<PlyElement> elements;
+};
+
+/// Leaves the file at the first byte after the header. Errors: kMalformedFile with the line.
+Result<PlyHeader> readPlyHeader(InputFile& file);
+
+}  // namespace shapedb

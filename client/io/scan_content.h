@@ -1,0 +1,100 @@
+// What every format reader produces, and the checks they share. Private to client/io.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "client/io/input_file.h"
+#include "core/base/error.h"
+#include "core/geometry/point.h"
+
+namespace shapedb {
+
+using Triangle = std::array<std::uint32_t, 3>;
+
+/// The file's content before anybody decides between vertices and surface samples.
+struct ScanContent {
+    PointCloud vertices;
+    std::vector<Triangle> triangles;  ///< indices are below vertices.size()
+    std::size_t skippedNonFinite = 0;
+    std::string format;
+};
+
+inline bool isFinite(const Point3& p) {
+    return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
+}
+
+/// Collects vertices under the rules that hold for all of them.
+class VertexSink {
+  public:
+    VertexSink(const InputFile& file, PointCloud& vertices, std::size_t maxPoints)
+        : file_(&file), vertices_(&vertices), maxPoints_(maxPoints) {}
+
+    /// False if the vertex is not finite or one too many; `refusal` then says it in words.
+    bool add(const Point3& p) {
+        if (!isFinite(p) || vertices_->size() >= maxPoints_) return false;
+        vertices_->push_back(p);
+        return true;
+    }
+
+    /// `where`: "line 7" or "byte 132".
+    Error refusal(const Point3& p, const std::string& where) const;
+
+    /// Makes room for vertices the file has been shown to have room for.
+    void reserve(std::uint64_t count);
+
+  private:
+    const InputFile* file_;
+    PointCloud* vertices_;
+    std::size_t maxPoints_;
+};
+
+/// Cuts a polygon into triangles as its corners arrive: (first, previous, current).
+class PolygonFan {
+  public:
+    explicit PolygonFan(std::vector<Triangle>& triangles) : triangles_(&triangles) {}
+    void begin() { corners_ = 0; }
+    void add(std::uint32_t vertex);
+
+  private:
+    std::vector<Triangle>* triangles_;
+    std::uint64_t corners_ = 0;
+    std::uint32_t first_ = 0;
+    std::uint32_t previous_ = 0;
+};
+
+/// Cuts a triangle strip as its corners arrive; `begin` also restarts it.
+class TriangleStrip {
+  public:
+    explicit TriangleStrip(std::vector<Triangle>& triangles) : triangles_(&triangles) {}
+    void begin() { corners_ = 0; }
+    void add(std::uint32_t vertex);
+
+  private:
+    std::vector<Triangle>* triangles_;
+    std::uint64_t corners_ = 0;
+    std::array<std::uint32_t, 2> last_ = {};
+};
+
+/// Calls visit(record, index) for `count` records of `size` bytes each, straight from the buffer;
+/// stops early when it returns false or the file ends. Returns the records visited with success.
+template <typename Visit>
+std::uint64_t visitRecords(InputFile& file, std::uint64_t count, std::uint64_t size, const Visit& visit) {
+    std::uint64_t done = 0;
+    while (done < count && file.fill(size)) {
+        const char* record = file.data();
+        const std::uint64_t whole = std::min<std::uint64_t>(count - done, file.available() / size);
+        for (std::uint64_t i = 0; i < whole; ++i, ++done, record += size) {
+            if (!visit(record, done)) return done;
+        }
+        file.consume(static_cast<std::size_t>(whole * size));
+    }
+    return done;
+}
+
+}  // namespace shapedb

@@ -1,0 +1,253 @@
+#include "client/io/scan_reader.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <new>
+#include <system_error>
+#include <utility>
+
+#include "client/io/formats.h"
+#include "client/io/input_file.h"
+#include "client/io/scan_content.h"
+#include "client/io/text.h"
+#include "core/geometry/mesh.h"
+
+namespace shapedb {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+using ReadFormat = Result<ScanContent> (*)(InputFile&, std::size_t);
+
+struct Format {
+    const char* ending;
+    ReadFormat read;
+};
+
+constexpr std::array<Format, 9> kFormats = {{{".ply", readPly},
+                                             {".pcd", readPcd},
+                                             {".off", readOff},
+                                             {".obj", readObj},
+                                             {".stl", readStl},
+                                             {".xyz", readXyz},
+                                             {".txt", readXyz},
+                                             {".pts", readXyz},
+                                             {".asc", readXyz}}};
+
+// Share of the area that must be in small triangles, and how small: see readScan.
+constexpr double kDenseAreaShare = 0.99;
+constexpr double kDenseEdge = 3.0;
+
+std::string endingOf(const fs::path& path) { return lowerCase(path.extension().string()); }
+
+const Format* formatOf(const std::string& path) {
+    const std::string ending = endingOf(path);
+    const auto* format = std::find_if(kFormats.begin(), kFormats.end(),
+                                      [&](const Format& candidate) { return ending == candidate.ending; });
+    return format == kFormats.end() ? nullptr : format;
+}
+
+std::string endingList() {
+    std::string list;
+    for (const Format& format : kFormats) list += (list.empty() ? "" : " ") + std::string(format.ending);
+    return list;
+}
+
+Error unknownFormat(const std::string& path) {
+    const std::string ending = endingOf(path);
+    return {ErrorCode::kUnknownFileFormat,
+            path + ": " + (ending.empty() ? "no file ending" : "unknown file ending " + inQuotes(ending)) +
+                "; scan files end in " + endingList()};
+}
+
+bool mostVerticesAreLoose(const ScanContent& content) {
+    std::vector<bool> used(content.vertices.size());
+    std::size_t count = 0;
+    for (const Triangle& triangle : content.triangles) {
+        for (const std::uint32_t v : triangle) {
+            if (!used[v]) ++count;
+            used[v] = true;
+        }
+    }
+    return count < content.vertices.size() - count;
+}
+
+bool verticesServeBetter(const ScanContent& content, std::size_t samples) {
+    if (mostVerticesAreLoose(content)) return true;
+    struct Size {
+        double area;
+        double squaredEdge;
+    };
+    const auto measure = [&](const Triangle& t) {
+        const Point3& a = content.vertices[t[0]];
+        const Point3& b = content.vertices[t[1]];
+        const Point3& c = content.vertices[t[2]];
+        return Size{0.5 * length(cross(b - a, c - a)),
+                    std::max({squaredDistance(a, b), squaredDistance(b, c), squaredDistance(c, a)})};
+    };
+    double area = 0.0;
+    for (const Triangle& t : content.triangles) area += measure(t).area;
+    // Coordinates too large or too small to have an area are for the segmentation to refuse.
+    if (!(area > 0.0) || !std::isfinite(area)) return true;
+    if (content.vertices.size() < samples) return false;
+    const double greatest = kDenseEdge * kDenseEdge * area / static_cast<double>(samples);
+    double denseArea = 0.0;
+    for (const Triangle& t : content.triangles) {
+        const Size size = measure(t);
+        if (size.squaredEdge <= greatest) denseArea += size.area;
+    }
+    return denseArea >= kDenseAreaShare * area;
+}
+
+bool wantsSamples(const ScanContent& content, const ReadOptions& options) {
+    if (options.meshHandling == MeshHandling::kSurface) return true;
+    if (options.meshHandling == MeshHandling::kVertices || content.triangles.empty()) return false;
+    return !verticesServeBetter(content, options.meshSamples);
+}
+
+Result<PointCloud> samplePoints(const std::string& path, ScanContent&& content, const ReadOptions& options) {
+    if (content.triangles.empty()) {
+        return fail(
+            ErrorCode::kInvalidArgument,
+            path + ": surface samples were asked for, but the file has no triangles; read its vertices");
+    }
+    if (options.meshSamples > options.maxPoints) {
+        return fail(ErrorCode::kPointLimitExceeded, path + ": " + std::to_string(options.meshSamples) +
+                                                        " surface samples were asked for, the limit is " +
+                                                        std::to_string(options.maxPoints) + " points");
+    }
+    const TriangleMesh mesh = {std::move(content.vertices), std::move(content.triangles)};
+    auto points = sampleSurface(mesh, options.meshSamples, options.seed);
+    if (!points) return fail(points.error().code, path + ": " + points.error().message);
+    return points;
+}
+
+Result<Scan> readScanUnguarded(const std::string& path, const ReadOptions& options,
+                               const RunContext& context) {
+    if (options.meshSamples == 0) {
+        return fail(ErrorCode::kInvalidArgument, "the number of surface samples must be at least 1");
+    }
+    auto file = InputFile::open(path, context);
+    if (!file) return fail(file.error());
+    const Format* format = formatOf(path);
+    if (format == nullptr) return fail(unknownFormat(path));
+    auto content = format->read(*file, options.maxPoints);
+    // What the parser made of an end that came too early is not the reason.
+    if (file->failure()) return fail(*file->failure());
+    if (!content) return fail(content.error());
+
+    Scan scan;
+    scan.skippedNonFinite = content->skippedNonFinite;
+    scan.format = content->format;
+    scan.verticesInFile = content->vertices.size() + content->skippedNonFinite;
+    scan.trianglesInFile = content->triangles.size();
+    scan.sampledFromMesh = wantsSamples(*content, options);
+    if (!scan.sampledFromMesh) {
+        scan.points = std::move(content->vertices);
+        return scan;
+    }
+    auto points = samplePoints(path, std::move(*content), options);
+    if (!points) return fail(points.error());
+    scan.points = std::move(*points);
+    return scan;
+}
+
+Error notSearchable(const std::string& path, const std::string& why) {
+    return {ErrorCode::kFileNotReadable, path + ": " + why};
+}
+
+// Text files of any content lie beside scans.
+bool isScanFile(const std::string& path) {
+    if (formatOf(path) == nullptr) return false;
+    if (endingOf(path) != ".txt") return true;
+    const RunContext context;
+    auto file = InputFile::open(path, context);
+    return file && looksLikeXyz(*file);
+}
+
+Result<void> searchFolder(const std::string& folder, std::vector<std::string>& found) {
+    std::error_code error;
+    const std::size_t before = found.size();
+    auto entry = fs::recursive_directory_iterator(folder, error);
+    for (; !error && entry != fs::recursive_directory_iterator(); entry.increment(error)) {
+        const fs::path& path = entry->path();
+        if (path.filename().string()[0] == '.') {
+            entry.disable_recursion_pending();
+            continue;
+        }
+        std::error_code statusError;  // a link to nothing is not a scan
+        if (entry->is_regular_file(statusError) && isScanFile(path.string())) found.push_back(path.string());
+    }
+    if (error) return fail(notSearchable(folder, "cannot be searched: " + error.message()));
+    if (found.size() == before) {
+        return fail(notSearchable(folder, "no scan file in this folder; scan files end in " + endingList()));
+    }
+    return {};
+}
+
+Result<std::vector<ScanFile>> listScanFilesUnguarded(const std::vector<std::string>& paths) {
+    std::vector<std::string> found;
+    for (const std::string& path : paths) {
+        std::error_code error;
+        const fs::file_status status = fs::status(path, error);
+        if (!fs::exists(status)) {
+            return fail(notSearchable(
+                path,
+                "cannot be read: " + (error ? error.message() : std::string("no such file or folder"))));
+        }
+        if (fs::is_directory(status)) {
+            if (const auto done = searchFolder(path, found); !done) return fail(done.error());
+        } else if (formatOf(path) == nullptr) {
+            return fail(unknownFormat(path));
+        } else {
+            found.push_back(path);
+        }
+    }
+    // "./a.ply" and "a.ply" are one file.
+    for (std::string& path : found) path = fs::path(path).lexically_normal().string();
+    std::sort(found.begin(), found.end());
+    found.erase(std::unique(found.begin(), found.end()), found.end());
+    std::vector<ScanFile> files;
+    files.reserve(found.size());
+    for (std::string& path : found) {
+        std::string label = fs::absolute(path).lexically_normal().parent_path().filename().string();
+        files.push_back({std::move(path), std::move(label)});
+    }
+    return files;
+}
+
+}  // namespace
+
+Result<Scan> readScan(const std::string& path, const ReadOptions& options, const RunContext& context) {
+    try {
+        return readScanUnguarded(path, options, context);
+    } catch (const std::bad_alloc&) {
+        return fail(ErrorCode::kOutOfMemory, path + ": not enough memory to read the file");
+    } catch (const std::exception& e) {
+        return fail(ErrorCode::kInternal, path + ": reading failed: " + e.what());
+    }
+}
+
+const std::vector<std::string>& scanFileEndings() {
+    static const std::vector<std::string> endings = [] {
+        std::vector<std::string> all;
+        for (const Format& format : kFormats) all.emplace_back(format.ending);
+        return all;
+    }();
+    return endings;
+}
+
+Result<std::vector<ScanFile>> listScanFiles(const std::vector<std::string>& paths) {
+    try {
+        return listScanFilesUnguarded(paths);
+    } catch (const std::bad_alloc&) {
+        return fail(ErrorCode::kOutOfMemory, "not enough memory to list the scan files");
+    } catch (const std::exception& e) {
+        return fail(ErrorCode::kFileNotReadable, std::string("the scan files cannot be listed: ") + e.what());
+    }
+}
+
+}  // namespace shapedb

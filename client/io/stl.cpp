@@ -1,0 +1,188 @@
+// STL, binary and ASCII. Corners at the very same position become one vertex.
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+
+#include "client/io/formats.h"
+#include "client/io/scalar.h"
+#include "client/io/text.h"
+
+namespace shapedb {
+
+namespace {
+
+constexpr std::uint64_t kHeaderBytes = 80;
+constexpr std::uint64_t kTriangleBytes = 50;  // normal, three corners, two attribute bytes
+constexpr std::uint64_t kNormalBytes = 12;
+
+struct PositionHash {
+    std::size_t operator()(const Point3& p) const {
+        // Adding zero makes -0 and 0, which are equal, hash alike.
+        std::uint64_t hash = 0;
+        for (const double coordinate : {p.x + 0.0, p.y + 0.0, p.z + 0.0}) {
+            std::uint64_t bits = 0;
+            std::memcpy(&bits, &coordinate, sizeof bits);
+            hash = (hash ^ bits) * 0x9e3779b97f4a7c15ULL;
+            hash ^= hash >> 32;
+        }
+        return static_cast<std::size_t>(hash);
+    }
+};
+
+class StlReader {
+  public:
+    StlReader(InputFile& file, std::size_t maxPoints)
+        : file_(file), sink_(file, content_.vertices, maxPoints), fan_(content_.triangles) {}
+
+    Result<ScanContent> read() {
+        const bool ascii = looksAscii();
+        const auto done = ascii ? readAscii() : readBinary();
+        if (!done) return fail(done.error());
+        content_.format = ascii ? "STL ASCII" : "STL binary";
+        return std::move(content_);
+    }
+
+  private:
+    // Many binary files start with "solid" as well, so the word alone proves nothing: the size a
+    // binary file must have, or a zero byte, which no text has, decides.
+    bool looksAscii() {
+        file_.fill(1024);
+        std::string_view head(file_.data(), std::min<std::size_t>(file_.available(), 1024));
+        if (head.substr(0, 3) == "\xEF\xBB\xBF") head.remove_prefix(3);
+        const std::size_t first = head.find_first_not_of(" \t\r\n");
+        if (first == std::string_view::npos || !equalsIgnoringCase(head.substr(first, 5), "solid"))
+            return false;
+        const auto size = file_.remaining();
+        if (size && file_.available() >= kHeaderBytes + 4 &&
+            (*size - kHeaderBytes - 4) == kTriangleBytes * announcedTriangles()) {
+            return false;
+        }
+        return head.find('\0') == std::string_view::npos;
+    }
+
+    // The file must have the header in its buffer.
+    std::uint64_t announcedTriangles() const {
+        return loadAs<std::uint32_t>(file_.data() + kHeaderBytes, !machineIsLittleEndian());
+    }
+
+    Result<void> readBinary() {
+        if (!file_.fill(kHeaderBytes + 4)) {
+            return fail(file_.malformed(
+                "expected 'solid' (ASCII STL) or the 84 bytes a binary STL starts with, found " +
+                std::to_string(file_.available()) + " bytes"));
+        }
+        const std::uint64_t count = announcedTriangles();
+        file_.consume(static_cast<std::size_t>(kHeaderBytes + 4));
+        const auto left = file_.remaining();
+        if (left && count > *left / kTriangleBytes) {
+            return fail(file_.malformedByte(kHeaderBytes, "the header announces " + std::to_string(count) +
+                                                              " triangles, but the file has room for " +
+                                                              std::to_string(*left / kTriangleBytes)));
+        }
+        const std::uint64_t start = file_.offset();
+        Point3 p;
+        const std::uint64_t done = visitRecords(file_, count, kTriangleBytes, [&](const char* record, auto) {
+            fan_.begin();
+            for (std::size_t corner = 0; corner < 3; ++corner) {
+                const char* at = record + kNormalBytes + 12 * corner;
+                const bool swapped = !machineIsLittleEndian();
+                p = {loadAs<float>(at, swapped), loadAs<float>(at + 4, swapped),
+                     loadAs<float>(at + 8, swapped)};
+                if (!addCorner(p)) return false;
+            }
+            return true;
+        });
+        if (done < count) {
+            const std::uint64_t place = start + done * kTriangleBytes;
+            if (!file_.fill(kTriangleBytes)) {
+                return fail(file_.malformedByte(place, "the file ends inside triangle " +
+                                                           std::to_string(done) + " of " +
+                                                           std::to_string(count)));
+            }
+            return fail(
+                sink_.refusal(p, "byte " + std::to_string(place) + ", triangle " + std::to_string(done)));
+        }
+        if (!file_.onlyPaddingLeft()) {
+            return fail(file_.malformedByte(file_.offset(), "data after the last of the announced " +
+                                                                std::to_string(count) + " triangles"));
+        }
+        return {};
+    }
+
+    // solid (facet, outer loop, vertex x 3, endloop, endfacet)* endsolid, one or more times.
+    Result<void> readAscii() {
+        file_.skipByteOrderMark();
+        std::string expected = "solid";
+        int corners = 0;
+        std::string_view rest;
+        while (file_.readLine(rest)) {
+            const std::string_view keyword = nextWord(rest);
+            if (keyword.empty()) continue;
+            const bool ends = expected == "facet" && equalsIgnoringCase(keyword, "endsolid");
+            if (!ends && !equalsIgnoringCase(keyword, expected)) {
+                return fail(file_.malformedLine("expected '" + expected + "', found " + inQuotes(keyword)));
+            }
+            if (ends) {
+                expected = "solid";
+            } else if (expected == "solid" || expected == "endfacet") {
+                expected = "facet";
+            } else if (expected == "facet") {
+                expected = "outer";
+            } else if (expected == "outer") {
+                expected = "vertex";
+                corners = 0;
+                fan_.begin();
+            } else if (expected == "vertex") {
+                if (const auto done = readCorner(rest); !done) return done;
+                if (++corners == 3) expected = "endloop";
+            } else {
+                expected = "endfacet";
+            }
+        }
+        if (expected == "solid") return {};
+        return fail(file_.malformed("the file ends after line " + std::to_string(file_.lineNumber()) +
+                                    ": expected '" + (expected == "facet" ? "endsolid" : expected) + "'"));
+    }
+
+    Result<void> readCorner(std::string_view rest) {
+        Point3 p;
+        for (double* coordinate : {&p.x, &p.y, &p.z}) {
+            const std::string_view word = nextWord(rest);
+            if (!parseReal(word, *coordinate)) {
+                return fail(
+                    file_.malformedLine("expected three numbers after 'vertex', found " + inQuotes(word)));
+            }
+        }
+        if (!addCorner(p)) return fail(sink_.refusal(p, "line " + std::to_string(file_.lineNumber())));
+        return {};
+    }
+
+    bool addCorner(const Point3& p) {
+        if (!isFinite(p)) return false;
+        const auto [entry, isNew] =
+            vertexAt_.try_emplace(p, static_cast<std::uint32_t>(content_.vertices.size()));
+        if (isNew &&
+            (content_.vertices.size() >= std::numeric_limits<std::uint32_t>::max() || !sink_.add(p))) {
+            return false;
+        }
+        fan_.add(entry->second);
+        return true;
+    }
+
+    InputFile& file_;
+    ScanContent content_;
+    VertexSink sink_;
+    PolygonFan fan_;
+    std::unordered_map<Point3, std::uint32_t, PositionHash> vertexAt_;
+};
+
+}  // namespace
+
+Result<ScanContent> readStl(InputFile& file, std::size_t maxPoints) {
+    return StlReader(file, maxPoints).read();
+}
+
+}  // namespace shapedb
