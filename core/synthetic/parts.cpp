@@ -1,0 +1,79 @@
+#include "core/synthetic/parts.h"
+
+#include <cmath>
+
+namespace shapedb {
+
+namespace {
+
+SolidPart place(SolidShape shape, const Point3& centre, const Matrix3& axes) {
+    Motion placement;
+    placement.rotation = axes;
+    placement.translation = centre;
+    return {shape, placement};
+}
+
+}  // namespace
+
+Matrix3 rotationFromZ(const Point3& to) {
+    const Point3 z = (1.0 / length(to)) * to;
+    // Any direction well away from z completes the frame.
+    const Point3 other = std::abs(z.x) < 0.6 ? Point3{1.0, 0.0, 0.0} : Point3{0.0, 1.0, 0.0};
+    const Point3 across = cross(other, z);
+    const Point3 y = (1.0 / length(across)) * across;
+    const Point3 x = cross(y, z);
+    return {{{x.x, y.x, z.x}, {x.y, y.y, z.y}, {x.z, y.z, z.z}}};
+}
+
+Matrix3 rotationAboutX(double angle) {
+    const double c = std::cos(angle);
+    const double s = std::sin(angle);
+    return {{{1.0, 0.0, 0.0}, {0.0, c, -s}, {0.0, s, c}}};
+}
+
+Matrix3 rotationAboutY(double angle) {
+    const double c = std::cos(angle);
+    const double s = std::sin(angle);
+    return {{{c, 0.0, s}, {0.0, 1.0, 0.0}, {-s, 0.0, c}}};
+}
+
+Matrix3 rotationAboutZ(double angle) {
+    const double c = std::cos(angle);
+    const double s = std::sin(angle);
+    return {{{c, -s, 0.0}, {s, c, 0.0}, {0.0, 0.0, 1.0}}};
+}
+
+Matrix3 multiply(const Matrix3& a, const Matrix3& b) {
+    Motion first;
+    first.rotation = b;
+    Motion second;
+    second.rotation = a;
+    return compose(second, first).rotation;
+}
+
+SolidPart ball(const Point3& centre, double radius) {
+    return place(SolidSphere{radius}, centre, Motion{}.rotation);
+}
+
+SolidPart ellipsoid(const Point3& centre, const Point3& semiAxes, const Matrix3& axes) {
+    return place(SolidEllipsoid{semiAxes}, centre, axes);
+}
+
+SolidPart block(const Point3& centre, const Point3& halfSides, const Matrix3& axes) {
+    return place(SolidBox{halfSides}, centre, axes);
+}
+
+SolidPart rod(const Point3& from, const Point3& to, double radius) {
+    return place(SolidCapsule{radius, 0.5 * distance(from, to)}, 0.5 * (from + to), rotationFromZ(to - from));
+}
+
+SolidPart cylinder(const Point3& from, const Point3& to, double radius, double innerRadius) {
+    return place(SolidTube{radius, 0.5 * distance(from, to), innerRadius}, 0.5 * (from + to),
+                 rotationFromZ(to - from));
+}
+
+SolidPart ring(const Point3& centre, const Point3& axis, double ringRadius, double tubeRadius) {
+    return place(SolidTorus{ringRadius, tubeRadius}, centre, rotationFromZ(axis));
+}
+
+}  // namespace shapedb
