@@ -19,10 +19,12 @@ struct SqliteOptions {
 };
 
 /// Opens the database and brings its schema up to date (migrations/, each in its own
-/// transaction). Only one process may have it open: a lock file beside it is held.
+/// transaction). Only one store at a time may have it open: an flock on `path`.lock is held
+/// until the returned store is destroyed. No function may be running then.
 ///
-/// Errors: kStorage (cannot be opened or created, locked by another process: the message
-/// says by what), kSchemaTooNew, kDataLoss (not a database, damaged), kInvalidArgument.
+/// Errors: kStorage (cannot be opened or created; in use: the message names the process),
+/// kStorageFull, kSchemaTooNew, kDataLoss (not a database of ours, damaged, empty, or its log
+/// without it: the message says what to do), kInvalidArgument.
 [[nodiscard]] Result<std::unique_ptr<Store>> openSqliteStore(const SqliteOptions& options);
 
 }  // namespace shapedb::store
