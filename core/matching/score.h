@@ -15,21 +15,28 @@ struct ScoreOptions {
     bool reflection = true;
     /// True compares sizes as well: shapes are not scaled to each other.
     bool keepScale = false;
-    /// Distance, in units of the bounding-box diagonal, at which a pair of points counts for
-    /// exp(-1/2) of its weight. > 0. Smaller: stricter.
+    /// How far apart two points may lie and still count as the same part, in units of the shapes'
+    /// common size: a pair at distance d counts for kernel(d) = (1 - d^2 / (8 width^2))^4 of its
+    /// weight (0 beyond 2.83 widths), close to a Gaussian of this standard deviation. > 0.
+    /// Smaller: stricter.
     double kernelWidth = 0.1;
 };
 
-/// Score of the best alignment: similarity / (similarity + dissimilarity) in [0, 1]. 1
-/// exactly when `sameShape(a, b)` (with keepScale also the same scale), symmetric bit for
-/// bit. A pair in which one signature has a single point is capped at
-/// kDegenerateCeiling unless they are the same: one weighted point says too little.
-///
-/// Both must be valid (as made by makeSignature or decodeSignature). Thread-safe, allocates
-/// nothing.
-[[nodiscard]] double score(const Signature& a, const Signature& b, const ScoreOptions& options);
-
 constexpr double kDegenerateCeiling = 0.9;
+
+/// Errors: kInvalidArgument naming the field, its value and its range.
+[[nodiscard]] Result<void> validate(const ScoreOptions& options);
+
+/// Score of the best alignment: similarity / (similarity + dissimilarity) in [0, 1], where the
+/// similarity is the sum over matched pairs (one to one) of min(weights) * kernel(distance), and
+/// the dissimilarity is the weight of either side that this leaves over. 1 when `sameShape(a, b)`
+/// (with keepScale also of the same scale); symmetric bit for bit. When one signature has a
+/// single point and they are not the same, the score is at most kDegenerateCeiling: one weighted
+/// point leaves the rotation open and says too little.
+///
+/// Both must be valid (as made by makeSignature or decodeSignature), the options valid.
+/// Thread-safe, allocates nothing.
+[[nodiscard]] double score(const Signature& a, const Signature& b, const ScoreOptions& options);
 
 /// Never below `score` of the same arguments, and cheaper by the number of alignments:
 /// a motion keeps distances from the anchor, so each point can at best meet a point of the

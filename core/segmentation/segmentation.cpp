@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "core/geometry/bounding.h"
 #include "core/geometry/decimate.h"
 #include "core/geometry/sanitise.h"
 #include "core/segmentation/flow.h"
@@ -141,6 +142,15 @@ std::vector<std::int32_t> labelSites(std::size_t siteCount, const Segmentation& 
     return labels;
 }
 
+// Size of what the interior spans, in the unit of the sites.
+Result<double> interiorSize(const PointCloud& sites, const std::vector<std::int32_t>& siteLabels) {
+    PointCloud touched;
+    for (std::size_t i = 0; i < sites.size(); ++i) {
+        if (siteLabels[i] >= 0) touched.push_back(sites[i]);
+    }
+    return smallestSphereDiameter(touched);
+}
+
 void toScanUnits(const Frame& frame, PointCloud sites, Segmentation& result) {
     for (Point3& p : sites) p = frame.toScan(p);
     result.sites = std::move(sites);
@@ -215,6 +225,9 @@ Result<Segmentation> segmentOrThrow(const PointCloud& points, const Segmentation
                         "scan the shape from all sides or raise big_ball_ratio");
     }
     const std::vector<std::int32_t> siteLabels = labelSites(prepared->sites.size(), result);
+    const auto size = interiorSize(prepared->sites, siteLabels);
+    if (!size) return fail(size.error());
+    result.size = *size * prepared->frame.unit;
     result.pointSegment.reserve(points.size());
     for (const std::uint32_t site : result.siteOfPoint) result.pointSegment.push_back(siteLabels[site]);
     toScanUnits(prepared->frame, std::move(prepared->sites), result);

@@ -50,7 +50,10 @@ struct Segmentation {
     PointCloud sites;
     std::vector<std::uint32_t> siteOfPoint;
 
-    double volume = 0.0;           ///< of all segments together, scan units cubed
+    double volume = 0.0;  ///< of all segments together, scan units cubed
+    /// Diameter of the smallest sphere around the interior's tetrahedra, scan units: stray points
+    /// off the surface do not count.
+    double size = 0.0;
     std::uint64_t duplicates = 0;  ///< input points that repeated an earlier one
     std::uint64_t bigBalls = 0;
     std::uint64_t interiorTetrahedra = 0;

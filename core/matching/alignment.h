@@ -1,0 +1,66 @@
+// All alignments of two weighted point sets (Section 4.2) and the best of them.
+//
+// An alignment lays the heaviest points (the anchors) on each other and turns b so that the
+// axis from its anchor to one of its points j lies on the axis from a's anchor to one of its
+// points i. In space this leaves a roll about the axis free, on which the paper is silent: it is
+// fixed by a second pair (k, l) whose directions away from the axis are made to agree. Each is
+// tried with and without a reflection.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "core/matching/score.h"
+
+namespace shapedb {
+
+/// A weighted point set in the scale in which two are compared.
+struct AnchoredPoints {
+    std::size_t count = 0;
+    std::array<Point3, kMaxSignaturePoints> position;  ///< the anchor, first, is the origin
+    std::array<double, kMaxSignaturePoints> weight{};  ///< falling
+    double totalWeight = 0.0;
+};
+
+/// `factor` scales lengths (weights by its cube): 1 leaves the normalised signature alone.
+[[nodiscard]] AnchoredPoints anchoredPoints(const Signature& signature, double factor);
+
+/// (1 - d^2 / (8 width^2))^4, 0 beyond; takes the squared distance.
+[[nodiscard]] double kernel(double squaredDistance, double width);
+
+/// Which points are laid on each other; indices into the two sets.
+struct PairList {
+    struct Pair {
+        std::uint8_t a = 0;
+        std::uint8_t b = 0;
+        double gain = 0.0;  ///< min(weights) * kernel(distance)
+        double squaredDistance = 0.0;
+    };
+    std::array<Pair, kMaxSignaturePoints> pairs;
+    std::size_t count = 0;
+    double similarity = 0.0;  ///< sum of the gains
+};
+
+/// One alignment: the axes through a's point i and b's point j, rolled so that b's l faces as a's
+/// k. k = l = 0 (the anchors, which fix no roll): the axes' own reference directions agree.
+/// i = j = 0: one side has no axis; no turn at all.
+struct Alignment {
+    std::uint8_t i = 0, j = 0, k = 0, l = 0;
+    bool reflected = false;  ///< b is mirrored before it is turned
+};
+
+struct BestAlignment {
+    Alignment alignment;
+    PairList matches;
+};
+
+/// The alignment with the largest similarity; the first in the order i, j, reflection, k, l among
+/// equals. `prune` skips axis pairs that cannot beat the best so far and changes nothing else.
+[[nodiscard]] BestAlignment bestAlignment(const AnchoredPoints& a, const AnchoredPoints& b,
+                                          const ScoreOptions& options, bool prune = true);
+
+/// The rotation (determinant -1 when reflected) that takes positions of b to positions of a.
+[[nodiscard]] Matrix3 alignmentRotation(const AnchoredPoints& a, const AnchoredPoints& b,
+                                        const Alignment& alignment);
+
+}  // namespace shapedb

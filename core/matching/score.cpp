@@ -1,0 +1,152 @@
+#include "core/matching/score.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "core/matching/alignment.h"
+
+namespace shapedb {
+
+namespace {
+
+constexpr double kBoundMargin = 1.0 + 1e-12;
+
+// A total order on what is scored, so that score(a, b) and score(b, a) are one computation.
+bool comesFirst(const Signature& a, const Signature& b) {
+    if (a.points.size() != b.points.size()) return a.points.size() < b.points.size();
+    for (std::size_t i = 0; i < a.points.size(); ++i) {
+        const SignaturePoint& p = a.points[i];
+        const SignaturePoint& q = b.points[i];
+        if (p.weight != q.weight) return p.weight < q.weight;
+        if (p.position != q.position) return p.position < q.position;
+    }
+    return a.scale < b.scale;
+}
+
+struct Scaled {
+    AnchoredPoints a, b;
+};
+
+Scaled inCommonScale(const Signature& a, const Signature& b, const ScoreOptions& options) {
+    if (!options.keepScale) return {anchoredPoints(a, 1.0), anchoredPoints(b, 1.0)};
+    const double larger = std::max(a.scale, b.scale);
+    return {anchoredPoints(a, a.scale / larger), anchoredPoints(b, b.scale / larger)};
+}
+
+bool identical(const Signature& a, const Signature& b, const ScoreOptions& options) {
+    return sameShape(a, b) && (!options.keepScale || a.scale == b.scale);
+}
+
+bool isDegenerate(const Signature& a, const Signature& b) {
+    return a.points.size() == 1 || b.points.size() == 1;
+}
+
+// similarity / (similarity + dissimilarity), clamped against rounding.
+double ratio(double similarity, const AnchoredPoints& a, const AnchoredPoints& b) {
+    const double whole = a.totalWeight + b.totalWeight - similarity;
+    return std::clamp(similarity / whole, 0.0, 1.0);
+}
+
+double finalScore(double similarity, const Scaled& scaled, const Signature& a, const Signature& b,
+                  const ScoreOptions& options) {
+    if (identical(a, b, options)) return 1.0;
+    const double value = ratio(similarity, scaled.a, scaled.b);
+    return isDegenerate(a, b) ? std::min(value, kDegenerateCeiling) : value;
+}
+
+// The most each point of one side could gain, whatever the motion.
+double similarityBound(const AnchoredPoints& a, const AnchoredPoints& b, double width) {
+    double sum = 0.0;
+    std::array<double, kMaxSignaturePoints> radiusB;
+    for (std::size_t q = 0; q < b.count; ++q) radiusB[q] = length(b.position[q]);
+    for (std::size_t p = 0; p < a.count; ++p) {
+        const double radius = length(a.position[p]);
+        double best = 0.0;
+        for (std::size_t q = 0; q < b.count; ++q) {
+            const double gap = radius - radiusB[q];
+            best = std::max(best, std::min(a.weight[p], b.weight[q]) * kernel(gap * gap, width));
+        }
+        sum += best;
+    }
+    return sum;
+}
+
+std::vector<std::uint32_t> missing(std::size_t count, const std::vector<PointMatch>& matches,
+                                   std::uint32_t PointMatch::*side) {
+    std::vector<bool> seen(count, false);
+    for (const PointMatch& match : matches) seen[match.*side] = true;
+    std::vector<std::uint32_t> rest;
+    for (std::uint32_t i = 0; i < count; ++i) {
+        if (!seen[i]) rest.push_back(i);
+    }
+    return rest;
+}
+
+// Scan coordinates of b to scan coordinates of a, from a rotation of normalised positions.
+Motion scanMotion(const Signature& a, const Signature& b, const ScoreOptions& options,
+                  const Matrix3& rotation, bool reflected) {
+    Motion motion;
+    motion.scale = options.keepScale ? 1.0 : a.scale / b.scale;
+    motion.rotation = rotation;
+    motion.reflected = reflected;
+    motion.translation = a.origin - motion.scale * rotate(rotation, b.origin);
+    return motion;
+}
+
+Explanation explainOrdered(const Signature& a, const Signature& b, const ScoreOptions& options) {
+    const Scaled scaled = inCommonScale(a, b, options);
+    const BestAlignment best = bestAlignment(scaled.a, scaled.b, options);
+    Explanation result;
+    result.score = finalScore(best.matches.similarity, scaled, a, b, options);
+    result.similarity = best.matches.similarity;
+    result.dissimilarity =
+        std::max(0.0, scaled.a.totalWeight + scaled.b.totalWeight - 2.0 * best.matches.similarity);
+    result.degenerate = isDegenerate(a, b);
+    result.motion = scanMotion(a, b, options, alignmentRotation(scaled.a, scaled.b, best.alignment),
+                               best.alignment.reflected);
+    for (std::size_t i = 0; i < best.matches.count; ++i) {
+        const PairList::Pair& pair = best.matches.pairs[i];
+        result.matches.push_back(
+            {pair.a, pair.b, pair.gain / best.matches.similarity, std::sqrt(pair.squaredDistance)});
+    }
+    result.unmatchedA = missing(a.points.size(), result.matches, &PointMatch::a);
+    result.unmatchedB = missing(b.points.size(), result.matches, &PointMatch::b);
+    return result;
+}
+
+}  // namespace
+
+Result<void> validate(const ScoreOptions& options) {
+    if (options.kernelWidth > 0.0 && std::isfinite(options.kernelWidth)) return {};
+    return fail(ErrorCode::kInvalidArgument,
+                "kernel_width is " + std::to_string(options.kernelWidth) + "; it must be above 0");
+}
+
+double score(const Signature& a, const Signature& b, const ScoreOptions& options) {
+    if (comesFirst(b, a)) return score(b, a, options);
+    const Scaled scaled = inCommonScale(a, b, options);
+    return finalScore(bestAlignment(scaled.a, scaled.b, options).matches.similarity, scaled, a, b, options);
+}
+
+double scoreUpperBound(const Signature& a, const Signature& b, const ScoreOptions& options) {
+    if (identical(a, b, options)) return 1.0;
+    const Scaled scaled = inCommonScale(a, b, options);
+    const double most = std::min({similarityBound(scaled.a, scaled.b, options.kernelWidth),
+                                  similarityBound(scaled.b, scaled.a, options.kernelWidth)}) *
+                        kBoundMargin;
+    const double whole = std::max(most, scaled.a.totalWeight + scaled.b.totalWeight - most);
+    const double bound = std::min(1.0, most / whole * kBoundMargin);
+    return isDegenerate(a, b) ? std::min(bound, kDegenerateCeiling) : bound;
+}
+
+Explanation explain(const Signature& a, const Signature& b, const ScoreOptions& options) {
+    if (!comesFirst(b, a)) return explainOrdered(a, b, options);
+    Explanation result = explainOrdered(b, a, options);
+    result.motion = inverse(result.motion);
+    for (PointMatch& match : result.matches) std::swap(match.a, match.b);
+    std::swap(result.unmatchedA, result.unmatchedB);
+    return result;
+}
+
+}  // namespace shapedb

@@ -1,0 +1,164 @@
+#include "core/search/filter.h"
+
+#include <charconv>
+#include <cmath>
+#include <cstddef>
+
+namespace shapedb {
+
+namespace {
+
+bool isBlank(char c) { return c == ' ' || c == '\t'; }
+bool isOperator(char c) { return c == '=' || c == '!' || c == '<' || c == '>'; }
+
+bool parseNumber(const std::string& text, double& value) {
+    const char* end = text.data() + text.size();
+    const auto [stop, error] = std::from_chars(text.data(), end, value);
+    return error == std::errc() && stop == end && std::isfinite(value);
+}
+
+}  // namespace
+
+class FilterParser {
+  public:
+    explicit FilterParser(const std::string& text) : text_(text) {}
+
+    Result<Filter> parse() {
+        Filter filter;
+        skipBlanks();
+        if (atEnd()) return filter;
+        while (true) {
+            auto term = parseTerm();
+            if (!term) return fail(term.error());
+            filter.terms_.push_back(std::move(*term));
+            skipBlanks();
+            if (atEnd()) return filter;
+            if (text_[at_] != ',') return expected("',' or the end");
+            ++at_;
+            skipBlanks();
+        }
+    }
+
+  private:
+    using Operator = Filter::Operator;
+
+    bool atEnd() const { return at_ >= text_.size(); }
+    void skipBlanks() {
+        while (!atEnd() && isBlank(text_[at_])) ++at_;
+    }
+    tl::unexpected<Error> expected(const std::string& what) const {
+        return fail(ErrorCode::kMalformedFilter, "filter '" + text_ + "', column " + std::to_string(at_ + 1) +
+                                                     ": expected " + what +
+                                                     "; write for example label=cup, year>=1990, !draft");
+    }
+
+    Result<Filter::Term> parseTerm() {
+        Filter::Term term;
+        const bool absent = !atEnd() && text_[at_] == '!';
+        if (absent) ++at_;
+        skipBlanks();
+        term.key = parseKey();
+        if (term.key.empty()) return expected("a key");
+        skipBlanks();
+        if (absent) {
+            term.op = Operator::kAbsent;
+            return term;
+        }
+        if (atEnd() || text_[at_] == ',') {
+            term.op = Operator::kPresent;
+            return term;
+        }
+        if (!parseOperator(term.op)) return expected("one of = != < <= > >=");
+        skipBlanks();
+        return parseValueOf(std::move(term));
+    }
+
+    std::string parseKey() {
+        const std::size_t begin = at_;
+        while (!atEnd() && !isBlank(text_[at_]) && !isOperator(text_[at_]) && text_[at_] != ',' &&
+               text_[at_] != '"') {
+            ++at_;
+        }
+        return text_.substr(begin, at_ - begin);
+    }
+
+    bool parseOperator(Operator& op) {
+        const auto take = [&](const char* symbol, Operator meaning) {
+            const std::string wanted(symbol);
+            if (text_.compare(at_, wanted.size(), wanted) != 0) return false;
+            at_ += wanted.size();
+            op = meaning;
+            return true;
+        };
+        return take("!=", Operator::kNotEqual) || take("<=", Operator::kLessEqual) ||
+               take(">=", Operator::kGreaterEqual) || take("=", Operator::kEqual) ||
+               take("<", Operator::kLess) || take(">", Operator::kGreater);
+    }
+
+    Result<Filter::Term> parseValueOf(Filter::Term term) {
+        const std::size_t begin = at_;
+        if (!atEnd() && text_[at_] == '"') {
+            if (!parseQuoted(term.value)) return expected("a closing quote");
+        } else {
+            while (!atEnd() && text_[at_] != ',') {
+                if (isOperator(text_[at_]) || text_[at_] == '"')
+                    return expected("a value without operators, or quotes around it");
+                ++at_;
+            }
+            std::size_t end = at_;
+            while (end > begin && isBlank(text_[end - 1])) --end;
+            term.value = text_.substr(begin, end - begin);
+            if (term.value.empty()) return expected("a value");
+        }
+        const bool ordered = term.op != Operator::kEqual && term.op != Operator::kNotEqual;
+        if (ordered && !parseNumber(term.value, term.number)) {
+            at_ = begin;
+            return expected("a number after an order comparison");
+        }
+        return term;
+    }
+
+    bool parseQuoted(std::string& value) {
+        for (++at_; !atEnd(); ++at_) {
+            if (text_[at_] == '"') {
+                ++at_;
+                return true;
+            }
+            if (text_[at_] == '\\' && at_ + 1 < text_.size()) ++at_;
+            value.push_back(text_[at_]);
+        }
+        return false;
+    }
+
+    const std::string& text_;
+    std::size_t at_ = 0;
+};
+
+Result<Filter> Filter::parse(const std::string& text) { return FilterParser(text).parse(); }
+
+bool Filter::matches(const std::map<std::string, std::string>& metadata) const {
+    for (const Term& term : terms_) {
+        if (!passes(term, metadata)) return false;
+    }
+    return true;
+}
+
+bool Filter::passes(const Term& term, const std::map<std::string, std::string>& metadata) {
+    const auto found = metadata.find(term.key);
+    const bool present = found != metadata.end();
+    double number = 0.0;
+    const auto compared = [&] { return present && parseNumber(found->second, number); };
+    switch (term.op) {
+        case Operator::kPresent: return present;
+        case Operator::kAbsent: return !present;
+        case Operator::kEqual: return present && found->second == term.value;
+        case Operator::kNotEqual: return !present || found->second != term.value;
+        case Operator::kLess: return compared() && number < term.number;
+        case Operator::kLessEqual: return compared() && number <= term.number;
+        case Operator::kGreater: return compared() && number > term.number;
+        case Operator::kGreaterEqual: return compared() && number >= term.number;
+    }
+    return false;
+}
+
+}  // namespace shapedb

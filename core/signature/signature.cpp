@@ -1,0 +1,87 @@
+#include "core/signature/signature.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <string>
+
+#include <Eigen/Eigenvalues>
+
+namespace shapedb {
+
+Result<void> validate(const SignatureOptions& options) {
+    if (options.maxPoints >= 1 && options.maxPoints <= kMaxSignaturePoints) return {};
+    return fail(ErrorCode::kInvalidArgument, "max_points is " + std::to_string(options.maxPoints) +
+                                                 "; it must be 1 to " + std::to_string(kMaxSignaturePoints));
+}
+
+bool sameShape(const Signature& a, const Signature& b) noexcept {
+    if (a.points.size() != b.points.size()) return false;
+    for (std::size_t i = 0; i < a.points.size(); ++i) {
+        const SignaturePoint& p = a.points[i];
+        const SignaturePoint& q = b.points[i];
+        if (p.position != q.position || p.weight != q.weight) return false;
+    }
+    return true;
+}
+
+Point3 pointPosition(const Signature& signature, std::size_t i) {
+    const auto& p = signature.points[i].position;
+    return signature.origin + signature.scale * Point3{p[0], p[1], p[2]};
+}
+
+double pointVolume(const Signature& signature, std::size_t i) {
+    return static_cast<double>(signature.points[i].weight) * signature.scale * signature.scale *
+           signature.scale;
+}
+
+std::array<double, 3> pointExtents(const Signature& signature, std::size_t i) {
+    const auto& c = signature.points[i].covariance;
+    Eigen::Matrix3d matrix;
+    matrix << c[0], c[1], c[2], c[1], c[3], c[4], c[2], c[4], c[5];
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(matrix, Eigen::EigenvaluesOnly);
+    const auto& rising = solver.eigenvalues();
+    std::array<double, 3> extents;
+    for (int axis = 0; axis < 3; ++axis) {
+        // Rounding may push the smallest eigenvalue of a flat segment below zero.
+        extents[static_cast<std::size_t>(axis)] =
+            signature.scale * std::sqrt(std::max(0.0, rising[2 - axis]));
+    }
+    return extents;
+}
+
+Result<Signature> makeSignature(const Segmentation& segmentation, const SignatureOptions& options) {
+    if (auto valid = validate(options); !valid) return fail(valid.error());
+    if (segmentation.segments.empty() || !(segmentation.size > 0.0)) {
+        return fail(ErrorCode::kNoInterior, "the shape has no segments to describe");
+    }
+    Signature signature;
+    signature.scale = segmentation.size;
+    signature.volume = segmentation.volume;
+    signature.origin = segmentation.segments.front().centroid;
+    const double inverse = 1.0 / segmentation.size;
+    const std::size_t count = std::min<std::size_t>(options.maxPoints, segmentation.segments.size());
+    for (std::size_t i = 0; i < count; ++i) {
+        const Segment& segment = segmentation.segments[i];
+        const Point3 position = inverse * (segment.centroid - signature.origin);
+        SignaturePoint point;
+        point.position = {static_cast<float>(position.x), static_cast<float>(position.y),
+                          static_cast<float>(position.z)};
+        point.weight = static_cast<float>(segment.volume * inverse * inverse * inverse);
+        point.volumeShare = static_cast<float>(segment.volume / segmentation.volume);
+        point.peakRadius = static_cast<float>(segment.peakRadius * inverse);
+        for (std::size_t m = 0; m < 6; ++m) {
+            point.covariance[m] = static_cast<float>(segment.covariance[m] * inverse * inverse);
+        }
+        // Segments too light for single precision (and lighter ones after them) say nothing.
+        if (!(point.weight > 0.0f) || !(point.volumeShare > 0.0f)) break;
+        signature.points.push_back(point);
+    }
+    if (signature.points.empty()) {
+        return fail(ErrorCode::kNoInterior,
+                    "the interior is too small against the size of the scan to describe");
+    }
+    return signature;
+}
+
+}  // namespace shapedb

@@ -1,0 +1,187 @@
+#include "core/signature/signature_codec.h"
+
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <new>
+
+namespace shapedb {
+
+namespace {
+
+// Persisted: never change. docs/signature-format.md describes every byte.
+constexpr char kMagic[4] = {'S', 'D', 'B', 'G'};
+constexpr std::uint16_t kVersion = 1;
+constexpr std::size_t kHeaderBytes = 52;
+constexpr std::size_t kPointBytes = 48;
+constexpr std::size_t kChecksumBytes = 4;
+
+// CRC-32 (IEEE 802.3, reflected), bit by bit: a few hundred bytes do not need a table.
+std::uint32_t crc32(const char* bytes, std::size_t size) {
+    std::uint32_t crc = 0xffffffffu;
+    for (std::size_t i = 0; i < size; ++i) {
+        crc ^= static_cast<unsigned char>(bytes[i]);
+        for (int bit = 0; bit < 8; ++bit) crc = (crc >> 1) ^ (0xedb88320u & (0u - (crc & 1u)));
+    }
+    return ~crc;
+}
+
+template <typename Unsigned>
+void putUnsigned(std::string& out, Unsigned value) {
+    for (std::size_t i = 0; i < sizeof(Unsigned); ++i)
+        out.push_back(static_cast<char>((value >> (8 * i)) & 0xffu));
+}
+
+void putFloat(std::string& out, float value) {
+    std::uint32_t bits = 0;
+    std::memcpy(&bits, &value, sizeof bits);
+    putUnsigned(out, bits);
+}
+
+void putDouble(std::string& out, double value) {
+    std::uint64_t bits = 0;
+    std::memcpy(&bits, &value, sizeof bits);
+    putUnsigned(out, bits);
+}
+
+// Reads from bytes whose length has been checked.
+class Reader {
+  public:
+    explicit Reader(const char* at) : at_(at) {}
+
+    template <typename Unsigned>
+    Unsigned takeUnsigned() {
+        Unsigned value = 0;
+        for (std::size_t i = 0; i < sizeof(Unsigned); ++i) {
+            value = static_cast<Unsigned>(
+                value | (static_cast<Unsigned>(static_cast<unsigned char>(at_[i])) << (8 * i)));
+        }
+        at_ += sizeof(Unsigned);
+        return value;
+    }
+    float takeFloat() {
+        const auto bits = takeUnsigned<std::uint32_t>();
+        float value = 0.0f;
+        std::memcpy(&value, &bits, sizeof value);
+        return value;
+    }
+    double takeDouble() {
+        const auto bits = takeUnsigned<std::uint64_t>();
+        double value = 0.0;
+        std::memcpy(&value, &bits, sizeof value);
+        return value;
+    }
+
+  private:
+    const char* at_;
+};
+
+SignaturePoint takePoint(Reader& reader) {
+    SignaturePoint point;
+    for (float& v : point.position) v = reader.takeFloat();
+    point.weight = reader.takeFloat();
+    point.volumeShare = reader.takeFloat();
+    point.peakRadius = reader.takeFloat();
+    for (float& v : point.covariance) v = reader.takeFloat();
+    return point;
+}
+
+bool allFinite(const SignaturePoint& point) {
+    bool finite =
+        std::isfinite(point.weight) && std::isfinite(point.volumeShare) && std::isfinite(point.peakRadius);
+    for (const float v : point.position) finite = finite && std::isfinite(v);
+    for (const float v : point.covariance) finite = finite && std::isfinite(v);
+    return finite;
+}
+
+tl::unexpected<Error> malformed(const std::string& what) {
+    return fail(ErrorCode::kMalformedSignature, "not a valid signature: " + what);
+}
+
+Result<void> checkNumbers(const Signature& signature) {
+    const Point3& o = signature.origin;
+    if (!std::isfinite(signature.scale) || signature.scale <= 0.0)
+        return malformed("the scale is not positive");
+    if (!std::isfinite(signature.volume) || signature.volume <= 0.0)
+        return malformed("the volume is not positive");
+    if (!std::isfinite(o.x) || !std::isfinite(o.y) || !std::isfinite(o.z)) {
+        return malformed("the origin is not finite");
+    }
+    for (std::size_t i = 0; i < signature.points.size(); ++i) {
+        const SignaturePoint& p = signature.points[i];
+        const std::string name = "point " + std::to_string(i);
+        if (!allFinite(p)) return malformed(name + " has a number that is not finite");
+        if (!(p.weight > 0.0f)) return malformed(name + " has no positive weight");
+        if (!(p.volumeShare > 0.0f) || p.volumeShare > 1.0f)
+            return malformed(name + " has a volume share outside (0, 1]");
+        if (!(p.peakRadius > 0.0f)) return malformed(name + " has no positive peak radius");
+        if (i > 0 && p.weight > signature.points[i - 1].weight)
+            return malformed(name + " is heavier than the one before");
+    }
+    if (signature.points.front().position != std::array<float, 3>{}) {
+        return malformed("the heaviest point is not at the origin");
+    }
+    return {};
+}
+
+}  // namespace
+
+std::string encodeSignature(const Signature& signature) {
+    std::string out(kMagic, sizeof kMagic);
+    out.reserve(kHeaderBytes + kPointBytes * signature.points.size() + kChecksumBytes);
+    putUnsigned(out, kVersion);
+    putUnsigned(out, static_cast<std::uint16_t>(signature.points.size()));
+    putUnsigned(out, std::uint32_t{0});
+    putDouble(out, signature.scale);
+    putDouble(out, signature.origin.x);
+    putDouble(out, signature.origin.y);
+    putDouble(out, signature.origin.z);
+    putDouble(out, signature.volume);
+    for (const SignaturePoint& point : signature.points) {
+        for (const float v : point.position) putFloat(out, v);
+        putFloat(out, point.weight);
+        putFloat(out, point.volumeShare);
+        putFloat(out, point.peakRadius);
+        for (const float v : point.covariance) putFloat(out, v);
+    }
+    putUnsigned(out, crc32(out.data(), out.size()));
+    return out;
+}
+
+Result<Signature> decodeSignature(const std::string& bytes) {
+    if (bytes.size() < kHeaderBytes + kPointBytes + kChecksumBytes) {
+        return malformed(std::to_string(bytes.size()) + " bytes are too few");
+    }
+    if (std::memcmp(bytes.data(), kMagic, sizeof kMagic) != 0)
+        return malformed("it does not begin with SDBG");
+    Reader reader(bytes.data() + sizeof kMagic);
+    const auto version = reader.takeUnsigned<std::uint16_t>();
+    if (version != kVersion) return malformed("version " + std::to_string(version) + " is unknown");
+    const auto count = reader.takeUnsigned<std::uint16_t>();
+    if (count < 1 || count > kMaxSignaturePoints)
+        return malformed(std::to_string(count) + " points announced");
+    if (bytes.size() != kHeaderBytes + kPointBytes * count + kChecksumBytes) {
+        return malformed(std::to_string(bytes.size()) + " bytes do not fit " + std::to_string(count) +
+                         " points");
+    }
+    Reader checksum(bytes.data() + bytes.size() - kChecksumBytes);
+    if (checksum.takeUnsigned<std::uint32_t>() != crc32(bytes.data(), bytes.size() - kChecksumBytes)) {
+        return malformed("the checksum does not agree");
+    }
+    if (reader.takeUnsigned<std::uint32_t>() != 0) return malformed("reserved bytes are in use");
+    try {
+        Signature signature;
+        signature.scale = reader.takeDouble();
+        signature.origin.x = reader.takeDouble();
+        signature.origin.y = reader.takeDouble();
+        signature.origin.z = reader.takeDouble();
+        signature.volume = reader.takeDouble();
+        for (std::uint16_t i = 0; i < count; ++i) signature.points.push_back(takePoint(reader));
+        if (auto valid = checkNumbers(signature); !valid) return fail(valid.error());
+        return signature;
+    } catch (const std::bad_alloc&) {
+        return fail(ErrorCode::kOutOfMemory, "not enough memory to decode a signature");
+    }
+}
+
+}  // namespace shapedb
