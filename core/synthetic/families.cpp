@@ -215,8 +215,8 @@ Solid makeTable(Random& random) {
     const bool round = random.below(3) == 0;
     const double halfWidth = round ? halfLength : halfLength * random.uniform(0.5, 0.95);
     const double height = random.uniform(0.45, 0.9);
-    const double slab = random.uniform(0.035, 0.055);
-    const double legRadius = random.uniform(0.038, 0.06);
+    const double slab = random.uniform(0.042, 0.06);
+    const double legRadius = random.uniform(0.045, 0.065);
     Solid solid;
     if (round) {
         solid.parts.push_back(cylinder({0.0, 0.0, -slab}, {0.0, 0.0, slab}, halfLength));
@@ -239,7 +239,7 @@ Solid makeTable(Random& random) {
     if (random.below(2) == 0) {
         const double z = -height * random.uniform(0.6, 0.8);
         for (const double y : {-inset * halfWidth, inset * halfWidth}) {
-            solid.parts.push_back(rod({-inset * halfLength, y, z}, {inset * halfLength, y, z}, 0.038));
+            solid.parts.push_back(rod({-inset * halfLength, y, z}, {inset * halfLength, y, z}, 0.042));
         }
     }
     return solid;
@@ -284,7 +284,7 @@ Solid makeChair(Random& random) {
 Solid makeMug(Random& random) {
     const double radius = random.uniform(0.3, 0.42);
     const double height = random.uniform(0.55, 1.05);
-    const double wall = random.uniform(0.065, 0.085);
+    const double wall = random.uniform(0.085, 0.11);
     const double reach = random.uniform(0.2, 0.34);
     const double halfGrip = height * random.uniform(0.22, 0.33);
     const double grip = random.uniform(0.042, 0.058);
@@ -297,7 +297,7 @@ Solid makeMug(Random& random) {
     for (int i = 0; i <= 8; ++i) {
         const double angle = (i / 8.0 - 0.5) * kPi;
         joints.push_back(
-            {radius - 0.4 * wall + reach * std::cos(angle), 0.0, middle + halfGrip * std::sin(angle)});
+            {radius - 0.5 * wall + reach * std::cos(angle), 0.0, middle + halfGrip * std::sin(angle)});
     }
     addRods(solid, joints, grip);
     return solid;
