@@ -104,6 +104,12 @@ bool InputFile::fillSlowly(std::uint64_t bytes) {
     return true;
 }
 
+std::string_view InputFile::peek(std::size_t bytes) {
+    while (available() < bytes && readMore()) {
+    }
+    return {data(), std::min(bytes, available())};
+}
+
 bool InputFile::skip(std::uint64_t bytes) {
     if (!mayHold(bytes)) return false;
     while (bytes > available()) {
@@ -125,7 +131,7 @@ bool InputFile::onlyPaddingLeft() {
 }
 
 void InputFile::skipByteOrderMark() {
-    if (fill(3) && std::memcmp(data(), "\xEF\xBB\xBF", 3) == 0) consume(3);
+    if (peek(3) == "\xEF\xBB\xBF") consume(3);
 }
 
 bool InputFile::readLine(std::string_view& line) {

@@ -43,8 +43,10 @@ class InputFile {
     const char* data() const { return buffer_.data() + begin_; }
     std::size_t available() const { return end_ - begin_; }
 
-    /// Reads until `bytes` are available or the file ends; true in the first case.
+    /// Makes `bytes` available; false if the file ends before (what is available then is open).
     bool fill(std::uint64_t bytes) { return available() >= bytes || fillSlowly(bytes); }
+    /// The first at most `bytes` of data(), fewer only where the file ends before.
+    std::string_view peek(std::size_t bytes);
     /// `bytes` <= available().
     void consume(std::size_t bytes) { begin_ += bytes; }
     /// Passes over bytes that need not be in the buffer; false if the file ends before.

@@ -346,7 +346,7 @@ class PcdBody {
         if (unpacked > packed * kLzfGreatestRatio || !file_.fill(packed)) {
             return fail(tooShort("the compressed data is cut short: announced " + std::to_string(packed) +
                                  " bytes for " + std::to_string(unpacked) + ", found " +
-                                 std::to_string(std::min<std::uint64_t>(packed, file_.available()))));
+                                 std::to_string(file_.remaining().value_or(file_.available()))));
         }
         std::vector<char> bytes(unpacked);
         const unsigned written = lzf_decompress(file_.data(), static_cast<unsigned>(packed), bytes.data(),

@@ -17,6 +17,7 @@ namespace {
 constexpr std::uint64_t kHeaderBytes = 80;
 constexpr std::uint64_t kTriangleBytes = 50;  // normal, three corners, two attribute bytes
 constexpr std::uint64_t kNormalBytes = 12;
+constexpr std::size_t kSniffedBytes = 1024;  // a text file this long without a zero byte is text
 
 struct PositionHash {
     std::size_t operator()(const Point3& p) const {
@@ -49,8 +50,7 @@ class StlReader {
     // Many binary files start with "solid" as well, so the word alone proves nothing: the size a
     // binary file must have, or a zero byte, which no text has, decides.
     bool looksAscii() {
-        file_.fill(1024);
-        std::string_view head(file_.data(), std::min<std::size_t>(file_.available(), 1024));
+        std::string_view head = file_.peek(kSniffedBytes);
         if (head.substr(0, 3) == "\xEF\xBB\xBF") head.remove_prefix(3);
         const std::size_t first = head.find_first_not_of(" \t\r\n");
         if (first == std::string_view::npos || !equalsIgnoringCase(head.substr(first, 5), "solid"))

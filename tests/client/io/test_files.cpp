@@ -1,0 +1,257 @@
+#include "tests/client/io/test_files.h"
+
+#include <array>
+#include <filesystem>
+#include <fstream>
+
+#include <lzf.h>
+#include <stdlib.h>
+
+namespace shapedb {
+
+namespace fs = std::filesystem;
+
+FileTest::FileTest() {
+    std::string pattern = (fs::temp_directory_path() / "shapedb-io-XXXXXX").string();
+    folder_ = ::mkdtemp(pattern.data()) != nullptr ? pattern : "";
+}
+
+FileTest::~FileTest() {
+    std::error_code ignored;
+    if (!folder_.empty()) fs::remove_all(folder_, ignored);
+}
+
+std::string FileTest::write(const std::string& name, const std::string& bytes) const {
+    const std::string full = path(name);
+    fs::create_directories(fs::path(full).parent_path());
+    // A new file each time: some file systems wait for the disk when an old one is overwritten.
+    if (fs::is_regular_file(full)) fs::remove(full);
+    std::ofstream(full, std::ios::binary) << bytes;
+    return full;
+}
+
+Result<Scan> FileTest::readVertices(const std::string& name, const std::string& bytes) const {
+    ReadOptions options;
+    options.meshHandling = MeshHandling::kVertices;
+    return readScan(write(name, bytes), options);
+}
+
+Scan FileTest::readGood(const std::string& name, const std::string& bytes) const {
+    auto scan = readVertices(name, bytes);
+    EXPECT_TRUE(scan) << name << ": " << (scan ? "" : scan.error().message);
+    return scan ? *scan : Scan{};
+}
+
+void FileTest::expectError(const std::string& name, const std::string& bytes, ErrorCode code,
+                           const std::vector<std::string>& parts) const {
+    const auto scan = readVertices(name, bytes);
+    ASSERT_FALSE(scan) << name << " was read, but should be refused";
+    EXPECT_STREQ(errorCodeName(scan.error().code), errorCodeName(code)) << scan.error().message;
+    EXPECT_NE(scan.error().message.find(path(name)), std::string::npos) << scan.error().message;
+    for (const std::string& part : parts) {
+        EXPECT_NE(scan.error().message.find(part), std::string::npos)
+            << "message '" << scan.error().message << "' lacks '" << part << "'";
+    }
+}
+
+PointCloud sampleVertices() { return {{0, 0, 0}, {1, 0, 0}, {0, 2, 0}, {0.5, 0.25, -4}, {3, 3, 3.5}}; }
+
+namespace {
+
+constexpr std::array<std::array<std::uint32_t, 3>, 4> kFaces = {
+    {{{0, 2, 1}}, {{0, 1, 3}}, {{1, 2, 3}}, {{2, 0, 3}}}};
+
+std::string textVertices(const std::string& lineEnd, const std::string& suffix = "") {
+    std::string text;
+    for (const Point3& p : sampleVertices()) {
+        for (const double c : {p.x, p.y, p.z}) {
+            std::string number = std::to_string(c);
+            text += number + " ";
+        }
+        text += suffix + lineEnd;
+    }
+    return text;
+}
+
+std::string plyHeader(const std::string& format, const std::string& scalar, const std::string& lineEnd) {
+    std::string text;
+    for (const std::string& line :
+         {std::string("ply"), "format " + format + " 1.0", std::string("comment made by a test"),
+          std::string("obj_info num_cols 512"), std::string("element vertex 5"), "property " + scalar + " x",
+          "property " + scalar + " y", "property " + scalar + " z", std::string("element face 4"),
+          std::string("property list uchar int vertex_indices"), std::string("end_header")}) {
+        text += line + lineEnd;
+    }
+    return text;
+}
+
+std::string asciiPly(const std::string& lineEnd) {
+    std::string text = plyHeader("ascii", "float", lineEnd) + textVertices(lineEnd);
+    for (const auto& f : kFaces) {
+        text +=
+            "3 " + std::to_string(f[0]) + " " + std::to_string(f[1]) + " " + std::to_string(f[2]) + lineEnd;
+    }
+    return text;
+}
+
+template <typename Real>
+std::string binaryPly(bool bigEndian, const std::string& scalar) {
+    Bytes bytes(bigEndian);
+    bytes.text(plyHeader(bigEndian ? "binary_big_endian" : "binary_little_endian", scalar, "\n"));
+    for (const Point3& p : sampleVertices()) {
+        bytes.add(static_cast<Real>(p.x)).add(static_cast<Real>(p.y)).add(static_cast<Real>(p.z));
+    }
+    for (const auto& f : kFaces) {
+        bytes.add(std::uint8_t{3});
+        for (const std::uint32_t v : f) bytes.add(static_cast<std::int32_t>(v));
+    }
+    return bytes.str();
+}
+
+// range_grid before the vertices, a list inside of them, strips after them.
+std::string listPly(bool text) {
+    const std::string header = std::string("ply\nformat ") + (text ? "ascii" : "binary_little_endian") +
+                               " 1.0\nelement range_grid 3\nproperty list uchar int vertex_indices\n"
+                               "element vertex 5\nproperty uchar quality\nproperty double z\n"
+                               "property list ushort float weights\nproperty float x\nproperty float y\n"
+                               "element tristrips 1\nproperty list int int vertex_indices\nend_header\n";
+    const std::vector<std::int32_t> strip = {0, 1, 2, 3, -1, 1, 2, 4};
+    Bytes bytes;
+    bytes.text(header);
+    if (text) {
+        bytes.text("0\n1 4\n0\n");
+        for (const Point3& p : sampleVertices()) {
+            bytes.text("7 " + std::to_string(p.z) + " 2 0.5 0.25 " + std::to_string(p.x) + " " +
+                       std::to_string(p.y) + "\n");
+        }
+        bytes.text("8");
+        for (const std::int32_t v : strip) bytes.text(" " + std::to_string(v));
+        return bytes.text("\n").str();
+    }
+    bytes.add(std::uint8_t{0}).add(std::uint8_t{1}).add(std::int32_t{4}).add(std::uint8_t{0});
+    for (const Point3& p : sampleVertices()) {
+        bytes.add(std::uint8_t{7}).add(p.z).add(std::uint16_t{2}).add(0.5F).add(0.25F);
+        bytes.add(static_cast<float>(p.x)).add(static_cast<float>(p.y));
+    }
+    bytes.add(static_cast<std::int32_t>(strip.size()));
+    for (const std::int32_t v : strip) bytes.add(v);
+    return bytes.str();
+}
+
+std::string pcdHeader(const std::string& data) {
+    return "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F U\nCOUNT 1 1 1 1\n"
+           "WIDTH 5\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 5\nDATA " +
+           data + "\n";
+}
+
+std::string binaryPcd() {
+    Bytes bytes;
+    bytes.text(pcdHeader("binary"));
+    for (const Point3& p : sampleVertices()) {
+        bytes.add(static_cast<float>(p.x)).add(static_cast<float>(p.y)).add(static_cast<float>(p.z));
+        bytes.add(std::uint32_t{0xff00ff});
+    }
+    return bytes.str();
+}
+
+std::string compressedPcd() {
+    Bytes columns;
+    for (const Point3& p : sampleVertices()) columns.add(static_cast<float>(p.x));
+    for (const Point3& p : sampleVertices()) columns.add(static_cast<float>(p.y));
+    for (const Point3& p : sampleVertices()) columns.add(static_cast<float>(p.z));
+    for (int i = 0; i < 5; ++i) columns.add(std::uint32_t{0});
+    return pcdHeader("binary_compressed") + compressedPcdBody(columns.str());
+}
+
+std::string off() {
+    std::string text = "OFF # a comment\n\n5 4 0\n" + textVertices("\n");
+    for (const auto& f : kFaces) {
+        text += "3 " + std::to_string(f[0]) + " " + std::to_string(f[1]) + " " + std::to_string(f[2]) +
+                " 0.5 0 1\n";
+    }
+    return text;
+}
+
+std::string obj() {
+    std::string text = "# made by a test\nmtllib a.mtl\no thing\n";
+    for (const Point3& p : sampleVertices()) {
+        text += "v " + std::to_string(p.x) + " " + std::to_string(p.y) + " " + std::to_string(p.z) + "\n";
+    }
+    text += "vt 0 0\nvn 0 0 1\ns off\n";
+    const std::array<const char*, 4> corner = {"", "/1", "//1", "/1/1"};
+    for (std::size_t i = 0; i < kFaces.size(); ++i) {
+        text += "f";
+        for (const std::uint32_t v : kFaces[i]) text += " " + std::to_string(v + 1) + corner[i];
+        text += "\n";
+    }
+    return text;
+}
+
+std::string asciiStl() {
+    const PointCloud v = sampleVertices();
+    std::string text = "solid thing\n";
+    for (const auto& f : kFaces) {
+        text += "  facet normal nan nan nan\n    outer loop\n";
+        for (const std::uint32_t i : f) {
+            text += "      vertex " + std::to_string(v[i].x) + " " + std::to_string(v[i].y) + " " +
+                    std::to_string(v[i].z) + "\n";
+        }
+        text += "    endloop\n  endfacet\n";
+    }
+    return text + "endsolid thing\n";
+}
+
+std::string binaryStl(std::string header) {
+    const PointCloud v = sampleVertices();
+    header.resize(80, ' ');
+    Bytes bytes;
+    bytes.text(header).add(static_cast<std::uint32_t>(kFaces.size()));
+    for (const auto& f : kFaces) {
+        bytes.add(0.0F).add(0.0F).add(1.0F);
+        for (const std::uint32_t i : f) {
+            bytes.add(static_cast<float>(v[i].x))
+                .add(static_cast<float>(v[i].y))
+                .add(static_cast<float>(v[i].z));
+        }
+        bytes.add(std::uint16_t{0});
+    }
+    return bytes.str();
+}
+
+}  // namespace
+
+std::string compressedPcdBody(const std::string& fieldByField) {
+    std::string packed(2 * fieldByField.size() + 64, '\0');
+    const unsigned size = lzf_compress(fieldByField.data(), static_cast<unsigned>(fieldByField.size()),
+                                       packed.data(), static_cast<unsigned>(packed.size()));
+    packed.resize(size);
+    Bytes sizes;
+    sizes.add(static_cast<std::uint32_t>(size)).add(static_cast<std::uint32_t>(fieldByField.size()));
+    return sizes.str() + packed;
+}
+
+std::vector<SampleFile> sampleFiles() {
+    return {
+        {"ascii.ply", asciiPly("\n"), 5, 4},
+        {"crlf.ply", asciiPly("\r\n"), 5, 4},
+        {"little.ply", binaryPly<float>(false, "float"), 5, 4},
+        {"big.ply", binaryPly<float>(true, "float32"), 5, 4},
+        {"double.ply", binaryPly<double>(false, "double"), 5, 4},
+        {"bigdouble.PLY", binaryPly<double>(true, "float64"), 5, 4},
+        {"lists.ply", listPly(true), 5, 3},
+        {"lists-binary.ply", listPly(false), 5, 3},
+        {"ascii.pcd", pcdHeader("ascii") + textVertices("\n", "255"), 5, 0},
+        {"binary.pcd", binaryPcd(), 5, 0},
+        {"compressed.Pcd", compressedPcd(), 5, 0},
+        {"plain.off", off(), 5, 4},
+        {"plain.obj", obj(), 5, 4},
+        {"ascii.stl", asciiStl(), 4, 4},
+        {"binary.stl", binaryStl("made by a test"), 4, 4},
+        {"solid.stl", binaryStl("solid but binary"), 4, 4},
+        {"plain.xyz", "# points\n" + textVertices("\n"), 5, 0},
+        {"crlf.txt", textVertices("\r\n", "255 0 0"), 5, 0},
+        {"counted.pts", "5\n" + textVertices("\n", "-17 255 0 0"), 5, 0},
+    };
+}
+
+}  // namespace shapedb

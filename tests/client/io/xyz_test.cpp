@@ -1,0 +1,51 @@
+#include <string>
+
+#include "tests/client/io/test_files.h"
+
+namespace shapedb {
+namespace {
+
+using Xyz = FileTest;
+
+constexpr auto kMalformed = ErrorCode::kMalformedFile;
+
+TEST_F(Xyz, EverySeparatorGivesTheSamePoints) {
+    const PointCloud expected = {{1.5, -2, 3e2}, {4, 5, 6}};
+    for (const std::string text :
+         {"1.5 -2 3e2\n4 5 6\n", "1.5\t-2\t3e2\n4\t5\t6\n", "1.5,-2,3e2\n4,5,6\n", "1.5;-2;3e2\n4;5;6\n",
+          "1.5, -2, 3e2\n4 , 5 , 6\n", " 1.5  -2 \t 3e2 \r\n4 5 6", "1.5; -2; 3e2;\n4;5;6;\n",
+          "1.5,-2,3e2,\n4,5,6, \n", "# c\n// c\n\n1.5 -2 3e2\n  # c\n4 5 6\n", "x y z\n1.5 -2 3e2\n4 5 6\n",
+          "\"X\",\"Y\",\"Z\",R\n1.5,-2,3e2,9\n4,5,6,9\n",
+          "\xEF\xBB\xBF"
+          "2\n1.5 -2 3e2\n4 5 6\n",
+          "1.5 -2 3e2 255 n/a\n4 5 6 -7\n", "//X Y Z\n1.5 -2 3e2\n4 5 6\n"}) {
+        EXPECT_EQ(readGood("a.xyz", text).points, expected) << text;
+    }
+}
+
+TEST_F(Xyz, EveryEndingIsRead) {
+    for (const std::string ending : {".xyz", ".txt", ".pts", ".asc", ".XYZ"}) {
+        EXPECT_EQ(readGood("a" + ending, "1 2 3\n").format, "XYZ text");
+    }
+}
+
+TEST_F(Xyz, DecimalCommasAreRefusedRatherThanMisread) {
+    for (const std::string text : {"1,5 2,5 3,5\n", "1,5;2,5;3,5\n", "1,5\t2,5\t3,5\n", "1,5; 2,5; 3,5\n"}) {
+        expectError("a.xyz", "0 0 0\n" + text, kMalformed, {"line 2", "commas inside numbers"});
+    }
+}
+
+TEST_F(Xyz, DefectsNameTheLine) {
+    expectError("empty.xyz", "", kMalformed, {"no point"});
+    expectError("a.xyz", "# only\n\n", kMalformed, {"no point"});
+    expectError("b.xyz", "1 2 3\n1 2\n", kMalformed, {"line 2", "nothing"});
+    expectError("c.xyz", "1 2 3\n\n1 b 3\n", kMalformed, {"line 3", "'b'"});
+    expectError("d.xyz", "3\n1 2 3\n1 2 3\n", kMalformed, {"announces 3", "has 2"});
+    expectError("e.xyz", "C 0.0 1.0 2.0\n", kMalformed, {"line 1", "'C'"});
+    expectError("f.xyz", "1 2 3\n7\n1 2 3\n", kMalformed, {"line 2"});
+    expectError("g.xyz", "1,,2,3\n", kMalformed, {"line 1", "nothing"});
+    expectError("h.xyz", "1 2 3\n1 2 nan\n", ErrorCode::kNonFiniteCoordinate, {"line 2", "vertex 1"});
+}
+
+}  // namespace
+}  // namespace shapedb
