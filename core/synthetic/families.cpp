@@ -297,7 +297,7 @@ Solid makeMug(Random& random) {
     for (int i = 0; i <= 8; ++i) {
         const double angle = (i / 8.0 - 0.5) * kPi;
         joints.push_back(
-            {radius - 0.5 * wall + reach * std::cos(angle), 0.0, middle + halfGrip * std::sin(angle)});
+            {radius - 0.3 * wall + reach * std::cos(angle), 0.0, middle + halfGrip * std::sin(angle)});
     }
     addRods(solid, joints, grip);
     return solid;
