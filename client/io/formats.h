@@ -11,7 +11,7 @@
 #include "client/io/scan_content.h"
 #include "core/base/error.h"
 
-namespace shapedb {
+namespace shapedb::io {
 
 Result<ScanContent> readPly(InputFile& file, std::size_t maxPoints);
 Result<ScanContent> readPcd(InputFile& file, std::size_t maxPoints);
@@ -24,4 +24,4 @@ Result<ScanContent> readXyz(InputFile& file, std::size_t maxPoints);
 /// from notes.
 bool looksLikeXyz(InputFile& file);
 
-}  // namespace shapedb
+}  // namespace shapedb::io

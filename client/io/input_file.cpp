@@ -10,7 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-namespace shapedb {
+namespace shapedb::io {
 
 namespace {
 
@@ -171,4 +171,4 @@ Error InputFile::malformed(const std::string& what) const {
     return {ErrorCode::kMalformedFile, path_ + ": " + what};
 }
 
-}  // namespace shapedb
+}  // namespace shapedb::io

@@ -12,7 +12,7 @@
 #include "core/base/error.h"
 #include "core/base/run_context.h"
 
-namespace shapedb {
+namespace shapedb::io {
 
 /// Not thread-safe. A device error, a cancelled context or an absurdly long line makes the file
 /// look as if it ended there; `failure` then holds the real reason, and readScan reports it
@@ -85,4 +85,4 @@ class InputFile {
     std::optional<Error> failure_;
 };
 
-}  // namespace shapedb
+}  // namespace shapedb::io

@@ -7,11 +7,12 @@
 #include <limits>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "client/io/formats.h"
 #include "client/io/text.h"
 
-namespace shapedb {
+namespace shapedb::io {
 
 namespace {
 
@@ -118,4 +119,4 @@ Result<ScanContent> readObj(InputFile& file, std::size_t maxPoints) {
     return ObjReader(file, maxPoints).read();
 }
 
-}  // namespace shapedb
+}  // namespace shapedb::io

@@ -3,11 +3,12 @@
 #include <limits>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "client/io/formats.h"
 #include "client/io/text.h"
 
-namespace shapedb {
+namespace shapedb::io {
 
 namespace {
 
@@ -147,4 +148,4 @@ Result<ScanContent> readOff(InputFile& file, std::size_t maxPoints) {
     return OffReader(file, maxPoints).read();
 }
 
-}  // namespace shapedb
+}  // namespace shapedb::io

@@ -10,7 +10,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-namespace shapedb {
+namespace shapedb::io {
 
 namespace fs = std::filesystem;
 
@@ -103,4 +103,4 @@ Result<void> OutputFile::commit() {
 
 Error OutputFile::failed(int number) const { return notWritable(path_, number); }
 
-}  // namespace shapedb
+}  // namespace shapedb::io

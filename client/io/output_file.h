@@ -8,7 +8,7 @@
 
 #include "core/base/error.h"
 
-namespace shapedb {
+namespace shapedb::io {
 
 /// Not thread-safe. What is not committed is removed by the destructor. Errors: kFileNotWritable.
 class OutputFile {
@@ -38,4 +38,4 @@ class OutputFile {
     std::vector<char> buffer_;
 };
 
-}  // namespace shapedb
+}  // namespace shapedb::io

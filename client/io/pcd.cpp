@@ -16,7 +16,7 @@
 #include "client/io/scalar.h"
 #include "client/io/text.h"
 
-namespace shapedb {
+namespace shapedb::io {
 
 namespace {
 
@@ -409,4 +409,4 @@ Result<ScanContent> readPcd(InputFile& file, std::size_t maxPoints) {
     return content;
 }
 
-}  // namespace shapedb
+}  // namespace shapedb::io

@@ -1,21 +1,23 @@
 // PLY: ASCII and both binary byte orders, any elements and properties in any order. Our own
-// reader because Debian has no PLY library that survives hostile headers.
+// reader because Debian 12 packages no PLY library.
 //
 // Elements are read one after the other as the header lists them. An element without lists has
 // records of one size and is read (vertex) or passed over in one go; everything else goes through
 // a record reader, TextRecord or BinaryRecord, which offer the same calls.
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <limits>
 #include <string>
 #include <string_view>
+#include <type_traits>
 
 #include "client/io/formats.h"
 #include "client/io/ply_header.h"
 #include "client/io/scalar.h"
 #include "client/io/text.h"
 
-namespace shapedb {
+namespace shapedb::io {
 
 namespace {
 
@@ -355,4 +357,4 @@ Result<ScanContent> readPly(InputFile& file, std::size_t maxPoints) {
     return content;
 }
 
-}  // namespace shapedb
+}  // namespace shapedb::io

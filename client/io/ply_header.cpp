@@ -7,7 +7,7 @@
 
 #include "client/io/text.h"
 
-namespace shapedb {
+namespace shapedb::io {
 
 namespace {
 
@@ -146,4 +146,4 @@ Result<PlyHeader> readPlyHeader(InputFile& file) {
     return fail(file.malformedLine("the file ends before 'end_header'"));
 }
 
-}  // namespace shapedb
+}  // namespace shapedb::io

@@ -11,7 +11,7 @@
 #include "client/io/scalar.h"
 #include "core/base/error.h"
 
-namespace shapedb {
+namespace shapedb::io {
 
 enum class PlyEncoding { kAscii, kLittleEndian, kBigEndian };
 
@@ -41,4 +41,4 @@ struct PlyHeader {
 /// Leaves the file at the first byte after the header. Errors: kMalformedFile with the line.
 Result<PlyHeader> readPlyHeader(InputFile& file);
 
-}  // namespace shapedb
+}  // namespace shapedb::io

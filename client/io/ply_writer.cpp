@@ -1,5 +1,6 @@
 #include "client/io/ply_writer.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
@@ -8,7 +9,6 @@
 #include <string_view>
 
 #include "client/io/output_file.h"
-#include "client/io/scan_content.h"
 
 namespace shapedb {
 
@@ -73,7 +73,7 @@ Result<void> appendPoint(std::string& bytes, const PointCloud& points, std::size
 
 Result<void> writePly(const std::string& path, const PointCloud& points,
                       const std::vector<std::int32_t>* labels) {
-    auto file = OutputFile::create(path);
+    auto file = io::OutputFile::create(path);
     if (!file) return fail(file.error());
     std::string bytes = "ply\nformat binary_little_endian 1.0\nelement vertex " +
                         std::to_string(points.size()) +

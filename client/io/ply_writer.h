@@ -25,8 +25,7 @@ struct Rgb {
 
 /// The colour a segment is drawn in, always the same for the same label. 0 to 17 are picked by
 /// hand to be told apart at a glance; from 18 on hues turn by the golden angle in three shades,
-/// all different for many thousands of labels but less far apart. Negative: grey, which no
-/// segment has.
+/// less far apart; the first 300 labels all differ. Negative: grey, which no segment has.
 [[nodiscard]] Rgb segmentColour(std::int32_t label);
 
 /// Writes binary little-endian PLY with the vertex properties float x y z, uchar red green blue

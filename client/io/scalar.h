@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <cstring>
 
-namespace shapedb {
+namespace shapedb::io {
 
 enum class ScalarType {
     kInt8,
@@ -40,8 +40,7 @@ constexpr bool isFloating(ScalarType type) {
     return type == ScalarType::kFloat32 || type == ScalarType::kFloat64;
 }
 
-/// `bytes` may have any alignment. The swapped case is spelled with shifts compilers know as one
-/// instruction.
+/// `bytes` may have any alignment.
 template <typename T>
 T loadAs(const char* bytes, bool swapped) {
     T value;
@@ -79,4 +78,4 @@ inline bool machineIsLittleEndian() {
     return loadAs<std::uint8_t>(reinterpret_cast<const char*>(&probe), false) == 1;
 }
 
-}  // namespace shapedb
+}  // namespace shapedb::io

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace shapedb {
+namespace shapedb::io {
 
 namespace {
 
@@ -46,4 +46,4 @@ void TriangleStrip::add(std::uint32_t vertex) {
     ++corners_;
 }
 
-}  // namespace shapedb
+}  // namespace shapedb::io

@@ -13,7 +13,7 @@
 #include "core/base/error.h"
 #include "core/geometry/point.h"
 
-namespace shapedb {
+namespace shapedb::io {
 
 using Triangle = std::array<std::uint32_t, 3>;
 
@@ -97,4 +97,4 @@ std::uint64_t visitRecords(InputFile& file, std::uint64_t count, std::uint64_t s
     return done;
 }
 
-}  // namespace shapedb
+}  // namespace shapedb::io

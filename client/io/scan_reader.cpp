@@ -20,6 +20,10 @@ namespace fs = std::filesystem;
 
 namespace {
 
+using io::InputFile;
+using io::ScanContent;
+using io::Triangle;
+
 using ReadFormat = Result<ScanContent> (*)(InputFile&, std::size_t);
 
 struct Format {
@@ -27,21 +31,21 @@ struct Format {
     ReadFormat read;
 };
 
-constexpr std::array<Format, 9> kFormats = {{{".ply", readPly},
-                                             {".pcd", readPcd},
-                                             {".off", readOff},
-                                             {".obj", readObj},
-                                             {".stl", readStl},
-                                             {".xyz", readXyz},
-                                             {".txt", readXyz},
-                                             {".pts", readXyz},
-                                             {".asc", readXyz}}};
+constexpr std::array<Format, 9> kFormats = {{{".ply", io::readPly},
+                                             {".pcd", io::readPcd},
+                                             {".off", io::readOff},
+                                             {".obj", io::readObj},
+                                             {".stl", io::readStl},
+                                             {".xyz", io::readXyz},
+                                             {".txt", io::readXyz},
+                                             {".pts", io::readXyz},
+                                             {".asc", io::readXyz}}};
 
 // Share of the area that must be in small triangles, and how small: see readScan.
 constexpr double kDenseAreaShare = 0.99;
 constexpr double kDenseEdge = 3.0;
 
-std::string endingOf(const fs::path& path) { return lowerCase(path.extension().string()); }
+std::string endingOf(const fs::path& path) { return io::lowerCase(path.extension().string()); }
 
 const Format* formatOf(const std::string& path) {
     const std::string ending = endingOf(path);
@@ -59,7 +63,8 @@ std::string endingList() {
 Error unknownFormat(const std::string& path) {
     const std::string ending = endingOf(path);
     return {ErrorCode::kUnknownFileFormat,
-            path + ": " + (ending.empty() ? "no file ending" : "unknown file ending " + inQuotes(ending)) +
+            path + ": " +
+                (ending.empty() ? "no file ending" : "unknown file ending " + io::inQuotes(ending)) +
                 "; scan files end in " + endingList()};
 }
 
@@ -165,7 +170,7 @@ bool isScanFile(const std::string& path) {
     if (endingOf(path) != ".txt") return true;
     const RunContext context;
     auto file = InputFile::open(path, context);
-    return file && looksLikeXyz(*file);
+    return file && io::looksLikeXyz(*file);
 }
 
 Result<void> searchFolder(const std::string& folder, std::vector<std::string>& found) {

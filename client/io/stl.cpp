@@ -1,16 +1,18 @@
 // STL, binary and ASCII. Corners at the very same position become one vertex.
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <limits>
 #include <string>
 #include <string_view>
-#include <unordered_map>
+#include <utility>
+#include <vector>
 
 #include "client/io/formats.h"
 #include "client/io/scalar.h"
 #include "client/io/text.h"
 
-namespace shapedb {
+namespace shapedb::io {
 
 namespace {
 
@@ -19,24 +21,57 @@ constexpr std::uint64_t kTriangleBytes = 50;  // normal, three corners, two attr
 constexpr std::uint64_t kNormalBytes = 12;
 constexpr std::size_t kSniffedBytes = 1024;  // a text file this long without a zero byte is text
 
-struct PositionHash {
-    std::size_t operator()(const Point3& p) const {
-        // Adding zero makes -0 and 0, which are equal, hash alike.
+// Finds the vertex at a position. An open table of vertex numbers: a map of positions would take
+// most of the time of reading a large file.
+class VertexTable {
+  public:
+    explicit VertexTable(const PointCloud& vertices) : vertices_(&vertices) {}
+
+    /// The place for `p`: it holds the number of the vertex there, or kFree, which the caller
+    /// replaces once the vertex is the last of the cloud.
+    std::uint32_t& place(const Point3& p) {
+        if (2 * vertices_->size() >= places_.size()) grow();
+        return find(p);
+    }
+
+    static constexpr std::uint32_t kFree = std::numeric_limits<std::uint32_t>::max();
+
+  private:
+    static std::uint64_t hash(const Point3& p) {
         std::uint64_t hash = 0;
+        // Adding zero makes -0 and 0, which are equal, hash alike.
         for (const double coordinate : {p.x + 0.0, p.y + 0.0, p.z + 0.0}) {
             std::uint64_t bits = 0;
             std::memcpy(&bits, &coordinate, sizeof bits);
             hash = (hash ^ bits) * 0x9e3779b97f4a7c15ULL;
             hash ^= hash >> 32;
         }
-        return static_cast<std::size_t>(hash);
+        return hash;
     }
+
+    std::uint32_t& find(const Point3& p) {
+        std::size_t at = hash(p) & (places_.size() - 1);
+        while (places_[at] != kFree && (*vertices_)[places_[at]] != p) at = (at + 1) & (places_.size() - 1);
+        return places_[at];
+    }
+
+    void grow() {
+        places_.assign(std::max<std::size_t>(1024, 2 * places_.size()), kFree);
+        for (std::size_t v = 0; v < vertices_->size(); ++v)
+            find((*vertices_)[v]) = static_cast<std::uint32_t>(v);
+    }
+
+    const PointCloud* vertices_;
+    std::vector<std::uint32_t> places_;  // a power of two of them, at most half taken
 };
 
 class StlReader {
   public:
     StlReader(InputFile& file, std::size_t maxPoints)
-        : file_(file), sink_(file, content_.vertices, maxPoints), fan_(content_.triangles) {}
+        : file_(file),
+          sink_(file, content_.vertices, maxPoints),
+          fan_(content_.triangles),
+          vertexAt_(content_.vertices) {}
 
     Result<ScanContent> read() {
         const bool ascii = looksAscii();
@@ -162,13 +197,12 @@ class StlReader {
 
     bool addCorner(const Point3& p) {
         if (!isFinite(p)) return false;
-        const auto [entry, isNew] =
-            vertexAt_.try_emplace(p, static_cast<std::uint32_t>(content_.vertices.size()));
-        if (isNew &&
-            (content_.vertices.size() >= std::numeric_limits<std::uint32_t>::max() || !sink_.add(p))) {
-            return false;
+        std::uint32_t& vertex = vertexAt_.place(p);
+        if (vertex == VertexTable::kFree) {
+            if (content_.vertices.size() >= VertexTable::kFree || !sink_.add(p)) return false;
+            vertex = static_cast<std::uint32_t>(content_.vertices.size() - 1);
         }
-        fan_.add(entry->second);
+        fan_.add(vertex);
         return true;
     }
 
@@ -176,7 +210,7 @@ class StlReader {
     ScanContent content_;
     VertexSink sink_;
     PolygonFan fan_;
-    std::unordered_map<Point3, std::uint32_t, PositionHash> vertexAt_;
+    VertexTable vertexAt_;
 };
 
 }  // namespace
@@ -185,4 +219,4 @@ Result<ScanContent> readStl(InputFile& file, std::size_t maxPoints) {
     return StlReader(file, maxPoints).read();
 }
 
-}  // namespace shapedb
+}  // namespace shapedb::io

@@ -5,7 +5,7 @@
 #include <limits>
 #include <system_error>
 
-namespace shapedb {
+namespace shapedb::io {
 
 namespace {
 
@@ -76,4 +76,4 @@ std::string inQuotes(std::string_view word) {
     return text + (word.size() > kLongest ? "...'" : "'");
 }
 
-}  // namespace shapedb
+}  // namespace shapedb::io

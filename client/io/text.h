@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-namespace shapedb {
+namespace shapedb::io {
 
 inline bool isBlank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f'; }
 
@@ -42,4 +42,4 @@ bool equalsIgnoringCase(std::string_view word, std::string_view lower);
 /// For messages: the word in quotes, shortened, without control characters; "nothing" if empty.
 std::string inQuotes(std::string_view word);
 
-}  // namespace shapedb
+}  // namespace shapedb::io

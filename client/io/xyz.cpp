@@ -8,7 +8,7 @@
 #include "client/io/formats.h"
 #include "client/io/text.h"
 
-namespace shapedb {
+namespace shapedb::io {
 
 namespace {
 
@@ -125,4 +125,4 @@ bool looksLikeXyz(InputFile& file) {
     return parsePoint(file, line).has_value();
 }
 
-}  // namespace shapedb
+}  // namespace shapedb::io

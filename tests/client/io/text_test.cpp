@@ -9,7 +9,7 @@
 
 #include "core/base/random.h"
 
-namespace shapedb {
+namespace shapedb::io {
 namespace {
 
 double real(const std::string& word) {
@@ -89,4 +89,4 @@ TEST(Text, WordsArePartedByAnyBlanks) {
 }
 
 }  // namespace
-}  // namespace shapedb
+}  // namespace shapedb::io
