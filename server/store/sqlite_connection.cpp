@@ -21,7 +21,7 @@ bool isFull(int systemError) {
     return systemError == ENOSPC || systemError == EFBIG || systemError == EDQUOT;
 }
 
-ErrorCode codeOf(int sqliteCode, int systemError) {
+ErrorCode codeOf(int sqliteCode, bool full) {
     switch (sqliteCode & 0xff) {
         case SQLITE_FULL: return ErrorCode::kStorageFull;
         case SQLITE_CORRUPT:
@@ -37,10 +37,24 @@ ErrorCode codeOf(int sqliteCode, int systemError) {
         case SQLITE_IOERR:
             if (sqliteCode == SQLITE_IOERR_NOMEM) return ErrorCode::kOutOfMemory;
             if (sqliteCode == SQLITE_IOERR_CORRUPTFS) return ErrorCode::kDataLoss;
-            return isFull(systemError) ? ErrorCode::kStorageFull : ErrorCode::kStorage;
-        case SQLITE_CANTOPEN: return isFull(systemError) ? ErrorCode::kStorageFull : ErrorCode::kStorage;
+            return full ? ErrorCode::kStorageFull : ErrorCode::kStorage;
+        case SQLITE_CANTOPEN: return full ? ErrorCode::kStorageFull : ErrorCode::kStorage;
         default: return ErrorCode::kStorage;
     }
+}
+
+/// Whether the database file or its log last failed for want of room. The global errno is of
+/// no use: SQLite has rolled back since.
+bool filesAreFull(sqlite3* db) {
+    int last = 0;
+    sqlite3_file_control(db, "main", SQLITE_FCNTL_LAST_ERRNO, &last);
+    if (isFull(last)) return true;
+    sqlite3_file* log = nullptr;
+    sqlite3_file_control(db, "main", SQLITE_FCNTL_JOURNAL_POINTER, &log);
+    if (log == nullptr || log->pMethods == nullptr) return false;
+    last = 0;
+    log->pMethods->xFileControl(log, SQLITE_FCNTL_LAST_ERRNO, &last);
+    return isFull(last);
 }
 
 int openFlags(OpenMode mode) {
@@ -86,10 +100,11 @@ Connection::~Connection() {
 
 void Connection::raiseLast(int code) const {
     if (db_ == nullptr) throw std::bad_alloc();
-    const int systemError = sqlite3_system_errno(db_);
+    const bool full =
+        isFull(sqlite3_system_errno(db_)) || ((code & 0xff) == SQLITE_IOERR && filesAreFull(db_));
     std::string message = sqlite3_errmsg(db_);
     message += " (SQLite code " + std::to_string(code) + ")";
-    const ErrorCode mapped = codeOf(code, systemError);
+    const ErrorCode mapped = codeOf(code, full);
     if (mapped == ErrorCode::kStorageFull) message += "; make room on the device";
     throw Failure(mapped, std::move(message), true);
 }
