@@ -1,0 +1,231 @@
+#include "server/config/load.h"
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <sstream>
+#include <utility>
+
+#include <CLI/CLI.hpp>
+#include <toml++/toml.h>
+#include <unistd.h>
+
+#include "server/config/settings.h"
+
+namespace shapedb::config {
+namespace {
+
+constexpr const char* kPrefix = "SHAPEDB_";
+constexpr const char* kConfigVariable = "SHAPEDB_CONFIG";
+/// Read by other programs of the project, so not mistakes here.
+constexpr const char* kForeignVariables[] = {"SHAPEDB_DATA", "SHAPEDB_SERVER"};
+
+const Setting* findByKey(const std::string& key) {
+    const auto& all = settings();
+    const auto found = std::find_if(all.begin(), all.end(), [&](const Setting& s) { return s.key == key; });
+    return found == all.end() ? nullptr : &*found;
+}
+
+Result<void> assign(Loaded& loaded, const Setting& setting, const std::string& text,
+                    const std::string& origin) {
+    const Result<void> assigned = setting.assign(loaded.config, text);
+    if (!assigned) {
+        return fail(assigned.error().code, origin + ": " + setting.key + ": " + assigned.error().message);
+    }
+    loaded.origins[setting.key] = origin;
+    return {};
+}
+
+/// The text of a TOML value if its type is the setting's; empty otherwise.
+std::optional<std::string> textOf(const toml::node& node, SettingKind kind) {
+    if (const auto* integer = node.as_integer(); integer != nullptr && kind != SettingKind::kText) {
+        return std::to_string(integer->get());
+    }
+    if (const auto* text = node.as_string(); text != nullptr && kind != SettingKind::kInteger) {
+        return text->get();
+    }
+    return std::nullopt;
+}
+
+class FileReader {
+  public:
+    FileReader(Loaded& loaded, std::string path) : loaded_(loaded), path_(std::move(path)) {}
+
+    Result<void> read() {
+        std::ifstream stream(path_, std::ios::binary);
+        const std::string text((std::istreambuf_iterator<char>(stream)), std::istreambuf_iterator<char>());
+        if (!stream.is_open() || stream.bad()) {
+            return fail(
+                ErrorCode::kFileNotReadable,
+                "configuration file " + path_ + " cannot be read: check that it exists and may be read");
+        }
+        try {
+            return readTable(toml::parse(text, path_), "");
+        } catch (const toml::parse_error& error) {
+            return fail(ErrorCode::kMalformedFile,
+                        place(error.source().begin.line) + ": " + std::string(error.description()));
+        }
+    }
+
+  private:
+    std::string place(std::size_t line) const { return path_ + " line " + std::to_string(line); }
+
+    Result<void> readTable(const toml::table& table, const std::string& prefix) {
+        for (const auto& [name, node] : table) {
+            const std::string key = prefix + std::string(name.str());
+            const std::string where = place(node.source().begin.line);
+            const Setting* setting = findByKey(key);
+            if (setting != nullptr) {
+                const auto text = textOf(node, setting->kind);
+                if (!text) {
+                    return fail(
+                        ErrorCode::kInvalidArgument,
+                        where + ": " + key + " must be " +
+                            (setting->kind == SettingKind::kText ? "text in quotes" : "a whole number") +
+                            " (" + setting->range + ")");
+                }
+                if (const auto assigned = assign(loaded_, *setting, *text, where); !assigned) return assigned;
+            } else if (isTable(key) && node.is_table()) {
+                if (const auto read = readTable(*node.as_table(), key + "."); !read) return read;
+            } else {
+                return fail(ErrorCode::kInvalidArgument,
+                            where + ": unknown key " + key + "; shapedbd --help lists the settings");
+            }
+        }
+        return {};
+    }
+
+    static bool isTable(const std::string& key) {
+        const auto& all = settings();
+        return std::any_of(all.begin(), all.end(), [&](const Setting& s) {
+            return s.key.compare(0, key.size() + 1, key + ".") == 0;
+        });
+    }
+
+    Loaded& loaded_;
+    std::string path_;
+};
+
+struct Variables {
+    std::map<std::string, std::string> settings;  ///< key -> text
+    std::string configFile;
+};
+
+Result<Variables> readEnvironment(const std::vector<std::string>& environment) {
+    Variables variables;
+    for (const std::string& entry : environment) {
+        const std::size_t equals = entry.find('=');
+        const std::string name = entry.substr(0, equals);
+        if (name.compare(0, std::char_traits<char>::length(kPrefix), kPrefix) != 0) continue;
+        const std::string value = equals == std::string::npos ? "" : entry.substr(equals + 1);
+        const auto& all = settings();
+        const auto found =
+            std::find_if(all.begin(), all.end(), [&](const Setting& s) { return s.environment == name; });
+        if (found != all.end()) {
+            variables.settings[found->key] = value;
+        } else if (name == kConfigVariable) {
+            variables.configFile = value;
+        } else if (std::find(std::begin(kForeignVariables), std::end(kForeignVariables), name) ==
+                   std::end(kForeignVariables)) {
+            return fail(ErrorCode::kInvalidArgument, "unknown environment variable " + name +
+                                                         ": unset it; shapedbd --help lists the settings");
+        }
+    }
+    return variables;
+}
+
+std::string tomlString(const std::string& text) {
+    std::ostringstream out;
+    out << toml::value<std::string>(text);
+    return out.str();
+}
+
+}  // namespace
+
+Result<CommandLine> parseCommandLine(int argc, const char* const* argv) {
+    CommandLine commandLine;
+    CLI::App app("shapedbd: the ShapeDB server", "shapedbd");
+    bool checkConfig = false;
+    app.add_option("--config", commandLine.configFile, "Configuration file (TOML) [SHAPEDB_CONFIG]");
+    app.add_flag("--check-config", checkConfig,
+                 "Print the effective configuration and where each value comes from, and end");
+    app.set_version_flag("--version", std::string("shapedbd ") + version());
+    // Options write to these; a map's values stay where they are.
+    std::map<std::string, std::string> values;
+    std::vector<std::pair<std::string, CLI::Option*>> options;
+    const ServerConfig defaults;
+    for (const Setting& setting : settings()) {
+        const std::string shown = setting.show(defaults);
+        const std::string help = setting.help + " " + setting.range + ", default " +
+                                 (shown.empty() ? "empty" : shown) + " [" + setting.environment + "]";
+        options.emplace_back(setting.key, app.add_option(setting.flag, values[setting.key], help));
+    }
+    app.footer("Flags win over environment variables, these over the file, the file over the defaults.");
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::CallForHelp&) {
+        commandLine.action = Action::kPrint;
+        commandLine.text = app.help();
+        return commandLine;
+    } catch (const CLI::CallForVersion&) {
+        commandLine.action = Action::kPrint;
+        commandLine.text = std::string("shapedbd ") + version() + "\n";
+        return commandLine;
+    } catch (const CLI::ParseError& error) {
+        return fail(ErrorCode::kInvalidArgument,
+                    std::string(error.what()) + "; shapedbd --help lists the flags");
+    }
+    for (const auto& [key, option] : options) {
+        if (option->count() > 0) commandLine.flags[key] = values[key];
+    }
+    if (checkConfig) commandLine.action = Action::kCheckConfig;
+    return commandLine;
+}
+
+Result<Loaded> load(const CommandLine& commandLine, const std::vector<std::string>& environment) {
+    Loaded loaded;
+    for (const Setting& setting : settings()) loaded.origins[setting.key] = "default";
+
+    const Result<Variables> variables = readEnvironment(environment);
+    if (!variables) return fail(variables.error());
+
+    const std::string& file = commandLine.configFile.empty() ? variables->configFile : commandLine.configFile;
+    if (!file.empty()) {
+        if (const auto read = FileReader(loaded, file).read(); !read) return fail(read.error());
+    }
+    for (const auto& [key, text] : variables->settings) {
+        const Setting& setting = *findByKey(key);
+        const auto assigned = assign(loaded, setting, text, "environment " + setting.environment);
+        if (!assigned) return fail(assigned.error());
+    }
+    for (const auto& [key, text] : commandLine.flags) {
+        const Setting* setting = findByKey(key);
+        if (setting == nullptr) return fail(ErrorCode::kInternal, "no setting for flag of " + key);
+        const auto assigned = assign(loaded, *setting, text, "flag " + setting->flag);
+        if (!assigned) return fail(assigned.error());
+    }
+    if (const auto valid = validateTogether(loaded.config); !valid) return fail(valid.error());
+    return loaded;
+}
+
+std::string describe(const Loaded& loaded) {
+    std::ostringstream out;
+    for (const Setting& setting : settings()) {
+        const std::string text = setting.show(loaded.config);
+        const bool bare = setting.kind == SettingKind::kInteger;
+        out << setting.key << " = " << (bare ? text : tomlString(text)) << "  # "
+            << loaded.origins.at(setting.key) << '\n';
+    }
+    return out.str();
+}
+
+std::vector<std::string> processEnvironment() {
+    std::vector<std::string> all;
+    for (char** entry = environ; entry != nullptr && *entry != nullptr; ++entry) all.emplace_back(*entry);
+    return all;
+}
+
+const char* version() noexcept { return SHAPEDB_VERSION; }
+
+}  // namespace shapedb::config

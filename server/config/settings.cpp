@@ -1,0 +1,298 @@
+#include "server/config/settings.h"
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <limits>
+#include <thread>
+#include <utility>
+
+namespace shapedb::config {
+namespace {
+
+std::string quoted(const std::string& text) { return "'" + text + "'"; }
+
+Result<std::uint64_t> parseUnsigned(const std::string& text) {
+    std::uint64_t value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc() || end != text.data() + text.size() || text.empty()) {
+        return fail(ErrorCode::kInvalidArgument, quoted(text) + " is not a whole number of 0 or more");
+    }
+    return value;
+}
+
+struct Unit {
+    const char* name;
+    int shift;
+};
+constexpr Unit kUnits[] = {{"KiB", 10}, {"MiB", 20}, {"GiB", 30}, {"TiB", 40}};
+
+/// "65536", "64KiB", "4GiB".
+Result<std::uint64_t> parseBytes(const std::string& text) {
+    std::string digits = text;
+    int shift = 0;
+    for (const Unit& unit : kUnits) {
+        const std::string name = unit.name;
+        if (text.size() > name.size() && text.compare(text.size() - name.size(), name.size(), name) == 0) {
+            digits = text.substr(0, text.size() - name.size());
+            shift = unit.shift;
+        }
+    }
+    const Result<std::uint64_t> number = parseUnsigned(digits);
+    if (!number || *number > (std::numeric_limits<std::uint64_t>::max() >> shift)) {
+        return fail(ErrorCode::kInvalidArgument,
+                    quoted(text) + " is not a number of bytes such as 65536, 64KiB, 64MiB or 4GiB");
+    }
+    return *number << shift;
+}
+
+std::string showBytes(std::uint64_t bytes) {
+    for (auto unit = std::rbegin(kUnits); unit != std::rend(kUnits); ++unit) {
+        const std::uint64_t size = std::uint64_t{1} << unit->shift;
+        if (bytes >= size && bytes % size == 0) return std::to_string(bytes / size) + unit->name;
+    }
+    return std::to_string(bytes);
+}
+
+/// SHAPEDB_INGEST_MAX_QUEUED_JOBS of "ingest.max_queued_jobs".
+std::string environmentName(const std::string& key) {
+    std::string name = "SHAPEDB_";
+    for (const char c : key) {
+        name += c == '.' ? '_' : static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+    }
+    return name;
+}
+
+/// --ingest-max-queued-jobs of "ingest.max_queued_jobs".
+std::string flagName(const std::string& key) {
+    std::string name = "--" + key;
+    std::replace(name.begin(), name.end(), '.', '-');
+    std::replace(name.begin(), name.end(), '_', '-');
+    return name;
+}
+
+Setting named(const std::string& key, SettingKind kind, std::string range, std::string help) {
+    Setting setting;
+    setting.key = key;
+    setting.environment = environmentName(key);
+    setting.flag = flagName(key);
+    setting.kind = kind;
+    setting.range = std::move(range);
+    setting.help = std::move(help);
+    return setting;
+}
+
+/// A number in [low, high]; `field` returns a reference to its place in a ServerConfig.
+template <typename Field>
+Setting number(const std::string& key, SettingKind kind, std::uint64_t low, std::uint64_t high, Field field,
+               std::string help) {
+    const auto show = [kind](std::uint64_t value) {
+        return kind == SettingKind::kBytes ? showBytes(value) : std::to_string(value);
+    };
+    Setting setting = named(key, kind, show(low) + " to " + show(high), std::move(help));
+    setting.assign = [=](ServerConfig& config, const std::string& text) -> Result<void> {
+        const auto value = kind == SettingKind::kBytes ? parseBytes(text) : parseUnsigned(text);
+        if (!value) return fail(value.error());
+        if (*value < low || *value > high) {
+            return fail(ErrorCode::kInvalidArgument,
+                        quoted(text) + " is outside " + show(low) + " to " + show(high));
+        }
+        auto& place = field(config);
+        place = static_cast<std::decay_t<decltype(place)>>(*value);
+        return {};
+    };
+    setting.show = [=](const ServerConfig& config) {
+        return show(static_cast<std::uint64_t>(field(const_cast<ServerConfig&>(config))));
+    };
+    return setting;
+}
+
+template <typename Field>
+Setting choice(const std::string& key, std::vector<std::string> names, Field field, std::string help) {
+    std::string list;
+    for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
+    Setting setting = named(key, SettingKind::kText, list, std::move(help));
+    setting.assign = [=](ServerConfig& config, const std::string& text) -> Result<void> {
+        if (std::find(names.begin(), names.end(), text) == names.end()) {
+            return fail(ErrorCode::kInvalidArgument, quoted(text) + " is none of " + list);
+        }
+        field(config) = text;
+        return {};
+    };
+    setting.show = [=](const ServerConfig& config) { return field(const_cast<ServerConfig&>(config)); };
+    return setting;
+}
+
+/// True for bytes a path or address may hold.
+bool printable(const std::string& text) {
+    return std::none_of(text.begin(), text.end(),
+                        [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; });
+}
+
+Setting listenSetting() {
+    Setting setting = named("listen", SettingKind::kText, "HOST:PORT",
+                            "Address to serve on. Port 0 picks a free one; IPv6 hosts in brackets.");
+    setting.assign = [](ServerConfig& config, const std::string& text) -> Result<void> {
+        const Result<Endpoint> endpoint = parseEndpoint(text);
+        if (!endpoint) return fail(endpoint.error());
+        config.listen = text;
+        return {};
+    };
+    setting.show = [](const ServerConfig& config) { return config.listen; };
+    return setting;
+}
+
+Setting dataSetting() {
+    Setting setting = named("data", SettingKind::kText, "a path",
+                            "Directory of the database; created when missing. One server at a time.");
+    // SHAPEDB_DATA is where the tests look for public models.
+    setting.environment = "SHAPEDB_DATA_DIR";
+    setting.assign = [](ServerConfig& config, const std::string& text) -> Result<void> {
+        if (text.empty()) return fail(ErrorCode::kInvalidArgument, "the path is empty");
+        if (!printable(text)) return fail(ErrorCode::kInvalidArgument, "the path has a control character");
+        config.data = text;
+        return {};
+    };
+    setting.show = [](const ServerConfig& config) { return config.data; };
+    return setting;
+}
+
+Setting logFileSetting() {
+    Setting setting = named("log.file", SettingKind::kText, "a path or empty",
+                            "File to append the log to. Empty: standard error.");
+    setting.assign = [](ServerConfig& config, const std::string& text) -> Result<void> {
+        if (!printable(text)) return fail(ErrorCode::kInvalidArgument, "the path has a control character");
+        config.log.file = text;
+        return {};
+    };
+    setting.show = [](const ServerConfig& config) { return config.log.file; };
+    return setting;
+}
+
+std::vector<Setting> makeSettings() {
+    constexpr SettingKind kInteger = SettingKind::kInteger;
+    constexpr SettingKind kBytes = SettingKind::kBytes;
+    constexpr std::uint64_t kMiB = std::uint64_t{1} << 20;
+    constexpr std::uint64_t kTiB = std::uint64_t{1} << 40;
+    using C = ServerConfig;
+    return {
+        listenSetting(),
+        dataSetting(),
+        number(
+            "ingest.threads", kInteger, 0, 256, [](C& c) -> int& { return c.ingest.threads; },
+            "Segmentation workers. 0: one for each processor."),
+        number(
+            "ingest.max_queued_jobs", kInteger, 1, 10'000'000,
+            [](C& c) -> std::uint64_t& { return c.ingest.maxQueuedJobs; },
+            "Scans waiting for segmentation at most; more are refused with a retry hint."),
+        number(
+            "ingest.max_queued_bytes", kBytes, kMiB, kTiB,
+            [](C& c) -> std::uint64_t& { return c.ingest.maxQueuedBytes; },
+            "Bytes of points waiting for segmentation at most."),
+        number(
+            "ingest.max_attempts", kInteger, 1, 10, [](C& c) -> int& { return c.ingest.maxAttempts; },
+            "Times one scan may bring the process down before it is set aside as failed."),
+        number(
+            "limits.max_points", kInteger, 4, 50'000'000,
+            [](C& c) -> std::uint64_t& { return c.limits.maxPoints; }, "Points of one scan at most."),
+        number(
+            "limits.max_k", kInteger, 1, 100'000, [](C& c) -> std::uint32_t& { return c.limits.maxK; },
+            "Hits a search may ask for."),
+        number(
+            "limits.max_batch", kInteger, 1, 1'000, [](C& c) -> std::uint32_t& { return c.limits.maxBatch; },
+            "Queries of one SearchBatch at most."),
+        number(
+            "limits.max_upload_bytes", kBytes, kMiB, kTiB,
+            [](C& c) -> std::uint64_t& { return c.limits.maxUploadBytes; },
+            "Bytes of points that all running uploads may hold in memory together."),
+        number(
+            "store.readers", kInteger, 1, 64, [](C& c) -> int& { return c.store.readers; },
+            "Pooled read connections to the database."),
+        number(
+            "store.compression_level", kInteger, 1, 19, [](C& c) -> int& { return c.store.compressionLevel; },
+            "zstd level of stored points. Higher: smaller and slower."),
+        number(
+            "search.threads", kInteger, 0, 256, [](C& c) -> int& { return c.search.threads; },
+            "Processors all searches share. 0: all."),
+        number(
+            "rebuild.threads", kInteger, 0, 256, [](C& c) -> int& { return c.rebuild.threads; },
+            "Processors a rebuild uses. 0: all."),
+        choice(
+            "log.level", {"trace", "debug", "info", "warn", "error"},
+            [](C& c) -> std::string& { return c.log.level; }, "The least important lines to write."),
+        choice(
+            "log.format", {"text", "json"}, [](C& c) -> std::string& { return c.log.format; },
+            "text for people, json (one object a line) for machines."),
+        logFileSetting(),
+        number(
+            "shutdown.drain_seconds", kInteger, 0, 3'600,
+            [](C& c) -> int& { return c.shutdown.drainSeconds; },
+            "How long running calls may take to finish after SIGTERM."),
+    };
+}
+
+}  // namespace
+
+int threadsOrProcessors(int configured) noexcept {
+    if (configured > 0) return configured;
+    return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
+bool Endpoint::isLoopback() const {
+    return host == "localhost" || host == "::1" || host.compare(0, 4, "127.") == 0;
+}
+
+std::string Endpoint::text() const {
+    const bool v6 = host.find(':') != std::string::npos;
+    return (v6 ? "[" + host + "]" : host) + ":" + std::to_string(port);
+}
+
+const std::vector<Setting>& settings() {
+    static const std::vector<Setting> table = makeSettings();
+    return table;
+}
+
+Result<void> validateTogether(const ServerConfig& config) {
+    const std::uint64_t scan = config.limits.maxPoints * 12;
+    const auto tooSmall = [&](const char* key) {
+        return fail(ErrorCode::kInvalidArgument,
+                    std::string(key) + " is smaller than one scan of limits.max_points (" +
+                        std::to_string(config.limits.maxPoints) + " points, " + std::to_string(scan) +
+                        " bytes): raise it or lower limits.max_points");
+    };
+    if (config.limits.maxUploadBytes < scan) return tooSmall("limits.max_upload_bytes");
+    if (config.ingest.maxQueuedBytes < scan) return tooSmall("ingest.max_queued_bytes");
+    return {};
+}
+
+Result<Endpoint> parseEndpoint(const std::string& listen) {
+    const auto bad = [&](const std::string& why) {
+        return fail(ErrorCode::kInvalidArgument, quoted(listen) + " is not HOST:PORT: " + why +
+                                                     "; for example 127.0.0.1:7878 or [::1]:7878");
+    };
+    const std::size_t colon = listen.rfind(':');
+    if (colon == std::string::npos) return bad("there is no port");
+    Endpoint endpoint;
+    endpoint.host = listen.substr(0, colon);
+    const bool bracketed =
+        endpoint.host.size() > 2 && endpoint.host.front() == '[' && endpoint.host.back() == ']';
+    if (bracketed) {
+        endpoint.host = endpoint.host.substr(1, endpoint.host.size() - 2);
+    } else if (endpoint.host.find(':') != std::string::npos) {
+        return bad("an IPv6 host stands in brackets");
+    }
+    if (endpoint.host.empty()) return bad("there is no host");
+    const auto hostByte = [](char c) {
+        return std::isalnum(static_cast<unsigned char>(c)) || c == '.' || c == '-' || c == ':' || c == '_' ||
+               c == '%';
+    };
+    if (!std::all_of(endpoint.host.begin(), endpoint.host.end(), hostByte)) {
+        return bad("the host has a character no host has");
+    }
+    const Result<std::uint64_t> port = parseUnsigned(listen.substr(colon + 1));
+    if (!port || *port > 65'535) return bad("the port is not 0 to 65535");
+    endpoint.port = static_cast<int>(*port);
+    return endpoint;
+}
+
+}  // namespace shapedb::config

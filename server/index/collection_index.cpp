@@ -1,0 +1,297 @@
+#include "server/index/collection_index.h"
+
+#include <algorithm>
+#include <exception>
+#include <new>
+#include <optional>
+#include <utility>
+
+#include "core/signature/signature_codec.h"
+#include "server/index/parameters_codec.h"
+
+namespace shapedb::index {
+namespace {
+
+/// Rows of one read: large enough to be cheap, small enough to leave the writer its turn.
+constexpr std::size_t kLoadBatch = 2'000;
+
+/// Empty when the signature is damaged; the damage is logged.
+SignatureSet::EntryPtr makeEntry(const store::Shape& shape, const std::string& bytes,
+                                 telemetry::Logger& log) {
+    Result<Signature> signature = decodeSignature(bytes);
+    if (!signature) {
+        auto fields = telemetry::fieldsOf(signature.error());
+        fields.push_back({"shape", shape.id});
+        fields.push_back({"key", shape.key});
+        log.error("stored signature is damaged: left out of searches until a rebuild", fields);
+        return nullptr;
+    }
+    auto entry = std::make_shared<IndexEntry>();
+    entry->id = shape.id;
+    entry->key = shape.key;
+    entry->metadata = shape.metadata;
+    entry->signature = std::move(*signature);
+    return entry;
+}
+
+Result<ShapeParameters> parametersOf(const store::Collection& collection) {
+    Result<ShapeParameters> parameters = decodeParameters(collection.parameters);
+    if (!parameters) {
+        return fail(parameters.error().code,
+                    "collection '" + collection.name + "': " + parameters.error().message);
+    }
+    return parameters;
+}
+
+/// Runs `work`; an allocation that fails becomes an error.
+template <typename Work>
+auto guarded(Work&& work) -> decltype(work()) {
+    try {
+        return work();
+    } catch (const std::bad_alloc&) {
+        return fail(ErrorCode::kOutOfMemory, "not enough memory for the cached signatures");
+    }
+}
+
+}  // namespace
+
+/// Lock order: gate, apply, then dirty or pointer (never both).
+struct CollectionIndex::Slot {
+    std::shared_mutex gate;  ///< shared: storing a signature; exclusive: switching generation
+    std::mutex apply;        ///< one update at a time
+    bool stale = false;      ///< under apply: an update failed, the next one reads everything anew
+    std::mutex dirtyMutex;
+    std::vector<std::int64_t> dirty;  ///< shapes to read again
+    std::mutex pointerMutex;
+    SnapshotPtr snapshot;
+
+    SnapshotPtr current() {
+        const std::lock_guard<std::mutex> lock(pointerMutex);
+        return snapshot;
+    }
+    void publish(SnapshotPtr next) {
+        // The old snapshot may be the last reference to a million entries: freed outside the lock.
+        const std::lock_guard<std::mutex> lock(pointerMutex);
+        snapshot.swap(next);
+    }
+    std::vector<std::int64_t> takeDirty() {
+        const std::lock_guard<std::mutex> lock(dirtyMutex);
+        return std::exchange(dirty, {});
+    }
+    void mark(const std::vector<std::int64_t>& ids) {
+        const std::lock_guard<std::mutex> lock(dirtyMutex);
+        dirty.insert(dirty.end(), ids.begin(), ids.end());
+    }
+};
+
+CollectionIndex::CollectionIndex(store::Store& store, telemetry::LoggerPtr log)
+    : store_(store), log_(std::move(log)) {}
+
+CollectionIndex::~CollectionIndex() = default;
+
+Result<SnapshotPtr> CollectionIndex::read(const store::Collection& collection,
+                                          const RunContext& context) const {
+    auto snapshot = std::make_shared<Snapshot>();
+    snapshot->collection = collection;
+    Result<ShapeParameters> parameters = parametersOf(collection);
+    if (!parameters) return fail(parameters.error());
+    snapshot->parameters = *parameters;
+
+    std::vector<SignatureSet::EntryPtr> entries;
+    std::int64_t afterId = 0;
+    for (;;) {
+        if (const auto go = context.checkpoint(); !go) return fail(go.error());
+        const auto rows = store_.loadIndex(collection.id, afterId, kLoadBatch);
+        if (!rows) return fail(rows.error());
+        for (const store::IndexRow& row : *rows) {
+            if (auto entry = makeEntry(row.shape, row.signature.bytes, *log_))
+                entries.push_back(std::move(entry));
+        }
+        if (rows->size() < kLoadBatch) break;
+        afterId = rows->back().shape.id;
+    }
+    snapshot->signatures = SignatureSet().with(std::move(entries), {});
+    return SnapshotPtr(std::move(snapshot));
+}
+
+void CollectionIndex::insert(Directory& directory, SlotPtr slot) const {
+    const store::Collection& collection = slot->current()->collection;
+    directory.byId[collection.id] = slot;
+    directory.byName[collection.name] = std::move(slot);
+}
+
+Result<void> CollectionIndex::loadAll(const RunContext& context) {
+    return guarded([&] { return loadAllUnguarded(context); });
+}
+
+Result<void> CollectionIndex::loadAllUnguarded(const RunContext& context) {
+    const auto collections = store_.listCollections();
+    if (!collections) return fail(collections.error());
+    Directory next;
+    for (const store::Collection& collection : *collections) {
+        Result<SnapshotPtr> snapshot = read(collection, context);
+        if (!snapshot) return fail(snapshot.error());
+        auto slot = std::make_shared<Slot>();
+        slot->publish(*snapshot);
+        insert(next, std::move(slot));
+    }
+    const std::lock_guard<std::mutex> lock(mutex_);
+    std::swap(directory_, next);
+    return {};
+}
+
+Result<SnapshotPtr> CollectionIndex::byName(const std::string& name) const {
+    SlotPtr slot;
+    {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        const auto found = directory_.byName.find(name);
+        if (found != directory_.byName.end()) slot = found->second;
+    }
+    if (!slot) return fail(ErrorCode::kNotFound, "there is no collection '" + name + "': create it first");
+    return slot->current();
+}
+
+CollectionIndex::SlotPtr CollectionIndex::find(std::int64_t collectionId) const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const auto found = directory_.byId.find(collectionId);
+    return found == directory_.byId.end() ? nullptr : found->second;
+}
+
+Result<SnapshotPtr> CollectionIndex::byId(std::int64_t collectionId) const {
+    const SlotPtr slot = find(collectionId);
+    if (!slot) return fail(ErrorCode::kNotFound, "there is no collection " + std::to_string(collectionId));
+    return slot->current();
+}
+
+std::vector<SnapshotPtr> CollectionIndex::all() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    std::vector<SnapshotPtr> snapshots;
+    for (const auto& [name, slot] : directory_.byName) snapshots.push_back(slot->current());
+    return snapshots;
+}
+
+Result<SnapshotPtr> CollectionIndex::add(const store::Collection& collection) {
+    auto snapshot = std::make_shared<Snapshot>();
+    snapshot->collection = collection;
+    Result<ShapeParameters> parameters = parametersOf(collection);
+    if (!parameters) return fail(parameters.error());
+    snapshot->parameters = *parameters;
+    auto slot = std::make_shared<Slot>();
+    slot->publish(snapshot);
+    const std::lock_guard<std::mutex> lock(mutex_);
+    insert(directory_, std::move(slot));
+    return SnapshotPtr(snapshot);
+}
+
+void CollectionIndex::remove(std::int64_t collectionId) {
+    SlotPtr removed;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const auto found = directory_.byId.find(collectionId);
+    if (found == directory_.byId.end()) return;
+    removed = found->second;
+    directory_.byName.erase(removed->current()->collection.name);
+    directory_.byId.erase(found);
+}
+
+Result<void> CollectionIndex::refresh(std::int64_t collectionId, std::int64_t shapeId) {
+    const SlotPtr slot = find(collectionId);
+    if (!slot) return {};
+    return guarded([&] {
+        slot->mark({shapeId});
+        const std::lock_guard<std::mutex> lock(slot->apply);
+        return slot->stale ? reloadLocked(*slot) : applyDirty(*slot);
+    });
+}
+
+/// Applies what is marked; finds nothing when the thread before took our mark along.
+Result<void> CollectionIndex::applyDirty(Slot& slot) {
+    std::vector<std::int64_t> ids = slot.takeDirty();
+    if (ids.empty()) return {};
+    std::sort(ids.begin(), ids.end());
+    ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+
+    const bool wasStale = std::exchange(slot.stale, true);  // until all is applied
+    const SnapshotPtr before = slot.current();
+    std::vector<SignatureSet::EntryPtr> updates;
+    std::vector<std::int64_t> removed;
+    for (const std::int64_t id : ids) {
+        const auto shape = store_.getShapeById(id);
+        auto row = shape ? store_.getSignature(id) : Result<store::SignatureRow>(fail(shape.error()));
+        if (!row && row.error().code != ErrorCode::kNotFound && row.error().code != ErrorCode::kNotReady) {
+            return fail(row.error());
+        }
+        // Of another generation: a switch is being completed, and its reload brings this shape.
+        if (row && row->generation != before->collection.generation) continue;
+        SignatureSet::EntryPtr entry = row ? makeEntry(*shape, row->bytes, *log_) : nullptr;
+        if (entry) {
+            updates.push_back(std::move(entry));
+        } else {
+            removed.push_back(id);
+        }
+    }
+    auto next = std::make_shared<Snapshot>(*before);
+    next->signatures = before->signatures.with(std::move(updates), std::move(removed));
+    slot.publish(std::move(next));
+    slot.stale = wasStale;
+    return {};
+}
+
+Result<void> CollectionIndex::reloadLocked(Slot& slot) {
+    slot.stale = true;
+    // What is marked by now will be read. Later marks may or may not be, and are applied after.
+    slot.takeDirty();
+    const auto collection = store_.getCollection(slot.current()->collection.name);
+    if (!collection) return fail(collection.error());
+    Result<SnapshotPtr> snapshot = read(*collection, {});
+    if (!snapshot) return fail(snapshot.error());
+    slot.publish(*snapshot);
+    slot.stale = false;
+    return applyDirty(slot);
+}
+
+Result<void> CollectionIndex::reload(std::int64_t collectionId) {
+    const SlotPtr slot = find(collectionId);
+    if (!slot) return fail(ErrorCode::kNotFound, "there is no collection " + std::to_string(collectionId));
+    return guarded([&] {
+        const std::lock_guard<std::mutex> lock(slot->apply);
+        return reloadLocked(*slot);
+    });
+}
+
+bool CollectionIndex::whileGeneration(std::int64_t collectionId, std::int64_t generation,
+                                      const std::function<void()>& commit) {
+    const SlotPtr slot = find(collectionId);
+    if (!slot) return false;
+    const std::shared_lock<std::shared_mutex> gate(slot->gate);
+    {
+        const std::lock_guard<std::mutex> lock(slot->apply);
+        if (slot->stale && !guarded([&] { return reloadLocked(*slot); })) return false;
+    }
+    if (slot->current()->collection.generation != generation) return false;
+    commit();
+    return true;
+}
+
+Result<bool> CollectionIndex::switchGeneration(std::int64_t collectionId,
+                                               const std::function<Result<bool>()>& change) {
+    const SlotPtr slot = find(collectionId);
+    if (!slot) return fail(ErrorCode::kNotFound, "there is no collection " + std::to_string(collectionId));
+    const std::unique_lock<std::shared_mutex> gate(slot->gate);
+    const Result<bool> changed = change();
+    if (!changed || !*changed) return changed;
+    const std::lock_guard<std::mutex> lock(slot->apply);
+    const Result<void> reloaded = guarded([&] { return reloadLocked(*slot); });
+    if (!reloaded) return fail(reloaded.error());
+    return true;
+}
+
+CollectionIndex::Totals CollectionIndex::totals() const {
+    Totals totals;
+    for (const SnapshotPtr& snapshot : all()) {
+        totals.signatures += snapshot->signatures.size();
+        totals.bytes += snapshot->signatures.memoryBytes();
+    }
+    return totals;
+}
+
+}  // namespace shapedb::index

@@ -1,0 +1,22 @@
+// The text in which a collection's parameters are stored: JSON with every field.
+//
+// The names are persisted: never rename one. A field added later takes, in older text, the
+// default of the stored profile.
+#pragma once
+
+#include <string>
+
+#include "core/base/error.h"
+#include "core/signature/profile.h"
+
+namespace shapedb::index {
+
+/// One line, fields in a fixed order, numbers that read back bit for bit: equal parameters
+/// give equal text.
+[[nodiscard]] std::string encodeParameters(const ShapeParameters& parameters);
+
+/// The inverse. Errors: kDataLoss (not JSON, unknown or doubled key, wrong type, value outside its range:
+/// the message names the field): the text came from our own database.
+[[nodiscard]] Result<ShapeParameters> decodeParameters(const std::string& text);
+
+}  // namespace shapedb::index

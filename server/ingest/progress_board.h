@@ -1,0 +1,71 @@
+// Where running segmentations stand, for those who watch or wait.
+//
+// The board says that something changed; what a shape's state is, only the store says.
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+
+namespace shapedb::ingest {
+
+/// Thread-safe. Must outlive its watches.
+class ProgressBoard {
+  public:
+    using Clock = std::chrono::steady_clock;
+
+    struct Status {
+        std::string stage = "queued";  ///< or the name of the stage being run
+        std::uint64_t done = 0;        ///< of total, in the stage's own unit
+        std::uint64_t total = 0;       ///< 0: unknown
+        std::uint64_t sequence = 0;    ///< rises with each change of this shape
+    };
+
+    /// A worker is at this point of this shape. Watchers hear of a new stage at once, of
+    /// progress inside one at most every 50 ms. `stage` must be static.
+    void report(std::int64_t shapeId, const char* stage, std::uint64_t done, std::uint64_t total);
+    /// No worker has the shape any more; its state in the store may have changed.
+    void settled(std::int64_t shapeId);
+
+    /// Interest in one shape, until destroyed.
+    class Watch {
+      public:
+        ~Watch();
+        Watch(const Watch&) = delete;
+        Watch& operator=(const Watch&) = delete;
+
+        [[nodiscard]] Status status() const;
+        /// Returns when the sequence is no longer `seen`, or at `until`.
+        void waitForChange(std::uint64_t seen, Clock::time_point until) const;
+
+      private:
+        friend class ProgressBoard;
+        Watch(ProgressBoard& board, std::int64_t shapeId) : board_(board), shapeId_(shapeId) {}
+
+        ProgressBoard& board_;
+        std::int64_t shapeId_;
+    };
+
+    [[nodiscard]] std::unique_ptr<Watch> watch(std::int64_t shapeId);
+
+  private:
+    struct Entry {
+        Status status;
+        bool running = false;
+        int watchers = 0;
+        Clock::time_point announced{};
+        std::condition_variable changed;
+    };
+
+    /// Drops the entry when neither a worker nor a watcher needs it. Under mutex_.
+    void release(std::map<std::int64_t, std::unique_ptr<Entry>>::iterator entry);
+
+    mutable std::mutex mutex_;
+    std::map<std::int64_t, std::unique_ptr<Entry>> entries_;
+};
+
+}  // namespace shapedb::ingest

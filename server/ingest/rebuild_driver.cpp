@@ -1,0 +1,304 @@
+#include "server/ingest/rebuild_driver.h"
+
+#include <algorithm>
+#include <exception>
+#include <new>
+#include <string>
+#include <utility>
+
+#include "core/signature/signature_codec.h"
+#include "server/index/parameters_codec.h"
+
+namespace shapedb::ingest {
+namespace {
+
+/// How often a waiting caller looks at its cancel flag, and at the counts in the store.
+constexpr std::chrono::milliseconds kLook{50};
+constexpr std::chrono::milliseconds kCount{200};
+/// Before a pass that found nothing left but could not finish is repeated.
+constexpr std::chrono::milliseconds kAnotherPass{50};
+
+bool sameProgress(const store::Rebuild& a, const store::Rebuild& b) {
+    return a.state == b.state && a.done == b.done && a.failed == b.failed && a.total == b.total;
+}
+
+std::vector<telemetry::Field> fieldsOf(const store::Rebuild& rebuild, const Error& error) {
+    auto fields = telemetry::fieldsOf(error);
+    fields.push_back({"rebuild", rebuild.id});
+    return fields;
+}
+
+}  // namespace
+
+RebuildDriver::RebuildDriver(store::Store& store, index::CollectionIndex& index, WorkerPool& pool,
+                             Describer describe, telemetry::LoggerPtr log, RebuildOptions options)
+    : store_(store),
+      index_(index),
+      pool_(pool),
+      describe_(std::move(describe)),
+      log_(std::move(log)),
+      options_(options) {}
+
+RebuildDriver::~RebuildDriver() { stop(); }
+
+Result<void> RebuildDriver::enqueueRunning() {
+    const auto running = store_.runningRebuilds();
+    if (!running) return fail(running.error());
+    const std::lock_guard<std::mutex> lock(mutex_);
+    queue_.assign(running->begin(), running->end());
+    return {};
+}
+
+Result<void> RebuildDriver::start() {
+    if (const auto queued = enqueueRunning(); !queued) return queued;
+    for (int i = 0; i < std::max(1, options_.threads); ++i) threads_.emplace_back([this] { run(); });
+    return {};
+}
+
+Result<store::Rebuild> RebuildDriver::begin(const store::Collection& collection,
+                                            const ShapeParameters& parameters) {
+    const std::lock_guard<std::mutex> one(beginMutex_);
+    const std::string text = index::encodeParameters(parameters);
+    const auto running = store_.runningRebuilds();
+    if (!running) return fail(running.error());
+    for (const store::Rebuild& rebuild : *running) {
+        if (rebuild.collectionId != collection.id) continue;
+        if (rebuild.parameters == text) return rebuild;
+        return fail(ErrorCode::kRejected, "a rebuild of collection '" + collection.name +
+                                              "' with other parameters is running: wait for it or cancel it");
+    }
+    auto started = store_.startRebuild(collection.id, text);
+    if (!started) return started;
+    log_->info("rebuild started", {{"collection", collection.name},
+                                   {"rebuild", started->id},
+                                   {"generation", started->targetGeneration},
+                                   {"shapes", started->total}});
+    const std::lock_guard<std::mutex> lock(mutex_);
+    queue_.push_back(*started);
+    changed_.notify_all();
+    return started;
+}
+
+Result<store::Rebuild> RebuildDriver::waitForChange(const store::Rebuild& seen, const RunContext& context) {
+    for (auto nextCount = RunContext::Clock::now();;) {
+        if (const auto go = context.checkpoint(); !go) return fail(go.error());
+        if (RunContext::Clock::now() >= nextCount) {
+            auto now = store_.getRebuild(seen.id);
+            if (!now || !sameProgress(*now, seen)) return now;
+            nextCount = RunContext::Clock::now() + kCount;
+        }
+        std::unique_lock<std::mutex> lock(mutex_);
+        changed_.wait_for(lock, kLook);
+    }
+}
+
+Result<void> RebuildDriver::cancel(const store::Collection& collection) {
+    const std::lock_guard<std::mutex> one(beginMutex_);
+    {
+        std::unique_lock<std::mutex> lock(mutex_);
+        const auto isIts = [&](const store::Rebuild& rebuild) {
+            return rebuild.collectionId == collection.id;
+        };
+        queue_.erase(std::remove_if(queue_.begin(), queue_.end(), isIts), queue_.end());
+        if (const ActivePtr active = active_; active && isIts(active->rebuild)) {
+            active->cancel = true;
+            changed_.notify_all();
+            changed_.wait(lock, [&] { return active->inFlight == 0 && !active->reading; });
+            if (active_ == active) active_.reset();
+            changed_.notify_all();
+        }
+    }
+    const auto running = store_.runningRebuilds();
+    if (!running) return fail(running.error());
+    for (const store::Rebuild& rebuild : *running) {
+        if (rebuild.collectionId != collection.id) continue;
+        const auto abandoned = store_.abandonRebuild(rebuild.id, store::RebuildState::kCancelled);
+        log_->info("rebuild cancelled", {{"collection", collection.name}, {"rebuild", rebuild.id}});
+        const std::lock_guard<std::mutex> lock(mutex_);
+        changed_.notify_all();
+        return abandoned;
+    }
+    return fail(ErrorCode::kNotFound, "no rebuild of collection '" + collection.name + "' is running");
+}
+
+void RebuildDriver::waitUntilQuiet(std::unique_lock<std::mutex>& lock) {
+    if (active_) active_->cancel = true;
+    changed_.notify_all();
+    changed_.wait(lock, [this] { return !active_ || (active_->inFlight == 0 && !active_->reading); });
+    active_.reset();
+    queue_.clear();
+}
+
+void RebuildDriver::pause() {
+    std::unique_lock<std::mutex> lock(mutex_);
+    paused_ = true;
+    waitUntilQuiet(lock);
+}
+
+Result<void> RebuildDriver::resume() {
+    const Result<void> queued = enqueueRunning();
+    const std::lock_guard<std::mutex> lock(mutex_);
+    paused_ = false;
+    changed_.notify_all();
+    return queued;
+}
+
+void RebuildDriver::stop() {
+    {
+        std::unique_lock<std::mutex> lock(mutex_);
+        stopping_ = true;
+        waitUntilQuiet(lock);
+    }
+    for (std::thread& thread : threads_) thread.join();
+    threads_.clear();
+}
+
+void RebuildDriver::rest(std::unique_lock<std::mutex>& lock, std::chrono::milliseconds time) {
+    changed_.wait_for(lock, time, [this] { return stopping_ || paused_ || (active_ && active_->cancel); });
+}
+
+void RebuildDriver::run() {
+    std::unique_lock<std::mutex> lock(mutex_);
+    for (;;) {
+        changed_.wait(lock, [this] { return stopping_ || (!paused_ && (active_ || !queue_.empty())); });
+        if (stopping_) return;
+        const ActivePtr active = activate(lock);
+        if (!active) continue;
+        if (active->cancel) {
+            // Whoever cancelled it waits for the others and clears it.
+            changed_.wait(lock, [&] { return stopping_ || active_ != active; });
+        } else if (!active->batch.empty()) {
+            rebuildOne(active, lock);
+        } else if (!active->reading && active->inFlight == 0) {
+            readBatch(active, lock);
+        } else {
+            // The rest of the batch is in other hands, or another thread reads the next one.
+            changed_.wait(lock, [&] {
+                return stopping_ || active_ != active || active->cancel || !active->batch.empty() ||
+                       (!active->reading && active->inFlight == 0);
+            });
+        }
+    }
+}
+
+/// The rebuild to work on; null when it had to be dropped.
+RebuildDriver::ActivePtr RebuildDriver::activate(std::unique_lock<std::mutex>& lock) {
+    if (active_) return active_;
+    const store::Rebuild rebuild = queue_.front();
+    queue_.pop_front();
+    const auto parameters = index::decodeParameters(rebuild.parameters);
+    if (parameters) {
+        active_ = std::make_shared<Active>();
+        active_->rebuild = rebuild;
+        active_->parameters = *parameters;
+        return active_;
+    }
+    log_->error("rebuild given up", fieldsOf(rebuild, parameters.error()));
+    lock.unlock();
+    const auto abandoned = store_.abandonRebuild(rebuild.id, store::RebuildState::kFailed);
+    if (!abandoned) log_->error("rebuild cannot be ended", fieldsOf(rebuild, abandoned.error()));
+    lock.lock();
+    return nullptr;
+}
+
+void RebuildDriver::retire(const ActivePtr& active) {
+    if (active_ == active) active_.reset();
+}
+
+/// Reads the next shapes, or finishes when there are none. Under the lock but for the store.
+void RebuildDriver::readBatch(const ActivePtr& active, std::unique_lock<std::mutex>& lock) {
+    active->reading = true;
+    lock.unlock();
+    const auto shapes = store_.rebuildBatch(active->rebuild.id, active->afterId, options_.batch);
+    lock.lock();
+    if (!shapes) {
+        if (shapes.error().code == ErrorCode::kNotFound) {
+            retire(active);  // deleted with its collection
+        } else {
+            log_->error("rebuild cannot read its next shapes", fieldsOf(active->rebuild, shapes.error()));
+            rest(lock, options_.backOff);
+        }
+    } else if (!shapes->empty()) {
+        active->batch.assign(shapes->begin(), shapes->end());
+        active->afterId = shapes->back().id;
+    } else if (active->afterId != 0) {
+        active->afterId = 0;  // another pass for what came meanwhile
+    } else {
+        finish(active, lock);
+    }
+    active->reading = false;
+    changed_.notify_all();
+}
+
+void RebuildDriver::finish(const ActivePtr& active, std::unique_lock<std::mutex>& lock) {
+    if (active->cancel) return;
+    const store::Rebuild& rebuild = active->rebuild;
+    lock.unlock();
+    const auto finished =
+        index_.switchGeneration(rebuild.collectionId, [&] { return store_.finishRebuild(rebuild.id); });
+    // The store alone knows whether it is done: the reload of the index may have failed after.
+    const auto now = store_.getRebuild(rebuild.id);
+    lock.lock();
+    const bool over =
+        now ? now->state != store::RebuildState::kRunning : now.error().code == ErrorCode::kNotFound;
+    if (!finished) log_->error("rebuild cannot be finished", fieldsOf(rebuild, finished.error()));
+    if (over) {
+        if (now)
+            log_->info("rebuild done",
+                       {{"rebuild", rebuild.id}, {"shapes", now->done}, {"failed", now->failed}});
+        retire(active);
+    } else {
+        rest(lock, finished ? kAnotherPass : options_.backOff);
+    }
+}
+
+void RebuildDriver::rebuildOne(const ActivePtr& active, std::unique_lock<std::mutex>& lock) {
+    const store::Shape shape = std::move(active->batch.front());
+    active->batch.pop_front();
+    ++active->inFlight;
+    lock.unlock();
+    if (pool_.running() > 0) {
+        lock.lock();
+        rest(lock, options_.yield);
+        lock.unlock();
+    }
+    Result<void> stored;
+    try {
+        if (!active->cancel) stored = process(*active, shape);
+    } catch (const std::exception& error) {
+        const bool memory = dynamic_cast<const std::bad_alloc*>(&error) != nullptr;
+        stored = store_.putRebuildFailure(active->rebuild.id, shape.id, shape.pointsVersion,
+                                          {memory ? ErrorCode::kOutOfMemory : ErrorCode::kInternal,
+                                           memory ? "not enough memory to segment this scan"
+                                                  : std::string("segmentation threw: ") + error.what()});
+    }
+    lock.lock();
+    if (!stored) {
+        auto fields = fieldsOf(active->rebuild, stored.error());
+        fields.push_back({"shape", shape.id});
+        log_->error("rebuild could not store a result: it will be tried again", fields);
+        rest(lock, options_.backOff);
+    }
+    --active->inFlight;
+    changed_.notify_all();
+}
+
+/// Errors: of the store; the shape comes again with the next pass.
+Result<void> RebuildDriver::process(Active& active, const store::Shape& shape) {
+    const auto points = store_.loadPoints(shape.id);
+    if (!points && points.error().code == ErrorCode::kNotFound) return {};  // deleted meanwhile
+    if (!points && points.error().code != ErrorCode::kDataLoss) return fail(points.error());
+    RunContext context;
+    context.cancel = &active.cancel;
+    const Result<Description> description = points ? describe_(toCloud(*points), active.parameters, context)
+                                                   : Result<Description>(fail(points.error()));
+    if (description) {
+        return store_.putRebuilt(active.rebuild.id,
+                                 {shape.id, shape.pointsVersion, active.rebuild.targetGeneration,
+                                  encodeSignature(description->signature)});
+    }
+    if (description.error().code == ErrorCode::kCancelled) return {};
+    return store_.putRebuildFailure(active.rebuild.id, shape.id, shape.pointsVersion, description.error());
+}
+
+}  // namespace shapedb::ingest

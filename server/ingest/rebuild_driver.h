@@ -1,0 +1,110 @@
+// Re-segments whole collections in the background, into a generation of signatures that
+// replaces the serving one when it is complete.
+//
+// What is done is in the store, shape by shape: a rebuild goes on where it stood after a
+// restart. Rebuilds run one after another, in the order they were asked for.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/run_context.h"
+#include "server/index/collection_index.h"
+#include "server/ingest/describer.h"
+#include "server/ingest/worker_pool.h"
+#include "server/store/store.h"
+#include "server/telemetry/logger.h"
+
+namespace shapedb::ingest {
+
+struct RebuildOptions {
+    int threads = 1;         ///< at least 1
+    std::size_t batch = 32;  ///< shapes read from the store at once
+    /// While uploads are being segmented, each rebuild thread waits this long before it takes
+    /// its next shape: uploads come first, and the rebuild still ends.
+    std::chrono::milliseconds yield{100};
+    /// How long it rests after the store failed it.
+    std::chrono::milliseconds backOff{1'000};
+};
+
+/// Thread-safe unless a function says otherwise.
+class RebuildDriver {
+  public:
+    /// The references are not owned and must outlive the driver.
+    RebuildDriver(store::Store& store, index::CollectionIndex& index, WorkerPool& pool, Describer describe,
+                  telemetry::LoggerPtr log, RebuildOptions options);
+    /// As `stop`.
+    ~RebuildDriver();
+
+    /// Goes on with what a dead process left running. Call once. Errors: as Store::runningRebuilds.
+    [[nodiscard]] Result<void> start();
+
+    /// Starts a rebuild, or finds the running one with the same parameters.
+    /// Errors: kNotFound (collection); kRejected: one with other parameters is running.
+    [[nodiscard]] Result<store::Rebuild> begin(const store::Collection& collection,
+                                               const ShapeParameters& parameters);
+
+    /// Returns the rebuild as soon as its counts or state differ from those of `seen`.
+    /// Errors: kNotFound; kCancelled, kDeadlineExceeded (of the waiting, not of the rebuild).
+    [[nodiscard]] Result<store::Rebuild> waitForChange(const store::Rebuild& seen, const RunContext& context);
+
+    /// Stops a rebuild and deletes what it made. Errors: kNotFound: none is running.
+    [[nodiscard]] Result<void> cancel(const store::Collection& collection);
+
+    /// Returns when no thread touches the store.
+    void pause();
+    /// Goes on with what the store then calls running. Errors: as Store::runningRebuilds.
+    [[nodiscard]] Result<void> resume();
+    /// As `pause`, and ends the threads; what is unfinished goes on at the next start. Idempotent.
+    void stop();
+
+  private:
+    struct Active {
+        store::Rebuild rebuild;
+        ShapeParameters parameters;
+        std::deque<store::Shape> batch;
+        std::int64_t afterId = 0;
+        int inFlight = 0;      ///< threads with one of its shapes
+        bool reading = false;  ///< a thread is reading the next batch or finishing
+        std::atomic<bool> cancel{false};
+    };
+    using ActivePtr = std::shared_ptr<Active>;
+
+    void run();
+    ActivePtr activate(std::unique_lock<std::mutex>& lock);
+    void readBatch(const ActivePtr& active, std::unique_lock<std::mutex>& lock);
+    void finish(const ActivePtr& active, std::unique_lock<std::mutex>& lock);
+    void rebuildOne(const ActivePtr& active, std::unique_lock<std::mutex>& lock);
+    Result<void> process(Active& active, const store::Shape& shape);
+    void retire(const ActivePtr& active);
+    void rest(std::unique_lock<std::mutex>& lock, std::chrono::milliseconds time);
+    void waitUntilQuiet(std::unique_lock<std::mutex>& lock);
+    Result<void> enqueueRunning();
+
+    store::Store& store_;
+    index::CollectionIndex& index_;
+    WorkerPool& pool_;
+    Describer describe_;
+    telemetry::LoggerPtr log_;
+    RebuildOptions options_;
+
+    std::mutex beginMutex_;  ///< one `begin` or `cancel` at a time; taken before mutex_
+    std::mutex mutex_;
+    std::condition_variable changed_;
+    std::deque<store::Rebuild> queue_;
+    ActivePtr active_;
+    bool paused_ = false;
+    bool stopping_ = false;
+    std::vector<std::thread> threads_;
+};
+
+}  // namespace shapedb::ingest

@@ -1,0 +1,305 @@
+#include "server/ingest/worker_pool.h"
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <new>
+#include <utility>
+
+#include "core/signature/signature_codec.h"
+
+namespace shapedb::ingest {
+namespace {
+
+/// Weight of the newest job in the running mean of their times.
+constexpr double kNewest = 0.1;
+constexpr std::chrono::milliseconds kShortestHint{100};
+constexpr std::chrono::milliseconds kLongestHint{60'000};
+
+/// Errors of the store or the machine: the scan is not to blame, and a later try may succeed.
+bool isTransient(ErrorCode code) {
+    return code == ErrorCode::kStorage || code == ErrorCode::kStorageFull || code == ErrorCode::kUnavailable;
+}
+
+std::vector<telemetry::Field> fieldsOf(const store::Job& job, const Error& error) {
+    auto fields = telemetry::fieldsOf(error);
+    fields.push_back({"job", job.id});
+    fields.push_back({"shape", job.shapeId});
+    return fields;
+}
+
+}  // namespace
+
+WorkerPool::WorkerPool(store::Store& store, index::CollectionIndex& index, ProgressBoard& board,
+                       Describer describe, telemetry::LoggerPtr log, WorkerOptions options)
+    : store_(store),
+      index_(index),
+      board_(board),
+      describe_(std::move(describe)),
+      log_(std::move(log)),
+      options_(options) {}
+
+WorkerPool::~WorkerPool() { stop(); }
+
+Result<void> WorkerPool::recover() {
+    const auto quarantined = store_.recoverJobs(options_.maxAttempts);
+    if (!quarantined) return fail(quarantined.error());
+    for (const store::Shape& shape : *quarantined) {
+        log_->error(
+            "scan set aside: the server died each time it was segmented",
+            {{"shape", shape.id}, {"key", shape.key}, {"attempts", std::int64_t{options_.maxAttempts}}});
+        board_.settled(shape.id);
+    }
+    return {};
+}
+
+Result<void> WorkerPool::start() {
+    if (const auto recovered = recover(); !recovered) return recovered;
+    for (int i = 0; i < std::max(1, options_.threads); ++i) threads_.emplace_back([this] { run(); });
+    return {};
+}
+
+void WorkerPool::wake() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++signals_;
+    changed_.notify_all();
+}
+
+void WorkerPool::supersede(std::int64_t shapeId, std::int64_t newPointsVersion) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    for (const auto& [id, running] : running_) {
+        if (running->job.shapeId == shapeId && running->job.pointsVersion < newPointsVersion) {
+            markSuperseded(*running);
+        }
+    }
+}
+
+void WorkerPool::supersedeCollection(std::int64_t collectionId) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    for (const auto& [id, running] : running_) {
+        if (running->job.collectionId == collectionId) markSuperseded(*running);
+    }
+}
+
+void WorkerPool::markSuperseded(Running& running) {
+    running.superseded = true;
+    running.cancel = true;
+}
+
+void WorkerPool::pause() {
+    std::unique_lock<std::mutex> lock(mutex_);
+    paused_ = true;
+    for (const auto& [id, running] : running_) running->cancel = true;
+    changed_.notify_all();
+    changed_.wait(lock, [this] { return running_.empty() && claiming_ == 0; });
+}
+
+Result<void> WorkerPool::resume() {
+    {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        unreleased_.clear();
+    }
+    const Result<void> recovered = recover();
+    const std::lock_guard<std::mutex> lock(mutex_);
+    paused_ = false;
+    ++signals_;
+    changed_.notify_all();
+    return recovered;
+}
+
+void WorkerPool::stop() {
+    pause();
+    {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        stopping_ = true;
+        changed_.notify_all();
+    }
+    for (std::thread& thread : threads_) thread.join();
+    threads_.clear();
+}
+
+std::size_t WorkerPool::running() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return running_.size();
+}
+
+std::chrono::milliseconds WorkerPool::retryAfter(std::uint64_t jobs) const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    // A tenth of the queue should be gone by then: trying again for each single place that
+    // falls free would keep everybody uploading for nothing.
+    const double places = std::max(1.0, 0.1 * static_cast<double>(jobs));
+    const double milliseconds = 1'000.0 * secondsPerJob_ * places / std::max(1, options_.threads);
+    const auto hint = std::chrono::milliseconds(
+        static_cast<std::int64_t>(std::min(milliseconds, static_cast<double>(kLongestHint.count()))));
+    return std::clamp(hint, kShortestHint, kLongestHint);
+}
+
+void WorkerPool::run() {
+    while (const std::shared_ptr<Running> running = next()) {
+        work(running);
+        const std::lock_guard<std::mutex> lock(mutex_);
+        running_.erase(running->job.id);
+        changed_.notify_all();
+    }
+}
+
+void WorkerPool::rest(std::unique_lock<std::mutex>& lock) {
+    changed_.wait_for(lock, options_.backOff, [this] { return stopping_ || paused_; });
+}
+
+/// Jobs the store refused to take back stay claimed there; nobody else would ever free them.
+void WorkerPool::retryReleases(std::unique_lock<std::mutex>& lock) {
+    const std::vector<store::Job> jobs = std::exchange(unreleased_, {});
+    lock.unlock();
+    std::vector<store::Job> still;
+    for (const store::Job& job : jobs) {
+        const auto released = store_.releaseJob(job);
+        if (!released && released.error().code != ErrorCode::kNotFound) still.push_back(job);
+    }
+    lock.lock();
+    unreleased_.insert(unreleased_.end(), still.begin(), still.end());
+}
+
+/// Claims outside the lock; empty when there is no job or the store failed (then it rested).
+std::optional<store::Job> WorkerPool::claim(std::unique_lock<std::mutex>& lock) {
+    ++claiming_;
+    if (!unreleased_.empty()) retryReleases(lock);
+    lock.unlock();
+    const auto job = store_.claimJob();
+    lock.lock();
+    --claiming_;
+    changed_.notify_all();
+    if (job) return *job;
+    log_->error("cannot take the next job", telemetry::fieldsOf(job.error()));
+    rest(lock);
+    ++signals_;  // look again
+    return std::nullopt;
+}
+
+/// Blocks until there is a job; null when the pool stops.
+std::shared_ptr<WorkerPool::Running> WorkerPool::next() {
+    std::unique_lock<std::mutex> lock(mutex_);
+    for (;;) {
+        changed_.wait(lock, [this] { return stopping_ || !paused_; });
+        if (stopping_) return nullptr;
+        const std::uint64_t seen = signals_;
+        if (const auto job = claim(lock)) {
+            auto running = std::make_shared<Running>();
+            running->job = *job;
+            running->cancel = paused_;  // paused while claiming: goes straight back
+            running_[job->id] = running;
+            return running;
+        }
+        changed_.wait(lock, [&] { return stopping_ || paused_ || signals_ != seen; });
+    }
+}
+
+void WorkerPool::work(const std::shared_ptr<Running>& running) {
+    const auto began = std::chrono::steady_clock::now();
+    const store::Job& job = running->job;
+    Outcome outcome = Outcome::kDone;
+    try {
+        outcome = attempt(*running);
+    } catch (const std::bad_alloc&) {
+        outcome = giveUp(job, {ErrorCode::kOutOfMemory, "not enough memory to segment this scan"});
+    } catch (const std::exception& error) {
+        outcome = giveUp(job, {ErrorCode::kInternal, std::string("segmentation threw: ") + error.what()});
+    }
+    if (outcome != Outcome::kDone) putBack(job);
+    board_.settled(job.shapeId);
+
+    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - began;
+    std::unique_lock<std::mutex> lock(mutex_);
+    if (outcome == Outcome::kDone) secondsPerJob_ += kNewest * (seconds.count() - secondsPerJob_);
+    if (outcome == Outcome::kStoreFailed) {
+        // Not counted as running while it rests, so that a drain does not wait for it.
+        running_.erase(job.id);
+        changed_.notify_all();
+        rest(lock);
+    }
+    if (outcome != Outcome::kDone) ++signals_;
+    changed_.notify_all();
+}
+
+WorkerPool::Outcome WorkerPool::attempt(Running& running) {
+    const store::Job& job = running.job;
+    const auto collection = index_.byId(job.collectionId);
+    if (!collection) return giveUp(job, collection.error());  // deleted, and its jobs with it
+    const auto points = store_.loadPoints(job.shapeId);
+    if (!points) {
+        if (!isTransient(points.error().code)) return giveUp(job, points.error());
+        log_->error("cannot read the points of a job", fieldsOf(job, points.error()));
+        return Outcome::kStoreFailed;
+    }
+    RunContext context;
+    context.cancel = &running.cancel;
+    context.progress = [this, &job](const char* stage, std::uint64_t done, std::uint64_t total) {
+        board_.report(job.shapeId, stage, done, total);
+    };
+    context.report("start", 0, 0);
+    const Result<Description> description = describe_(toCloud(*points), (*collection)->parameters, context);
+    if (!description) {
+        if (description.error().code == ErrorCode::kCancelled && !running.superseded)
+            return Outcome::kPutBack;
+        return giveUp(job, description.error());
+    }
+    return commit(running, **collection, *description);
+}
+
+WorkerPool::Outcome WorkerPool::commit(const Running& running, const index::Snapshot& collection,
+                                       const Description& description) {
+    const store::Job& job = running.job;
+    const std::int64_t generation = collection.collection.generation;
+    const store::SignatureRow row{job.shapeId, job.pointsVersion, generation,
+                                  encodeSignature(description.signature)};
+    Result<std::optional<store::Shape>> finished = std::optional<store::Shape>();
+    const bool current =
+        index_.whileGeneration(job.collectionId, generation, [&] { finished = store_.finishJob(job, row); });
+    if (!current) {
+        // A rebuild switched the parameters: once more, with the new ones. Or the index could
+        // not be read, and then there is no hurry.
+        const auto now = index_.byId(job.collectionId);
+        const bool unchanged = now && (*now)->collection.generation == generation;
+        return unchanged ? Outcome::kStoreFailed : Outcome::kPutBack;
+    }
+    if (!finished) {
+        log_->error("cannot store a signature", fieldsOf(job, finished.error()));
+        return isTransient(finished.error().code) ? Outcome::kStoreFailed : giveUp(job, finished.error());
+    }
+    if (!*finished) return Outcome::kDone;  // deleted or replaced meanwhile
+    ingested_.fetch_add(1);
+    if (const auto refreshed = index_.refresh(job.collectionId, job.shapeId); !refreshed) {
+        log_->error("signature is stored but not searched yet", fieldsOf(job, refreshed.error()));
+    }
+    log_->debug("segmented", {{"shape", job.shapeId},
+                              {"key", (*finished)->key},
+                              {"points", (*finished)->pointCount},
+                              {"seconds", description.segmentation.totalSeconds}});
+    return Outcome::kDone;
+}
+
+WorkerPool::Outcome WorkerPool::giveUp(const store::Job& job, const Error& why) {
+    const auto failed = store_.failJob(job, why);
+    if (!failed) {
+        log_->error("cannot record that a scan failed", fieldsOf(job, failed.error()));
+        return Outcome::kStoreFailed;
+    }
+    if (!*failed) return Outcome::kDone;  // deleted or replaced meanwhile
+    auto fields = fieldsOf(job, why);
+    fields.push_back({"key", (*failed)->key});
+    log_->warn("scan cannot be segmented", fields);
+    if (const auto refreshed = index_.refresh(job.collectionId, job.shapeId); !refreshed) {
+        log_->error("failed scan is still searched", fieldsOf(job, refreshed.error()));
+    }
+    return Outcome::kDone;
+}
+
+void WorkerPool::putBack(const store::Job& job) {
+    const auto released = store_.releaseJob(job);
+    if (released || released.error().code == ErrorCode::kNotFound) return;  // gone with its shape
+    log_->error("cannot put a job back", fieldsOf(job, released.error()));
+    const std::lock_guard<std::mutex> lock(mutex_);
+    unreleased_.push_back(job);
+}
+
+}  // namespace shapedb::ingest

@@ -1,0 +1,115 @@
+// The workers that turn stored scans into signatures, one durable job after another.
+//
+// A job is claimed, segmented, and its result committed in the store; then the index is
+// brought up to date and watchers are told. A crash at any point leaves the job in the
+// store, where the next start finds it.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include "core/base/error.h"
+#include "server/index/collection_index.h"
+#include "server/ingest/describer.h"
+#include "server/ingest/progress_board.h"
+#include "server/store/store.h"
+#include "server/telemetry/logger.h"
+
+namespace shapedb::ingest {
+
+struct WorkerOptions {
+    int threads = 1;      ///< at least 1
+    int maxAttempts = 2;  ///< as Store::recoverJobs
+    /// How long a worker rests after the store failed it.
+    std::chrono::milliseconds backOff{1'000};
+};
+
+/// Thread-safe unless a function says otherwise.
+class WorkerPool {
+  public:
+    /// The references are not owned and must outlive the pool.
+    WorkerPool(store::Store& store, index::CollectionIndex& index, ProgressBoard& board, Describer describe,
+               telemetry::LoggerPtr log, WorkerOptions options);
+    /// As `stop`.
+    ~WorkerPool();
+
+    /// Queues again what a dead process left running, quarantines what killed it too often,
+    /// and starts the workers. Call once. Errors: as Store::recoverJobs.
+    [[nodiscard]] Result<void> start();
+
+    /// A job was queued.
+    void wake();
+
+    /// The shape was deleted, or its points replaced by those of `newPointsVersion`: a worker
+    /// still busy with older ones stops.
+    void supersede(std::int64_t shapeId,
+                   std::int64_t newPointsVersion = std::numeric_limits<std::int64_t>::max());
+
+    /// The collection was deleted.
+    void supersedeCollection(std::int64_t collectionId);
+
+    /// Stops claiming, puts running jobs back and returns when no worker touches the store.
+    void pause();
+    /// Goes on after `pause`; what the store then calls running is queued again (after a
+    /// restore those are jobs of another process). Errors: as Store::recoverJobs.
+    [[nodiscard]] Result<void> resume();
+    /// As `pause`, and ends the threads. Idempotent.
+    void stop();
+
+    [[nodiscard]] std::size_t running() const;
+    /// Jobs that ended in a signature since start.
+    [[nodiscard]] std::uint64_t ingested() const { return ingested_.load(); }
+    /// When a queue of `jobs` will about have room for another one: a hint for refused callers.
+    [[nodiscard]] std::chrono::milliseconds retryAfter(std::uint64_t jobs) const;
+
+  private:
+    struct Running {
+        store::Job job;
+        std::atomic<bool> cancel{false};
+        std::atomic<bool> superseded{false};  ///< set before cancel
+    };
+    enum class Outcome { kDone, kPutBack, kStoreFailed };
+
+    static void markSuperseded(Running& running);
+    void run();
+    std::shared_ptr<Running> next();
+    std::optional<store::Job> claim(std::unique_lock<std::mutex>& lock);
+    void retryReleases(std::unique_lock<std::mutex>& lock);
+    void work(const std::shared_ptr<Running>& running);
+    Outcome attempt(Running& running);
+    Outcome commit(const Running& running, const index::Snapshot& collection, const Description& description);
+    Outcome giveUp(const store::Job& job, const Error& why);
+    void putBack(const store::Job& job);
+    void rest(std::unique_lock<std::mutex>& lock);
+    Result<void> recover();
+
+    store::Store& store_;
+    index::CollectionIndex& index_;
+    ProgressBoard& board_;
+    Describer describe_;
+    telemetry::LoggerPtr log_;
+    WorkerOptions options_;
+
+    mutable std::mutex mutex_;
+    std::condition_variable changed_;
+    std::uint64_t signals_ = 0;  ///< rises when there may be a job
+    bool paused_ = false;
+    bool stopping_ = false;
+    int claiming_ = 0;                                          ///< workers inside the store without a job
+    std::map<std::int64_t, std::shared_ptr<Running>> running_;  ///< by job id
+    std::vector<store::Job> unreleased_;                        ///< could not be put back yet
+    double secondsPerJob_ = 1.0;                                ///< running mean
+    std::vector<std::thread> threads_;
+    std::atomic<std::uint64_t> ingested_{0};
+};
+
+}  // namespace shapedb::ingest

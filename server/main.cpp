@@ -1,0 +1,119 @@
+// shapedbd: reads the configuration, serves until SIGTERM or SIGINT, drains.
+//
+// Standard output carries one line, `listening on HOST:PORT`; everything else is logged.
+// Exit codes: 0 drained or nothing to do, 1 could not start or not end cleanly, 2 wrong
+// configuration, 130 stopped at once by a second signal.
+
+#include <cstdio>
+#include <exception>
+#include <string>
+#include <thread>
+
+#include <signal.h>
+#include <unistd.h>
+
+#include "core/signature/profile.h"
+#include "server/config/load.h"
+#include "server/config/settings.h"
+#include "server/rpc/daemon.h"
+#include "server/telemetry/logger.h"
+
+namespace {
+
+using namespace shapedb;
+
+constexpr int kCannotServe = 1;
+constexpr int kWrongConfiguration = 2;
+constexpr int kStoppedAtOnce = 130;
+
+int report(const Error& error, int exitCode) {
+    std::fprintf(stderr, "shapedbd: %s: %s\n", errorCodeName(error.code), error.message.c_str());
+    return exitCode;
+}
+
+/// The signals that end the server; blocked in every thread and waited for in one.
+sigset_t endSignals() {
+    sigset_t signals;
+    sigemptyset(&signals);
+    sigaddset(&signals, SIGTERM);
+    sigaddset(&signals, SIGINT);
+    return signals;
+}
+
+Result<telemetry::LoggerPtr> openLog(const config::ServerConfig::Log& log) {
+    const auto level = telemetry::levelFromName(log.level);
+    if (!level) return fail(level.error());
+    return telemetry::makeLogger({*level, log.format == "json", log.file});
+}
+
+int serve(const config::ServerConfig& config) {
+    const sigset_t signals = endSignals();
+    pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+    signal(SIGPIPE, SIG_IGN);
+
+    const auto log = openLog(config.log);
+    if (!log) return report(log.error(), kWrongConfiguration);
+    (*log)->info("starting", {{"version", std::string(config::version())}, {"data", config.data}});
+    const auto describeScan = [](const PointCloud& points, const ShapeParameters& parameters,
+                                 const RunContext& context) { return describe(points, parameters, context); };
+    auto daemon = rpc::Daemon::start(config, *log, describeScan);
+    if (!daemon) {
+        (*log)->error("cannot start", telemetry::fieldsOf(daemon.error()));
+        return kCannotServe;
+    }
+    const config::Endpoint& endpoint = (*daemon)->endpoint();
+    if (!endpoint.isLoopback()) {
+        (*log)->warn(
+            "listening beyond this machine without transport security: anyone who can reach the "
+            "port can read, change and delete everything",
+            {{"address", endpoint.text()}});
+    }
+    (*log)->info("listening", {{"address", endpoint.text()}});
+    std::printf("listening on %s\n", endpoint.text().c_str());
+    std::fflush(stdout);
+
+    int received = 0;
+    sigwait(&signals, &received);
+    (*log)->info("draining", {{"signal", std::int64_t{received}}});
+    std::thread([signals] {
+        int second = 0;
+        sigwait(&signals, &second);
+        ::_exit(kStoppedAtOnce);
+    }).detach();
+    const auto drained = (*daemon)->drain();
+    if (!drained) (*log)->error("not ended cleanly", telemetry::fieldsOf(drained.error()));
+    daemon->reset();
+    (*log)->info("stopped");
+    return drained ? 0 : kCannotServe;
+}
+
+int run(int argc, char** argv) {
+    const auto commandLine = config::parseCommandLine(argc, argv);
+    if (!commandLine) return report(commandLine.error(), kWrongConfiguration);
+    if (commandLine->action == config::Action::kPrint) {
+        std::fputs(commandLine->text.c_str(), stdout);
+        return 0;
+    }
+    const auto loaded = config::load(*commandLine, config::processEnvironment());
+    if (!loaded) {
+        // --check-config promises 0 or 1.
+        const bool checking = commandLine->action == config::Action::kCheckConfig;
+        return report(loaded.error(), checking ? 1 : kWrongConfiguration);
+    }
+    if (commandLine->action == config::Action::kCheckConfig) {
+        std::fputs(config::describe(*loaded).c_str(), stdout);
+        return 0;
+    }
+    return serve(loaded->config);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    try {
+        return run(argc, argv);
+    } catch (const std::exception& error) {
+        std::fprintf(stderr, "shapedbd: %s\n", error.what());
+        return kCannotServe;
+    }
+}

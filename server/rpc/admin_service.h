@@ -1,0 +1,35 @@
+// shapedb.v1.AdminService: validate, convert, call, convert back.
+#pragma once
+
+#include "server/rpc/services.h"
+#include "shapedb/v1/admin_service.grpc.pb.h"
+
+namespace shapedb::rpc {
+
+class Call;
+
+/// Thread-safe. `services` must outlive it.
+class AdminServiceHandler final : public shapedb::v1::AdminService::Service {
+  public:
+    explicit AdminServiceHandler(const Services& services) : services_(services) {}
+
+    grpc::Status Rebuild(grpc::ServerContext* context, const v1::RebuildRequest* request,
+                         grpc::ServerWriter<v1::RebuildProgress>* writer) override;
+    grpc::Status CancelRebuild(grpc::ServerContext* context, const v1::CancelRebuildRequest* request,
+                               v1::CancelRebuildResponse* response) override;
+    grpc::Status Backup(grpc::ServerContext* context, const v1::BackupRequest* request,
+                        grpc::ServerWriter<v1::BackupChunk>* writer) override;
+    grpc::Status Restore(grpc::ServerContext* context, grpc::ServerReader<v1::BackupChunk>* reader,
+                         v1::RestoreResponse* response) override;
+    grpc::Status Check(grpc::ServerContext* context, const v1::CheckRequest* request,
+                       grpc::ServerWriter<v1::CheckProgress>* writer) override;
+    grpc::Status Stats(grpc::ServerContext* context, const v1::StatsRequest* request,
+                       v1::StatsResponse* response) override;
+    grpc::Status ServerInfo(grpc::ServerContext* context, const v1::ServerInfoRequest* request,
+                            v1::ServerInfoResponse* response) override;
+
+  private:
+    const Services& services_;
+};
+
+}  // namespace shapedb::rpc

@@ -1,0 +1,55 @@
+// A database file in chunks, out and in.
+#pragma once
+
+#include <cstdint>
+#include <cstdio>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "core/base/error.h"
+#include "core/base/run_context.h"
+#include "server/common/sha256.h"
+#include "shapedb/v1/admin_service.pb.h"
+
+namespace shapedb::rpc {
+
+/// Sends a file: its size with the first chunk, its SHA-256 alone in the last message. `send`
+/// returns false when the receiver has gone. Errors: kFileNotReadable, kCancelled,
+/// kDeadlineExceeded.
+[[nodiscard]] Result<void> sendFile(const std::string& path, const RunContext& context,
+                                    const std::function<bool(const v1::BackupChunk&)>& send);
+
+/// Writes chunks to a new file and checks them. After an error only destruction.
+class FileReceiver {
+  public:
+    /// Errors: kFileNotWritable.
+    [[nodiscard]] static Result<FileReceiver> create(const std::string& path);
+
+    /// Errors: kMalformedStream (no size in the first message, a size later, data or message
+    /// after the checksum, chunk over 1 MiB, empty message), kCountMismatch (more than
+    /// announced), kInvalidArgument (checksum not 32 bytes), kStorageFull, kFileNotWritable.
+    [[nodiscard]] Result<void> add(const v1::BackupChunk& chunk);
+
+    /// Closes the file. Errors: kMalformedStream (no checksum came), kCountMismatch,
+    /// kChecksumMismatch, kStorageFull.
+    [[nodiscard]] Result<void> finish();
+
+    [[nodiscard]] std::uint64_t bytes() const { return received_; }
+
+  private:
+    struct Close {
+        void operator()(std::FILE* file) const { std::fclose(file); }
+    };
+    explicit FileReceiver(std::FILE* file) : file_(file) {}
+    Result<void> write(const std::string& data);
+
+    std::unique_ptr<std::FILE, Close> file_;
+    bool first_ = true;
+    std::uint64_t announced_ = 0;
+    std::uint64_t received_ = 0;
+    std::string wantedChecksum_;
+    Sha256 hash_;
+};
+
+}  // namespace shapedb::rpc

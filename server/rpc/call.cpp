@@ -1,0 +1,119 @@
+#include "server/rpc/call.h"
+
+#include <utility>
+
+#include "server/rpc/request_checks.h"
+#include "server/rpc/status.h"
+
+namespace shapedb::rpc {
+namespace {
+
+RunContext::Clock::time_point steadyDeadline(const grpc::ServerContext& context) {
+    using System = std::chrono::system_clock;
+    const System::time_point deadline = context.deadline();
+    const auto left = deadline - System::now();
+    // gRPC says "never" by a moment centuries away, which a sum with `now` could overflow.
+    if (deadline == System::time_point::max() || left > std::chrono::hours(24 * 365)) {
+        return RunContext::Clock::time_point::max();
+    }
+    return RunContext::Clock::now() + std::chrono::duration_cast<RunContext::Clock::duration>(left);
+}
+
+const char* statusName(grpc::StatusCode code) {
+    switch (code) {
+        case grpc::StatusCode::OK: return "OK";
+        case grpc::StatusCode::CANCELLED: return "CANCELLED";
+        case grpc::StatusCode::INVALID_ARGUMENT: return "INVALID_ARGUMENT";
+        case grpc::StatusCode::DEADLINE_EXCEEDED: return "DEADLINE_EXCEEDED";
+        case grpc::StatusCode::NOT_FOUND: return "NOT_FOUND";
+        case grpc::StatusCode::ALREADY_EXISTS: return "ALREADY_EXISTS";
+        case grpc::StatusCode::RESOURCE_EXHAUSTED: return "RESOURCE_EXHAUSTED";
+        case grpc::StatusCode::FAILED_PRECONDITION: return "FAILED_PRECONDITION";
+        case grpc::StatusCode::ABORTED: return "ABORTED";
+        case grpc::StatusCode::OUT_OF_RANGE: return "OUT_OF_RANGE";
+        case grpc::StatusCode::UNAVAILABLE: return "UNAVAILABLE";
+        case grpc::StatusCode::DATA_LOSS: return "DATA_LOSS";
+        case grpc::StatusCode::INTERNAL: return "INTERNAL";
+        default: return "UNKNOWN";
+    }
+}
+
+telemetry::Level levelOf(grpc::StatusCode code) {
+    switch (code) {
+        case grpc::StatusCode::INTERNAL:
+        case grpc::StatusCode::DATA_LOSS: return telemetry::Level::kError;
+        case grpc::StatusCode::RESOURCE_EXHAUSTED:
+        case grpc::StatusCode::UNAVAILABLE: return telemetry::Level::kWarn;
+        default: return telemetry::Level::kInfo;
+    }
+}
+
+}  // namespace
+
+Call::Call(const Services& services, grpc::ServerContext& context, const char* rpc)
+    : services_(services),
+      context_(context),
+      rpc_(rpc),
+      began_(std::chrono::steady_clock::now()),
+      cancellation_(services.cancellations, context),
+      epoch_(services.restores.epoch()) {
+    run_.cancel = &cancellation_.flag();
+    run_.deadline = steadyDeadline(context);
+}
+
+Call::~Call() {
+    if (admitted_) services_.calls.leave();
+}
+
+Result<void> Call::admit() {
+    admitted_ = services_.calls.enter();
+    if (!admitted_) return fail(ErrorCode::kUnavailable, "the server is shutting down: try again later");
+    return {};
+}
+
+Result<void> Call::checkpointWhileFollowing() const {
+    if (services_.calls.draining()) {
+        return fail(ErrorCode::kUnavailable,
+                    "the server is shutting down: the work goes on after its restart");
+    }
+    return run_.checkpoint();
+}
+
+Result<index::SnapshotPtr> Call::collection(const std::string& name) {
+    collection_ = collectionNameOrDefault(name);
+    return services_.index.byName(collection_);
+}
+
+grpc::Status Call::finish(Result<void> result) {
+    if (!expectsRestore_ && services_.restores.epoch() != epoch_) {
+        // Ids looked up before the restore mean other shapes after it.
+        result = fail(ErrorCode::kUnavailable,
+                      "the database was replaced by a backup while the call ran: repeat it");
+    }
+    if (!result && result.error().code == ErrorCode::kCancelled &&
+        RunContext::Clock::now() >= run_.deadline) {
+        // gRPC cancels a call whose deadline passed; the deadline is the reason.
+        result = fail(ErrorCode::kDeadlineExceeded, "the deadline passed before the work was done");
+    }
+    const grpc::Status status = result ? grpc::Status::OK : makeStatus(result.error(), context_, retryAfter_);
+    logLine(status, result ? nullptr : &result.error());
+    return status;
+}
+
+void Call::logLine(const grpc::Status& status, const Error* error) {
+    const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - began_;
+    std::vector<telemetry::Field> fields = {{"rpc", std::string(rpc_)},
+                                            {"peer", context_.peer()},
+                                            {"code", std::string(statusName(status.error_code()))},
+                                            {"ms", took.count()}};
+    if (!collection_.empty()) fields.push_back({"collection", collection_});
+    fields.insert(fields.end(), notes_.begin(), notes_.end());
+    if (points_ > 0) fields.push_back({"points", points_});
+    if (bytes_ > 0) fields.push_back({"bytes", bytes_});
+    if (error != nullptr) {
+        for (telemetry::Field& field : telemetry::fieldsOf(*error)) fields.push_back(std::move(field));
+    }
+    services_.log->log(levelOf(status.error_code()), "call", fields);
+}
+
+}  // namespace shapedb::rpc

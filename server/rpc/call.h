@@ -1,0 +1,99 @@
+// The frame around every handler: admission, cancellation and deadline, one log line, and no
+// exception past this point.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <exception>
+#include <new>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <grpcpp/server_context.h>
+#include <grpcpp/support/status.h>
+
+#include "core/base/error.h"
+#include "core/base/run_context.h"
+#include "server/rpc/services.h"
+
+namespace shapedb::rpc {
+
+/// One call while it runs. Used by its own thread only.
+class Call {
+  public:
+    Call(const Services& services, grpc::ServerContext& context, const char* rpc);
+    ~Call();
+    Call(const Call&) = delete;
+    Call& operator=(const Call&) = delete;
+
+    /// Errors: kUnavailable (draining).
+    [[nodiscard]] Result<void> admit();
+
+    /// Follows the client's cancellation and deadline.
+    [[nodiscard]] const RunContext& run() const { return run_; }
+
+    /// Asks gRPC now: the flag in `run()` follows a moment later.
+    [[nodiscard]] bool clientGone() const { return context_.IsCancelled(); }
+
+    /// Errors: kCancelled, kDeadlineExceeded; kUnavailable when the server is draining, for
+    /// calls that would otherwise follow something for long.
+    [[nodiscard]] Result<void> checkpointWhileFollowing() const;
+
+    /// The collection named, "default" when empty; noted for the log. Errors: kNotFound.
+    [[nodiscard]] Result<index::SnapshotPtr> collection(const std::string& name);
+    /// What the log line should say besides.
+    void note(telemetry::Field field) { notes_.push_back(std::move(field)); }
+    void noteKey(const std::string& key) { note({"key", key}); }
+    void addPoints(std::uint64_t points, std::uint64_t bytes) {
+        points_ += points;
+        bytes_ += bytes;
+    }
+    /// For RESOURCE_EXHAUSTED.
+    void retryAfter(std::chrono::milliseconds time) { retryAfter_ = time; }
+    /// A call that replaces the database itself is not surprised by it.
+    void expectRestore() { expectsRestore_ = true; }
+
+    /// Status and log line. Call once, last.
+    [[nodiscard]] grpc::Status finish(Result<void> result);
+
+  private:
+    void logLine(const grpc::Status& status, const Error* error);
+
+    const Services& services_;
+    grpc::ServerContext& context_;
+    const char* rpc_;
+    std::chrono::steady_clock::time_point began_;
+    CancelWatcher::Registration cancellation_;
+    RunContext run_;
+    std::uint64_t epoch_;
+    bool admitted_ = false;
+    bool expectsRestore_ = false;
+    std::string collection_;
+    std::vector<telemetry::Field> notes_;
+    std::uint64_t points_ = 0;
+    std::uint64_t bytes_ = 0;
+    std::optional<std::chrono::milliseconds> retryAfter_;
+};
+
+/// Runs `body(call)`, which returns Result<void>, as the handler of one call.
+template <typename Body>
+grpc::Status handle(const Services& services, grpc::ServerContext* context, const char* rpc, Body&& body) {
+    Call call(services, *context, rpc);
+    Result<void> result = call.admit();
+    if (result) {
+        try {
+            result = body(call);
+        } catch (const std::bad_alloc&) {
+            result = fail(ErrorCode::kOutOfMemory, "not enough memory for this request: try again later");
+        } catch (const std::exception& error) {
+            result = fail(ErrorCode::kInternal, std::string("unexpected failure: ") + error.what());
+        } catch (...) {
+            result = fail(ErrorCode::kInternal, "unexpected failure of unknown kind");
+        }
+    }
+    return call.finish(std::move(result));
+}
+
+}  // namespace shapedb::rpc

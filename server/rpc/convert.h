@@ -1,0 +1,47 @@
+// Between the messages of the API and the types of core/ and store/.
+#pragma once
+
+#include <optional>
+
+#include "core/base/error.h"
+#include "core/matching/score.h"
+#include "core/segmentation/segmentation.h"
+#include "core/signature/profile.h"
+#include "core/signature/signature.h"
+#include "server/index/collection_index.h"
+#include "server/store/store.h"
+#include "shapedb/v1/collection_service.pb.h"
+#include "shapedb/v1/search_service.pb.h"
+#include "shapedb/v1/shape_service.pb.h"
+#include "shapedb/v1/types.pb.h"
+
+namespace shapedb::rpc {
+
+namespace pb = shapedb::v1;
+
+void toProto(const store::Shape& shape, const std::string& collection, pb::Shape* out);
+[[nodiscard]] pb::ShapeState toProto(store::ShapeState state);
+void toProto(const Error& failure, pb::Failure* out);
+void toProto(const store::Collection& collection, const ShapeParameters& parameters, pb::Collection* out);
+void toProto(const Signature& signature, pb::Signature* out);
+void toProto(const Segmentation& segmentation, pb::SegmentationReport* out);
+void toProto(const Explanation& explanation, pb::Explanation* out);
+void toProto(store::TimestampMs time, google::protobuf::Timestamp* out);
+
+/// Empty for UNSPECIFIED. Errors: kInvalidArgument (a number without a name).
+[[nodiscard]] Result<std::optional<store::ShapeState>> fromProto(pb::ShapeState state);
+/// UNSPECIFIED is upsert. Errors: kInvalidArgument.
+[[nodiscard]] Result<store::PutMode> fromProto(pb::AddMode mode);
+
+/// What a request says about parameters, applied to those it starts from: `current` without a
+/// profile, the profile's defaults with one; then each field that is set.
+/// Errors: kInvalidArgument naming the parameter, its value and its range.
+[[nodiscard]] Result<ShapeParameters> parametersFrom(pb::Profile profile,
+                                                     const pb::SegmentationParameters& segmentation,
+                                                     const pb::SignatureParameters& signature,
+                                                     const ShapeParameters& current);
+
+/// Metadata of a message as the store keeps it.
+[[nodiscard]] store::Metadata toMetadata(const google::protobuf::Map<std::string, std::string>& metadata);
+
+}  // namespace shapedb::rpc

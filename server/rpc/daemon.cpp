@@ -1,0 +1,223 @@
+#include "server/rpc/daemon.h"
+
+#include <chrono>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+#include <grpcpp/ext/proto_server_reflection_plugin.h>
+#include <grpcpp/grpcpp.h>
+#include <grpcpp/health_check_service_interface.h>
+
+#include "server/config/settings.h"
+#include "server/index/parameters_codec.h"
+#include "server/rpc/admin_service.h"
+#include "server/rpc/collection_service.h"
+#include "server/rpc/limits.h"
+#include "server/rpc/request_checks.h"
+#include "server/rpc/search_service.h"
+#include "server/rpc/services.h"
+#include "server/rpc/shape_service.h"
+#include "server/rpc/temporary_file.h"
+#include "server/store/sqlite_store.h"
+
+namespace shapedb::rpc {
+namespace {
+
+constexpr const char* kDatabaseFile = "shapedb.sqlite";
+constexpr const char* kTemporaryFolder = "tmp";
+/// For calls still running when the drain time is over: long enough to hear of it.
+constexpr std::chrono::milliseconds kAfterDrain{200};
+
+Result<std::unique_ptr<store::Store>> openStore(const config::ServerConfig& config) {
+    std::error_code error;
+    std::filesystem::create_directories(config.data, error);
+    if (!error && !std::filesystem::is_directory(config.data))
+        error = std::make_error_code(std::errc::not_a_directory);
+    if (error) {
+        return fail(ErrorCode::kFileNotWritable,
+                    "data directory " + config.data + " cannot be created: " + error.message());
+    }
+    store::SqliteOptions options;
+    options.path = config.data + "/" + kDatabaseFile;
+    options.readers = config.store.readers;
+    options.pointCompressionLevel = config.store.compressionLevel;
+    return store::openSqliteStore(options);
+}
+
+/// The collection requests mean that name none.
+Result<void> ensureDefaultCollection(store::Store& store) {
+    const auto created =
+        store.createCollection(kDefaultCollection, "Used by requests that name no collection.",
+                               index::encodeParameters(parametersOf(Profile::kDefault)));
+    if (!created && created.error().code != ErrorCode::kAlreadyExists) return fail(created.error());
+    return {};
+}
+
+/// Services whose health can be asked for by name.
+constexpr const char* kServiceNames[] = {"shapedb.v1.ShapeService", "shapedb.v1.SearchService",
+                                         "shapedb.v1.CollectionService", "shapedb.v1.AdminService"};
+
+}  // namespace
+
+/// In order of construction; destroyed in reverse.
+struct Daemon::Parts {
+    Parts(const config::ServerConfig& configuration, telemetry::LoggerPtr logger, ingest::Describer describe,
+          std::unique_ptr<store::Store> opened)
+        : config(configuration),
+          log(std::move(logger)),
+          store(std::move(opened)),
+          index(*store, log),
+          workers(*store, index, board, describe, log,
+                  {config::threadsOrProcessors(config.ingest.threads), config.ingest.maxAttempts}),
+          rebuilds(*store, index, workers, describe, log, rebuildOptions(config)),
+          slots(config::threadsOrProcessors(config.search.threads)),
+          uploads(config.limits.maxUploadBytes),
+          searches(config::threadsOrProcessors(config.search.threads)),
+          services{config,
+                   *store,
+                   index,
+                   workers,
+                   rebuilds,
+                   board,
+                   std::move(describe),
+                   log,
+                   cancellations,
+                   calls,
+                   restores,
+                   slots,
+                   uploads,
+                   searches,
+                   config.data + "/" + kTemporaryFolder,
+                   std::chrono::system_clock::now()},
+          shapeService(services),
+          searchService(services),
+          collectionService(services),
+          adminService(services) {}
+
+    static ingest::RebuildOptions rebuildOptions(const config::ServerConfig& config) {
+        ingest::RebuildOptions options;
+        options.threads = config::threadsOrProcessors(config.rebuild.threads);
+        return options;
+    }
+
+    Result<void> prepare();
+    Result<void> listen();
+    Result<void> drain();
+
+    const config::ServerConfig config;
+    telemetry::LoggerPtr log;
+    std::unique_ptr<store::Store> store;
+    index::CollectionIndex index;
+    ingest::ProgressBoard board;
+    ingest::WorkerPool workers;
+    ingest::RebuildDriver rebuilds;
+    CancelWatcher cancellations;
+    CallGate calls;
+    RestoreGate restores;
+    SegmentationSlots slots;
+    UploadBudget uploads;
+    SearchRunner searches;
+    Services services;
+    ShapeServiceHandler shapeService;
+    SearchServiceHandler searchService;
+    CollectionServiceHandler collectionService;
+    AdminServiceHandler adminService;
+    config::Endpoint endpoint;
+    std::unique_ptr<grpc::Server> server;
+    bool drained = false;
+};
+
+Result<void> Daemon::Parts::prepare() {
+    if (const auto ready = prepareTemporaryDirectory(services.temporaryDirectory); !ready) return ready;
+    if (const auto ready = ensureDefaultCollection(*store); !ready) return ready;
+    const auto began = std::chrono::steady_clock::now();
+    if (const auto loaded = index.loadAll(); !loaded) return loaded;
+    const auto totals = index.totals();
+    log->info("index loaded",
+              {{"signatures", totals.signatures},
+               {"bytes", totals.bytes},
+               {"seconds", std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count()}});
+    if (const auto started = workers.start(); !started) return started;
+    return rebuilds.start();
+}
+
+Result<void> Daemon::Parts::listen() {
+    const auto wanted = config::parseEndpoint(config.listen);
+    if (!wanted) return fail(wanted.error());
+    endpoint = *wanted;
+
+    grpc::EnableDefaultHealthCheckService(true);
+    grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+    grpc::ServerBuilder builder;
+    int port = 0;
+    builder.AddListeningPort(endpoint.text(), grpc::InsecureServerCredentials(), &port);
+    builder.RegisterService(&shapeService);
+    builder.RegisterService(&searchService);
+    builder.RegisterService(&collectionService);
+    builder.RegisterService(&adminService);
+    builder.SetMaxReceiveMessageSize(kMaxReceiveBytes);
+    builder.SetMaxSendMessageSize(-1);  // answers are bounded where they are made
+    // Two servers on one port would each get half of the calls.
+    builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+    const auto milliseconds = [](std::chrono::milliseconds time) { return static_cast<int>(time.count()); };
+    builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, milliseconds(kKeepaliveTime));
+    builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, milliseconds(kKeepaliveTimeout));
+    builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS,
+                               milliseconds(kShortestClientPing));
+    builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
+    grpc::ResourceQuota quota("shapedbd");
+    quota.SetMaxThreads(kMaxCallThreads);
+    builder.SetResourceQuota(quota);
+    server = builder.BuildAndStart();
+    if (!server || port == 0) {
+        return fail(ErrorCode::kUnavailable,
+                    "cannot listen on " + config.listen +
+                        ": the address is in use, not of this machine, or not permitted");
+    }
+    endpoint.port = port;
+    for (const char* name : kServiceNames) server->GetHealthCheckService()->SetServingStatus(name, true);
+    return {};
+}
+
+Result<void> Daemon::Parts::drain() {
+    if (std::exchange(drained, true)) return {};
+    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(config.shutdown.drainSeconds);
+    if (server) {
+        server->GetHealthCheckService()->SetServingStatus(false);
+        calls.drain();
+        const bool empty = calls.waitUntilEmpty(until);
+        if (!empty) log->warn("drain time is over: cancelling the calls still running");
+        // Streams of health and reflection never end by themselves; they are cut here too.
+        server->Shutdown(std::chrono::system_clock::now() + kAfterDrain);
+        server->Wait();
+    }
+    rebuilds.stop();
+    workers.stop();
+    return store->checkpoint();
+}
+
+Daemon::Daemon(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
+
+Daemon::~Daemon() {
+    if (const auto drained = drain(); !drained) {
+        parts_->log->error("checkpoint at shutdown failed", telemetry::fieldsOf(drained.error()));
+    }
+}
+
+Result<std::unique_ptr<Daemon>> Daemon::start(const config::ServerConfig& config, telemetry::LoggerPtr log,
+                                              ingest::Describer describe) {
+    auto opened = openStore(config);
+    if (!opened) return fail(opened.error());
+    auto parts = std::make_unique<Parts>(config, std::move(log), std::move(describe), std::move(*opened));
+    std::unique_ptr<Daemon> daemon(new Daemon(std::move(parts)));
+    if (const auto prepared = daemon->parts_->prepare(); !prepared) return fail(prepared.error());
+    if (const auto listening = daemon->parts_->listen(); !listening) return fail(listening.error());
+    return daemon;
+}
+
+const config::Endpoint& Daemon::endpoint() const { return parts_->endpoint; }
+
+Result<void> Daemon::drain() { return parts_->drain(); }
+
+}  // namespace shapedb::rpc

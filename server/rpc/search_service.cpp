@@ -1,0 +1,229 @@
+#include "server/rpc/search_service.h"
+
+#include <chrono>
+#include <utility>
+
+#include "core/signature/signature_codec.h"
+#include "server/rpc/call.h"
+#include "server/rpc/convert.h"
+#include "server/rpc/limits.h"
+#include "server/rpc/point_stream.h"
+#include "server/rpc/request_checks.h"
+#include "server/rpc/shape_lookup.h"
+
+namespace shapedb::rpc {
+namespace {
+
+/// One request's options, checked, and the snapshot all its queries read.
+struct Prepared {
+    index::SnapshotPtr collection;
+    SearchOptions options;
+    bool explain = true;
+};
+
+Result<Prepared> prepare(const Services& services, Call& call, const pb::SearchOptions& options) {
+    call.note({"k", std::uint64_t{options.k()}});
+    const auto collection = call.collection(options.collection());
+    if (!collection) return fail(collection.error());
+    if (const auto valid = checkK(options.k(), services.config); !valid) return fail(valid.error());
+    if (const auto valid = checkThreshold(options.threshold()); !valid) return fail(valid.error());
+    if (const auto valid = checkFilterLength(options.filter()); !valid) return fail(valid.error());
+    Result<Filter> filter = Filter::parse(options.filter());
+    if (!filter) return fail(filter.error());
+    Prepared prepared;
+    prepared.collection = *collection;
+    prepared.options.k = options.k();
+    prepared.options.threshold = options.threshold();
+    prepared.options.filter = std::move(*filter);
+    prepared.options.score.reflection = !options.forbid_reflection();
+    prepared.options.score.keepScale = options.keep_scale();
+    prepared.explain = !options.no_explanation();
+    return prepared;
+}
+
+/// Searches and fills `response`; `room` is what the whole answer may still grow by, bytes.
+Result<void> search(const Services& services, const Call& call, const Prepared& prepared,
+                    const Signature& query, std::size_t& room, pb::SearchResponse* response) {
+    const auto began = std::chrono::steady_clock::now();
+    const auto found =
+        services.searches.run(query, prepared.collection->signatures, prepared.options, call.run());
+    if (!found) return fail(found.error());
+    response->set_candidates(found->candidates);
+    response->set_filtered(found->filtered);
+    response->set_scored(found->scored);
+    toProto(query, response->mutable_query());
+    for (const SearchHit& hit : found->hits) {
+        const auto shape = services.store.getShapeById(hit.entry->id);
+        if (!shape && shape.error().code == ErrorCode::kNotFound) continue;  // deleted meanwhile
+        if (!shape) return fail(shape.error());
+        pb::Hit* out = response->add_hits();
+        toProto(*shape, prepared.collection->collection.name, out->mutable_shape());
+        out->set_score(hit.score);
+        if (prepared.explain) {
+            toProto(explain(query, hit.entry->signature, prepared.options.score), out->mutable_explanation());
+        }
+        const std::size_t bytes = out->ByteSizeLong();
+        if (bytes > room) {
+            return fail(ErrorCode::kInvalidArgument,
+                        "the answer would pass " + std::to_string(kMaxAnswerBytes) +
+                            " bytes: ask for a smaller k or fewer queries, or set no_explanation");
+        }
+        room -= bytes;
+    }
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
+    response->set_seconds_search(took.count());
+    return {};
+}
+
+/// A stored shape as a query.
+struct StoredQuery {
+    SignatureSet::EntryPtr entry;
+    std::int64_t id = 0;
+};
+
+Result<StoredQuery> storedQuery(const Services& services, const Prepared& prepared, const std::string& key) {
+    if (const auto valid = checkKey(key); !valid) return fail(valid.error());
+    auto shape = services.store.getShape(prepared.collection->collection.id, key);
+    if (!shape && shape.error().code == ErrorCode::kNotFound) {
+        return fail(ErrorCode::kNotFound, "there is no shape '" + key + "' in collection '" +
+                                              prepared.collection->collection.name + "'");
+    }
+    if (!shape) return fail(shape.error());
+    auto entry = findSignature({prepared.collection, *shape});
+    if (!entry) return fail(entry.error());
+    return StoredQuery{*entry, shape->id};
+}
+
+Result<void> searchOne(const Services& services, const Call& call, const Prepared& prepared,
+                       const v1::SearchBatchRequest::Query& query, std::size_t& room,
+                       v1::SearchResponse* response) {
+    switch (query.by_case()) {
+        case v1::SearchBatchRequest::Query::kKey: {
+            const auto stored = storedQuery(services, prepared, query.key());
+            if (!stored) return fail(stored.error());
+            Prepared without = prepared;
+            without.options.excludeId = stored->id;
+            return search(services, call, without, stored->entry->signature, room, response);
+        }
+        case v1::SearchBatchRequest::Query::kSignature: {
+            const auto signature = decodeSignature(query.signature());
+            if (!signature) return fail(signature.error());
+            return search(services, call, prepared, *signature, room, response);
+        }
+        case v1::SearchBatchRequest::Query::BY_NOT_SET: break;
+    }
+    return fail(ErrorCode::kInvalidArgument, "neither key nor signature is set");
+}
+
+}  // namespace
+
+grpc::Status SearchServiceHandler::SearchByKey(grpc::ServerContext* context,
+                                               const v1::SearchByKeyRequest* request,
+                                               v1::SearchResponse* response) {
+    return handle(services_, context, "SearchByKey", [&](Call& call) -> Result<void> {
+        call.noteKey(request->key());
+        auto prepared = prepare(services_, call, request->options());
+        if (!prepared) return fail(prepared.error());
+        const auto stored = storedQuery(services_, *prepared, request->key());
+        if (!stored) return fail(stored.error());
+        if (!request->include_self()) prepared->options.excludeId = stored->id;
+        std::size_t room = kMaxAnswerBytes;
+        return search(services_, call, *prepared, stored->entry->signature, room, response);
+    });
+}
+
+grpc::Status SearchServiceHandler::SearchByScan(grpc::ServerContext* context,
+                                                grpc::ServerReader<v1::SearchByScanRequest>* reader,
+                                                v1::SearchResponse* response) {
+    return handle(services_, context, "SearchByScan", [&](Call& call) -> Result<void> {
+        Prepared prepared;
+        PointReceiver receiver(services_.config.limits.maxPoints, services_.uploads);
+        const auto checkSearchHeader = [&](const v1::SearchByScanHeader& header) -> Result<void> {
+            auto checked = prepare(services_, call, header.options());
+            if (!checked) return fail(checked.error());
+            prepared = std::move(*checked);
+            return {};
+        };
+        const auto scan = receiveScan<v1::SearchByScanRequest>(*reader, receiver, call, checkSearchHeader);
+        if (!scan && scan.error().code == ErrorCode::kQueueFull) call.retryAfter(kUploadRetry);
+        if (!scan) return fail(scan.error());
+
+        Result<Description> description = fail(ErrorCode::kInternal, "not segmented");
+        {
+            SegmentationSlots::Slot slot(services_.slots);
+            if (const auto acquired = slot.acquire(call.run()); !acquired) return acquired;
+            description =
+                services_.describe(ingest::toCloud(scan->xyz), prepared.collection->parameters, call.run());
+        }
+        if (!description) return fail(description.error());
+        toProto(description->segmentation, response->mutable_report());
+        response->set_seconds_segment(description->segmentation.totalSeconds);
+        std::size_t room = kMaxAnswerBytes;
+        return search(services_, call, prepared, description->signature, room, response);
+    });
+}
+
+grpc::Status SearchServiceHandler::SearchBySignature(grpc::ServerContext* context,
+                                                     const v1::SearchBySignatureRequest* request,
+                                                     v1::SearchResponse* response) {
+    return handle(services_, context, "SearchBySignature", [&](Call& call) -> Result<void> {
+        const auto prepared = prepare(services_, call, request->options());
+        if (!prepared) return fail(prepared.error());
+        const auto signature = decodeSignature(request->signature());
+        if (!signature) return fail(signature.error());
+        std::size_t room = kMaxAnswerBytes;
+        return search(services_, call, *prepared, *signature, room, response);
+    });
+}
+
+grpc::Status SearchServiceHandler::SearchBatch(grpc::ServerContext* context,
+                                               const v1::SearchBatchRequest* request,
+                                               v1::SearchBatchResponse* response) {
+    return handle(services_, context, "SearchBatch", [&](Call& call) -> Result<void> {
+        const int count = request->queries_size();
+        call.note({"queries", std::int64_t{count}});
+        if (count < 1 || static_cast<std::uint32_t>(count) > services_.config.limits.maxBatch) {
+            return fail(ErrorCode::kInvalidArgument, "queries: " + std::to_string(count) +
+                                                         " is outside 1 to " +
+                                                         std::to_string(services_.config.limits.maxBatch));
+        }
+        const auto prepared = prepare(services_, call, request->options());
+        if (!prepared) return fail(prepared.error());
+        std::size_t room = kMaxAnswerBytes;
+        for (int i = 0; i < count; ++i) {
+            const auto done =
+                searchOne(services_, call, *prepared, request->queries(i), room, response->add_responses());
+            if (!done)
+                return fail(done.error().code, "query " + std::to_string(i) + ": " + done.error().message);
+        }
+        return {};
+    });
+}
+
+grpc::Status SearchServiceHandler::Compare(grpc::ServerContext* context, const v1::CompareRequest* request,
+                                           v1::CompareResponse* response) {
+    return handle(services_, context, "Compare", [&](Call& call) -> Result<void> {
+        Signature signatures[2];
+        const pb::ShapeRef* refs[2] = {&request->query(), &request->other()};
+        for (int i = 0; i < 2; ++i) {
+            const auto found = findShape(services_, call, *refs[i]);
+            const auto entry =
+                found ? findSignature(*found) : Result<SignatureSet::EntryPtr>(fail(found.error()));
+            if (!entry) {
+                return fail(entry.error().code, (i == 0 ? "query: " : "other: ") + entry.error().message);
+            }
+            signatures[i] = (*entry)->signature;
+        }
+        ScoreOptions options;
+        options.reflection = !request->forbid_reflection();
+        options.keepScale = request->keep_scale();
+        const Explanation explanation = explain(signatures[0], signatures[1], options);
+        response->set_score(explanation.score);
+        toProto(explanation, response->mutable_explanation());
+        toProto(signatures[0], response->mutable_query());
+        toProto(signatures[1], response->mutable_other());
+        return {};
+    });
+}
+
+}  // namespace shapedb::rpc

@@ -1,0 +1,51 @@
+#include "server/rpc/shape_lookup.h"
+
+#include "server/rpc/limits.h"
+#include "server/rpc/request_checks.h"
+
+namespace shapedb::rpc {
+
+Result<FoundShape> findShape(const Services& services, Call& call, const pb::ShapeRef& ref) {
+    call.noteKey(ref.key());
+    const auto collection = call.collection(ref.collection());
+    if (!collection) return fail(collection.error());
+    if (const auto valid = checkKey(ref.key()); !valid) return fail(valid.error());
+    const auto shape = services.store.getShape((*collection)->collection.id, ref.key());
+    if (!shape && shape.error().code == ErrorCode::kNotFound) {
+        return fail(ErrorCode::kNotFound, "there is no shape '" + ref.key() + "' in collection '" +
+                                              (*collection)->collection.name + "'");
+    }
+    if (!shape) return fail(shape.error());
+    return FoundShape{*collection, *shape};
+}
+
+Result<SignatureSet::EntryPtr> findSignature(const FoundShape& found) {
+    if (auto entry = found.collection->signatures.find(found.shape.id)) return entry;
+    const std::string name = "shape '" + found.shape.key + "' has no signature";
+    if (found.shape.failure) {
+        return fail(ErrorCode::kNotReady, name + ": it cannot be segmented: " + found.shape.failure->message);
+    }
+    return fail(ErrorCode::kNotReady, name + " yet: wait until it is READY (WatchIngest)");
+}
+
+Result<store::Shape> followIngest(
+    const Services& services, std::int64_t shapeId, const std::function<Result<void>()>& checkpoint,
+    const std::function<Result<void>(const store::Shape&, const ingest::ProgressBoard::Status&)>& onChange) {
+    const auto watch = services.board.watch(shapeId);
+    for (;;) {
+        // The status first: what happens after it raises the sequence, and the wait returns.
+        const ingest::ProgressBoard::Status status = watch->status();
+        auto shape = services.store.getShapeById(shapeId);
+        if (!shape) return shape;
+        if (const auto told = onChange(*shape, status); !told) return fail(told.error());
+        if (shape->state != store::ShapeState::kPending) return shape;
+        const auto lookAgain = ingest::ProgressBoard::Clock::now() + kReadStateAgain;
+        while (watch->status().sequence == status.sequence &&
+               ingest::ProgressBoard::Clock::now() < lookAgain) {
+            if (const auto go = checkpoint(); !go) return fail(go.error());
+            watch->waitForChange(status.sequence, ingest::ProgressBoard::Clock::now() + kLookForCancellation);
+        }
+    }
+}
+
+}  // namespace shapedb::rpc

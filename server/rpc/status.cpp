@@ -1,0 +1,63 @@
+#include "server/rpc/status.h"
+
+#include "server/rpc/limits.h"
+
+namespace shapedb::rpc {
+
+// No default label: a new ErrorCode does not compile until it has a place here.
+grpc::StatusCode statusCodeOf(ErrorCode code) noexcept {
+    switch (code) {
+        case ErrorCode::kNonFiniteCoordinate:
+        case ErrorCode::kCoordinateOutOfRange:
+        case ErrorCode::kTooFewPoints:
+        case ErrorCode::kAllPointsEqual:
+        case ErrorCode::kCollinear:
+        case ErrorCode::kCoplanar:
+        case ErrorCode::kNoInterior:
+        case ErrorCode::kUnknownFileFormat:
+        case ErrorCode::kMalformedFile:
+        case ErrorCode::kInvalidArgument:
+        case ErrorCode::kMalformedFilter:
+        case ErrorCode::kMalformedCursor:
+        case ErrorCode::kMalformedSignature:
+        case ErrorCode::kMalformedStream:
+        case ErrorCode::kChecksumMismatch:
+        case ErrorCode::kCountMismatch: return grpc::StatusCode::INVALID_ARGUMENT;
+        case ErrorCode::kPointLimitExceeded: return grpc::StatusCode::OUT_OF_RANGE;
+        case ErrorCode::kNotFound: return grpc::StatusCode::NOT_FOUND;
+        case ErrorCode::kAlreadyExists: return grpc::StatusCode::ALREADY_EXISTS;
+        case ErrorCode::kVersionConflict: return grpc::StatusCode::ABORTED;
+        case ErrorCode::kNotReady:
+        case ErrorCode::kRejected:
+        case ErrorCode::kSchemaTooNew: return grpc::StatusCode::FAILED_PRECONDITION;
+        case ErrorCode::kQueueFull:
+        case ErrorCode::kOutOfMemory:
+        case ErrorCode::kStorageFull: return grpc::StatusCode::RESOURCE_EXHAUSTED;
+        case ErrorCode::kUnavailable: return grpc::StatusCode::UNAVAILABLE;
+        case ErrorCode::kCancelled: return grpc::StatusCode::CANCELLED;
+        case ErrorCode::kDeadlineExceeded: return grpc::StatusCode::DEADLINE_EXCEEDED;
+        case ErrorCode::kDataLoss: return grpc::StatusCode::DATA_LOSS;
+        case ErrorCode::kFileNotReadable:
+        case ErrorCode::kFileNotWritable:
+        case ErrorCode::kStorage:
+        case ErrorCode::kInternal: return grpc::StatusCode::INTERNAL;
+    }
+    return grpc::StatusCode::INTERNAL;
+}
+
+std::string cutText(const std::string& text, std::size_t limit) {
+    if (text.size() <= limit) return text;
+    std::size_t end = limit;
+    // Back over the continuation bytes 10xxxxxx of a character cut in two.
+    while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xc0) == 0x80) --end;
+    return text.substr(0, end);
+}
+
+grpc::Status makeStatus(const Error& error, grpc::ServerContext& context,
+                        std::optional<std::chrono::milliseconds> retryAfter) {
+    context.AddTrailingMetadata(kErrorNameKey, errorCodeName(error.code));
+    if (retryAfter) context.AddTrailingMetadata(kRetryKey, std::to_string(retryAfter->count()));
+    return {statusCodeOf(error.code), cutText(error.message, kMaxErrorMessageBytes)};
+}
+
+}  // namespace shapedb::rpc

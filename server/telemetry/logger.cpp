@@ -1,0 +1,150 @@
+#include "server/telemetry/logger.h"
+
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+#include <spdlog/logger.h>
+#include <spdlog/pattern_formatter.h>
+#include <spdlog/sinks/basic_file_sink.h>
+#include <spdlog/sinks/stdout_sinks.h>
+
+namespace shapedb::telemetry {
+namespace {
+
+using Value = decltype(Field::value);
+
+/// A JSON string literal; invalid UTF-8 becomes U+FFFD.
+std::string jsonString(const std::string& text) {
+    return nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+std::string number(double value) {
+    char buffer[32];
+    std::snprintf(buffer, sizeof buffer, "%.6g", value);
+    return buffer;
+}
+
+bool plainWord(const std::string& text) {
+    if (text.empty()) return false;
+    for (const char c : text) {
+        const auto byte = static_cast<unsigned char>(c);
+        if (byte <= 0x20 || byte >= 0x7f || c == '"' || c == '=' || c == '\\') return false;
+    }
+    return true;
+}
+
+std::string show(const Value& value, bool json) {
+    return std::visit(
+        [json](const auto& v) -> std::string {
+            using T = std::decay_t<decltype(v)>;
+            if constexpr (std::is_same_v<T, std::string>) {
+                return !json && plainWord(v) ? v : jsonString(v);
+            } else if constexpr (std::is_same_v<T, bool>) {
+                return v ? "true" : "false";
+            } else if constexpr (std::is_same_v<T, double>) {
+                if (std::isfinite(v)) return number(v);
+                return json ? "null" : number(v);  // JSON has no infinities
+            } else {
+                return std::to_string(v);
+            }
+        },
+        value);
+}
+
+spdlog::level::level_enum spdlogLevel(Level level) {
+    switch (level) {
+        case Level::kTrace: return spdlog::level::trace;
+        case Level::kDebug: return spdlog::level::debug;
+        case Level::kInfo: return spdlog::level::info;
+        case Level::kWarn: return spdlog::level::warn;
+        case Level::kError: return spdlog::level::err;
+    }
+    return spdlog::level::err;
+}
+
+class SpdlogLogger : public Logger {
+  public:
+    SpdlogLogger(spdlog::sink_ptr sink, const LogOptions& options)
+        : json_(options.json), logger_("shapedb", std::move(sink)) {
+        // UTC, so that lines of several machines sort.
+        const char* pattern =
+            json_ ? R"({"time":"%Y-%m-%dT%H:%M:%S.%eZ","level":"%l",%v})" : "%Y-%m-%dT%H:%M:%S.%eZ %-5l %v";
+        logger_.set_formatter(
+            std::make_unique<spdlog::pattern_formatter>(pattern, spdlog::pattern_time_type::utc));
+        logger_.set_level(spdlogLevel(options.level));
+        logger_.flush_on(spdlog::level::trace);
+        logger_.set_error_handler([](const std::string&) {});  // a full disk must not take calls down
+    }
+
+    void log(Level level, const std::string& message, const std::vector<Field>& fields) override {
+        const auto wanted = spdlogLevel(level);
+        if (!logger_.should_log(wanted)) return;
+        try {
+            logger_.log(wanted, spdlog::string_view_t(json_ ? formatJson(message, fields)
+                                                            : formatText(message, fields)));
+        } catch (const std::exception&) {
+            // Out of memory while building a line: the line is lost, the call goes on.
+        }
+    }
+
+  private:
+    bool json_;
+    spdlog::logger logger_;
+};
+
+class SilentLogger : public Logger {
+  public:
+    void log(Level, const std::string&, const std::vector<Field>&) override {}
+};
+
+}  // namespace
+
+std::vector<Field> fieldsOf(const Error& error) {
+    return {{"error", std::string(errorCodeName(error.code))}, {"reason", error.message}};
+}
+
+Result<Level> levelFromName(const std::string& name) {
+    if (name == "trace") return Level::kTrace;
+    if (name == "debug") return Level::kDebug;
+    if (name == "info") return Level::kInfo;
+    if (name == "warn") return Level::kWarn;
+    if (name == "error") return Level::kError;
+    return fail(ErrorCode::kInvalidArgument, "'" + name + "' is none of trace, debug, info, warn, error");
+}
+
+std::string formatText(const std::string& message, const std::vector<Field>& fields) {
+    std::string line;
+    // A message is ours, but may quote a client.
+    const std::string safe = jsonString(message);
+    line.append(safe, 1, safe.size() - 2);
+    for (const Field& field : fields) line += " " + field.name + "=" + show(field.value, false);
+    return line;
+}
+
+std::string formatJson(const std::string& message, const std::vector<Field>& fields) {
+    std::string line = "\"message\":" + jsonString(message);
+    for (const Field& field : fields) line += ",\"" + field.name + "\":" + show(field.value, true);
+    return line;
+}
+
+Result<LoggerPtr> makeLogger(const LogOptions& options) {
+    try {
+        spdlog::sink_ptr sink;
+        if (options.file.empty()) {
+            sink = std::make_shared<spdlog::sinks::stderr_sink_mt>();
+        } else {
+            sink = std::make_shared<spdlog::sinks::basic_file_sink_mt>(options.file);
+        }
+        return std::make_shared<SpdlogLogger>(std::move(sink), options);
+    } catch (const std::exception& error) {
+        return fail(ErrorCode::kFileNotWritable,
+                    "log file " + options.file + " cannot be opened for writing: " + error.what());
+    }
+}
+
+LoggerPtr makeSilentLogger() { return std::make_shared<SilentLogger>(); }
+
+}  // namespace shapedb::telemetry

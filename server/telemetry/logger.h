@@ -1,0 +1,71 @@
+// Log lines with named fields, as text for people or as JSON for machines.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "core/base/error.h"
+
+namespace shapedb::telemetry {
+
+enum class Level { kTrace, kDebug, kInfo, kWarn, kError };
+
+/// One named value of a line. Names are lower_case and not repeated in a line; the names
+/// "time", "level" and "message" are taken.
+struct Field {
+    std::string name;
+    std::variant<std::string, std::int64_t, std::uint64_t, double, bool> value;
+};
+
+/// Writes whole lines; a line is never split by another thread's. Values may hold any bytes:
+/// control characters, quotes and invalid UTF-8 are escaped, so a client cannot forge a line.
+///
+/// Thread-safe. Passed around as shared_ptr; there is no global logger.
+class Logger {
+  public:
+    virtual ~Logger() = default;
+    virtual void log(Level level, const std::string& message, const std::vector<Field>& fields) = 0;
+
+    void debug(const std::string& message, const std::vector<Field>& fields = {}) {
+        log(Level::kDebug, message, fields);
+    }
+    void info(const std::string& message, const std::vector<Field>& fields = {}) {
+        log(Level::kInfo, message, fields);
+    }
+    void warn(const std::string& message, const std::vector<Field>& fields = {}) {
+        log(Level::kWarn, message, fields);
+    }
+    void error(const std::string& message, const std::vector<Field>& fields = {}) {
+        log(Level::kError, message, fields);
+    }
+};
+
+using LoggerPtr = std::shared_ptr<Logger>;
+
+/// The fields that describe an error: error (its name) and reason (its message).
+[[nodiscard]] std::vector<Field> fieldsOf(const Error& error);
+
+struct LogOptions {
+    Level level = Level::kInfo;
+    bool json = false;
+    std::string file;  ///< appended to; empty: standard error
+};
+
+/// "trace", "debug", "info", "warn", "error". Errors: kInvalidArgument.
+[[nodiscard]] Result<Level> levelFromName(const std::string& name);
+
+/// Errors: kFileNotWritable.
+[[nodiscard]] Result<LoggerPtr> makeLogger(const LogOptions& options);
+
+/// Drops everything.
+[[nodiscard]] LoggerPtr makeSilentLogger();
+
+/// One line without time and level, as `makeLogger` writes it after them: text
+/// `message name=value name="quoted value"`, or the members of a JSON object without braces.
+[[nodiscard]] std::string formatText(const std::string& message, const std::vector<Field>& fields);
+[[nodiscard]] std::string formatJson(const std::string& message, const std::vector<Field>& fields);
+
+}  // namespace shapedb::telemetry
