@@ -28,8 +28,7 @@ class Random {
 
     /// Uniform in [0, bound); bound > 0. The bias is below bound / 2^64.
     std::uint64_t below(std::uint64_t bound) {
-        return static_cast<std::uint64_t>((static_cast<Wide>(next()) * bound) >>
-                                          64);
+        return static_cast<std::uint64_t>((static_cast<Wide>(next()) * bound) >> 64);
     }
 
     /// Standard normal (Box-Muller; the second value of each pair is kept for the next call).

@@ -95,19 +95,24 @@ struct Candidate {
 // each pair; returns the sum of gains.
 template <typename SquaredDistance, typename Take>
 double matchGreedily(const AnchoredPoints& a, const AnchoredPoints& b, double width, SquaredDistance between,
-                     Take take) {
+                     Take take, double needed = -1.0) {
     std::array<Candidate, kMaxSignaturePoints * kMaxSignaturePoints> candidates;
     std::size_t count = 0;
+    double most = 0.0;
     for (std::size_t p = 0; p < a.count; ++p) {
+        double bestOfPoint = 0.0;
         for (std::size_t q = 0; q < b.count; ++q) {
             const double squared = between(p, q);
             const double gain = std::min(a.weight[p], b.weight[q]) * kernel(squared, width);
             if (gain > 0.0) {
                 candidates[count++] = {gain, squared, static_cast<std::uint8_t>(p),
                                        static_cast<std::uint8_t>(q)};
+                bestOfPoint = std::max(bestOfPoint, gain);
             }
         }
+        most += bestOfPoint;
     }
+    if (most * kBoundMargin <= needed) return most;
     std::sort(candidates.begin(), candidates.begin() + static_cast<std::ptrdiff_t>(count),
               [](const Candidate& x, const Candidate& y) {
                   if (x.gain != y.gain) return x.gain > y.gain;
@@ -148,12 +153,10 @@ double axisBound(const AnchoredPoints& a, const Cylindrical& viewA, const Anchor
 
 class Search {
   public:
-    Search(const AnchoredPoints& a, const AnchoredPoints& b, const ScoreOptions& options)
-        : a_(a), b_(b), width_(options.kernelWidth) {}
+    Search(const AnchoredPoints& a, const AnchoredPoints& b, double width, bool prune)
+        : a_(a), b_(b), width_(width), prune_(prune) {}
 
-    void tryRolls(Alignment alignment, const Cylindrical& viewA, const Cylindrical& viewB, bool prune) {
-        if (prune && bestSimilarity_ > 0.0 && axisBound(a_, viewA, b_, viewB, width_) <= bestSimilarity_)
-            return;
+    void tryRolls(Alignment alignment, const Cylindrical& viewA, const Cylindrical& viewB) {
         tryRoll(alignment, viewA, viewB, Roll{});
         for (std::size_t k = 1; k < a_.count; ++k) {
             if (!givesRoll(viewA, k)) continue;
@@ -167,12 +170,14 @@ class Search {
     }
 
     const Alignment& best() const { return best_; }
+    double bestSimilarity() const { return bestSimilarity_; }
 
   private:
     void tryRoll(const Alignment& alignment, const Cylindrical& viewA, const Cylindrical& viewB,
                  const Roll& roll) {
         const auto gap = [&](std::size_t p, std::size_t q) { return squaredGap(viewA, p, viewB, q, roll); };
-        const double similarity = matchGreedily(a_, b_, width_, gap, [](const Candidate&) {});
+        const double similarity = matchGreedily(
+            a_, b_, width_, gap, [](const Candidate&) {}, prune_ ? bestSimilarity_ : -1.0);
         if (similarity > bestSimilarity_) {
             bestSimilarity_ = similarity;
             best_ = alignment;
@@ -182,8 +187,15 @@ class Search {
     const AnchoredPoints& a_;
     const AnchoredPoints& b_;
     double width_;
+    bool prune_;
     Alignment best_;
     double bestSimilarity_ = 0.0;
+};
+
+// One axis of either side, with what no roll about it can exceed.
+struct AxisPair {
+    double bound;
+    std::uint8_t i, j;
 };
 
 // What an alignment lays on what.
@@ -242,23 +254,34 @@ double kernel(double squaredDistance, double width) {
 BestAlignment bestAlignment(const AnchoredPoints& a, const AnchoredPoints& b, const ScoreOptions& options,
                             bool prune) {
     if (!hasAxis(a) || !hasAxis(b)) return {{}, matchesOf(a, b, options.kernelWidth, {})};
-    Search search(a, b, options);
+    Search search(a, b, options.kernelWidth, prune);
     std::array<Cylindrical, kMaxSignaturePoints> viewsA;
+    std::array<Cylindrical, kMaxSignaturePoints> viewsB;
     for (std::size_t i = 1; i < a.count; ++i) viewsA[i] = alongAxis(a, i);
-    for (std::size_t j = 1; j < b.count; ++j) {
-        const Cylindrical viewB = alongAxis(b, j);
-        if (!viewB.exists) continue;
-        const Cylindrical mirroredB = mirrored(viewB);
-        for (std::size_t i = 1; i < a.count; ++i) {
-            if (!viewsA[i].exists) continue;
-            Alignment alignment;
-            alignment.i = static_cast<std::uint8_t>(i);
-            alignment.j = static_cast<std::uint8_t>(j);
-            search.tryRolls(alignment, viewsA[i], viewB, prune);
-            if (!options.reflection) continue;
-            alignment.reflected = true;
-            search.tryRolls(alignment, viewsA[i], mirroredB, prune);
+    for (std::size_t j = 1; j < b.count; ++j) viewsB[j] = alongAxis(b, j);
+    std::array<AxisPair, kMaxSignaturePoints * kMaxSignaturePoints> axes;
+    std::size_t count = 0;
+    for (std::size_t i = 1; i < a.count; ++i) {
+        for (std::size_t j = 1; j < b.count; ++j) {
+            if (!viewsA[i].exists || !viewsB[j].exists) continue;
+            axes[count++] = {axisBound(a, viewsA[i], b, viewsB[j], options.kernelWidth),
+                             static_cast<std::uint8_t>(i), static_cast<std::uint8_t>(j)};
         }
+    }
+    std::sort(axes.begin(), axes.begin() + static_cast<std::ptrdiff_t>(count),
+              [](const AxisPair& x, const AxisPair& y) {
+                  if (x.bound != y.bound) return x.bound > y.bound;
+                  return x.i != y.i ? x.i < y.i : x.j < y.j;
+              });
+    for (std::size_t c = 0; c < count; ++c) {
+        if (prune && axes[c].bound <= search.bestSimilarity()) break;
+        Alignment alignment;
+        alignment.i = axes[c].i;
+        alignment.j = axes[c].j;
+        search.tryRolls(alignment, viewsA[alignment.i], viewsB[alignment.j]);
+        if (!options.reflection) continue;
+        alignment.reflected = true;
+        search.tryRolls(alignment, viewsA[alignment.i], mirrored(viewsB[alignment.j]));
     }
     return {search.best(), matchesOf(a, b, options.kernelWidth, search.best())};
 }

@@ -54,8 +54,8 @@ struct BestAlignment {
     PairList matches;
 };
 
-/// The alignment with the largest similarity; the first in the order i, j, reflection, k, l among
-/// equals. `prune` skips axis pairs that cannot beat the best so far and changes nothing else.
+/// The alignment with the largest similarity. Axis pairs are tried by falling bound; the first of
+/// equals stays. `prune` stops where no bound can beat the best so far and changes nothing else.
 [[nodiscard]] BestAlignment bestAlignment(const AnchoredPoints& a, const AnchoredPoints& b,
                                           const ScoreOptions& options, bool prune = true);
 

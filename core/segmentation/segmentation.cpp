@@ -148,7 +148,7 @@ Result<double> interiorSize(const PointCloud& sites, const std::vector<std::int3
     for (std::size_t i = 0; i < sites.size(); ++i) {
         if (siteLabels[i] >= 0) touched.push_back(sites[i]);
     }
-    return smallestSphereDiameter(touched);
+    return smallestBoxDiagonal(touched);
 }
 
 void toScanUnits(const Frame& frame, PointCloud sites, Segmentation& result) {

@@ -51,8 +51,8 @@ struct Segmentation {
     std::vector<std::uint32_t> siteOfPoint;
 
     double volume = 0.0;  ///< of all segments together, scan units cubed
-    /// Diameter of the smallest sphere around the interior's tetrahedra, scan units: stray points
-    /// off the surface do not count.
+    /// Smallest diagonal of an oriented box around the interior's tetrahedra, scan units: stray
+    /// points off the surface do not count.
     double size = 0.0;
     std::uint64_t duplicates = 0;  ///< input points that repeated an earlier one
     std::uint64_t bigBalls = 0;

@@ -17,7 +17,8 @@ struct SignatureOptions {
     std::uint32_t maxPoints = 7;
 };
 
-constexpr std::uint32_t kMaxSignaturePoints = 32;
+/// Alignments grow with the fourth power of the points.
+constexpr std::uint32_t kMaxSignaturePoints = 16;
 
 /// Errors: kInvalidArgument naming the field, its value and its range.
 [[nodiscard]] Result<void> validate(const SignatureOptions& options);
@@ -36,7 +37,7 @@ struct SignaturePoint {
 
 struct Signature {
     std::vector<SignaturePoint> points;  ///< by falling weight; 1 to kMaxSignaturePoints
-    double scale = 1.0;                  ///< diagonal of the bounding box, scan units, > 0
+    double scale = 1.0;                  ///< smallest diagonal of a box around the interior, scan units, > 0
     Point3 origin;                       ///< heaviest representative point, scan units
     double volume = 0.0;                 ///< of the whole interior, scan units cubed
 };
