@@ -226,8 +226,8 @@ Result<void> SqliteStore::backup(const std::string& path, const RunContext& cont
             Connection target(temporary.path(), OpenMode::kReadWrite, options_.busyTimeoutMs);
             target.execute("PRAGMA synchronous=OFF");  // made durable as a whole by `publish`
             copyDatabase(source, target, kStepPages, [&](std::uint64_t done, std::uint64_t total) {
-                orRaise(context.checkpoint());
                 context.report("backup", done, total);
+                orRaise(context.checkpoint());
             });
             // A file alone, that can be read from a folder one may not write to.
             if (target.text("PRAGMA journal_mode=DELETE") != "delete") {
@@ -252,8 +252,8 @@ Result<void> SqliteStore::restore(const std::string& path, const RunContext& con
         const std::lock_guard<std::mutex> lock(writerMutex_);
         separateIds(*copy, *writer_);
         copyDatabase(*copy, *writer_, kStepPages, [&](std::uint64_t done, std::uint64_t total) {
-            orRaise(context.checkpoint());
             context.report("restore", done, total);
+            orRaise(context.checkpoint());
         });
         boundWal();
     });

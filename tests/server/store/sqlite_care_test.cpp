@@ -165,7 +165,9 @@ TEST_F(SqliteCareTest, CancelledLeavesNothing) {
     context.cancel = &cancel;
     for (const std::string stop : {"copy", "integrity", "points", "restore", "backup"}) {
         cancel = false;
-        context.progress = [&](const char* stage, std::uint64_t, std::uint64_t) { cancel = stage == stop; };
+        context.progress = [&](const char* stage, std::uint64_t, std::uint64_t) {
+            if (stage == stop) cancel = true;
+        };
         const std::string path = folder_.file("cancelled.db");
         if (stop == "backup") {
             EXPECT_FAILS(store_->backup(path, context), ErrorCode::kCancelled);
