@@ -13,6 +13,7 @@ static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "points are stored litt
 namespace {
 
 constexpr std::size_t kFloatBytes = sizeof(float);
+constexpr std::size_t kPointBytes = 3 * kFloatBytes;
 
 std::string rawBlob(const std::vector<float>& points) {
     std::string blob(1 + points.size() * kFloatBytes, static_cast<char>(PointFormat::kRaw));
@@ -38,7 +39,7 @@ Result<std::vector<float>> decodePlanes(const char* body, std::size_t size, std:
     if (content == ZSTD_CONTENTSIZE_ERROR || content == ZSTD_CONTENTSIZE_UNKNOWN) {
         return damaged("no zstd frame of known size");
     }
-    if (content / kFloatBytes != floatCount || content % kFloatBytes != 0) {
+    if (content / kFloatBytes != floatCount || content % kPointBytes != 0) {
         return damaged("a zstd frame of " + std::to_string(content) + " bytes for " +
                        std::to_string(floatCount) + " numbers");
     }
@@ -47,21 +48,21 @@ Result<std::vector<float>> decodePlanes(const char* body, std::size_t size, std:
     if (ZSTD_isError(got) != 0) return damaged(ZSTD_getErrorName(got));
     if (got != planes.size()) return damaged("the zstd frame is shorter than it says");
     std::vector<float> points(static_cast<std::size_t>(floatCount));
-    planesToBytes(planes.data(), reinterpret_cast<unsigned char*>(points.data()), points.size());
+    planesToBytes(planes.data(), reinterpret_cast<unsigned char*>(points.data()), points.size() / 3);
     return points;
 }
 
 }  // namespace
 
-void bytesToPlanes(const unsigned char* in, unsigned char* out, std::size_t floatCount) {
-    for (std::size_t b = 0; b < kFloatBytes; ++b) {
-        for (std::size_t i = 0; i < floatCount; ++i) out[b * floatCount + i] = in[kFloatBytes * i + b];
+void bytesToPlanes(const unsigned char* in, unsigned char* out, std::size_t pointCount) {
+    for (std::size_t k = 0; k < kPointBytes; ++k) {
+        for (std::size_t i = 0; i < pointCount; ++i) out[k * pointCount + i] = in[kPointBytes * i + k];
     }
 }
 
-void planesToBytes(const unsigned char* in, unsigned char* out, std::size_t floatCount) {
-    for (std::size_t b = 0; b < kFloatBytes; ++b) {
-        for (std::size_t i = 0; i < floatCount; ++i) out[kFloatBytes * i + b] = in[b * floatCount + i];
+void planesToBytes(const unsigned char* in, unsigned char* out, std::size_t pointCount) {
+    for (std::size_t k = 0; k < kPointBytes; ++k) {
+        for (std::size_t i = 0; i < pointCount; ++i) out[kPointBytes * i + k] = in[k * pointCount + i];
     }
 }
 
@@ -69,7 +70,7 @@ Result<std::string> encodePoints(const std::vector<float>& points, int level) tr
     if (points.empty()) return rawBlob(points);
     const std::size_t bytes = points.size() * kFloatBytes;
     std::vector<unsigned char> planes(bytes);
-    bytesToPlanes(reinterpret_cast<const unsigned char*>(points.data()), planes.data(), points.size());
+    bytesToPlanes(reinterpret_cast<const unsigned char*>(points.data()), planes.data(), points.size() / 3);
     std::string blob(1 + ZSTD_compressBound(bytes), static_cast<char>(PointFormat::kPlanesZstd));
     const std::size_t size = ZSTD_compress(blob.data() + 1, blob.size() - 1, planes.data(), bytes, level);
     if (ZSTD_isError(size) != 0) {

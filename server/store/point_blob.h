@@ -14,11 +14,11 @@ namespace shapedb::store {
 /// First byte of the blob. Persisted: never renumber.
 enum class PointFormat : std::uint8_t {
     kRaw = 0,         ///< little-endian float32 as they came; used when the other is not smaller
-    kPlanesZstd = 1,  ///< one zstd frame of the floats' bytes, regrouped into planes
+    kPlanesZstd = 1,  ///< one zstd frame of the points' bytes, regrouped into planes
 };
 
-/// Encodes packed x y z. Bits are kept exactly, NaN payloads included. `level`: zstd level,
-/// 1 to 19. Errors: kOutOfMemory, kInternal (zstd failed).
+/// Encodes packed x y z (a multiple of three numbers). Bits are kept exactly, NaN payloads included. `level`:
+/// zstd level, 1 to 19. Errors: kOutOfMemory, kInternal (zstd failed).
 [[nodiscard]] Result<std::string> encodePoints(const std::vector<float>& points, int level);
 
 /// The inverse. `floatCount` is what the shape's row says; nothing is allocated before the
@@ -27,10 +27,11 @@ enum class PointFormat : std::uint8_t {
 [[nodiscard]] Result<std::vector<float>> decodePoints(const void* blob, std::size_t size,
                                                       std::uint64_t floatCount);
 
-/// The regrouping alone, for the tests: byte b of float i moves from 4 i + b to
-/// b * floatCount + i. Neighbouring scan points share sign, exponent and leading digits, so
-/// whole planes nearly repeat. `in` and `out` hold 4 * floatCount bytes and do not overlap.
-void bytesToPlanes(const unsigned char* in, unsigned char* out, std::size_t floatCount);
-void planesToBytes(const unsigned char* in, unsigned char* out, std::size_t floatCount);
+/// The regrouping alone, for the tests: byte k (0 to 11) of point i moves from 12 i + k to
+/// k * pointCount + i, so that each byte of x, of y and of z forms a plane. Neighbouring scan
+/// points share sign, exponent and leading digits of each coordinate, so whole planes nearly
+/// repeat. `in` and `out` hold 12 * pointCount bytes and do not overlap.
+void bytesToPlanes(const unsigned char* in, unsigned char* out, std::size_t pointCount);
+void planesToBytes(const unsigned char* in, unsigned char* out, std::size_t pointCount);
 
 }  // namespace shapedb::store

@@ -47,30 +47,30 @@ TEST(PointBlob, LiteralRaw) {
 }
 
 // The bytes of format 1 are frozen: a zstd frame (RFC 8878) with one raw block, written by
-// hand, of the four planes of 1, -2, 0.5.
+// hand, of the twelve planes of (1, -2, 0.5) and (2, 4, -1).
 TEST(PointBlob, LiteralPlanes) {
-    const std::string blob = bytes({0x01,                    // format
+    const std::string head = bytes({0x01,                    // format
                                     0x28, 0xb5, 0x2f, 0xfd,  // zstd magic
-                                    0x20, 0x0c,              // single segment, 12 bytes
-                                    0x61, 0x00, 0x00,        // last block, raw, 12 bytes
-                                    0x00, 0x00, 0x00,        // lowest bytes of x, y, z
-                                    0x00, 0x00, 0x00,        //
-                                    0x80, 0x00, 0x00,        //
-                                    0x3f, 0xc0, 0x3f});      // sign and exponent
-    const auto points = decodePoints(blob.data(), blob.size(), 3);
+                                    0x20, 0x18,              // single segment, 24 bytes
+                                    0xc1, 0x00, 0x00});      // last block, raw, 24 bytes
+    const std::string x = bytes({0x00, 0x00, 0x00, 0x00, 0x80, 0x00, 0x3f, 0x40});
+    const std::string y = bytes({0x00, 0x00, 0x00, 0x00, 0x00, 0x80, 0xc0, 0x40});
+    const std::string z = bytes({0x00, 0x00, 0x00, 0x00, 0x00, 0x80, 0x3f, 0xbf});
+    const std::string blob = head + x + y + z;
+    const auto points = decodePoints(blob.data(), blob.size(), 6);
     ASSERT_TRUE(points) << points.error().message;
-    EXPECT_EQ(*points, (std::vector<float>{1.0f, -2.0f, 0.5f}));
+    EXPECT_EQ(*points, (std::vector<float>{1.0f, -2.0f, 0.5f, 2.0f, 4.0f, -1.0f}));
 }
 
 TEST(PointBlob, PlanesAreATransposition) {
-    const std::string in = "0123abcdABCD";
-    std::string planes(12, ' ');
-    std::string back(12, ' ');
-    bytesToPlanes(reinterpret_cast<const unsigned char*>(in.data()),
-                  reinterpret_cast<unsigned char*>(planes.data()), 3);
-    EXPECT_EQ(planes, "0aA1bB2cC3dD");
-    planesToBytes(reinterpret_cast<const unsigned char*>(planes.data()),
-                  reinterpret_cast<unsigned char*>(back.data()), 3);
+    const std::string in = "abcdefghijklABCDEFGHIJKL";
+    std::string planes(24, ' ');
+    std::string back(24, ' ');
+    const auto* from = reinterpret_cast<const unsigned char*>(in.data());
+    auto* middle = reinterpret_cast<unsigned char*>(planes.data());
+    bytesToPlanes(from, middle, 2);
+    EXPECT_EQ(planes, "aAbBcCdDeEfFgGhHiIjJkKlL");
+    planesToBytes(middle, reinterpret_cast<unsigned char*>(back.data()), 2);
     EXPECT_EQ(back, in);
 }
 
