@@ -1,0 +1,35 @@
+// The file a backup is written to. Private to client/api.
+#pragma once
+
+#include <cstdio>
+#include <string>
+
+#include "core/base/error.h"
+
+namespace shapedb::client {
+
+/// Collects a backup under `PATH.part` and gives it its name when it is complete and on the
+/// disk; without `commit` nothing is left behind. Not thread-safe.
+class BackupFile {
+  public:
+    explicit BackupFile(std::string path) : path_(std::move(path)), part_(path_ + ".part") {}
+    BackupFile(const BackupFile&) = delete;
+    BackupFile& operator=(const BackupFile&) = delete;
+    ~BackupFile();
+
+    /// Creates the file, empty; what an earlier attempt wrote is dropped.
+    [[nodiscard]] Result<void> open();
+    [[nodiscard]] Result<void> write(const std::string& data);
+    /// Flushes to the disk and renames. Errors of all three: kFileNotWritable.
+    [[nodiscard]] Result<void> commit();
+
+  private:
+    void discard();
+    [[nodiscard]] tl::unexpected<Error> failed(const char* what) const;
+
+    std::string path_;
+    std::string part_;
+    std::FILE* file_ = nullptr;
+};
+
+}  // namespace shapedb::client

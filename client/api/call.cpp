@@ -1,0 +1,123 @@
+#include "client/api/call.h"
+
+#include <algorithm>
+#include <condition_variable>
+#include <mutex>
+#include <new>
+#include <random>
+#include <thread>
+
+#include "client/api/retry.h"
+#include "client/api/status.h"
+
+namespace shapedb::client {
+
+namespace {
+
+using Clock = RunContext::Clock;
+
+/// How often a waiting call looks whether it was cancelled.
+constexpr auto kPoll = std::chrono::milliseconds(20);
+
+/// Cancels one rpc when the flag goes up. Blocking stubs have no other way in; the thread is
+/// only made for callers that can cancel at all.
+class CancelWatch {
+  public:
+    CancelWatch(grpc::ClientContext& rpc, const std::atomic<bool>* flag) {
+        if (flag == nullptr) return;
+        thread_ = std::thread([this, &rpc, flag] {
+            std::unique_lock<std::mutex> lock(mutex_);
+            while (!done_) {
+                if (flag->load(std::memory_order_relaxed)) return rpc.TryCancel();
+                wake_.wait_for(lock, kPoll);
+            }
+        });
+    }
+    CancelWatch(const CancelWatch&) = delete;
+    CancelWatch& operator=(const CancelWatch&) = delete;
+    ~CancelWatch() {
+        if (!thread_.joinable()) return;
+        {
+            const std::lock_guard<std::mutex> lock(mutex_);
+            done_ = true;
+        }
+        wake_.notify_one();
+        thread_.join();
+    }
+
+  private:
+    std::mutex mutex_;
+    std::condition_variable wake_;
+    bool done_ = false;
+    std::thread thread_;
+};
+
+/// The earlier of the caller's deadline and the one every call has.
+Clock::time_point deadlineOf(const ClientOptions& options, const RunContext& context, CallTraits traits) {
+    if (!traits.bounded || options.deadline.count() == 0) return context.deadline;
+    return std::min(context.deadline, Clock::now() + options.deadline);
+}
+
+void setDeadline(grpc::ClientContext& rpc, Clock::time_point deadline) {
+    if (deadline == Clock::time_point::max()) return;
+    // gRPC takes wall-clock time; RunContext counts on the steady clock.
+    rpc.set_deadline(
+        std::chrono::system_clock::now() +
+        std::chrono::duration_cast<std::chrono::system_clock::duration>(deadline - Clock::now()));
+}
+
+/// False when there is no time for it, or the caller cancels meanwhile.
+bool sleepFor(std::chrono::milliseconds delay, Clock::time_point deadline, const RunContext& context) {
+    const auto until = Clock::now() + delay;
+    if (until >= deadline) return false;
+    while (Clock::now() < until) {
+        if (!context.checkpoint()) return false;
+        std::this_thread::sleep_for(std::min<Clock::duration>(kPoll, until - Clock::now()));
+    }
+    return true;
+}
+
+Result<void> makeCallUnguarded(const ClientOptions& options, const RunContext& context, CallTraits traits,
+                               const Attempt& attempt) {
+    if (const auto proceed = context.checkpoint(); !proceed) return fail(proceed.error());
+    const Clock::time_point deadline = deadlineOf(options, context, traits);
+    // Jitter must differ between clients that failed together.
+    Random random(std::random_device{}());
+    for (int number = 1;; ++number) {
+        grpc::ClientContext rpc;
+        setDeadline(rpc, deadline);
+        Result<void> local;
+        grpc::Status status;
+        {
+            const CancelWatch watch(rpc, context.cancel);
+            status = attempt(rpc, local);
+        }
+        if (!local) return fail(local.error());
+        if (status.ok()) return {};
+        // Our own cancellation comes back as a failure of the rpc.
+        if (const auto proceed = context.checkpoint();
+            !proceed && proceed.error().code == ErrorCode::kCancelled) {
+            return fail(proceed.error());
+        }
+        const Error error = errorOf(status, rpc.GetServerTrailingMetadata(), options.address);
+        if (!traits.idempotent) return fail(error);
+        const auto delay = retryDelay(options.retry, number,
+                                      failureOf(status, rpc.GetServerTrailingMetadata(), error), random);
+        if (!delay || !sleepFor(*delay, deadline, context)) return fail(error);
+    }
+}
+
+}  // namespace
+
+Result<void> makeCall(const ClientOptions& options, const RunContext& context, CallTraits traits,
+                      const Attempt& attempt) {
+    try {
+        return makeCallUnguarded(options, context, traits, attempt);
+    } catch (const std::bad_alloc&) {
+        return fail(ErrorCode::kOutOfMemory, "not enough memory for the call");
+    } catch (const std::exception& e) {
+        return fail(ErrorCode::kInternal, std::string("the call failed on this side: ") + e.what());
+    }
+}
+
+}  // namespace shapedb::client

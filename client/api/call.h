@@ -1,0 +1,65 @@
+// How every rpc is made: deadline, cancellation, retries and translation of the outcome, once.
+// Private to client/api.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include <grpcpp/grpcpp.h>
+
+#include "client/api/client.h"
+#include "core/base/error.h"
+#include "core/base/run_context.h"
+#include "shapedb/v1/admin_service.grpc.pb.h"
+#include "shapedb/v1/collection_service.grpc.pb.h"
+#include "shapedb/v1/search_service.grpc.pb.h"
+#include "shapedb/v1/shape_service.grpc.pb.h"
+
+namespace shapedb::client {
+
+struct Client::Impl {
+    ClientOptions options;  ///< address with its port
+    std::shared_ptr<grpc::Channel> channel;
+    std::unique_ptr<v1::ShapeService::Stub> shapes;
+    std::unique_ptr<v1::SearchService::Stub> search;
+    std::unique_ptr<v1::CollectionService::Stub> collections;
+    std::unique_ptr<v1::AdminService::Stub> admin;
+};
+
+/// How one rpc may be treated.
+struct CallTraits {
+    bool idempotent = true;  ///< may be made again
+    bool bounded = true;     ///< ClientOptions::deadline applies
+};
+
+constexpr CallTraits kIdempotent{true, true};
+constexpr CallTraits kOnce{false, true};
+constexpr CallTraits kIdempotentUnbounded{true, false};
+constexpr CallTraits kOnceUnbounded{false, false};
+
+/// One attempt: makes the rpc with the given context and returns its status. A failure on this
+/// side (a file that cannot be written) goes to `local`; the attempt then cancels the rpc.
+using Attempt = std::function<grpc::Status(grpc::ClientContext& rpc, Result<void>& local)>;
+
+/// Makes the call until it succeeds, its failure is final, or time is up. No exception leaves.
+/// The error of the last attempt is reported even when it is time that forbids another one.
+[[nodiscard]] Result<void> makeCall(const ClientOptions& options, const RunContext& context,
+                                    CallTraits traits, const Attempt& attempt);
+
+/// A unary rpc: `Stub::Method` of `stub` with `request`.
+template <typename Stub, typename Request, typename Response>
+[[nodiscard]] Result<Response> callUnary(
+    const ClientOptions& options, const RunContext& context, CallTraits traits, Stub& stub,
+    grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*), const Request& request) {
+    Response response;
+    const auto made = makeCall(options, context, traits, [&](grpc::ClientContext& rpc, Result<void>&) {
+        response.Clear();
+        return (stub.*method)(&rpc, request, &response);
+    });
+    if (!made) return fail(made.error());
+    return response;
+}
+
+}  // namespace shapedb::client

@@ -1,0 +1,65 @@
+#include "client/api/client.h"
+
+#include <grpcpp/grpcpp.h>
+
+#include "client/api/address.h"
+#include "client/api/call.h"
+#include "client/api/retry.h"
+
+namespace shapedb::client {
+
+namespace {
+
+/// A lost connection is tried again about as soon as a call is.
+constexpr int kFirstReconnectMs = 100;
+constexpr int kLongestReconnectMs = 2000;
+
+grpc::ChannelArguments channelArguments() {
+    grpc::ChannelArguments arguments;
+    // Replies are as large as the caller asked for (1,000 hits with their metadata).
+    arguments.SetMaxReceiveMessageSize(-1);
+    // Retries are decided here, with the server's own error names; gRPC must not add its own.
+    arguments.SetInt(GRPC_ARG_ENABLE_RETRIES, 0);
+    arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, kFirstReconnectMs);
+    arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, kFirstReconnectMs);
+    arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, kLongestReconnectMs);
+    // Two clients of one process have a connection each.
+    arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+    return arguments;
+}
+
+}  // namespace
+
+Client::Client(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Client::~Client() = default;
+Client::Client(Client&&) noexcept = default;
+Client& Client::operator=(Client&&) noexcept = default;
+
+Result<Client> Client::connect(ClientOptions options) {
+    if (options.address.empty()) {
+        return fail(ErrorCode::kInvalidArgument, "the server's address is empty; give HOST:PORT");
+    }
+    if (options.deadline.count() < 0) {
+        return fail(ErrorCode::kInvalidArgument,
+                    "deadline is " + std::to_string(options.deadline.count()) + " ms; it must be at least 0");
+    }
+    if (const auto valid = validate(options.retry); !valid) return fail(valid.error());
+    try {
+        auto impl = std::make_unique<Impl>();
+        options.address = withDefaultPort(options.address);
+        impl->options = std::move(options);
+        impl->channel = grpc::CreateCustomChannel(impl->options.address, grpc::InsecureChannelCredentials(),
+                                                  channelArguments());
+        impl->shapes = v1::ShapeService::NewStub(impl->channel);
+        impl->search = v1::SearchService::NewStub(impl->channel);
+        impl->collections = v1::CollectionService::NewStub(impl->channel);
+        impl->admin = v1::AdminService::NewStub(impl->channel);
+        return Client(std::move(impl));
+    } catch (const std::bad_alloc&) {
+        return fail(ErrorCode::kOutOfMemory, "not enough memory for a connection");
+    }
+}
+
+const std::string& Client::address() const { return impl_->options.address; }
+
+}  // namespace shapedb::client

@@ -1,0 +1,49 @@
+// CollectionService.
+#include "client/api/call.h"
+#include "client/api/client.h"
+#include "client/api/convert.h"
+
+namespace shapedb::client {
+
+Result<Collection> Client::createCollection(const std::string& name, const std::string& description,
+                                            const Parameters& parameters, const RunContext& context) const {
+    v1::CreateCollectionRequest request;
+    request.set_name(name);
+    request.set_description(description);
+    fillParameters(parameters, &request);
+    const auto response = callUnary(impl_->options, context, kOnce, *impl_->collections,
+                                    &v1::CollectionService::Stub::CreateCollection, request);
+    if (!response) return fail(response.error());
+    return fromWire(*response);
+}
+
+Result<Collection> Client::getCollection(const std::string& name, const RunContext& context) const {
+    v1::GetCollectionRequest request;
+    request.set_name(name);
+    const auto response = callUnary(impl_->options, context, kIdempotent, *impl_->collections,
+                                    &v1::CollectionService::Stub::GetCollection, request);
+    if (!response) return fail(response.error());
+    return fromWire(*response);
+}
+
+Result<std::vector<Collection>> Client::listCollections(const RunContext& context) const {
+    const auto response =
+        callUnary(impl_->options, context, kIdempotent, *impl_->collections,
+                  &v1::CollectionService::Stub::ListCollections, v1::ListCollectionsRequest());
+    if (!response) return fail(response.error());
+    std::vector<Collection> collections;
+    for (const v1::Collection& one : response->collections()) collections.push_back(fromWire(one));
+    return collections;
+}
+
+Result<void> Client::deleteCollection(const std::string& name, bool force, const RunContext& context) const {
+    v1::DeleteCollectionRequest request;
+    request.set_name(name);
+    request.set_force(force);
+    const auto response = callUnary(impl_->options, context, kOnce, *impl_->collections,
+                                    &v1::CollectionService::Stub::DeleteCollection, request);
+    if (!response) return fail(response.error());
+    return {};
+}
+
+}  // namespace shapedb::client

@@ -1,0 +1,254 @@
+#include "client/api/convert.h"
+
+#include <algorithm>
+
+namespace shapedb::client {
+
+namespace {
+
+Point3 fromWire(const v1::Vector3& from) { return {from.x(), from.y(), from.z()}; }
+
+Timestamp fromWire(const google::protobuf::Timestamp& from) {
+    return Timestamp(std::chrono::duration_cast<Timestamp::duration>(std::chrono::seconds(from.seconds()) +
+                                                                     std::chrono::nanoseconds(from.nanos())));
+}
+
+Error fromWire(const v1::Failure& from) { return {errorCodeFromName(from.error()), from.message()}; }
+
+ShapeState fromWire(v1::ShapeState from) {
+    switch (from) {
+        case v1::SHAPE_STATE_READY: return ShapeState::kReady;
+        case v1::SHAPE_STATE_FAILED: return ShapeState::kFailed;
+        default: return ShapeState::kPending;
+    }
+}
+
+Motion fromWire(const v1::Motion& from) {
+    Motion motion;
+    motion.scale = from.scale();
+    motion.reflected = from.reflected();
+    motion.translation = fromWire(from.translation());
+    if (from.rotation_size() == 9) {
+        for (int i = 0; i < 9; ++i) {
+            motion.rotation[static_cast<std::size_t>(i / 3)][static_cast<std::size_t>(i % 3)] =
+                from.rotation(i);
+        }
+    }
+    return motion;
+}
+
+}  // namespace
+
+const char* stateName(ShapeState state) noexcept {
+    switch (state) {
+        case ShapeState::kPending: return "pending";
+        case ShapeState::kReady: return "ready";
+        case ShapeState::kFailed: return "failed";
+    }
+    return "pending";
+}
+
+const char* outcomeName(AddOutcome outcome) noexcept {
+    switch (outcome) {
+        case AddOutcome::kCreated: return "created";
+        case AddOutcome::kReplaced: return "replaced";
+        case AddOutcome::kMetadataChanged: return "metadata changed";
+        case AddOutcome::kUnchanged: return "unchanged";
+    }
+    return "created";
+}
+
+void fill(const ShapeRef& from, v1::ShapeRef* to) {
+    to->set_collection(from.collection);
+    to->set_key(from.key);
+}
+
+void fill(const SearchOptions& from, v1::SearchOptions* to) {
+    to->set_collection(from.collection);
+    to->set_k(from.k);
+    to->set_threshold(from.threshold);
+    to->set_filter(from.filter);
+    to->set_forbid_reflection(!from.reflection);
+    to->set_keep_scale(from.keepScale);
+    to->set_no_explanation(!from.explanation);
+}
+
+v1::AddMode toWire(AddMode mode) {
+    switch (mode) {
+        case AddMode::kUpsert: return v1::ADD_MODE_UPSERT;
+        case AddMode::kInsertOnly: return v1::ADD_MODE_INSERT_ONLY;
+        case AddMode::kUpdateOnly: return v1::ADD_MODE_UPDATE_ONLY;
+    }
+    return v1::ADD_MODE_UPSERT;
+}
+
+v1::ShapeState toWire(const std::optional<ShapeState>& state) {
+    if (!state) return v1::SHAPE_STATE_UNSPECIFIED;
+    switch (*state) {
+        case ShapeState::kPending: return v1::SHAPE_STATE_PENDING;
+        case ShapeState::kReady: return v1::SHAPE_STATE_READY;
+        case ShapeState::kFailed: return v1::SHAPE_STATE_FAILED;
+    }
+    return v1::SHAPE_STATE_UNSPECIFIED;
+}
+
+Shape fromWire(const v1::Shape& from) {
+    Shape to;
+    to.collection = from.collection();
+    to.key = from.key();
+    to.id = from.id();
+    to.version = from.version();
+    to.state = fromWire(from.state());
+    to.pointCount = from.point_count();
+    to.sha256 = from.sha256();
+    to.metadata.insert(from.metadata().begin(), from.metadata().end());
+    to.created = fromWire(from.created());
+    to.updated = fromWire(from.updated());
+    if (from.has_failure()) to.failure = fromWire(from.failure());
+    return to;
+}
+
+AddOutcome fromWire(v1::AddShapeResponse::Outcome from) {
+    switch (from) {
+        case v1::AddShapeResponse::OUTCOME_REPLACED: return AddOutcome::kReplaced;
+        case v1::AddShapeResponse::OUTCOME_METADATA_CHANGED: return AddOutcome::kMetadataChanged;
+        case v1::AddShapeResponse::OUTCOME_UNCHANGED: return AddOutcome::kUnchanged;
+        default: return AddOutcome::kCreated;
+    }
+}
+
+IngestEvent fromWire(const v1::IngestEvent& from) {
+    IngestEvent to;
+    to.state = fromWire(from.state());
+    to.stage = from.stage();
+    to.done = from.done();
+    to.total = from.total();
+    if (from.has_failure()) to.failure = fromWire(from.failure());
+    return to;
+}
+
+Signature fromWire(const v1::Signature& from) {
+    Signature to;
+    to.scale = from.scale();
+    to.volume = from.volume();
+    to.encoded = from.encoded();
+    for (const v1::WeightedPoint& point : from.points()) {
+        WeightedPoint out;
+        out.position = fromWire(point.position());
+        out.weight = point.weight();
+        out.volumeShare = point.volume_share();
+        out.peakRadius = point.peak_radius();
+        const auto count = std::min(static_cast<std::size_t>(point.extents_size()), out.extents.size());
+        std::copy_n(point.extents().begin(), count, out.extents.begin());
+        to.points.push_back(out);
+    }
+    return to;
+}
+
+SegmentationReport fromWire(const v1::SegmentationReport& from) {
+    SegmentationReport to;
+    to.points = from.points();
+    to.pointsUsed = from.points_used();
+    to.duplicates = from.duplicates();
+    to.tetrahedra = from.tetrahedra();
+    to.interiorTetrahedra = from.interior_tetrahedra();
+    to.maxima = from.maxima();
+    to.segments = from.segments();
+    to.volume = from.volume();
+    to.delaunaySeconds = from.delaunay_seconds();
+    to.totalSeconds = from.total_seconds();
+    for (const v1::StageTime& stage : from.stages()) to.stages.push_back({stage.stage(), stage.seconds()});
+    return to;
+}
+
+Explanation fromWire(const v1::Explanation& from) {
+    Explanation to;
+    to.similarity = from.similarity();
+    to.dissimilarity = from.dissimilarity();
+    to.motion = fromWire(from.motion());
+    for (const v1::SegmentMatch& match : from.matches()) {
+        to.matches.push_back({match.query_segment(), match.hit_segment(), match.share(), match.distance()});
+    }
+    to.unmatchedQuery.assign(from.unmatched_query().begin(), from.unmatched_query().end());
+    to.unmatchedHit.assign(from.unmatched_hit().begin(), from.unmatched_hit().end());
+    to.degenerate = from.degenerate();
+    return to;
+}
+
+SearchReply fromWire(const v1::SearchResponse& from) {
+    SearchReply to;
+    for (const v1::Hit& hit : from.hits()) {
+        Hit out;
+        out.shape = fromWire(hit.shape());
+        out.score = hit.score();
+        if (hit.has_explanation()) out.explanation = fromWire(hit.explanation());
+        to.hits.push_back(std::move(out));
+    }
+    to.candidates = from.candidates();
+    to.filtered = from.filtered();
+    to.scored = from.scored();
+    to.query = fromWire(from.query());
+    to.secondsSegment = from.seconds_segment();
+    to.secondsSearch = from.seconds_search();
+    if (from.has_report()) to.report = fromWire(from.report());
+    return to;
+}
+
+Collection fromWire(const v1::Collection& from) {
+    Collection to;
+    to.name = from.name();
+    to.description = from.description();
+    to.parameters.profile = from.profile() == v1::PROFILE_PAPER ? Profile::kPaper : Profile::kDefault;
+    const v1::SegmentationParameters& segmentation = from.segmentation();
+    to.parameters.bigBallRatio = segmentation.big_ball_ratio();
+    to.parameters.deepAngleDegrees = segmentation.deep_angle_degrees();
+    to.parameters.hullAngleDegrees = segmentation.hull_angle_degrees();
+    to.parameters.mergeRatio = segmentation.merge_ratio();
+    to.parameters.decimateTo = segmentation.decimate_to();
+    to.parameters.maxPoints = from.signature().max_points();
+    to.generation = from.generation();
+    to.created = fromWire(from.created());
+    to.shapes = from.shapes();
+    to.shapesReady = from.shapes_ready();
+    to.shapesFailed = from.shapes_failed();
+    return to;
+}
+
+RebuildProgress fromWire(const v1::RebuildProgress& from) {
+    return {from.collection(), from.done(), from.total(), from.failed(), from.finished(), from.seconds()};
+}
+
+Stats fromWire(const v1::StatsResponse& from) {
+    Stats to;
+    to.collections = from.collections();
+    to.shapesPending = from.shapes_pending();
+    to.shapesReady = from.shapes_ready();
+    to.shapesFailed = from.shapes_failed();
+    to.cachedSignatures = from.cached_signatures();
+    to.cacheBytes = from.cache_bytes();
+    to.queuedJobs = from.queued_jobs();
+    to.queuedBytes = from.queued_bytes();
+    to.runningJobs = from.running_jobs();
+    to.databaseBytes = from.database_bytes();
+    to.walBytes = from.wal_bytes();
+    to.pointBytes = from.point_bytes();
+    to.storedPointBytes = from.stored_point_bytes();
+    to.uptimeSeconds = from.uptime_seconds();
+    to.searches = from.searches();
+    to.ingested = from.ingested();
+    return to;
+}
+
+ServerInfo fromWire(const v1::ServerInfoResponse& from) {
+    ServerInfo to;
+    to.version = from.version();
+    to.schemaVersion = from.schema_version();
+    to.started = fromWire(from.started());
+    to.limits = {from.limits().max_points(),       from.limits().max_k(),
+                 from.limits().max_batch(),        from.limits().max_queued_jobs(),
+                 from.limits().max_queued_bytes(), from.limits().max_chunk_bytes()};
+    to.ingestThreads = from.ingest_threads();
+    return to;
+}
+
+}  // namespace shapedb::client

@@ -1,0 +1,47 @@
+// Between the values of types.h and the messages of the wire. Private to client/api.
+//
+// Nothing here trusts the server: a value it has no business sending (an unknown state, too few
+// extents) becomes the nearest harmless one, because a newer server may mean something by it.
+#pragma once
+
+#include "client/api/types.h"
+#include "shapedb/v1/admin_service.pb.h"
+#include "shapedb/v1/collection_service.pb.h"
+#include "shapedb/v1/search_service.pb.h"
+#include "shapedb/v1/shape_service.pb.h"
+
+namespace shapedb::client {
+
+void fill(const ShapeRef& from, v1::ShapeRef* to);
+void fill(const SearchOptions& from, v1::SearchOptions* to);
+
+/// The parameters as the three fields each request has for them.
+template <typename Message>
+void fillParameters(const Parameters& from, Message* to) {
+    if (from.profile) {
+        to->set_profile(*from.profile == Profile::kPaper ? v1::PROFILE_PAPER : v1::PROFILE_DEFAULT);
+    }
+    if (from.bigBallRatio) to->mutable_segmentation()->set_big_ball_ratio(*from.bigBallRatio);
+    if (from.deepAngleDegrees) to->mutable_segmentation()->set_deep_angle_degrees(*from.deepAngleDegrees);
+    if (from.hullAngleDegrees) to->mutable_segmentation()->set_hull_angle_degrees(*from.hullAngleDegrees);
+    if (from.mergeRatio) to->mutable_segmentation()->set_merge_ratio(*from.mergeRatio);
+    if (from.decimateTo) to->mutable_segmentation()->set_decimate_to(*from.decimateTo);
+    if (from.maxPoints) to->mutable_signature()->set_max_points(*from.maxPoints);
+}
+
+[[nodiscard]] v1::AddMode toWire(AddMode mode);
+[[nodiscard]] v1::ShapeState toWire(const std::optional<ShapeState>& state);
+
+[[nodiscard]] Shape fromWire(const v1::Shape& from);
+[[nodiscard]] AddOutcome fromWire(v1::AddShapeResponse::Outcome from);
+[[nodiscard]] IngestEvent fromWire(const v1::IngestEvent& from);
+[[nodiscard]] Signature fromWire(const v1::Signature& from);
+[[nodiscard]] SegmentationReport fromWire(const v1::SegmentationReport& from);
+[[nodiscard]] Explanation fromWire(const v1::Explanation& from);
+[[nodiscard]] SearchReply fromWire(const v1::SearchResponse& from);
+[[nodiscard]] Collection fromWire(const v1::Collection& from);
+[[nodiscard]] RebuildProgress fromWire(const v1::RebuildProgress& from);
+[[nodiscard]] Stats fromWire(const v1::StatsResponse& from);
+[[nodiscard]] ServerInfo fromWire(const v1::ServerInfoResponse& from);
+
+}  // namespace shapedb::client

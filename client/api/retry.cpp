@@ -1,0 +1,55 @@
+#include "client/api/retry.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+namespace shapedb::client {
+
+namespace {
+
+/// Nothing when the server says not to come back.
+std::optional<std::chrono::milliseconds> parsePushback(const std::string& text) {
+    std::int64_t value = 0;
+    const char* end = text.data() + text.size();
+    const auto [stop, error] = std::from_chars(text.data(), end, value);
+    if (error != std::errc() || stop != end || value < 0) return std::nullopt;
+    return std::chrono::milliseconds(value);
+}
+
+}  // namespace
+
+std::optional<std::chrono::milliseconds> retryDelay(const RetryPolicy& policy, int attempt,
+                                                    const AttemptFailure& failure, Random& random) {
+    if (failure.code != ErrorCode::kUnavailable && failure.code != ErrorCode::kQueueFull) return std::nullopt;
+    if (attempt >= policy.maxAttempts) return std::nullopt;
+    if (failure.pushback) return parsePushback(*failure.pushback);
+    const double longest = static_cast<double>(policy.maxBackoff.count());
+    const double backoff = std::min(longest, static_cast<double>(policy.initialBackoff.count()) *
+                                                 std::pow(policy.multiplier, attempt - 1));
+    const double jittered = backoff * random.uniform(1.0 - policy.jitter, 1.0 + policy.jitter);
+    return std::chrono::milliseconds(std::llround(jittered));
+}
+
+Result<void> validate(const RetryPolicy& policy) {
+    const auto invalid = [](const std::string& field, const std::string& value, const std::string& range) {
+        return fail(ErrorCode::kInvalidArgument, "retry." + field + " is " + value + "; it must be " + range);
+    };
+    if (policy.maxAttempts < 1)
+        return invalid("maxAttempts", std::to_string(policy.maxAttempts), "at least 1");
+    if (policy.initialBackoff.count() < 0) {
+        return invalid("initialBackoff", std::to_string(policy.initialBackoff.count()) + " ms", "at least 0");
+    }
+    if (policy.maxBackoff.count() < 0) {
+        return invalid("maxBackoff", std::to_string(policy.maxBackoff.count()) + " ms", "at least 0");
+    }
+    if (!(policy.multiplier >= 1.0) || !std::isfinite(policy.multiplier)) {
+        return invalid("multiplier", std::to_string(policy.multiplier), "finite and at least 1");
+    }
+    if (!(policy.jitter >= 0.0 && policy.jitter <= 1.0)) {
+        return invalid("jitter", std::to_string(policy.jitter), "in [0, 1]");
+    }
+    return {};
+}
+
+}  // namespace shapedb::client

@@ -1,0 +1,61 @@
+#include "client/api/status.h"
+
+namespace shapedb::client {
+
+namespace {
+
+std::optional<std::string> valueOf(const TrailingMetadata& trailing, const char* key) {
+    const auto found = trailing.find(key);
+    if (found == trailing.end()) return std::nullopt;
+    return std::string(found->second.data(), found->second.size());
+}
+
+ErrorCode codeOf(grpc::StatusCode code) {
+    switch (code) {
+        case grpc::StatusCode::INVALID_ARGUMENT: return ErrorCode::kInvalidArgument;
+        case grpc::StatusCode::OUT_OF_RANGE: return ErrorCode::kPointLimitExceeded;
+        case grpc::StatusCode::NOT_FOUND: return ErrorCode::kNotFound;
+        case grpc::StatusCode::ALREADY_EXISTS: return ErrorCode::kAlreadyExists;
+        case grpc::StatusCode::ABORTED: return ErrorCode::kVersionConflict;
+        case grpc::StatusCode::FAILED_PRECONDITION:
+        case grpc::StatusCode::PERMISSION_DENIED:
+        case grpc::StatusCode::UNAUTHENTICATED:
+        case grpc::StatusCode::UNIMPLEMENTED: return ErrorCode::kRejected;
+        case grpc::StatusCode::UNAVAILABLE: return ErrorCode::kUnavailable;
+        case grpc::StatusCode::CANCELLED: return ErrorCode::kCancelled;
+        case grpc::StatusCode::DEADLINE_EXCEEDED: return ErrorCode::kDeadlineExceeded;
+        case grpc::StatusCode::DATA_LOSS: return ErrorCode::kDataLoss;
+        default: return ErrorCode::kInternal;  // also RESOURCE_EXHAUSTED: the server's own has a name
+    }
+}
+
+}  // namespace
+
+Error errorOf(const grpc::Status& status, const TrailingMetadata& trailing, const std::string& address) {
+    if (const auto name = valueOf(trailing, "shapedb-error")) {
+        return {errorCodeFromName(*name), status.error_message()};
+    }
+    const Error error{codeOf(status.error_code()), status.error_message()};
+    switch (status.error_code()) {
+        case grpc::StatusCode::UNAVAILABLE:
+            return {error.code, "cannot reach a server at " + address + " (" + error.message + ")"};
+        case grpc::StatusCode::DEADLINE_EXCEEDED:
+            return {error.code, "the server at " + address + " did not answer before the deadline"};
+        case grpc::StatusCode::UNIMPLEMENTED:
+            return {error.code, "the server at " + address + " does not know this call (" + error.message +
+                                    "); is it a ShapeDB server, and not an older one?"};
+        default: return error;
+    }
+}
+
+AttemptFailure failureOf(const grpc::Status& status, const TrailingMetadata& trailing, const Error& error) {
+    AttemptFailure failure;
+    failure.code = error.code;
+    failure.pushback = valueOf(trailing, "grpc-retry-pushback-ms");
+    if (status.error_code() == grpc::StatusCode::RESOURCE_EXHAUSTED && failure.pushback) {
+        failure.code = ErrorCode::kQueueFull;
+    }
+    return failure;
+}
+
+}  // namespace shapedb::client

@@ -1,0 +1,274 @@
+// `shapedb add`: files and folders of scans into a collection.
+#include <algorithm>
+#include <memory>
+#include <mutex>
+#include <thread>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "client/cli/connection.h"
+#include "client/cli/exit_code.h"
+#include "client/cli/scan_source.h"
+#include "client/cli/session.h"
+#include "client/cli/shape_output.h"
+#include "client/cli/text.h"
+
+namespace shapedb::cli {
+
+using nlohmann::json;
+
+namespace {
+
+/// Results of more files than this are summed up instead of listed one by one.
+constexpr std::size_t kListedFiles = 30;
+
+struct AddFlags {
+    std::vector<std::string> paths;
+    std::string collection;
+    std::string key;
+    std::vector<std::string> metadata;
+    bool labelFromFolder = false;
+    bool insertOnly = false;
+    bool updateOnly = false;
+    bool wait = false;
+    unsigned jobs = 4;
+    ScanFlags scan;
+};
+
+struct Upload {
+    std::string path;
+    std::string name;  ///< relative to the path that was given; decides key and seed
+    std::string key;
+    std::string label;
+    std::optional<client::AddReply> reply;
+    std::optional<Error> failure;
+};
+
+Result<std::vector<Upload>> listUploads(const AddFlags& flags) {
+    std::vector<Upload> uploads;
+    for (const std::string& path : flags.paths) {
+        const auto files = listScanFiles({path});
+        if (!files) return fail(files.error());
+        for (const ScanFile& file : *files) {
+            Upload upload;
+            upload.path = file.path;
+            upload.name = relativeName(file.path, path);
+            upload.key = withoutEnding(upload.name);
+            upload.label = file.label;
+            uploads.push_back(std::move(upload));
+        }
+    }
+    if (!flags.key.empty()) {
+        if (uploads.size() != 1) {
+            return fail(ErrorCode::kInvalidArgument,
+                        "--key names one shape, but there are " + std::to_string(uploads.size()) + " files");
+        }
+        uploads.front().key = flags.key;
+    }
+    std::map<std::string, std::string> taken;
+    for (const Upload& upload : uploads) {
+        const auto [other, isNew] = taken.emplace(upload.key, upload.path);
+        if (!isNew) {
+            return fail(ErrorCode::kInvalidArgument,
+                        other->second + " and " + upload.path + " would both get the key '" + upload.key +
+                            "'; add them in two calls with --key, or from a folder "
+                            "above both");
+        }
+    }
+    return uploads;
+}
+
+client::AddRequest requestFor(const AddFlags& flags, const client::Metadata& metadata, const Upload& upload) {
+    client::AddRequest request;
+    request.shape = {flags.collection, upload.key};
+    request.metadata = metadata;
+    if (flags.labelFromFolder) request.metadata.emplace("label", upload.label);
+    if (flags.insertOnly) request.mode = client::AddMode::kInsertOnly;
+    if (flags.updateOnly) request.mode = client::AddMode::kUpdateOnly;
+    return request;
+}
+
+void uploadOne(const client::Client& client, const AddFlags& flags, const client::Metadata& metadata,
+               Upload& upload, const RunContext& context) {
+    const auto scan = loadScan(upload.path, flags.scan, fileSeed(flags.scan.seed, upload.name), context);
+    if (!scan) {
+        upload.failure = scan.error();
+        return;
+    }
+    auto reply = client.addShape(requestFor(flags, metadata, upload), scan->points, context);
+    if (!reply) {
+        upload.failure = reply.error();
+    } else {
+        upload.reply = std::move(*reply);
+    }
+}
+
+/// Nothing sent after this has a chance.
+bool endsTheRun(const Error& error) {
+    return error.code == ErrorCode::kUnavailable || error.code == ErrorCode::kCancelled ||
+           error.code == ErrorCode::kDeadlineExceeded;
+}
+
+/// `jobs` threads take the next file each until all are done or the server is gone.
+void uploadAll(Session& session, const client::Client& client, const AddFlags& flags,
+               const client::Metadata& metadata, std::vector<Upload>& uploads) {
+    RunContext context = session.context();
+    context.progress = nullptr;  // counted in files
+    std::atomic<std::size_t> next{0};
+    std::atomic<std::size_t> done{0};
+    std::mutex mutex;
+    std::optional<Error> stop;  // guarded by mutex
+    const auto work = [&] {
+        for (std::size_t i = next++; i < uploads.size(); i = next++) {
+            {
+                const std::lock_guard<std::mutex> lock(mutex);
+                if (stop) {
+                    uploads[i].failure = Error{stop->code, "not sent: " + stop->message};
+                    continue;
+                }
+            }
+            uploadOne(client, flags, metadata, uploads[i], context);
+            if (uploads[i].failure && endsTheRun(*uploads[i].failure)) {
+                const std::lock_guard<std::mutex> lock(mutex);
+                if (!stop) stop = uploads[i].failure;
+            }
+            session.console().progress("upload", ++done, uploads.size());
+        }
+    };
+    std::vector<std::thread> workers;
+    const std::size_t count = std::min<std::size_t>(std::max(1u, flags.jobs), uploads.size());
+    for (std::size_t i = 1; i < count; ++i) workers.emplace_back(work);
+    work();
+    for (std::thread& worker : workers) worker.join();
+}
+
+/// Follows each stored shape to its end; all are being segmented meanwhile.
+void waitForAll(Session& session, const client::Client& client, const AddFlags& flags,
+                std::vector<Upload>& uploads) {
+    RunContext context = session.context();
+    context.progress = nullptr;
+    std::size_t done = 0;
+    for (Upload& upload : uploads) {
+        session.console().progress("segment", done++, uploads.size());
+        if (!upload.reply) continue;
+        client::Shape& shape = upload.reply->shape;
+        if (shape.state == client::ShapeState::kPending) {
+            const auto last = client.watchIngest({flags.collection, upload.key}, {}, context);
+            if (!last) {
+                upload.failure = last.error();
+                continue;
+            }
+            shape.state = last->state;
+            shape.failure = last->failure;
+        }
+        if (shape.failure) upload.failure = shape.failure;
+    }
+}
+
+json uploadsJson(const std::vector<Upload>& uploads) {
+    json added = json::array();
+    json failed = json::array();
+    std::map<std::string, std::size_t> outcomes;
+    for (const Upload& upload : uploads) {
+        if (upload.failure) {
+            failed.push_back(
+                {{"file", upload.path}, {"key", upload.key}, {"error", toJson(*upload.failure)}});
+        } else if (upload.reply) {
+            const char* outcome = client::outcomeName(upload.reply->outcome);
+            ++outcomes[outcome];
+            json entry = toJson(upload.reply->shape);
+            entry["file"] = upload.path;
+            entry["outcome"] = outcome;
+            added.push_back(std::move(entry));
+        }
+    }
+    return {{"added", added}, {"failed", failed}, {"outcomes", outcomes}};
+}
+
+std::string uploadsText(const std::vector<Upload>& uploads) {
+    std::map<std::string, std::size_t> outcomes;
+    std::size_t stored = 0;
+    Table table({{"key"}, {"label"}, {"points", Table::Align::kRight}, {"outcome"}, {"state"}});
+    for (const Upload& upload : uploads) {
+        if (!upload.reply) continue;
+        const client::Shape& shape = upload.reply->shape;
+        ++outcomes[client::outcomeName(upload.reply->outcome)];
+        ++stored;
+        table.add({shape.key, labelOf(shape), formatCount(shape.pointCount),
+                   client::outcomeName(upload.reply->outcome), client::stateName(shape.state)});
+    }
+    std::string text = stored > 0 && stored <= kListedFiles ? table.render() + "\n" : std::string();
+    text += formatCount(stored, "scan", "scans") + " stored";
+    const char* separator = ": ";
+    for (const auto& [outcome, count] : outcomes) {
+        text += separator + formatCount(count) + " " + outcome;
+        separator = ", ";
+    }
+    return text + "\n";
+}
+
+/// Names each failure; the exit code of the whole.
+int reportFailures(Session& session, const std::vector<Upload>& uploads) {
+    std::size_t failed = 0;
+    int last = kOk;
+    for (const Upload& upload : uploads) {
+        if (!upload.failure) continue;
+        ++failed;
+        last = exitCodeOf(upload.failure->code);
+        const std::string& message = upload.failure->message;
+        const bool named = message.find(upload.path) != std::string::npos;
+        session.console().note(named ? message : upload.path + ": " + message);
+    }
+    if (failed == 0) return kOk;
+    if (uploads.size() > 1) {
+        session.console().note(formatCount(failed) + " of " + formatCount(uploads.size(), "file", "files") +
+                               " failed");
+    }
+    // One reason for everything is told as that; a mixed result as "some failed".
+    const bool interrupted = last == kInterrupted;
+    return failed == uploads.size() && (uploads.size() == 1 || last == kUnavailable) ? last
+           : interrupted                                                             ? kInterrupted
+                                                                                     : kSomeFailed;
+}
+
+CommandResult runAdd(Session& session, const AddFlags& flags) {
+    const auto metadata = parseMetadata(flags.metadata);
+    if (!metadata) return fail(metadata.error());
+    auto uploads = listUploads(flags);
+    if (!uploads) return fail(uploads.error());
+    const auto client = connectToServer(session, kPatientAttempts);
+    if (!client) return fail(client.error());
+    uploadAll(session, *client, flags, *metadata, *uploads);
+    if (flags.wait) waitForAll(session, *client, flags, *uploads);
+    session.console().document(uploadsJson(*uploads));
+    session.console().text(uploadsText(*uploads));
+    return reportFailures(session, *uploads);
+}
+
+}  // namespace
+
+void addAddCommand(CLI::App& app, Session& session) {
+    auto flags = std::make_shared<AddFlags>();
+    CLI::App* command = app.add_subcommand("add", "Store scans: files, and folders searched to any depth");
+    command->add_option("PATH", flags->paths, "Scans, or folders of scans")->required();
+    addCollectionOption(*command, flags->collection);
+    command->add_option("--key", flags->key,
+                        "Key of the one scan [its path below the folder given, no ending]");
+    command->add_flag("--label-from-folder", flags->labelFromFolder,
+                      "Metadata label: the name of the folder that holds the file");
+    command->add_option("--meta", flags->metadata, "Metadata for every scan; repeat for more")
+        ->type_name("NAME=VALUE")
+        ->allow_extra_args(false);
+    auto* insertOnly = command->add_flag("--insert-only", flags->insertOnly, "Fail when the key is taken");
+    command->add_flag("--update-only", flags->updateOnly, "Fail when the key is free")->excludes(insertOnly);
+    command->add_flag("--wait", flags->wait, "Return when all are segmented, not when all are stored");
+    command->add_option("--jobs", flags->jobs, "Files read and sent at the same time")
+        ->check(CLI::Range(1, 64))
+        ->capture_default_str();
+    addScanFlags(*command, flags->scan);
+    command->callback(
+        [&session, flags] { session.action = [&session, flags] { return runAdd(session, *flags); }; });
+}
+
+}  // namespace shapedb::cli

@@ -1,0 +1,225 @@
+// `shapedb admin rebuild|backup|restore|check|stats|info`.
+#include <memory>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "client/cli/connection.h"
+#include "client/cli/exit_code.h"
+#include "client/cli/parameters.h"
+#include "client/cli/session.h"
+#include "client/cli/shape_output.h"
+#include "client/cli/text.h"
+
+namespace shapedb::cli {
+
+using nlohmann::json;
+
+namespace {
+
+struct RebuildFlags {
+    client::RebuildRequest request;
+    ParameterFlags parameters;
+    bool cancel = false;
+};
+
+std::string collectionText(const std::string& name) { return name.empty() ? "all collections" : name; }
+
+CommandResult runCancelRebuild(Session& session, const client::Client& client, const RebuildFlags& flags) {
+    const auto cancelled = client.cancelRebuild(flags.request.collection, session.context());
+    if (!cancelled) return fail(cancelled.error());
+    session.console().document({{"cancelled", flags.request.collection}});
+    session.console().text(collectionText(flags.request.collection) + ": rebuild cancelled\n");
+    return kOk;
+}
+
+CommandResult runRebuild(Session& session, const RebuildFlags& flags) {
+    const auto client = connectToServer(session);
+    if (!client) return fail(client.error());
+    if (flags.cancel) return runCancelRebuild(session, *client, flags);
+    client::RebuildRequest request = flags.request;
+    request.parameters = flags.parameters.forServer();
+    const auto results = client->rebuild(
+        request,
+        [&](const client::RebuildProgress& progress) {
+            session.console().progress("rebuild " + progress.collection, progress.done, progress.total);
+        },
+        session.context());
+    if (!results) return fail(results.error());
+
+    json list = json::array();
+    Table table(
+        {{"collection"}, {"shapes", Table::Align::kRight}, {"failed", Table::Align::kRight}, {"time"}, {""}});
+    for (const client::RebuildProgress& one : *results) {
+        list.push_back({{"collection", one.collection},
+                        {"done", one.done},
+                        {"total", one.total},
+                        {"failed", one.failed},
+                        {"finished", one.finished},
+                        {"seconds", one.seconds}});
+        table.add({one.collection, formatCount(one.done) + " / " + formatCount(one.total),
+                   formatCount(one.failed), formatSeconds(one.seconds),
+                   one.finished ? "done" : "goes on in the background"});
+    }
+    session.console().document({{"rebuilt", list}});
+    session.console().text(table.empty() ? "nothing to rebuild\n" : table.render());
+    return kOk;
+}
+
+CommandResult runBackup(Session& session, const std::string& file) {
+    const auto client = connectToServer(session);
+    if (!client) return fail(client.error());
+    const auto report = client->backupToFile(file, session.context());
+    if (!report) return fail(report.error());
+    session.console().document(
+        {{"file", file}, {"bytes", report->bytes}, {"sha256", hexText(report->sha256)}});
+    session.console().text(file + ": " + formatBytes(report->bytes) + "\n");
+    return kOk;
+}
+
+CommandResult runRestore(Session& session, const std::string& file) {
+    const auto client = connectToServer(session);
+    if (!client) return fail(client.error());
+    const auto report = client->restoreFromFile(file, session.context());
+    if (!report) return fail(report.error());
+    session.console().document(
+        {{"file", file}, {"collections", report->collections}, {"shapes", report->shapes}});
+    session.console().text(formatCount(report->shapes, "shape", "shapes") + " in " +
+                           formatCount(report->collections, "collection", "collections") + " restored from " +
+                           file + "\n");
+    return kOk;
+}
+
+CommandResult runCheck(Session& session) {
+    const auto client = connectToServer(session);
+    if (!client) return fail(client.error());
+    const auto problems = client->check(
+        [&](const client::CheckProgress& progress) {
+            session.console().progress("check", progress.done, progress.total);
+        },
+        session.context());
+    if (!problems) return fail(problems.error());
+    session.console().document({{"sound", problems->empty()}, {"problems", *problems}});
+    for (const std::string& problem : *problems) session.console().text(problem + "\n");
+    session.console().text(problems->empty()
+                               ? "the database is sound\n"
+                               : formatCount(problems->size(), "problem", "problems") + " found\n");
+    return problems->empty() ? kOk : kDefect;
+}
+
+CommandResult runStats(Session& session) {
+    const auto client = connectToServer(session);
+    if (!client) return fail(client.error());
+    const auto stats = client->stats(session.context());
+    if (!stats) return fail(stats.error());
+    session.console().document({{"collections", stats->collections},
+                                {"shapes_pending", stats->shapesPending},
+                                {"shapes_ready", stats->shapesReady},
+                                {"shapes_failed", stats->shapesFailed},
+                                {"cached_signatures", stats->cachedSignatures},
+                                {"cache_bytes", stats->cacheBytes},
+                                {"queued_jobs", stats->queuedJobs},
+                                {"queued_bytes", stats->queuedBytes},
+                                {"running_jobs", stats->runningJobs},
+                                {"database_bytes", stats->databaseBytes},
+                                {"wal_bytes", stats->walBytes},
+                                {"point_bytes", stats->pointBytes},
+                                {"stored_point_bytes", stats->storedPointBytes},
+                                {"uptime_seconds", stats->uptimeSeconds},
+                                {"searches", stats->searches},
+                                {"ingested", stats->ingested}});
+    Table table({{""}, {""}});
+    table.add({"collections", formatCount(stats->collections)});
+    table.add({"shapes", formatCount(stats->shapesReady) + " ready, " + formatCount(stats->shapesPending) +
+                             " pending, " + formatCount(stats->shapesFailed) + " failed"});
+    table.add({"cache", formatCount(stats->cachedSignatures, "signature", "signatures") + ", " +
+                            formatBytes(stats->cacheBytes)});
+    table.add({"queue", formatCount(stats->queuedJobs, "job", "jobs") + " of " +
+                            formatBytes(stats->queuedBytes) + ", " + formatCount(stats->runningJobs) +
+                            " running"});
+    table.add({"database", formatBytes(stats->databaseBytes) + ", log " + formatBytes(stats->walBytes)});
+    table.add(
+        {"points", formatBytes(stats->pointBytes) + ", stored as " + formatBytes(stats->storedPointBytes)});
+    table.add({"since start", formatSeconds(stats->uptimeSeconds) + ", " +
+                                  formatCount(stats->searches, "search", "searches") + ", " +
+                                  formatCount(stats->ingested) + " ingested"});
+    session.console().text(table.render());
+    return kOk;
+}
+
+CommandResult runInfo(Session& session) {
+    const auto client = connectToServer(session);
+    if (!client) return fail(client.error());
+    const auto info = client->serverInfo(session.context());
+    if (!info) return fail(info.error());
+    const client::Limits& limits = info->limits;
+    session.console().document({{"server", client->address()},
+                                {"version", info->version},
+                                {"schema_version", info->schemaVersion},
+                                {"ingest_threads", info->ingestThreads},
+                                {"limits",
+                                 {{"max_points", limits.maxPoints},
+                                  {"max_k", limits.maxK},
+                                  {"max_batch", limits.maxBatch},
+                                  {"max_queued_jobs", limits.maxQueuedJobs},
+                                  {"max_queued_bytes", limits.maxQueuedBytes},
+                                  {"max_chunk_bytes", limits.maxChunkBytes}}}});
+    Table table({{""}, {""}});
+    table.add({"server", client->address()});
+    table.add({"version", info->version + ", database schema " + std::to_string(info->schemaVersion)});
+    table.add({"ingest threads", std::to_string(info->ingestThreads)});
+    table.add({"points of one scan", "at most " + formatCount(limits.maxPoints)});
+    table.add({"hits of one search", "at most " + formatCount(limits.maxK)});
+    table.add({"ingest queue", "at most " + formatCount(limits.maxQueuedJobs, "scan", "scans") + " and " +
+                                   formatBytes(limits.maxQueuedBytes)});
+    session.console().text(table.render());
+    return kOk;
+}
+
+void addRebuild(CLI::App& group, Session& session) {
+    auto flags = std::make_shared<RebuildFlags>();
+    CLI::App* command = group.add_subcommand(
+        "rebuild",
+        "Segment stored scans again, or follow a rebuild that is running; searches go on meanwhile");
+    command->add_option("--collection", flags->request.collection, "Only this one [all]")->type_name("NAME");
+    command->add_flag("--cancel", flags->cancel, "Stop a running rebuild and forget its partial result");
+    command->add_flag("--cache-only", flags->request.cacheOnly,
+                      "Only reload the signatures from the database");
+    command->add_flag("--detach", flags->request.detach, "Start it and return");
+    addParameterFlags(*command, flags->parameters);
+    command->callback(
+        [&session, flags] { session.action = [&session, flags] { return runRebuild(session, *flags); }; });
+}
+
+void addFileCommand(CLI::App& group, Session& session, const char* name, const char* help,
+                    CommandResult (*runner)(Session&, const std::string&)) {
+    auto file = std::make_shared<std::string>();
+    CLI::App* command = group.add_subcommand(name, help);
+    command->add_option("FILE", *file, "Backup file")->required();
+    command->callback([&session, file, runner] {
+        session.action = [&session, file, runner] { return runner(session, *file); };
+    });
+}
+
+void addPlainCommand(CLI::App& group, Session& session, const char* name, const char* help,
+                     CommandResult (*runner)(Session&)) {
+    group.add_subcommand(name, help)->callback([&session, runner] {
+        session.action = [&session, runner] { return runner(session); };
+    });
+}
+
+}  // namespace
+
+void addAdminCommands(CLI::App& app, Session& session) {
+    CLI::App* group = app.add_subcommand("admin", "Care of a running server");
+    group->require_subcommand(1);
+    addRebuild(*group, session);
+    addFileCommand(*group, session, "backup", "Copy the whole database to a file while it serves",
+                   &runBackup);
+    addFileCommand(*group, session, "restore", "Replace the whole database by a backup", &runRestore);
+    addPlainCommand(*group, session, "check", "Read the whole database and report damage", &runCheck);
+    addPlainCommand(*group, session, "stats", "Counts and sizes", &runStats);
+    addPlainCommand(*group, session, "info", "Version and limits", &runInfo);
+}
+
+}  // namespace shapedb::cli

@@ -1,0 +1,140 @@
+// `shapedb collection create|get|list|delete`.
+#include <memory>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "client/cli/connection.h"
+#include "client/cli/exit_code.h"
+#include "client/cli/parameters.h"
+#include "client/cli/session.h"
+#include "client/cli/text.h"
+
+namespace shapedb::cli {
+
+using nlohmann::json;
+
+namespace {
+
+struct CollectionFlags {
+    std::string name;
+    std::string description;
+    ParameterFlags parameters;
+    bool force = false;
+};
+
+const char* profileText(const client::Collection& collection) {
+    return collection.parameters.profile == client::Profile::kPaper ? "paper" : "default";
+}
+
+json toJson(const client::Collection& collection) {
+    const client::Parameters& parameters = collection.parameters;
+    return {{"name", collection.name},
+            {"description", collection.description},
+            {"generation", collection.generation},
+            {"shapes", collection.shapes},
+            {"shapes_ready", collection.shapesReady},
+            {"shapes_failed", collection.shapesFailed},
+            {"parameters",
+             {{"profile", profileText(collection)},
+              {"big_ball_ratio", parameters.bigBallRatio.value_or(0.0)},
+              {"deep_angle_degrees", parameters.deepAngleDegrees.value_or(0.0)},
+              {"hull_angle_degrees", parameters.hullAngleDegrees.value_or(0.0)},
+              {"merge_ratio", parameters.mergeRatio.value_or(0.0)},
+              {"decimate_to", parameters.decimateTo.value_or(0)},
+              {"max_points", parameters.maxPoints.value_or(0)}}}};
+}
+
+std::string toText(const std::vector<client::Collection>& collections) {
+    if (collections.empty()) return "no collections\n";
+    const auto right = Table::Align::kRight;
+    Table table({{"collection"},
+                 {"shapes", right},
+                 {"ready", right},
+                 {"failed", right},
+                 {"generation", right},
+                 {"profile"},
+                 {"description"}});
+    for (const client::Collection& one : collections) {
+        table.add({one.name, formatCount(one.shapes), formatCount(one.shapesReady),
+                   formatCount(one.shapesFailed), std::to_string(one.generation), profileText(one),
+                   one.description});
+    }
+    return table.render();
+}
+
+CommandResult show(Session& session, const Result<client::Collection>& collection) {
+    if (!collection) return fail(collection.error());
+    session.console().document(toJson(*collection));
+    session.console().text(toText({*collection}));
+    return kOk;
+}
+
+CommandResult runCreate(Session& session, const CollectionFlags& flags) {
+    const auto client = connectToServer(session);
+    if (!client) return fail(client.error());
+    return show(session, client->createCollection(flags.name, flags.description, flags.parameters.forServer(),
+                                                  session.context()));
+}
+
+CommandResult runGet(Session& session, const CollectionFlags& flags) {
+    const auto client = connectToServer(session);
+    if (!client) return fail(client.error());
+    return show(session, client->getCollection(flags.name, session.context()));
+}
+
+CommandResult runList(Session& session, const CollectionFlags&) {
+    const auto client = connectToServer(session);
+    if (!client) return fail(client.error());
+    const auto collections = client->listCollections(session.context());
+    if (!collections) return fail(collections.error());
+    json list = json::array();
+    for (const client::Collection& one : *collections) list.push_back(toJson(one));
+    session.console().document({{"collections", list}});
+    session.console().text(toText(*collections));
+    return kOk;
+}
+
+CommandResult runDelete(Session& session, const CollectionFlags& flags) {
+    const auto client = connectToServer(session);
+    if (!client) return fail(client.error());
+    const auto deleted = client->deleteCollection(flags.name, flags.force, session.context());
+    if (!deleted) return fail(deleted.error());
+    session.console().document({{"deleted", flags.name}});
+    session.console().text(flags.name + ": deleted\n");
+    return kOk;
+}
+
+using Runner = CommandResult (*)(Session&, const CollectionFlags&);
+
+CLI::App* addOne(CLI::App& group, Session& session, const char* name, const char* help,
+                 const std::shared_ptr<CollectionFlags>& flags, Runner runner) {
+    CLI::App* command = group.add_subcommand(name, help);
+    command->callback([&session, flags, runner] {
+        session.action = [&session, flags, runner] { return runner(session, *flags); };
+    });
+    return command;
+}
+
+}  // namespace
+
+void addCollectionCommands(CLI::App& app, Session& session) {
+    CLI::App* group = app.add_subcommand("collection", "Collections: shapes that share parameters");
+    group->require_subcommand(1);
+    auto flags = std::make_shared<CollectionFlags>();
+    const auto addName = [&](CLI::App* command) {
+        command->add_option("NAME", flags->name, "Name of the collection")->required();
+    };
+
+    CLI::App* create = addOne(*group, session, "create", "Create a collection", flags, &runCreate);
+    addName(create);
+    create->add_option("--description", flags->description, "What it is for, for people");
+    addParameterFlags(*create, flags->parameters);
+    addName(addOne(*group, session, "get", "Show one collection", flags, &runGet));
+    addOne(*group, session, "list", "List all collections", flags, &runList);
+    CLI::App* remove = addOne(*group, session, "delete", "Delete a collection", flags, &runDelete);
+    addName(remove);
+    remove->add_flag("--force", flags->force, "Even if it holds shapes: they are deleted with it");
+}
+
+}  // namespace shapedb::cli

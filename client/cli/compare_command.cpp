@@ -1,0 +1,96 @@
+// `shapedb compare`: two stored shapes, or two files without a server, and why they have their score.
+#include <memory>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "client/cli/connection.h"
+#include "client/cli/exit_code.h"
+#include "client/cli/parameters.h"
+#include "client/cli/scan_source.h"
+#include "client/cli/session.h"
+#include "client/cli/shape_output.h"
+#include "client/cli/text.h"
+
+namespace shapedb::cli {
+
+namespace {
+
+struct CompareFlags {
+    std::string a;
+    std::string b;
+    std::string collection;
+    bool files = false;
+    ScoreFlags score;
+    ScanFlags scan;
+    ParameterFlags parameters;
+};
+
+Result<Signature> describeFile(Session& session, const CompareFlags& flags, const ShapeParameters& parameters,
+                               const std::string& path) {
+    const RunContext context = session.context();
+    const auto scan = loadScan(path, flags.scan, flags.scan.seed, context);
+    if (!scan) return fail(scan.error());
+    const auto description = describe(scan->points, parameters, context);
+    if (!description) return fail(description.error().code, path + ": " + description.error().message);
+    return description->signature;
+}
+
+Result<client::Comparison> compareFiles(Session& session, const CompareFlags& flags) {
+    const auto parameters = flags.parameters.resolve();
+    if (!parameters) return fail(parameters.error());
+    const auto a = describeFile(session, flags, *parameters, flags.a);
+    if (!a) return fail(a.error());
+    const auto b = describeFile(session, flags, *parameters, flags.b);
+    if (!b) return fail(b.error());
+    const Explanation explanation = explain(*a, *b, flags.score.resolve());
+    return client::Comparison{explanation.score, toClient(explanation), toClient(*a), toClient(*b)};
+}
+
+Result<client::Comparison> compareStored(Session& session, const CompareFlags& flags) {
+    if (flags.parameters.any()) {
+        return fail(
+            ErrorCode::kInvalidArgument,
+            "stored shapes have the parameters of their collection; --profile and the like need --files");
+    }
+    const auto client = connectToServer(session);
+    if (!client) return fail(client.error());
+    return client->compare({flags.collection, flags.a}, {flags.collection, flags.b},
+                           !flags.score.noReflection, flags.score.keepScale, session.context());
+}
+
+CommandResult runCompare(Session& session, const CompareFlags& flags) {
+    const auto comparison = flags.files ? compareFiles(session, flags) : compareStored(session, flags);
+    if (!comparison) return fail(comparison.error());
+    nlohmann::json document = {{"query_name", flags.a},
+                               {"other_name", flags.b},
+                               {"score", comparison->score},
+                               {"explanation", toJson(comparison->explanation)},
+                               {"query", toJson(comparison->query)},
+                               {"other", toJson(comparison->other)}};
+    session.console().document(document);
+    session.console().text(
+        "score " + formatFixed(comparison->score, 3) + "  " + bar(comparison->score, 20) + "\n\n" +
+        explanationText(comparison->explanation, comparison->query, flags.a, flags.b) + "\n" + flags.a +
+        "\n" + signatureTable(comparison->query) + "\n" + flags.b + "\n" + signatureTable(comparison->other));
+    return kOk;
+}
+
+}  // namespace
+
+void addCompareCommand(CLI::App& app, Session& session) {
+    auto flags = std::make_shared<CompareFlags>();
+    CLI::App* command =
+        app.add_subcommand("compare", "Score two stored shapes, or two files without a server, and say why");
+    command->add_option("A", flags->a, "Key, or file with --files")->required();
+    command->add_option("B", flags->b, "Key, or file with --files")->required();
+    command->add_flag("--files", flags->files, "A and B are scan files; no server is asked");
+    addCollectionOption(*command, flags->collection);
+    addScoreFlags(*command, flags->score);
+    addScanFlags(*command, flags->scan);
+    addParameterFlags(*command, flags->parameters);
+    command->callback(
+        [&session, flags] { session.action = [&session, flags] { return runCompare(session, *flags); }; });
+}
+
+}  // namespace shapedb::cli

@@ -1,0 +1,39 @@
+#include "client/cli/connection.h"
+
+#include <CLI/CLI.hpp>
+
+namespace shapedb::cli {
+
+Result<client::Client> connectToServer(const Session& session, int maxAttempts) {
+    client::ClientOptions options;
+    if (!session.options().server.empty()) options.address = session.options().server;
+    if (session.options().timeoutSeconds) options.deadline = std::chrono::milliseconds(0);
+    options.retry.maxAttempts = maxAttempts;
+    return client::Client::connect(std::move(options));
+}
+
+void addCollectionOption(CLI::App& command, std::string& collection) {
+    command.add_option("--collection", collection, "Collection [default]")->type_name("NAME");
+}
+
+Result<client::Metadata> parseMetadata(const std::vector<std::string>& pairs) {
+    client::Metadata metadata;
+    for (const std::string& pair : pairs) {
+        const std::size_t equals = pair.find('=');
+        if (equals == std::string::npos || equals == 0) {
+            return fail(ErrorCode::kInvalidArgument, "--meta '" + pair + "' is not NAME=VALUE");
+        }
+        const std::string name = pair.substr(0, equals);
+        if (!metadata.emplace(name, pair.substr(equals + 1)).second) {
+            return fail(ErrorCode::kInvalidArgument, "--meta names '" + name + "' twice");
+        }
+    }
+    return metadata;
+}
+
+std::string labelOf(const client::Shape& shape) {
+    const auto found = shape.metadata.find("label");
+    return found == shape.metadata.end() ? std::string() : found->second;
+}
+
+}  // namespace shapedb::cli

@@ -1,0 +1,69 @@
+// Where a command's words go: results to one stream, errors and progress to the other.
+#pragma once
+
+#include <chrono>
+#include <iosfwd>
+#include <mutex>
+#include <string>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "core/base/error.h"
+
+namespace shapedb::cli {
+
+/// With --json the result stream carries exactly one JSON document and nothing else; without,
+/// text for people. Errors and notes always go to the error stream as `shapedb: MESSAGE`.
+///
+/// Thread-safety: `note` and `progress` from any thread; the rest from one thread.
+class Console {
+  public:
+    /// The streams must outlive the console. `errorIsTerminal`: draw a progress bar there.
+    Console(std::ostream& out, std::ostream& err, bool errorIsTerminal);
+
+    void setJson(bool json) { json_ = json; }
+    [[nodiscard]] bool json() const { return json_; }
+
+    /// Text for people; dropped with --json.
+    void text(const std::string& text);
+
+    /// The one document of the command; dropped without --json.
+    void document(const nlohmann::json& document);
+
+    /// `shapedb: MESSAGE` on the error stream.
+    void note(const std::string& message);
+
+    /// The error that ends the command: a note, and with --json the document
+    /// {"error": {"name": ..., "message": ...}} unless a document was printed before.
+    void failure(const Error& error);
+
+    /// Redraws the progress bar, at most ten times a second; nothing unless the error stream is
+    /// a terminal. total 0: unknown, shows the count alone.
+    void progress(const std::string& what, std::uint64_t done, std::uint64_t total);
+    /// Wipes the bar, so that other output starts on a clean line.
+    void clearProgress();
+
+    /// False when the result stream refused something (a full disk, a closed pipe).
+    [[nodiscard]] bool flush();
+
+  private:
+    void clearProgressLocked();
+
+    std::ostream& out_;
+    std::ostream& err_;
+    const bool bar_;
+    bool json_ = false;
+    bool documentPrinted_ = false;
+
+    std::mutex mutex_;  ///< guards err_ and what follows
+    bool barShown_ = false;
+    std::chrono::steady_clock::time_point lastBar_{};
+};
+
+/// JSON text that never throws: bytes that are not UTF-8 become U+FFFD.
+[[nodiscard]] std::string dump(const nlohmann::json& document);
+
+/// {"name": ..., "message": ...}
+[[nodiscard]] nlohmann::json toJson(const Error& error);
+
+}  // namespace shapedb::cli

@@ -1,0 +1,474 @@
+// `shapedb evaluate`: how well the method finds shapes of the same class (leave-one-out), or the
+// right entries of a gallery, measured here without a server.
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "client/cli/evaluation_run.h"
+#include "client/cli/exit_code.h"
+#include "client/cli/figure.h"
+#include "client/cli/parameters.h"
+#include "client/cli/session.h"
+#include "client/cli/text.h"
+#include "core/evaluation/similarity_matrix.h"
+
+namespace shapedb::cli {
+
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+namespace {
+
+struct EvaluateFlags {
+    std::vector<std::string> paths;
+    std::vector<std::string> gallery;
+    std::string match = "folder";
+    std::string confusion;
+    bool perClass = false;
+    unsigned threads = 0;
+    ScanFlags scan;
+    ParameterFlags parameters;
+    ScoreFlags score;
+};
+
+struct Timing {
+    double segment = 0.0;  ///< wall clock, reading included
+    double match = 0.0;    ///< wall clock
+};
+
+class Stopwatch {
+  public:
+    [[nodiscard]] double seconds() const {
+        return std::chrono::duration<double>(RunContext::Clock::now() - start_).count();
+    }
+
+  private:
+    RunContext::Clock::time_point start_ = RunContext::Clock::now();
+};
+
+bool isSegmentationFailure(const Error& error) {
+    switch (error.code) {
+        case ErrorCode::kTooFewPoints:
+        case ErrorCode::kAllPointsEqual:
+        case ErrorCode::kCollinear:
+        case ErrorCode::kCoplanar:
+        case ErrorCode::kNoInterior: return true;
+        default: return false;
+    }
+}
+
+json failuresJson(const std::vector<const EvaluatedShape*>& failures) {
+    json list = json::array();
+    for (const EvaluatedShape* shape : failures) {
+        list.push_back({{"file", shape->path},
+                        {"error", errorCodeName(shape->failure->code)},
+                        {"message", shape->failure->message}});
+    }
+    return list;
+}
+
+json settingsJson(const EvaluateFlags& flags, const ShapeParameters& parameters) {
+    json settings = {{"parameters", toJson(parameters)},
+                     {"noise", flags.scan.noise},
+                     {"seed", flags.scan.seed},
+                     {"points", flags.scan.points ? json(*flags.scan.points) : json(nullptr)},
+                     {"threads", flags.threads},
+                     {"reflection", !flags.score.noReflection},
+                     {"keep_scale", flags.score.keepScale}};
+    return settings;
+}
+
+std::string settingsText(const EvaluateFlags& flags, const ShapeParameters& parameters) {
+    std::string text = std::string("profile ") + profileName(parameters.profile);
+    text += flags.scan.noise > 0.0 ? ", noise " + formatPercent(flags.scan.noise) +
+                                         " of the diagonal (seed " + std::to_string(flags.scan.seed) + ")"
+                                   : ", no noise added";
+    if (flags.scan.points) text += ", " + formatCount(*flags.scan.points) + " points each";
+    return text;
+}
+
+std::string timingText(const Timing& timing, std::size_t shapes, std::size_t pairs) {
+    return "Segmented " + formatCount(shapes, "scan", "scans") + " in " + formatSeconds(timing.segment) +
+           ", matched " + formatCount(pairs, "pair", "pairs") + " in " + formatSeconds(timing.match) + ".\n";
+}
+
+/// Names what failed; says whether anything but a segmentation did.
+int reportFailures(Session& session, const std::vector<const EvaluatedShape*>& failures) {
+    bool unreadable = false;
+    for (const EvaluatedShape* shape : failures) {
+        const std::string& message = shape->failure->message;
+        const bool named = message.find(shape->path) != std::string::npos;
+        session.console().note(named ? message : shape->path + ": " + message);
+        unreadable = unreadable || !isSegmentationFailure(*shape->failure);
+    }
+    return unreadable ? kSomeFailed : kOk;
+}
+
+void collectFailures(const std::vector<EvaluatedShape>& shapes,
+                     std::vector<const EvaluatedShape*>& failures) {
+    for (const EvaluatedShape& shape : shapes) {
+        if (shape.failure) failures.push_back(&shape);
+    }
+}
+
+Result<void> describeAll(Session& session, const char* what, std::vector<EvaluatedShape>& shapes,
+                         const ScanFlags& scan, const EvaluateFlags& flags,
+                         const ShapeParameters& parameters) {
+    return describeShapes(
+        shapes, scan, parameters, flags.threads,
+        [&](std::size_t done) { session.console().progress(what, done, shapes.size()); }, session.context());
+}
+
+// ---------------------------------------------------------------------------------- leave one out
+
+/// A shape without a signature is worth nothing, not what the order of files gives it by chance:
+/// where it is tied at 0, the right answers come last.
+ScoreMatrix withTiesAgainstFailures(ScoreMatrix scores, const std::vector<EvaluatedShape>& shapes) {
+    const std::size_t n = shapes.size();
+    for (std::size_t q = 0; q < n; ++q) {
+        for (std::size_t c = 0; c < n; ++c) {
+            const bool failed = shapes[q].failure || shapes[c].failure;
+            if (failed && shapes[q].label == shapes[c].label) scores[q * n + c] = -1.0;
+        }
+    }
+    return scores;
+}
+
+json metricsJson(const RetrievalMetrics& metrics) {
+    return {{"nn", metrics.nearestNeighbour},
+            {"first_tier", metrics.firstTier},
+            {"second_tier", metrics.secondTier},
+            {"dcg", metrics.dcg},
+            {"map", metrics.averagePrecision}};
+}
+
+json leaveOneOutJson(const EvaluateFlags& flags, const ShapeParameters& parameters,
+                     const RetrievalReport& report, const std::vector<EvaluatedShape>& shapes,
+                     const std::vector<const EvaluatedShape*>& failures, const Timing& timing) {
+    json document = metricsJson(report.mean);
+    document.update(settingsJson(flags, parameters));
+    document["queries"] = report.queries;
+    document["shapes"] = shapes.size();
+    document["lonely"] = report.lonely;
+    document["classes"] = report.perClass.size();
+    document["seconds_segment"] = timing.segment;
+    document["seconds_match"] = timing.match;
+    document["failures"] = failuresJson(failures);
+    if (flags.perClass) {
+        json classes = json::object();
+        for (const ClassMetrics& one : report.perClass) {
+            classes[one.name] = metricsJson(one.mean);
+            classes[one.name]["queries"] = one.queries;
+        }
+        document["per_class"] = classes;
+    }
+    return document;
+}
+
+std::vector<std::string> metricCells(const RetrievalMetrics& metrics) {
+    std::vector<std::string> cells;
+    for (const double value : {metrics.nearestNeighbour, metrics.firstTier, metrics.secondTier, metrics.dcg,
+                               metrics.averagePrecision}) {
+        cells.push_back(formatFixed(value, 3));
+    }
+    return cells;
+}
+
+std::string leaveOneOutText(const EvaluateFlags& flags, const ShapeParameters& parameters,
+                            const RetrievalReport& report, const std::vector<EvaluatedShape>& shapes,
+                            const std::vector<const EvaluatedShape*>& failures, const Timing& timing) {
+    std::string text = formatCount(report.queries, "query", "queries") + " among " +
+                       formatCount(shapes.size(), "shape", "shapes") + " of " +
+                       formatCount(report.perClass.size(), "class", "classes") +
+                       ", each against all others; " + settingsText(flags, parameters) + "\n\n";
+    const auto right = Table::Align::kRight;
+    Table table({{"class"},
+                 {"queries", right},
+                 {"NN", right},
+                 {"1st tier", right},
+                 {"2nd tier", right},
+                 {"DCG", right},
+                 {"mAP", right}});
+    const auto add = [&](const std::string& name, std::size_t queries, const RetrievalMetrics& metrics) {
+        std::vector<std::string> cells = {name, formatCount(queries)};
+        for (std::string& cell : metricCells(metrics)) cells.push_back(std::move(cell));
+        table.add(std::move(cells));
+    };
+    if (flags.perClass) {
+        for (const ClassMetrics& one : report.perClass) add(one.name, one.queries, one.mean);
+    }
+    add("all", report.queries, report.mean);
+    text += table.render() + "\n";
+    if (report.lonely > 0) {
+        text +=
+            formatCount(report.lonely, "shape is", "shapes are") + " alone in a class and asked nothing.\n";
+    }
+    if (!failures.empty()) {
+        text += formatCount(failures.size(), "shape", "shapes") +
+                " could not be segmented and counted as matching nothing.\n";
+    }
+    return text + timingText(timing, shapes.size(), shapes.size() * (shapes.size() - 1) / 2);
+}
+
+Result<void> requireClassFolders(const std::vector<EvaluatedShape>& shapes, const std::string& root) {
+    for (const EvaluatedShape& shape : shapes) {
+        if (shape.name.find('/') == std::string::npos) {
+            return fail(ErrorCode::kInvalidArgument,
+                        shape.path + " lies in no class folder; " + root +
+                            " must hold a folder for each class (DIR/CLASS/FILE)");
+        }
+    }
+    return {};
+}
+
+CommandResult runLeaveOneOut(Session& session, const EvaluateFlags& flags) {
+    if (flags.paths.size() != 1) {
+        return fail(ErrorCode::kInvalidArgument,
+                    "leave-one-out takes one folder of class folders; to rank "
+                    "queries against other shapes give --gallery");
+    }
+    if (!flags.confusion.empty()) {
+        if (const auto ok = checkFigurePath(flags.confusion); !ok) return fail(ok.error());
+    }
+    const auto parameters = flags.parameters.resolve();
+    if (!parameters) return fail(parameters.error());
+    auto shapes = listShapes(flags.paths);
+    if (!shapes) return fail(shapes.error());
+    if (const auto ok = requireClassFolders(*shapes, flags.paths.front()); !ok) return fail(ok.error());
+
+    Timing timing;
+    const Stopwatch segmenting;
+    if (const auto ok = describeAll(session, "segment", *shapes, flags.scan, flags, *parameters); !ok) {
+        return fail(ok.error());
+    }
+    timing.segment = segmenting.seconds();
+    const Stopwatch matching;
+    const auto scores = scorePairs(
+        *shapes, *shapes, flags.score.resolve(), flags.threads,
+        [&](std::size_t done) { session.console().progress("match", done, shapes->size()); },
+        session.context());
+    if (!scores) return fail(scores.error());
+    timing.match = matching.seconds();
+
+    std::vector<std::string> labels;
+    for (const EvaluatedShape& shape : *shapes) labels.push_back(shape.label);
+    const auto report = evaluateLeaveOneOut(withTiesAgainstFailures(*scores, *shapes), labels);
+    if (!report) return fail(report.error());
+    if (!flags.confusion.empty()) {
+        const auto raster = drawSimilarityMatrix(*scores, labels);
+        if (!raster) return fail(raster.error());
+        if (const auto drawn = writeSimilarityFigure(*raster, flags.confusion); !drawn) {
+            return fail(drawn.error());
+        }
+    }
+    std::vector<const EvaluatedShape*> failures;
+    collectFailures(*shapes, failures);
+    Console& console = session.console();
+    const int exitCode = reportFailures(session, failures);
+    console.document(leaveOneOutJson(flags, *parameters, *report, *shapes, failures, timing));
+    console.text(leaveOneOutText(flags, *parameters, *report, *shapes, failures, timing));
+    if (!flags.confusion.empty()) console.text("Similarity matrix: " + flags.confusion + "\n");
+    return exitCode;
+}
+
+// ---------------------------------------------------------------------------------------- gallery
+
+bool sameFile(const EvaluatedShape& a, const EvaluatedShape& b) {
+    std::error_code error;
+    return fs::equivalent(a.path, b.path, error) && !error;
+}
+
+bool isRight(const std::string& match, const EvaluatedShape& query, const EvaluatedShape& entry) {
+    if (match == "stem") return fs::path(query.path).stem() == fs::path(entry.path).stem();
+    return query.label == entry.label && !sameFile(query, entry);
+}
+
+/// Entries by falling score, ties by index. By folder a query is no answer to itself; by stem it
+/// is: the same file, made noisy, has to find the clean one.
+GalleryQuery galleryQuery(const EvaluateFlags& flags, const EvaluatedShape& query,
+                          const std::vector<EvaluatedShape>& gallery, const double* scores) {
+    GalleryQuery out;
+    for (std::size_t g = 0; g < gallery.size(); ++g) {
+        if (isRight(flags.match, query, gallery[g])) out.right.push_back(g);
+        const bool itself = flags.match == "folder" && sameFile(query, gallery[g]);
+        if (query.signature && gallery[g].signature && !itself) out.ranking.push_back(g);
+    }
+    std::stable_sort(out.ranking.begin(), out.ranking.end(),
+                     [&](std::size_t a, std::size_t b) { return scores[a] > scores[b]; });
+    return out;
+}
+
+/// What is told of one query.
+struct RankedQuery {
+    const EvaluatedShape* query = nullptr;
+    const EvaluatedShape* best = nullptr;   ///< null when nothing was ranked
+    const EvaluatedShape* right = nullptr;  ///< first right entry; null when there is none
+    double bestScore = 0.0;
+    double rightScore = 0.0;
+    std::size_t rank = 0;  ///< from 1; 0: not found
+};
+
+json galleryJson(const EvaluateFlags& flags, const ShapeParameters& parameters, const GalleryReport& report,
+                 const std::vector<RankedQuery>& ranked, std::size_t gallerySize,
+                 const std::vector<const EvaluatedShape*>& failures, const Timing& timing) {
+    json document = settingsJson(flags, parameters);
+    document["match"] = flags.match;
+    document["queries"] = report.queries;
+    document["without_right_answer"] = report.withoutRightAnswer;
+    document["gallery"] = gallerySize;
+    document["hit_at_1"] = report.hitAt1;
+    document["hit_at_5"] = report.hitAt5;
+    document["mrr"] = report.meanReciprocalRank;
+    document["seconds_segment"] = timing.segment;
+    document["seconds_match"] = timing.match;
+    document["failures"] = failuresJson(failures);
+    json ranks = json::array();
+    for (const RankedQuery& one : ranked) {
+        json entry = {{"query", one.query->path}, {"rank", one.rank}};
+        if (one.best != nullptr) entry.update({{"best", one.best->path}, {"best_score", one.bestScore}});
+        if (one.right != nullptr) entry.update({{"right", one.right->path}, {"right_score", one.rightScore}});
+        ranks.push_back(entry);
+    }
+    document["ranks"] = ranks;
+    return document;
+}
+
+std::string galleryText(const EvaluateFlags& flags, const ShapeParameters& parameters,
+                        const GalleryReport& report, const std::vector<RankedQuery>& ranked,
+                        std::size_t gallerySize, const Timing& timing) {
+    std::string text = formatCount(ranked.size(), "query", "queries") + " against a gallery of " +
+                       formatCount(gallerySize, "shape", "shapes") + ", right when the " +
+                       (flags.match == "stem" ? "file name" : "folder name") + " is the same; " +
+                       settingsText(flags, parameters) + "\n\n";
+    const auto right = Table::Align::kRight;
+    Table table(
+        {{"query"}, {"rank", right}, {"first hit"}, {"score", right}, {"right answer"}, {"score", right}});
+    for (const RankedQuery& one : ranked) {
+        table.add(
+            {one.query->name, one.rank > 0 ? std::to_string(one.rank) : "-",
+             one.best != nullptr ? one.best->name : "-",
+             one.best != nullptr ? formatFixed(one.bestScore, 3) : "",
+             one.right != nullptr ? one.right->name : (one.query->failure ? "-" : "none in the gallery"),
+             one.right != nullptr ? formatFixed(one.rightScore, 3) : ""});
+    }
+    text += table.render() + "\n";
+    text += "hit at 1 " + formatFixed(report.hitAt1, 3) + ", hit at 5 " + formatFixed(report.hitAt5, 3) +
+            ", mean reciprocal rank " + formatFixed(report.meanReciprocalRank, 3) + " over " +
+            formatCount(report.queries, "query", "queries") + " with a right answer\n";
+    return text + timingText(timing, ranked.size() + gallerySize, ranked.size() * gallerySize);
+}
+
+std::vector<RankedQuery> tellRanks(const std::vector<EvaluatedShape>& queries,
+                                   const std::vector<EvaluatedShape>& gallery, const ScoreMatrix& scores,
+                                   const std::vector<GalleryQuery>& asked, const GalleryReport& report) {
+    std::vector<RankedQuery> ranked;
+    for (std::size_t q = 0; q < queries.size(); ++q) {
+        const double* row = scores.data() + q * gallery.size();
+        RankedQuery one;
+        one.query = &queries[q];
+        one.rank = report.firstRightRank[q];
+        if (!asked[q].ranking.empty()) {
+            one.best = &gallery[asked[q].ranking.front()];
+            one.bestScore = row[asked[q].ranking.front()];
+        }
+        if (one.rank > 0) {
+            const std::size_t entry = asked[q].ranking[one.rank - 1];
+            one.right = &gallery[entry];
+            one.rightScore = row[entry];
+        } else if (!asked[q].right.empty()) {
+            one.right = &gallery[asked[q].right.front()];
+        }
+        ranked.push_back(one);
+    }
+    return ranked;
+}
+
+CommandResult runGallery(Session& session, const EvaluateFlags& flags) {
+    if (!flags.confusion.empty() || flags.perClass) {
+        return fail(ErrorCode::kInvalidArgument,
+                    "--confusion and --per-class need class folders on both sides; "
+                    "leave --gallery out");
+    }
+    const auto parameters = flags.parameters.resolve();
+    if (!parameters) return fail(parameters.error());
+    auto queries = listShapes(flags.paths);
+    if (!queries) return fail(queries.error());
+    auto gallery = listShapes(flags.gallery);
+    if (!gallery) return fail(gallery.error());
+
+    // The gallery is what a user has stored: it stays as it is; noise and subset are the query's.
+    ScanFlags clean = flags.scan;
+    clean.noise = 0.0;
+    clean.points.reset();
+    Timing timing;
+    const Stopwatch segmenting;
+    if (const auto ok = describeAll(session, "queries", *queries, flags.scan, flags, *parameters); !ok) {
+        return fail(ok.error());
+    }
+    if (const auto ok = describeAll(session, "gallery", *gallery, clean, flags, *parameters); !ok) {
+        return fail(ok.error());
+    }
+    timing.segment = segmenting.seconds();
+    const Stopwatch matching;
+    const auto scores = scorePairs(
+        *queries, *gallery, flags.score.resolve(), flags.threads,
+        [&](std::size_t done) { session.console().progress("match", done, queries->size()); },
+        session.context());
+    if (!scores) return fail(scores.error());
+    timing.match = matching.seconds();
+
+    std::vector<GalleryQuery> asked;
+    for (std::size_t q = 0; q < queries->size(); ++q) {
+        asked.push_back(galleryQuery(flags, (*queries)[q], *gallery, scores->data() + q * gallery->size()));
+    }
+    const auto report = evaluateGallery(asked, gallery->size());
+    if (!report) return fail(report.error());
+    const auto ranked = tellRanks(*queries, *gallery, *scores, asked, *report);
+    std::vector<const EvaluatedShape*> failures;
+    collectFailures(*queries, failures);
+    collectFailures(*gallery, failures);
+    const int exitCode = reportFailures(session, failures);
+    session.console().document(
+        galleryJson(flags, *parameters, *report, ranked, gallery->size(), failures, timing));
+    session.console().text(galleryText(flags, *parameters, *report, ranked, gallery->size(), timing));
+    return exitCode;
+}
+
+}  // namespace
+
+void addEvaluateCommand(CLI::App& app, Session& session) {
+    auto flags = std::make_shared<EvaluateFlags>();
+    CLI::App* command =
+        app.add_subcommand("evaluate",
+                           "Measure retrieval on labelled scans here, without a server: leave-one-out over "
+                           "DIR/CLASS/*, or queries against a gallery");
+    command
+        ->add_option("DIR", flags->paths,
+                     "Folder of class folders; with --gallery: queries (files or folders)")
+        ->required();
+    command->add_option("--gallery", flags->gallery, "Rank the queries against these files or folders")
+        ->type_name("DIR");
+    command
+        ->add_option("--match", flags->match,
+                     "With --gallery, what makes an entry right: the same folder name or file name")
+        ->check(CLI::IsMember({"folder", "stem"}))
+        ->capture_default_str();
+    command->add_option("--confusion", flags->confusion, "Draw the similarity matrix of the paper's Figure 6")
+        ->type_name("FILE.png|svg");
+    command->add_flag("--per-class", flags->perClass, "Measures of each class too");
+    command->add_option("--threads", flags->threads,
+                        "Threads [one a core]; the result does not depend on it");
+    addScanFlags(*command, flags->scan);
+    addParameterFlags(*command, flags->parameters);
+    addScoreFlags(*command, flags->score);
+    command->callback([&session, flags] {
+        session.action = [&session, flags] {
+            return flags->gallery.empty() ? runLeaveOneOut(session, *flags) : runGallery(session, *flags);
+        };
+    });
+}
+
+}  // namespace shapedb::cli

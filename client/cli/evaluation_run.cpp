@@ -1,0 +1,119 @@
+#include "client/cli/evaluation_run.h"
+
+#include <atomic>
+#include <mutex>
+#include <new>
+
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+namespace shapedb::cli {
+
+namespace {
+
+/// Runs body(i) for all i below count on `threads` threads; body returns an Error to stop.
+/// Items are handed out one at a time because their costs differ widely.
+Result<void> forEach(std::size_t count, unsigned threads, const RunContext& context,
+                     const std::function<std::optional<Error>(std::size_t)>& body) {
+    std::mutex mutex;
+    std::optional<Error> stop;
+    std::atomic<bool> stopped{false};
+    const auto record = [&](Error error) {
+        const std::lock_guard<std::mutex> lock(mutex);
+        if (!stop) stop = std::move(error);
+        stopped.store(true, std::memory_order_relaxed);
+    };
+    try {
+        tbb::task_arena arena(threads == 0 ? tbb::task_arena::automatic : static_cast<int>(threads));
+        arena.execute([&] {
+            tbb::parallel_for(
+                tbb::blocked_range<std::size_t>(0, count, 1),
+                [&](const tbb::blocked_range<std::size_t>& range) {
+                    for (std::size_t i = range.begin(); i != range.end(); ++i) {
+                        if (stopped.load(std::memory_order_relaxed)) return;
+                        if (const auto proceed = context.checkpoint(); !proceed)
+                            return record(proceed.error());
+                        if (auto error = body(i)) return record(std::move(*error));
+                    }
+                },
+                tbb::simple_partitioner());
+        });
+    } catch (const std::bad_alloc&) {
+        return fail(ErrorCode::kOutOfMemory, "not enough memory for this many threads; try fewer");
+    }
+    if (stop) return fail(std::move(*stop));
+    return {};
+}
+
+bool endsTheRun(const Error& error) {
+    return error.code == ErrorCode::kCancelled || error.code == ErrorCode::kDeadlineExceeded ||
+           error.code == ErrorCode::kInvalidArgument;
+}
+
+}  // namespace
+
+Result<std::vector<EvaluatedShape>> listShapes(const std::vector<std::string>& roots) {
+    std::vector<EvaluatedShape> shapes;
+    for (const std::string& root : roots) {
+        const auto files = listScanFiles({root});
+        if (!files) return fail(files.error());
+        for (const ScanFile& file : *files) {
+            EvaluatedShape shape;
+            shape.path = file.path;
+            shape.name = relativeName(file.path, root);
+            shape.label = file.label;
+            shapes.push_back(std::move(shape));
+        }
+    }
+    return shapes;
+}
+
+Result<void> describeShapes(std::vector<EvaluatedShape>& shapes, const ScanFlags& flags,
+                            const ShapeParameters& parameters, unsigned threads,
+                            const std::function<void(std::size_t done)>& progress,
+                            const RunContext& context) {
+    RunContext quiet = context;  // progress is counted in shapes, not in stages of one of them
+    quiet.progress = nullptr;
+    std::atomic<std::size_t> done{0};
+    return forEach(shapes.size(), threads, context, [&](std::size_t i) -> std::optional<Error> {
+        EvaluatedShape& shape = shapes[i];
+        const auto start = RunContext::Clock::now();
+        const auto scan = loadScan(shape.path, flags, fileSeed(flags.seed, shape.name), quiet);
+        if (!scan) {
+            shape.failure = scan.error();
+        } else if (auto description = describe(scan->points, parameters, quiet); !description) {
+            shape.failure = description.error();
+        } else {
+            shape.signature = std::move(description->signature);
+        }
+        shape.seconds = std::chrono::duration<double>(RunContext::Clock::now() - start).count();
+        if (shape.failure && endsTheRun(*shape.failure)) return shape.failure;
+        progress(++done);
+        return std::nullopt;
+    });
+}
+
+Result<ScoreMatrix> scorePairs(const std::vector<EvaluatedShape>& rows,
+                               const std::vector<EvaluatedShape>& columns, const ScoreOptions& options,
+                               unsigned threads, const std::function<void(std::size_t rowsDone)>& progress,
+                               const RunContext& context) {
+    const bool symmetric = &rows == &columns;
+    const std::size_t width = columns.size();
+    ScoreMatrix scores(rows.size() * width, 0.0);
+    std::atomic<std::size_t> done{0};
+    const auto scored = forEach(rows.size(), threads, context, [&](std::size_t r) -> std::optional<Error> {
+        for (std::size_t c = symmetric ? r : 0; c < width; ++c) {
+            if (!rows[r].signature || !columns[c].signature) continue;
+            const double value = score(*rows[r].signature, *columns[c].signature, options);
+            scores[r * width + c] = value;
+            // Only this task writes (c, r): its row starts right of the diagonal.
+            if (symmetric) scores[c * width + r] = value;
+        }
+        progress(++done);
+        return std::nullopt;
+    });
+    if (!scored) return fail(scored.error());
+    return scores;
+}
+
+}  // namespace shapedb::cli

@@ -1,0 +1,53 @@
+// The flags that choose how a scan is segmented and scored, the same for every command.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "client/api/types.h"
+#include "core/base/error.h"
+#include "core/matching/score.h"
+#include "core/signature/profile.h"
+
+namespace CLI {
+class App;
+}
+
+namespace shapedb::cli {
+
+/// --profile and one flag per parameter; what is not given keeps the profile's value.
+struct ParameterFlags {
+    std::optional<std::string> profile;
+    std::optional<double> bigBallRatio;
+    std::optional<double> deepAngle;
+    std::optional<double> hullAngle;
+    std::optional<double> mergeRatio;
+    std::optional<std::uint32_t> decimateTo;
+    std::optional<std::uint32_t> maxPoints;
+
+    /// For segmenting here. Errors: kInvalidArgument naming the value and its range.
+    [[nodiscard]] Result<ShapeParameters> resolve() const;
+    /// For the server, which fills in what is not given.
+    [[nodiscard]] client::Parameters forServer() const;
+    [[nodiscard]] bool any() const;
+};
+
+/// `flags` must outlive the parsing.
+void addParameterFlags(CLI::App& command, ParameterFlags& flags);
+
+/// --no-reflection and --keep-scale.
+struct ScoreFlags {
+    bool noReflection = false;
+    bool keepScale = false;
+
+    [[nodiscard]] ScoreOptions resolve() const;
+};
+
+void addScoreFlags(CLI::App& command, ScoreFlags& flags);
+
+[[nodiscard]] nlohmann::json toJson(const ShapeParameters& parameters);
+
+}  // namespace shapedb::cli

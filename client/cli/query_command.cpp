@@ -1,0 +1,141 @@
+// `shapedb query`: the stored shapes most like a scan, or like a stored one.
+#include <memory>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "client/cli/connection.h"
+#include "client/cli/exit_code.h"
+#include "client/cli/parameters.h"
+#include "client/cli/scan_source.h"
+#include "client/cli/session.h"
+#include "client/cli/shape_output.h"
+#include "client/cli/text.h"
+
+namespace shapedb::cli {
+
+using nlohmann::json;
+
+namespace {
+
+struct QueryFlags {
+    std::string path;
+    std::string key;
+    client::SearchOptions options;
+    ScoreFlags score;
+    ScanFlags scan;
+    bool includeSelf = false;
+    bool explain = false;
+    bool noExplanation = false;
+};
+
+json replyJson(const client::SearchReply& reply) {
+    json hits = json::array();
+    for (std::size_t i = 0; i < reply.hits.size(); ++i) {
+        const client::Hit& hit = reply.hits[i];
+        json entry = {{"rank", i + 1},
+                      {"key", hit.shape.key},
+                      {"label", labelOf(hit.shape)},
+                      {"score", hit.score},
+                      {"shape", toJson(hit.shape)}};
+        if (hit.explanation) entry["explanation"] = toJson(*hit.explanation);
+        hits.push_back(std::move(entry));
+    }
+    json document = {{"hits", hits},
+                     {"candidates", reply.candidates},
+                     {"filtered", reply.filtered},
+                     {"scored", reply.scored},
+                     {"query", toJson(reply.query)},
+                     {"seconds_segment", reply.secondsSegment},
+                     {"seconds_search", reply.secondsSearch}};
+    if (reply.report) document["report"] = toJson(*reply.report);
+    if (reply.offset != Point3{}) document["offset"] = {reply.offset.x, reply.offset.y, reply.offset.z};
+    return document;
+}
+
+std::string replyText(const QueryFlags& flags, const client::SearchReply& reply) {
+    const std::string queryName = flags.path.empty() ? flags.key : "the query";
+    std::string text;
+    if (reply.report) {
+        text += flags.path + ": " + formatCount(reply.report->points, "point", "points") + ", " +
+                formatCount(reply.report->segments, "segment", "segments") + ", segmented in " +
+                formatSeconds(reply.secondsSegment) + "\n";
+    }
+    text += formatCount(reply.candidates, "shape", "shapes") + " searched";
+    if (reply.filtered != reply.candidates) text += ", " + formatCount(reply.filtered) + " of them asked for";
+    text += ", " + formatCount(reply.scored) + " scored in full, in " + formatSeconds(reply.secondsSearch) +
+            "\n\n";
+    if (reply.hits.empty()) return text + "Nothing found.\n";
+
+    const auto right = Table::Align::kRight;
+    Table table({{"rank", right}, {"score", right}, {""}, {"label"}, {"key"}});
+    for (std::size_t i = 0; i < reply.hits.size(); ++i) {
+        const client::Hit& hit = reply.hits[i];
+        table.add({std::to_string(i + 1), formatFixed(hit.score, 3), bar(hit.score, 20), labelOf(hit.shape),
+                   hit.shape.key});
+    }
+    text += table.render();
+    const std::size_t explained = flags.explain ? reply.hits.size() : 1;
+    for (std::size_t i = 0; i < explained; ++i) {
+        const client::Hit& hit = reply.hits[i];
+        if (!hit.explanation) continue;
+        text += "\nWhy " + hit.shape.key + ": " +
+                explanationText(*hit.explanation, reply.query, queryName, hit.shape.key);
+    }
+    return text;
+}
+
+CommandResult runQuery(Session& session, const QueryFlags& flags) {
+    if (flags.path.empty() == flags.key.empty()) {
+        return fail(ErrorCode::kInvalidArgument, "give either a scan file or --key, not both");
+    }
+    client::SearchOptions options = flags.options;
+    options.reflection = !flags.score.noReflection;
+    options.keepScale = flags.score.keepScale;
+    options.explanation = !flags.noExplanation;
+    const RunContext context = session.context();
+    Scan scan;
+    if (!flags.path.empty()) {
+        auto loaded = loadScan(flags.path, flags.scan, flags.scan.seed, context);
+        if (!loaded) return fail(loaded.error());
+        scan = std::move(*loaded);
+    }
+    const auto client = connectToServer(session);
+    if (!client) return fail(client.error());
+    const auto reply = flags.path.empty()
+                           ? client->searchByKey(options, flags.key, flags.includeSelf, context)
+                           : client->searchByScan(options, scan.points, context);
+    if (!reply) {
+        if (flags.path.empty()) return fail(reply.error());
+        return fail(reply.error().code, flags.path + ": " + reply.error().message);
+    }
+    session.console().document(replyJson(*reply));
+    session.console().text(replyText(flags, *reply));
+    return kOk;
+}
+
+}  // namespace
+
+void addQueryCommand(CLI::App& app, Session& session) {
+    auto flags = std::make_shared<QueryFlags>();
+    CLI::App* command =
+        app.add_subcommand("query", "Find the stored shapes most like a scan or a stored shape");
+    command->add_option("PATH", flags->path, "Scan to search with; it is not stored");
+    command->add_option("--key", flags->key, "Search with this stored shape instead; it is left out itself");
+    command->add_flag("--include-self", flags->includeSelf, "With --key: rank the shape itself too");
+    addCollectionOption(*command, flags->options.collection);
+    command->add_option("-k,--k", flags->options.k, "Hits at most")->capture_default_str();
+    command->add_option("--threshold", flags->options.threshold,
+                        "Only hits with at least this score, 0 to 1");
+    command->add_option("--filter", flags->options.filter,
+                        "Only shapes whose metadata passes, e.g. 'label=cup'");
+    addScoreFlags(*command, flags->score);
+    auto* none = command->add_flag("--no-explanation", flags->noExplanation, "Do not say why");
+    command->add_flag("--explain", flags->explain, "Say why for every hit, not only the first")
+        ->excludes(none);
+    addScanFlags(*command, flags->scan);
+    command->callback(
+        [&session, flags] { session.action = [&session, flags] { return runQuery(session, *flags); }; });
+}
+
+}  // namespace shapedb::cli

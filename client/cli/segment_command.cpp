@@ -1,0 +1,101 @@
+// `shapedb segment`: one scan, its segments and its signature, without a server.
+#include <memory>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "client/cli/exit_code.h"
+#include "client/cli/parameters.h"
+#include "client/cli/scan_source.h"
+#include "client/cli/session.h"
+#include "client/cli/shape_output.h"
+#include "client/cli/text.h"
+#include "client/io/ply_writer.h"
+
+namespace shapedb::cli {
+
+namespace {
+
+struct SegmentFlags {
+    std::string file;
+    std::string out;
+    ScanFlags scan;
+    ParameterFlags parameters;
+};
+
+nlohmann::json segmentJson(const SegmentFlags& flags, const Scan& scan, const ShapeParameters& parameters,
+                           const client::SegmentationReport& report, const client::Signature& signature) {
+    nlohmann::json document = toJson(report);
+    document["file"] = flags.file;
+    document["format"] = scan.format;
+    document["sampled_from_mesh"] = scan.sampledFromMesh;
+    document["skipped_non_finite"] = scan.skippedNonFinite;
+    document["noise"] = flags.scan.noise;
+    document["seed"] = flags.scan.seed;
+    document["parameters"] = toJson(parameters);
+    document["scale"] = signature.scale;
+    document["signature"] = pointsJson(signature);
+    if (!flags.out.empty()) document["out"] = flags.out;
+    return document;
+}
+
+std::string segmentText(const SegmentFlags& flags, const Scan& scan, const ShapeParameters& parameters,
+                        const client::SegmentationReport& report, const client::Signature& signature) {
+    std::string text = flags.file + ": " + scan.format + ", " +
+                       formatCount(report.points, "point", "points") +
+                       (scan.sampledFromMesh ? " drawn from its surface" : "") + "\n";
+    if (scan.skippedNonFinite > 0) {
+        text += formatCount(scan.skippedNonFinite, "point", "points") + " without a measurement left out\n";
+    }
+    if (report.pointsUsed != report.points) {
+        text += formatCount(report.pointsUsed) + " after merging " +
+                formatCount(report.duplicates, "duplicate", "duplicates") +
+                (report.pointsUsed + report.duplicates < report.points ? " and averaging onto a grid" : "") +
+                "\n";
+    }
+    text += formatCount(report.segments, "segment", "segments") + ", volume " + formatNumber(report.volume) +
+            ", from " + formatCount(report.tetrahedra) + " tetrahedra (profile " +
+            profileName(parameters.profile) + ") in " + formatSeconds(report.totalSeconds) + ", " +
+            formatSeconds(report.delaunaySeconds) + " of it Delaunay\n\n";
+    text += "The " + std::to_string(signature.points.size()) + " heaviest:\n" + signatureTable(signature);
+    if (!flags.out.empty()) text += "\nPoints coloured by segment: " + flags.out + "\n";
+    return text;
+}
+
+CommandResult runSegment(Session& session, const SegmentFlags& flags) {
+    const auto parameters = flags.parameters.resolve();
+    if (!parameters) return fail(parameters.error());
+    const RunContext context = session.context();
+    const auto scan = loadScan(flags.file, flags.scan, flags.scan.seed, context);
+    if (!scan) return fail(scan.error());
+    const auto description = describe(scan->points, *parameters, context);
+    if (!description) {
+        return fail(description.error().code, flags.file + ": " + description.error().message);
+    }
+    if (!flags.out.empty()) {
+        const auto written =
+            writeLabelledPly(flags.out, scan->points, description->segmentation.pointSegment);
+        if (!written) return fail(written.error());
+    }
+    const client::SegmentationReport report = reportOf(description->segmentation);
+    const client::Signature signature = toClient(description->signature);
+    session.console().document(segmentJson(flags, *scan, *parameters, report, signature));
+    session.console().text(segmentText(flags, *scan, *parameters, report, signature));
+    return kOk;
+}
+
+}  // namespace
+
+void addSegmentCommand(CLI::App& app, Session& session) {
+    auto flags = std::make_shared<SegmentFlags>();
+    CLI::App* command = app.add_subcommand("segment", "Segment one scan here, without a server");
+    command->add_option("FILE", flags->file, "Scan: PLY, PCD, OFF, OBJ, STL or XYZ")->required();
+    command->add_option("--out", flags->out, "Write the points, coloured and labelled by segment")
+        ->type_name("FILE.ply");
+    addScanFlags(*command, flags->scan);
+    addParameterFlags(*command, flags->parameters);
+    command->callback(
+        [&session, flags] { session.action = [&session, flags] { return runSegment(session, *flags); }; });
+}
+
+}  // namespace shapedb::cli

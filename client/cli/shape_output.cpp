@@ -1,0 +1,251 @@
+#include "client/cli/shape_output.h"
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+
+#include <nlohmann/json.hpp>
+
+#include "client/cli/text.h"
+#include "core/signature/signature_codec.h"
+
+namespace shapedb::cli {
+
+using nlohmann::json;
+
+namespace {
+
+/// Matched pairs told one by one; the rest is counted.
+constexpr std::size_t kPairsTold = 3;
+
+json pointJson(const Point3& p) { return json::array({p.x, p.y, p.z}); }
+
+std::string timeText(client::Timestamp time) {
+    const std::time_t seconds = std::chrono::system_clock::to_time_t(time);
+    std::tm parts{};
+    if (gmtime_r(&seconds, &parts) == nullptr) return {};
+    char buffer[40];
+    const std::size_t length = std::strftime(buffer, sizeof buffer, "%Y-%m-%dT%H:%M:%SZ", &parts);
+    return std::string(buffer, length);
+}
+
+/// "segment 4" or "segments 4, 5 and 7", counted from 1.
+std::string segmentList(const std::vector<std::uint32_t>& indices) {
+    std::string text = indices.size() == 1 ? "segment " : "segments ";
+    for (std::size_t i = 0; i < indices.size(); ++i) {
+        if (i > 0) text += i + 1 == indices.size() ? " and " : ", ";
+        text += std::to_string(indices[i] + 1);
+    }
+    return text;
+}
+
+double volumeShareOf(const client::Signature& signature, std::uint32_t index) {
+    return index < signature.points.size() ? signature.points[index].volumeShare : 0.0;
+}
+
+std::string motionText(const client::Explanation& explanation, const std::string& hitName) {
+    const Motion& motion = explanation.motion;
+    std::string text = "To get there " + hitName + " is ";
+    if (motion.reflected) text += "mirrored and ";
+    text += "turned by " + formatFixed(rotationDegrees(motion), 0) + " degrees";
+    if (std::abs(motion.scale - 1.0) < 5e-4) {
+        text += " at its own size";
+    } else {
+        text += std::string(motion.scale > 1.0 ? ", enlarged" : ", shrunk") + " to " +
+                formatNumber(motion.scale) + " times its size";
+    }
+    return text + (motion.reflected ? ".\n" : " and not mirrored.\n");
+}
+
+}  // namespace
+
+client::Signature toClient(const Signature& signature) {
+    client::Signature out;
+    out.scale = signature.scale;
+    out.volume = signature.volume;
+    out.encoded = encodeSignature(signature);
+    for (std::size_t i = 0; i < signature.points.size(); ++i) {
+        client::WeightedPoint point;
+        point.position = pointPosition(signature, i);
+        point.weight = pointVolume(signature, i);
+        point.volumeShare = signature.points[i].volumeShare;
+        point.peakRadius = static_cast<double>(signature.points[i].peakRadius) * signature.scale;
+        point.extents = pointExtents(signature, i);
+        out.points.push_back(point);
+    }
+    return out;
+}
+
+client::Explanation toClient(const Explanation& explanation) {
+    client::Explanation out;
+    out.similarity = explanation.similarity;
+    out.dissimilarity = explanation.dissimilarity;
+    out.motion = explanation.motion;
+    for (const PointMatch& match : explanation.matches) {
+        out.matches.push_back({match.a, match.b, match.share, match.distance});
+    }
+    out.unmatchedQuery = explanation.unmatchedA;
+    out.unmatchedHit = explanation.unmatchedB;
+    out.degenerate = explanation.degenerate;
+    return out;
+}
+
+client::SegmentationReport reportOf(const Segmentation& segmentation) {
+    client::SegmentationReport report;
+    report.points = segmentation.pointSegment.size();
+    report.pointsUsed = segmentation.sites.size();
+    report.duplicates = segmentation.duplicates;
+    report.tetrahedra = segmentation.tetrahedra.size();
+    report.interiorTetrahedra = segmentation.interiorTetrahedra;
+    report.maxima = segmentation.maxima;
+    report.segments = segmentation.segments.size();
+    report.volume = segmentation.volume;
+    report.delaunaySeconds = segmentation.delaunaySeconds;
+    report.totalSeconds = segmentation.totalSeconds;
+    for (const shapedb::StageTime& stage : segmentation.stages) {
+        report.stages.push_back({stage.stage, stage.seconds});
+    }
+    return report;
+}
+
+std::string hexText(const std::string& bytes) {
+    static constexpr char kDigits[] = "0123456789abcdef";
+    std::string text;
+    for (const char c : bytes) {
+        text += kDigits[static_cast<unsigned char>(c) >> 4];
+        text += kDigits[static_cast<unsigned char>(c) & 15];
+    }
+    return text;
+}
+
+json pointsJson(const client::Signature& signature) {
+    json points = json::array();
+    for (const client::WeightedPoint& point : signature.points) {
+        points.push_back({{"position", pointJson(point.position)},
+                          {"weight", point.weight},
+                          {"volume_share", point.volumeShare},
+                          {"peak_radius", point.peakRadius},
+                          {"extents", point.extents}});
+    }
+    return points;
+}
+
+json toJson(const client::Signature& signature) {
+    return {{"points", pointsJson(signature)}, {"scale", signature.scale}, {"volume", signature.volume}};
+}
+
+json toJson(const client::SegmentationReport& report) {
+    json stages = json::object();
+    for (const client::StageTime& stage : report.stages) stages[stage.stage] = stage.seconds;
+    return {{"points", report.points},
+            {"points_used", report.pointsUsed},
+            {"duplicates", report.duplicates},
+            {"tetrahedra", report.tetrahedra},
+            {"interior_tetrahedra", report.interiorTetrahedra},
+            {"maxima", report.maxima},
+            {"segments", report.segments},
+            {"volume", report.volume},
+            {"delaunay_seconds", report.delaunaySeconds},
+            {"total_seconds", report.totalSeconds},
+            {"stages", stages}};
+}
+
+json toJson(const client::Explanation& explanation) {
+    json matches = json::array();
+    for (const client::SegmentMatch& match : explanation.matches) {
+        matches.push_back({{"query", match.query},
+                           {"hit", match.hit},
+                           {"share", match.share},
+                           {"distance", match.distance}});
+    }
+    const Motion& motion = explanation.motion;
+    return {{"similarity", explanation.similarity},
+            {"dissimilarity", explanation.dissimilarity},
+            {"motion",
+             {{"rotation", motion.rotation},
+              {"rotation_degrees", rotationDegrees(motion)},
+              {"scale", motion.scale},
+              {"translation", pointJson(motion.translation)},
+              {"reflected", motion.reflected}}},
+            {"matches", matches},
+            {"unmatched_query", explanation.unmatchedQuery},
+            {"unmatched_hit", explanation.unmatchedHit},
+            {"degenerate", explanation.degenerate}};
+}
+
+json toJson(const client::Shape& shape) {
+    json out = {{"collection", shape.collection},
+                {"key", shape.key},
+                {"id", shape.id},
+                {"version", shape.version},
+                {"state", client::stateName(shape.state)},
+                {"points", shape.pointCount},
+                {"sha256", hexText(shape.sha256)},
+                {"metadata", shape.metadata},
+                {"created", timeText(shape.created)},
+                {"updated", timeText(shape.updated)}};
+    if (shape.failure) {
+        out["failure"] = {{"name", errorCodeName(shape.failure->code)}, {"message", shape.failure->message}};
+    }
+    return out;
+}
+
+std::string signatureTable(const client::Signature& signature) {
+    Table table({{"segment", Table::Align::kRight},
+                 {"share", Table::Align::kRight},
+                 {""},
+                 {"volume", Table::Align::kRight},
+                 {"radius", Table::Align::kRight},
+                 {"position"}});
+    for (std::size_t i = 0; i < signature.points.size(); ++i) {
+        const client::WeightedPoint& point = signature.points[i];
+        table.add({std::to_string(i + 1), formatPercent(point.volumeShare), bar(point.volumeShare, 12),
+                   formatNumber(point.weight), formatNumber(point.peakRadius), formatPoint(point.position)});
+    }
+    return table.render();
+}
+
+double rotationDegrees(const Motion& motion) {
+    const double trace = motion.rotation[0][0] + motion.rotation[1][1] + motion.rotation[2][2];
+    const double cosine = motion.reflected ? (trace + 1.0) / 2.0 : (trace - 1.0) / 2.0;
+    return std::acos(std::clamp(cosine, -1.0, 1.0)) * 180.0 / 3.14159265358979323846;
+}
+
+std::string explanationText(const client::Explanation& explanation, const client::Signature& query,
+                            const std::string& queryName, const std::string& hitName) {
+    if (explanation.matches.empty())
+        return "No segment of " + queryName + " lies on one of " + hitName + ".\n";
+    double matchedVolume = 0.0;
+    for (const auto& match : explanation.matches) matchedVolume += volumeShareOf(query, match.query);
+
+    const std::size_t count = explanation.matches.size();
+    std::string text = formatCount(count, "segment", "segments") + " of " + queryName + " with " +
+                       formatPercent(matchedVolume) + " of its volume " +
+                       (count == 1 ? "lies on one of " : "lie on segments of ") + hitName + ": ";
+    for (std::size_t i = 0; i < std::min(count, kPairsTold); ++i) {
+        const client::SegmentMatch& match = explanation.matches[i];
+        if (i > 0) text += ", ";
+        text += std::to_string(match.query + 1) + " on " + std::to_string(match.hit + 1) + " (" +
+                formatPercent(match.share) + " of the match, " + formatPercent(match.distance) +
+                " of the size apart)";
+    }
+    if (count > kPairsTold) text += " and " + std::to_string(count - kPairsTold) + " more";
+    text += ".\n";
+    if (explanation.degenerate) {
+        text += "One of the two is a single segment, so nothing fixes how it is turned.\n";
+    } else {
+        text += motionText(explanation, hitName);
+    }
+    if (!explanation.unmatchedQuery.empty()) {
+        text += "Without a partner: " + segmentList(explanation.unmatchedQuery) + " of " + queryName;
+        if (!explanation.unmatchedHit.empty()) {
+            text += ", " + segmentList(explanation.unmatchedHit) + " of " + hitName;
+        }
+        text += ".\n";
+    } else if (!explanation.unmatchedHit.empty()) {
+        text += "Without a partner: " + segmentList(explanation.unmatchedHit) + " of " + hitName + ".\n";
+    }
+    return text;
+}
+
+}  // namespace shapedb::cli

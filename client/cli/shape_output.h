@@ -1,0 +1,44 @@
+// How signatures, shapes and alignments are told, as text and as JSON, by every command alike.
+#pragma once
+
+#include <string>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "client/api/types.h"
+#include "core/matching/score.h"
+#include "core/segmentation/segmentation.h"
+#include "core/signature/signature.h"
+
+namespace shapedb::cli {
+
+/// What was computed here, in the form the server answers in. `encoded` is set as well.
+[[nodiscard]] client::Signature toClient(const Signature& signature);
+[[nodiscard]] client::Explanation toClient(const Explanation& explanation);
+[[nodiscard]] client::SegmentationReport reportOf(const Segmentation& segmentation);
+
+/// List of {position, weight, volume_share, peak_radius, extents} by falling weight.
+[[nodiscard]] nlohmann::json pointsJson(const client::Signature& signature);
+/// {points: ..., scale, volume}.
+[[nodiscard]] nlohmann::json toJson(const client::Signature& signature);
+/// points, tetrahedra, segments, volume, delaunay_seconds, total_seconds, stages, ...
+[[nodiscard]] nlohmann::json toJson(const client::SegmentationReport& report);
+[[nodiscard]] nlohmann::json toJson(const client::Explanation& explanation);
+[[nodiscard]] nlohmann::json toJson(const client::Shape& shape);
+
+/// Lower-case hexadecimal digits of binary data (a checksum).
+[[nodiscard]] std::string hexText(const std::string& bytes);
+
+/// One line a segment.
+[[nodiscard]] std::string signatureTable(const client::Signature& signature);
+
+/// Why the two match, in a few plain sentences. `queryName` and `hitName` are put in as they are.
+[[nodiscard]] std::string explanationText(const client::Explanation& explanation,
+                                          const client::Signature& query, const std::string& queryName,
+                                          const std::string& hitName);
+
+/// Angle of the rotation in a motion, degrees, [0, 180]. A reflected one is a mirroring in some
+/// plane and a turn about that plane's normal: the angle of the turn.
+[[nodiscard]] double rotationDegrees(const Motion& motion);
+
+}  // namespace shapedb::cli

@@ -1,0 +1,69 @@
+// Numbers and tables for people. JSON output never goes through here.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/geometry/point.h"
+
+namespace shapedb::cli {
+
+/// Four significant digits, trailing zeros dropped: "0.4891", "12.5", "1.2e+09", "0".
+[[nodiscard]] std::string formatNumber(double value);
+
+/// A fixed number of decimals: "0.489".
+[[nodiscard]] std::string formatFixed(double value, int decimals);
+
+/// Thousands separated by commas: "362,272".
+[[nodiscard]] std::string formatCount(std::uint64_t count);
+
+/// "1 shape", "3 shapes".
+[[nodiscard]] std::string formatCount(std::uint64_t count, const std::string& singular,
+                                      const std::string& plural);
+
+/// "312 B", "4.0 KiB", "1.5 GiB".
+[[nodiscard]] std::string formatBytes(std::uint64_t bytes);
+
+/// "35 ms", "4.2 s", "3 min 20 s", "2 h 5 min", "3 d 4 h". Negative values count as 0.
+[[nodiscard]] std::string formatSeconds(double seconds);
+
+/// "42 %", "0.3 %".
+[[nodiscard]] std::string formatPercent(double share);
+
+/// "(0.1, -2, 30)".
+[[nodiscard]] std::string formatPoint(const Point3& p);
+
+/// A bar of `width` cells filled to `share` of [0, 1], in eighths: "█████▌    ".
+[[nodiscard]] std::string bar(double share, int width);
+
+/// How many terminal columns a UTF-8 text takes (code points; no wide or combining ones).
+[[nodiscard]] std::size_t displayWidth(const std::string& text);
+
+/// Columns padded to their widest cell, two blanks between them, no blanks at line ends.
+class Table {
+  public:
+    enum class Align { kLeft, kRight };
+
+    struct Column {
+        std::string title;
+        Align align = Align::kLeft;
+    };
+
+    explicit Table(std::vector<Column> columns) : columns_(std::move(columns)) {}
+
+    /// Missing cells are empty; there must not be more than columns.
+    void add(std::vector<std::string> cells) { rows_.push_back(std::move(cells)); }
+
+    [[nodiscard]] bool empty() const { return rows_.empty(); }
+
+    /// With a title line unless all titles are empty. Ends in a newline.
+    [[nodiscard]] std::string render() const;
+
+  private:
+    std::vector<Column> columns_;
+    std::vector<std::vector<std::string>> rows_;
+};
+
+}  // namespace shapedb::cli
