@@ -142,7 +142,7 @@ class DamageTest : public StoreTest {
 
 TEST_F(DamageTest, FlippedBytes) {
     Random random(31);
-    for (int round = 0; round < 60; ++round) {
+    for (int round = 0; round < 40; ++round) {
         std::string bytes = whole_;
         const std::uint64_t flips = 1 + random.below(12);
         for (std::uint64_t i = 0; i < flips; ++i) {
@@ -212,7 +212,7 @@ TEST_F(ConcurrencyTest, ReadersBesideWriters) {
     for (std::uint64_t t = 0; t < 2; ++t) {
         writers.emplace_back([&, t] {
             Random random(t);
-            for (int i = 0; i < 150; ++i) {
+            for (int i = 0; i < 80; ++i) {
                 const std::uint64_t seed = random.below(1000);
                 const auto points = cloud(seed);
                 const std::string key = "k" + std::to_string(random.below(10));

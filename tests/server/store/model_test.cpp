@@ -310,7 +310,7 @@ class ModelTest : public StoreTest, public ::testing::WithParamInterface<int> {
 TEST_P(ModelTest, EqualsAMap) {
     random_ = Random(static_cast<std::uint64_t>(GetParam()));
     collection_ = collection();
-    for (int step = 0; step < 700 && !HasFatalFailure(); ++step) {
+    for (int step = 0; step < 500 && !HasFatalFailure(); ++step) {
         const std::uint64_t dice = random_.below(100);
         SCOPED_TRACE("step " + std::to_string(step));
         if (dice < 22) {

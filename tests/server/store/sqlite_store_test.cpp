@@ -171,6 +171,18 @@ TEST_F(SqliteStoreTest, FullDeviceStoresNothingAndRecovers) {
     EXPECT_FALSE(std::filesystem::exists(folder_.file("too-big.db")));
 }
 
+TEST_F(SqliteStoreTest, TheLogStaysSmall) {
+    const Collection c = collection();
+    std::uint64_t largest = 0;
+    for (std::uint64_t i = 0; i < 25; ++i) {
+        const auto points = cloud(i, 100000);
+        ASSERT_TRUE(store_->putShape(request(c.id, "k", points)));
+        largest = std::max(largest, store_->stats()->walBytes);
+    }
+    EXPECT_GT(store_->stats()->databaseBytes, 1000000u);
+    EXPECT_LT(largest, 17u << 20) << "25 MB were written";
+}
+
 TEST_F(SqliteStoreTest, FilesAreForTheOwnerOnly) {
     collection();
     for (const char* name : {"shapes.db", "shapes.db-wal", "shapes.db.lock"}) {
