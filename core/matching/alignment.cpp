@@ -11,9 +11,6 @@ namespace {
 // direction that single precision could be trusted with.
 constexpr double kNoDirection = 1e-6;
 
-// Room for rounding between a bound and what it bounds.
-constexpr double kBoundMargin = 1.0 + 1e-12;
-
 // Orthonormal, right-handed: u along the axis, e and f across.
 struct Axis {
     Point3 u, e, f;
@@ -53,8 +50,8 @@ Cylindrical alongAxis(const AnchoredPoints& points, std::size_t through) {
     return view;
 }
 
-Cylindrical mirrored(Cylindrical view) {
-    for (double& im : view.im) im = -im;
+Cylindrical mirrored(Cylindrical view, std::size_t count) {
+    for (std::size_t p = 0; p < count; ++p) view.im[p] = -view.im[p];
     return view;
 }
 
@@ -66,6 +63,13 @@ struct Roll {
 
 bool givesRoll(const Cylindrical& view, std::size_t p) {
     return view.squaredRadius[p] >= kNoDirection * kNoDirection;
+}
+
+bool anyRoll(const Cylindrical& view, std::size_t count) {
+    for (std::size_t p = 1; p < count; ++p) {
+        if (givesRoll(view, p)) return true;
+    }
+    return false;
 }
 
 Roll rollFrom(const Cylindrical& a, std::size_t k, const Cylindrical& b, std::size_t l) {
@@ -138,12 +142,14 @@ double matchGreedily(const AnchoredPoints& a, const AnchoredPoints& b, double wi
 double axisBound(const AnchoredPoints& a, const Cylindrical& viewA, const AnchoredPoints& b,
                  const Cylindrical& viewB, double width) {
     double sum = 0.0;
+    std::array<double, kMaxSignaturePoints> radiusB;
+    for (std::size_t q = 0; q < b.count; ++q) radiusB[q] = std::sqrt(viewB.squaredRadius[q]);
     for (std::size_t p = 0; p < a.count; ++p) {
         double best = 0.0;
         const double radius = std::sqrt(viewA.squaredRadius[p]);
         for (std::size_t q = 0; q < b.count; ++q) {
-            const double dh = viewA.height[p] - viewB.height[q];
-            const double dr = radius - std::sqrt(viewB.squaredRadius[q]);
+            const double dh = leastGap(viewA.height[p], viewB.height[q]);
+            const double dr = leastGap(radius, radiusB[q]);
             best = std::max(best, std::min(a.weight[p], b.weight[q]) * kernel(dh * dh + dr * dr, width));
         }
         sum += best;
@@ -157,7 +163,10 @@ class Search {
         : a_(a), b_(b), width_(width), prune_(prune) {}
 
     void tryRolls(Alignment alignment, const Cylindrical& viewA, const Cylindrical& viewB) {
-        tryRoll(alignment, viewA, viewB, Roll{});
+        if (!anyRoll(viewA, a_.count) || !anyRoll(viewB, b_.count)) {
+            tryRoll(alignment, viewA, viewB, Roll{});
+            return;
+        }
         for (std::size_t k = 1; k < a_.count; ++k) {
             if (!givesRoll(viewA, k)) continue;
             for (std::size_t l = 1; l < b_.count; ++l) {
@@ -215,7 +224,7 @@ PairList matchesOf(const AnchoredPoints& a, const AnchoredPoints& b, double widt
     }
     const Cylindrical viewA = alongAxis(a, alignment.i);
     const Cylindrical straightB = alongAxis(b, alignment.j);
-    const Cylindrical viewB = alignment.reflected ? mirrored(straightB) : straightB;
+    const Cylindrical viewB = alignment.reflected ? mirrored(straightB, b.count) : straightB;
     const Roll roll = alignment.k == 0 ? Roll{} : rollFrom(viewA, alignment.k, viewB, alignment.l);
     list.similarity = matchGreedily(
         a, b, width, [&](std::size_t p, std::size_t q) { return squaredGap(viewA, p, viewB, q, roll); },
@@ -251,6 +260,11 @@ double kernel(double squaredDistance, double width) {
     return t2 * t2;
 }
 
+double leastGap(double x, double y) {
+    constexpr double kRounding = 1e-14;  // some fifty times that of a rotation
+    return std::max(0.0, std::abs(x - y) - kRounding * (std::abs(x) + std::abs(y)));
+}
+
 BestAlignment bestAlignment(const AnchoredPoints& a, const AnchoredPoints& b, const ScoreOptions& options,
                             bool prune) {
     if (!hasAxis(a) || !hasAxis(b)) return {{}, matchesOf(a, b, options.kernelWidth, {})};
@@ -281,7 +295,7 @@ BestAlignment bestAlignment(const AnchoredPoints& a, const AnchoredPoints& b, co
         search.tryRolls(alignment, viewsA[alignment.i], viewsB[alignment.j]);
         if (!options.reflection) continue;
         alignment.reflected = true;
-        search.tryRolls(alignment, viewsA[alignment.i], mirrored(viewsB[alignment.j]));
+        search.tryRolls(alignment, viewsA[alignment.i], mirrored(viewsB[alignment.j], b.count));
     }
     return {search.best(), matchesOf(a, b, options.kernelWidth, search.best())};
 }
@@ -294,7 +308,7 @@ Matrix3 alignmentRotation(const AnchoredPoints& a, const AnchoredPoints& b, cons
     if (alignment.k != 0) {
         const Cylindrical viewA = alongAxis(a, alignment.i);
         Cylindrical viewB = alongAxis(b, alignment.j);
-        if (alignment.reflected) viewB = mirrored(viewB);
+        if (alignment.reflected) viewB = mirrored(viewB, b.count);
         roll = rollFrom(viewA, alignment.k, viewB, alignment.l);
     }
     // b's coordinates (height, re, im) -> rolled -> along a's axes. Mirroring negates im first.

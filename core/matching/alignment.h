@@ -28,6 +28,13 @@ struct AnchoredPoints {
 /// (1 - d^2 / (8 width^2))^4, 0 beyond; takes the squared distance.
 [[nodiscard]] double kernel(double squaredDistance, double width);
 
+/// A lower bound of |x - y| that holds after rounding too: how near two points at heights (or
+/// radii) x and y can be brought by a motion that keeps these. What makes bounds safe to prune by.
+[[nodiscard]] double leastGap(double x, double y);
+
+/// Factor by which a bound is raised: room for the rounding of sums taken in another order.
+constexpr double kBoundMargin = 1.0 + 1e-12;
+
 /// Which points are laid on each other; indices into the two sets.
 struct PairList {
     struct Pair {
@@ -42,7 +49,7 @@ struct PairList {
 };
 
 /// One alignment: the axes through a's point i and b's point j, rolled so that b's l faces as a's
-/// k. k = l = 0 (the anchors, which fix no roll): the axes' own reference directions agree.
+/// k. k = l = 0: all points of one side lie on the axis, any roll does as well as another.
 /// i = j = 0: one side has no axis; no turn at all.
 struct Alignment {
     std::uint8_t i = 0, j = 0, k = 0, l = 0;

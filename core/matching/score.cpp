@@ -2,15 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
+#include <sstream>
 
 #include "core/matching/alignment.h"
 
 namespace shapedb {
 
 namespace {
-
-constexpr double kBoundMargin = 1.0 + 1e-12;
 
 // A total order on what is scored, so that score(a, b) and score(b, a) are one computation.
 bool comesFirst(const Signature& a, const Signature& b) {
@@ -28,10 +26,14 @@ struct Scaled {
     AnchoredPoints a, b;
 };
 
+// Length 1 of `of` in the unit in which it is compared with `other`: its own scale, or, where
+// sizes count, the larger scale of the two.
+double inCommonUnit(const Signature& of, const Signature& other, const ScoreOptions& options) {
+    return options.keepScale ? of.scale / std::max(of.scale, other.scale) : 1.0;
+}
+
 Scaled inCommonScale(const Signature& a, const Signature& b, const ScoreOptions& options) {
-    if (!options.keepScale) return {anchoredPoints(a, 1.0), anchoredPoints(b, 1.0)};
-    const double larger = std::max(a.scale, b.scale);
-    return {anchoredPoints(a, a.scale / larger), anchoredPoints(b, b.scale / larger)};
+    return {anchoredPoints(a, inCommonUnit(a, b, options)), anchoredPoints(b, inCommonUnit(b, a, options))};
 }
 
 bool identical(const Signature& a, const Signature& b, const ScoreOptions& options) {
@@ -64,7 +66,7 @@ double similarityBound(const AnchoredPoints& a, const AnchoredPoints& b, double 
         const double radius = length(a.position[p]);
         double best = 0.0;
         for (std::size_t q = 0; q < b.count; ++q) {
-            const double gap = radius - radiusB[q];
+            const double gap = leastGap(radius, radiusB[q]);
             best = std::max(best, std::min(a.weight[p], b.weight[q]) * kernel(gap * gap, width));
         }
         sum += best;
@@ -107,8 +109,8 @@ Explanation explainOrdered(const Signature& a, const Signature& b, const ScoreOp
                                best.alignment.reflected);
     for (std::size_t i = 0; i < best.matches.count; ++i) {
         const PairList::Pair& pair = best.matches.pairs[i];
-        result.matches.push_back(
-            {pair.a, pair.b, pair.gain / best.matches.similarity, std::sqrt(pair.squaredDistance)});
+        result.matches.push_back({pair.a, pair.b, pair.gain / best.matches.similarity,
+                                  std::sqrt(pair.squaredDistance) / inCommonUnit(a, b, options)});
     }
     result.unmatchedA = missing(a.points.size(), result.matches, &PointMatch::a);
     result.unmatchedB = missing(b.points.size(), result.matches, &PointMatch::b);
@@ -118,9 +120,11 @@ Explanation explainOrdered(const Signature& a, const Signature& b, const ScoreOp
 }  // namespace
 
 Result<void> validate(const ScoreOptions& options) {
-    if (options.kernelWidth > 0.0 && std::isfinite(options.kernelWidth)) return {};
-    return fail(ErrorCode::kInvalidArgument,
-                "kernel_width is " + std::to_string(options.kernelWidth) + "; it must be above 0");
+    if (options.kernelWidth >= kMinKernelWidth && options.kernelWidth <= kMaxKernelWidth) return {};
+    std::ostringstream message;
+    message << "kernel_width is " << options.kernelWidth << "; it must be " << kMinKernelWidth << " to "
+            << kMaxKernelWidth;
+    return fail(ErrorCode::kInvalidArgument, message.str());
 }
 
 double score(const Signature& a, const Signature& b, const ScoreOptions& options) {
@@ -144,7 +148,12 @@ Explanation explain(const Signature& a, const Signature& b, const ScoreOptions& 
     if (!comesFirst(b, a)) return explainOrdered(a, b, options);
     Explanation result = explainOrdered(b, a, options);
     result.motion = inverse(result.motion);
-    for (PointMatch& match : result.matches) std::swap(match.a, match.b);
+    // Distances so far are in units of b's scale.
+    const double unit = inCommonUnit(b, a, options) / inCommonUnit(a, b, options);
+    for (PointMatch& match : result.matches) {
+        std::swap(match.a, match.b);
+        match.distance *= unit;
+    }
     std::swap(result.unmatchedA, result.unmatchedB);
     return result;
 }

@@ -10,6 +10,9 @@
 
 namespace shapedb {
 
+constexpr double kMinKernelWidth = 1e-6;  ///< below, single-precision positions decide by their rounding
+constexpr double kMaxKernelWidth = 1e6;   ///< far beyond any shape: weights alone count
+
 struct ScoreOptions {
     /// Try mirrored alignments too. False tells left from right.
     bool reflection = true;
@@ -17,11 +20,12 @@ struct ScoreOptions {
     bool keepScale = false;
     /// How far apart two points may lie and still count as the same part, in units of the shapes'
     /// common size: a pair at distance d counts for kernel(d) = (1 - d^2 / (8 width^2))^4 of its
-    /// weight (0 beyond 2.83 widths), close to a Gaussian of this standard deviation. > 0.
-    /// Smaller: stricter.
+    /// weight (0 beyond 2.83 widths), close to a Gaussian of this standard deviation.
+    /// kMinKernelWidth to kMaxKernelWidth. Smaller: stricter.
     double kernelWidth = 0.1;
 };
 
+/// The most a signature with a single point scores against another: see `score`.
 constexpr double kDegenerateCeiling = 0.9;
 
 /// Errors: kInvalidArgument naming the field, its value and its range.
@@ -52,9 +56,11 @@ struct PointMatch {
 
 /// The alignment that achieves the score, and what it lays on what.
 struct Explanation {
-    double score = 0.0;               ///< as `score`
-    double similarity = 0.0;          ///< matched weight, each pair discounted by its distance
-    double dissimilarity = 0.0;       ///< weight of either side that found no match
+    double score = 0.0;  ///< as `score`
+    /// Matched weight, each pair discounted by its distance; in cubes of the common unit: each
+    /// signature's own scale, or with keepScale the larger of the two.
+    double similarity = 0.0;
+    double dissimilarity = 0.0;       ///< weight of either side that found no match; same unit
     Motion motion;                    ///< scan coordinates of b to scan coordinates of a
     std::vector<PointMatch> matches;  ///< by falling share
     std::vector<std::uint32_t> unmatchedA;
