@@ -1,5 +1,6 @@
 #include "core/search/filter.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstddef>
@@ -47,9 +48,27 @@ class FilterParser {
         while (!atEnd() && isBlank(text_[at_])) ++at_;
     }
     tl::unexpected<Error> expected(const std::string& what) const {
-        return fail(ErrorCode::kMalformedFilter, "filter '" + text_ + "', column " + std::to_string(at_ + 1) +
-                                                     ": expected " + what +
+        return fail(ErrorCode::kMalformedFilter, "filter '" + excerpt() + "', column " +
+                                                     std::to_string(at_ + 1) + ": expected " + what +
                                                      "; write for example label=cup, year>=1990, !draft");
+    }
+
+    // The text around the error, fit for one line of an error message: never cut inside a UTF-8
+    // character, control characters as '?'.
+    std::string excerpt() const {
+        constexpr std::size_t kContext = 40;
+        const auto continues = [&](std::size_t i) {
+            return i < text_.size() && (static_cast<unsigned char>(text_[i]) & 0xc0u) == 0x80u;
+        };
+        std::size_t begin = at_ > kContext ? at_ - kContext : 0;
+        std::size_t end = std::min(text_.size(), at_ + kContext);
+        while (begin < at_ && continues(begin)) ++begin;
+        while (end > at_ && continues(end)) --end;
+        std::string shown = text_.substr(begin, end - begin);
+        for (char& c : shown) {
+            if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
+        }
+        return (begin > 0 ? "..." : "") + shown + (end < text_.size() ? "..." : "");
     }
 
     Result<Filter::Term> parseTerm() {

@@ -13,7 +13,8 @@ namespace shapedb {
 /// `!key` (absent), and `key<v`, `key<=v`, `key>v`, `key>=v` (numbers). Blanks around keys,
 /// operators and values are ignored; a value with commas, blanks at its ends or operators is
 /// written in double quotes, with \" and \\ inside. A shape without the key never passes a
-/// comparison, except `!=`. An empty text accepts everything.
+/// comparison, except `!=`. An empty text accepts everything. Keys have no blanks, commas, quotes
+/// or operator characters. docs/filters.md has the grammar.
 ///
 /// Immutable; safe to share between threads.
 class Filter {
@@ -21,7 +22,7 @@ class Filter {
     /// Accepts everything.
     Filter() = default;
 
-    /// Errors: kMalformedFilter with the column (from 1) and what was expected there.
+    /// Errors: kMalformedFilter with the column (bytes, from 1) and what was expected there.
     [[nodiscard]] static Result<Filter> parse(const std::string& text);
 
     [[nodiscard]] bool matches(const std::map<std::string, std::string>& metadata) const;

@@ -43,10 +43,13 @@ SignatureSet SignatureSet::with(std::vector<EntryPtr> updates, std::vector<std::
         next.size_ += block->size();
         next.blocks_.push_back(std::move(block));
     };
-    // Splits what has outgrown a block.
+    // Splits what has outgrown a block, evenly: cutting off only the excess would leave a block of
+    // one entry for each id that arrives late.
     const auto keepSplit = [&keep](const Block& entries) {
-        for (std::size_t begin = 0; begin < entries.size(); begin += kBlockSize) {
-            const std::size_t end = std::min(entries.size(), begin + kBlockSize);
+        const std::size_t parts = (entries.size() + kBlockSize - 1) / kBlockSize;
+        for (std::size_t part = 0; part < parts; ++part) {
+            const std::size_t begin = part * entries.size() / parts;
+            const std::size_t end = (part + 1) * entries.size() / parts;
             keep(std::make_shared<const Block>(entries.begin() + static_cast<std::ptrdiff_t>(begin),
                                                entries.begin() + static_cast<std::ptrdiff_t>(end)));
         }

@@ -33,7 +33,7 @@ class SignatureSet {
 
     /// This set with the entries of `updates` inserted or replaced (by id) and those of
     /// `removedIds` left out (unknown ids are ignored). Neither needs an order; an id must
-    /// not be in both.
+    /// not be in both, nor twice in `updates`. No entry may be null.
     [[nodiscard]] SignatureSet with(std::vector<EntryPtr> updates,
                                     std::vector<std::int64_t> removedIds) const;
 
@@ -43,7 +43,7 @@ class SignatureSet {
     /// Bytes held by the entries, about.
     [[nodiscard]] std::size_t memoryBytes() const;
 
-    /// Entries in blocks of at most kBlockSize by rising id; for scans.
+    /// Entries in blocks of 1 to kBlockSize by rising id; for scans.
     using Block = std::vector<EntryPtr>;
     static constexpr std::size_t kBlockSize = 1024;
     [[nodiscard]] const std::vector<std::shared_ptr<const Block>>& blocks() const { return blocks_; }

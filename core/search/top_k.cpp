@@ -55,13 +55,22 @@ Result<std::vector<Candidate>> boundCandidates(const Signature& query, const Sig
     return all;
 }
 
-// Scores candidates[begin, end) in parallel.
-void scoreChunk(const Signature& query, const std::vector<Candidate>& candidates, std::size_t begin,
-                std::size_t end, const ScoreOptions& options, std::vector<double>& scores) {
+// Scores candidates[begin, end) in parallel. Signatures of many points take milliseconds each, so
+// a stop is looked for before each.
+Result<void> scoreChunk(const Signature& query, const std::vector<Candidate>& candidates, std::size_t begin,
+                        std::size_t end, const ScoreOptions& options, std::vector<double>& scores,
+                        const RunContext& context) {
     scores.resize(end - begin);
+    std::atomic<bool> stop{false};
     tbb::parallel_for(begin, end, [&](std::size_t i) {
+        if (stop.load(std::memory_order_relaxed)) return;
+        if (!context.checkpoint()) {
+            stop = true;
+            return;
+        }
         scores[i - begin] = score(query, (*candidates[i].entry)->signature, options);
     });
+    return context.checkpoint();
 }
 
 Result<SearchResult> searchOrThrow(const Signature& query, const SignatureSet& set,
@@ -78,14 +87,15 @@ Result<SearchResult> searchOrThrow(const Signature& query, const SignatureSet& s
     std::vector<double> scores;
     std::size_t chunk = 32;
     for (std::size_t begin = 0; begin < candidates->size();) {
-        if (auto go = context.checkpoint(); !go) return fail(go.error());
         const bool full = result.hits.size() == options.k;
         const double needed = full ? result.hits.back().score : options.threshold;
         // A candidate whose bound equals the k-th score may still win by its smaller id.
         std::size_t end = begin;
         while (end < candidates->size() && end - begin < chunk && (*candidates)[end].bound >= needed) ++end;
         if (end == begin) break;
-        scoreChunk(query, *candidates, begin, end, options.score, scores);
+        if (auto done = scoreChunk(query, *candidates, begin, end, options.score, scores, context); !done) {
+            return fail(done.error());
+        }
         result.scored += end - begin;
         for (std::size_t i = begin; i < end; ++i) {
             if (scores[i - begin] >= options.threshold) {
