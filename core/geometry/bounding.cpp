@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <exception>
 #include <iterator>
 #include <new>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
@@ -25,9 +26,18 @@ using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 // A box turned by 90 degrees is the same box, so the rotations to search are 1/24 of all: this
 // many starts lie about 12 degrees apart there.
 constexpr int kStarts = 400;
-constexpr std::size_t kDescents = 8;
-constexpr double kFirstStep = 0.1;  // radians, half the distance between starts
-constexpr double kLastStep = 1e-5;  // radians; the diagonal moves by less than this share
+constexpr double kFirstStep = 0.1;     // radians, half the distance between starts
+constexpr double kRefineStep = 0.004;  // radians; basins are told apart here
+constexpr double kLastStep = 1e-5;     // radians; the diagonal moves by less than this share
+constexpr std::size_t kCoarseDescents = 48;
+constexpr std::size_t kFineDescents = 6;
+
+// The function has creases (a face of the box passes from one vertex to another), along which
+// only a few directions lead down: as many random ones fail before the step is halved.
+constexpr int kTriesPerStep = 24;
+
+// Basins are searched on no more than the farthest hull vertices in this many directions.
+constexpr int kCoarseDirections = 1000;
 
 PointCloud hullVertices(const PointCloud& points) {
     std::vector<Kernel::Point_3> copies;
@@ -59,55 +69,88 @@ double squaredDiagonal(const PointCloud& points, const Matrix3& axes) {
     return sum;
 }
 
-// Turns the box by `angle` about its own edge number `edge`.
-Matrix3 turned(const Matrix3& axes, std::size_t edge, double angle) {
-    const std::size_t a = (edge + 1) % 3;
-    const std::size_t b = (edge + 2) % 3;
+Point3 randomDirection(Random& random) {
+    const double z = random.uniform(-1.0, 1.0);
+    const double angle = random.uniform(0.0, 6.283185307179586);
+    const double across = std::sqrt(1.0 - z * z);
+    return {across * std::cos(angle), across * std::sin(angle), z};
+}
+
+// The vertices that lie farthest in directions spread over the sphere.
+PointCloud farthestVertices(const PointCloud& vertices) {
+    if (vertices.size() <= static_cast<std::size_t>(kCoarseDirections)) return vertices;
+    Random random(2);
+    std::vector<std::uint8_t> taken(vertices.size(), 0);
+    for (int i = 0; i < kCoarseDirections; ++i) {
+        const Point3 direction = randomDirection(random);
+        const auto farthest = std::max_element(
+            vertices.begin(), vertices.end(),
+            [&](const Point3& a, const Point3& b) { return dot(a, direction) < dot(b, direction); });
+        taken[static_cast<std::size_t>(farthest - vertices.begin())] = 1;
+    }
+    PointCloud chosen;
+    for (std::size_t i = 0; i < vertices.size(); ++i) {
+        if (taken[i]) chosen.push_back(vertices[i]);
+    }
+    return chosen;
+}
+
+// Turns every row of `axes` by `angle` about the unit vector `about` (Rodrigues).
+Matrix3 turned(const Matrix3& axes, const Point3& about, double angle) {
     const double c = std::cos(angle);
     const double s = std::sin(angle);
-    Matrix3 result = axes;
+    Matrix3 result;
     for (std::size_t i = 0; i < 3; ++i) {
-        result[a][i] = c * axes[a][i] + s * axes[b][i];
-        result[b][i] = c * axes[b][i] - s * axes[a][i];
+        const Point3 row{axes[i][0], axes[i][1], axes[i][2]};
+        const Point3 moved = c * row + s * cross(about, row) + ((1.0 - c) * dot(about, row)) * about;
+        result[i] = {moved.x, moved.y, moved.z};
     }
     return result;
 }
 
-double descend(const PointCloud& points, Matrix3 axes, double value) {
-    for (double step = kFirstStep; step > kLastStep;) {
-        Matrix3 best = axes;
-        double bestValue = value;
-        for (std::size_t edge = 0; edge < 3; ++edge) {
-            for (const double angle : {step, -step}) {
-                const Matrix3 candidate = turned(axes, edge, angle);
-                const double candidateValue = squaredDiagonal(points, candidate);
-                if (candidateValue < bestValue) {
-                    best = candidate;
-                    bestValue = candidateValue;
-                }
+struct Box {
+    double squaredDiagonal = 0.0;
+    Matrix3 axes;
+};
+
+Box descend(const PointCloud& points, Box box, double firstStep, double lastStep, Random& random) {
+    for (double step = firstStep; step > lastStep; step *= 0.5) {
+        for (int failures = 0; failures < kTriesPerStep;) {
+            const Matrix3 candidate = turned(box.axes, randomDirection(random), step);
+            const double value = squaredDiagonal(points, candidate);
+            if (value < box.squaredDiagonal) {
+                box = {value, candidate};
+                failures = 0;
+            } else {
+                ++failures;
             }
         }
-        if (bestValue < value) {
-            axes = best;
-            value = bestValue;
-        } else {
-            step *= 0.5;
-        }
     }
-    return value;
+    return box;
 }
 
-double leastSquaredDiagonal(const PointCloud& points) {
+void sortBySize(std::vector<Box>& boxes) {
+    std::sort(boxes.begin(), boxes.end(),
+              [](const Box& a, const Box& b) { return a.squaredDiagonal < b.squaredDiagonal; });
+}
+
+double leastSquaredDiagonal(const PointCloud& vertices) {
+    const PointCloud outline = farthestVertices(vertices);
     Random random(1);
-    std::vector<std::pair<double, Matrix3>> starts;
-    for (int i = 0; i < kStarts; ++i) {
-        const Matrix3 axes = randomRotation(random);
-        starts.emplace_back(squaredDiagonal(points, axes), axes);
+    std::vector<Box> boxes(kStarts);
+    for (Box& box : boxes) {
+        box.axes = randomRotation(random);
+        box.squaredDiagonal = squaredDiagonal(outline, box.axes);
     }
-    std::sort(starts.begin(), starts.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-    double least = starts.front().first;
-    for (std::size_t i = 0; i < kDescents; ++i) {
-        least = std::min(least, descend(points, starts[i].second, starts[i].first));
+    sortBySize(boxes);
+    boxes.resize(kCoarseDescents);
+    for (Box& box : boxes) box = descend(outline, box, kFirstStep, kRefineStep, random);
+    sortBySize(boxes);
+    boxes.resize(kFineDescents);
+    double least = INFINITY;
+    for (Box& box : boxes) {
+        box.squaredDiagonal = squaredDiagonal(vertices, box.axes);
+        least = std::min(least, descend(vertices, box, kRefineStep, kLastStep, random).squaredDiagonal);
     }
     return least;
 }

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <new>
+#include <string>
 #include <utility>
 
 #include "core/geometry/sanitise.h"
@@ -12,6 +14,8 @@ namespace {
 
 // Finest grid: 2^20 cells along the unit cube's edge of 2, three indices in one 64-bit key.
 constexpr double kMinCell = 2.0 / (1 << 20);
+// Coarsest: one cell holds everything, the far corner (1, 1, 1) too.
+constexpr double kMaxCell = 2.5;
 constexpr int kMaxSteps = 24;
 constexpr double kAcceptedShare = 0.9;
 
@@ -55,19 +59,15 @@ DecimatedPoints averageCells(const PointCloud& points, const std::vector<Keyed>&
     return {std::move(merged.points), std::move(cellOfPoint), cell};
 }
 
-}  // namespace
-
-Result<DecimatedPoints> decimate(const PointCloud& points, std::size_t target, const RunContext& context) {
-    if (target < 4) {
-        return fail(ErrorCode::kInvalidArgument, "the target of the decimation must be at least 4 points");
-    }
+Result<DecimatedPoints> decimateOrThrow(const PointCloud& points, std::size_t target,
+                                        const RunContext& context) {
     if (points.size() <= target) {
         MergedPoints merged = mergeDuplicates(points);
         return DecimatedPoints{std::move(merged.points), std::move(merged.siteOfPoint), 0.0};
     }
     // `fine` gives too many cells, `coarse` few enough.
     double fine = kMinCell;
-    double coarse = 2.0;
+    double coarse = kMaxCell;
     double cell = std::clamp(2.0 / std::sqrt(static_cast<double>(target)), fine, coarse);
     std::vector<Keyed> best;
     double bestCell = coarse;
@@ -90,6 +90,20 @@ Result<DecimatedPoints> decimate(const PointCloud& points, std::size_t target, c
     }
     if (best.empty()) best = sortedByCell(points, bestCell);
     return averageCells(points, best, bestCell);
+}
+
+}  // namespace
+
+Result<DecimatedPoints> decimate(const PointCloud& points, std::size_t target, const RunContext& context) {
+    if (target < 4) {
+        return fail(ErrorCode::kInvalidArgument, "the target of the decimation must be at least 4 points");
+    }
+    try {
+        return decimateOrThrow(points, target, context);
+    } catch (const std::bad_alloc&) {
+        return fail(ErrorCode::kOutOfMemory,
+                    "not enough memory to decimate " + std::to_string(points.size()) + " points");
+    }
 }
 
 }  // namespace shapedb

@@ -23,7 +23,7 @@ struct DecimatedPoints {
 /// few secant steps: a surface's cells grow with the inverse square of the size.
 ///
 /// Precondition: finite coordinates with magnitude at most 1 (as sanitise returns them).
-/// Errors: kInvalidArgument when target < 4; kCancelled, kDeadlineExceeded.
+/// Errors: kInvalidArgument when target < 4; kCancelled, kDeadlineExceeded; kOutOfMemory.
 [[nodiscard]] Result<DecimatedPoints> decimate(const PointCloud& points, std::size_t target,
                                                const RunContext& context = {});
 

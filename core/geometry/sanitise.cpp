@@ -86,6 +86,13 @@ Result<void> checkSpansSpace(const PointCloud& points) {
     return {};
 }
 
+// The nearest multiple of kGrid. Adding zero turns -0.0 into 0.0, so that equal points have
+// equal bytes.
+Point3 onGrid(const Point3& p) {
+    const auto round = [](double v) { return kGrid * std::nearbyint(v / kGrid) + 0.0; };
+    return {round(p.x), round(p.y), round(p.z)};
+}
+
 Result<SanitisedPoints> sanitiseChecked(const PointCloud& scan) {
     const Box box = axisAlignedBox(scan);
     const Point3 half = 0.5 * box.high - 0.5 * box.low;
@@ -105,8 +112,7 @@ Result<SanitisedPoints> sanitiseChecked(const PointCloud& scan) {
     const double inverse = 1.0 / result.frame.unit;  // exact: a power of two
     PointCloud scaled(scan.size());
     for (std::size_t i = 0; i < scan.size(); ++i) {
-        // Adding zero turns -0.0 into 0.0, so that equal points have equal bytes.
-        scaled[i] = inverse * (scan[i] - result.frame.centre) + Point3{};
+        scaled[i] = onGrid(inverse * (scan[i] - result.frame.centre));
     }
     MergedPoints merged = mergeDuplicates(scaled);
     result.duplicates = scan.size() - merged.points.size();

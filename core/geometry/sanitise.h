@@ -17,6 +17,11 @@ constexpr double kMinHalfExtent = 1.2e-38;
 /// Points closer to a common line or plane than this share of the half extent span no volume.
 constexpr double kFlatnessTolerance = 1e-6;
 
+/// Coordinates in the unit frame are multiples of this: the last digit of a double near 1. So
+/// differences of points are exact, and no product of a few of them leaves the range of a double,
+/// however close to each other or to a common plane points lie.
+constexpr double kGrid = 0x1p-52;
+
 /// Where the unit frame lies in the scan: scan = centre + unit * p. The unit is a power of
 /// two, so scaling a scan by one changes no digit of what follows.
 struct Frame {
@@ -27,11 +32,11 @@ struct Frame {
 };
 
 struct SanitisedPoints {
-    /// Distinct points in the unit frame (|coordinate| <= 1), in lexicographic order: the
-    /// order of the input leaves no trace in anything computed from them.
+    /// Distinct points in the unit frame (|coordinate| <= 1, multiples of kGrid), in
+    /// lexicographic order: the order of the input leaves no trace in anything computed from them.
     PointCloud points;
     std::vector<std::uint32_t> siteOfPoint;  ///< input point -> index into `points`
-    std::uint64_t duplicates = 0;            ///< input points that repeated another
+    std::uint64_t duplicates = 0;            ///< input points that repeated another (within kGrid)
     Frame frame;
 };
 

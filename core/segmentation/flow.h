@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/base/error.h"
+#include "core/base/run_context.h"
 #include "core/geometry/point.h"
 #include "core/segmentation/delaunay.h"
 
@@ -14,7 +16,11 @@ namespace shapedb {
 /// is a maximum: the circumcentre lies in its own tetrahedron. Exact: what double precision
 /// cannot decide is decided with rational numbers, so the flow has no cycles. Only tetrahedra
 /// with `wanted` set are computed, the others get 0.
-[[nodiscard]] std::vector<std::uint8_t> flowMasks(const PointCloud& points, const Tetrahedra& tetrahedra,
-                                                  const std::vector<std::uint8_t>& wanted);
+///
+/// Precondition: coordinates as sanitise returns them. Errors: kCancelled, kDeadlineExceeded.
+[[nodiscard]] Result<std::vector<std::uint8_t>> flowMasks(const PointCloud& points,
+                                                          const Tetrahedra& tetrahedra,
+                                                          const std::vector<std::uint8_t>& wanted,
+                                                          const RunContext& context = {});
 
 }  // namespace shapedb

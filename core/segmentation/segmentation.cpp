@@ -191,9 +191,10 @@ Result<SegmentLabels> findSegments(const PointCloud& sites, const SegmentationOp
     const auto interior = interiorTetrahedra(sites, tetrahedra, big, options, context);
     if (!interior) return fail(interior.error());
     if (auto go = clock.begin("flow"); !go) return fail(go.error());
-    const std::vector<std::uint8_t> flow = flowMasks(sites, tetrahedra, *interior);
+    const auto flow = flowMasks(sites, tetrahedra, *interior, context);
+    if (!flow) return fail(flow.error());
     if (auto go = clock.begin("segments"); !go) return fail(go.error());
-    const auto fine = stableManifolds(tetrahedra, *interior, flow, context);
+    const auto fine = stableManifolds(tetrahedra, *interior, *flow, context);
     if (!fine) return fail(fine.error());
     result.maxima = fine->peaks.size();
     if (auto go = clock.begin("merge"); !go) return fail(go.error());

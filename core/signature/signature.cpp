@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
+#include <limits>
+#include <new>
 #include <string>
 
 #include <Eigen/Eigenvalues>
@@ -50,8 +51,9 @@ std::array<double, 3> pointExtents(const Signature& signature, std::size_t i) {
     return extents;
 }
 
-Result<Signature> makeSignature(const Segmentation& segmentation, const SignatureOptions& options) {
-    if (auto valid = validate(options); !valid) return fail(valid.error());
+namespace {
+
+Result<Signature> makeSignatureOrThrow(const Segmentation& segmentation, const SignatureOptions& options) {
     if (segmentation.segments.empty() || !(segmentation.size > 0.0)) {
         return fail(ErrorCode::kNoInterior, "the shape has no segments to describe");
     }
@@ -69,7 +71,9 @@ Result<Signature> makeSignature(const Segmentation& segmentation, const Signatur
                           static_cast<float>(position.z)};
         point.weight = static_cast<float>(segment.volume * inverse * inverse * inverse);
         point.volumeShare = static_cast<float>(segment.volume / segmentation.volume);
-        point.peakRadius = static_cast<float>(segment.peakRadius * inverse);
+        // A segment without a maximum may peak in a flat tetrahedron, of any circumradius.
+        point.peakRadius = static_cast<float>(
+            std::min<double>(segment.peakRadius * inverse, std::numeric_limits<float>::max()));
         for (std::size_t m = 0; m < 6; ++m) {
             point.covariance[m] = static_cast<float>(segment.covariance[m] * inverse * inverse);
         }
@@ -82,6 +86,17 @@ Result<Signature> makeSignature(const Segmentation& segmentation, const Signatur
                     "the interior is too small against the size of the scan to describe");
     }
     return signature;
+}
+
+}  // namespace
+
+Result<Signature> makeSignature(const Segmentation& segmentation, const SignatureOptions& options) {
+    if (auto valid = validate(options); !valid) return fail(valid.error());
+    try {
+        return makeSignatureOrThrow(segmentation, options);
+    } catch (const std::bad_alloc&) {
+        return fail(ErrorCode::kOutOfMemory, "not enough memory for a signature");
+    }
 }
 
 }  // namespace shapedb

@@ -52,7 +52,8 @@ struct Signature {
 /// Scan units: standard deviations of the segment's matter along its principal axes, falling.
 [[nodiscard]] std::array<double, 3> pointExtents(const Signature& signature, std::size_t i);
 
-/// Errors: kInvalidArgument (options), kOutOfMemory.
+/// Errors: kInvalidArgument (options); kNoInterior (no segment heavy enough for single precision);
+/// kOutOfMemory.
 [[nodiscard]] Result<Signature> makeSignature(const Segmentation& segmentation,
                                               const SignatureOptions& options);
 

@@ -10,7 +10,7 @@
 
 namespace shapedb {
 
-/// Little-endian on every machine; at most 64 + 48 * kMaxSignaturePoints bytes.
+/// Little-endian on every machine; 56 + 48 bytes a point.
 [[nodiscard]] std::string encodeSignature(const Signature& signature);
 
 /// The exact inverse. Errors: kMalformedSignature (too short or long, wrong magic, unknown
