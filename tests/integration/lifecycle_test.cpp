@@ -1,0 +1,305 @@
+// Ends and beginnings: drain, kill, restart, a full queue, a scan that kills the server.
+#include <atomic>
+#include <future>
+#include <mutex>
+#include <thread>
+
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include "tests/integration/support/client.h"
+#include "tests/integration/support/server_process.h"
+
+namespace shapedb::testing {
+namespace {
+
+using grpc::StatusCode;
+
+class Lifecycle : public ::testing::Test {
+  protected:
+    void start(const std::vector<std::string>& arguments = {}) {
+        client.reset();
+        server.reset();
+        server = std::make_unique<ServerProcess>(directory.path(), arguments);
+        client = std::make_unique<Client>(server->address());
+    }
+
+    /// Adds without waiting; true when it was acknowledged.
+    bool add(const std::string& key, const Scan& scan) {
+        return addShape(*client, headerFor("", key, scan), scan).ok();
+    }
+
+    pb::ShapeState stateOf(const std::string& key) { return getShape(*client, "", key).value.state(); }
+
+    /// True when a worker is inside the segmentation of this shape.
+    bool beingSegmented(const std::string& key) {
+        pb::WatchIngestRequest request;
+        request.mutable_shape()->set_key(key);
+        CallContext context;
+        const auto reader = client->shapes->WatchIngest(&context, request);
+        pb::IngestEvent event;
+        const bool running =
+            reader->Read(&event) && event.state() == pb::SHAPE_STATE_PENDING && event.stage() != "queued";
+        context.get().TryCancel();
+        (void)reader->Finish();
+        return running;
+    }
+
+    TemporaryDirectory directory;
+    std::unique_ptr<ServerProcess> server;
+    std::unique_ptr<Client> client;
+};
+
+TEST_F(Lifecycle, RestartFindsEverythingAgain) {
+    start();
+    ASSERT_TRUE(createCollection(*client, "kept").ok());
+    ASSERT_TRUE(addAndWait(*client, "kept", "k", dumbbell(), {{"label", "d"}}).ok());
+    const auto before = searchByScan(*client, searchOptions("kept"), dumbbell(2));
+    server->signal(SIGTERM);
+    EXPECT_EQ(server->wait(), 0);
+    start();
+    const auto after = searchByScan(*client, searchOptions("kept"), dumbbell(2));
+    ASSERT_TRUE(after.ok()) << after;
+    ASSERT_EQ(after.value.hits_size(), 1);
+    EXPECT_EQ(after.value.hits(0).score(), before.value.hits(0).score());
+    EXPECT_EQ(after.value.hits(0).shape().metadata().at("label"), "d");
+}
+
+TEST_F(Lifecycle, TerminationPutsJobsBackAndTheRestartDoesThem) {
+    start({"--ingest-threads", "1", "--shutdown-drain-seconds", "1"});
+    for (int i = 0; i < 3; ++i) {
+        const Scan slow = slowScan(static_cast<std::uint64_t>(i));
+        ASSERT_TRUE(add(std::to_string(i), slow));
+    }
+    ASSERT_TRUE(eventually([&] { return beingSegmented("0"); }));
+    const auto began = std::chrono::steady_clock::now();
+    server->signal(SIGTERM);
+    EXPECT_EQ(server->wait(), 0) << server->log();
+    EXPECT_LT(std::chrono::steady_clock::now() - began, std::chrono::seconds(4));
+    // Three drains: a job that is put back has not used up an attempt.
+    for (int i = 0; i < 2; ++i) {
+        start({"--ingest-threads", "1", "--shutdown-drain-seconds", "0"});
+        ASSERT_TRUE(eventually(
+            [&] { return statsOf(*client).running_jobs() > 0 || statsOf(*client).shapes_pending() == 0; }));
+        server->signal(SIGTERM);
+        EXPECT_EQ(server->wait(), 0) << server->log();
+    }
+    start();
+    EXPECT_TRUE(eventually([&] { return statsOf(*client).shapes_ready() == 3; }));
+}
+
+TEST_F(Lifecycle, RunningCallsMayFinishWhileDraining) {
+    start({"--shutdown-drain-seconds", "20"});
+    const Scan slow = slowScan(3, 60'000);
+    pb::AddShapeHeader header = headerFor("", "k", slow);
+    header.set_wait(true);
+    auto waiting = std::async(std::launch::async, [&] { return addShape(*client, header, slow); });
+    ASSERT_TRUE(eventually([&] { return getShape(*client, "", "k").ok(); }));
+    server->signal(SIGTERM);
+    const auto reply = waiting.get();
+    EXPECT_TRUE(reply.ok()) << reply;
+    EXPECT_EQ(reply.value.shape().state(), pb::SHAPE_STATE_READY);
+    EXPECT_EQ(server->wait(), 0);
+}
+
+TEST_F(Lifecycle, NewCallsAreRefusedWhileDraining) {
+    start({"--shutdown-drain-seconds", "20"});
+    CallContext context;
+    pb::AddShapeResponse response;
+    const auto upload = client->shapes->AddShape(&context, &response);  // keeps the drain waiting
+    pb::AddShapeRequest message;
+    *message.mutable_header() = headerFor("", "k", dumbbell());
+    ASSERT_TRUE(upload->Write(message));
+    ASSERT_TRUE(eventually([&] { return statsOf(*client).collections() == 1; }));
+    server->signal(SIGTERM);
+    EXPECT_TRUE(eventually([&] { return getShape(*client, "", "k").error == "unavailable"; }));
+    for (const std::string& chunk : chunksOf(dumbbell())) {
+        message.mutable_chunk()->set_xyz(chunk);
+        EXPECT_TRUE(upload->Write(message));
+    }
+    upload->WritesDone();
+    EXPECT_TRUE(upload->Finish().ok()) << "a call that was running may finish";
+    EXPECT_EQ(server->wait(), 0);
+    start();
+    EXPECT_TRUE(eventually([&] { return stateOf("k") == pb::SHAPE_STATE_READY; }));
+}
+
+TEST_F(Lifecycle, FollowersAreSentAwayAtTheDrain) {
+    start({"--ingest-threads", "1", "--shutdown-drain-seconds", "20"});
+    ASSERT_TRUE(add("k", slowScan(4, 190'000)));
+    pb::WatchIngestRequest request;
+    request.mutable_shape()->set_key("k");
+    CallContext context;
+    const auto reader = client->shapes->WatchIngest(&context, request);
+    pb::IngestEvent event;
+    ASSERT_TRUE(reader->Read(&event));
+    server->signal(SIGTERM);
+    const auto rest = testing::drain(context, *reader);
+    EXPECT_EQ(rest.status.error_code(), StatusCode::UNAVAILABLE) << rest;
+    EXPECT_EQ(server->wait(std::chrono::seconds(5)), 0);
+}
+
+TEST_F(Lifecycle, SecondSignalEndsAtOnce) {
+    start({"--shutdown-drain-seconds", "60"});
+    CallContext context;
+    pb::AddShapeResponse response;
+    const auto upload = client->shapes->AddShape(&context, &response);
+    pb::AddShapeRequest message;
+    *message.mutable_header() = headerFor("", "k", dumbbell());
+    ASSERT_TRUE(upload->Write(message));
+    ASSERT_TRUE(eventually([&] { return statsOf(*client).collections() == 1; }));
+    server->signal(SIGTERM);
+    EXPECT_TRUE(eventually([&] { return getShape(*client, "", "k").error == "unavailable"; }));
+    server->signal(SIGTERM);
+    EXPECT_EQ(server->wait(std::chrono::seconds(5)), 130);
+    context.get().TryCancel();
+    (void)upload->Finish();
+}
+
+// The promise: acknowledged means durable.
+TEST_F(Lifecycle, KillInMidIngestLosesNothingAcknowledged) {
+    start({"--ingest-threads", "2"});
+    std::vector<std::string> acknowledged;
+    std::mutex mutex;
+    std::vector<std::thread> uploads;
+    std::atomic<bool> stop{false};
+    for (int t = 0; t < 4; ++t) {
+        uploads.emplace_back([&, t] {
+            Client own(server->address());
+            for (int i = 0; !stop; ++i) {
+                const Scan scan = dumbbell(static_cast<std::uint64_t>(1'000 * t + i), 1'200);
+                const std::string key = std::to_string(t) + "/" + std::to_string(i);
+                const auto reply = addShape(own, headerFor("", key, scan), scan, std::chrono::seconds(5));
+                if (!reply.ok()) return;
+                const std::lock_guard<std::mutex> lock(mutex);
+                acknowledged.push_back(key);
+            }
+        });
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(700));
+    server->kill();
+    stop = true;
+    for (std::thread& upload : uploads) upload.join();
+    ASSERT_GT(acknowledged.size(), 4u);
+
+    start();
+    for (const std::string& key : acknowledged) EXPECT_TRUE(getShape(*client, "", key).ok()) << key;
+    EXPECT_TRUE(eventually([&] { return statsOf(*client).shapes_pending() == 0; }));
+    for (const pb::Shape& shape : listAll(*client, "")) {
+        EXPECT_EQ(shape.state(), pb::SHAPE_STATE_READY) << shape.ShortDebugString();
+    }
+    CallContext context;
+    const auto reader = client->admin->Check(&context, pb::CheckRequest());
+    const auto checked = testing::drain(context, *reader);
+    ASSERT_TRUE(checked.ok()) << checked;
+    EXPECT_TRUE(checked.messages.back().problems().empty()) << checked.messages.back().ShortDebugString();
+}
+
+// To the server it is the scan that killed it: it died twice while that one was segmented.
+TEST_F(Lifecycle, ScanThatKillsTheServerTwiceIsSetAside) {
+    const std::vector<std::string> oneWorker = {"--ingest-threads", "1", "--limits-max-points", "1000000"};
+    start(oneWorker);
+    ASSERT_TRUE(add("poison", slowScan(5, 400'000)));
+    ASSERT_TRUE(add("innocent", dumbbell()));
+    for (int death = 0; death < 2; ++death) {
+        ASSERT_TRUE(eventually([&] { return beingSegmented("poison"); })) << death;
+        EXPECT_EQ(stateOf("innocent"), pb::SHAPE_STATE_PENDING);
+        server->kill();
+        start(oneWorker);
+    }
+    const auto poison = getShape(*client, "", "poison");
+    EXPECT_EQ(poison.value.state(), pb::SHAPE_STATE_FAILED);
+    EXPECT_NE(poison.value.failure().message().find("2 times"), std::string::npos)
+        << poison.value.ShortDebugString();
+    EXPECT_TRUE(eventually([&] { return stateOf("innocent") == pb::SHAPE_STATE_READY; }))
+        << "everything else serves";
+    // Other points under the same key are a new chance.
+    const auto replaced = addAndWait(*client, "", "poison", dumbbell(2));
+    EXPECT_EQ(replaced.value.shape().state(), pb::SHAPE_STATE_READY) << replaced;
+}
+
+TEST_F(Lifecycle, FullQueueRefusesWithAHint) {
+    start({"--ingest-threads", "1", "--ingest-max-queued-jobs", "2"});
+    // Beyond the limit of bytes nothing is tested here: the store counts both the same way.
+    ASSERT_TRUE(add("0", slowScan(6)));
+    ASSERT_TRUE(add("1", slowScan(7)));
+    const auto refused = addShape(*client, headerFor("", "2", dumbbell()), dumbbell());
+    EXPECT_EQ(refused.status.error_code(), StatusCode::RESOURCE_EXHAUSTED) << refused;
+    EXPECT_EQ(refused.error, "queue_full");
+    ASSERT_FALSE(refused.retryAfter.empty());
+    EXPECT_GE(std::stoi(refused.retryAfter), 100);
+    EXPECT_LE(std::stoi(refused.retryAfter), 60'000);
+    EXPECT_EQ(getShape(*client, "", "2").error, "not_found") << "nothing is stored";
+    EXPECT_TRUE(eventually([&] { return add("2", dumbbell()); })) << "later there is room";
+}
+
+TEST_F(Lifecycle, FullQueueCountsBytesToo) {
+    start({"--ingest-threads", "1", "--ingest-max-queued-bytes", "2MiB", "--limits-max-points", "170000"});
+    ASSERT_TRUE(add("0", slowScan(8, 160'000)));
+    const Scan scan = slowScan(9, 30'000);
+    EXPECT_EQ(addShape(*client, headerFor("", "1", scan), scan).error, "queue_full");
+    EXPECT_TRUE(add("2", dumbbell()));
+}
+
+TEST_F(Lifecycle, UploadsTogetherStayInTheirMemory) {
+    start({"--limits-max-upload-bytes", "1MiB", "--limits-max-points", "80000"});
+    const Scan scan = slowScan(10, 80'000);
+    const auto chunks = chunksOf(scan, 60'000);
+    CallContext context;
+    pb::AddShapeResponse response;
+    const auto upload = client->shapes->AddShape(&context, &response);
+    pb::AddShapeRequest message;
+    *message.mutable_header() = headerFor("", "first", scan);
+    ASSERT_TRUE(upload->Write(message));
+    message.mutable_chunk()->set_xyz(chunks[0]);
+    ASSERT_TRUE(upload->Write(message));
+    Outcome refused;
+    ASSERT_TRUE(eventually([&] {
+        refused = addShape(*client, headerFor("", "second", scan), scan);
+        return refused.error == "queue_full";
+    }));
+    EXPECT_EQ(refused.status.error_code(), StatusCode::RESOURCE_EXHAUSTED) << refused;
+    EXPECT_FALSE(refused.retryAfter.empty());
+    message.mutable_chunk()->set_xyz(chunks[1]);
+    EXPECT_TRUE(upload->Write(message));
+    upload->WritesDone();
+    EXPECT_TRUE(upload->Finish().ok());
+    EXPECT_TRUE(add("second", scan)) << "the memory is given back";
+}
+
+TEST_F(Lifecycle, RestartGoesOnWithARebuild) {
+    start();
+    for (int i = 0; i < 6; ++i) {
+        ASSERT_TRUE(
+            addAndWait(*client, "", std::to_string(i), slowScan(static_cast<std::uint64_t>(i), 25'000)).ok());
+    }
+    pb::RebuildRequest request;
+    request.set_collection("default");
+    request.mutable_signature()->set_max_points(3);
+    {
+        CallContext context;
+        const auto reader = client->admin->Rebuild(&context, request);
+        pb::RebuildProgress progress;
+        while (reader->Read(&progress) && progress.done() == 0) {
+        }
+        ASSERT_GT(progress.done(), 0u);
+        ASSERT_FALSE(progress.finished()) << "too quick to be interrupted";
+        server->kill();
+        (void)reader->Finish();
+    }
+    start();
+    CallContext context;
+    const auto reader = client->admin->Rebuild(&context, request);
+    const auto followed = testing::drain(context, *reader);
+    ASSERT_TRUE(followed.ok()) << followed;
+    EXPECT_GT(followed.messages.front().done(), 0u) << "what was done before the kill stays done";
+    pb::GetCollectionRequest get;
+    get.set_name("default");
+    const auto now = unary(*client->collections, &pb::CollectionService::Stub::GetCollection, get);
+    EXPECT_EQ(now.value.generation(), 2);
+    EXPECT_EQ(now.value.signature().max_points(), 3u);
+    EXPECT_EQ(now.value.shapes_ready(), 6u);
+}
+
+}  // namespace
+}  // namespace shapedb::testing
