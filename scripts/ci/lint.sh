@@ -1,0 +1,36 @@
+#!/usr/bin/env bash
+# What can be checked without compiling: format, layers, wiring of tests, file sizes.
+set -uo pipefail
+cd "$(dirname "$0")/../.."
+failed=0
+complain() { echo "lint: $1" >&2; failed=1; }
+
+sources() { git ls-files -- '*.h' '*.cpp'; }
+
+unformatted=$(sources | xargs -r clang-format-14 --dry-run -Werror 2>&1 | grep -oE '^[^:]+' | sort -u | grep -E '\.(h|cpp)$')
+[ -z "$unformatted" ] || complain "not formatted (clang-format-14 -i): $(echo $unformatted)"
+
+# core/ is the science: no transport, storage, logging or files.
+leaks=$(git grep -nE '#include [<"](grpc|google/protobuf|shapedb/v1|sqlite3|spdlog|fstream|filesystem|server/|client/)' -- core)
+[ -z "$leaks" ] || complain "core/ includes what it must not know:"$'\n'"$leaks"
+leaks=$(git grep -n 'sqlite3\.h' -- server client tests ':!server/store' ':!tests/server/store')
+[ -z "$leaks" ] || complain "sqlite3.h outside server/store/:"$'\n'"$leaks"
+leaks=$(git grep -nE '#include [<"]CGAL' -- 'core/**/*.h')
+[ -z "$leaks" ] || complain "CGAL in a public header:"$'\n'"$leaks"
+leaks=$(git grep -nE '#include [<"](grpc|google/protobuf|shapedb/v1)' -- 'client/api/*.h' | grep -v internal)
+[ -z "$leaks" ] || complain "gRPC or protobuf in a public client header:"$'\n'"$leaks"
+
+# A folder of tests is built from all its *_test.cpp, so it only has to be added itself.
+for folder in $(git ls-files -- 'tests/*_test.cpp' | xargs -rn1 dirname | sort -u); do
+  grep -qs shapedb_test "$folder/CMakeLists.txt" || complain "$folder has tests but no shapedb_test() in a CMakeLists.txt"
+  grep -qs "add_subdirectory($(basename "$folder"))" "$(dirname "$folder")/CMakeLists.txt" ||
+    complain "$folder is not added by $(dirname "$folder")/CMakeLists.txt"
+done
+
+long=$(sources | xargs -r wc -l | awk '$2 != "total" && $1 > 800 { print $2 " (" $1 " lines)" }')
+[ -z "$long" ] || complain "longer than 800 lines: $long"
+unfinished=$(git grep -nE 'TODO|FIXME|\bXXX\b|DISABLED_' -- '*.cpp' '*.h')
+[ -z "$unfinished" ] || complain "unfinished:"$'\n'"$unfinished"
+
+[ "$failed" -eq 0 ] && echo "lint: clean"
+exit "$failed"

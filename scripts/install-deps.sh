@@ -1,0 +1,38 @@
+#!/usr/bin/env bash
+# Installs the Debian 12 packages that ShapeDB needs, and only those that are missing.
+#   scripts/install-deps.sh             everything to build, test and check
+#   scripts/install-deps.sh --runtime   only what the built programs load
+set -euo pipefail
+
+build_packages=(
+  ca-certificates g++ cmake ninja-build ccache mold pkg-config git
+  libcgal-dev libgmp-dev libmpfr-dev libeigen3-dev libtbb-dev libexpected-dev
+  libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc
+  libsqlite3-dev libzstd-dev libssl-dev libspdlog-dev libtomlplusplus-dev
+  libcli11-dev nlohmann-json3-dev libpng-dev liblzf-dev
+  libgtest-dev libgmock-dev clang-format-14
+)
+runtime_packages=(
+  ca-certificates libgmpxx4ldbl libmpfr6 libtbb12 libgrpc++1.51 libprotobuf32 libsqlite3-0
+  libzstd1 libssl3 libspdlog1.10 libpng16-16 liblzf1
+)
+
+packages=("${build_packages[@]}")
+[ "${1:-}" = "--runtime" ] && packages=("${runtime_packages[@]}")
+
+missing=()
+for package in "${packages[@]}"; do
+  if [ "$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null || true)" != installed ]; then
+    missing+=("$package")
+  fi
+done
+[ ${#missing[@]} -eq 0 ] && exit 0
+
+as_root=()
+if [ "$(id -u)" -ne 0 ]; then
+  command -v sudo >/dev/null || { echo "install-deps: run as root or install sudo; missing: ${missing[*]}" >&2; exit 1; }
+  as_root=(sudo)
+fi
+echo "installing ${#missing[@]} packages: ${missing[*]}" >&2
+"${as_root[@]}" apt-get update -q >&2
+"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends "${missing[@]}" >&2
