@@ -15,6 +15,11 @@ target_include_directories(shapedb_options INTERFACE ${PROJECT_SOURCE_DIR})
 target_compile_features(shapedb_options INTERFACE cxx_std_17)
 target_compile_options(shapedb_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
                                                  -Woverloaded-virtual -Wno-psabi)
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
+  # g++ 12.2's vectoriser of straight-line code drops the rounding of double -> float -> double
+  # in loops over structs of three doubles: points would not be what the wire carries.
+  target_compile_options(shapedb_options INTERFACE -fno-tree-slp-vectorize)
+endif()
 if(SHAPEDB_WARNINGS_AS_ERRORS)
   target_compile_options(shapedb_options INTERFACE -Werror)
 endif()
