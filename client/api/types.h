@@ -43,7 +43,7 @@ struct Parameters {
     std::optional<double> hullAngleDegrees;   ///< degrees, in (0, 90)
     std::optional<double> mergeRatio;         ///< >= 1
     std::optional<std::uint32_t> decimateTo;  ///< grid cells; 0: never average
-    std::optional<std::uint32_t> maxPoints;   ///< heaviest segments kept, 1 to 32
+    std::optional<std::uint32_t> maxPoints;   ///< heaviest segments kept, 1 to 16
 };
 
 /// Names one shape. An empty collection is "default".

@@ -63,7 +63,7 @@ void addParameterFlags(CLI::App& command, ParameterFlags& flags) {
     group->add_option("--decimate-to", flags.decimateTo,
                       "Average denser scans onto a grid of about this many cells; 0: never");
     group->add_option("--max-points,--segments", flags.maxPoints,
-                      "Heaviest segments kept in the signature, 1 to 32 [7]");
+                      "Heaviest segments kept in the signature, 1 to 16 [7]");
 }
 
 ScoreOptions ScoreFlags::resolve() const {
