@@ -128,6 +128,7 @@ Result<void> validate(const ScoreOptions& options) {
 }
 
 double score(const Signature& a, const Signature& b, const ScoreOptions& options) {
+    if (identical(a, b, options)) return 1.0;
     if (comesFirst(b, a)) return score(b, a, options);
     const Scaled scaled = inCommonScale(a, b, options);
     return finalScore(bestAlignment(scaled.a, scaled.b, options).matches.similarity, scaled, a, b, options);

@@ -1,0 +1,47 @@
+// Random signatures of every awkward kind, for the tests of matching and search.
+#pragma once
+
+#include <string>
+
+#include "core/base/random.h"
+#include "core/geometry/motion.h"
+#include "core/signature/signature.h"
+
+namespace shapedb::testing_support {
+
+/// What is special about a random signature.
+enum class Kind {
+    kPlain,        ///< positions in a ball, weights over two decades
+    kNearTies,     ///< weights equal up to a few units in the last place, points in clusters
+    kEqualWeight,  ///< all weights the same
+    kCollinear,    ///< all points on a line through the anchor
+    kCoplanar,     ///< all points in a plane through the anchor
+    kCoincident,   ///< points exactly on each other
+    kAtAnchor,     ///< points on the anchor, or 1e-7 from it: too near for a direction
+    kTinyWeight,   ///< weights down to 1e-30
+    kLattice,      ///< positions on a coarse grid: many equal distances
+};
+constexpr int kKindCount = 9;
+
+/// 1 to `maxPoints` points by falling weight, anchor first at (0, 0, 0).
+Signature randomSignature(Random& random, Kind kind, std::size_t maxPoints);
+/// Of a random kind.
+Signature randomSignature(Random& random, std::size_t maxPoints = 8);
+
+/// The same shape with every point moved a little (standard deviation `noise` per coordinate)
+/// and every weight changed by about as large a share.
+Signature disturbed(Signature signature, Random& random, double noise);
+
+/// Every position through a rotation (or reflection), as another pose of the scan would give.
+Signature turned(Signature signature, const Matrix3& rotation);
+
+/// A random orthonormal matrix of determinant -1.
+Matrix3 randomReflection(Random& random);
+
+/// From literal numbers; `rows` are x, y, z, weight.
+Signature signatureOf(const std::vector<std::array<double, 4>>& rows);
+
+/// The scored numbers, to find a failing pair again.
+std::string describeSignature(const Signature& signature);
+
+}  // namespace shapedb::testing_support
