@@ -1,0 +1,96 @@
+// The whole road once: noisy scans in random poses to signatures to the nearest of them.
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "core/search/top_k.h"
+#include "core/signature/profile.h"
+#include "core/synthetic/families.h"
+
+namespace shapedb {
+namespace {
+
+constexpr std::size_t kMembers = 4;
+
+struct Library {
+    std::vector<std::string> labels;  // of id i + 1
+    SignatureSet set;
+};
+
+Signature scanned(const std::string& family, std::size_t member, std::uint64_t seed) {
+    ScanOptions options;
+    options.count = 4000;
+    options.noise = 0.0025;
+    options.seed = seed;
+    const PointCloud points = scanOf(makeMember(family, member, 1).value(), options).value();
+    return describe(points, parametersOf(Profile::kPaper)).value().signature;
+}
+
+const std::vector<std::string>& families() {
+    static const std::vector<std::string> kFamilies = {"airplane", "animal", "dumbbell",
+                                                       "hammer",   "human",  "table"};
+    return kFamilies;
+}
+
+Library makeLibrary() {
+    Library library;
+    std::vector<SignatureSet::EntryPtr> entries;
+    for (const std::string& family : families()) {
+        for (std::size_t member = 0; member < kMembers; ++member) {
+            auto entry = std::make_shared<IndexEntry>();
+            entry->id = static_cast<std::int64_t>(entries.size()) + 1;
+            entry->metadata["label"] = family;
+            entry->signature = scanned(family, member, 100 + entries.size());
+            library.labels.push_back(family);
+            entries.push_back(std::move(entry));
+        }
+    }
+    library.set = SignatureSet().with(std::move(entries), {});
+    return library;
+}
+
+TEST(Retrieval, FindsItselfFirstAndItsFamilyMostly) {
+    const Library library = makeLibrary();
+    std::size_t right = 0;
+    for (const auto& entry : *library.set.blocks().front()) {
+        SearchOptions options;
+        options.k = 3;
+        const auto self = topK(entry->signature, library.set, options);
+        ASSERT_TRUE(self);
+        EXPECT_EQ(self->hits.front().entry, entry);
+        EXPECT_EQ(self->hits.front().score, 1.0);
+
+        options.excludeId = entry->id;
+        const auto others = topK(entry->signature, library.set, options);
+        ASSERT_TRUE(others);
+        EXPECT_NE(others->hits.front().entry, entry);
+        right += others->hits.front().entry->metadata.at("label") == entry->metadata.at("label") ? 1u : 0u;
+    }
+    const double nearest = static_cast<double>(right) / static_cast<double>(library.set.size());
+    std::cout << "nearest neighbour of the same family: " << nearest << " of " << library.set.size()
+              << " scans (chance " << static_cast<double>(kMembers - 1) / (library.set.size() - 1.0) << ")\n";
+    EXPECT_GE(nearest, 0.45);  // measured: 0.58
+}
+
+TEST(Retrieval, FindsTheShapeOfANewScan) {
+    const Library library = makeLibrary();
+    std::size_t first = 0;
+    std::size_t queries = 0;
+    for (std::size_t f = 0; f < families().size(); ++f) {
+        for (std::size_t member = 0; member < kMembers; ++member) {
+            const Signature query = scanned(families()[f], member, 900 + queries);
+            const auto result = topK(query, library.set, {});
+            ASSERT_TRUE(result);
+            first += result->hits.front().entry->id == static_cast<std::int64_t>(queries) + 1 ? 1u : 0u;
+            ++queries;
+        }
+    }
+    const double hits = static_cast<double>(first) / static_cast<double>(queries);
+    std::cout << "second scan of a shape finds the first scan at rank 1: " << hits << "\n";
+    EXPECT_GE(hits, 0.6);  // measured: 0.75
+}
+
+}  // namespace
+}  // namespace shapedb

@@ -1,0 +1,286 @@
+#include "core/search/top_k.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cstring>
+#include <limits>
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
+
+#include "tests/core/matching/random_signatures.h"
+
+namespace shapedb {
+namespace {
+
+using testing_support::disturbed;
+using testing_support::randomSignature;
+
+bool sameBits(double x, double y) { return std::memcmp(&x, &y, sizeof x) == 0; }
+
+SignatureSet::EntryPtr entryOf(std::int64_t id, Signature signature) {
+    auto entry = std::make_shared<IndexEntry>();
+    entry->id = id;
+    entry->key = "shape-" + std::to_string(id);
+    entry->metadata["third"] = std::to_string(id % 3);
+    if (id % 5 == 0) entry->metadata["fifth"] = "yes";
+    entry->signature = std::move(signature);
+    return entry;
+}
+
+// Random shapes, near copies of the query, and the same signature under several ids.
+SignatureSet randomSet(Random& random, const Signature& query, std::size_t count) {
+    std::vector<SignatureSet::EntryPtr> entries;
+    std::vector<Signature> before = {query};
+    for (std::size_t i = 0; i < count; ++i) {
+        Signature signature;
+        switch (random.below(4)) {
+            case 0: signature = before[random.below(before.size())]; break;
+            case 1: signature = disturbed(query, random, random.uniform(0, 0.1)); break;
+            default: signature = randomSignature(random, 6);
+        }
+        before.push_back(signature);
+        entries.push_back(entryOf(static_cast<std::int64_t>(7 * i + 1 + random.below(7)), signature));
+    }
+    return SignatureSet().with(entries, {});
+}
+
+// Scores everything and sorts.
+std::vector<SearchHit> bruteForce(const Signature& query, const SignatureSet& set,
+                                  const SearchOptions& options) {
+    std::vector<SearchHit> hits;
+    for (const auto& block : set.blocks()) {
+        for (const auto& entry : *block) {
+            if (options.excludeId && *options.excludeId == entry->id) continue;
+            if (!options.filter.matches(entry->metadata)) continue;
+            const double value = score(query, entry->signature, options.score);
+            if (value >= options.threshold) hits.push_back({entry, value});
+        }
+    }
+    std::stable_sort(hits.begin(), hits.end(), [](const SearchHit& a, const SearchHit& b) {
+        return a.score > b.score || (a.score == b.score && a.entry->id < b.entry->id);
+    });
+    if (hits.size() > options.k) hits.resize(options.k);
+    return hits;
+}
+
+void expectSameHits(const std::vector<SearchHit>& hits, const std::vector<SearchHit>& expected) {
+    ASSERT_EQ(hits.size(), expected.size());
+    for (std::size_t i = 0; i < hits.size(); ++i) {
+        ASSERT_EQ(hits[i].entry, expected[i].entry) << "rank " << i;
+        ASSERT_TRUE(sameBits(hits[i].score, expected[i].score)) << "rank " << i;
+    }
+}
+
+SearchOptions randomOptions(Random& random, const SignatureSet& set) {
+    SearchOptions options;
+    const std::vector<std::size_t> ks = {1, 2, 3, 10, 31, 32, 33, set.size(), set.size() + 1};
+    options.k = std::max<std::size_t>(1, ks[random.below(ks.size())]);
+    const std::vector<double> thresholds = {0.0, 0.0, 0.0, 0.3, 0.9, 1.0, random.uniform()};
+    options.threshold = thresholds[random.below(thresholds.size())];
+    const std::vector<const char*> filters = {"", "", "third=1", "fifth", "!fifth, third!=0", "none"};
+    options.filter = Filter::parse(filters[random.below(filters.size())]).value();
+    options.score.reflection = random.below(2) == 0;
+    options.score.keepScale = random.below(4) == 0;
+    if (random.below(3) == 0) options.score.kernelWidth = random.uniform(0.01, 0.5);
+    if (random.below(3) == 0 && set.size() > 0) {
+        const auto& block = *set.blocks()[random.below(set.blocks().size())];
+        options.excludeId = block[random.below(block.size())]->id;
+    }
+    return options;
+}
+
+TEST(TopK, EqualsBruteForceBitForBit) {
+    Random random(1);
+    for (int round = 0; round < 400; ++round) {
+        const Signature query = randomSignature(random, 7);
+        const SignatureSet set = randomSet(random, query, random.below(round % 20 == 0 ? 1500 : 150));
+        const SearchOptions options = randomOptions(random, set);
+        const auto result = topK(query, set, options);
+        ASSERT_TRUE(result) << result.error().message;
+        expectSameHits(result->hits, bruteForce(query, set, options));
+        if (HasFatalFailure()) FAIL() << "round " << round << " k " << options.k << " of " << set.size();
+
+        std::uint64_t passing = 0;
+        for (const auto& block : set.blocks()) {
+            for (const auto& entry : *block) {
+                const bool excluded = options.excludeId && *options.excludeId == entry->id;
+                passing += !excluded && options.filter.matches(entry->metadata) ? 1u : 0u;
+            }
+        }
+        EXPECT_EQ(result->candidates, set.size());
+        EXPECT_EQ(result->filtered, passing);
+        EXPECT_LE(result->scored, passing);
+        EXPECT_GE(result->scored, result->hits.size());
+    }
+}
+
+TEST(TopK, BreaksTiesByIdAtEveryK) {
+    Random random(2);
+    const Signature query = randomSignature(random, testing_support::Kind::kPlain, 7);
+    const Signature other = disturbed(query, random, 0.05);
+    std::vector<SignatureSet::EntryPtr> entries;
+    // More ties than a chunk, the copies of the query under the highest ids.
+    for (std::int64_t id = 1; id <= 300; ++id) entries.push_back(entryOf(id, id > 200 ? query : other));
+    const SignatureSet set = SignatureSet().with(entries, {});
+    for (std::size_t k = 1; k <= 301; k += k < 40 || k > 95 ? 1 : 5) {
+        SearchOptions options;
+        options.k = k;
+        const auto result = topK(query, set, options);
+        ASSERT_TRUE(result);
+        ASSERT_EQ(result->hits.size(), std::min<std::size_t>(k, 300));
+        for (std::size_t i = 0; i < result->hits.size(); ++i) {
+            ASSERT_EQ(result->hits[i].entry->id, static_cast<std::int64_t>(i < 100 ? 201 + i : i - 99));
+            ASSERT_EQ(result->hits[i].score == 1.0, i < 100);
+        }
+    }
+}
+
+TEST(TopK, IsTheSameOnAnyNumberOfThreads) {
+    Random random(3);
+    for (int round = 0; round < 15; ++round) {
+        const Signature query = randomSignature(random, 7);
+        const SignatureSet set = randomSet(random, query, 3000);
+        const SearchOptions options = randomOptions(random, set);
+        const auto expected = topK(query, set, options);
+        ASSERT_TRUE(expected);
+        for (const int threads : {1, 2, 3, 8}) {
+            const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
+                                            static_cast<std::size_t>(threads));
+            tbb::task_arena arena(threads);
+            const auto result = arena.execute([&] { return topK(query, set, options); });
+            ASSERT_TRUE(result);
+            expectSameHits(result->hits, expected->hits);
+        }
+    }
+}
+
+TEST(TopK, RulesMostOutWithoutScoring) {
+    Random random(4);
+    const Signature query = randomSignature(random, testing_support::Kind::kPlain, 7);
+    std::vector<SignatureSet::EntryPtr> entries;
+    for (std::int64_t id = 1; id <= 5000; ++id) {
+        entries.push_back(entryOf(id, id == 4321
+                                          ? disturbed(query, random, 0.01)
+                                          : randomSignature(random, testing_support::Kind::kPlain, 7)));
+    }
+    SearchOptions options;
+    options.k = 1;
+    const auto result = topK(query, SignatureSet().with(entries, {}), options);
+    ASSERT_TRUE(result);
+    EXPECT_EQ(result->hits.front().entry->id, 4321);
+    EXPECT_LT(result->scored, 500u);
+}
+
+TEST(TopK, OfAnEmptySetIsEmpty) {
+    Random random(5);
+    const auto result = topK(randomSignature(random), SignatureSet(), {});
+    ASSERT_TRUE(result);
+    EXPECT_TRUE(result->hits.empty());
+    EXPECT_EQ(result->candidates, 0u);
+    EXPECT_EQ(result->filtered, 0u);
+    EXPECT_EQ(result->scored, 0u);
+}
+
+TEST(TopK, RefusesOptionsOutOfRange) {
+    Random random(6);
+    const Signature query = randomSignature(random);
+    const SignatureSet set = randomSet(random, query, 10);
+    const auto refused = [&](const SearchOptions& options, const char* word) {
+        const auto result = topK(query, set, options);
+        ASSERT_FALSE(result) << word;
+        EXPECT_EQ(result.error().code, ErrorCode::kInvalidArgument);
+        EXPECT_NE(result.error().message.find(word), std::string::npos) << result.error().message;
+    };
+    SearchOptions options;
+    options.k = 0;
+    refused(options, "k is 0");
+    for (const double threshold :
+         {-0.001, 1.001, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+        options = {};
+        options.threshold = threshold;
+        refused(options, "threshold");
+    }
+    options = {};
+    options.score.kernelWidth = 0.0;
+    refused(options, "kernel_width");
+    options = {};
+    options.k = std::numeric_limits<std::size_t>::max();
+    EXPECT_EQ(topK(query, set, options)->hits.size(), 10u);
+}
+
+TEST(TopK, StopsWhenAsked) {
+    Random random(7);
+    const Signature query = randomSignature(random, testing_support::Kind::kPlain, 7);
+    const SignatureSet set = randomSet(random, query, 2000);
+    SearchOptions options;
+    options.k = 2000;
+
+    std::atomic<bool> cancel{true};
+    RunContext context;
+    context.cancel = &cancel;
+    for (const SignatureSet& any : {set, SignatureSet()}) {
+        const auto result = topK(query, any, options, context);
+        ASSERT_FALSE(result);
+        EXPECT_EQ(result.error().code, ErrorCode::kCancelled);
+    }
+
+    // In the middle: at the first report.
+    cancel = false;
+    int reports = 0;
+    context.progress = [&](const char*, std::uint64_t done, std::uint64_t total) {
+        EXPECT_LE(done, total);
+        ++reports;
+        cancel = true;
+    };
+    const auto stopped = topK(query, set, options, context);
+    ASSERT_FALSE(stopped);
+    EXPECT_EQ(stopped.error().code, ErrorCode::kCancelled);
+    EXPECT_EQ(reports, 1);
+
+    RunContext late;
+    late.deadline = RunContext::Clock::now() - std::chrono::seconds(1);
+    const auto result = topK(query, set, options, late);
+    ASSERT_FALSE(result);
+    EXPECT_EQ(result.error().code, ErrorCode::kDeadlineExceeded);
+}
+
+TEST(TopK, StopsAtTheDeadlineWithinAChunkOfHeavySignatures) {
+    Random random(8);
+    // Sixteen points each: scoring all of them takes seconds.
+    const auto heavy = [&] {
+        Signature s = randomSignature(random, testing_support::Kind::kEqualWeight, kMaxSignaturePoints);
+        while (s.points.size() < kMaxSignaturePoints) {
+            s = randomSignature(random, testing_support::Kind::kEqualWeight, kMaxSignaturePoints);
+        }
+        return s;
+    };
+    const Signature query = heavy();
+    std::vector<SignatureSet::EntryPtr> entries;
+    for (std::int64_t id = 1; id <= 4000; ++id) entries.push_back(entryOf(id, heavy()));
+    const SignatureSet set = SignatureSet().with(entries, {});
+    SearchOptions options;
+    options.k = 4000;
+    RunContext context;
+    context.deadline = RunContext::Clock::now() + std::chrono::milliseconds(200);
+    const auto begin = RunContext::Clock::now();
+    const auto result = topK(query, set, options, context);
+    ASSERT_FALSE(result);
+    EXPECT_EQ(result.error().code, ErrorCode::kDeadlineExceeded);
+    EXPECT_LT(RunContext::Clock::now() - begin, std::chrono::seconds(2));
+}
+
+TEST(TopK, ReportsAnExceptionOfTheCallerAsAnError) {
+    Random random(9);
+    const Signature query = randomSignature(random);
+    RunContext context;
+    context.progress = [](const char*, std::uint64_t, std::uint64_t) { throw std::runtime_error("no room"); };
+    const auto result = topK(query, randomSet(random, query, 10), {}, context);
+    ASSERT_FALSE(result);
+    EXPECT_EQ(result.error().code, ErrorCode::kInternal);
+    EXPECT_NE(result.error().message.find("no room"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace shapedb
