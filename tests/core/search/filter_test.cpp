@@ -149,6 +149,13 @@ TEST(Filter, RefusesTheRestAndSaysWhere) {
     }
 }
 
+TEST(Filter, MessageIsAsDocumented) {
+    EXPECT_EQ(
+        Filter::parse("a b").error().message,
+        "filter 'a b', column 3: expected one of = != < <= > >=; write for example label=cup, year>=1990, "
+        "!draft");
+}
+
 TEST(Filter, MessageIsOneShortLineWhateverTheText) {
     const std::string longValue(1000000, 'x');
     const auto tooLong = Filter::parse("a=" + longValue + ",=" + longValue);
