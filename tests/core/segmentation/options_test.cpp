@@ -1,0 +1,59 @@
+#include "core/segmentation/options.h"
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include <gtest/gtest.h>
+
+namespace shapedb {
+namespace {
+
+TEST(SegmentationOptions, DefaultsAreThePapers) {
+    const SegmentationOptions options;
+    EXPECT_TRUE(validate(options));
+    EXPECT_EQ(options.bigBallRatio, 0.5);
+    EXPECT_EQ(options.deepAngleDegrees, 20.0);
+    EXPECT_EQ(options.hullAngleDegrees, 5.0);
+    EXPECT_EQ(options.mergeRatio, 1.5);
+    EXPECT_EQ(options.decimateTo, 0U);
+}
+
+// Sets one field to each value; the error must name the field.
+template <typename Field>
+void expectRefused(Field SegmentationOptions::*field, const std::string& name,
+                   std::initializer_list<double> values) {
+    for (const double value : values) {
+        SegmentationOptions options;
+        options.*field = static_cast<Field>(value);
+        const auto valid = validate(options);
+        ASSERT_FALSE(valid) << name << " " << value;
+        EXPECT_EQ(valid.error().code, ErrorCode::kInvalidArgument);
+        EXPECT_NE(valid.error().message.find(name), std::string::npos) << valid.error().message;
+    }
+}
+
+TEST(SegmentationOptions, EachFieldHasItsRange) {
+    const double nan = std::nan("");
+    const double inf = std::numeric_limits<double>::infinity();
+    expectRefused(&SegmentationOptions::bigBallRatio, "big_ball_ratio", {0.0, -1.0, nan, inf});
+    expectRefused(&SegmentationOptions::deepAngleDegrees, "deep_angle_degrees", {0.0, 90.0, -5.0, nan, inf});
+    expectRefused(&SegmentationOptions::hullAngleDegrees, "hull_angle_degrees", {0.0, 90.0, -5.0, nan, inf});
+    expectRefused(&SegmentationOptions::mergeRatio, "merge_ratio", {0.999, 0.0, -2.0, nan, inf});
+    expectRefused(&SegmentationOptions::decimateTo, "decimate_to", {1, 2, 3});
+}
+
+TEST(SegmentationOptions, EndsOfTheRangesAreAllowed) {
+    SegmentationOptions options;
+    options.bigBallRatio = 1e-300;
+    options.deepAngleDegrees = 89.999;
+    options.hullAngleDegrees = 1e-9;
+    options.mergeRatio = 1.0;
+    options.decimateTo = 4;
+    EXPECT_TRUE(validate(options));
+    options.decimateTo = 4294967295U;
+    EXPECT_TRUE(validate(options));
+}
+
+}  // namespace
+}  // namespace shapedb
