@@ -1,7 +1,6 @@
 #include "core/search/filter.h"
 
 #include <cstdlib>
-#include <regex>
 
 #include <gtest/gtest.h>
 
@@ -189,9 +188,13 @@ struct PlainTerm {
         const std::string& text = metadata.at(key);
         if (op == "=") return text == value;
         if (op == "!=") return text != value;
-        static const std::regex number(R"(-?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?)");
-        if (!std::regex_match(text, number)) return false;
-        const double left = std::strtod(text.c_str(), nullptr);
+        if (text.empty() || text[0] == '+' ||
+            text.find_first_not_of("0123456789.eE+-") != std::string::npos) {
+            return false;
+        }
+        char* end = nullptr;
+        const double left = std::strtod(text.c_str(), &end);
+        if (*end != '\0') return false;
         const double right = std::strtod(value.c_str(), nullptr);
         if (op == "<") return left < right;
         if (op == "<=") return left <= right;
