@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <ios>
 #include <iterator>
 #include <optional>
 #include <sstream>
@@ -53,15 +54,10 @@ class FileReader {
     FileReader(Loaded& loaded, std::string path) : loaded_(loaded), path_(std::move(path)) {}
 
     Result<void> read() {
-        std::ifstream stream(path_, std::ios::binary);
-        const std::string text((std::istreambuf_iterator<char>(stream)), std::istreambuf_iterator<char>());
-        if (!stream.is_open() || stream.bad()) {
-            return fail(
-                ErrorCode::kFileNotReadable,
-                "configuration file " + path_ + " cannot be read: check that it exists and may be read");
-        }
+        const Result<std::string> text = content();
+        if (!text) return fail(text.error());
         try {
-            return readTable(toml::parse(text, path_), "");
+            return readTable(toml::parse(*text, path_), "");
         } catch (const toml::parse_error& error) {
             return fail(ErrorCode::kMalformedFile,
                         place(error.source().begin.line) + ": " + std::string(error.description()));
@@ -69,6 +65,18 @@ class FileReader {
     }
 
   private:
+    Result<std::string> content() const {
+        std::ifstream stream(path_, std::ios::binary);
+        try {
+            // Opening a directory succeeds; reading it throws, whatever the exception mask.
+            std::string text((std::istreambuf_iterator<char>(stream)), std::istreambuf_iterator<char>());
+            if (stream.is_open() && !stream.bad()) return text;
+        } catch (const std::ios_base::failure&) {
+        }
+        return fail(ErrorCode::kFileNotReadable,
+                    "configuration file " + path_ + " cannot be read: check that it exists and may be read");
+    }
+
     std::string place(std::size_t line) const { return path_ + " line " + std::to_string(line); }
 
     Result<void> readTable(const toml::table& table, const std::string& prefix) {

@@ -7,6 +7,8 @@
 #include <thread>
 #include <utility>
 
+#include <arpa/inet.h>
+
 namespace shapedb::config {
 namespace {
 
@@ -239,7 +241,9 @@ int threadsOrProcessors(int configured) noexcept {
 }
 
 bool Endpoint::isLoopback() const {
-    return host == "localhost" || host == "::1" || host.compare(0, 4, "127.") == 0;
+    in_addr address{};
+    const bool v4 = ::inet_pton(AF_INET, host.c_str(), &address) == 1;
+    return host == "localhost" || host == "::1" || (v4 && (ntohl(address.s_addr) >> 24) == 127);
 }
 
 std::string Endpoint::text() const {

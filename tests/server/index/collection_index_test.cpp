@@ -1,0 +1,240 @@
+#include "server/index/collection_index.h"
+
+#include <atomic>
+#include <thread>
+
+#include <gtest/gtest.h>
+
+#include "core/base/random.h"
+#include "tests/server/support/fixtures.h"
+#include "tests/server/support/memory_store.h"
+
+namespace shapedb::index {
+namespace {
+
+using namespace shapedb::testing;
+
+class Index : public ::testing::Test {
+  protected:
+    Index() : log(std::make_shared<RecordingLogger>()), index(store, log) {
+        parts = *store.createCollection("parts", "", paperParameters());
+        EXPECT_TRUE(index.loadAll());
+    }
+
+    /// A stored shape with a signature of this volume.
+    store::Shape put(const std::string& key, float volume, store::Metadata metadata = {}) {
+        const auto points = taggedPoints(volume);
+        const auto shape = store.putShape(putRequest(parts.id, key, points, std::move(metadata)))->shape;
+        while (const auto job = *store.claimJob()) {
+            const std::string bytes = encodeSignature(signatureOf(volume));
+            EXPECT_TRUE(store.finishJob(*job, {job->shapeId, job->pointsVersion, generation(), bytes}));
+        }
+        return shape;
+    }
+
+    std::int64_t generation() { return store.getCollection("parts")->generation; }
+
+    SnapshotPtr snapshot() { return *index.byName("parts"); }
+
+    /// What the store says, shape by shape.
+    void expectSameAsStore() {
+        const auto rows = *store.loadIndex(parts.id, 0, 1'000'000);
+        const SnapshotPtr now = snapshot();
+        EXPECT_EQ(now->signatures.size(), rows.size());
+        for (const store::IndexRow& row : rows) {
+            const auto entry = now->signatures.find(row.shape.id);
+            ASSERT_TRUE(entry) << row.shape.key;
+            EXPECT_EQ(entry->key, row.shape.key);
+            EXPECT_EQ(entry->metadata, row.shape.metadata);
+            EXPECT_EQ(encodeSignature(entry->signature), row.signature.bytes);
+        }
+    }
+
+    MemoryStore store;
+    std::shared_ptr<RecordingLogger> log;
+    CollectionIndex index;
+    store::Collection parts;
+};
+
+TEST_F(Index, LoadsAllThatIsStored) {
+    for (int i = 0; i < 5'000; ++i) put(std::to_string(i), static_cast<float>(i + 1));
+    ASSERT_TRUE(index.loadAll());
+    EXPECT_EQ(snapshot()->signatures.size(), 5'000u) << "more than one batch";
+    EXPECT_EQ(index.totals().signatures, 5'000u);
+    EXPECT_GT(index.totals().bytes, 5'000u * sizeof(SignaturePoint));
+    expectSameAsStore();
+}
+
+TEST_F(Index, NamesAndIdsFindTheSame) {
+    EXPECT_EQ((*index.byName("parts"))->collection.id, parts.id);
+    EXPECT_EQ((*index.byId(parts.id))->collection.name, "parts");
+    EXPECT_EQ(snapshot()->parameters.profile, Profile::kPaper);
+    EXPECT_EQ(index.byName("nothing").error().code, ErrorCode::kNotFound);
+    EXPECT_EQ(index.byId(999).error().code, ErrorCode::kNotFound);
+    const auto cups = *store.createCollection("cups", "", paperParameters());
+    EXPECT_FALSE(index.byName("cups"));
+    ASSERT_TRUE(index.add(cups));
+    ASSERT_EQ(index.all().size(), 2u);
+    EXPECT_EQ(index.all()[0]->collection.name, "cups");
+    index.remove(cups.id);
+    index.remove(999);
+    EXPECT_FALSE(index.byName("cups"));
+    EXPECT_FALSE(index.byId(cups.id));
+}
+
+TEST_F(Index, RefreshFollowsTheStore) {
+    const auto a = put("a", 1.0f);
+    EXPECT_EQ(snapshot()->signatures.size(), 0u);
+    ASSERT_TRUE(index.refresh(parts.id, a.id));
+    expectSameAsStore();
+    EXPECT_EQ(snapshot()->signatures.size(), 1u);
+    const SnapshotPtr old = snapshot();
+
+    const auto points = taggedPoints(1.0f);
+    ASSERT_TRUE(store.putShape(putRequest(parts.id, "a", points, {{"label", "new"}})));
+    ASSERT_TRUE(index.refresh(parts.id, a.id));
+    expectSameAsStore();
+    EXPECT_EQ(snapshot()->signatures.find(a.id)->metadata.at("label"), "new");
+
+    ASSERT_TRUE(store.deleteShape(parts.id, "a", std::nullopt));
+    ASSERT_TRUE(index.refresh(parts.id, a.id));
+    EXPECT_EQ(snapshot()->signatures.size(), 0u);
+    EXPECT_EQ(old->signatures.size(), 1u) << "a snapshot never changes";
+    EXPECT_TRUE(index.refresh(parts.id, 999));
+    EXPECT_TRUE(index.refresh(999, a.id)) << "a collection that is gone is no error";
+}
+
+// The order in which threads get here must not matter: a late refresh of a shape that was
+// deleted meanwhile cannot bring it back.
+TEST_F(Index, ConcurrentChangesEndAsTheStoreSays) {
+    std::vector<std::thread> threads;
+    std::atomic<bool> stop{false};
+    std::thread reader([&] {
+        while (!stop) {
+            const SnapshotPtr seen = snapshot();
+            std::size_t count = 0;
+            for (const auto& block : seen->signatures.blocks()) count += block->size();
+            EXPECT_EQ(count, seen->signatures.size());
+        }
+    });
+    for (int t = 0; t < 4; ++t) {
+        threads.emplace_back([&, t] {
+            Random random(static_cast<std::uint64_t>(t));
+            for (int i = 0; i < 400; ++i) {
+                const std::string key = std::to_string(random.below(20));
+                if (random.below(3) == 0) {
+                    const auto deleted = store.deleteShape(parts.id, key, std::nullopt);
+                    if (deleted) {
+                        EXPECT_TRUE(index.refresh(parts.id, deleted->id));
+                    }
+                } else {
+                    const auto points = taggedPoints(static_cast<float>(1 + random.below(100)));
+                    const auto put = store.putShape(putRequest(parts.id, key, points));
+                    ASSERT_TRUE(put);
+                    while (const auto job = *store.claimJob()) {
+                        const std::string bytes = encodeSignature(signatureOf(1.0 + t));
+                        ASSERT_TRUE(store.finishJob(*job, {job->shapeId, job->pointsVersion, 1, bytes}));
+                        EXPECT_TRUE(index.refresh(parts.id, job->shapeId));
+                    }
+                }
+            }
+        });
+    }
+    for (std::thread& thread : threads) thread.join();
+    stop = true;
+    reader.join();
+    expectSameAsStore();
+}
+
+TEST_F(Index, FailedReadIsMadeUpForByTheNextUpdate) {
+    const auto a = put("a", 1.0f);
+    const auto b = put("b", 2.0f);
+    store.fault = [](const std::string& function) -> std::optional<Error> {
+        if (function == "getSignature") return Error{ErrorCode::kStorage, "disk gone"};
+        return std::nullopt;
+    };
+    EXPECT_EQ(index.refresh(parts.id, a.id).error().code, ErrorCode::kStorage);
+    store.fault = nullptr;
+    ASSERT_TRUE(index.refresh(parts.id, b.id));
+    expectSameAsStore();
+    EXPECT_EQ(snapshot()->signatures.size(), 2u);
+}
+
+TEST_F(Index, DamagedSignatureIsLeftOutAndLogged) {
+    const auto a = put("a", 1.0f);
+    put("b", 2.0f);
+    const auto points = taggedPoints(3.0f);
+    ASSERT_TRUE(store.putShape(putRequest(parts.id, "c", points)));
+    const auto job = *store.claimJob();
+    ASSERT_TRUE(store.finishJob(*job, {job->shapeId, job->pointsVersion, 1, "damaged"}));
+    ASSERT_TRUE(index.loadAll());
+    EXPECT_EQ(snapshot()->signatures.size(), 2u);
+    EXPECT_TRUE(snapshot()->signatures.find(a.id));
+    EXPECT_NE(log->all().find("damaged"), std::string::npos) << log->all();
+}
+
+TEST_F(Index, DamagedParametersNameTheCollection) {
+    ASSERT_TRUE(store.createCollection("broken", "", "{}"));
+    const auto loaded = index.loadAll();
+    ASSERT_FALSE(loaded);
+    EXPECT_EQ(loaded.error().code, ErrorCode::kDataLoss);
+    EXPECT_NE(loaded.error().message.find("broken"), std::string::npos);
+    EXPECT_TRUE(index.byName("parts")) << "the old content serves on";
+}
+
+TEST_F(Index, LoadingCanBeCancelled) {
+    put("a", 1.0f);
+    const std::atomic<bool> cancel{true};
+    RunContext context;
+    context.cancel = &cancel;
+    EXPECT_EQ(index.loadAll(context).error().code, ErrorCode::kCancelled);
+}
+
+TEST_F(Index, GenerationIsKeptWhileCommitting) {
+    bool called = false;
+    EXPECT_TRUE(index.whileGeneration(parts.id, 1, [&] { called = true; }));
+    EXPECT_TRUE(called);
+    EXPECT_FALSE(index.whileGeneration(parts.id, 2, [] { FAIL(); }));
+    EXPECT_FALSE(index.whileGeneration(999, 1, [] { FAIL(); }));
+}
+
+TEST_F(Index, SwitchingReloadsParametersAndSignaturesTogether) {
+    const auto a = put("a", 1.0f);
+    ASSERT_TRUE(index.refresh(parts.id, a.id));
+    const auto rebuild = store.startRebuild(parts.id, paperParameters(3));
+    ASSERT_TRUE(rebuild);
+    const auto notYet = index.switchGeneration(parts.id, [&] { return store.finishRebuild(rebuild->id); });
+    ASSERT_TRUE(notYet);
+    EXPECT_FALSE(*notYet);
+    EXPECT_EQ(snapshot()->collection.generation, 1);
+
+    ASSERT_TRUE(store.putRebuilt(rebuild->id, {a.id, 1, 2, encodeSignature(signatureOf(9.0))}));
+    const auto done = index.switchGeneration(parts.id, [&] { return store.finishRebuild(rebuild->id); });
+    ASSERT_TRUE(done) << done.error().message;
+    EXPECT_TRUE(*done);
+    EXPECT_EQ(snapshot()->collection.generation, 2);
+    EXPECT_EQ(snapshot()->parameters.signature.maxPoints, 3u);
+    EXPECT_EQ(snapshot()->signatures.find(a.id)->signature.volume, 9.0);
+    EXPECT_FALSE(index.whileGeneration(parts.id, 1, [] { FAIL(); }));
+    EXPECT_EQ(index.switchGeneration(999, [] { return Result<bool>(true); }).error().code,
+              ErrorCode::kNotFound);
+}
+
+TEST_F(Index, FailedReloadAfterASwitchIsRepeatedBeforeAnythingIsCommitted) {
+    const auto a = put("a", 1.0f);
+    const auto rebuild = store.startRebuild(parts.id, paperParameters(3));
+    ASSERT_TRUE(store.putRebuilt(rebuild->id, {a.id, 1, 2, encodeSignature(signatureOf(9.0))}));
+    store.fault = [](const std::string& function) -> std::optional<Error> {
+        if (function == "loadIndex") return Error{ErrorCode::kStorage, "disk gone"};
+        return std::nullopt;
+    };
+    EXPECT_FALSE(index.switchGeneration(parts.id, [&] { return store.finishRebuild(rebuild->id); }));
+    EXPECT_FALSE(index.whileGeneration(parts.id, 1, [] { FAIL() << "a signature of the old parameters"; }));
+    store.fault = nullptr;
+    EXPECT_FALSE(index.whileGeneration(parts.id, 1, [] { FAIL() << "still the old parameters"; }));
+    EXPECT_TRUE(index.whileGeneration(parts.id, 2, [] {}));
+    expectSameAsStore();
+}
+
+}  // namespace
+}  // namespace shapedb::index

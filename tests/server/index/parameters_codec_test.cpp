@@ -1,0 +1,92 @@
+#include "server/index/parameters_codec.h"
+
+#include <gtest/gtest.h>
+
+#include "core/base/random.h"
+
+namespace shapedb::index {
+namespace {
+
+void expectSame(const ShapeParameters& a, const ShapeParameters& b) {
+    EXPECT_EQ(a.profile, b.profile);
+    EXPECT_EQ(a.segmentation.bigBallRatio, b.segmentation.bigBallRatio);
+    EXPECT_EQ(a.segmentation.deepAngleDegrees, b.segmentation.deepAngleDegrees);
+    EXPECT_EQ(a.segmentation.hullAngleDegrees, b.segmentation.hullAngleDegrees);
+    EXPECT_EQ(a.segmentation.mergeRatio, b.segmentation.mergeRatio);
+    EXPECT_EQ(a.segmentation.decimateTo, b.segmentation.decimateTo);
+    EXPECT_EQ(a.signature.maxPoints, b.signature.maxPoints);
+}
+
+// The text is in databases: these names stay.
+TEST(ParametersCodec, TextIsFrozen) {
+    EXPECT_EQ(encodeParameters(parametersOf(Profile::kPaper)),
+              R"({"profile":"paper","segmentation":{"big_ball_ratio":0.5,"deep_angle_degrees":20.0,)"
+              R"("hull_angle_degrees":5.0,"merge_ratio":1.5,"decimate_to":0},"signature":{"max_points":7}})");
+}
+
+TEST(ParametersCodec, RoundTripIsExact) {
+    Random random(1);
+    for (int i = 0; i < 200; ++i) {
+        ShapeParameters parameters = parametersOf(i % 2 == 0 ? Profile::kPaper : Profile::kDefault);
+        parameters.segmentation.bigBallRatio = random.uniform(1e-6, 10.0);
+        parameters.segmentation.deepAngleDegrees = random.uniform(0.1, 89.9);
+        parameters.segmentation.hullAngleDegrees = random.uniform(0.1, 89.9);
+        parameters.segmentation.mergeRatio = random.uniform(1.0, 9.0);
+        parameters.segmentation.decimateTo =
+            i % 3 == 0 ? 0 : 1'000 + static_cast<std::uint32_t>(random.below(100'000));
+        parameters.signature.maxPoints = 1 + static_cast<std::uint32_t>(random.below(kMaxSignaturePoints));
+        const std::string text = encodeParameters(parameters);
+        const auto decoded = decodeParameters(text);
+        ASSERT_TRUE(decoded) << decoded.error().message;
+        expectSame(*decoded, parameters);
+        EXPECT_EQ(encodeParameters(*decoded), text);
+    }
+}
+
+TEST(ParametersCodec, MissingFieldsTakeTheProfilesDefaults) {
+    for (const Profile profile : {Profile::kPaper, Profile::kDefault}) {
+        const auto decoded =
+            decodeParameters(std::string(R"({"profile":")") + profileName(profile) + R"("})");
+        ASSERT_TRUE(decoded) << decoded.error().message;
+        expectSame(*decoded, parametersOf(profile));
+    }
+    const auto partly = decodeParameters(R"({"profile":"paper","segmentation":{"merge_ratio":2}})");
+    ASSERT_TRUE(partly);
+    EXPECT_EQ(partly->segmentation.mergeRatio, 2.0);
+    EXPECT_EQ(partly->segmentation.bigBallRatio, 0.5);
+}
+
+TEST(ParametersCodec, EverythingElseIsRefusedByName) {
+    const struct {
+        const char* text;
+        const char* word;
+    } cases[] = {
+        {"", ""},
+        {"{", ""},
+        {"[]", "object"},
+        {"{}", "profile"},
+        {R"({"profile":"best"})", "best"},
+        {R"({"profile":1})", "profile"},
+        {R"({"profile":"paper","extra":1})", "extra"},
+        {R"({"profile":"paper","profile":"default"})", "twice"},
+        {R"({"profile":"paper","segmentation":[]})", "segmentation"},
+        {R"({"profile":"paper","segmentation":{"big_bal_ratio":1}})", "segmentation.big_bal_ratio"},
+        {R"({"profile":"paper","segmentation":{"merge_ratio":2,"merge_ratio":3}})", "twice"},
+        {R"({"profile":"paper","segmentation":{"merge_ratio":"2"}})", "segmentation.merge_ratio"},
+        {R"({"profile":"paper","segmentation":{"decimate_to":-1}})", "segmentation.decimate_to"},
+        {R"({"profile":"paper","segmentation":{"decimate_to":4294967296}})", "segmentation.decimate_to"},
+        {R"({"profile":"paper","segmentation":{"deep_angle_degrees":90}})", "90"},
+        {R"({"profile":"paper","signature":{"max_points":1.5}})", "signature.max_points"},
+        {R"({"profile":"paper","signature":{"max_points":33}})", "33"},
+        {"{\"profile\":\"\xff\"}", ""},
+    };
+    for (const auto& one : cases) {
+        const auto decoded = decodeParameters(one.text);
+        ASSERT_FALSE(decoded) << one.text;
+        EXPECT_EQ(decoded.error().code, ErrorCode::kDataLoss) << one.text;
+        EXPECT_NE(decoded.error().message.find(one.word), std::string::npos) << decoded.error().message;
+    }
+}
+
+}  // namespace
+}  // namespace shapedb::index

@@ -1,0 +1,317 @@
+#include "server/ingest/rebuild_driver.h"
+
+#include <atomic>
+#include <set>
+
+#include <gtest/gtest.h>
+
+#include "core/base/random.h"
+#include "tests/server/support/fixtures.h"
+#include "tests/server/support/memory_store.h"
+
+namespace shapedb::ingest {
+namespace {
+
+using namespace shapedb::testing;
+using namespace std::chrono_literals;
+
+class Driver : public ::testing::Test {
+  protected:
+    Driver() : log(std::make_shared<RecordingLogger>()), index(store, log) {
+        parts = *store.createCollection("parts", "", paperParameters());
+        EXPECT_TRUE(index.loadAll());
+        WorkerOptions options;
+        options.threads = 1;
+        options.backOff = 5ms;
+        pool = std::make_unique<WorkerPool>(store, index, board, quickDescribe, log, options);
+        EXPECT_TRUE(pool->start());
+    }
+
+    void fill(int count) {
+        for (int i = 0; i < count; ++i) put(std::to_string(i), static_cast<float>(i + 1));
+        pool->wake();
+        ASSERT_TRUE(eventually([&] { return store.queueDepth()->jobs == 0 && pool->running() == 0; }));
+    }
+
+    void put(const std::string& key, float tag) {
+        const auto points = taggedPoints(tag);
+        ASSERT_TRUE(store.putShape(putRequest(parts.id, key, points)));
+    }
+
+    RebuildDriver& start(Describer describe = quickDescribe, int threads = 3) {
+        RebuildOptions options;
+        options.threads = threads;
+        options.batch = 4;
+        options.backOff = 5ms;
+        options.yield = 1ms;
+        driver = std::make_unique<RebuildDriver>(store, index, *pool, std::move(describe), log, options);
+        EXPECT_TRUE(driver->start());
+        return *driver;
+    }
+
+    /// Counts what it describes; waits at each scan while closed.
+    Describer counting() {
+        return
+            [this](const PointCloud& points, const ShapeParameters& parameters, const RunContext& context) {
+                ++described;
+                while (closed && described > freeScans) {
+                    if (const auto go = context.checkpoint(); !go)
+                        return Result<Description>(fail(go.error()));
+                    std::this_thread::sleep_for(1ms);
+                }
+                return quickDescribe(points, parameters, context);
+            };
+    }
+
+    static ShapeParameters parametersWith(std::uint32_t maxPoints) {
+        ShapeParameters parameters = parametersOf(Profile::kPaper);
+        parameters.signature.maxPoints = maxPoints;
+        return parameters;
+    }
+
+    store::Rebuild begin(std::uint32_t maxPoints = 3) {
+        const auto rebuild = driver->begin((*index.byName("parts"))->collection, parametersWith(maxPoints));
+        EXPECT_TRUE(rebuild);
+        return *rebuild;
+    }
+
+    store::Rebuild finished(store::Rebuild rebuild) {
+        while (rebuild.state == store::RebuildState::kRunning) {
+            RunContext context;
+            context.deadline = RunContext::Clock::now() + 20s;
+            const auto next = driver->waitForChange(rebuild, context);
+            if (!next) {
+                ADD_FAILURE() << next.error().message;
+                return rebuild;
+            }
+            rebuild = *next;
+        }
+        return rebuild;
+    }
+
+    std::int64_t generation() { return (*index.byName("parts"))->collection.generation; }
+
+    void expectAllOf(std::uint32_t maxPoints) {
+        const auto snapshot = *index.byName("parts");
+        EXPECT_EQ(snapshot->parameters.signature.maxPoints, maxPoints);
+        const auto shapes = store.listShapes(parts.id, 0, 1'000, {});
+        for (const auto& shape : *shapes) {
+            const auto entry = snapshot->signatures.find(shape.id);
+            ASSERT_TRUE(entry) << shape.key;
+            EXPECT_EQ(entry->signature.scale, maxPoints) << shape.key;
+        }
+    }
+
+    MemoryStore store;
+    std::shared_ptr<RecordingLogger> log;
+    index::CollectionIndex index;
+    ProgressBoard board;
+    store::Collection parts;
+    std::unique_ptr<WorkerPool> pool;
+    std::unique_ptr<RebuildDriver> driver;
+    std::atomic<bool> closed{false};
+    std::atomic<int> described{0};
+    std::atomic<int> freeScans{0};
+};
+
+TEST_F(Driver, RebuildsEverythingIntoTheNextGeneration) {
+    fill(25);
+    start(counting());
+    const auto done = finished(begin());
+    EXPECT_EQ(done.state, store::RebuildState::kDone);
+    EXPECT_EQ(described, 25) << "each shape once";
+    ASSERT_TRUE(eventually([&] { return generation() == 2; }));
+    expectAllOf(3);
+}
+
+TEST_F(Driver, EmptyCollectionIsDoneAtOnce) {
+    start();
+    EXPECT_EQ(finished(begin()).state, store::RebuildState::kDone);
+    ASSERT_TRUE(eventually([&] { return generation() == 2; }));
+}
+
+TEST_F(Driver, RecordsFailuresAndGoesOn) {
+    fill(5);
+    put("bad", -1.0f);
+    pool->wake();
+    ASSERT_TRUE(eventually([&] { return store.queueDepth()->jobs == 0; }));
+    start();
+    const auto done = finished(begin());
+    EXPECT_EQ(done.done, 6u);
+    EXPECT_EQ(done.failed, 1u);
+    EXPECT_EQ(store.getShape(parts.id, "bad")->failure->code, ErrorCode::kNoInterior);
+}
+
+TEST_F(Driver, ExceptionsBecomeFailures) {
+    fill(3);
+    start([](const PointCloud& points, const ShapeParameters& parameters,
+             const RunContext& context) -> Result<Description> {
+        if (points[0].x == 2.0) throw std::bad_alloc();
+        if (points[0].x == 3.0) throw std::runtime_error("surprise");
+        return quickDescribe(points, parameters, context);
+    });
+    EXPECT_EQ(finished(begin()).failed, 2u);
+    EXPECT_EQ(store.getShape(parts.id, "1")->failure->code, ErrorCode::kOutOfMemory);
+    EXPECT_EQ(store.getShape(parts.id, "2")->failure->code, ErrorCode::kInternal);
+}
+
+TEST_F(Driver, SameParametersFollowOthersAreRefused) {
+    fill(5);
+    closed = true;
+    start(counting());
+    const auto first = begin(3);
+    EXPECT_EQ(begin(3).id, first.id);
+    const auto other = driver->begin((*index.byName("parts"))->collection, parametersWith(4));
+    ASSERT_FALSE(other);
+    EXPECT_EQ(other.error().code, ErrorCode::kRejected);
+    closed = false;
+    EXPECT_EQ(finished(first).state, store::RebuildState::kDone);
+}
+
+TEST_F(Driver, CancelForgetsThePartialResult) {
+    fill(10);
+    closed = true;
+    freeScans = 4;
+    start(counting());
+    const auto rebuild = begin();
+    ASSERT_TRUE(eventually([&] { return store.getRebuild(rebuild.id)->done == 4; }));
+    ASSERT_TRUE(driver->cancel(parts));
+    EXPECT_EQ(finished(rebuild).state, store::RebuildState::kCancelled);
+    EXPECT_EQ(generation(), 1);
+    EXPECT_EQ(driver->cancel(parts).error().code, ErrorCode::kNotFound);
+    closed = false;
+    described = 0;
+    EXPECT_EQ(finished(begin(5)).state, store::RebuildState::kDone);
+    EXPECT_EQ(described, 10) << "from the beginning";
+}
+
+TEST_F(Driver, QueuedRebuildCanBeCancelledToo) {
+    fill(3);
+    const auto cups = *store.createCollection("cups", "", paperParameters());
+    ASSERT_TRUE(index.add(cups));
+    closed = true;
+    start(counting());
+    const auto first = begin();
+    const auto second = driver->begin(cups, parametersWith(2));
+    ASSERT_TRUE(second);
+    ASSERT_TRUE(driver->cancel(cups));
+    EXPECT_EQ(store.getRebuild(second->id)->state, store::RebuildState::kCancelled);
+    closed = false;
+    EXPECT_EQ(finished(first).state, store::RebuildState::kDone);
+}
+
+TEST_F(Driver, StopKeepsWhatIsDoneForTheNextStart) {
+    fill(10);
+    closed = true;
+    freeScans = 6;
+    start(counting());
+    const auto rebuild = begin();
+    ASSERT_TRUE(eventually([&] { return store.getRebuild(rebuild.id)->done == 6; }));
+    driver->stop();
+    EXPECT_EQ(store.getRebuild(rebuild.id)->state, store::RebuildState::kRunning);
+    closed = false;
+    described = 0;
+    start(counting());
+    EXPECT_EQ(finished(rebuild).state, store::RebuildState::kDone);
+    EXPECT_EQ(described, 4) << "only the missing ones";
+    ASSERT_TRUE(eventually([&] { return generation() == 2; }));
+    expectAllOf(3);
+}
+
+TEST_F(Driver, PauseAndResume) {
+    fill(10);
+    closed = true;
+    freeScans = 2;
+    start(counting());
+    const auto rebuild = begin();
+    ASSERT_TRUE(eventually([&] { return store.getRebuild(rebuild.id)->done == 2; }));
+    driver->pause();
+    const int before = described;
+    closed = false;
+    std::this_thread::sleep_for(20ms);
+    EXPECT_EQ(described, before);
+    ASSERT_TRUE(driver->resume());
+    EXPECT_EQ(finished(rebuild).state, store::RebuildState::kDone);
+}
+
+TEST_F(Driver, ShapesThatComeAndGoMeanwhile) {
+    fill(10);
+    closed = true;
+    freeScans = 5;
+    start(counting());
+    const auto rebuild = begin();
+    ASSERT_TRUE(eventually([&] { return store.getRebuild(rebuild.id)->done == 5; }));
+    ASSERT_TRUE(store.deleteShape(parts.id, "9", std::nullopt));
+    put("0", 50.0f);    // replaced after it was rebuilt
+    put("new", 60.0f);  // added with the old parameters
+    pool->wake();
+    ASSERT_TRUE(eventually([&] { return store.queueDepth()->jobs == 0; }));
+    closed = false;
+    EXPECT_EQ(finished(rebuild).state, store::RebuildState::kDone);
+    ASSERT_TRUE(eventually([&] { return generation() == 2; }));
+    expectAllOf(3);
+    const auto snapshot = *index.byName("parts");
+    EXPECT_EQ(snapshot->signatures.size(), 10u);
+    EXPECT_EQ(snapshot->signatures.find(store.getShape(parts.id, "0")->id)->signature.volume, 50.0);
+}
+
+TEST_F(Driver, StoreFailuresAreOutlived) {
+    fill(12);
+    Random random(1);  // called under the store's lock
+    store.fault = [&](const std::string& function) -> std::optional<Error> {
+        const bool ours = function == "rebuildBatch" || function == "loadPoints" ||
+                          function == "putRebuilt" || function == "finishRebuild";
+        if (ours && random.below(3) == 0) return Error{ErrorCode::kStorage, "now and then"};
+        return std::nullopt;
+    };
+    start();
+    EXPECT_EQ(finished(begin()).state, store::RebuildState::kDone);
+    store.fault = nullptr;
+    ASSERT_TRUE(eventually([&] { return generation() == 2; }));
+    expectAllOf(3);
+}
+
+TEST_F(Driver, DeletedCollectionEndsItsRebuild) {
+    fill(5);
+    closed = true;
+    start(counting());
+    const auto rebuild = begin();
+    ASSERT_TRUE(eventually([&] { return described > 0; }));
+    ASSERT_TRUE(driver->cancel(parts));
+    ASSERT_TRUE(store.deleteCollection(parts.id));
+    index.remove(parts.id);
+    RunContext context;
+    EXPECT_EQ(driver->waitForChange(rebuild, context).error().code, ErrorCode::kNotFound);
+    const auto cups = *store.createCollection("cups", "", paperParameters());
+    ASSERT_TRUE(index.add(cups));
+    const auto next = driver->begin(cups, parametersWith(2));
+    ASSERT_TRUE(next);
+    EXPECT_EQ(finished(*next).state, store::RebuildState::kDone);
+}
+
+TEST_F(Driver, UnreadableParametersAreGivenUp) {
+    ASSERT_TRUE(store.startRebuild(parts.id, "not parameters"));
+    start();
+    ASSERT_TRUE(eventually([&] { return store.runningRebuilds()->empty(); }));
+    EXPECT_NE(log->all().find("rebuild given up"), std::string::npos) << log->all();
+}
+
+TEST_F(Driver, WaitingIsCancelledWithoutStoppingTheRebuild) {
+    fill(3);
+    closed = true;
+    start(counting());
+    auto rebuild = begin();
+    const std::atomic<bool> cancel{true};
+    RunContext context;
+    context.cancel = &cancel;
+    EXPECT_EQ(driver->waitForChange(rebuild, context).error().code, ErrorCode::kCancelled);
+    RunContext late;
+    late.deadline = RunContext::Clock::now() + 20ms;
+    EXPECT_EQ(driver->waitForChange(*store.getRebuild(rebuild.id), late).error().code,
+              ErrorCode::kDeadlineExceeded);
+    closed = false;
+    EXPECT_EQ(finished(rebuild).state, store::RebuildState::kDone);
+}
+
+}  // namespace
+}  // namespace shapedb::ingest

@@ -1,0 +1,270 @@
+#include "server/ingest/worker_pool.h"
+
+#include <atomic>
+#include <condition_variable>
+#include <mutex>
+
+#include <gtest/gtest.h>
+
+#include "core/base/random.h"
+#include "tests/server/support/fixtures.h"
+#include "tests/server/support/memory_store.h"
+
+namespace shapedb::ingest {
+namespace {
+
+using namespace shapedb::testing;
+using namespace std::chrono_literals;
+
+/// A describer that stands still inside a scan until told to go on or cancelled.
+class Gate {
+  public:
+    Result<Description> describe(const PointCloud& points, const ShapeParameters& parameters,
+                                 const RunContext& context) {
+        ++entered_;
+        while (closed_) {
+            if (const auto go = context.checkpoint(); !go) return fail(go.error());
+            std::this_thread::sleep_for(1ms);
+        }
+        return quickDescribe(points, parameters, context);
+    }
+    void open() { closed_ = false; }
+    int entered() const { return entered_; }
+
+  private:
+    std::atomic<bool> closed_{true};
+    std::atomic<int> entered_{0};
+};
+
+class Pool : public ::testing::Test {
+  protected:
+    Pool() : log(std::make_shared<RecordingLogger>()), index(store, log) {
+        parts = *store.createCollection("parts", "", paperParameters());
+        EXPECT_TRUE(index.loadAll());
+    }
+
+    WorkerPool& start(Describer describe = quickDescribe, int threads = 2) {
+        WorkerOptions options;
+        options.threads = threads;
+        options.backOff = 5ms;
+        pool = std::make_unique<WorkerPool>(store, index, board, std::move(describe), log, options);
+        EXPECT_TRUE(pool->start());
+        return *pool;
+    }
+
+    Describer through(Gate& gate) {
+        return [&gate](const PointCloud& points, const ShapeParameters& parameters,
+                       const RunContext& context) { return gate.describe(points, parameters, context); };
+    }
+
+    store::Shape put(const std::string& key, float tag) {
+        const auto points = taggedPoints(tag);
+        const auto result = store.putShape(putRequest(parts.id, key, points));
+        EXPECT_TRUE(result);
+        if (pool) pool->wake();
+        return result->shape;
+    }
+
+    store::Shape shape(const std::string& key) { return *store.getShape(parts.id, key); }
+    bool settled(const std::string& key) { return shape(key).state != store::ShapeState::kPending; }
+    bool idle() { return store.queueDepth()->jobs == 0 && pool->running() == 0; }
+
+    MemoryStore store;
+    std::shared_ptr<RecordingLogger> log;
+    index::CollectionIndex index;
+    ProgressBoard board;
+    store::Collection parts;
+    std::unique_ptr<WorkerPool> pool;
+};
+
+TEST_F(Pool, TurnsScansIntoSearchedSignatures) {
+    put("before the start", 1.0f);
+    start();
+    for (int i = 0; i < 100; ++i) put(std::to_string(i), static_cast<float>(i + 2));
+    ASSERT_TRUE(eventually([&] { return idle(); }));
+    EXPECT_EQ(pool->ingested(), 101u);
+    const auto snapshot = *index.byName("parts");
+    EXPECT_EQ(snapshot->signatures.size(), 101u);
+    EXPECT_EQ(snapshot->signatures.find(shape("7").id)->signature.volume, 9.0);
+    EXPECT_EQ(shape("7").state, store::ShapeState::kReady);
+}
+
+TEST_F(Pool, RecordsWhyAScanFails) {
+    start();
+    const auto before = put("k", 1.0f);
+    ASSERT_TRUE(eventually([&] { return settled("k"); }));
+    put("k", -1.0f);
+    ASSERT_TRUE(eventually([&] { return shape("k").state == store::ShapeState::kFailed; }));
+    EXPECT_EQ(shape("k").failure->code, ErrorCode::kNoInterior);
+    ASSERT_TRUE(eventually([&] { return idle(); }));
+    EXPECT_FALSE((*index.byName("parts"))->signatures.find(before.id))
+        << "the old signature is of other points";
+}
+
+TEST_F(Pool, ExceptionsBecomeFailures) {
+    start([](const PointCloud& points, const ShapeParameters&, const RunContext&) -> Result<Description> {
+        if (points[0].x > 1.5) throw std::bad_alloc();
+        throw std::runtime_error("surprise");
+    });
+    put("thrown", 1.0f);
+    put("memory", 2.0f);
+    ASSERT_TRUE(eventually([&] { return settled("thrown") && settled("memory"); }));
+    EXPECT_EQ(shape("thrown").failure->code, ErrorCode::kInternal);
+    EXPECT_NE(shape("thrown").failure->message.find("surprise"), std::string::npos);
+    EXPECT_EQ(shape("memory").failure->code, ErrorCode::kOutOfMemory);
+}
+
+TEST_F(Pool, DeletedShapeStopsItsWorker) {
+    Gate gate;
+    start(through(gate));
+    const auto k = put("k", 1.0f);
+    ASSERT_TRUE(eventually([&] { return gate.entered() == 1; }));
+    ASSERT_TRUE(store.deleteShape(parts.id, "k", std::nullopt));
+    pool->supersede(k.id);
+    EXPECT_TRUE(eventually([&] { return idle(); }));
+    EXPECT_EQ(pool->ingested(), 0u);
+}
+
+TEST_F(Pool, ReplacedPointsStopOnlyTheOldJob) {
+    Gate gate;
+    start(through(gate));
+    put("k", 1.0f);
+    ASSERT_TRUE(eventually([&] { return gate.entered() == 1; }));
+    const auto replaced = put("k", 2.0f);
+    pool->supersede(replaced.id, replaced.pointsVersion);
+    // Even when it comes late and the new job is already running.
+    ASSERT_TRUE(eventually([&] { return gate.entered() == 2; }));
+    pool->supersede(replaced.id, replaced.pointsVersion);
+    gate.open();
+    ASSERT_TRUE(eventually([&] { return settled("k"); }));
+    EXPECT_EQ(shape("k").state, store::ShapeState::kReady);
+    ASSERT_TRUE(eventually([&] { return idle(); }));
+    EXPECT_EQ((*index.byName("parts"))->signatures.find(replaced.id)->signature.volume, 2.0);
+    EXPECT_EQ(pool->ingested(), 1u);
+}
+
+TEST_F(Pool, DeletedCollectionStopsItsWorkers) {
+    Gate gate;
+    start(through(gate));
+    put("a", 1.0f);
+    put("b", 2.0f);
+    ASSERT_TRUE(eventually([&] { return gate.entered() == 2; }));
+    ASSERT_TRUE(store.deleteCollection(parts.id));
+    index.remove(parts.id);
+    pool->supersedeCollection(parts.id);
+    EXPECT_TRUE(eventually([&] { return idle(); }));
+}
+
+TEST_F(Pool, DrainPutsJobsBackUntried) {
+    Gate gate;
+    start(through(gate), 1);
+    put("k", 1.0f);
+    ASSERT_TRUE(eventually([&] { return gate.entered() == 1; }));
+    pool->stop();
+    EXPECT_EQ(shape("k").state, store::ShapeState::kPending);
+    EXPECT_EQ(store.queueDepth()->jobs, 1u);
+    const auto job = *store.claimJob();
+    ASSERT_TRUE(job);
+    EXPECT_EQ(job->attempts, 1) << "the attempt that was interrupted does not count";
+}
+
+TEST_F(Pool, PauseStopsAndResumeGoesOn) {
+    Gate gate;
+    start(through(gate));
+    for (int i = 0; i < 5; ++i) put(std::to_string(i), static_cast<float>(i + 1));
+    ASSERT_TRUE(eventually([&] { return gate.entered() == 2; }));
+    pool->pause();
+    EXPECT_EQ(pool->running(), 0u);
+    gate.open();
+    std::this_thread::sleep_for(20ms);
+    EXPECT_EQ(store.queueDepth()->jobs, 5u) << "nothing moves while paused";
+    ASSERT_TRUE(pool->resume());
+    ASSERT_TRUE(eventually([&] { return idle(); }));
+    EXPECT_EQ(pool->ingested(), 5u);
+}
+
+TEST_F(Pool, JobOfADeadProcessIsDoneAgainButNotForEver) {
+    const auto quarantined = put("twice", 1.0f);
+    ASSERT_TRUE(*store.claimJob());
+    ASSERT_TRUE(store.recoverJobs(2));
+    ASSERT_TRUE(*store.claimJob());  // second death
+    put("once", 2.0f);
+    ASSERT_TRUE(*store.claimJob());  // first death
+    start();
+    EXPECT_EQ(shape("twice").state, store::ShapeState::kFailed);
+    EXPECT_NE(log->all().find("key=twice"), std::string::npos) << log->all();
+    ASSERT_TRUE(eventually([&] { return settled("once"); }));
+    EXPECT_EQ(shape("once").state, store::ShapeState::kReady);
+}
+
+// The store fails now and then: everything is done in the end, nothing twice.
+TEST_F(Pool, StoreFailuresAreOutlived) {
+    Random random(1);  // called under the store's lock
+    store.fault = [&](const std::string& function) -> std::optional<Error> {
+        const bool worker = function == "claimJob" || function == "loadPoints" || function == "finishJob" ||
+                            function == "releaseJob" || function == "failJob" || function == "getSignature";
+        if (worker && random.below(3) == 0) return Error{ErrorCode::kStorage, "now and then"};
+        return std::nullopt;
+    };
+    start();
+    for (int i = 0; i < 30; ++i) put(std::to_string(i), static_cast<float>(i % 5 == 0 ? -1 - i : 1 + i));
+    ASSERT_TRUE(eventually([&] { return store.queueDepth()->jobs == 0; }));
+    store.fault = nullptr;
+    pool->stop();
+    ASSERT_TRUE(index.reload(parts.id));
+    for (int i = 0; i < 30; ++i) {
+        EXPECT_EQ(shape(std::to_string(i)).state,
+                  i % 5 == 0 ? store::ShapeState::kFailed : store::ShapeState::kReady);
+    }
+    EXPECT_EQ((*index.byName("parts"))->signatures.size(), 24u);
+}
+
+TEST_F(Pool, DamagedPointsFailTheShape) {
+    store.fault = [](const std::string& function) -> std::optional<Error> {
+        if (function == "loadPoints") return Error{ErrorCode::kDataLoss, "checksum of the points"};
+        return std::nullopt;
+    };
+    start();
+    put("k", 1.0f);
+    ASSERT_TRUE(eventually([&] { return settled("k"); }));
+    EXPECT_EQ(shape("k").failure->code, ErrorCode::kDataLoss);
+}
+
+// A job that was segmented with the parameters of before a rebuild is segmented again.
+TEST_F(Pool, ResultOfOldParametersIsNeverStored) {
+    Gate gate;
+    start(through(gate), 1);
+    put("k", 1.0f);
+    ASSERT_TRUE(eventually([&] { return gate.entered() == 1; }));
+    const auto rebuild = store.startRebuild(parts.id, paperParameters(3));
+    ASSERT_TRUE(rebuild);
+    const auto switched = index.switchGeneration(parts.id, [&] { return store.finishRebuild(rebuild->id); });
+    ASSERT_TRUE(switched && *switched);
+    gate.open();
+    ASSERT_TRUE(eventually([&] { return settled("k"); }));
+    const auto row = store.getSignature(shape("k").id);
+    ASSERT_TRUE(row);
+    EXPECT_EQ(row->generation, 2);
+    EXPECT_EQ(decodeSignature(row->bytes)->scale, 3.0) << "made with the new parameters";
+}
+
+TEST_F(Pool, WatchersHearOfTheEndAfterTheIndexHasIt) {
+    start();
+    const auto k = put("k", 1.0f);
+    const auto watch = board.watch(k.id);
+    while (!settled("k")) {
+        watch->waitForChange(watch->status().sequence, ProgressBoard::Clock::now() + 10ms);
+    }
+    ASSERT_TRUE(eventually([&] { return pool->running() == 0; }));
+    EXPECT_TRUE((*index.byName("parts"))->signatures.find(k.id));
+}
+
+TEST_F(Pool, RetryHintGrowsWithTheQueueWithinBounds) {
+    WorkerPool& workers = start();
+    EXPECT_GE(workers.retryAfter(0), 100ms);
+    EXPECT_LE(workers.retryAfter(10), workers.retryAfter(1'000));
+    EXPECT_LE(workers.retryAfter(1'000'000'000), 60s);
+}
+
+}  // namespace
+}  // namespace shapedb::ingest

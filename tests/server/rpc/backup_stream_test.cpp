@@ -1,0 +1,123 @@
+#include "server/rpc/backup_stream.h"
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "core/base/random.h"
+#include "server/rpc/temporary_file.h"
+
+namespace shapedb::rpc {
+namespace {
+
+class BackupStream : public ::testing::Test {
+  protected:
+    BackupStream() : directory(::testing::TempDir() + "shapedb-backup-" + std::to_string(::getpid())) {
+        EXPECT_TRUE(prepareTemporaryDirectory(directory));
+    }
+    ~BackupStream() override { std::filesystem::remove_all(directory); }
+
+    static std::string noise(std::size_t size) {
+        Random random(size);
+        std::string text(size, '\0');
+        for (char& c : text) c = static_cast<char>(random.next());
+        return text;
+    }
+
+    std::vector<v1::BackupChunk> chunksOf(const std::string& content) {
+        std::ofstream(directory + "/in", std::ios::binary) << content;
+        std::vector<v1::BackupChunk> chunks;
+        const auto sent = sendFile(directory + "/in", {}, [&](const v1::BackupChunk& chunk) {
+            chunks.push_back(chunk);
+            return true;
+        });
+        EXPECT_TRUE(sent) << sent.error().message;
+        return chunks;
+    }
+
+    static std::string contentOf(const std::string& path) {
+        std::ifstream stream(path, std::ios::binary);
+        return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+    }
+
+    std::string directory;
+};
+
+TEST_F(BackupStream, RoundTrip) {
+    for (const std::size_t size :
+         {std::size_t{1}, std::size_t{1} << 20, (std::size_t{1} << 20) + 1, std::size_t{3'500'000}}) {
+        const std::string content = noise(size);
+        const auto chunks = chunksOf(content);
+        EXPECT_EQ(chunks.front().total_bytes(), size);
+        EXPECT_EQ(chunks.back().sha256().size(), 32u);
+        const auto file = TemporaryFile::create(directory);
+        ASSERT_TRUE(file);
+        auto receiver = FileReceiver::create(file->path());
+        ASSERT_TRUE(receiver);
+        for (const auto& chunk : chunks) {
+            EXPECT_LE(chunk.data().size(), std::size_t{1} << 20);
+            const auto added = receiver->add(chunk);
+            ASSERT_TRUE(added) << added.error().message;
+        }
+        ASSERT_TRUE(receiver->finish());
+        EXPECT_EQ(receiver->bytes(), size);
+        EXPECT_EQ(contentOf(file->path()), content);
+    }
+}
+
+TEST_F(BackupStream, ChecksumMayComeWithTheLastData) {
+    const auto chunks = chunksOf(noise(100));
+    v1::BackupChunk one = chunks[0];
+    one.set_sha256(chunks[1].sha256());
+    const auto file = TemporaryFile::create(directory);
+    auto receiver = FileReceiver::create(file->path());
+    ASSERT_TRUE(receiver->add(one));
+    EXPECT_TRUE(receiver->finish());
+}
+
+TEST_F(BackupStream, ReceiverThatHasGoneEndsTheSending) {
+    std::ofstream(directory + "/in", std::ios::binary) << noise(5'000'000);
+    int sent = 0;
+    const auto result = sendFile(directory + "/in", {}, [&](const v1::BackupChunk&) { return ++sent < 2; });
+    EXPECT_EQ(result.error().code, ErrorCode::kCancelled);
+    EXPECT_EQ(sent, 2);
+    EXPECT_EQ(sendFile(directory + "/none", {}, [](const auto&) { return true; }).error().code,
+              ErrorCode::kFileNotReadable);
+}
+
+TEST_F(BackupStream, ExistingFileIsNotOverwritten) {
+    std::ofstream(directory + "/there") << "precious";
+    EXPECT_FALSE(FileReceiver::create(directory + "/there"));
+    EXPECT_EQ(contentOf(directory + "/there"), "precious");
+}
+
+TEST_F(BackupStream, TemporaryFilesGoWithTheirOwner) {
+    std::string path;
+    {
+        auto file = TemporaryFile::create(directory);
+        ASSERT_TRUE(file);
+        path = file->path();
+        std::ofstream(path) << "x";
+        std::ofstream(path + "-wal") << "y";
+        TemporaryFile moved = std::move(*file);
+        EXPECT_EQ(moved.path(), path);
+        EXPECT_TRUE(std::filesystem::exists(path));
+    }
+    EXPECT_FALSE(std::filesystem::exists(path));
+    EXPECT_TRUE(std::filesystem::is_empty(directory));
+    EXPECT_FALSE(TemporaryFile::create(directory + "/none"));
+}
+
+TEST_F(BackupStream, PreparingRemovesLeftovers) {
+    std::filesystem::create_directories(directory + "/a/b");
+    std::ofstream(directory + "/a/b/c") << "x";
+    ASSERT_TRUE(prepareTemporaryDirectory(directory));
+    EXPECT_TRUE(std::filesystem::is_empty(directory));
+    EXPECT_FALSE(prepareTemporaryDirectory("/proc/none/at/all"));
+}
+
+}  // namespace
+}  // namespace shapedb::rpc

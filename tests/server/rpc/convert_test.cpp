@@ -1,0 +1,142 @@
+#include "server/rpc/convert.h"
+
+#include <gtest/gtest.h>
+
+#include "core/signature/signature_codec.h"
+
+namespace shapedb::rpc {
+namespace {
+
+TEST(ParametersFrom, SetFieldsWinOverTheBase) {
+    ShapeParameters current = parametersOf(Profile::kPaper);
+    current.segmentation.mergeRatio = 3.0;
+    pb::SegmentationParameters segmentation;
+    segmentation.set_decimate_to(0);
+    segmentation.set_big_ball_ratio(0.75);
+    const auto kept = parametersFrom(pb::PROFILE_UNSPECIFIED, segmentation, {}, current);
+    ASSERT_TRUE(kept) << kept.error().message;
+    EXPECT_EQ(kept->profile, Profile::kPaper);
+    EXPECT_EQ(kept->segmentation.mergeRatio, 3.0);
+    EXPECT_EQ(kept->segmentation.bigBallRatio, 0.75);
+
+    const auto fresh = parametersFrom(pb::PROFILE_DEFAULT, segmentation, {}, current);
+    ASSERT_TRUE(fresh);
+    EXPECT_EQ(fresh->profile, Profile::kDefault);
+    EXPECT_EQ(fresh->segmentation.mergeRatio, 1.5) << "a profile starts from its defaults";
+    EXPECT_EQ(fresh->segmentation.decimateTo, 0u) << "set to 0 is not unset";
+}
+
+TEST(ParametersFrom, EveryFieldArrives) {
+    pb::SegmentationParameters segmentation;
+    segmentation.set_big_ball_ratio(0.6);
+    segmentation.set_deep_angle_degrees(21.0);
+    segmentation.set_hull_angle_degrees(6.0);
+    segmentation.set_merge_ratio(1.75);
+    segmentation.set_decimate_to(5'000);
+    pb::SignatureParameters signature;
+    signature.set_max_points(11);
+    const auto parameters = parametersFrom(pb::PROFILE_PAPER, segmentation, signature, {});
+    ASSERT_TRUE(parameters);
+    // And back: the collection message says the same.
+    pb::Collection collection;
+    toProto(store::Collection(), *parameters, &collection);
+    EXPECT_EQ(collection.segmentation().SerializeAsString(), segmentation.SerializeAsString());
+    EXPECT_EQ(collection.signature().SerializeAsString(), signature.SerializeAsString());
+    EXPECT_EQ(collection.profile(), pb::PROFILE_PAPER);
+}
+
+TEST(ParametersFrom, RefusesUnknownProfilesAndBadValues) {
+    EXPECT_FALSE(parametersFrom(static_cast<pb::Profile>(3), {}, {}, {}));
+    pb::SegmentationParameters segmentation;
+    segmentation.set_merge_ratio(0.99);
+    const auto refused = parametersFrom(pb::PROFILE_PAPER, segmentation, {}, {});
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST(Enums, RoundTripAndRefuseTheUnknown) {
+    for (const auto state :
+         {store::ShapeState::kPending, store::ShapeState::kReady, store::ShapeState::kFailed}) {
+        const auto back = fromProto(toProto(state));
+        ASSERT_TRUE(back && *back);
+        EXPECT_EQ(**back, state);
+    }
+    const auto all = fromProto(pb::SHAPE_STATE_UNSPECIFIED);
+    ASSERT_TRUE(all);
+    EXPECT_FALSE(*all);
+    EXPECT_FALSE(fromProto(static_cast<pb::ShapeState>(4)));
+    EXPECT_EQ(*fromProto(pb::ADD_MODE_UNSPECIFIED), store::PutMode::kUpsert);
+    EXPECT_EQ(*fromProto(pb::ADD_MODE_INSERT_ONLY), store::PutMode::kInsertOnly);
+    EXPECT_EQ(*fromProto(pb::ADD_MODE_UPDATE_ONLY), store::PutMode::kUpdateOnly);
+    EXPECT_FALSE(fromProto(static_cast<pb::AddMode>(4)));
+}
+
+TEST(Timestamps, AreSplitTowardsThePast) {
+    google::protobuf::Timestamp time;
+    toProto(1'500, &time);
+    EXPECT_EQ(time.seconds(), 1);
+    EXPECT_EQ(time.nanos(), 500'000'000);
+    toProto(-1, &time);
+    EXPECT_EQ(time.seconds(), -1);
+    EXPECT_EQ(time.nanos(), 999'000'000);
+    toProto(-2'000, &time);
+    EXPECT_EQ(time.seconds(), -2);
+    EXPECT_EQ(time.nanos(), 0);
+}
+
+TEST(Shapes, AllFieldsArrive) {
+    store::Shape shape;
+    shape.id = 5;
+    shape.key = "k";
+    shape.version = 3;
+    shape.state = store::ShapeState::kFailed;
+    shape.pointCount = 99;
+    shape.checksum[31] = 7;
+    shape.metadata = {{"label", "cup"}};
+    shape.createdAt = 1'000;
+    shape.updatedAt = 2'000;
+    shape.failure = Error{ErrorCode::kNoInterior, "why"};
+    pb::Shape message;
+    toProto(shape, "parts", &message);
+    EXPECT_EQ(message.collection(), "parts");
+    EXPECT_EQ(message.id(), 5);
+    EXPECT_EQ(message.key(), "k");
+    EXPECT_EQ(message.version(), 3);
+    EXPECT_EQ(message.state(), pb::SHAPE_STATE_FAILED);
+    EXPECT_EQ(message.point_count(), 99u);
+    ASSERT_EQ(message.sha256().size(), 32u);
+    EXPECT_EQ(message.sha256()[31], 7);
+    EXPECT_EQ(message.metadata().at("label"), "cup");
+    EXPECT_EQ(message.created().seconds(), 1);
+    EXPECT_EQ(message.updated().seconds(), 2);
+    EXPECT_EQ(message.failure().error(), "no_interior");
+    EXPECT_EQ(message.failure().message(), "why");
+}
+
+TEST(Signatures, AreInScanUnits) {
+    Signature signature;
+    signature.scale = 10.0;
+    signature.origin = {100.0, 0.0, 0.0};
+    signature.volume = 600.0;
+    signature.points.resize(2);
+    signature.points[0].weight = 0.4f;
+    signature.points[0].volumeShare = 0.75f;
+    signature.points[0].peakRadius = 0.5f;
+    signature.points[1].weight = 0.125f;
+    signature.points[1].position = {0.5f, 0.0f, -1.0f};
+    pb::Signature message;
+    toProto(signature, &message);
+    ASSERT_EQ(message.points_size(), 2);
+    EXPECT_EQ(message.points(0).position().x(), 100.0);
+    EXPECT_EQ(message.points(0).peak_radius(), 5.0);
+    EXPECT_EQ(message.points(0).volume_share(), 0.75);
+    EXPECT_EQ(message.points(1).position().x(), 105.0);
+    EXPECT_EQ(message.points(1).position().z(), -10.0);
+    EXPECT_EQ(message.points(1).weight(), 125.0);
+    EXPECT_EQ(message.scale(), 10.0);
+    EXPECT_EQ(message.volume(), 600.0);
+    EXPECT_EQ(message.encoded(), encodeSignature(signature));
+}
+
+}  // namespace
+}  // namespace shapedb::rpc

@@ -1,0 +1,82 @@
+#include "server/rpc/status.h"
+
+#include <map>
+
+#include <gtest/gtest.h>
+
+namespace shapedb::rpc {
+namespace {
+
+using grpc::StatusCode;
+
+// The table of docs/api.md, by name; a new error belongs in both.
+const std::map<std::string, StatusCode> kTable = {
+    {"non_finite_coordinate", StatusCode::INVALID_ARGUMENT},
+    {"coordinate_out_of_range", StatusCode::INVALID_ARGUMENT},
+    {"too_few_points", StatusCode::INVALID_ARGUMENT},
+    {"all_points_equal", StatusCode::INVALID_ARGUMENT},
+    {"collinear", StatusCode::INVALID_ARGUMENT},
+    {"coplanar", StatusCode::INVALID_ARGUMENT},
+    {"no_interior", StatusCode::INVALID_ARGUMENT},
+    {"point_limit_exceeded", StatusCode::OUT_OF_RANGE},
+    {"file_not_readable", StatusCode::INTERNAL},
+    {"unknown_file_format", StatusCode::INVALID_ARGUMENT},
+    {"malformed_file", StatusCode::INVALID_ARGUMENT},
+    {"file_not_writable", StatusCode::INTERNAL},
+    {"invalid_argument", StatusCode::INVALID_ARGUMENT},
+    {"malformed_filter", StatusCode::INVALID_ARGUMENT},
+    {"malformed_cursor", StatusCode::INVALID_ARGUMENT},
+    {"malformed_signature", StatusCode::INVALID_ARGUMENT},
+    {"malformed_stream", StatusCode::INVALID_ARGUMENT},
+    {"checksum_mismatch", StatusCode::INVALID_ARGUMENT},
+    {"count_mismatch", StatusCode::INVALID_ARGUMENT},
+    {"not_found", StatusCode::NOT_FOUND},
+    {"already_exists", StatusCode::ALREADY_EXISTS},
+    {"version_conflict", StatusCode::ABORTED},
+    {"not_ready", StatusCode::FAILED_PRECONDITION},
+    {"rejected", StatusCode::FAILED_PRECONDITION},
+    {"queue_full", StatusCode::RESOURCE_EXHAUSTED},
+    {"unavailable", StatusCode::UNAVAILABLE},
+    {"cancelled", StatusCode::CANCELLED},
+    {"deadline_exceeded", StatusCode::DEADLINE_EXCEEDED},
+    {"out_of_memory", StatusCode::RESOURCE_EXHAUSTED},
+    {"storage", StatusCode::INTERNAL},
+    {"storage_full", StatusCode::RESOURCE_EXHAUSTED},
+    {"data_loss", StatusCode::DATA_LOSS},
+    {"schema_too_new", StatusCode::FAILED_PRECONDITION},
+    {"internal", StatusCode::INTERNAL},
+};
+
+TEST(StatusCodeOf, EveryErrorHasItsCode) {
+    EXPECT_EQ(kTable.size(), static_cast<std::size_t>(ErrorCode::kInternal) + 1);
+    for (int i = 0; i <= static_cast<int>(ErrorCode::kInternal); ++i) {
+        const auto code = static_cast<ErrorCode>(i);
+        const auto row = kTable.find(errorCodeName(code));
+        ASSERT_NE(row, kTable.end()) << errorCodeName(code);
+        EXPECT_EQ(statusCodeOf(code), row->second) << row->first;
+    }
+}
+
+TEST(MakeStatus, CarriesCodeAndMessage) {
+    grpc::ServerContext context;
+    const grpc::Status status = makeStatus({ErrorCode::kVersionConflict, "version is 3"}, context);
+    EXPECT_EQ(status.error_code(), StatusCode::ABORTED);
+    EXPECT_EQ(status.error_message(), "version is 3");
+}
+
+TEST(MakeStatus, CutsLongMessages) {
+    grpc::ServerContext context;
+    EXPECT_EQ(makeStatus({ErrorCode::kInternal, std::string(10'000, 'x')}, context).error_message().size(),
+              2'048u);
+}
+
+TEST(CutText, NeverCutsACharacterInTwo) {
+    const std::string text = "aé€𝄞";  // 1, 2, 3 and 4 bytes
+    const std::map<std::size_t, std::string> expected = {{0, ""},    {1, "a"},   {2, "a"},   {3, "aé"},
+                                                         {4, "aé"},  {5, "aé"},  {6, "aé€"}, {7, "aé€"},
+                                                         {8, "aé€"}, {9, "aé€"}, {10, text}, {11, text}};
+    for (const auto& [limit, cut] : expected) EXPECT_EQ(cutText(text, limit), cut) << limit;
+}
+
+}  // namespace
+}  // namespace shapedb::rpc

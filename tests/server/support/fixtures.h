@@ -1,0 +1,96 @@
+// Small things several server tests need.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "core/signature/profile.h"
+#include "core/signature/signature_codec.h"
+#include "server/index/parameters_codec.h"
+#include "server/store/store.h"
+#include "server/telemetry/logger.h"
+
+namespace shapedb::testing {
+
+/// A valid signature whose volume says which one it is.
+inline Signature signatureOf(double volume) {
+    Signature signature;
+    signature.points.resize(1);
+    signature.points[0].weight = 0.5f;
+    signature.points[0].volumeShare = 1.0f;
+    signature.points[0].peakRadius = 0.25f;
+    signature.points[0].covariance = {0.01f, 0.0f, 0.0f, 0.01f, 0.0f, 0.01f};
+    signature.volume = volume;
+    return signature;
+}
+
+/// Points whose first coordinate is `tag`.
+inline std::vector<float> taggedPoints(float tag) { return {tag, 0, 0, 0, 1, 0, 0, 0, 1, 1, 1, 1}; }
+
+/// A describer that needs no geometry: the signature's volume is the first coordinate, its
+/// scale the parameters' maximum of points. Negative coordinates have no interior.
+inline Result<Description> quickDescribe(const PointCloud& points, const ShapeParameters& parameters,
+                                         const RunContext& context) {
+    context.report("quick", 0, 0);
+    if (const auto go = context.checkpoint(); !go) return fail(go.error());
+    if (points.at(0).x < 0.0) return fail(ErrorCode::kNoInterior, "negative tag");
+    Description description;
+    description.signature = signatureOf(points.at(0).x);
+    description.signature.scale = parameters.signature.maxPoints;
+    return description;
+}
+
+inline store::PutRequest putRequest(std::int64_t collectionId, const std::string& key,
+                                    const std::vector<float>& points, store::Metadata metadata = {}) {
+    store::PutRequest request;
+    request.collectionId = collectionId;
+    request.key = key;
+    request.points = &points;
+    request.checksum[0] = static_cast<std::uint8_t>(static_cast<int>(points[0]));
+    request.metadata = std::move(metadata);
+    return request;
+}
+
+inline std::string paperParameters(std::uint32_t maxPoints = 7) {
+    ShapeParameters parameters = parametersOf(Profile::kPaper);
+    parameters.signature.maxPoints = maxPoints;
+    return index::encodeParameters(parameters);
+}
+
+inline bool eventually(const std::function<bool()>& condition,
+                       std::chrono::milliseconds atMost = std::chrono::seconds(10)) {
+    const auto until = std::chrono::steady_clock::now() + atMost;
+    while (!condition()) {
+        if (std::chrono::steady_clock::now() >= until) return false;
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    return true;
+}
+
+/// Keeps the lines.
+class RecordingLogger : public telemetry::Logger {
+  public:
+    void log(telemetry::Level, const std::string& message,
+             const std::vector<telemetry::Field>& fields) override {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        lines_.push_back(telemetry::formatText(message, fields));
+    }
+    std::string all() const {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        std::string text;
+        for (const std::string& line : lines_) text += line + "\n";
+        return text;
+    }
+
+  private:
+    mutable std::mutex mutex_;
+    std::vector<std::string> lines_;
+};
+
+}  // namespace shapedb::testing

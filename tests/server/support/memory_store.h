@@ -1,0 +1,113 @@
+// The Store contract in maps: a plain second implementation for tests of what stands above
+// it. Not durable; backup and restore copy a whole MemoryStore by name of "file".
+#pragma once
+
+#include <functional>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "server/store/store.h"
+
+namespace shapedb::testing {
+
+class MemoryStore : public store::Store {
+  public:
+    /// Called at the start of each function with its name; an error it returns is the
+    /// function's. Set before use.
+    std::function<std::optional<Error>(const std::string& function)> fault;
+
+    Result<store::Collection> createCollection(const std::string& name, const std::string& description,
+                                               const std::string& parameters) override;
+    Result<store::Collection> getCollection(const std::string& name) override;
+    Result<std::vector<store::Collection>> listCollections() override;
+    Result<void> deleteCollection(std::int64_t collectionId) override;
+
+    Result<store::PutResult> putShape(const store::PutRequest& request) override;
+    Result<store::Shape> getShape(std::int64_t collectionId, const std::string& key) override;
+    Result<store::Shape> getShapeById(std::int64_t shapeId) override;
+    Result<std::vector<store::Shape>> listShapes(std::int64_t collectionId, std::int64_t afterId,
+                                                 std::size_t limit,
+                                                 const store::ShapeFilter& filter) override;
+    Result<std::uint64_t> countShapes(std::int64_t collectionId, const store::ShapeFilter& filter) override;
+    Result<store::Shape> deleteShape(std::int64_t collectionId, const std::string& key,
+                                     std::optional<std::int64_t> expectedVersion) override;
+    Result<std::vector<float>> loadPoints(std::int64_t shapeId) override;
+    Result<store::SignatureRow> getSignature(std::int64_t shapeId) override;
+
+    Result<std::optional<store::Job>> claimJob() override;
+    Result<std::optional<store::Shape>> finishJob(const store::Job& job,
+                                                  const store::SignatureRow& signature) override;
+    Result<std::optional<store::Shape>> failJob(const store::Job& job, const Error& why) override;
+    Result<void> releaseJob(const store::Job& job) override;
+    Result<std::vector<store::Shape>> recoverJobs(int maxAttempts) override;
+    Result<store::QueueDepth> queueDepth() override;
+
+    Result<std::vector<store::IndexRow>> loadIndex(std::int64_t collectionId, std::int64_t afterId,
+                                                   std::size_t limit) override;
+
+    Result<store::Rebuild> startRebuild(std::int64_t collectionId, const std::string& parameters) override;
+    Result<store::Rebuild> getRebuild(std::int64_t rebuildId) override;
+    Result<std::vector<store::Rebuild>> runningRebuilds() override;
+    Result<std::vector<store::Shape>> rebuildBatch(std::int64_t rebuildId, std::int64_t afterId,
+                                                   std::size_t limit) override;
+    Result<void> putRebuilt(std::int64_t rebuildId, const store::SignatureRow& signature) override;
+    Result<void> putRebuildFailure(std::int64_t rebuildId, std::int64_t shapeId, std::int64_t pointsVersion,
+                                   const Error& why) override;
+    Result<bool> finishRebuild(std::int64_t rebuildId) override;
+    Result<void> abandonRebuild(std::int64_t rebuildId, store::RebuildState state) override;
+
+    Result<void> backup(const std::string& path, const RunContext& context) override;
+    Result<void> restore(const std::string& path, const RunContext& context) override;
+    Result<std::vector<std::string>> check(const RunContext& context) override;
+    Result<store::StoreStats> stats() override;
+    Result<void> checkpoint() override;
+
+  private:
+    struct QueuedJob {
+        store::Job job;
+        bool running = false;
+    };
+    /// What a rebuild knows of one shape; an error instead of bytes when it failed.
+    struct Rebuilt {
+        std::int64_t pointsVersion = 0;
+        std::string bytes;
+        std::optional<Error> failure;
+    };
+    struct Content {
+        std::map<std::int64_t, store::Collection> collections;
+        std::map<std::int64_t, store::Shape> shapes;
+        std::map<std::int64_t, std::vector<float>> points;
+        std::map<std::int64_t, store::SignatureRow> signatures;
+        std::map<std::int64_t, QueuedJob> jobs;
+        std::map<std::int64_t, store::Rebuild> rebuilds;
+        std::map<std::int64_t, std::map<std::int64_t, Rebuilt>> rebuilt;
+        std::int64_t nextId = 1;
+    };
+
+    template <typename Body>
+    auto guarded(const char* function, Body&& body) -> decltype(body()) {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        if (fault) {
+            if (auto error = fault(function)) return fail(*error);
+        }
+        return body();
+    }
+
+    store::Shape* find(std::int64_t collectionId, const std::string& key);
+    void queueJob(const store::Shape& shape);
+    void removeShape(std::int64_t shapeId);
+    /// The shape if the job is still its current one; the job is dropped in any case.
+    store::Shape* settle(const store::Job& job);
+    bool hasJob(std::int64_t shapeId) const;
+    void count(store::Rebuild& rebuild) const;
+
+    std::mutex mutex_;
+    Content content_;
+    std::map<std::string, Content> backups_;
+};
+
+}  // namespace shapedb::testing
