@@ -27,13 +27,13 @@ using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 // many starts lie about 12 degrees apart there.
 constexpr int kStarts = 400;
 constexpr double kFirstStep = 0.1;     // radians, half the distance between starts
-constexpr double kRefineStep = 0.004;  // radians; basins are told apart here
+constexpr double kRefineStep = 0.004;  // radians; enough to tell basins apart
 constexpr double kLastStep = 1e-5;     // radians; the diagonal moves by less than this share
 constexpr std::size_t kCoarseDescents = 48;
-constexpr std::size_t kFineDescents = 6;
+constexpr std::size_t kFineDescents = 8;
 
 // The function has creases (a face of the box passes from one vertex to another), along which
-// only a few directions lead down: as many random ones fail before the step is halved.
+// only a few directions lead down: as many random turns of up to a step fail before it is halved.
 constexpr int kTriesPerStep = 24;
 
 // Basins are searched on no more than the farthest hull vertices in this many directions.
@@ -116,7 +116,7 @@ struct Box {
 Box descend(const PointCloud& points, Box box, double firstStep, double lastStep, Random& random) {
     for (double step = firstStep; step > lastStep; step *= 0.5) {
         for (int failures = 0; failures < kTriesPerStep;) {
-            const Matrix3 candidate = turned(box.axes, randomDirection(random), step);
+            const Matrix3 candidate = turned(box.axes, randomDirection(random), step * random.uniform());
             const double value = squaredDiagonal(points, candidate);
             if (value < box.squaredDiagonal) {
                 box = {value, candidate};
@@ -150,7 +150,7 @@ double leastSquaredDiagonal(const PointCloud& vertices) {
     double least = INFINITY;
     for (Box& box : boxes) {
         box.squaredDiagonal = squaredDiagonal(vertices, box.axes);
-        least = std::min(least, descend(vertices, box, kRefineStep, kLastStep, random).squaredDiagonal);
+        least = std::min(least, descend(vertices, box, kFirstStep, kLastStep, random).squaredDiagonal);
     }
     return least;
 }

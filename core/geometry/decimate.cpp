@@ -16,7 +16,8 @@ namespace {
 constexpr double kMinCell = 2.0 / (1 << 20);
 // Coarsest: one cell holds everything, the far corner (1, 1, 1) too.
 constexpr double kMaxCell = 2.5;
-constexpr int kMaxSteps = 24;
+constexpr int kMaxSteps = 32;
+constexpr int kSecantSteps = 4;
 constexpr double kAcceptedShare = 0.9;
 
 using Keyed = std::pair<std::uint64_t, std::uint32_t>;  // cell, point
@@ -84,9 +85,11 @@ Result<DecimatedPoints> decimateOrThrow(const PointCloud& points, std::size_t ta
         } else {
             fine = cell;
         }
-        // Aim a little below the target; fall back to bisection when the step leaves the bracket.
+        // Aim a little below the target. Where nearly every point has a cell of its own the count
+        // hardly answers to the size and such steps creep: then every other one bisects.
         const double guess = cell * std::sqrt(share / 0.96);
-        cell = guess > fine && guess < coarse ? guess : std::sqrt(fine * coarse);
+        const bool bisect = step >= kSecantSteps && step % 2 == 0;
+        cell = !bisect && guess > fine && guess < coarse ? guess : std::sqrt(fine * coarse);
     }
     if (best.empty()) best = sortedByCell(points, bestCell);
     return averageCells(points, best, bestCell);

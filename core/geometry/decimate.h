@@ -20,7 +20,7 @@ struct DecimatedPoints {
 
 /// At most `target` points, usually at least nine tenths of that. Scans that have no more
 /// already come back merged and sorted but otherwise unchanged. The cell size is found by a
-/// few secant steps: a surface's cells grow with the inverse square of the size.
+/// few secant and bisection steps: a surface's cells grow with the inverse square of the size.
 ///
 /// Precondition: finite coordinates with magnitude at most 1 (as sanitise returns them).
 /// Errors: kInvalidArgument when target < 4; kCancelled, kDeadlineExceeded; kOutOfMemory.
