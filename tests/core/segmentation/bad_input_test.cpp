@@ -1,0 +1,273 @@
+// Every way a scan can be unusable, and how running work is stopped and watched.
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "core/base/random.h"
+#include "core/geometry/motion.h"
+#include "core/segmentation/segmentation.h"
+#include "core/synthetic/named_shapes.h"
+
+namespace shapedb {
+namespace {
+
+using Clock = RunContext::Clock;
+
+PointCloud dumbbell(std::size_t count) { return sampleBoundary(makeDumbbell().solid, count, 1).value(); }
+
+double secondsSince(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+void expectError(const PointCloud& points, ErrorCode code, const std::vector<std::string>& words = {}) {
+    const auto result = segment(points, {});
+    ASSERT_FALSE(result);
+    EXPECT_EQ(result.error().code, code) << result.error().message;
+    for (const std::string& word : words) {
+        EXPECT_NE(result.error().message.find(word), std::string::npos) << result.error().message;
+    }
+}
+
+TEST(BadInput, NonFiniteCoordinatesAreNamed) {
+    PointCloud points = dumbbell(500);
+    points[77].y = std::nan("");
+    expectError(points, ErrorCode::kNonFiniteCoordinate, {"y", "77", "NaN"});
+    points = dumbbell(500);
+    points[499].z = -std::numeric_limits<double>::infinity();
+    expectError(points, ErrorCode::kNonFiniteCoordinate, {"z", "499", "infinite"});
+}
+
+TEST(BadInput, TooFewPoints) {
+    PointCloud points;
+    for (int i = 0; i < 4; ++i) {
+        expectError(points, ErrorCode::kTooFewPoints, {std::to_string(i)});
+        points.push_back({i * 1.0, i * i * 1.0, i * i * i * 1.0});
+    }
+    expectError({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 1, 0}, {1, 0, 0}}, ErrorCode::kTooFewPoints,
+                {"3 of 5"});
+}
+
+TEST(BadInput, AMillionCopiesOfOnePointAreRefusedAtOnce) {
+    const auto start = Clock::now();
+    expectError(PointCloud(1000000, Point3{0.1, -7.0, 3e5}), ErrorCode::kAllPointsEqual, {"1000000"});
+    EXPECT_LT(secondsSince(start), 5.0);
+}
+
+TEST(BadInput, AMillionCopiesDoNotHideTheShape) {
+    PointCloud points = dumbbell(2000);
+    points.insert(points.end(), 1000000, points[5]);
+    const auto result = segment(points, {});
+    ASSERT_TRUE(result);
+    EXPECT_EQ(result->duplicates, 1000000U);
+    EXPECT_EQ(result->sites.size(), 2000U);
+    EXPECT_EQ(result->pointSegment.back(), result->pointSegment[5]);
+}
+
+TEST(BadInput, PointsOnALine) {
+    Random random(2);
+    const Point3 direction{0.3, -0.7, 0.2};
+    for (const double scale : {1e-6, 1.0, 1e6}) {
+        PointCloud axis;
+        PointCloud slanted;
+        PointCloud rounded;
+        for (int i = 0; i < 300; ++i) {
+            const double t = scale * random.uniform(-1, 1);
+            axis.push_back({t, 0, 0});
+            slanted.push_back(t * direction);
+            rounded.push_back({static_cast<float>(t * direction.x), static_cast<float>(t * direction.y),
+                               static_cast<float>(t * direction.z)});
+        }
+        expectError(axis, ErrorCode::kCollinear);
+        expectError(slanted, ErrorCode::kCollinear);
+        expectError(rounded, ErrorCode::kCollinear);
+    }
+}
+
+TEST(BadInput, PointsInAPlane) {
+    Random random(3);
+    for (int turn = 0; turn < 5; ++turn) {
+        const Matrix3 rotation = turn == 0 ? Motion{}.rotation : randomRotation(random);
+        PointCloud plane;
+        PointCloud rounded;
+        for (int i = 0; i < 500; ++i) {
+            const Point3 p = rotate(rotation, {random.uniform(-1, 1), random.uniform(-1, 1), 0.0});
+            plane.push_back(p);
+            rounded.push_back({static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)});
+        }
+        expectError(plane, ErrorCode::kCoplanar);
+        expectError(rounded, ErrorCode::kCoplanar);
+    }
+}
+
+TEST(BadInput, MagnitudesBeyondSinglePrecision) {
+    PointCloud points = dumbbell(500);
+    points[3].x = 1e300;
+    expectError(points, ErrorCode::kCoordinateOutOfRange, {"x", "3"});
+    points = dumbbell(500);
+    for (Point3& p : points) p = 1e-300 * p;
+    expectError(points, ErrorCode::kCoordinateOutOfRange, {"smaller"});
+}
+
+TEST(BadInput, TinyDifferencesWithinAShapeAreHarmless) {
+    // Coordinates of 1e-200 beside ones of 1 must not overflow a circumcentre.
+    PointCloud points;
+    for (const double z : {-1.0, 1.0}) {
+        for (int i = 0; i < 12; ++i) points.push_back({std::cos(i * 0.5236), std::sin(i * 0.5236), z});
+    }
+    Random random(1);
+    for (int i = 0; i < 12; ++i) {
+        points.push_back({std::cos(i * 0.5236), std::sin(i * 0.5236), random.uniform(-1e-200, 1e-200)});
+    }
+    const auto result = segment(points, {});
+    if (result) {
+        for (const double radius : result->tetrahedra.circumradii) EXPECT_TRUE(std::isfinite(radius));
+    } else {
+        EXPECT_EQ(result.error().code, ErrorCode::kNoInterior) << result.error().message;
+    }
+}
+
+TEST(BadInput, DuplicatesAreMergedAndCounted) {
+    const PointCloud once = dumbbell(1500);
+    PointCloud thrice = once;
+    thrice.insert(thrice.end(), once.rbegin(), once.rend());
+    thrice.insert(thrice.end(), once.begin(), once.end());
+    const auto a = segment(once, {});
+    const auto b = segment(thrice, {});
+    ASSERT_TRUE(a && b);
+    EXPECT_EQ(a->duplicates, 0U);
+    EXPECT_EQ(b->duplicates, 3000U);
+    EXPECT_EQ(a->volume, b->volume);
+    for (std::size_t i = 0; i < once.size(); ++i) {
+        ASSERT_EQ(b->pointSegment[i], a->pointSegment[i]);
+        ASSERT_EQ(b->pointSegment[2999 - i], a->pointSegment[i]);
+    }
+}
+
+TEST(BadInput, OptionsOutOfRange) {
+    SegmentationOptions options;
+    options.deepAngleDegrees = 0.0;
+    EXPECT_EQ(segment(dumbbell(500), options).error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST(BadInput, OpenSheetsAreRefusedOrLeaveSliversOnly) {
+    Random random(5);
+    PointCloud sheet;
+    PointCloud noisyPlane;
+    for (int i = 0; i < 4000; ++i) {
+        const double x = random.uniform(-1, 1);
+        const double y = random.uniform(-1, 1);
+        sheet.push_back({x, y, 0.05 * std::sin(3 * x) * std::cos(2 * y)});
+        noisyPlane.push_back({x, y, 1e-4 * random.normal()});
+    }
+    for (const PointCloud* open : {&sheet, &noisyPlane}) {
+        const auto result = segment(*open, {});
+        if (result) {
+            EXPECT_LT(result->volume, 1e-5 * std::pow(result->size, 3.0));
+        } else {
+            EXPECT_EQ(result.error().code, ErrorCode::kNoInterior) << result.error().message;
+        }
+    }
+}
+
+// A bowl is not refused: the balls behind its opening are no larger than the opening, nothing
+// says that it is one, and the method closes it with its hull.
+TEST(BadInput, AHemisphereIsClosedByItsHull) {
+    Random random(5);
+    PointCloud bowl;
+    for (int i = 0; i < 4000; ++i) {
+        const Point3 d{random.normal(), random.normal(), std::abs(random.normal())};
+        bowl.push_back((1.0 / length(d)) * d);
+    }
+    const auto result = segment(bowl, {});
+    ASSERT_TRUE(result);
+    EXPECT_NEAR(result->volume, 2.0943951, 0.02 * 2.0943951);
+}
+
+TEST(BadInput, NoBigBallsNoInterior) {
+    SegmentationOptions options;
+    options.bigBallRatio = 1e6;
+    const auto result = segment(dumbbell(500), options);
+    ASSERT_FALSE(result);
+    EXPECT_EQ(result.error().code, ErrorCode::kNoInterior);
+    EXPECT_NE(result.error().message.find("big_ball_ratio"), std::string::npos) << "says what to do";
+}
+
+// Cancels when a stage begins, or in the middle of the triangulation: every stage can be left.
+TEST(RunControl, CancellingInEachStageStops) {
+    const PointCloud points = dumbbell(20000);
+    SegmentationOptions options;
+    options.decimateTo = 15000;
+    for (const std::string stop : {"sanitise", "decimate", "delaunay", "point_scale", "interior", "flow",
+                                   "segments", "merge", "describe"}) {
+        std::atomic<bool> cancel{false};
+        RunContext context;
+        context.cancel = &cancel;
+        std::string last;
+        context.progress = [&](const char* stage, std::uint64_t, std::uint64_t) {
+            last = stage;
+            if (stage == stop) cancel = true;
+        };
+        const auto result = segment(points, options, context);
+        ASSERT_FALSE(result) << stop;
+        EXPECT_EQ(result.error().code, ErrorCode::kCancelled) << stop;
+        EXPECT_EQ(last, stop) << "nothing runs after the stage that was cancelled";
+    }
+}
+
+TEST(RunControl, AFlagSetByAnotherThreadStopsPromptly) {
+    const PointCloud points = dumbbell(200000);
+    std::atomic<bool> cancel{false};
+    RunContext context;
+    context.cancel = &cancel;
+    std::atomic<Clock::rep> cancelledAt{0};
+    std::thread other([&] {
+        std::this_thread::sleep_for(std::chrono::milliseconds(300));
+        cancelledAt = Clock::now().time_since_epoch().count();
+        cancel = true;
+    });
+    const auto result = segment(points, {}, context);
+    const auto returned = Clock::now();
+    other.join();
+    ASSERT_FALSE(result);
+    EXPECT_EQ(result.error().code, ErrorCode::kCancelled);
+    EXPECT_LT(
+        std::chrono::duration<double>(returned.time_since_epoch() - Clock::duration(cancelledAt)).count(),
+        1.0);
+}
+
+TEST(RunControl, ThePassedDeadlineIsNamed) {
+    RunContext context;
+    context.deadline = Clock::now() + std::chrono::milliseconds(60);
+    const auto start = Clock::now();
+    const auto result = segment(dumbbell(200000), {}, context);
+    ASSERT_FALSE(result);
+    EXPECT_EQ(result.error().code, ErrorCode::kDeadlineExceeded);
+    EXPECT_LT(secondsSince(start), 3.0);
+}
+
+TEST(RunControl, ProgressNamesEveryStage) {
+    std::vector<std::string> stages;
+    bool moved = false;
+    RunContext context;
+    context.progress = [&](const char* stage, std::uint64_t done, std::uint64_t total) {
+        if (stages.empty() || stages.back() != stage) stages.push_back(stage);
+        EXPECT_LE(done, total);
+        moved = moved || (done > 0 && total > done);
+    };
+    const auto result = segment(dumbbell(10000), {}, context);
+    ASSERT_TRUE(result);
+    std::vector<std::string> timed;
+    for (const StageTime& stage : result->stages) timed.push_back(stage.stage);
+    EXPECT_EQ(stages, timed);
+    EXPECT_TRUE(moved) << "the triangulation reports how far it is";
+}
+
+}  // namespace
+}  // namespace shapedb
