@@ -1,4 +1,5 @@
 // AdminService and grpc.health.v1.
+#include <algorithm>
 #include <fstream>
 
 #include <google/protobuf/io/coded_stream.h>
@@ -47,33 +48,31 @@ Result<BackupReport> receiveBackup(Stream& stream, BackupFile& file, const RunCo
     return report;
 }
 
-/// Sends the file: size first, then chunks, the checksum with the last message.
+/// Sends the file: the size goes with the first chunk, the checksum with the last.
 template <typename Stream>
 Result<void> sendBackup(Stream& stream, std::ifstream& file, std::uint64_t size, const std::string& path,
                         const RunContext& context) {
-    v1::BackupChunk chunk;
-    chunk.set_total_bytes(size);
-    if (!stream.Write(chunk)) return {};  // the status of the call says why
     Sha256 checksum;
     std::string buffer(kBackupChunkBytes, '\0');
     std::uint64_t sent = 0;
     while (sent < size) {
-        file.read(buffer.data(), static_cast<std::streamsize>(buffer.size()));
+        // Never beyond the announced size, even if somebody appends to the file meanwhile.
+        file.read(buffer.data(),
+                  static_cast<std::streamsize>(std::min<std::uint64_t>(buffer.size(), size - sent)));
         const auto count = static_cast<std::size_t>(file.gcount());
         if (count == 0) {
             return fail(ErrorCode::kFileNotReadable,
                         path + ": cannot be read beyond byte " + std::to_string(sent));
         }
         checksum.update(buffer.data(), count);
-        chunk.Clear();
+        v1::BackupChunk chunk;
+        if (sent == 0) chunk.set_total_bytes(size);
         chunk.set_data(buffer.data(), count);
-        if (!stream.Write(chunk)) return {};
         sent += count;
+        if (sent == size) chunk.set_sha256(asBytes(checksum.finish()));
+        if (!stream.Write(chunk)) return {};  // the status of the call says why
         context.report("restore", sent, size);
     }
-    chunk.Clear();
-    chunk.set_sha256(asBytes(checksum.finish()));
-    stream.Write(chunk);
     stream.WritesDone();
     return {};
 }

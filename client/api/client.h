@@ -44,7 +44,7 @@ struct ClientOptions {
     /// work on the server (watchIngest, addShape with wait, rebuild, backup, restore, check)
     /// are bounded by the deadline of their RunContext alone.
     std::chrono::milliseconds deadline{60000};
-    RetryPolicy retry;
+    RetryPolicy retry{};
 };
 
 /// A connection to one server. It is made when first needed and again after it was lost.

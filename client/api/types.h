@@ -83,12 +83,12 @@ enum class AddMode {
 };
 
 struct AddRequest {
-    ShapeRef shape;
+    ShapeRef shape{};
     AddMode mode = AddMode::kUpsert;
-    Metadata metadata;
+    Metadata metadata{};
     /// When set, the version the shape must have now; 0: the key must be free. A call with
     /// this set is not retried: the lost first try may have changed the version.
-    std::optional<std::int64_t> expectedVersion;
+    std::optional<std::int64_t> expectedVersion{};
     /// Return only when the shape is kReady or kFailed.
     bool wait = false;
 };
@@ -110,11 +110,11 @@ struct AddReply {
 };
 
 struct ListRequest {
-    std::string collection;
-    std::string filter;               ///< docs/filters.md; empty: all
-    std::optional<ShapeState> state;  ///< not set: any
-    std::uint32_t pageSize = 0;       ///< 1 to 1,000; 0: 100
-    std::string cursor;               ///< nextCursor of the page before
+    std::string collection{};
+    std::string filter{};               ///< docs/filters.md; empty: all
+    std::optional<ShapeState> state{};  ///< not set: any
+    std::uint32_t pageSize = 0;         ///< 1 to 1,000; 0: 100
+    std::string cursor{};               ///< nextCursor of the page before
 };
 
 struct ListPage {
@@ -177,10 +177,10 @@ struct SegmentedScan {
 };
 
 struct SearchOptions {
-    std::string collection;
+    std::string collection{};
     std::uint32_t k = 10;     ///< 1 to the server's limit
     double threshold = 0.0;   ///< hits have at least this score, [0, 1]
-    std::string filter;       ///< the k best of those that pass
+    std::string filter{};     ///< the k best of those that pass
     bool reflection = true;   ///< false tells left from right
     bool keepScale = false;   ///< true compares sizes too
     bool explanation = true;  ///< false leaves out motion and matches of each hit
@@ -225,8 +225,8 @@ struct SearchReply {
 
 /// One query of a batch: a stored shape (itself left out), or a signature taken before.
 struct BatchQuery {
-    std::string key;        ///< used when `signature` is empty
-    std::string signature;  ///< Signature::encoded
+    std::string key{};        ///< used when `signature` is empty
+    std::string signature{};  ///< Signature::encoded
 };
 
 struct Comparison {

@@ -28,7 +28,7 @@ struct EvaluateFlags {
     std::string match = "folder";
     std::string confusion;
     bool perClass = false;
-    unsigned threads = 0;
+    unsigned threads = defaultThreads();
     ScanFlags scan;
     ParameterFlags parameters;
     ScoreFlags score;
@@ -459,8 +459,9 @@ void addEvaluateCommand(CLI::App& app, Session& session) {
     command->add_option("--confusion", flags->confusion, "Draw the similarity matrix of the paper's Figure 6")
         ->type_name("FILE.png|svg");
     command->add_flag("--per-class", flags->perClass, "Measures of each class too");
-    command->add_option("--threads", flags->threads,
-                        "Threads [one a core]; the result does not depend on it");
+    command->add_option("--threads", flags->threads, "Threads; the result does not depend on them")
+        ->check(CLI::Range(1, 1024))
+        ->capture_default_str();
     addScanFlags(*command, flags->scan);
     addParameterFlags(*command, flags->parameters);
     addScoreFlags(*command, flags->score);

@@ -4,6 +4,8 @@
 #include <mutex>
 #include <new>
 
+#include <tbb/global_control.h>
+#include <tbb/info.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
@@ -24,7 +26,9 @@ Result<void> forEach(std::size_t count, unsigned threads, const RunContext& cont
         stopped.store(true, std::memory_order_relaxed);
     };
     try {
-        tbb::task_arena arena(threads == 0 ? tbb::task_arena::automatic : static_cast<int>(threads));
+        // Without this oneTBB gives no more threads than processors, and says so on standard error.
+        const tbb::global_control allowed(tbb::global_control::max_allowed_parallelism, threads);
+        tbb::task_arena arena(static_cast<int>(threads));
         arena.execute([&] {
             tbb::parallel_for(
                 tbb::blocked_range<std::size_t>(0, count, 1),
@@ -51,6 +55,8 @@ bool endsTheRun(const Error& error) {
 }
 
 }  // namespace
+
+unsigned defaultThreads() { return static_cast<unsigned>(tbb::info::default_concurrency()); }
 
 Result<std::vector<EvaluatedShape>> listShapes(const std::vector<std::string>& roots) {
     std::vector<EvaluatedShape> shapes;

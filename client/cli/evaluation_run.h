@@ -27,12 +27,15 @@ struct EvaluatedShape {
     double seconds = 0.0;  ///< reading, noise and segmentation together
 };
 
+/// One a processor this program may use.
+[[nodiscard]] unsigned defaultThreads();
+
 /// Every scan file under each root, in the order of the roots and, within one, of the paths.
 /// Errors: those of listScanFiles.
 [[nodiscard]] Result<std::vector<EvaluatedShape>> listShapes(const std::vector<std::string>& roots);
 
 /// Fills in `signature` or `failure` of each shape; noise and subset come from
-/// fileSeed(flags.seed, name). Files are taken by `threads` threads (0: one a core).
+/// fileSeed(flags.seed, name). Files are taken by `threads` threads, at least 1.
 /// A file that cannot be read or segmented is a `failure`, not an error.
 ///
 /// Errors: kCancelled, kDeadlineExceeded; kInvalidArgument (flags).

@@ -17,6 +17,8 @@ namespace {
 
 /// Matched pairs told one by one; the rest is counted.
 constexpr std::size_t kPairsTold = 3;
+/// Pairs that contribute less than this share of the similarity are not worth a reader's time.
+constexpr double kShareWorthTelling = 0.01;
 
 json pointJson(const Point3& p) { return json::array({p.x, p.y, p.z}); }
 
@@ -41,6 +43,40 @@ std::string segmentList(const std::vector<std::uint32_t>& indices) {
 
 double volumeShareOf(const client::Signature& signature, std::uint32_t index) {
     return index < signature.points.size() ? signature.points[index].volumeShare : 0.0;
+}
+
+/// The heaviest pairs one by one; what adds next to nothing is only counted.
+std::string pairsText(const client::Explanation& explanation) {
+    std::string text;
+    std::size_t told = 0;
+    for (const client::SegmentMatch& match : explanation.matches) {
+        if (told == kPairsTold || (told > 0 && match.share < kShareWorthTelling)) break;
+        if (told > 0) text += ", ";
+        text += std::to_string(match.query + 1) + " on " + std::to_string(match.hit + 1) + " (" +
+                formatPercent(match.share) + " of the match, " + formatPercent(match.distance) +
+                " of the size apart)";
+        ++told;
+    }
+    const std::size_t more = explanation.matches.size() - told;
+    if (more == 0) return text;
+    const bool slight = explanation.matches[told].share < kShareWorthTelling;
+    return text + " and " + std::to_string(more) + (slight ? " that hardly count" : " more");
+}
+
+std::string unmatchedText(const client::Explanation& explanation, const client::Signature& query,
+                          const std::string& queryName, const std::string& hitName) {
+    std::string text;
+    if (!explanation.unmatchedQuery.empty()) {
+        double volume = 0.0;
+        for (const std::uint32_t index : explanation.unmatchedQuery) volume += volumeShareOf(query, index);
+        text += segmentList(explanation.unmatchedQuery) + " of " + queryName + " (" + formatPercent(volume) +
+                " of its volume)";
+    }
+    if (!explanation.unmatchedHit.empty()) {
+        if (!text.empty()) text += ", ";
+        text += segmentList(explanation.unmatchedHit) + " of " + hitName;
+    }
+    return text.empty() ? text : "Without a partner: " + text + ".\n";
 }
 
 std::string motionText(const client::Explanation& explanation, const std::string& hitName) {
@@ -217,35 +253,15 @@ std::string explanationText(const client::Explanation& explanation, const client
         return "No segment of " + queryName + " lies on one of " + hitName + ".\n";
     double matchedVolume = 0.0;
     for (const auto& match : explanation.matches) matchedVolume += volumeShareOf(query, match.query);
-
     const std::size_t count = explanation.matches.size();
-    std::string text = formatCount(count, "segment", "segments") + " of " + queryName + " with " +
-                       formatPercent(matchedVolume) + " of its volume " +
-                       (count == 1 ? "lies on one of " : "lie on segments of ") + hitName + ": ";
-    for (std::size_t i = 0; i < std::min(count, kPairsTold); ++i) {
-        const client::SegmentMatch& match = explanation.matches[i];
-        if (i > 0) text += ", ";
-        text += std::to_string(match.query + 1) + " on " + std::to_string(match.hit + 1) + " (" +
-                formatPercent(match.share) + " of the match, " + formatPercent(match.distance) +
-                " of the size apart)";
-    }
-    if (count > kPairsTold) text += " and " + std::to_string(count - kPairsTold) + " more";
-    text += ".\n";
-    if (explanation.degenerate) {
-        text += "One of the two is a single segment, so nothing fixes how it is turned.\n";
-    } else {
-        text += motionText(explanation, hitName);
-    }
-    if (!explanation.unmatchedQuery.empty()) {
-        text += "Without a partner: " + segmentList(explanation.unmatchedQuery) + " of " + queryName;
-        if (!explanation.unmatchedHit.empty()) {
-            text += ", " + segmentList(explanation.unmatchedHit) + " of " + hitName;
-        }
-        text += ".\n";
-    } else if (!explanation.unmatchedHit.empty()) {
-        text += "Without a partner: " + segmentList(explanation.unmatchedHit) + " of " + hitName + ".\n";
-    }
-    return text;
+    std::string text = formatCount(count) + " of " + formatCount(query.points.size(), "segment", "segments") +
+                       " of " + queryName + ", " + formatPercent(matchedVolume) + " of its volume, " +
+                       (count == 1 ? "lies" : "lie") + " on segments of " + hitName + ": " +
+                       pairsText(explanation) + ".\n";
+    text += explanation.degenerate
+                ? "One of the two is a single segment, so nothing fixes how it is turned.\n"
+                : motionText(explanation, hitName);
+    return text + unmatchedText(explanation, query, queryName, hitName);
 }
 
 }  // namespace shapedb::cli

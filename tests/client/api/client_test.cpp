@@ -1,0 +1,418 @@
+#include "client/api/client.h"
+
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <thread>
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "client/api/packing.h"
+#include "server/common/sha256.h"
+#include "tests/client/api/fake_server.h"
+
+namespace shapedb::client {
+namespace {
+
+namespace fs = std::filesystem;
+using std::chrono::milliseconds;
+
+PointCloud cloud(std::size_t count) {
+    PointCloud points;
+    for (std::size_t i = 0; i < count; ++i)
+        points.push_back({1.0 * (i % 100), 1.0 * (i / 100 % 100), i / 1e4});
+    return points;
+}
+
+double secondsOf(const std::function<void()>& work) {
+    const auto start = std::chrono::steady_clock::now();
+    work();
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+std::string digestOf(const std::string& bytes) {
+    const Sha256Digest digest = sha256(bytes.data(), bytes.size());
+    return {digest.begin(), digest.end()};
+}
+
+TEST(Client, OptionsAreValidated) {
+    EXPECT_EQ(Client::connect({""}).error().code, ErrorCode::kInvalidArgument);
+    ClientOptions options;
+    options.deadline = milliseconds(-1);
+    EXPECT_EQ(Client::connect(options).error().code, ErrorCode::kInvalidArgument);
+    options = {};
+    options.retry.maxAttempts = 0;
+    EXPECT_EQ(Client::connect(options).error().code, ErrorCode::kInvalidArgument);
+    EXPECT_EQ(Client::connect({"localhost"})->address(), "localhost:7878");
+}
+
+TEST(Client, ErrorsCarryTheServersNameAndMessage) {
+    FakeServer server;
+    server.shapes.answer = [](grpc::ServerContext& context, int) {
+        return namedError(context, grpc::StatusCode::FAILED_PRECONDITION, "not_ready", "shape 'a' is queued");
+    };
+    const auto shape = server.client().getShape({"", "a"});
+    ASSERT_FALSE(shape);
+    EXPECT_EQ(shape.error().code, ErrorCode::kNotReady);
+    EXPECT_EQ(shape.error().message, "shape 'a' is queued");
+    EXPECT_EQ(server.shapes.calls, 1) << "not worth a second try";
+}
+
+TEST(Client, TriesAgainUntilTheServerIsThere) {
+    FakeServer server;
+    server.shapes.answer = [](grpc::ServerContext&, int call) {
+        return call < 3 ? grpc::Status(grpc::StatusCode::UNAVAILABLE, "starting") : grpc::Status::OK;
+    };
+    const auto shape = server.client().getShape({"cups", "a"});
+    ASSERT_TRUE(shape) << shape.error().message;
+    EXPECT_EQ(shape->key, "a");
+    EXPECT_EQ(shape->collection, "cups");
+    EXPECT_EQ(server.shapes.calls, 3);
+}
+
+TEST(Client, GivesUpAfterTheLastAttempt) {
+    FakeServer server;
+    server.shapes.answer = [](grpc::ServerContext&, int) {
+        return grpc::Status(grpc::StatusCode::UNAVAILABLE, "down");
+    };
+    const auto shape = server.client(4).getShape({"", "a"});
+    ASSERT_FALSE(shape);
+    EXPECT_EQ(shape.error().code, ErrorCode::kUnavailable);
+    EXPECT_NE(shape.error().message.find(server.address()), std::string::npos);
+    EXPECT_EQ(server.shapes.calls, 4);
+}
+
+TEST(Client, WhatIsNotIdempotentIsTriedOnce) {
+    FakeServer server;
+    server.shapes.answer = [](grpc::ServerContext&, int) {
+        return grpc::Status(grpc::StatusCode::UNAVAILABLE, "down");
+    };
+    EXPECT_FALSE(server.client().deleteShape({"", "a"}));
+    EXPECT_EQ(server.shapes.calls, 1);
+
+    AddRequest conditional;
+    conditional.shape.key = "a";
+    conditional.expectedVersion = 3;
+    EXPECT_FALSE(server.client().addShape(conditional, cloud(10)));
+    EXPECT_EQ(server.shapes.calls, 2);
+}
+
+TEST(Client, WaitsAsLongAsTheServerAsks) {
+    FakeServer server;
+    server.shapes.answer = [](grpc::ServerContext& context, int call) {
+        if (call > 1) return grpc::Status::OK;
+        context.AddTrailingMetadata("grpc-retry-pushback-ms", "300");
+        return namedError(context, grpc::StatusCode::RESOURCE_EXHAUSTED, "queue_full", "the queue is full");
+    };
+    Result<AddReply> reply;
+    const double seconds = secondsOf([&] { reply = server.client().addShape({{"", "a"}}, cloud(100)); });
+    ASSERT_TRUE(reply) << reply.error().message;
+    EXPECT_EQ(server.shapes.calls, 2);
+    EXPECT_GE(seconds, 0.3);
+    EXPECT_LT(seconds, 5.0);
+}
+
+TEST(Client, AServerThatSaysNeverIsNotAskedAgain) {
+    FakeServer server;
+    server.shapes.answer = [](grpc::ServerContext& context, int) {
+        context.AddTrailingMetadata("grpc-retry-pushback-ms", "-1");
+        return namedError(context, grpc::StatusCode::RESOURCE_EXHAUSTED, "queue_full", "the queue is full");
+    };
+    const auto reply = server.client().addShape({{"", "a"}}, cloud(100));
+    ASSERT_FALSE(reply);
+    EXPECT_EQ(reply.error().code, ErrorCode::kQueueFull);
+    EXPECT_EQ(server.shapes.calls, 1);
+}
+
+TEST(Client, AWaitLongerThanTheDeadlineIsNotBegun) {
+    FakeServer server;
+    server.shapes.answer = [](grpc::ServerContext& context, int) {
+        context.AddTrailingMetadata("grpc-retry-pushback-ms", "60000");
+        return namedError(context, grpc::StatusCode::RESOURCE_EXHAUSTED, "queue_full", "the queue is full");
+    };
+    RunContext context;
+    context.deadline = RunContext::Clock::now() + std::chrono::seconds(5);
+    Result<AddReply> reply;
+    EXPECT_LT(secondsOf([&] { reply = server.client().addShape({{"", "a"}}, cloud(100), context); }), 3.0);
+    ASSERT_FALSE(reply);
+    EXPECT_EQ(reply.error().code, ErrorCode::kQueueFull) << "the reason, not the clock";
+}
+
+TEST(Client, UploadsInChunksWithCountAndChecksum) {
+    FakeServer server;
+    const PointCloud points = cloud(200'000);  // 2.4 MB
+    AddRequest request;
+    request.shape = {"cups", "a"};
+    request.mode = AddMode::kInsertOnly;
+    request.metadata = {{"label", "cup"}};
+    std::uint64_t reported = 0;
+    RunContext context;
+    context.progress = [&](const char* stage, std::uint64_t done, std::uint64_t total) {
+        EXPECT_STREQ(stage, "upload");
+        EXPECT_GT(done, reported);
+        EXPECT_EQ(total, 12u * 200'000);
+        reported = done;
+    };
+    const auto reply = server.client().addShape(request, points, context);
+    ASSERT_TRUE(reply) << reply.error().message;
+    EXPECT_EQ(reported, 12u * 200'000);
+    EXPECT_EQ(reply->outcome, AddOutcome::kCreated);
+    EXPECT_EQ(server.shapes.points, packPoints(points)->bytes);
+    EXPECT_LE(server.shapes.largestChunk, std::size_t{1} << 20);
+    EXPECT_EQ(server.shapes.header.point_count(), 200'000u);
+    EXPECT_EQ(server.shapes.header.sha256(), digestOf(server.shapes.points));
+    EXPECT_EQ(server.shapes.header.collection(), "cups");
+    EXPECT_EQ(server.shapes.header.mode(), v1::ADD_MODE_INSERT_ONLY);
+    EXPECT_EQ(server.shapes.header.metadata().at("label"), "cup");
+    EXPECT_FALSE(server.shapes.header.has_expected_version());
+}
+
+TEST(Client, ARetriedUploadIsWholeAgain) {
+    FakeServer server;
+    server.shapes.answer = [](grpc::ServerContext&, int call) {
+        return call < 3 ? grpc::Status(grpc::StatusCode::UNAVAILABLE, "busy") : grpc::Status::OK;
+    };
+    const PointCloud points = cloud(150'000);
+    ASSERT_TRUE(server.client().addShape({{"", "a"}}, points));
+    EXPECT_EQ(server.shapes.calls, 3);
+    EXPECT_EQ(server.shapes.points, packPoints(points)->bytes);
+}
+
+TEST(Client, AnOffsetIsRecordedInTheMetadata) {
+    FakeServer server;
+    PointCloud points = cloud(1000);
+    for (Point3& p : points) p = p + Point3{5e6, 0.0, 0.0};
+    const auto reply = server.client().addShape({{"", "a"}}, points);
+    ASSERT_TRUE(reply);
+    EXPECT_NEAR(reply->offset.x, 5e6 + 49.5, 1.0);
+    EXPECT_EQ(server.shapes.header.metadata().at(kOffsetKey), offsetText(reply->offset));
+}
+
+TEST(Client, ABadScanIsNotSent) {
+    FakeServer server;
+    EXPECT_EQ(server.client().addShape({{"", "a"}}, {}).error().code, ErrorCode::kTooFewPoints);
+    EXPECT_EQ(server.client().searchByScan({}, {{0, 0, 1e300}}).error().code,
+              ErrorCode::kCoordinateOutOfRange);
+    EXPECT_EQ(server.shapes.calls, 0);
+}
+
+TEST(Client, DeadlineOfTheOptionsAndOfTheContext) {
+    FakeServer server;
+    server.shapes.answer = [](grpc::ServerContext& context, int) {
+        for (int i = 0; i < 300 && !context.IsCancelled(); ++i) std::this_thread::sleep_for(milliseconds(10));
+        return grpc::Status::OK;
+    };
+    ClientOptions options;
+    options.address = server.address();
+    options.deadline = milliseconds(200);
+    const auto impatient = Client::connect(options);
+    Result<Shape> shape;
+    EXPECT_LT(secondsOf([&] { shape = impatient->getShape({"", "a"}); }), 2.0);
+    ASSERT_FALSE(shape);
+    EXPECT_EQ(shape.error().code, ErrorCode::kDeadlineExceeded);
+
+    RunContext context;
+    context.deadline = RunContext::Clock::now() + milliseconds(200);
+    EXPECT_LT(secondsOf([&] { shape = server.client().getShape({"", "a"}, context); }), 2.0);
+    ASSERT_FALSE(shape);
+    EXPECT_EQ(shape.error().code, ErrorCode::kDeadlineExceeded);
+}
+
+TEST(Client, CancellingEndsARunningCall) {
+    FakeServer server;
+    server.shapes.answer = [](grpc::ServerContext& context, int) {
+        for (int i = 0; i < 500 && !context.IsCancelled(); ++i) std::this_thread::sleep_for(milliseconds(10));
+        return grpc::Status::OK;
+    };
+    std::atomic<bool> cancel{false};
+    RunContext context;
+    context.cancel = &cancel;
+    std::thread later([&] {
+        std::this_thread::sleep_for(milliseconds(150));
+        cancel = true;
+    });
+    Result<Shape> shape;
+    EXPECT_LT(secondsOf([&] { shape = server.client().getShape({"", "a"}, context); }), 2.0);
+    later.join();
+    ASSERT_FALSE(shape);
+    EXPECT_EQ(shape.error().code, ErrorCode::kCancelled);
+
+    const int calls = server.shapes.calls;
+    EXPECT_EQ(server.client().getShape({"", "a"}, context).error().code, ErrorCode::kCancelled);
+    EXPECT_EQ(server.shapes.calls, calls) << "cancelled before it began";
+}
+
+TEST(Client, CancellingEndsTheWaitBetweenAttempts) {
+    FakeServer server;
+    server.shapes.answer = [](grpc::ServerContext& context, int) {
+        context.AddTrailingMetadata("grpc-retry-pushback-ms", "30000");
+        return namedError(context, grpc::StatusCode::RESOURCE_EXHAUSTED, "queue_full", "full");
+    };
+    std::atomic<bool> cancel{false};
+    RunContext context;
+    context.cancel = &cancel;
+    std::thread later([&] {
+        std::this_thread::sleep_for(milliseconds(150));
+        cancel = true;
+    });
+    Result<AddReply> reply;
+    EXPECT_LT(secondsOf([&] { reply = server.client().addShape({{"", "a"}}, cloud(10), context); }), 2.0);
+    later.join();
+    EXPECT_FALSE(reply);
+}
+
+TEST(Client, WatchTellsEveryEventAndReturnsTheLast) {
+    FakeServer server;
+    v1::IngestEvent pending;
+    pending.set_state(v1::SHAPE_STATE_PENDING);
+    pending.set_stage("delaunay");
+    v1::IngestEvent failed;
+    failed.set_state(v1::SHAPE_STATE_FAILED);
+    failed.mutable_failure()->set_error("no_interior");
+    failed.mutable_failure()->set_message("open below");
+    server.shapes.events = {pending, failed};
+    std::vector<std::string> stages;
+    const auto last = server.client().watchIngest(
+        {"", "a"}, [&](const IngestEvent& event) { stages.push_back(event.stage); });
+    ASSERT_TRUE(last);
+    EXPECT_EQ(stages, (std::vector<std::string>{"delaunay", ""}));
+    EXPECT_EQ(last->state, ShapeState::kFailed);
+    ASSERT_TRUE(last->failure);
+    EXPECT_EQ(last->failure->code, ErrorCode::kNoInterior);
+    EXPECT_EQ(last->failure->message, "open below");
+}
+
+TEST(Client, SegmentedPointsComeBackWithTheirLabels) {
+    FakeServer server;
+    v1::SegmentedPoints summary;
+    summary.mutable_summary()->mutable_report()->set_points(2);
+    summary.mutable_summary()->mutable_signature()->add_points()->set_weight(4.0);
+    v1::SegmentedPoints chunk;
+    chunk.mutable_chunk()->set_xyz(packPoints({{1, 2, 3}, {4, 5, 6}})->bytes);
+    chunk.mutable_chunk()->add_segments(0);
+    chunk.mutable_chunk()->add_segments(-1);
+    server.shapes.segmented = {summary, chunk};
+    const auto scan = server.client().segment(cloud(100'000), {}, false);
+    ASSERT_TRUE(scan) << scan.error().message;
+    EXPECT_EQ(scan->points, (PointCloud{{1, 2, 3}, {4, 5, 6}}));
+    EXPECT_EQ(scan->segments, (std::vector<std::int32_t>{0, -1}));
+    EXPECT_EQ(scan->report.points, 2u);
+    EXPECT_EQ(scan->signature.points.at(0).weight, 4.0);
+
+    chunk.mutable_chunk()->add_segments(7);
+    server.shapes.segmented = {summary, chunk};
+    EXPECT_EQ(server.client().segment(cloud(100), {}, false).error().code, ErrorCode::kMalformedStream);
+}
+
+class ClientBackup : public ::testing::Test {
+  protected:
+    ClientBackup()
+        : folder_((fs::path(::testing::TempDir()) / ("backup-" + std::to_string(::getpid()))).string()) {
+        fs::create_directories(folder_);
+        v1::BackupChunk chunk;
+        chunk.set_total_bytes(content_.size());
+        chunk.set_data(content_.substr(0, 4));
+        server_.admin.backup.push_back(chunk);
+        chunk.Clear();
+        chunk.set_data(content_.substr(4));
+        chunk.set_sha256(digestOf(content_));
+        server_.admin.backup.push_back(chunk);
+    }
+    ~ClientBackup() override { fs::remove_all(folder_); }
+
+    std::string file() const { return folder_ + "/copy.db"; }
+    std::string written() const {
+        std::ifstream stream(file(), std::ios::binary);
+        return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+    }
+    bool nothingLeft() const { return fs::is_empty(folder_); }
+
+    const std::string content_ = "all the shapes there are";
+    std::string folder_;
+    FakeServer server_;
+};
+
+TEST_F(ClientBackup, IsWrittenWhole) {
+    const auto report = server_.client().backupToFile(file());
+    ASSERT_TRUE(report) << report.error().message;
+    EXPECT_EQ(report->bytes, content_.size());
+    EXPECT_EQ(report->sha256, digestOf(content_));
+    EXPECT_EQ(written(), content_);
+}
+
+TEST_F(ClientBackup, DamagedOrShortLeavesNothing) {
+    server_.admin.backup.back().set_data("otherwise");
+    server_.admin.backup.front().set_total_bytes(13);
+    EXPECT_EQ(server_.client().backupToFile(file()).error().code, ErrorCode::kChecksumMismatch);
+    EXPECT_TRUE(nothingLeft());
+
+    server_.admin.backup.pop_back();
+    EXPECT_EQ(server_.client().backupToFile(file()).error().code, ErrorCode::kCountMismatch);
+    EXPECT_TRUE(nothingLeft());
+}
+
+TEST_F(ClientBackup, AFailingServerKeepsItsReasonAndTheOldFile) {
+    std::ofstream(file()) << "older backup";
+    server_.admin.backup.pop_back();
+    server_.admin.backupStatus = grpc::Status(grpc::StatusCode::DATA_LOSS, "page 7 is damaged");
+    const auto report = server_.client().backupToFile(file());
+    ASSERT_FALSE(report);
+    EXPECT_EQ(report.error().code, ErrorCode::kDataLoss);
+    EXPECT_EQ(written(), "older backup");
+}
+
+TEST_F(ClientBackup, AFullDiskIsToldAsThat) {
+    const auto report = server_.client().backupToFile(folder_ + "/no/such/folder/copy.db");
+    ASSERT_FALSE(report);
+    EXPECT_EQ(report.error().code, ErrorCode::kFileNotWritable);
+}
+
+TEST_F(ClientBackup, RestoreSendsSizeChunksAndChecksum) {
+    const std::string large(3'000'000, 'x');
+    std::ofstream(file(), std::ios::binary) << large;
+    const auto report = server_.client().restoreFromFile(file());
+    ASSERT_TRUE(report) << report.error().message;
+    EXPECT_EQ(report->shapes, 3u);
+    const auto& chunks = server_.admin.restored;
+    ASSERT_EQ(chunks.size(), 3u);
+    EXPECT_EQ(chunks.front().total_bytes(), large.size());
+    EXPECT_EQ(chunks.back().sha256(), digestOf(large));
+    std::string joined;
+    for (const v1::BackupChunk& chunk : chunks) {
+        EXPECT_LE(chunk.data().size(), std::size_t{1} << 20);
+        joined += chunk.data();
+    }
+    EXPECT_EQ(joined, large);
+}
+
+TEST_F(ClientBackup, RestoreNeedsAFile) {
+    EXPECT_EQ(server_.client().restoreFromFile(file()).error().code, ErrorCode::kFileNotReadable);
+    EXPECT_EQ(server_.client().restoreFromFile(folder_).error().code, ErrorCode::kFileNotReadable);
+    std::ofstream(file()).close();
+    EXPECT_EQ(server_.client().restoreFromFile(file()).error().code, ErrorCode::kFileNotReadable);
+}
+
+TEST(Client, HealthOfAServerWithoutTheServiceIsAnError) {
+    FakeServer server;
+    const auto health = server.client().health();
+    ASSERT_FALSE(health);
+    EXPECT_EQ(health.error().code, ErrorCode::kRejected);
+}
+
+TEST(Client, NobodyThere) {
+    ClientOptions options;
+    options.address = "127.0.0.1:1";
+    options.retry.maxAttempts = 2;
+    const auto client = Client::connect(options);
+    ASSERT_TRUE(client) << "connecting touches no network";
+    const auto health = client->health();
+    ASSERT_FALSE(health);
+    EXPECT_EQ(health.error().code, ErrorCode::kUnavailable);
+    EXPECT_NE(health.error().message.find("127.0.0.1:1"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace shapedb::client

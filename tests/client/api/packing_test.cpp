@@ -1,0 +1,132 @@
+#include "client/api/packing.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "core/base/random.h"
+#include "server/common/sha256.h"
+
+namespace shapedb::client {
+namespace {
+
+PointCloud cloud(double size, const Point3& at, std::size_t count = 200) {
+    Random random(11);
+    PointCloud points;
+    for (std::size_t i = 0; i < count; ++i) {
+        points.push_back(
+            at + size * Point3{random.uniform() - 0.5, random.uniform() - 0.5, random.uniform() - 0.5});
+    }
+    return points;
+}
+
+PointCloud unpacked(const PackedPoints& packed) {
+    PointCloud points;
+    EXPECT_TRUE(unpackPoints(packed.bytes, points));
+    return points;
+}
+
+TEST(Packing, BytesAreLittleEndianFloats) {
+    const auto packed = packPoints({{1.0, -2.0, 0.5}});
+    ASSERT_TRUE(packed);
+    EXPECT_EQ(packed->bytes, std::string("\x00\x00\x80\x3f\x00\x00\x00\xc0\x00\x00\x00\x3f", 12));
+    EXPECT_EQ(packed->count, 1u);
+    const Sha256Digest digest = sha256(packed->bytes.data(), packed->bytes.size());
+    EXPECT_EQ(packed->sha256, std::string(digest.begin(), digest.end()));
+    EXPECT_EQ(packed->offset, Point3{});
+}
+
+TEST(Packing, RoundTripsAtEverySize) {
+    for (const double size : {1e-30, 1e-6, 1.0, 1e6, 1e30}) {
+        const PointCloud points = cloud(size, {});
+        const auto packed = packPoints(points);
+        ASSERT_TRUE(packed) << size << packed.error().message;
+        EXPECT_EQ(packed->offset, Point3{});
+        const PointCloud back = unpacked(*packed);
+        for (std::size_t i = 0; i < points.size(); ++i) {
+            EXPECT_LT(std::sqrt(3.0) * std::abs(back[i].x - points[i].x), 1e-6 * size);
+        }
+    }
+}
+
+TEST(Packing, FarFromTheOriginTheShapeSurvives) {
+    const Point3 far{4.5e6, -5.4e6, 300.0};
+    const PointCloud points = cloud(2.0, far);
+    const auto packed = packPoints(points);
+    ASSERT_TRUE(packed);
+    EXPECT_LT(distance(packed->offset, far), 2.0);
+    const PointCloud back = unpacked(*packed);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        EXPECT_LT(distance(back[i] + packed->offset, points[i]), 2e-6) << "a millionth of the size";
+    }
+}
+
+TEST(Packing, TheOffsetStartsWhereRoundingWouldHurt) {
+    const double size = 1.0;
+    const auto offsetAt = [&](double distanceFromOrigin) {
+        PointCloud corners = {{0, 0, 0}, {size, 0, 0}, {0, size, 0}, {0, 0, size}};
+        for (Point3& p : corners) p.x += distanceFromOrigin;
+        return packPoints(corners)->offset;
+    };
+    const double diagonal = std::sqrt(3.0);
+    EXPECT_EQ(offsetAt(kFarFromOrigin * diagonal - 1.1), Point3{});
+    EXPECT_NE(offsetAt(kFarFromOrigin * diagonal), Point3{});
+    // Without it nothing moves further than the promised millionth of the diagonal.
+    const double x = kFarFromOrigin * diagonal - 1.1 + 0.123456789;
+    EXPECT_LE(std::abs(static_cast<double>(static_cast<float>(x)) - x), diagonal * 0x1p-20);
+}
+
+TEST(Packing, SameScanSameBytes) {
+    const PointCloud points = cloud(1.0, {1e7, 1e7, 0.0});
+    EXPECT_EQ(packPoints(points)->sha256, packPoints(points)->sha256);
+}
+
+TEST(Packing, RefusesWhatSinglePrecisionCannotHold) {
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    const double infinity = std::numeric_limits<double>::infinity();
+    const auto codeOf = [](const PointCloud& points) { return packPoints(points).error().code; };
+    PointCloud points = cloud(1.0, {});
+    EXPECT_EQ(codeOf({}), ErrorCode::kTooFewPoints);
+    points[7].y = nan;
+    EXPECT_EQ(codeOf(points), ErrorCode::kNonFiniteCoordinate);
+    EXPECT_NE(packPoints(points).error().message.find("point 7"), std::string::npos);
+    points[7].y = -infinity;
+    EXPECT_EQ(codeOf(points), ErrorCode::kNonFiniteCoordinate);
+    points[7].y = 1e300;
+    EXPECT_EQ(codeOf(points), ErrorCode::kCoordinateOutOfRange);
+    EXPECT_NE(packPoints(points).error().message.find("point 7"), std::string::npos);
+    EXPECT_EQ(codeOf(cloud(1e-300, {})), ErrorCode::kCoordinateOutOfRange);
+    EXPECT_EQ(codeOf(cloud(1e-35, {})), ErrorCode::kCoordinateOutOfRange);
+}
+
+TEST(Packing, EqualPointsAreTheServersToJudge) {
+    EXPECT_TRUE(packPoints(PointCloud(10, Point3{1e9, 0.0, 0.0})));
+}
+
+TEST(Packing, AChunkIsWholePointsAndUnderAMebibyte) {
+    EXPECT_EQ(kChunkBytes % kPointBytes, 0u);
+    EXPECT_LE(kChunkBytes, std::size_t{1} << 20);
+    EXPECT_GT(kChunkBytes, (std::size_t{1} << 20) - kPointBytes);
+}
+
+TEST(Packing, UnpackRefusesHalfAPoint) {
+    PointCloud points;
+    const auto result = unpackPoints(std::string(13, '\0'), points);
+    ASSERT_FALSE(result);
+    EXPECT_EQ(result.error().code, ErrorCode::kMalformedStream);
+}
+
+TEST(Packing, OffsetTextGivesTheSameNumbersAgain) {
+    const Point3 offset{1.0 / 3.0, -4.5e6, 1e-300};
+    double x = 0.0;
+    double y = 0.0;
+    double z = 0.0;
+    ASSERT_EQ(std::sscanf(offsetText(offset).c_str(), "%lf %lf %lf", &x, &y, &z), 3);
+    EXPECT_EQ((Point3{x, y, z}), offset);
+}
+
+}  // namespace
+}  // namespace shapedb::client

@@ -1,0 +1,52 @@
+#include "client/api/status.h"
+
+#include <gtest/gtest.h>
+
+namespace shapedb::client {
+namespace {
+
+Error translate(grpc::StatusCode code, const TrailingMetadata& trailing = {}) {
+    return errorOf(grpc::Status(code, "words"), trailing, "host:1");
+}
+
+TEST(Status, TheServersOwnNameDecides) {
+    for (int i = 0; i <= static_cast<int>(ErrorCode::kInternal); ++i) {
+        const auto code = static_cast<ErrorCode>(i);
+        const Error error =
+            translate(grpc::StatusCode::INVALID_ARGUMENT, {{"shapedb-error", errorCodeName(code)}});
+        EXPECT_EQ(error.code, code);
+        EXPECT_EQ(error.message, "words") << "the server's message as it is";
+    }
+}
+
+TEST(Status, WithoutANameTheGrpcCodeDoes) {
+    EXPECT_EQ(translate(grpc::StatusCode::NOT_FOUND).code, ErrorCode::kNotFound);
+    EXPECT_EQ(translate(grpc::StatusCode::INVALID_ARGUMENT).code, ErrorCode::kInvalidArgument);
+    EXPECT_EQ(translate(grpc::StatusCode::UNAVAILABLE).code, ErrorCode::kUnavailable);
+    EXPECT_EQ(translate(grpc::StatusCode::DEADLINE_EXCEEDED).code, ErrorCode::kDeadlineExceeded);
+    EXPECT_EQ(translate(grpc::StatusCode::UNIMPLEMENTED).code, ErrorCode::kRejected);
+    EXPECT_EQ(translate(grpc::StatusCode::RESOURCE_EXHAUSTED).code, ErrorCode::kInternal);
+    EXPECT_EQ(translate(grpc::StatusCode::UNKNOWN).code, ErrorCode::kInternal);
+}
+
+TEST(Status, AnUnreachableServerIsNamed) {
+    for (const auto code : {grpc::StatusCode::UNAVAILABLE, grpc::StatusCode::DEADLINE_EXCEEDED,
+                            grpc::StatusCode::UNIMPLEMENTED}) {
+        EXPECT_NE(translate(code).message.find("host:1"), std::string::npos);
+    }
+}
+
+TEST(Status, PushbackMakesAnyExhaustionWorthWaitingFor) {
+    const grpc::Status status(grpc::StatusCode::RESOURCE_EXHAUSTED, "full");
+    const TrailingMetadata named = {{"shapedb-error", "queue_full"}};
+    EXPECT_EQ(failureOf(status, named, errorOf(status, named, "")).code, ErrorCode::kQueueFull);
+    const TrailingMetadata hinted = {{"grpc-retry-pushback-ms", "20"}};
+    const AttemptFailure failure = failureOf(status, hinted, errorOf(status, hinted, ""));
+    EXPECT_EQ(failure.code, ErrorCode::kQueueFull);
+    EXPECT_EQ(failure.pushback, "20");
+    EXPECT_EQ(failureOf(status, {}, errorOf(status, {}, "")).code, ErrorCode::kInternal)
+        << "a message too large";
+}
+
+}  // namespace
+}  // namespace shapedb::client

@@ -1,0 +1,353 @@
+// The online commands against a real shapedbd.
+#include <filesystem>
+#include <fstream>
+
+#include "client/io/scan_reader.h"
+#include "tests/client/cli/run_command.h"
+#include "tests/integration/support/server_process.h"
+
+namespace shapedb::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using testing::ServerProcess;
+using testing::TemporaryDirectory;
+
+/// One server for all tests; each works in a collection of its own.
+class Online : public CommandTest {
+  protected:
+    static void SetUpTestSuite() {
+        data() = std::make_unique<TemporaryDirectory>();
+        server() =
+            std::make_unique<ServerProcess>(data()->path(), std::vector<std::string>{"--limits-max-k", "50"});
+        scans() = data()->path() + "/scans";
+        const CommandRun run = runCommand(
+            {"sample", scans(), "--count", "2", "--points", "2000", "--families", "human,mug,fish"});
+        ASSERT_EQ(run.exitCode, 0) << run.err;
+    }
+    static void TearDownTestSuite() {
+        server().reset();
+        data().reset();
+    }
+
+    static std::unique_ptr<TemporaryDirectory>& data() {
+        static std::unique_ptr<TemporaryDirectory> directory;
+        return directory;
+    }
+    static std::unique_ptr<ServerProcess>& server() {
+        static std::unique_ptr<ServerProcess> process;
+        return process;
+    }
+    static std::string& scans() {
+        static std::string folder;
+        return folder;
+    }
+
+    static CommandRun online(std::vector<std::string> arguments) {
+        arguments.insert(arguments.end(), {"--server", server()->address(), "--timeout", "60"});
+        return runCommand(arguments);
+    }
+    static json onlineJson(std::vector<std::string> arguments, int exitCode = 0) {
+        arguments.emplace_back("--json");
+        const CommandRun run = online(arguments);
+        EXPECT_EQ(run.exitCode, exitCode) << arguments[0] << ": " << run.err;
+        return run.json();
+    }
+    /// A collection with the six samples, segmented.
+    static void fill(const std::string& collection) {
+        onlineJson({"collection", "create", collection, "--profile", "paper"});
+        const json added =
+            onlineJson({"add", scans(), "--collection", collection, "--label-from-folder", "--wait"});
+        ASSERT_EQ(added["added"].size(), 6u);
+    }
+};
+
+TEST_F(Online, HealthIsServing) {
+    EXPECT_EQ(onlineJson({"health"})["status"], "SERVING");
+    EXPECT_EQ(onlineJson({"health", "--service", "shapedb.v1.SearchService"})["status"], "SERVING");
+    const json unknown = onlineJson({"health", "--service", "no.such.Service"}, 4);
+    EXPECT_EQ(unknown["error"]["name"], "not_found");
+}
+
+TEST_F(Online, AddStoresEveryFileOnce) {
+    fill("add");
+    const json again = onlineJson({"add", scans(), "--collection", "add", "--label-from-folder", "--wait"});
+    EXPECT_EQ(again["outcomes"], json({{"unchanged", 6}}));
+    for (const json& shape : again["added"]) {
+        EXPECT_EQ(shape["state"], "ready");
+        EXPECT_EQ(shape["metadata"]["label"].get<std::string>() + "/",
+                  shape["key"].get<std::string>().substr(
+                      0, shape["metadata"]["label"].get<std::string>().size() + 1));
+    }
+    EXPECT_EQ(onlineJson({"count", "--collection", "add"})["count"], 6);
+    EXPECT_EQ(onlineJson({"count", "--collection", "add", "--filter", "label=mug"})["count"], 2);
+
+    const std::string mug = scans() + "/mug/mug_01.ply";
+    EXPECT_EQ(onlineJson({"add", mug, "--collection", "add", "--key", "mug/mug_01", "--meta", "label=mug",
+                          "--meta", "colour=blue"})["outcomes"],
+              json({{"metadata changed", 1}}));
+    EXPECT_EQ(onlineJson({"get", "mug/mug_01", "--collection", "add"})["metadata"],
+              json({{"label", "mug"}, {"colour", "blue"}}));
+    EXPECT_EQ(onlineJson({"add", mug, "--collection", "add", "--key", "fish/fish_01", "--insert-only"},
+                         4)["failed"][0]["error"]["name"],
+              "already_exists");
+    EXPECT_EQ(onlineJson({"add", mug, "--collection", "add", "--key", "new", "--update-only"},
+                         4)["failed"][0]["error"]["name"],
+              "not_found");
+}
+
+TEST_F(Online, AddGoesOnAfterABadFile) {
+    onlineJson({"collection", "create", "mixed"});
+    writePoints("in/good.xyz", dumbbellPoints(2000));
+    writePoints("in/flat.xyz", ellipsoidPoints(1.0, 1.0, 0.0, 100));
+    write("in/broken.ply", "ply\nformat ascii 1.0\nelement vertex 10\n");
+    const CommandRun run = online({"add", path("in"), "--collection", "mixed", "--wait", "--json"});
+    EXPECT_EQ(run.exitCode, 1);
+    const json document = run.json();
+    ASSERT_EQ(document["added"].size(), 1u);
+    EXPECT_EQ(document["added"][0]["key"], "good");
+    EXPECT_EQ(document["failed"].size(), 2u);
+    EXPECT_NE(run.err.find("flat.xyz"), std::string::npos) << run.err;
+    EXPECT_NE(run.err.find("broken.ply"), std::string::npos) << run.err;
+    EXPECT_NE(run.err.find("2 of 3 files failed"), std::string::npos) << run.err;
+}
+
+TEST_F(Online, AddRefusesTwoFilesOfOneKey) {
+    writePoints("in/a.xyz", dumbbellPoints(500));
+    writePoints("in/a.pts.xyz", dumbbellPoints(500));
+    writePoints("other/a.xyz", dumbbellPoints(500));
+    const CommandRun run = online({"add", path("in/a.xyz"), path("other/a.xyz"), "--json"});
+    EXPECT_EQ(run.exitCode, 2);
+    EXPECT_EQ(onlineJson({"add", path("in"), "--key", "x"}, 2)["error"]["name"], "invalid_argument");
+    EXPECT_EQ(onlineJson({"add", path("in/a.xyz"), "--meta", "nonsense"}, 2)["error"]["name"],
+              "invalid_argument");
+}
+
+TEST_F(Online, SurveyedCoordinatesKeepTheirShape) {
+    onlineJson({"collection", "create", "survey", "--profile", "paper"});
+    PointCloud local = dumbbellPoints(2000);
+    PointCloud surveyed = local;
+    for (Point3& p : surveyed) p = p + Point3{4.5e6, 5.4e6, 312.5};
+    writePoints("local.xyz", local);
+    std::string text;
+    for (const Point3& p : surveyed) {
+        text += std::to_string(p.x) + " " + std::to_string(p.y) + " " + std::to_string(p.z) + "\n";
+    }
+    write("surveyed.xyz", text);
+    onlineJson({"add", path("local.xyz"), path("surveyed.xyz"), "--collection", "survey", "--wait"});
+    const json shape = onlineJson({"get", "surveyed", "--collection", "survey"});
+    EXPECT_NEAR(std::stod(shape["metadata"]["shapedb.offset"].get<std::string>()), 4.5e6, 0.01);
+    EXPECT_FALSE(
+        onlineJson({"get", "local", "--collection", "survey"})["metadata"].contains("shapedb.offset"));
+    EXPECT_GT(onlineJson({"compare", "local", "surveyed", "--collection", "survey"})["score"].get<double>(),
+              0.99);
+}
+
+TEST_F(Online, QueryByKeyAndByScanRankTheSame) {
+    fill("query");
+    const json byScan =
+        onlineJson({"query", scans() + "/mug/mug_01.ply", "--collection", "query", "-k", "6"});
+    ASSERT_EQ(byScan["hits"].size(), 6u);
+    EXPECT_EQ(byScan["hits"][0]["key"], "mug/mug_01");
+    EXPECT_EQ(byScan["hits"][0]["score"], 1.0);
+    EXPECT_EQ(byScan["hits"][0]["label"], "mug");
+    EXPECT_EQ(byScan["candidates"], 6);
+    EXPECT_TRUE(byScan["hits"][0].contains("explanation"));
+
+    const json byKey =
+        onlineJson({"query", "--key", "mug/mug_01", "--include-self", "--collection", "query", "-k", "6"});
+    for (std::size_t i = 0; i < 6; ++i) {
+        EXPECT_EQ(byKey["hits"][i]["key"], byScan["hits"][i]["key"]);
+        EXPECT_EQ(byKey["hits"][i]["score"], byScan["hits"][i]["score"]);
+        EXPECT_EQ(byKey["hits"][i]["rank"], i + 1);
+    }
+    const json others = onlineJson({"query", "--key", "mug/mug_01", "--collection", "query", "-k", "6"});
+    EXPECT_EQ(others["hits"].size(), 5u) << "itself left out";
+
+    const json filtered = onlineJson({"query", "--key", "mug/mug_01", "--collection", "query", "--filter",
+                                      "label=fish", "--no-explanation"});
+    ASSERT_EQ(filtered["hits"].size(), 2u);
+    EXPECT_EQ(filtered["hits"][0]["label"], "fish");
+    EXPECT_FALSE(filtered["hits"][0].contains("explanation"));
+    const double second = others["hits"][1]["score"];
+    EXPECT_EQ(onlineJson({"query", "--key", "mug/mug_01", "--collection", "query", "--threshold",
+                          std::to_string(second + 1e-5)})["hits"]
+                  .size(),
+              1u);
+}
+
+TEST_F(Online, QueryTextRanksAndSaysWhy) {
+    fill("why");
+    const CommandRun run = online({"query", "--key", "human/human_01", "--collection", "why"});
+    ASSERT_EQ(run.exitCode, 0) << run.err;
+    for (const char* word : {"rank", "score", "human/human_02", "Why ", "of the match", "turned by"}) {
+        EXPECT_NE(run.out.find(word), std::string::npos) << word << "\n" << run.out;
+    }
+    const CommandRun every = online({"query", "--key", "human/human_01", "--collection", "why", "--explain"});
+    EXPECT_NE(every.out.find("Why fish/fish_01"), std::string::npos) << every.out;
+}
+
+TEST_F(Online, QueryRefusesWhatTheServerRefuses) {
+    fill("refuse");
+    const std::vector<std::string> base = {"query", "--key", "mug/mug_01", "--collection", "refuse"};
+    const auto with = [&](const std::vector<std::string>& more, int exitCode) {
+        auto arguments = base;
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        return onlineJson(arguments, exitCode)["error"]["name"];
+    };
+    EXPECT_EQ(with({"-k", "0"}, 2), "invalid_argument");
+    EXPECT_EQ(with({"-k", "51"}, 2), "invalid_argument");
+    EXPECT_EQ(with({"--threshold", "1.5"}, 2), "invalid_argument");
+    EXPECT_EQ(with({"--filter", "=="}, 2), "malformed_filter");
+    EXPECT_EQ(onlineJson({"query", "--key", "nobody", "--collection", "refuse"}, 4)["error"]["name"],
+              "not_found");
+    EXPECT_EQ(onlineJson({"query", "--key", "x", "--collection", "nowhere"}, 4)["error"]["name"],
+              "not_found");
+    const std::string flat = writePoints("flat.xyz", ellipsoidPoints(1.0, 1.0, 0.0, 100));
+    EXPECT_EQ(onlineJson({"query", flat, "--collection", "refuse"}, 3)["error"]["name"], "coplanar");
+}
+
+TEST_F(Online, CompareStoredAndFilesAgree) {
+    fill("compare");
+    const json stored = onlineJson({"compare", "mug/mug_01", "mug/mug_02", "--collection", "compare"});
+    const json files = onlineJson({"compare", "--files", scans() + "/mug/mug_01.ply",
+                                   scans() + "/mug/mug_02.ply", "--profile", "paper"});
+    EXPECT_EQ(stored["score"], files["score"]);
+    EXPECT_EQ(stored["explanation"]["matches"], files["explanation"]["matches"]);
+    EXPECT_EQ(stored["query"]["points"], files["query"]["points"]);
+    EXPECT_EQ(onlineJson({"compare", "a", "b", "--profile", "paper"}, 2)["error"]["name"],
+              "invalid_argument");
+}
+
+TEST_F(Online, ListPagesAndStates) {
+    fill("list");
+    const json all = onlineJson({"list", "--collection", "list"});
+    ASSERT_EQ(all["shapes"].size(), 6u);
+    EXPECT_EQ(all["next_cursor"], "");
+    const json first = onlineJson({"list", "--collection", "list", "--limit", "4"});
+    ASSERT_EQ(first["shapes"].size(), 4u);
+    const json rest = onlineJson({"list", "--collection", "list", "--cursor", first["next_cursor"]});
+    ASSERT_EQ(rest["shapes"].size(), 2u);
+    EXPECT_EQ(rest["shapes"][0]["key"], all["shapes"][4]["key"]);
+    EXPECT_EQ(onlineJson({"list", "--collection", "list", "--state", "failed"})["shapes"].size(), 0u);
+    EXPECT_EQ(onlineJson({"list", "--collection", "list", "--cursor", "rubbish"}, 2)["error"]["name"],
+              "malformed_cursor");
+}
+
+TEST_F(Online, GetWritesTheSegmentedPoints) {
+    fill("get");
+    const json shape = onlineJson({"get", "fish/fish_01", "--collection", "get", "--out", path("fish.ply")});
+    EXPECT_EQ(shape["state"], "ready");
+    EXPECT_EQ(shape["points"], 2000);
+    const auto scan = readScan(path("fish.ply"));
+    ASSERT_TRUE(scan) << scan.error().message;
+    EXPECT_EQ(scan->points.size(), 2000u);
+
+    const json offline =
+        runCommand({"segment", scans() + "/fish/fish_01.ply", "--profile", "paper", "--json"}).json();
+    const json signature = onlineJson({"signature", "fish/fish_01", "--collection", "get"});
+    EXPECT_EQ(signature["points"], offline["signature"]) << "the server computes what the command computes";
+    EXPECT_EQ(onlineJson({"get", "nobody", "--collection", "get"}, 4)["error"]["name"], "not_found");
+}
+
+TEST_F(Online, WatchEndsReadyOrFailed) {
+    onlineJson({"collection", "create", "watch"});
+    writePoints("flat.xyz", ellipsoidPoints(1.0, 1.0, 0.0, 100));
+    writePoints("bell.xyz", dumbbellPoints(2000));
+    onlineJson({"add", path("bell.xyz"), "--collection", "watch"});
+    EXPECT_EQ(onlineJson({"watch", "bell", "--collection", "watch"})["state"], "ready");
+    EXPECT_EQ(onlineJson({"watch", "nobody", "--collection", "watch"}, 4)["error"]["name"], "not_found");
+}
+
+TEST_F(Online, DeleteIsForGood) {
+    fill("delete");
+    EXPECT_EQ(onlineJson({"delete", "mug/mug_01", "--collection", "delete", "--expected-version", "7"},
+                         4)["error"]["name"],
+              "version_conflict");
+    const json document =
+        onlineJson({"delete", "mug/mug_01", "nobody", "mug/mug_02", "--collection", "delete"}, 1);
+    EXPECT_EQ(document["deleted"].size(), 2u);
+    EXPECT_EQ(document["failed"][0]["key"], "nobody");
+    EXPECT_EQ(onlineJson({"count", "--collection", "delete"})["count"], 4);
+    EXPECT_EQ(onlineJson({"delete", "mug/mug_01", "--collection", "delete"}, 4)["error"]["name"],
+              "not_found");
+}
+
+TEST_F(Online, Collections) {
+    const json made = onlineJson({"collection", "create", "mine", "--description", "for the test",
+                                  "--profile", "paper", "--segments", "5", "--deep-angle", "22"});
+    EXPECT_EQ(made["parameters"]["max_points"], 5);
+    EXPECT_EQ(made["parameters"]["deep_angle_degrees"], 22.0);
+    EXPECT_EQ(made["parameters"]["profile"], "paper");
+    EXPECT_EQ(onlineJson({"collection", "get", "mine"}), made);
+    EXPECT_EQ(onlineJson({"collection", "create", "mine"}, 4)["error"]["name"], "already_exists");
+    bool listed = false;
+    const json list = onlineJson({"collection", "list"});
+    for (const json& one : list["collections"]) listed = listed || one == made;
+    EXPECT_TRUE(listed);
+
+    writePoints("bell.xyz", dumbbellPoints(1000));
+    onlineJson({"add", path("bell.xyz"), "--collection", "mine"});
+    EXPECT_EQ(online({"collection", "delete", "mine"}).exitCode, 4);
+    EXPECT_EQ(onlineJson({"collection", "delete", "mine", "--force"})["deleted"], "mine");
+    EXPECT_EQ(onlineJson({"collection", "get", "mine"}, 4)["error"]["name"], "not_found");
+}
+
+TEST_F(Online, RebuildWithNewParametersChangesTheSignatures) {
+    fill("rebuild");
+    const json done = onlineJson({"admin", "rebuild", "--collection", "rebuild", "--segments", "2"});
+    ASSERT_EQ(done["rebuilt"].size(), 1u);
+    EXPECT_EQ(done["rebuilt"][0]["done"], 6);
+    EXPECT_EQ(done["rebuilt"][0]["finished"], true);
+    EXPECT_EQ(onlineJson({"signature", "mug/mug_01", "--collection", "rebuild"})["points"].size(), 2u);
+    EXPECT_EQ(onlineJson({"admin", "rebuild", "--collection", "rebuild", "--cancel"}, 4)["error"]["name"],
+              "not_found");
+    EXPECT_EQ(online({"admin", "rebuild", "--collection", "rebuild", "--cache-only"}).exitCode, 0);
+}
+
+TEST_F(Online, BackupAndRestore) {
+    // A server of its own: restoring replaces everything.
+    const TemporaryDirectory directory;
+    const ServerProcess own(directory.path() + "/data");
+    const std::vector<std::string> to = {"--server", own.address(), "--json"};
+    const auto ask = [&](std::vector<std::string> arguments) {
+        arguments.insert(arguments.end(), to.begin(), to.end());
+        return runCommand(arguments);
+    };
+    EXPECT_EQ(ask({"add", scans() + "/mug", "--wait"}).exitCode, 0);
+    const json backup = ask({"admin", "backup", path("copy.db")}).json();
+    EXPECT_EQ(backup["bytes"], fs::file_size(path("copy.db")));
+    EXPECT_FALSE(fs::exists(path("copy.db.part")));
+    EXPECT_EQ(ask({"delete", "mug_01", "mug_02"}).exitCode, 0);
+    EXPECT_EQ(ask({"count"}).json()["count"], 0);
+    const json restored = ask({"admin", "restore", path("copy.db")}).json();
+    EXPECT_EQ(restored["shapes"], 2);
+    EXPECT_EQ(ask({"count"}).json()["count"], 2);
+    EXPECT_EQ(ask({"query", "--key", "mug_01"}).json()["hits"].size(), 1u);
+
+    write("rubbish.db", "this is no database");
+    EXPECT_NE(ask({"admin", "restore", path("rubbish.db")}).exitCode, 0);
+    EXPECT_EQ(ask({"count"}).json()["count"], 2) << "a bad backup changes nothing";
+    EXPECT_EQ(ask({"admin", "restore", path("missing.db")}).exitCode, 3);
+    EXPECT_EQ(ask({"admin", "backup", path("no/such/folder/copy.db")}).exitCode, 3);
+}
+
+TEST_F(Online, CheckStatsAndInfo) {
+    fill("care");
+    EXPECT_EQ(onlineJson({"admin", "check"})["sound"], true);
+    const json stats = onlineJson({"admin", "stats"});
+    EXPECT_GE(stats["shapes_ready"].get<int>(), 6);
+    EXPECT_GT(stats["database_bytes"].get<std::uint64_t>(), 0u);
+    const json info = onlineJson({"admin", "info"});
+    EXPECT_EQ(info["limits"]["max_k"], 50);
+    EXPECT_EQ(info["server"], server()->address());
+    for (const char* command : {"check", "stats", "info"}) {
+        const CommandRun run = online({"admin", command});
+        EXPECT_EQ(run.exitCode, 0);
+        EXPECT_NE(run.out, "");
+    }
+}
+
+}  // namespace
+}  // namespace shapedb::cli

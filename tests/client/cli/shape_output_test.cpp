@@ -1,0 +1,132 @@
+#include "client/cli/shape_output.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "core/base/random.h"
+
+namespace shapedb::cli {
+namespace {
+
+Matrix3 aboutZ(double degrees) {
+    const double angle = degrees * 3.14159265358979323846 / 180.0;
+    return {
+        {{std::cos(angle), -std::sin(angle), 0.0}, {std::sin(angle), std::cos(angle), 0.0}, {0.0, 0.0, 1.0}}};
+}
+
+client::Signature signatureOf(const std::vector<double>& shares) {
+    client::Signature signature;
+    for (const double share : shares) {
+        client::WeightedPoint point;
+        point.volumeShare = share;
+        signature.points.push_back(point);
+    }
+    return signature;
+}
+
+TEST(ShapeOutput, AngleOfARotation) {
+    for (const double degrees : {0.0, 1.0, 37.0, 90.0, 179.0}) {
+        Motion motion;
+        motion.rotation = aboutZ(degrees);
+        EXPECT_NEAR(rotationDegrees(motion), degrees, 1e-6);
+    }
+}
+
+TEST(ShapeOutput, AngleOfARotationIsTheSameAboutAnyAxis) {
+    Random random(3);
+    for (int i = 0; i < 20; ++i) {
+        // Conjugating with a rotation turns the axis and leaves the angle.
+        Motion frame;
+        frame.rotation = randomRotation(random);
+        Motion turn;
+        turn.rotation = aboutZ(50.0);
+        EXPECT_NEAR(rotationDegrees(compose(frame, compose(turn, inverse(frame)))), 50.0, 1e-6);
+    }
+}
+
+TEST(ShapeOutput, AMirrorAloneTurnsNothing) {
+    Motion mirror;
+    mirror.reflected = true;
+    mirror.rotation = {{{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, -1.0}}};
+    EXPECT_NEAR(rotationDegrees(mirror), 0.0, 1e-6);
+
+    Motion turn;
+    turn.rotation = aboutZ(30.0);  // about the mirror's normal
+    EXPECT_NEAR(rotationDegrees(compose(turn, mirror)), 30.0, 1e-6);
+}
+
+TEST(ShapeOutput, ExplanationTellsPairsMotionAndWhatIsLeft) {
+    client::Explanation explanation;
+    explanation.matches = {{0, 1, 0.9, 0.0}, {2, 0, 0.09, 0.02}, {3, 2, 0.009, 0.1}, {4, 3, 0.001, 0.1}};
+    explanation.unmatchedQuery = {1};
+    explanation.unmatchedHit = {4, 5, 6};
+    explanation.motion.rotation = aboutZ(37.0);
+    explanation.motion.scale = 2.5;
+    const std::string text =
+        explanationText(explanation, signatureOf({0.5, 0.2, 0.15, 0.1, 0.05}), "the query", "cup-7");
+    EXPECT_EQ(
+        text,
+        "4 of 5 segments of the query, 80 % of its volume, lie on segments of cup-7: 1 on 2 (90 % of the "
+        "match, "
+        "0 % of the size apart), 3 on 1 (9 % of the match, 2 % of the size apart) and 2 that hardly count.\n"
+        "To get there cup-7 is turned by 37 degrees, enlarged to 2.5 times its size and not mirrored.\n"
+        "Without a partner: segment 2 of the query (20 % of its volume), segments 5, 6 and 7 of cup-7.\n");
+}
+
+TEST(ShapeOutput, ExplanationOfAMirroredShapeOfTheSameSize) {
+    client::Explanation explanation;
+    explanation.matches = {{0, 0, 1.0, 0.0}};
+    explanation.motion.reflected = true;
+    explanation.motion.rotation = {{{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, -1.0}}};
+    EXPECT_EQ(explanationText(explanation, signatureOf({1.0}), "a", "b"),
+              "1 of 1 segment of a, 100 % of its volume, lies on segments of b: 1 on 1 (100 % of the match, "
+              "0 % of the "
+              "size apart).\nTo get there b is mirrored and turned by 0 degrees at its own size.\n");
+}
+
+TEST(ShapeOutput, ExplanationOfADegenerateOrEmptyMatch) {
+    client::Explanation explanation;
+    EXPECT_EQ(explanationText(explanation, signatureOf({1.0}), "a", "b"),
+              "No segment of a lies on one of b.\n");
+    explanation.matches = {{0, 0, 1.0, 0.0}};
+    explanation.degenerate = true;
+    EXPECT_NE(explanationText(explanation, signatureOf({1.0}), "a", "b").find("single segment"),
+              std::string::npos);
+    // A server that names a segment the signature does not have must not crash the client.
+    explanation.matches = {{7, 9, 1.0, 0.0}};
+    explanation.unmatchedQuery = {100};
+    EXPECT_FALSE(explanationText(explanation, signatureOf({1.0}), "a", "b").empty());
+}
+
+TEST(ShapeOutput, SignaturePointsHaveTheDocumentedKeys) {
+    client::Signature signature = signatureOf({1.0});
+    signature.points[0].position = {1.0, 2.0, 3.0};
+    signature.points[0].extents = {3.0, 2.0, 1.0};
+    const nlohmann::json points = pointsJson(signature);
+    ASSERT_EQ(points.size(), 1u);
+    EXPECT_EQ(points[0]["position"], nlohmann::json({1.0, 2.0, 3.0}));
+    EXPECT_EQ(points[0]["extents"], nlohmann::json({3.0, 2.0, 1.0}));
+    for (const char* key : {"weight", "volume_share", "peak_radius"})
+        EXPECT_TRUE(points[0].contains(key)) << key;
+}
+
+TEST(ShapeOutput, ShapeInJson) {
+    client::Shape shape;
+    shape.key = "cup";
+    shape.sha256 = std::string("\x00\xff\x1a", 3);
+    shape.state = client::ShapeState::kFailed;
+    shape.failure = Error{ErrorCode::kNoInterior, "open"};
+    shape.created = client::Timestamp(std::chrono::seconds(86400));
+    const nlohmann::json document = toJson(shape);
+    EXPECT_EQ(document["key"], "cup");
+    EXPECT_EQ(document["sha256"], "00ff1a");
+    EXPECT_EQ(document["state"], "failed");
+    EXPECT_EQ(document["failure"]["name"], "no_interior");
+    EXPECT_EQ(document["created"], "1970-01-02T00:00:00Z");
+    EXPECT_FALSE(toJson(client::Shape{}).contains("failure"));
+}
+
+}  // namespace
+}  // namespace shapedb::cli

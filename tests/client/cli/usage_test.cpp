@@ -1,0 +1,142 @@
+// What the command line itself refuses, and what holds for every command alike.
+#include <csignal>
+
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "tests/client/cli/run_command.h"
+
+namespace shapedb::cli {
+namespace {
+
+using Usage = CommandTest;
+
+TEST_F(Usage, WrongCommandLinesAreExitCodeTwo) {
+    const std::vector<std::vector<std::string>> wrong = {
+        {},
+        {"nonsense"},
+        {"segment"},
+        {"segment", "a.ply", "b.ply"},
+        {"segment", "a.ply", "--profile", "best"},
+        {"segment", "a.ply", "--noise", "-1"},
+        {"segment", "a.ply", "--points", "many"},
+        {"segment", "a.ply", "--points", "3"},
+        {"segment", "a.ply", "--deep-angle", "90"},
+        {"segment", "a.ply", "--segments", "33"},
+        {"segment", "a.ply", "--no-such-flag"},
+        {"sample"},
+        {"sample", "x", "--count", "0"},
+        {"sample", "x", "--families", "unicorn"},
+        {"evaluate"},
+        {"evaluate", "x", "--match", "colour"},
+        {"add"},
+        {"add", "x", "--insert-only", "--update-only"},
+        {"query"},
+        {"query", "a.ply", "--key", "b"},
+        {"collection"},
+        {"collection", "create"},
+        {"admin"},
+        {"admin", "backup"},
+        {"delete"},
+        {"health", "--timeout", "0"},
+    };
+    for (const auto& arguments : wrong) {
+        std::string line;
+        for (const std::string& argument : arguments) line += argument + " ";
+        const CommandRun run = runCommand(arguments);
+        EXPECT_EQ(run.exitCode, 2) << line << run.err;
+        EXPECT_EQ(run.out, "") << line;
+        EXPECT_EQ(run.err.rfind("shapedb: ", 0), 0u) << line << run.err;
+        EXPECT_EQ(run.err.find('\n'), run.err.size() - 1) << "one line: " << run.err;
+    }
+}
+
+TEST_F(Usage, WithJsonTheErrorIsADocument) {
+    const CommandRun run = runCommand({"segment", "--json", "--no-such-flag"});
+    EXPECT_EQ(run.exitCode, 2);
+    const auto document = run.json();
+    EXPECT_EQ(document["error"]["name"], "invalid_argument");
+    EXPECT_NE(document["error"]["message"].get<std::string>().find("segment --help"), std::string::npos);
+}
+
+TEST_F(Usage, HelpAndVersionAreOnStandardOutput) {
+    const std::vector<std::vector<std::string>> asked = {{"--help"},
+                                                         {"segment", "--help"},
+                                                         {"admin", "rebuild", "-h"},
+                                                         {"collection", "--help"},
+                                                         {"--version"}};
+    for (const auto& arguments : asked) {
+        const CommandRun run = runCommand(arguments);
+        EXPECT_EQ(run.exitCode, 0) << run.err;
+        EXPECT_NE(run.out, "");
+        EXPECT_EQ(run.err, "");
+    }
+    EXPECT_EQ(runCommand({"--version"}).out.rfind("shapedb ", 0), 0u);
+    EXPECT_NE(runCommand({"segment", "--help"}).out.find("--deep-angle"), std::string::npos);
+}
+
+TEST_F(Usage, JsonMayStandBeforeOrAfterTheCommand) {
+    EXPECT_TRUE(runCommand({"--json", "sample", "--list"}).json().contains("families"));
+    EXPECT_TRUE(runCommand({"sample", "--list", "--json"}).json().contains("families"));
+}
+
+TEST_F(Usage, AResultThatCannotBeWrittenIsNoSuccess) {
+    const std::string file = writePoints("a.xyz", dumbbellPoints());
+    const std::string line =
+        std::string(SHAPEDB_PATH) + " segment " + file + " --json > /dev/full 2> " + path("err");
+    const int status = std::system(line.c_str());
+    ASSERT_TRUE(WIFEXITED(status));
+    EXPECT_EQ(WEXITSTATUS(status), 3);
+}
+
+TEST_F(Usage, InterruptEndsWithItsOwnExitCode) {
+    // Enough work to be met in the middle of it.
+    for (int i = 0; i < 20; ++i) {
+        writePoints("set/a/" + std::to_string(i) + ".xyz", ellipsoidPoints(1.0, 0.8, 0.6 + 0.01 * i, 20000));
+    }
+    const int process = startCommand({"evaluate", path("set"), "--threads", "1"});
+    ::usleep(400'000);
+    ASSERT_EQ(::kill(process, SIGINT), 0);
+    int status = 0;
+    ::waitpid(process, &status, 0);
+    ASSERT_TRUE(WIFEXITED(status)) << "ended by signal " << WTERMSIG(status);
+    EXPECT_EQ(WEXITSTATUS(status), 130);
+}
+
+TEST_F(Usage, TimeoutEndsOfflineWorkToo) {
+    for (int i = 0; i < 20; ++i) {
+        writePoints("set/a/" + std::to_string(i) + ".xyz", ellipsoidPoints(1.0, 0.8, 0.6 + 0.01 * i, 20000));
+    }
+    const CommandRun run =
+        runCommand({"evaluate", path("set"), "--threads", "1", "--timeout", "0.3", "--json"});
+    EXPECT_EQ(run.exitCode, 5);
+    EXPECT_EQ(run.json()["error"]["name"], "deadline_exceeded");
+}
+
+TEST_F(Usage, NoServerIsExitCodeFiveAndNamesTheAddress) {
+    const std::string file = writePoints("a.xyz", dumbbellPoints());
+    const std::vector<std::vector<std::string>> online = {{"health"},
+                                                          {"list"},
+                                                          {"count"},
+                                                          {"get", "x"},
+                                                          {"query", file},
+                                                          {"query", "--key", "x"},
+                                                          {"compare", "a", "b"},
+                                                          {"collection", "list"},
+                                                          {"admin", "stats"},
+                                                          {"admin", "backup", path("b")}};
+    for (auto arguments : online) {
+        // Port 1 of loopback: nobody listens there.
+        arguments.insert(arguments.end(), {"--server", "127.0.0.1:1", "--json", "--timeout", "0.2"});
+        const CommandRun run = runCommand(arguments);
+        EXPECT_EQ(run.exitCode, 5) << arguments[0] << run.err;
+        EXPECT_EQ(run.json()["error"]["name"], "unavailable") << arguments[0];
+        EXPECT_NE(run.err.find("127.0.0.1:1"), std::string::npos) << run.err;
+    }
+    EXPECT_NE(runCommand({"health"}, {{"SHAPEDB_SERVER", "127.0.0.1:1"}}).err.find("127.0.0.1:1"),
+              std::string::npos)
+        << "the environment names the server too";
+}
+
+}  // namespace
+}  // namespace shapedb::cli
