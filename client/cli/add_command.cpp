@@ -32,7 +32,7 @@ struct AddFlags {
     bool insertOnly = false;
     bool updateOnly = false;
     bool wait = false;
-    unsigned jobs = 4;
+    unsigned jobs = 1;
     ScanFlags scan;
 };
 
@@ -263,7 +263,9 @@ void addAddCommand(CLI::App& app, Session& session) {
     auto* insertOnly = command->add_flag("--insert-only", flags->insertOnly, "Fail when the key is taken");
     command->add_flag("--update-only", flags->updateOnly, "Fail when the key is free")->excludes(insertOnly);
     command->add_flag("--wait", flags->wait, "Return when all are segmented, not when all are stored");
-    command->add_option("--jobs", flags->jobs, "Files read and sent at the same time")
+    command
+        ->add_option("--jobs", flags->jobs,
+                     "Files read and sent at the same time; with 1 the server numbers them in their order")
         ->check(CLI::Range(1, 64))
         ->capture_default_str();
     addScanFlags(*command, flags->scan);

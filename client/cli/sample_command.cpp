@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <tbb/parallel_for.h>
 
+#include "client/cli/checks.h"
 #include "client/cli/exit_code.h"
 #include "client/cli/scan_source.h"
 #include "client/cli/session.h"
@@ -162,7 +163,7 @@ void addSampleCommand(CLI::App& app, Session& session) {
         ->check(CLI::Range(4, 100000000))
         ->capture_default_str();
     command->add_option("--noise", flags->noise, "Gaussian noise, as a share of the bounding-box diagonal")
-        ->check(CLI::NonNegativeNumber)
+        ->check(atLeastZero())
         ->capture_default_str();
     command->add_option("--seed", flags->seed, "Seed of shapes, poses and noise")->capture_default_str();
     command->add_flag("--upright", flags->upright, "Leave shapes as built: do not turn, scale or move them");

@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "client/cli/checks.h"
 #include "core/base/random.h"
 #include "core/geometry/noise.h"
 
@@ -17,13 +18,13 @@ void addScanFlags(CLI::App& command, ScanFlags& flags) {
         ->add_option("--noise", flags.noise,
                      "Gaussian noise with this standard deviation, as a share of the bounding-box diagonal "
                      "(0.01: 1 %)")
-        ->check(CLI::NonNegativeNumber);
+        ->check(atLeastZero());
     group->add_option("--points", flags.points, "Random subset of this many points (4 or more)");
     group->add_option("--seed", flags.seed, "Seed of noise, subset and mesh samples [1]");
     group
         ->add_option("--mesh-samples", flags.meshSamples,
                      "Points drawn from the surface of a file with triangles [20000]")
-        ->check(CLI::PositiveNumber);
+        ->check(aboveZero());
 }
 
 std::uint64_t fileSeed(std::uint64_t seed, const std::string& name) {

@@ -8,6 +8,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "client/cli/checks.h"
 #include "client/cli/exit_code.h"
 
 namespace shapedb::cli {
@@ -28,7 +29,7 @@ void addGlobalOptions(CLI::App& app, GlobalOptions& options) {
     app.add_option("--timeout", options.timeoutSeconds,
                    "Give up on the whole command after this long; without it each call to the server "
                    "may take 60 seconds, and following something takes as long as it takes")
-        ->check(CLI::PositiveNumber)
+        ->check(aboveZero())
         ->type_name("SECONDS");
 }
 

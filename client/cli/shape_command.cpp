@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "client/cli/checks.h"
 #include "client/cli/connection.h"
 #include "client/cli/exit_code.h"
 #include "client/cli/session.h"
@@ -251,7 +252,7 @@ void addShapeCommands(CLI::App& app, Session& session) {
     const auto list = addListCommand(app, session, "list", "List stored shapes", &runList);
     app.get_subcommand("list")
         ->add_option("--limit", list->limit, "At most this many [all]")
-        ->check(CLI::PositiveNumber);
+        ->check(aboveZero());
     app.get_subcommand("list")->add_option("--cursor", list->request.cursor,
                                            "Go on after an earlier --limit");
     addListCommand(app, session, "count", "Count stored shapes", &runCount);
