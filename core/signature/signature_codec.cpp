@@ -16,6 +16,11 @@ constexpr std::size_t kHeaderBytes = 52;
 constexpr std::size_t kPointBytes = 48;
 constexpr std::size_t kChecksumBytes = 4;
 
+// No scan that `sanitise` accepts is larger or smaller (scan units): beyond, a motion between two
+// shapes would overflow.
+constexpr double kLargestSize = 1e40;
+constexpr double kSmallestSize = 1e-40;
+
 // CRC-32 (IEEE 802.3, reflected), bit by bit: a few hundred bytes do not need a table.
 std::uint32_t crc32(const char* bytes, std::size_t size) {
     std::uint32_t crc = 0xffffffffu;
@@ -100,8 +105,8 @@ tl::unexpected<Error> malformed(const std::string& what) {
 
 Result<void> checkNumbers(const Signature& signature) {
     const Point3& o = signature.origin;
-    if (!std::isfinite(signature.scale) || signature.scale <= 0.0)
-        return malformed("the scale is not positive");
+    if (!(signature.scale >= kSmallestSize && signature.scale <= kLargestSize))
+        return malformed("the scale is not between 1e-40 and 1e40");
     if (!std::isfinite(signature.volume) || signature.volume <= 0.0)
         return malformed("the volume is not positive");
     if (!std::isfinite(o.x) || !std::isfinite(o.y) || !std::isfinite(o.z)) {

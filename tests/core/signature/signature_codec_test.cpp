@@ -188,6 +188,7 @@ TEST(SignatureCodec, BadNumbersAreRefused) {
         refused("scale", [&](Signature& s) { s.scale = bad; });
         refused("volume", [&](Signature& s) { s.volume = bad; });
     }
+    for (const double absurd : {1e-60, 1e60}) refused("scale", [&](Signature& s) { s.scale = absurd; });
     refused("origin", [&](Signature& s) { s.origin.y = nan; });
     refused("point 1", [&](Signature& s) { s.points[1].position[2] = inf; });
     refused("point 1", [&](Signature& s) { s.points[1].covariance[5] = std::nanf(""); });
