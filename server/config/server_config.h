@@ -26,6 +26,7 @@ struct ServerConfig {
         std::uint32_t maxBatch = 1'000;       ///< queries of one SearchBatch
         /// Points of all uploads being received at one moment, bytes.
         std::uint64_t maxUploadBytes = std::uint64_t{1} << 30;
+        int stallSeconds = 60;  ///< a client that neither sends nor takes anything so long is cut off
     } limits;
 
     struct Store {

@@ -208,6 +208,9 @@ std::vector<Setting> makeSettings() {
             [](C& c) -> std::uint64_t& { return c.limits.maxUploadBytes; },
             "Bytes of points that all running uploads may hold in memory together."),
         number(
+            "limits.stall_seconds", kInteger, 1, 86'400, [](C& c) -> int& { return c.limits.stallSeconds; },
+            "A client that neither sends nor takes anything for so long inside a stream is cut off."),
+        number(
             "store.readers", kInteger, 1, 64, [](C& c) -> int& { return c.store.readers; },
             "Pooled read connections to the database."),
         number(

@@ -31,13 +31,16 @@ std::vector<telemetry::Field> fieldsOf(const store::Rebuild& rebuild, const Erro
 }  // namespace
 
 RebuildDriver::RebuildDriver(store::Store& store, index::CollectionIndex& index, WorkerPool& pool,
-                             Describer describe, telemetry::LoggerPtr log, RebuildOptions options)
+                             SuspectGate& suspects, Describer describe, telemetry::LoggerPtr log,
+                             RebuildOptions options)
     : store_(store),
       index_(index),
       pool_(pool),
+      suspects_(suspects),
       describe_(std::move(describe)),
       log_(std::move(log)),
-      options_(options) {}
+      options_(std::move(options)),
+      journal_(options_.journalPath, log_) {}
 
 RebuildDriver::~RebuildDriver() { stop(); }
 
@@ -136,6 +139,7 @@ void RebuildDriver::pause() {
 }
 
 Result<void> RebuildDriver::resume() {
+    journal_.clear();
     const Result<void> queued = enqueueRunning();
     const std::lock_guard<std::mutex> lock(mutex_);
     paused_ = false;
@@ -264,7 +268,7 @@ void RebuildDriver::rebuildOne(const ActivePtr& active, std::unique_lock<std::mu
     }
     Result<void> stored;
     try {
-        if (!active->cancel) stored = process(*active, shape);
+        if (!active->cancel) stored = guarded(*active, shape);
     } catch (const std::exception& error) {
         const bool memory = dynamic_cast<const std::bad_alloc*>(&error) != nullptr;
         stored = store_.putRebuildFailure(active->rebuild.id, shape.id, shape.pointsVersion,
@@ -281,6 +285,30 @@ void RebuildDriver::rebuildOne(const ActivePtr& active, std::unique_lock<std::mu
     }
     --active->inFlight;
     changed_.notify_all();
+}
+
+/// A scan that had its part in a death of the process runs alone, and one that had it too often
+/// does not run any more.
+Result<void> RebuildDriver::guarded(Active& active, const store::Shape& shape) {
+    const int deaths = journal_.deaths(shape);
+    if (deaths >= options_.maxAttempts) {
+        log_->error("scan set aside: the server died each time it was segmented",
+                    {{"shape", shape.id}, {"key", shape.key}, {"attempts", std::int64_t{deaths}}});
+        const auto stored = store_.putRebuildFailure(
+            active.rebuild.id, shape.id, shape.pointsVersion,
+            {ErrorCode::kInternal,
+             "the server stopped " + std::to_string(deaths) +
+                 " times while it segmented this scan; it is set aside. Replace its points, "
+                 "or rebuild the collection, to try again"});
+        CrashJournal::Entry entry(journal_, shape);
+        if (stored) entry.acquit();
+        return stored;
+    }
+    const SuspectGate::Pass pass(suspects_, deaths > 0);
+    CrashJournal::Entry entry(journal_, shape);
+    const Result<void> stored = process(active, shape);
+    if (stored && !active.cancel) entry.acquit();
+    return stored;
 }
 
 /// Errors: of the store; the shape comes again with the next pass.

@@ -13,13 +13,16 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <string>
 #include <thread>
 #include <vector>
 
 #include "core/base/error.h"
 #include "core/base/run_context.h"
 #include "server/index/collection_index.h"
+#include "server/ingest/crash_journal.h"
 #include "server/ingest/describer.h"
+#include "server/ingest/suspect_gate.h"
 #include "server/ingest/worker_pool.h"
 #include "server/store/store.h"
 #include "server/telemetry/logger.h"
@@ -27,8 +30,10 @@
 namespace shapedb::ingest {
 
 struct RebuildOptions {
-    int threads = 1;         ///< at least 1
-    std::size_t batch = 32;  ///< shapes read from the store at once
+    int threads = 1;          ///< at least 1
+    int maxAttempts = 2;      ///< deaths of the process after which a scan is set aside
+    std::string journalPath;  ///< of the CrashJournal
+    std::size_t batch = 32;   ///< shapes read from the store at once
     /// While uploads are being segmented, each rebuild thread waits this long before it takes
     /// its next shape: uploads come first, and the rebuild still ends.
     std::chrono::milliseconds yield{100};
@@ -40,8 +45,8 @@ struct RebuildOptions {
 class RebuildDriver {
   public:
     /// The references are not owned and must outlive the driver.
-    RebuildDriver(store::Store& store, index::CollectionIndex& index, WorkerPool& pool, Describer describe,
-                  telemetry::LoggerPtr log, RebuildOptions options);
+    RebuildDriver(store::Store& store, index::CollectionIndex& index, WorkerPool& pool, SuspectGate& suspects,
+                  Describer describe, telemetry::LoggerPtr log, RebuildOptions options);
     /// As `stop`.
     ~RebuildDriver();
 
@@ -62,7 +67,8 @@ class RebuildDriver {
 
     /// Returns when no thread touches the store.
     void pause();
-    /// Goes on with what the store then calls running. Errors: as Store::runningRebuilds.
+    /// Goes on with what the store, whose content may be another now, calls running.
+    /// Errors: as Store::runningRebuilds.
     [[nodiscard]] Result<void> resume();
     /// As `pause`, and ends the threads; what is unfinished goes on at the next start. Idempotent.
     void stop();
@@ -84,6 +90,7 @@ class RebuildDriver {
     void readBatch(const ActivePtr& active, std::unique_lock<std::mutex>& lock);
     void finish(const ActivePtr& active, std::unique_lock<std::mutex>& lock);
     void rebuildOne(const ActivePtr& active, std::unique_lock<std::mutex>& lock);
+    Result<void> guarded(Active& active, const store::Shape& shape);
     Result<void> process(Active& active, const store::Shape& shape);
     void retire(const ActivePtr& active);
     void rest(std::unique_lock<std::mutex>& lock, std::chrono::milliseconds time);
@@ -93,9 +100,11 @@ class RebuildDriver {
     store::Store& store_;
     index::CollectionIndex& index_;
     WorkerPool& pool_;
+    SuspectGate& suspects_;
     Describer describe_;
     telemetry::LoggerPtr log_;
     RebuildOptions options_;
+    CrashJournal journal_;
 
     std::mutex beginMutex_;  ///< one `begin` or `cancel` at a time; taken before mutex_
     std::mutex mutex_;

@@ -31,10 +31,12 @@ std::vector<telemetry::Field> fieldsOf(const store::Job& job, const Error& error
 }  // namespace
 
 WorkerPool::WorkerPool(store::Store& store, index::CollectionIndex& index, ProgressBoard& board,
-                       Describer describe, telemetry::LoggerPtr log, WorkerOptions options)
+                       SuspectGate& suspects, Describer describe, telemetry::LoggerPtr log,
+                       WorkerOptions options)
     : store_(store),
       index_(index),
       board_(board),
+      suspects_(suspects),
       describe_(std::move(describe)),
       log_(std::move(log)),
       options_(options) {}
@@ -102,6 +104,7 @@ Result<void> WorkerPool::resume() {
     const Result<void> recovered = recover();
     const std::lock_guard<std::mutex> lock(mutex_);
     paused_ = false;
+    probing_ = true;
     ++signals_;
     changed_.notify_all();
     return recovered;
@@ -135,8 +138,12 @@ std::chrono::milliseconds WorkerPool::retryAfter(std::uint64_t jobs) const {
 }
 
 void WorkerPool::run() {
-    while (const std::shared_ptr<Running> running = next()) {
+    for (;;) {
+        std::optional<SuspectGate::Pass> pass;
+        const std::shared_ptr<Running> running = next(pass);
+        if (!running) return;
         work(running);
+        pass.reset();
         const std::lock_guard<std::mutex> lock(mutex_);
         running_.erase(running->job.id);
         changed_.notify_all();
@@ -160,34 +167,50 @@ void WorkerPool::retryReleases(std::unique_lock<std::mutex>& lock) {
     unreleased_.insert(unreleased_.end(), still.begin(), still.end());
 }
 
-/// Claims outside the lock; empty when there is no job or the store failed (then it rested).
-std::optional<store::Job> WorkerPool::claim(std::unique_lock<std::mutex>& lock) {
-    ++claiming_;
+/// Claims outside the lock. When the store fails it rests, and there is a new signal to look
+/// again.
+Result<std::optional<store::Job>> WorkerPool::claim(std::unique_lock<std::mutex>& lock) {
     if (!unreleased_.empty()) retryReleases(lock);
     lock.unlock();
-    const auto job = store_.claimJob();
+    auto job = store_.claimJob();
     lock.lock();
-    --claiming_;
-    changed_.notify_all();
-    if (job) return *job;
+    if (job) return job;
     log_->error("cannot take the next job", telemetry::fieldsOf(job.error()));
     rest(lock);
-    ++signals_;  // look again
-    return std::nullopt;
+    ++signals_;
+    return job;
 }
 
-/// Blocks until there is a job; null when the pool stops.
-std::shared_ptr<WorkerPool::Running> WorkerPool::next() {
+/// Blocks until there is a job and this worker may have it; null when the pool stops.
+std::shared_ptr<WorkerPool::Running> WorkerPool::next(std::optional<SuspectGate::Pass>& pass) {
     std::unique_lock<std::mutex> lock(mutex_);
     for (;;) {
-        changed_.wait(lock, [this] { return stopping_ || !paused_; });
+        const auto mayClaim = [this] {
+            return !paused_ && (!probing_ || (claiming_ == 0 && running_.empty()));
+        };
+        changed_.wait(lock, [&] { return stopping_ || mayClaim(); });
         if (stopping_) return nullptr;
         const std::uint64_t seen = signals_;
-        if (const auto job = claim(lock)) {
+        const bool probing = probing_;
+        ++claiming_;
+        lock.unlock();
+        // Before the claim: a claimed job would count as tried if another suspect, of a
+        // rebuild, brought the process down while this one waited for its turn.
+        if (probing) pass.emplace(suspects_, true);
+        lock.lock();
+        const auto job = claim(lock);
+        --claiming_;
+        const bool suspect = job && *job && (*job)->attempts > 1;
+        if (job && !suspect) probing_ = false;
+        changed_.notify_all();
+        if (!suspect) pass.reset();
+        if (job && *job) {
             auto running = std::make_shared<Running>();
-            running->job = *job;
+            running->job = **job;
             running->cancel = paused_;  // paused while claiming: goes straight back
-            running_[job->id] = running;
+            running_[running->job.id] = running;
+            lock.unlock();
+            if (!pass) pass.emplace(suspects_, suspect);
             return running;
         }
         changed_.wait(lock, [&] { return stopping_ || paused_ || signals_ != seen; });

@@ -21,6 +21,7 @@
 #include "server/index/collection_index.h"
 #include "server/ingest/describer.h"
 #include "server/ingest/progress_board.h"
+#include "server/ingest/suspect_gate.h"
 #include "server/store/store.h"
 #include "server/telemetry/logger.h"
 
@@ -37,8 +38,8 @@ struct WorkerOptions {
 class WorkerPool {
   public:
     /// The references are not owned and must outlive the pool.
-    WorkerPool(store::Store& store, index::CollectionIndex& index, ProgressBoard& board, Describer describe,
-               telemetry::LoggerPtr log, WorkerOptions options);
+    WorkerPool(store::Store& store, index::CollectionIndex& index, ProgressBoard& board,
+               SuspectGate& suspects, Describer describe, telemetry::LoggerPtr log, WorkerOptions options);
     /// As `stop`.
     ~WorkerPool();
 
@@ -81,8 +82,8 @@ class WorkerPool {
 
     static void markSuperseded(Running& running);
     void run();
-    std::shared_ptr<Running> next();
-    std::optional<store::Job> claim(std::unique_lock<std::mutex>& lock);
+    std::shared_ptr<Running> next(std::optional<SuspectGate::Pass>& pass);
+    Result<std::optional<store::Job>> claim(std::unique_lock<std::mutex>& lock);
     void retryReleases(std::unique_lock<std::mutex>& lock);
     void work(const std::shared_ptr<Running>& running);
     Outcome attempt(Running& running);
@@ -95,6 +96,7 @@ class WorkerPool {
     store::Store& store_;
     index::CollectionIndex& index_;
     ProgressBoard& board_;
+    SuspectGate& suspects_;
     Describer describe_;
     telemetry::LoggerPtr log_;
     WorkerOptions options_;
@@ -104,6 +106,9 @@ class WorkerPool {
     std::uint64_t signals_ = 0;  ///< rises when there may be a job
     bool paused_ = false;
     bool stopping_ = false;
+    /// True from the start until a job is seen that no dead process had in hand (older ones
+    /// come first): one job at a time, and alone, so that one that kills dies alone.
+    bool probing_ = true;
     int claiming_ = 0;                                          ///< workers inside the store without a job
     std::map<std::int64_t, std::shared_ptr<Running>> running_;  ///< by job id
     std::vector<store::Job> unreleased_;                        ///< could not be put back yet

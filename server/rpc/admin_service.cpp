@@ -17,16 +17,14 @@ namespace {
 
 using RebuildWriter = grpc::ServerWriter<v1::RebuildProgress>;
 
-tl::unexpected<Error> clientGone() { return fail(ErrorCode::kCancelled, "the client has gone"); }
-
 bool hasParameters(const v1::RebuildRequest& request) {
     return request.has_segmentation() || request.has_signature() ||
            request.profile() != v1::PROFILE_UNSPECIFIED;
 }
 
 /// Reads the stored signatures anew; nothing is segmented.
-Result<void> reloadCache(const Services& services, const std::vector<index::SnapshotPtr>& collections,
-                         RebuildWriter& writer) {
+Result<void> reloadCache(const Services& services, Call& call,
+                         const std::vector<index::SnapshotPtr>& collections, RebuildWriter& writer) {
     for (const index::SnapshotPtr& snapshot : collections) {
         const auto began = std::chrono::steady_clock::now();
         if (const auto reloaded = services.index.reload(snapshot->collection.id); !reloaded) return reloaded;
@@ -38,12 +36,13 @@ Result<void> reloadCache(const Services& services, const std::vector<index::Snap
         progress.set_total(count);
         progress.set_finished(true);
         progress.set_seconds(std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count());
-        if (!writer.Write(progress)) return clientGone();
+        if (const auto sent = call.write(writer, progress); !sent) return sent;
     }
     return {};
 }
 
-bool sendProgress(const std::string& collection, const store::Rebuild& rebuild, RebuildWriter& writer) {
+Result<void> sendProgress(Call& call, const std::string& collection, const store::Rebuild& rebuild,
+                          RebuildWriter& writer) {
     using std::chrono::system_clock;
     const auto nowMs =
         std::chrono::duration_cast<std::chrono::milliseconds>(system_clock::now().time_since_epoch());
@@ -56,7 +55,7 @@ bool sendProgress(const std::string& collection, const store::Rebuild& rebuild, 
     progress.set_finished(rebuild.state == store::RebuildState::kDone);
     progress.set_seconds(static_cast<double>(std::max<store::TimestampMs>(0, end - rebuild.startedAt)) /
                          1'000.0);
-    return writer.Write(progress);
+    return call.write(writer, progress);
 }
 
 /// Tells how a rebuild goes until it ends; it goes on whatever happens to this call.
@@ -64,7 +63,7 @@ Result<void> follow(const Services& services, Call& call, const std::string& col
                     store::Rebuild rebuild, bool detach, RebuildWriter& writer) {
     RunContext oneSecond = call.run();
     for (;;) {
-        if (!sendProgress(collection, rebuild, writer)) return clientGone();
+        if (const auto sent = sendProgress(call, collection, rebuild, writer); !sent) return sent;
         if (detach || rebuild.state == store::RebuildState::kDone) return {};
         if (rebuild.state == store::RebuildState::kCancelled) {
             return fail(ErrorCode::kCancelled,
@@ -119,8 +118,9 @@ grpc::Status AdminServiceHandler::Rebuild(grpc::ServerContext* context, const v1
             if (!found) return fail(found.error());
             collections = {*found};
         }
-        if (request->cache_only()) return reloadCache(services_, collections, *writer);
+        if (request->cache_only()) return reloadCache(services_, call, collections, *writer);
 
+        if (const auto place = call.becomeFollower(); !place) return place;
         // All are started first: they go on should this call be lost while it follows one.
         std::vector<store::Rebuild> started;
         for (const index::SnapshotPtr& snapshot : collections) {
@@ -159,7 +159,7 @@ grpc::Status AdminServiceHandler::Backup(grpc::ServerContext* context, const v1:
         if (!file) return fail(file.error());
         if (const auto copied = services_.store.backup(file->path(), call.run()); !copied) return copied;
         return sendFile(file->path(), call.run(),
-                        [&](const v1::BackupChunk& chunk) { return writer->Write(chunk); });
+                        [&](const v1::BackupChunk& chunk) { return call.write(*writer, chunk); });
     });
 }
 
@@ -173,7 +173,7 @@ grpc::Status AdminServiceHandler::Restore(grpc::ServerContext* context,
         auto receiver = FileReceiver::create(file->path());
         if (!receiver) return fail(receiver.error());
         v1::BackupChunk chunk;
-        while (reader->Read(&chunk)) {
+        while (call.read(*reader, &chunk)) {
             if (const auto go = call.run().checkpoint(); !go) return go;
             if (const auto added = receiver->add(chunk); !added) return added;
         }
@@ -205,7 +205,7 @@ grpc::Status AdminServiceHandler::Check(grpc::ServerContext* context, const v1::
             progress.set_total(total);
             if (RunContext::Clock::now() - lastSent < kProgressInterval) return;
             lastSent = RunContext::Clock::now();
-            writer->Write(progress);  // a client that has gone is seen by the checkpoint
+            (void)call.write(*writer, progress);  // a client that has gone is seen by the checkpoint
         };
         const auto problems = services_.store.check(run);
         if (!problems) return fail(problems.error());
@@ -214,12 +214,11 @@ grpc::Status AdminServiceHandler::Check(grpc::ServerContext* context, const v1::
         for (const std::string& problem : *problems) {
             progress.add_problems(problem);
             if (progress.ByteSizeLong() < kMaxChunkBytes) continue;
-            if (!writer->Write(progress)) return clientGone();
+            if (const auto sent = call.write(*writer, progress); !sent) return sent;
             progress.clear_problems();
         }
         progress.set_finished(true);
-        if (!writer->Write(progress)) return clientGone();
-        return {};
+        return call.write(*writer, progress);
     });
 }
 

@@ -18,7 +18,7 @@ Error writeError(int number) {
 }  // namespace
 
 Result<void> sendFile(const std::string& path, const RunContext& context,
-                      const std::function<bool(const v1::BackupChunk&)>& send) {
+                      const std::function<Result<void>(const v1::BackupChunk&)>& send) {
     const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), std::fclose);
     const auto unreadable = [] {
         return fail(ErrorCode::kFileNotReadable,
@@ -28,7 +28,6 @@ Result<void> sendFile(const std::string& path, const RunContext& context,
     const long size = std::ftell(file.get());
     if (size < 0 || std::fseek(file.get(), 0, SEEK_SET) != 0) return unreadable();
 
-    const auto gone = [] { return fail(ErrorCode::kCancelled, "the client has gone"); };
     Sha256 hash;
     v1::BackupChunk chunk;
     chunk.set_total_bytes(static_cast<std::uint64_t>(size));
@@ -40,13 +39,12 @@ Result<void> sendFile(const std::string& path, const RunContext& context,
         if (data->empty()) return unreadable();
         hash.update(data->data(), data->size());
         sent += data->size();
-        if (!send(chunk)) return gone();
+        if (const auto passed = send(chunk); !passed) return passed;
         chunk.Clear();
     }
     const Sha256Digest digest = hash.finish();
     chunk.set_sha256(digest.data(), digest.size());
-    if (!send(chunk)) return gone();
-    return {};
+    return send(chunk);
 }
 
 Result<FileReceiver> FileReceiver::create(const std::string& path) {

@@ -14,11 +14,10 @@
 
 namespace shapedb::rpc {
 
-/// Sends a file: its size with the first chunk, its SHA-256 alone in the last message. `send`
-/// returns false when the receiver has gone. Errors: kFileNotReadable, kCancelled,
-/// kDeadlineExceeded.
+/// Sends a file: its size with the first chunk, its SHA-256 alone in the last message.
+/// Errors: those of `send`; kFileNotReadable, kCancelled, kDeadlineExceeded.
 [[nodiscard]] Result<void> sendFile(const std::string& path, const RunContext& context,
-                                    const std::function<bool(const v1::BackupChunk&)>& send);
+                                    const std::function<Result<void>(const v1::BackupChunk&)>& send);
 
 /// Writes chunks to a new file and checks them. After an error only destruction.
 class FileReceiver {

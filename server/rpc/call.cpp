@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "server/rpc/limits.h"
 #include "server/rpc/request_checks.h"
 #include "server/rpc/status.h"
 
@@ -54,8 +55,10 @@ Call::Call(const Services& services, grpc::ServerContext& context, const char* r
     : services_(services),
       context_(context),
       rpc_(rpc),
+      peer_(context.peer()),
       began_(std::chrono::steady_clock::now()),
       cancellation_(services.cancellations, context),
+      follower_(services.followers),
       epoch_(services.restores.epoch()) {
     run_.cancel = &cancellation_.flag();
     run_.deadline = steadyDeadline(context);
@@ -84,14 +87,24 @@ Result<index::SnapshotPtr> Call::collection(const std::string& name) {
     return services_.index.byName(collection_);
 }
 
+Result<void> Call::becomeFollower() {
+    auto taken = follower_.take(1);
+    if (!taken) retryAfter(kBudgetRetry);
+    return taken;
+}
+
 grpc::Status Call::finish(Result<void> result) {
     if (!expectsRestore_ && services_.restores.epoch() != epoch_) {
         // Ids looked up before the restore mean other shapes after it.
         result = fail(ErrorCode::kUnavailable,
                       "the database was replaced by a backup while the call ran: repeat it");
     }
-    if (!result && result.error().code == ErrorCode::kCancelled &&
-        RunContext::Clock::now() >= run_.deadline) {
+    if (!result && cancellation_.stalled()) {
+        result = fail(ErrorCode::kCancelled, "the client neither sent nor took anything for " +
+                                                 std::to_string(services_.config.limits.stallSeconds) +
+                                                 " seconds");
+    } else if (!result && result.error().code == ErrorCode::kCancelled &&
+               RunContext::Clock::now() >= run_.deadline) {
         // gRPC cancels a call whose deadline passed; the deadline is the reason.
         result = fail(ErrorCode::kDeadlineExceeded, "the deadline passed before the work was done");
     }
@@ -103,7 +116,7 @@ grpc::Status Call::finish(Result<void> result) {
 void Call::logLine(const grpc::Status& status, const Error* error) {
     const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - began_;
     std::vector<telemetry::Field> fields = {{"rpc", std::string(rpc_)},
-                                            {"peer", context_.peer()},
+                                            {"peer", peer_},
                                             {"code", std::string(statusName(status.error_code()))},
                                             {"ms", took.count()}};
     if (!collection_.empty()) fields.push_back({"collection", collection_});

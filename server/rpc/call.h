@@ -34,6 +34,25 @@ class Call {
     /// Follows the client's cancellation and deadline.
     [[nodiscard]] const RunContext& run() const { return run_; }
 
+    /// One message of a stream. False at the end of the stream or when the client has gone; a
+    /// client that makes this block for limits.stall_seconds is cut off.
+    template <typename Reader, typename Message>
+    bool read(Reader& reader, Message* message) {
+        cancellation_.beginTransfer();
+        const bool good = reader.Read(message);
+        cancellation_.endTransfer();
+        return good;
+    }
+    /// Errors: kCancelled (the client has gone, or was cut off as above).
+    template <typename Writer, typename Message>
+    Result<void> write(Writer& writer, const Message& message) {
+        cancellation_.beginTransfer();
+        const bool good = writer.Write(message);
+        cancellation_.endTransfer();
+        if (good) return {};
+        return fail(ErrorCode::kCancelled, "the client has gone");
+    }
+
     /// Asks gRPC now: the flag in `run()` follows a moment later.
     [[nodiscard]] bool clientGone() const { return context_.IsCancelled(); }
 
@@ -50,6 +69,8 @@ class Call {
         points_ += points;
         bytes_ += bytes;
     }
+    /// Takes one of the places for calls that wait; given back with the call. Errors: kQueueFull.
+    [[nodiscard]] Result<void> becomeFollower();
     /// For RESOURCE_EXHAUSTED.
     void retryAfter(std::chrono::milliseconds time) { retryAfter_ = time; }
     /// A call that replaces the database itself is not surprised by it.
@@ -64,8 +85,10 @@ class Call {
     const Services& services_;
     grpc::ServerContext& context_;
     const char* rpc_;
+    const std::string peer_;  ///< asked at once: a cancelled call has none
     std::chrono::steady_clock::time_point began_;
     CancelWatcher::Registration cancellation_;
+    Budget::Share follower_;
     RunContext run_;
     std::uint64_t epoch_;
     bool admitted_ = false;

@@ -4,7 +4,7 @@
 
 namespace shapedb::rpc {
 
-CancelWatcher::CancelWatcher() : thread_([this] { run(); }) {}
+CancelWatcher::CancelWatcher(std::chrono::milliseconds stall) : stall_(stall), thread_([this] { run(); }) {}
 
 CancelWatcher::~CancelWatcher() {
     {
@@ -23,23 +23,32 @@ void CancelWatcher::run() {
         } else {
             changed_.wait_for(lock, kLookForCancellation, [this] { return stopping_; });
         }
-        for (const auto& [flag, context] : calls_) {
-            if (!flag->load(std::memory_order_relaxed) && context->IsCancelled()) *flag = true;
-        }
+        for (Registration* call : calls_) look(*call);
     }
 }
 
-CancelWatcher::Registration::Registration(CancelWatcher& watcher, const grpc::ServerContext& context)
-    : watcher_(watcher) {
+void CancelWatcher::look(Registration& call) const {
+    if (call.flag_) return;
+    if (call.context_.IsCancelled()) {
+        call.flag_ = true;
+        return;
+    }
+    const Clock::rep since = call.blockedSince_;
+    if (since == 0 || Clock::now() - Clock::time_point(Clock::duration(since)) < stall_) return;
+    call.stalled_ = true;
+    call.context_.TryCancel();
+}
+
+CancelWatcher::Registration::Registration(CancelWatcher& watcher, grpc::ServerContext& context)
+    : watcher_(watcher), context_(context) {
     const std::lock_guard<std::mutex> lock(watcher_.mutex_);
-    const bool wasEmpty = watcher_.calls_.empty();
-    watcher_.calls_[&flag_] = &context;
-    if (wasEmpty) watcher_.changed_.notify_all();
+    watcher_.calls_.insert(this);
+    if (watcher_.calls_.size() == 1) watcher_.changed_.notify_all();
 }
 
 CancelWatcher::Registration::~Registration() {
     const std::lock_guard<std::mutex> lock(watcher_.mutex_);
-    watcher_.calls_.erase(&flag_);
+    watcher_.calls_.erase(this);
 }
 
 }  // namespace shapedb::rpc

@@ -26,14 +26,18 @@ namespace {
 
 constexpr const char* kDatabaseFile = "shapedb.sqlite";
 constexpr const char* kTemporaryFolder = "tmp";
+constexpr const char* kRebuildJournal = "rebuild.journal";
 /// For calls still running when the drain time is over: long enough to hear of it.
 constexpr std::chrono::milliseconds kAfterDrain{200};
 
 Result<std::unique_ptr<store::Store>> openStore(const config::ServerConfig& config) {
+    namespace fs = std::filesystem;
     std::error_code error;
-    std::filesystem::create_directories(config.data, error);
-    if (!error && !std::filesystem::is_directory(config.data))
-        error = std::make_error_code(std::errc::not_a_directory);
+    // Scans are nobody else's business; an existing directory keeps the permissions it has.
+    if (fs::create_directories(config.data, error)) {
+        fs::permissions(config.data, fs::perms::owner_all, error);
+    }
+    if (!error && !fs::is_directory(config.data)) error = std::make_error_code(std::errc::not_a_directory);
     if (error) {
         return fail(ErrorCode::kFileNotWritable,
                     "data directory " + config.data + " cannot be created: " + error.message());
@@ -68,11 +72,13 @@ struct Daemon::Parts {
           log(std::move(logger)),
           store(std::move(opened)),
           index(*store, log),
-          workers(*store, index, board, describe, log,
+          workers(*store, index, board, suspects, describe, log,
                   {config::threadsOrProcessors(config.ingest.threads), config.ingest.maxAttempts}),
-          rebuilds(*store, index, workers, describe, log, rebuildOptions(config)),
+          rebuilds(*store, index, workers, suspects, describe, log, rebuildOptions(config)),
+          cancellations(std::chrono::seconds(config.limits.stallSeconds)),
           slots(config::threadsOrProcessors(config.search.threads)),
-          uploads(config.limits.maxUploadBytes),
+          uploads(config.limits.maxUploadBytes, "bytes of points that uploads in progress may hold"),
+          followers(kMaxFollowers, "calls that may wait for shapes and rebuilds"),
           searches(config::threadsOrProcessors(config.search.threads)),
           services{config,
                    *store,
@@ -87,6 +93,7 @@ struct Daemon::Parts {
                    restores,
                    slots,
                    uploads,
+                   followers,
                    searches,
                    config.data + "/" + kTemporaryFolder,
                    std::chrono::system_clock::now()},
@@ -98,6 +105,8 @@ struct Daemon::Parts {
     static ingest::RebuildOptions rebuildOptions(const config::ServerConfig& config) {
         ingest::RebuildOptions options;
         options.threads = config::threadsOrProcessors(config.rebuild.threads);
+        options.maxAttempts = config.ingest.maxAttempts;
+        options.journalPath = config.data + "/" + kRebuildJournal;
         return options;
     }
 
@@ -110,13 +119,15 @@ struct Daemon::Parts {
     std::unique_ptr<store::Store> store;
     index::CollectionIndex index;
     ingest::ProgressBoard board;
+    ingest::SuspectGate suspects;
     ingest::WorkerPool workers;
     ingest::RebuildDriver rebuilds;
     CancelWatcher cancellations;
     CallGate calls;
     RestoreGate restores;
     SegmentationSlots slots;
-    UploadBudget uploads;
+    Budget uploads;
+    Budget followers;
     SearchRunner searches;
     Services services;
     ShapeServiceHandler shapeService;

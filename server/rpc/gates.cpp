@@ -53,16 +53,15 @@ Result<void> SegmentationSlots::Slot::acquire(const RunContext& context) {
     return {};
 }
 
-Result<void> UploadBudget::Share::take(std::uint64_t bytes) {
+Result<void> Budget::Share::take(std::uint64_t amount) {
     std::uint64_t free = budget_.free_.load();
     do {
-        if (free < bytes) {
-            return fail(ErrorCode::kQueueFull, "uploads in progress hold all of the " +
-                                                   std::to_string(budget_.total_) +
-                                                   " bytes they may hold together: try again later");
+        if (free < amount) {
+            return fail(ErrorCode::kQueueFull, "all of the " + std::to_string(budget_.total_) + " " +
+                                                   budget_.what_ + " are taken: try again later");
         }
-    } while (!budget_.free_.compare_exchange_weak(free, free - bytes));
-    taken_ += bytes;
+    } while (!budget_.free_.compare_exchange_weak(free, free - amount));
+    taken_ += amount;
     return {};
 }
 

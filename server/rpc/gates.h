@@ -91,28 +91,30 @@ class SegmentationSlots {
     int free_;
 };
 
-/// Memory that uploads in progress may hold together. Thread-safe.
-class UploadBudget {
+/// So much of something that all calls may hold together. Thread-safe.
+class Budget {
   public:
-    explicit UploadBudget(std::uint64_t bytes) : total_(bytes), free_(bytes) {}
+    /// `what` completes "all of the N ...": static, e.g. "bytes that uploads may hold".
+    Budget(std::uint64_t total, const char* what) : total_(total), what_(what), free_(total) {}
 
-    /// One upload's share; given back when destroyed.
+    /// One call's share; given back when destroyed.
     class Share {
       public:
-        explicit Share(UploadBudget& budget) : budget_(budget) {}
+        explicit Share(Budget& budget) : budget_(budget) {}
         ~Share() { budget_.free_.fetch_add(taken_); }
         Share(const Share&) = delete;
         Share& operator=(const Share&) = delete;
         /// Errors: kQueueFull.
-        [[nodiscard]] Result<void> take(std::uint64_t bytes);
+        [[nodiscard]] Result<void> take(std::uint64_t amount);
 
       private:
-        UploadBudget& budget_;
+        Budget& budget_;
         std::uint64_t taken_ = 0;
     };
 
   private:
     const std::uint64_t total_;
+    const char* const what_;
     std::atomic<std::uint64_t> free_;
 };
 

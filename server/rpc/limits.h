@@ -36,6 +36,8 @@ constexpr std::size_t kMaxErrorMessageBytes = 2'048;
 // Transport.
 constexpr int kMaxReceiveBytes = 4 << 20;
 constexpr int kMaxCallThreads = 256;  ///< calls at one moment, streams included
+/// Calls that only wait for a shape or a rebuild: the other threads stay free for work.
+constexpr int kMaxFollowers = 192;
 constexpr std::chrono::milliseconds kKeepaliveTime{60'000};
 constexpr std::chrono::milliseconds kKeepaliveTimeout{20'000};
 constexpr std::chrono::milliseconds kShortestClientPing{10'000};
@@ -46,7 +48,7 @@ constexpr std::chrono::milliseconds kProgressInterval{100};  ///< between two me
 /// Who waits for a shape reads its row again this often though nobody reported a change: it
 /// may have gone with its collection.
 constexpr std::chrono::milliseconds kReadStateAgain{1'000};
-/// When a caller refused for lack of upload memory should try again.
-constexpr std::chrono::milliseconds kUploadRetry{500};
+/// When a caller refused for lack of upload memory or of places to wait should try again.
+constexpr std::chrono::milliseconds kBudgetRetry{500};
 
 }  // namespace shapedb::rpc

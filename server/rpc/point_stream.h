@@ -23,7 +23,7 @@ struct ReceivedScan {
 class PointReceiver {
   public:
     /// `maxPoints` as config limits.max_points; `budget` is not owned.
-    PointReceiver(std::uint64_t maxPoints, UploadBudget& budget) : maxPoints_(maxPoints), share_(budget) {}
+    PointReceiver(std::uint64_t maxPoints, Budget& budget) : maxPoints_(maxPoints), share_(budget) {}
 
     /// Errors: kMalformedStream (second header), kTooFewPoints (announced),
     /// kPointLimitExceeded (announced), kInvalidArgument (sha256 neither empty nor 32 bytes).
@@ -45,7 +45,7 @@ class PointReceiver {
     Result<void> checkChunk(const std::string& xyz) const;
 
     std::uint64_t maxPoints_;
-    UploadBudget::Share share_;
+    Budget::Share share_;
     std::optional<std::uint64_t> announced_;
     std::string wantedChecksum_;
     Sha256 hash_;
@@ -58,7 +58,7 @@ class PointReceiver {
 template <typename Request, typename Reader, typename OnHeader>
 Result<ReceivedScan> receiveScan(Reader& reader, PointReceiver& receiver, Call& call, OnHeader&& onHeader) {
     Request request;
-    while (reader.Read(&request)) {
+    while (call.read(reader, &request)) {
         if (const auto go = call.run().checkpoint(); !go) return fail(go.error());
         Result<void> taken;
         if (request.has_header()) {

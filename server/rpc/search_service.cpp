@@ -145,7 +145,7 @@ grpc::Status SearchServiceHandler::SearchByScan(grpc::ServerContext* context,
             return {};
         };
         const auto scan = receiveScan<v1::SearchByScanRequest>(*reader, receiver, call, checkSearchHeader);
-        if (!scan && scan.error().code == ErrorCode::kQueueFull) call.retryAfter(kUploadRetry);
+        if (!scan && scan.error().code == ErrorCode::kQueueFull) call.retryAfter(kBudgetRetry);
         if (!scan) return fail(scan.error());
 
         Result<Description> description = fail(ErrorCode::kInternal, "not segmented");

@@ -35,7 +35,8 @@ struct Services {
     CallGate& calls;
     RestoreGate& restores;
     SegmentationSlots& slots;
-    UploadBudget& uploads;
+    Budget& uploads;    ///< bytes of points being received
+    Budget& followers;  ///< calls that wait for a shape or a rebuild
     SearchRunner& searches;
     std::string temporaryDirectory;  ///< exists; for backup and restore files
     std::chrono::system_clock::time_point started;

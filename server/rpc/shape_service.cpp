@@ -37,6 +37,9 @@ Result<void> checkHeader(const Services& services, Call& call, const pb::AddShap
     }
     if (const auto collection = call.collection(header.collection()); !collection)
         return fail(collection.error());
+    if (header.wait()) {
+        if (const auto place = call.becomeFollower(); !place) return place;
+    }
     if (services.restores.restoring()) {
         return fail(ErrorCode::kUnavailable, "the database is being replaced by a backup: try again later");
     }
@@ -69,20 +72,14 @@ Result<store::ShapeFilter> makeFilter(const Call& call, const std::string& text,
     return result;
 }
 
-template <typename Writer>
-Result<void> writeOr(Writer& writer, const pb::SegmentedPoints& message) {
-    if (writer.Write(message)) return {};
-    return fail(ErrorCode::kCancelled, "the client has gone");
-}
-
 /// One summary, then the points in the order they were uploaded, each with its segment.
 template <typename Writer>
-Result<void> sendSegments(Writer& writer, const Description& description, const std::vector<float>& xyz,
-                          bool summaryOnly) {
+Result<void> sendSegments(Call& call, Writer& writer, const Description& description,
+                          const std::vector<float>& xyz, bool summaryOnly) {
     pb::SegmentedPoints message;
     toProto(description.segmentation, message.mutable_summary()->mutable_report());
     toProto(description.signature, message.mutable_summary()->mutable_signature());
-    if (const auto sent = writeOr(writer, message); !sent || summaryOnly) return sent;
+    if (const auto sent = call.write(writer, message); !sent || summaryOnly) return sent;
 
     const auto& labels = description.segmentation.pointSegment;
     for (std::size_t first = 0; first < labels.size(); first += kLabelledChunkPoints) {
@@ -93,7 +90,7 @@ Result<void> sendSegments(Writer& writer, const Description& description, const 
         std::memcpy(chunk->mutable_xyz()->data(), xyz.data() + 3 * first, count * kPointBytes);
         chunk->mutable_segments()->Add(labels.begin() + static_cast<std::ptrdiff_t>(first),
                                        labels.begin() + static_cast<std::ptrdiff_t>(first + count));
-        if (const auto sent = writeOr(writer, message); !sent) return sent;
+        if (const auto sent = call.write(writer, message); !sent) return sent;
     }
     return {};
 }
@@ -120,7 +117,7 @@ Result<void> ShapeServiceHandler::addShape(Call& call, grpc::ServerReader<v1::Ad
             header = received;
             return checkHeader(services_, call, received);
         });
-        if (!scan && scan.error().code == ErrorCode::kQueueFull) call.retryAfter(kUploadRetry);
+        if (!scan && scan.error().code == ErrorCode::kQueueFull) call.retryAfter(kBudgetRetry);
         if (!scan) return fail(scan.error());
         if (const auto usable = checkUsable(scan->xyz); !usable) return usable;
         if (const auto go = call.run().checkpoint(); !go) return go;
@@ -262,6 +259,7 @@ grpc::Status ShapeServiceHandler::WatchIngest(grpc::ServerContext* context,
     return handle(services_, context, "WatchIngest", [&](Call& call) -> Result<void> {
         const auto found = findShape(services_, call, request->shape());
         if (!found) return fail(found.error());
+        if (const auto place = call.becomeFollower(); !place) return place;
         std::string last;
         const auto tell = [&](const store::Shape& shape,
                               const ingest::ProgressBoard::Status& status) -> Result<void> {
@@ -276,8 +274,7 @@ grpc::Status ShapeServiceHandler::WatchIngest(grpc::ServerContext* context,
             const std::string text = event.SerializeAsString();
             if (text == last) return {};
             last = text;
-            if (writer->Write(event)) return {};
-            return fail(ErrorCode::kCancelled, "the client has gone");
+            return call.write(*writer, event);
         };
         const auto settled = followIngest(
             services_, found->shape.id, [&] { return call.checkpointWhileFollowing(); }, tell);
@@ -313,7 +310,7 @@ grpc::Status ShapeServiceHandler::GetSegments(grpc::ServerContext* context,
         const auto description =
             services_.describe(ingest::toCloud(*points), found->collection->parameters, call.run());
         if (!description) return fail(description.error());
-        return sendSegments(*writer, *description, *points, false);
+        return sendSegments(call, *writer, *description, *points, false);
     });
 }
 
@@ -332,13 +329,13 @@ grpc::Status ShapeServiceHandler::Segment(
             return {};
         };
         const auto scan = receiveScan<v1::SegmentRequest>(*stream, receiver, call, checkSegmentHeader);
-        if (!scan && scan.error().code == ErrorCode::kQueueFull) call.retryAfter(kUploadRetry);
+        if (!scan && scan.error().code == ErrorCode::kQueueFull) call.retryAfter(kBudgetRetry);
         if (!scan) return fail(scan.error());
         SegmentationSlots::Slot slot(services_.slots);
         if (const auto acquired = slot.acquire(call.run()); !acquired) return acquired;
         const auto description = services_.describe(ingest::toCloud(scan->xyz), parameters, call.run());
         if (!description) return fail(description.error());
-        return sendSegments(*stream, *description, scan->xyz, summaryOnly);
+        return sendSegments(call, *stream, *description, scan->xyz, summaryOnly);
     });
 }
 

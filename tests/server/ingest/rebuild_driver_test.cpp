@@ -1,9 +1,12 @@
 #include "server/ingest/rebuild_driver.h"
 
 #include <atomic>
+#include <cstdio>
+#include <fstream>
 #include <set>
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include "core/base/random.h"
 #include "tests/server/support/fixtures.h"
@@ -23,7 +26,7 @@ class Driver : public ::testing::Test {
         WorkerOptions options;
         options.threads = 1;
         options.backOff = 5ms;
-        pool = std::make_unique<WorkerPool>(store, index, board, quickDescribe, log, options);
+        pool = std::make_unique<WorkerPool>(store, index, board, suspects, quickDescribe, log, options);
         EXPECT_TRUE(pool->start());
     }
 
@@ -44,7 +47,9 @@ class Driver : public ::testing::Test {
         options.batch = 4;
         options.backOff = 5ms;
         options.yield = 1ms;
-        driver = std::make_unique<RebuildDriver>(store, index, *pool, std::move(describe), log, options);
+        options.journalPath = journal;
+        driver =
+            std::make_unique<RebuildDriver>(store, index, *pool, suspects, std::move(describe), log, options);
         EXPECT_TRUE(driver->start());
         return *driver;
     }
@@ -106,9 +111,11 @@ class Driver : public ::testing::Test {
     std::shared_ptr<RecordingLogger> log;
     index::CollectionIndex index;
     ProgressBoard board;
+    SuspectGate suspects;
     store::Collection parts;
     std::unique_ptr<WorkerPool> pool;
     std::unique_ptr<RebuildDriver> driver;
+    std::string journal;
     std::atomic<bool> closed{false};
     std::atomic<int> described{0};
     std::atomic<int> freeScans{0};
@@ -287,6 +294,28 @@ TEST_F(Driver, DeletedCollectionEndsItsRebuild) {
     const auto next = driver->begin(cups, parametersWith(2));
     ASSERT_TRUE(next);
     EXPECT_EQ(finished(*next).state, store::RebuildState::kDone);
+}
+
+// What a process that died twice over one scan leaves: the scan is set aside, the rebuild ends.
+TEST_F(Driver, ScanThatKillsTheRebuildTwiceIsSetAside) {
+    fill(5);
+    journal = ::testing::TempDir() + "shapedb-rebuild-journal-" + std::to_string(::getpid());
+    const auto guilty = *store.getShape(parts.id, "2");
+    const auto suspected = *store.getShape(parts.id, "3");
+    std::ofstream(journal) << guilty.id << " 1 1 1\n" << suspected.id << " 1 0 1\n";
+    start(counting());
+    const auto done = finished(begin());
+    EXPECT_EQ(done.state, store::RebuildState::kDone);
+    EXPECT_EQ(done.failed, 1u);
+    EXPECT_EQ(described, 4) << "it was not tried again";
+    EXPECT_EQ(store.getShape(parts.id, "2")->state, store::ShapeState::kFailed);
+    EXPECT_NE(store.getShape(parts.id, "2")->failure->message.find("2 times"), std::string::npos);
+    EXPECT_EQ(store.getShape(parts.id, "3")->state, store::ShapeState::kReady);
+    EXPECT_EQ(finished(begin(4)).failed, 0u) << "the next rebuild tries it again";
+    driver.reset();
+    std::ifstream left(journal);
+    EXPECT_EQ(left.peek(), std::ifstream::traits_type::eof());
+    std::remove(journal.c_str());
 }
 
 TEST_F(Driver, UnreadableParametersAreGivenUp) {

@@ -47,7 +47,7 @@ class Pool : public ::testing::Test {
         WorkerOptions options;
         options.threads = threads;
         options.backOff = 5ms;
-        pool = std::make_unique<WorkerPool>(store, index, board, std::move(describe), log, options);
+        pool = std::make_unique<WorkerPool>(store, index, board, suspects, std::move(describe), log, options);
         EXPECT_TRUE(pool->start());
         return *pool;
     }
@@ -73,6 +73,7 @@ class Pool : public ::testing::Test {
     std::shared_ptr<RecordingLogger> log;
     index::CollectionIndex index;
     ProgressBoard board;
+    SuspectGate suspects;
     store::Collection parts;
     std::unique_ptr<WorkerPool> pool;
 };
@@ -195,6 +196,35 @@ TEST_F(Pool, JobOfADeadProcessIsDoneAgainButNotForEver) {
     EXPECT_NE(log->all().find("key=twice"), std::string::npos) << log->all();
     ASSERT_TRUE(eventually([&] { return settled("once"); }));
     EXPECT_EQ(shape("once").state, store::ShapeState::kReady);
+}
+
+// Three scans were in hand when the server died. One by one they show who did it.
+TEST_F(Pool, SuspectsRunOneAtATimeAndTheRestTogether) {
+    for (int i = 0; i < 3; ++i) put("suspect " + std::to_string(i), 1.0f);
+    for (int i = 0; i < 3; ++i) ASSERT_TRUE(*store.claimJob());
+    for (int i = 0; i < 6; ++i) put("innocent " + std::to_string(i), 2.0f);
+    std::atomic<int> inside{0};
+    std::atomic<int> mostWithSuspect{0};
+    std::atomic<int> mostInnocent{0};
+    const auto raise = [](std::atomic<int>& most, int now) {
+        int seen = most.load();
+        while (now > seen && !most.compare_exchange_weak(seen, now)) {
+        }
+    };
+    start(
+        [&](const PointCloud& points, const ShapeParameters& parameters, const RunContext& context) {
+            const int now = ++inside;
+            raise(points[0].x == 1.0 ? mostWithSuspect : mostInnocent, now);
+            std::this_thread::sleep_for(20ms);
+            if (points[0].x == 1.0) raise(mostWithSuspect, inside.load());
+            --inside;
+            return quickDescribe(points, parameters, context);
+        },
+        3);
+    ASSERT_TRUE(eventually([&] { return idle(); }));
+    EXPECT_EQ(mostWithSuspect, 1);
+    EXPECT_GE(mostInnocent, 2);
+    EXPECT_EQ(pool->ingested(), 9u);
 }
 
 // The store fails now and then: everything is done in the end, nothing twice.

@@ -32,7 +32,7 @@ class BackupStream : public ::testing::Test {
         std::vector<v1::BackupChunk> chunks;
         const auto sent = sendFile(directory + "/in", {}, [&](const v1::BackupChunk& chunk) {
             chunks.push_back(chunk);
-            return true;
+            return Result<void>();
         });
         EXPECT_TRUE(sent) << sent.error().message;
         return chunks;
@@ -81,10 +81,13 @@ TEST_F(BackupStream, ChecksumMayComeWithTheLastData) {
 TEST_F(BackupStream, ReceiverThatHasGoneEndsTheSending) {
     std::ofstream(directory + "/in", std::ios::binary) << noise(5'000'000);
     int sent = 0;
-    const auto result = sendFile(directory + "/in", {}, [&](const v1::BackupChunk&) { return ++sent < 2; });
+    const auto result = sendFile(directory + "/in", {}, [&](const v1::BackupChunk&) -> Result<void> {
+        if (++sent < 2) return {};
+        return fail(ErrorCode::kCancelled, "gone");
+    });
     EXPECT_EQ(result.error().code, ErrorCode::kCancelled);
     EXPECT_EQ(sent, 2);
-    EXPECT_EQ(sendFile(directory + "/none", {}, [](const auto&) { return true; }).error().code,
+    EXPECT_EQ(sendFile(directory + "/none", {}, [](const auto&) { return Result<void>(); }).error().code,
               ErrorCode::kFileNotReadable);
 }
 

@@ -32,7 +32,7 @@ class Receiver : public ::testing::Test {
         EXPECT_NE(result.error().message.find(word), std::string::npos) << result.error().message;
     }
 
-    UploadBudget budget{1 << 20};
+    Budget budget{1 << 20, "bytes"};
 };
 
 TEST_F(Receiver, ReturnsWhatWasSent) {
@@ -132,7 +132,7 @@ TEST_F(Receiver, NonFiniteCoordinatesAreNamed) {
 }
 
 TEST_F(Receiver, MemoryOfAllUploadsIsBounded) {
-    UploadBudget small(24'000);  // 2,000 points
+    Budget small(24'000, "bytes");  // 2,000 points
     PointReceiver first(10'000, small);
     ASSERT_TRUE(first.begin(2'000, ""));
     ASSERT_TRUE(first.add(bytes(somePoints(1'500))));
