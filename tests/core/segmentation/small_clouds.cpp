@@ -91,7 +91,12 @@ std::vector<SmallCloud> makeClouds() {
     add("integer sphere", integerSphere(false));
     add("integer sphere with centre", integerSphere(true));
     // Tetrahedra a ten-millionth of the frame, far from its origin: a grid but for the last digits.
-    add("tiny grid in a large frame", together(grid(5, 1e-7, {0.71, 0.63, 0.57}), uniformCube(40, 5)));
+    add("tiny grid in a large frame", [] {
+        Random random(6);
+        PointCloud points = grid(5, 1e-7, {0.71, 0.63, 0.57});
+        for (Point3& p : points) p = p + 1e-15 * randomPoint(random);
+        return together(points, uniformCube(40, 5));
+    }());
     add("flat", [] {
         PointCloud points = uniformCube(200, 8);
         for (Point3& p : points) p.z *= 1e-5;
@@ -112,6 +117,11 @@ const std::vector<Triangulated>& triangulatedClouds() {
         std::vector<Triangulated> made;
         for (const SmallCloud& cloud : smallClouds()) {
             made.push_back({cloud.name, cloud.points, triangulate(cloud.points).value()});
+            std::vector<ExactPoint> centres;
+            for (std::size_t t = 0; t < made.back().tetrahedra.size(); ++t) {
+                centres.push_back(exactCentre(made.back(), t));
+            }
+            made.back().centres = std::move(centres);
         }
         return made;
     }();
@@ -130,6 +140,7 @@ std::array<ExactPoint, 4> exactCorners(const Triangulated& cloud, std::size_t t)
 }
 
 ExactPoint exactCentre(const Triangulated& cloud, std::size_t t) {
+    if (!cloud.centres.empty()) return cloud.centres[t];
     const auto p = exactCorners(cloud, t);
     return CGAL::circumcenter(p[0], p[1], p[2], p[3]);
 }

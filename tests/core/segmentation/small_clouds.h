@@ -22,19 +22,20 @@ struct SmallCloud {
 /// All of them; computed once.
 const std::vector<SmallCloud>& smallClouds();
 
-/// A cloud with its triangulation.
+using ExactNumber = CGAL::Exact_rational;
+using ExactKernel = CGAL::Simple_cartesian<ExactNumber>;
+using ExactPoint = ExactKernel::Point_3;
+
+/// A cloud with its triangulation and, where many tests ask for them, its exact circumcentres.
 struct Triangulated {
     std::string name;
     PointCloud points;
     Tetrahedra tetrahedra;
+    std::vector<ExactPoint> centres{};
 };
 
 /// All small clouds, triangulated once.
 const std::vector<Triangulated>& triangulatedClouds();
-
-using ExactNumber = CGAL::Exact_rational;
-using ExactKernel = CGAL::Simple_cartesian<ExactNumber>;
-using ExactPoint = ExactKernel::Point_3;
 
 inline ExactPoint exact(const Point3& p) { return {p.x, p.y, p.z}; }
 
