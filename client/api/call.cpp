@@ -83,7 +83,9 @@ Result<void> makeCallUnguarded(const ClientOptions& options, const RunContext& c
     const Clock::time_point deadline = deadlineOf(options, context, traits);
     // Jitter must differ between clients that failed together.
     Random random(std::random_device{}());
-    for (int number = 1;; ++number) {
+    int inARow = 0;
+    ErrorCode reason = ErrorCode::kInternal;
+    while (true) {
         grpc::ClientContext rpc;
         setDeadline(rpc, deadline);
         Result<void> local;
@@ -101,8 +103,10 @@ Result<void> makeCallUnguarded(const ClientOptions& options, const RunContext& c
         }
         const Error error = errorOf(status, rpc.GetServerTrailingMetadata(), options.address);
         if (!traits.idempotent) return fail(error);
-        const auto delay = retryDelay(options.retry, number,
-                                      failureOf(status, rpc.GetServerTrailingMetadata(), error), random);
+        const AttemptFailure failure = failureOf(status, rpc.GetServerTrailingMetadata(), error);
+        inARow = failure.code == reason ? inARow + 1 : 1;
+        reason = failure.code;
+        const auto delay = retryDelay(options.retry, inARow, failure, random);
         if (!delay || !sleepFor(*delay, deadline, context)) return fail(error);
     }
 }

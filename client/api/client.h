@@ -28,9 +28,10 @@ constexpr int kDefaultPort = 7878;
 /// not be reached or said that its queue is full, never after any other error. The wait before
 /// try n is initialBackoff * multiplier^(n - 2), at most maxBackoff, and shortened or lengthened
 /// at random by up to `jitter` of itself; when the server says how long to wait
-/// (`grpc-retry-pushback-ms`), that is the wait.
+/// (`grpc-retry-pushback-ms`), that is the wait. Tries are counted anew when the reason changes.
 struct RetryPolicy {
-    int maxAttempts = 5;  ///< at least 1; 1: never again
+    int maxAttempts = 5;       ///< while the server cannot be reached; at least 1; 1: never again
+    int maxQueueAttempts = 5;  ///< while its queue is full; the same
     std::chrono::milliseconds initialBackoff{100};
     double multiplier = 2.0;  ///< at least 1
     std::chrono::milliseconds maxBackoff{5000};

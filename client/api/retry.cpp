@@ -17,12 +17,17 @@ std::optional<std::chrono::milliseconds> parsePushback(const std::string& text) 
     return std::chrono::milliseconds(value);
 }
 
+/// How often a call that fails for this reason is made.
+int attemptsFor(const RetryPolicy& policy, ErrorCode code) {
+    if (code == ErrorCode::kUnavailable) return policy.maxAttempts;
+    return code == ErrorCode::kQueueFull ? policy.maxQueueAttempts : 1;
+}
+
 }  // namespace
 
 std::optional<std::chrono::milliseconds> retryDelay(const RetryPolicy& policy, int attempt,
                                                     const AttemptFailure& failure, Random& random) {
-    if (failure.code != ErrorCode::kUnavailable && failure.code != ErrorCode::kQueueFull) return std::nullopt;
-    if (attempt >= policy.maxAttempts) return std::nullopt;
+    if (attempt >= attemptsFor(policy, failure.code)) return std::nullopt;
     if (failure.pushback) return parsePushback(*failure.pushback);
     const double longest = static_cast<double>(policy.maxBackoff.count());
     const double backoff = std::min(longest, static_cast<double>(policy.initialBackoff.count()) *
@@ -37,6 +42,9 @@ Result<void> validate(const RetryPolicy& policy) {
     };
     if (policy.maxAttempts < 1)
         return invalid("maxAttempts", std::to_string(policy.maxAttempts), "at least 1");
+    if (policy.maxQueueAttempts < 1) {
+        return invalid("maxQueueAttempts", std::to_string(policy.maxQueueAttempts), "at least 1");
+    }
     if (policy.initialBackoff.count() < 0) {
         return invalid("initialBackoff", std::to_string(policy.initialBackoff.count()) + " ms", "at least 0");
     }

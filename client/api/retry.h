@@ -19,8 +19,8 @@ struct AttemptFailure {
     std::optional<std::string> pushback;
 };
 
-/// How long to wait before try `attempt + 1`, or nothing when the failure is final. `attempt`
-/// counts from 1. Advances `random`.
+/// How long to wait before the next try, or nothing when the failure is final. `attempt` says how
+/// many tries in a row have now failed for this reason, from 1. Advances `random`.
 [[nodiscard]] std::optional<std::chrono::milliseconds> retryDelay(const RetryPolicy& policy, int attempt,
                                                                   const AttemptFailure& failure,
                                                                   Random& random);

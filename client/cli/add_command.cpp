@@ -237,7 +237,7 @@ CommandResult runAdd(Session& session, const AddFlags& flags) {
     if (!metadata) return fail(metadata.error());
     auto uploads = listUploads(flags);
     if (!uploads) return fail(uploads.error());
-    const auto client = connectToServer(session, kPatientAttempts);
+    const auto client = connectToServer(session, Work::kHeavy);
     if (!client) return fail(client.error());
     uploadAll(session, *client, flags, *metadata, *uploads);
     if (flags.wait) waitForAll(session, *client, flags, *uploads);

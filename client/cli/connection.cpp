@@ -4,11 +4,22 @@
 
 namespace shapedb::cli {
 
-Result<client::Client> connectToServer(const Session& session, int maxAttempts) {
+namespace {
+
+constexpr std::chrono::hours kHeavyDeadline{1};
+/// A full queue is waited for as long as there is time; the server says how long between tries.
+constexpr int kPatientAttempts = 1'000'000;
+
+}  // namespace
+
+Result<client::Client> connectToServer(const Session& session, Work work) {
     client::ClientOptions options;
     if (!session.options().server.empty()) options.address = session.options().server;
+    if (work == Work::kHeavy) {
+        options.deadline = kHeavyDeadline;
+        options.retry.maxQueueAttempts = kPatientAttempts;
+    }
     if (session.options().timeoutSeconds) options.deadline = std::chrono::milliseconds(0);
-    options.retry.maxAttempts = maxAttempts;
     return client::Client::connect(std::move(options));
 }
 

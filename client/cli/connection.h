@@ -11,13 +11,15 @@
 
 namespace shapedb::cli {
 
-/// How long a full ingest queue is waited for, in tries; the server says how long each.
-constexpr int kPatientAttempts = 1000;
+/// What a command's calls ask of the server.
+enum class Work {
+    kLight,  ///< an answer from what it has: a minute is plenty
+    kHeavy,  ///< a scan sent and perhaps segmented, a full queue waited for: an hour
+};
 
 /// A client for --server. With --timeout the session's context bounds the calls, without it the
-/// client's own deadline does. Errors: kInvalidArgument.
-[[nodiscard]] Result<client::Client> connectToServer(const Session& session,
-                                                     int maxAttempts = client::RetryPolicy{}.maxAttempts);
+/// time that the work may take does. Errors: kInvalidArgument.
+[[nodiscard]] Result<client::Client> connectToServer(const Session& session, Work work = Work::kLight);
 
 /// --collection, empty for the default one.
 void addCollectionOption(CLI::App& command, std::string& collection);

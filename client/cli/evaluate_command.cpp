@@ -213,13 +213,16 @@ std::string leaveOneOutText(const EvaluateFlags& flags, const ShapeParameters& p
     return text + timingText(timing, shapes.size(), shapes.size() * (shapes.size() - 1) / 2);
 }
 
-Result<void> requireClassFolders(const std::vector<EvaluatedShape>& shapes, const std::string& root) {
-    for (const EvaluatedShape& shape : shapes) {
-        if (shape.name.find('/') == std::string::npos) {
+/// The class is the folder right below the root, however deep the file lies in it.
+Result<void> labelByClassFolder(std::vector<EvaluatedShape>& shapes, const std::string& root) {
+    for (EvaluatedShape& shape : shapes) {
+        const std::size_t slash = shape.name.find('/');
+        if (slash == std::string::npos) {
             return fail(ErrorCode::kInvalidArgument,
                         shape.path + " lies in no class folder; " + root +
                             " must hold a folder for each class (DIR/CLASS/FILE)");
         }
+        shape.label = shape.name.substr(0, slash);
     }
     return {};
 }
@@ -237,7 +240,7 @@ CommandResult runLeaveOneOut(Session& session, const EvaluateFlags& flags) {
     if (!parameters) return fail(parameters.error());
     auto shapes = listShapes(flags.paths);
     if (!shapes) return fail(shapes.error());
-    if (const auto ok = requireClassFolders(*shapes, flags.paths.front()); !ok) return fail(ok.error());
+    if (const auto ok = labelByClassFolder(*shapes, flags.paths.front()); !ok) return fail(ok.error());
 
     Timing timing;
     const Stopwatch segmenting;

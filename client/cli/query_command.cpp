@@ -100,7 +100,7 @@ CommandResult runQuery(Session& session, const QueryFlags& flags) {
         if (!loaded) return fail(loaded.error());
         scan = std::move(*loaded);
     }
-    const auto client = connectToServer(session);
+    const auto client = connectToServer(session, Work::kHeavy);
     if (!client) return fail(client.error());
     const auto reply = flags.path.empty()
                            ? client->searchByKey(options, flags.key, flags.includeSelf, context)

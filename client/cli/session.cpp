@@ -27,8 +27,8 @@ void addGlobalOptions(CLI::App& app, GlobalOptions& options) {
         ->default_str("127.0.0.1:7878")
         ->type_name("HOST:PORT");
     app.add_option("--timeout", options.timeoutSeconds,
-                   "Give up on the whole command after this long; without it each call to the server "
-                   "may take 60 seconds, and following something takes as long as it takes")
+                   "Give up on the whole command after this long; without it a call to the server may take a "
+                   "minute, sending a scan an hour, and following something as long as it takes")
         ->check(aboveZero())
         ->type_name("SECONDS");
 }

@@ -115,6 +115,18 @@ TEST(Client, WaitsAsLongAsTheServerAsks) {
     EXPECT_LT(seconds, 5.0);
 }
 
+TEST(Client, TriesAreCountedAnewForAnotherReason) {
+    FakeServer server;
+    // Three times full, three times away, then there: neither reason came four times in a row.
+    server.shapes.answer = [](grpc::ServerContext& context, int call) {
+        if (call <= 3) return namedError(context, grpc::StatusCode::RESOURCE_EXHAUSTED, "queue_full", "full");
+        return call <= 6 ? grpc::Status(grpc::StatusCode::UNAVAILABLE, "away") : grpc::Status::OK;
+    };
+    const auto reply = server.client(4).addShape({{"", "a"}}, cloud(10));
+    ASSERT_TRUE(reply) << reply.error().message;
+    EXPECT_EQ(server.shapes.calls, 7);
+}
+
 TEST(Client, AServerThatSaysNeverIsNotAskedAgain) {
     FakeServer server;
     server.shapes.answer = [](grpc::ServerContext& context, int) {

@@ -54,10 +54,12 @@ TEST(Retry, GrowsUpToTheLongestWithinTheJitter) {
 TEST(Retry, EndsAfterTheLastAttempt) {
     RetryPolicy policy;
     policy.maxAttempts = 3;
+    policy.maxQueueAttempts = 7;
     Random random(1);
     EXPECT_TRUE(retryDelay(policy, 2, failure(ErrorCode::kUnavailable), random));
     EXPECT_FALSE(retryDelay(policy, 3, failure(ErrorCode::kUnavailable), random));
-    EXPECT_FALSE(retryDelay(policy, 3, failure(ErrorCode::kQueueFull, "5"), random));
+    EXPECT_TRUE(retryDelay(policy, 6, failure(ErrorCode::kQueueFull, "5"), random));
+    EXPECT_FALSE(retryDelay(policy, 7, failure(ErrorCode::kQueueFull, "5"), random));
     policy.maxAttempts = 1;
     EXPECT_FALSE(retryDelay(policy, 1, failure(ErrorCode::kUnavailable), random));
 }
@@ -80,6 +82,7 @@ TEST(Retry, PolicyIsValidated) {
         return !valid && valid.error().code == ErrorCode::kInvalidArgument;
     };
     EXPECT_TRUE(bad([](RetryPolicy& p) { p.maxAttempts = 0; }));
+    EXPECT_TRUE(bad([](RetryPolicy& p) { p.maxQueueAttempts = 0; }));
     EXPECT_TRUE(bad([](RetryPolicy& p) { p.initialBackoff = std::chrono::milliseconds(-1); }));
     EXPECT_TRUE(bad([](RetryPolicy& p) { p.maxBackoff = std::chrono::milliseconds(-1); }));
     EXPECT_TRUE(bad([](RetryPolicy& p) { p.multiplier = 0.5; }));

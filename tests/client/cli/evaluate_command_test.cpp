@@ -160,6 +160,16 @@ TEST_F(EvaluateCommand, RefusesFilesOutsideClassFolders) {
     EXPECT_NE(document["error"]["message"].get<std::string>().find("stray.xyz"), std::string::npos);
 }
 
+TEST_F(EvaluateCommand, TheClassIsTheFolderBelowTheRoot) {
+    fs::create_directories(path("set/people/of"));
+    fs::create_directories(path("set/cups/of"));
+    fs::copy(samples() + "/human", path("set/people/of/one"));
+    fs::copy(samples() + "/mug", path("set/cups/of/one"));
+    const auto document = evaluate({path("set"), "--per-class"});
+    ASSERT_EQ(document["per_class"].size(), 2u);
+    EXPECT_EQ(document["per_class"]["people"]["queries"], 3);
+}
+
 TEST_F(EvaluateCommand, GalleryByFolder) {
     const auto document =
         evaluate({samples() + "/human/human_01.ply", "--gallery", samples() + "/human", samples() + "/mug"});
