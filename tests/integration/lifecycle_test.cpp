@@ -176,7 +176,7 @@ TEST_F(Lifecycle, KillInMidIngestLosesNothingAcknowledged) {
             }
         });
     }
-    ASSERT_TRUE(eventually([&] {
+    EXPECT_TRUE(eventually([&] {
         const std::lock_guard<std::mutex> lock(mutex);
         return acknowledged.size() >= 60;
     }));

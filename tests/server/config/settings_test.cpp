@@ -1,6 +1,8 @@
 #include "server/config/settings.h"
 
 #include <algorithm>
+#include <fstream>
+#include <iterator>
 #include <set>
 
 #include <gtest/gtest.h>
@@ -36,6 +38,21 @@ TEST(Settings, DefaultsAreValid) {
         EXPECT_EQ(setting.show(config), setting.show(defaults)) << setting.key;
     }
     EXPECT_TRUE(validateTogether(defaults));
+}
+
+// The page for people says what the table says.
+TEST(Settings, PageListsEachWithDefaultRangeAndHelp) {
+    std::ifstream stream(SHAPEDB_CONFIGURATION_PAGE);
+    const std::string page((std::istreambuf_iterator<char>(stream)), std::istreambuf_iterator<char>());
+    ASSERT_FALSE(page.empty());
+    const ServerConfig defaults;
+    for (const Setting& setting : settings()) {
+        const std::string shown = setting.show(defaults);
+        const bool quoted = setting.key == "listen" || setting.key == "data";
+        const std::string value = shown.empty() ? "empty" : quoted ? "`" + shown + "`" : shown;
+        const std::string row = "| `" + setting.key + "` | " + value + " | " + setting.range + " | ";
+        EXPECT_NE(page.find(row), std::string::npos) << row;
+    }
 }
 
 TEST(Settings, RefusedValuesLeaveTheConfigurationAlone) {

@@ -1,6 +1,8 @@
 #include "server/rpc/status.h"
 
+#include <fstream>
 #include <map>
+#include <string>
 
 #include <gtest/gtest.h>
 
@@ -54,6 +56,43 @@ TEST(StatusCodeOf, EveryErrorHasItsCode) {
         const auto row = kTable.find(errorCodeName(code));
         ASSERT_NE(row, kTable.end()) << errorCodeName(code);
         EXPECT_EQ(statusCodeOf(code), row->second) << row->first;
+    }
+}
+
+const char* nameOf(StatusCode code) {
+    static const std::map<StatusCode, const char*> kNames = {
+        {StatusCode::INVALID_ARGUMENT, "INVALID_ARGUMENT"},
+        {StatusCode::OUT_OF_RANGE, "OUT_OF_RANGE"},
+        {StatusCode::NOT_FOUND, "NOT_FOUND"},
+        {StatusCode::ALREADY_EXISTS, "ALREADY_EXISTS"},
+        {StatusCode::ABORTED, "ABORTED"},
+        {StatusCode::FAILED_PRECONDITION, "FAILED_PRECONDITION"},
+        {StatusCode::RESOURCE_EXHAUSTED, "RESOURCE_EXHAUSTED"},
+        {StatusCode::UNAVAILABLE, "UNAVAILABLE"},
+        {StatusCode::CANCELLED, "CANCELLED"},
+        {StatusCode::DEADLINE_EXCEEDED, "DEADLINE_EXCEEDED"},
+        {StatusCode::DATA_LOSS, "DATA_LOSS"},
+        {StatusCode::INTERNAL, "INTERNAL"}};
+    return kNames.at(code);
+}
+
+// The page for people says the same.
+TEST(StatusCodeOf, PageListsEveryErrorWithItsCode) {
+    std::ifstream page(SHAPEDB_API_PAGE);
+    std::map<std::string, std::string> codes;
+    for (std::string line; std::getline(page, line);) {
+        const std::size_t second = line.find(" | ");
+        if (line.rfind("| `", 0) != 0 || second == std::string::npos) continue;
+        const std::string code = line.substr(second + 3, line.find(" | ", second + 3) - second - 3);
+        for (std::size_t at = line.find('`'); at < second; at = line.find('`', at + 1)) {
+            const std::size_t end = line.find('`', at + 1);
+            codes[line.substr(at + 1, end - at - 1)] = code;
+            at = end;
+        }
+    }
+    for (const auto& [name, code] : kTable) {
+        ASSERT_EQ(codes.count(name), 1u) << name;
+        EXPECT_EQ(codes[name], nameOf(code)) << name;
     }
 }
 
