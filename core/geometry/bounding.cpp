@@ -29,15 +29,15 @@ constexpr int kStarts = 400;
 constexpr double kFirstStep = 0.1;     // radians, half the distance between starts
 constexpr double kRefineStep = 0.004;  // radians; enough to tell basins apart
 constexpr double kLastStep = 1e-5;     // radians; the diagonal moves by less than this share
-constexpr std::size_t kCoarseDescents = 48;
-constexpr std::size_t kFineDescents = 8;
+constexpr std::size_t kCoarseDescents = 120;
+constexpr std::size_t kFineDescents = 12;
 
 // The function has creases (a face of the box passes from one vertex to another), along which
 // only a few directions lead down: as many random turns of up to a step fail before it is halved.
 constexpr int kTriesPerStep = 24;
 
 // Basins are searched on no more than the farthest hull vertices in this many directions.
-constexpr int kCoarseDirections = 1000;
+constexpr int kCoarseDirections = 1500;
 
 PointCloud hullVertices(const PointCloud& points) {
     std::vector<Kernel::Point_3> copies;

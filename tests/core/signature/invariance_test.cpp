@@ -107,8 +107,8 @@ TEST(SignatureInvariance, DumbbellUnderTenMotions) {
 TEST(SignatureInvariance, JackUnderTenMotions) {
     expectInvariant(makeJack(), 20000, sample(makeJack(), 20000));
 }
-TEST(SignatureInvariance, LShapeUnderTenMotions) { expectInvariantWhenTurned(makeLShape(), 4000); }
-TEST(SignatureInvariance, BoxUnderTenMotions) { expectInvariantWhenTurned(makeBox(), 4000); }
+TEST(SignatureInvariance, LShapeUnderTenMotions) { expectInvariantWhenTurned(makeLShape(), 2000); }
+TEST(SignatureInvariance, BoxUnderTenMotions) { expectInvariantWhenTurned(makeBox(), 2000); }
 
 // Faces in coordinate planes are exactly flat only until the scan is turned; rounding then covers
 // them with flat tetrahedra, through which the walk enters by the deep angle and not by the hull
@@ -133,10 +133,10 @@ TEST(SignatureInvariance, ExactlyFlatFacesChangeSliversOnly) {
 
 TEST(SignatureInvariance, PointOrderChangesNoBit) {
     for (const NamedShape& shape : {makeDumbbell(), makeTorus()}) {
-        const PointCloud points = sample(shape, 5000);
+        const PointCloud points = sample(shape, 3000);
         for (const Profile profile : {Profile::kPaper, Profile::kDefault}) {
             ShapeParameters parameters = parametersOf(profile);
-            if (profile == Profile::kDefault) parameters.segmentation.decimateTo = 3000;
+            if (profile == Profile::kDefault) parameters.segmentation.decimateTo = 2000;
             const auto reference = describe(points, parameters).value();
             const std::string bytes = encodeSignature(reference.signature);
             for (std::uint64_t seed = 1; seed <= 3; ++seed) {
