@@ -51,8 +51,9 @@ struct Segmentation {
     std::vector<std::uint32_t> siteOfPoint;
 
     double volume = 0.0;  ///< of all segments together, scan units cubed
-    /// Smallest diagonal of an oriented box around the interior's tetrahedra, scan units: stray
-    /// points off the surface do not count.
+    /// Smallest diagonal of an oriented box around the interior's tetrahedra, scan units.
+    /// A stray point counts only where an interior tetrahedron reaches it; with a fixed deep angle
+    /// several of them can make that happen (docs/algorithm.md).
     double size = 0.0;
     std::uint64_t duplicates = 0;  ///< input points that repeated an earlier one
     std::uint64_t bigBalls = 0;
