@@ -4,6 +4,7 @@
 // Exit codes: 0 drained or nothing to do, 1 could not start or not end cleanly, 2 wrong
 // configuration, 130 stopped at once by a second signal.
 
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <string>
@@ -88,18 +89,18 @@ int serve(const config::ServerConfig& config) {
 }
 
 int run(int argc, char** argv) {
+    // Of a check the exit code is the answer: 0 or 1, also when the mistake is in the flags.
+    const bool checking = std::any_of(argv, argv + argc,
+                                      [](const char* flag) { return std::string(flag) == "--check-config"; });
+    const int mistake = checking ? 1 : kWrongConfiguration;
     const auto commandLine = config::parseCommandLine(argc, argv);
-    if (!commandLine) return report(commandLine.error(), kWrongConfiguration);
+    if (!commandLine) return report(commandLine.error(), mistake);
     if (commandLine->action == config::Action::kPrint) {
         std::fputs(commandLine->text.c_str(), stdout);
         return 0;
     }
     const auto loaded = config::load(*commandLine, config::processEnvironment());
-    if (!loaded) {
-        // --check-config promises 0 or 1.
-        const bool checking = commandLine->action == config::Action::kCheckConfig;
-        return report(loaded.error(), checking ? 1 : kWrongConfiguration);
-    }
+    if (!loaded) return report(loaded.error(), mistake);
     if (commandLine->action == config::Action::kCheckConfig) {
         std::fputs(config::describe(*loaded).c_str(), stdout);
         return 0;

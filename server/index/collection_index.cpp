@@ -189,8 +189,10 @@ void CollectionIndex::remove(std::int64_t collectionId) {
     const auto found = directory_.byId.find(collectionId);
     if (found == directory_.byId.end()) return;
     removed = found->second;
-    directory_.byName.erase(removed->current()->collection.name);
     directory_.byId.erase(found);
+    // The name may be taken again by now.
+    const auto named = directory_.byName.find(removed->current()->collection.name);
+    if (named != directory_.byName.end() && named->second == removed) directory_.byName.erase(named);
 }
 
 Result<void> CollectionIndex::refresh(std::int64_t collectionId, std::int64_t shapeId) {

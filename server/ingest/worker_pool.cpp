@@ -247,7 +247,14 @@ void WorkerPool::work(const std::shared_ptr<Running>& running) {
 WorkerPool::Outcome WorkerPool::attempt(Running& running) {
     const store::Job& job = running.job;
     const auto collection = index_.byId(job.collectionId);
-    if (!collection) return giveUp(job, collection.error());  // deleted, and its jobs with it
+    if (!collection) {
+        // Deleted, and its jobs with it; or an index that could not be loaded after a restore.
+        const bool gone = [&] {
+            const auto shape = store_.getShapeById(job.shapeId);
+            return !shape && shape.error().code == ErrorCode::kNotFound;
+        }();
+        return gone ? giveUp(job, collection.error()) : Outcome::kStoreFailed;
+    }
     const auto points = store_.loadPoints(job.shapeId);
     if (!points) {
         if (!isTransient(points.error().code)) return giveUp(job, points.error());

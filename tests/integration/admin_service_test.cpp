@@ -317,6 +317,27 @@ TEST_F(AdminRpc, RestoreBringsBackUnfinishedWork) {
     }));
 }
 
+// The ids a call has looked up may mean other shapes after a restore.
+TEST_F(AdminRpc, CallsThatSpanARestoreAreToldToRepeat) {
+    const Scan slow = slowScan(1, 150'000);
+    ASSERT_TRUE(addShape(client, headerFor(collection, "k", slow), slow).ok());
+    const auto saved = backup();
+    ASSERT_TRUE(saved.ok()) << saved;
+    pb::WatchIngestRequest request;
+    request.mutable_shape()->set_collection(collection);
+    request.mutable_shape()->set_key("k");
+    CallContext context;
+    const auto reader = client.shapes->WatchIngest(&context, request);
+    pb::IngestEvent event;
+    ASSERT_TRUE(reader->Read(&event));
+    ASSERT_TRUE(restore(saved.messages).ok());
+    const auto watched = testing::drain(context, *reader);
+    EXPECT_EQ(watched.status.error_code(), StatusCode::UNAVAILABLE) << watched;
+    EXPECT_EQ(watched.error, "unavailable");
+    EXPECT_TRUE(
+        eventually([&] { return getShape(client, collection, "k").value.state() == pb::SHAPE_STATE_READY; }));
+}
+
 TEST_F(AdminRpc, BadBackupsAreRefusedAndChangeNothing) {
     fill(2);
     const auto saved = backup();

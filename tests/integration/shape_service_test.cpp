@@ -152,6 +152,34 @@ TEST_F(ShapeRpc, ListingPagesByRisingIdAndFilters) {
     EXPECT_TRUE(one.value.next_cursor().empty());
 }
 
+// Shapes with all the metadata they may have: a page ends before it grows past what clients take.
+TEST_F(ShapeRpc, LongPagesAreCutAndGoOn) {
+    const Scan scan = dumbbell(1, 500);
+    constexpr int kShapes = 60;
+    for (int i = 0; i < kShapes; ++i) {
+        pb::AddShapeHeader header = headerFor(collection, std::to_string(i), scan);
+        for (int m = 0; m < 64; ++m)
+            (*header.mutable_metadata())["k" + std::to_string(m)] = std::string(1'024, 'v');
+        ASSERT_TRUE(addShape(client, header, scan).ok());
+    }
+    pb::ListShapesRequest request;
+    request.set_collection(collection);
+    request.set_page_size(1'000);
+    int seen = 0;
+    int pages = 0;
+    do {
+        const auto page = unary(*client.shapes, &pb::ShapeService::Stub::ListShapes, request);
+        ASSERT_TRUE(page.ok()) << page;
+        EXPECT_LT(page.value.ByteSizeLong(), 4u << 20);
+        EXPECT_GT(page.value.shapes_size(), 0);
+        seen += page.value.shapes_size();
+        ++pages;
+        request.set_cursor(page.value.next_cursor());
+    } while (!request.cursor().empty());
+    EXPECT_EQ(seen, kShapes);
+    EXPECT_GE(pages, 2);
+}
+
 TEST_F(ShapeRpc, StateFilterFindsWhatFailed) {
     ASSERT_TRUE(addAndWait(client, collection, "good", dumbbell()).ok());
     ASSERT_TRUE(addAndWait(client, collection, "open", openSheet()).ok());

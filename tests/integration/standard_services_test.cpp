@@ -145,6 +145,8 @@ TEST(Program, CheckConfigTellsWhereValuesComeFrom) {
     EXPECT_EQ(bad.exitCode, 1);
     EXPECT_NE(bad.err.find(file + " line 2: unknown key limits.max_kk"), std::string::npos) << bad.err;
     EXPECT_EQ(runServer({"--config", file}).exitCode, 2) << "nor does it serve";
+    EXPECT_EQ(runServer({"--check-config", "--no-such-flag"}).exitCode, 1);
+    EXPECT_EQ(runServer({"--no-such-flag"}).exitCode, 2);
 }
 
 TEST(Program, RefusesAnAddressOrDirectoryInUse) {

@@ -82,6 +82,17 @@ TEST_F(Index, NamesAndIdsFindTheSame) {
     EXPECT_FALSE(index.byId(cups.id));
 }
 
+// Deleted and created again before the first deletion got here.
+TEST_F(Index, RemovingKeepsASuccessorOfTheSameName) {
+    ASSERT_TRUE(store.deleteCollection(parts.id));
+    const auto successor = *store.createCollection("parts", "", paperParameters());
+    ASSERT_TRUE(index.add(successor));
+    index.remove(parts.id);
+    ASSERT_TRUE(index.byName("parts"));
+    EXPECT_EQ((*index.byName("parts"))->collection.id, successor.id);
+    EXPECT_EQ(index.all().size(), 1u);
+}
+
 TEST_F(Index, RefreshFollowsTheStore) {
     const auto a = put("a", 1.0f);
     EXPECT_EQ(snapshot()->signatures.size(), 0u);
