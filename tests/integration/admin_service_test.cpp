@@ -32,7 +32,7 @@ class AdminRpc : public ::testing::Test {
     }
 
     Stream<pb::RebuildProgress> rebuild(const pb::RebuildRequest& request,
-                                        std::chrono::milliseconds timeout = std::chrono::seconds(30)) {
+                                        std::chrono::milliseconds timeout = std::chrono::seconds(60)) {
         CallContext context(timeout);
         const auto reader = client.admin->Rebuild(&context, request);
         return testing::drain(context, *reader);

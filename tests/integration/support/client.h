@@ -58,7 +58,7 @@ struct Client {
 /// A context whose calls cannot hang a test.
 class CallContext {
   public:
-    explicit CallContext(std::chrono::milliseconds timeout = std::chrono::seconds(30));
+    explicit CallContext(std::chrono::milliseconds timeout = std::chrono::seconds(60));
     grpc::ClientContext* operator&() { return &context_; }
     grpc::ClientContext& get() { return context_; }
     [[nodiscard]] Outcome outcome(const grpc::Status& status) const;
@@ -71,7 +71,7 @@ class CallContext {
 template <typename Stub, typename Base, typename Request, typename Response>
 Reply<Response> unary(Stub& stub,
                       grpc::Status (Base::*method)(grpc::ClientContext*, const Request&, Response*),
-                      const Request& request, std::chrono::milliseconds timeout = std::chrono::seconds(30)) {
+                      const Request& request, std::chrono::milliseconds timeout = std::chrono::seconds(60)) {
     CallContext context(timeout);
     Reply<Response> reply;
     const grpc::Status status = (stub.*method)(&context, request, &reply.value);
@@ -102,21 +102,21 @@ Stream<Response> drain(CallContext& context, grpc::ClientReaderInterface<Respons
 /// Sends exactly these messages.
 [[nodiscard]] Reply<pb::AddShapeResponse> sendAddShape(
     Client& client, const std::vector<pb::AddShapeRequest>& messages,
-    std::chrono::milliseconds timeout = std::chrono::seconds(30));
+    std::chrono::milliseconds timeout = std::chrono::seconds(60));
 /// Header and all points.
 [[nodiscard]] Reply<pb::AddShapeResponse> addShape(
     Client& client, const pb::AddShapeHeader& header, const Scan& scan,
-    std::chrono::milliseconds timeout = std::chrono::seconds(30));
+    std::chrono::milliseconds timeout = std::chrono::seconds(60));
 /// Adds and waits until it is segmented.
 [[nodiscard]] Reply<pb::AddShapeResponse> addAndWait(Client& client, const std::string& collection,
                                                      const std::string& key, const Scan& scan,
                                                      const std::map<std::string, std::string>& metadata = {});
 [[nodiscard]] Reply<pb::SearchResponse> searchByScan(
     Client& client, const pb::SearchOptions& options, const Scan& scan,
-    std::chrono::milliseconds timeout = std::chrono::seconds(30));
+    std::chrono::milliseconds timeout = std::chrono::seconds(60));
 [[nodiscard]] Stream<pb::SegmentedPoints> segmentScan(
     Client& client, pb::SegmentHeader header, const Scan& scan,
-    std::chrono::milliseconds timeout = std::chrono::seconds(30));
+    std::chrono::milliseconds timeout = std::chrono::seconds(60));
 
 [[nodiscard]] Reply<pb::Shape> getShape(Client& client, const std::string& collection,
                                         const std::string& key);
@@ -129,6 +129,6 @@ Stream<Response> drain(CallContext& context, grpc::ClientReaderInterface<Respons
 
 /// True as soon as `condition` holds, false when it does not within `atMost`.
 [[nodiscard]] bool eventually(const std::function<bool()>& condition,
-                              std::chrono::milliseconds atMost = std::chrono::seconds(20));
+                              std::chrono::milliseconds atMost = std::chrono::seconds(60));
 
 }  // namespace shapedb::testing

@@ -16,7 +16,7 @@
 namespace shapedb::testing {
 namespace {
 
-constexpr std::chrono::seconds kStartTime{20};
+constexpr std::chrono::seconds kStartTime{60};
 
 /// `environ` without our variables, with those given.
 std::vector<std::string> environmentWith(const std::map<std::string, std::string>& own) {

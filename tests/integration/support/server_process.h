@@ -49,7 +49,7 @@ class ServerProcess {
     void signal(int number) const;
     [[nodiscard]] bool running() const;
     /// Waits for the end; -1 when a signal ended it or the time is over.
-    int wait(std::chrono::seconds atMost = std::chrono::seconds(20));
+    int wait(std::chrono::seconds atMost = std::chrono::seconds(60));
     /// SIGKILL, and waits.
     void kill();
     [[nodiscard]] std::string log() const;
