@@ -1,6 +1,7 @@
 #include "client/cli/console.h"
 
 #include <ostream>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -15,8 +16,8 @@ constexpr int kBarWidth = 24;
 
 }  // namespace
 
-Console::Console(std::ostream& out, std::ostream& err, bool errorIsTerminal)
-    : out_(out), err_(err), bar_(errorIsTerminal) {}
+Console::Console(std::ostream& out, std::ostream& err, bool errorIsTerminal, std::string program)
+    : out_(out), err_(err), bar_(errorIsTerminal), program_(std::move(program)) {}
 
 void Console::text(const std::string& text) {
     if (json_) return;
@@ -34,7 +35,7 @@ void Console::document(const nlohmann::json& document) {
 void Console::note(const std::string& message) {
     const std::lock_guard<std::mutex> lock(mutex_);
     clearProgressLocked();
-    err_ << "shapedb: " << message << '\n' << std::flush;
+    err_ << program_ << ": " << message << '\n' << std::flush;
 }
 
 void Console::failure(const Error& error) {

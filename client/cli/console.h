@@ -13,13 +13,13 @@
 namespace shapedb::cli {
 
 /// With --json the result stream carries exactly one JSON document and nothing else; without,
-/// text for people. Errors and notes always go to the error stream as `shapedb: MESSAGE`.
+/// text for people. Errors and notes always go to the error stream as `PROGRAM: MESSAGE`.
 ///
 /// Thread-safety: `note` and `progress` from any thread; the rest from one thread.
 class Console {
   public:
     /// The streams must outlive the console. `errorIsTerminal`: draw a progress bar there.
-    Console(std::ostream& out, std::ostream& err, bool errorIsTerminal);
+    Console(std::ostream& out, std::ostream& err, bool errorIsTerminal, std::string program = "shapedb");
 
     void setJson(bool json) { json_ = json; }
     [[nodiscard]] bool json() const { return json_; }
@@ -30,7 +30,7 @@ class Console {
     /// The one document of the command; dropped without --json.
     void document(const nlohmann::json& document);
 
-    /// `shapedb: MESSAGE` on the error stream.
+    /// `PROGRAM: MESSAGE` on the error stream.
     void note(const std::string& message);
 
     /// The error that ends the command: a note, and with --json the document
@@ -52,6 +52,7 @@ class Console {
     std::ostream& out_;
     std::ostream& err_;
     const bool bar_;
+    const std::string program_;
     bool json_ = false;
     bool documentPrinted_ = false;
 

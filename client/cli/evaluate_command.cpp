@@ -1,7 +1,5 @@
 // `shapedb evaluate`: how well the method finds shapes of the same class (leave-one-out), or the
 // right entries of a gallery, measured here without a server.
-#include <algorithm>
-#include <filesystem>
 #include <memory>
 
 #include <CLI/CLI.hpp>
@@ -11,6 +9,7 @@
 #include "client/cli/exit_code.h"
 #include "client/cli/figure.h"
 #include "client/cli/parameters.h"
+#include "client/cli/retrieval_task.h"
 #include "client/cli/session.h"
 #include "client/cli/text.h"
 #include "core/evaluation/similarity_matrix.h"
@@ -18,7 +17,6 @@
 namespace shapedb::cli {
 
 using nlohmann::json;
-namespace fs = std::filesystem;
 
 namespace {
 
@@ -26,6 +24,7 @@ struct EvaluateFlags {
     std::vector<std::string> paths;
     std::vector<std::string> gallery;
     std::string match = "folder";
+    ClassFlags classes;
     std::string confusion;
     bool perClass = false;
     unsigned threads = defaultThreads();
@@ -78,6 +77,8 @@ json settingsJson(const EvaluateFlags& flags, const ShapeParameters& parameters)
                      {"threads", flags.threads},
                      {"reflection", !flags.score.noReflection},
                      {"keep_scale", flags.score.keepScale}};
+    if (!flags.classes.only.empty()) settings["only_classes"] = flags.classes.only;
+    if (!flags.classes.except.empty()) settings["except_classes"] = flags.classes.except;
     return settings;
 }
 
@@ -123,19 +124,6 @@ Result<void> describeAll(Session& session, const char* what, std::vector<Evaluat
 }
 
 // ---------------------------------------------------------------------------------- leave one out
-
-/// A shape without a signature is worth nothing, not what the order of files gives it by chance:
-/// where it is tied at 0, the right answers come last.
-ScoreMatrix withTiesAgainstFailures(ScoreMatrix scores, const std::vector<EvaluatedShape>& shapes) {
-    const std::size_t n = shapes.size();
-    for (std::size_t q = 0; q < n; ++q) {
-        for (std::size_t c = 0; c < n; ++c) {
-            const bool failed = shapes[q].failure || shapes[c].failure;
-            if (failed && shapes[q].label == shapes[c].label) scores[q * n + c] = -1.0;
-        }
-    }
-    return scores;
-}
 
 json metricsJson(const RetrievalMetrics& metrics) {
     return {{"nn", metrics.nearestNeighbour},
@@ -213,20 +201,6 @@ std::string leaveOneOutText(const EvaluateFlags& flags, const ShapeParameters& p
     return text + timingText(timing, shapes.size(), shapes.size() * (shapes.size() - 1) / 2);
 }
 
-/// The class is the folder right below the root, however deep the file lies in it.
-Result<void> labelByClassFolder(std::vector<EvaluatedShape>& shapes, const std::string& root) {
-    for (EvaluatedShape& shape : shapes) {
-        const std::size_t slash = shape.name.find('/');
-        if (slash == std::string::npos) {
-            return fail(ErrorCode::kInvalidArgument,
-                        shape.path + " lies in no class folder; " + root +
-                            " must hold a folder for each class (DIR/CLASS/FILE)");
-        }
-        shape.label = shape.name.substr(0, slash);
-    }
-    return {};
-}
-
 CommandResult runLeaveOneOut(Session& session, const EvaluateFlags& flags) {
     if (flags.paths.size() != 1) {
         return fail(ErrorCode::kInvalidArgument,
@@ -238,27 +212,32 @@ CommandResult runLeaveOneOut(Session& session, const EvaluateFlags& flags) {
     }
     const auto parameters = flags.parameters.resolve();
     if (!parameters) return fail(parameters.error());
-    auto shapes = listShapes(flags.paths);
-    if (!shapes) return fail(shapes.error());
-    if (const auto ok = labelByClassFolder(*shapes, flags.paths.front()); !ok) return fail(ok.error());
+    const auto scans = listClasses(flags.paths.front(), flags.classes);
+    if (!scans) return fail(scans.error());
+    std::vector<EvaluatedShape> shapes = shapesOf(*scans);
 
     Timing timing;
     const Stopwatch segmenting;
-    if (const auto ok = describeAll(session, "segment", *shapes, flags.scan, flags, *parameters); !ok) {
+    if (const auto ok = describeAll(session, "segment", shapes, flags.scan, flags, *parameters); !ok) {
         return fail(ok.error());
     }
     timing.segment = segmenting.seconds();
     const Stopwatch matching;
     const auto scores = scorePairs(
-        *shapes, *shapes, flags.score.resolve(), flags.threads,
-        [&](std::size_t done) { session.console().progress("match", done, shapes->size()); },
+        shapes, shapes, flags.score.resolve(), flags.threads,
+        [&](std::size_t done) { session.console().progress("match", done, shapes.size()); },
         session.context());
     if (!scores) return fail(scores.error());
     timing.match = matching.seconds();
 
     std::vector<std::string> labels;
-    for (const EvaluatedShape& shape : *shapes) labels.push_back(shape.label);
-    const auto report = evaluateLeaveOneOut(withTiesAgainstFailures(*scores, *shapes), labels);
+    std::vector<bool> failed;
+    for (const EvaluatedShape& shape : shapes) {
+        labels.push_back(shape.label);
+        failed.push_back(shape.failure.has_value());
+    }
+    // Failed pairs score 0, the least there is.
+    const auto report = evaluateLeaveOneOut(withTiesAgainstFailures(*scores, labels, failed, -1.0), labels);
     if (!report) return fail(report.error());
     if (!flags.confusion.empty()) {
         const auto raster = drawSimilarityMatrix(*scores, labels);
@@ -268,41 +247,16 @@ CommandResult runLeaveOneOut(Session& session, const EvaluateFlags& flags) {
         }
     }
     std::vector<const EvaluatedShape*> failures;
-    collectFailures(*shapes, failures);
+    collectFailures(shapes, failures);
     Console& console = session.console();
     const int exitCode = reportFailures(session, failures);
-    console.document(leaveOneOutJson(flags, *parameters, *report, *shapes, failures, timing));
-    console.text(leaveOneOutText(flags, *parameters, *report, *shapes, failures, timing));
+    console.document(leaveOneOutJson(flags, *parameters, *report, shapes, failures, timing));
+    console.text(leaveOneOutText(flags, *parameters, *report, shapes, failures, timing));
     if (!flags.confusion.empty()) console.text("Similarity matrix: " + flags.confusion + "\n");
     return exitCode;
 }
 
 // ---------------------------------------------------------------------------------------- gallery
-
-bool sameFile(const EvaluatedShape& a, const EvaluatedShape& b) {
-    std::error_code error;
-    return fs::equivalent(a.path, b.path, error) && !error;
-}
-
-bool isRight(const std::string& match, const EvaluatedShape& query, const EvaluatedShape& entry) {
-    if (match == "stem") return fs::path(query.path).stem() == fs::path(entry.path).stem();
-    return query.label == entry.label && !sameFile(query, entry);
-}
-
-/// Entries by falling score, ties by index. By folder a query is no answer to itself; by stem it
-/// is: the same file, made noisy, has to find the clean one.
-GalleryQuery galleryQuery(const EvaluateFlags& flags, const EvaluatedShape& query,
-                          const std::vector<EvaluatedShape>& gallery, const double* scores) {
-    GalleryQuery out;
-    for (std::size_t g = 0; g < gallery.size(); ++g) {
-        if (isRight(flags.match, query, gallery[g])) out.right.push_back(g);
-        const bool itself = flags.match == "folder" && sameFile(query, gallery[g]);
-        if (query.signature && gallery[g].signature && !itself) out.ranking.push_back(g);
-    }
-    std::stable_sort(out.ranking.begin(), out.ranking.end(),
-                     [&](std::size_t a, std::size_t b) { return scores[a] > scores[b]; });
-    return out;
-}
 
 /// What is told of one query.
 struct RankedQuery {
@@ -395,12 +349,21 @@ CommandResult runGallery(Session& session, const EvaluateFlags& flags) {
                     "--confusion and --per-class need class folders on both sides; "
                     "leave --gallery out");
     }
+    if (flags.classes.any()) {
+        return fail(ErrorCode::kInvalidArgument,
+                    "--classes and --except-classes are for leave-one-out over class folders; "
+                    "with --gallery name the folders that take part");
+    }
+    const auto match = matchFromName(flags.match);
+    if (!match) return fail(match.error());
     const auto parameters = flags.parameters.resolve();
     if (!parameters) return fail(parameters.error());
-    auto queries = listShapes(flags.paths);
-    if (!queries) return fail(queries.error());
-    auto gallery = listShapes(flags.gallery);
-    if (!gallery) return fail(gallery.error());
+    const auto queryScans = listCollection(flags.paths);
+    if (!queryScans) return fail(queryScans.error());
+    const auto galleryScans = listCollection(flags.gallery);
+    if (!galleryScans) return fail(galleryScans.error());
+    std::vector<EvaluatedShape> queries = shapesOf(*queryScans);
+    std::vector<EvaluatedShape> gallery = shapesOf(*galleryScans);
 
     // The gallery is what a user has stored: it stays as it is; noise and subset are the query's.
     ScanFlags clean = flags.scan;
@@ -408,35 +371,37 @@ CommandResult runGallery(Session& session, const EvaluateFlags& flags) {
     clean.points.reset();
     Timing timing;
     const Stopwatch segmenting;
-    if (const auto ok = describeAll(session, "queries", *queries, flags.scan, flags, *parameters); !ok) {
+    if (const auto ok = describeAll(session, "queries", queries, flags.scan, flags, *parameters); !ok) {
         return fail(ok.error());
     }
-    if (const auto ok = describeAll(session, "gallery", *gallery, clean, flags, *parameters); !ok) {
+    if (const auto ok = describeAll(session, "gallery", gallery, clean, flags, *parameters); !ok) {
         return fail(ok.error());
     }
     timing.segment = segmenting.seconds();
     const Stopwatch matching;
     const auto scores = scorePairs(
-        *queries, *gallery, flags.score.resolve(), flags.threads,
-        [&](std::size_t done) { session.console().progress("match", done, queries->size()); },
+        queries, gallery, flags.score.resolve(), flags.threads,
+        [&](std::size_t done) { session.console().progress("match", done, queries.size()); },
         session.context());
     if (!scores) return fail(scores.error());
     timing.match = matching.seconds();
 
     std::vector<GalleryQuery> asked;
-    for (std::size_t q = 0; q < queries->size(); ++q) {
-        asked.push_back(galleryQuery(flags, (*queries)[q], *gallery, scores->data() + q * gallery->size()));
+    for (std::size_t q = 0; q < queries.size(); ++q) {
+        asked.push_back(
+            rankGallery(*match, queries[q], *galleryScans, scores->data() + q * gallery.size(),
+                        [&](std::size_t g) { return queries[q].signature && gallery[g].signature; }));
     }
-    const auto report = evaluateGallery(asked, gallery->size());
+    const auto report = evaluateGallery(asked, gallery.size());
     if (!report) return fail(report.error());
-    const auto ranked = tellRanks(*queries, *gallery, *scores, asked, *report);
+    const auto ranked = tellRanks(queries, gallery, *scores, asked, *report);
     std::vector<const EvaluatedShape*> failures;
-    collectFailures(*queries, failures);
-    collectFailures(*gallery, failures);
+    collectFailures(queries, failures);
+    collectFailures(gallery, failures);
     const int exitCode = reportFailures(session, failures);
     session.console().document(
-        galleryJson(flags, *parameters, *report, ranked, gallery->size(), failures, timing));
-    session.console().text(galleryText(flags, *parameters, *report, ranked, gallery->size(), timing));
+        galleryJson(flags, *parameters, *report, ranked, gallery.size(), failures, timing));
+    session.console().text(galleryText(flags, *parameters, *report, ranked, gallery.size(), timing));
     return exitCode;
 }
 
@@ -461,6 +426,7 @@ void addEvaluateCommand(CLI::App& app, Session& session) {
         ->capture_default_str();
     command->add_option("--confusion", flags->confusion, "Draw the similarity matrix of the paper's Figure 6")
         ->type_name("FILE.png|svg");
+    addClassFlags(*command, flags->classes);
     command->add_flag("--per-class", flags->perClass, "Measures of each class too");
     command->add_option("--threads", flags->threads, "Threads; the result does not depend on them")
         ->check(CLI::Range(1, 1024))

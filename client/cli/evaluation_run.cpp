@@ -13,10 +13,17 @@ namespace shapedb::cli {
 
 namespace {
 
-/// Runs body(i) for all i below count on `threads` threads; body returns an Error to stop.
-/// Items are handed out one at a time because their costs differ widely.
-Result<void> forEach(std::size_t count, unsigned threads, const RunContext& context,
-                     const std::function<std::optional<Error>(std::size_t)>& body) {
+bool endsTheRun(const Error& error) {
+    return error.code == ErrorCode::kCancelled || error.code == ErrorCode::kDeadlineExceeded ||
+           error.code == ErrorCode::kInvalidArgument;
+}
+
+}  // namespace
+
+unsigned defaultThreads() { return static_cast<unsigned>(tbb::info::default_concurrency()); }
+
+Result<void> forEachItem(std::size_t count, unsigned threads, const RunContext& context,
+                         const std::function<std::optional<Error>(std::size_t)>& body) {
     std::mutex mutex;
     std::optional<Error> stop;
     std::atomic<bool> stopped{false};
@@ -49,28 +56,9 @@ Result<void> forEach(std::size_t count, unsigned threads, const RunContext& cont
     return {};
 }
 
-bool endsTheRun(const Error& error) {
-    return error.code == ErrorCode::kCancelled || error.code == ErrorCode::kDeadlineExceeded ||
-           error.code == ErrorCode::kInvalidArgument;
-}
-
-}  // namespace
-
-unsigned defaultThreads() { return static_cast<unsigned>(tbb::info::default_concurrency()); }
-
-Result<std::vector<EvaluatedShape>> listShapes(const std::vector<std::string>& roots) {
-    std::vector<EvaluatedShape> shapes;
-    for (const std::string& root : roots) {
-        const auto files = listScanFiles({root});
-        if (!files) return fail(files.error());
-        for (const ScanFile& file : *files) {
-            EvaluatedShape shape;
-            shape.path = file.path;
-            shape.name = relativeName(file.path, root);
-            shape.label = file.label;
-            shapes.push_back(std::move(shape));
-        }
-    }
+std::vector<EvaluatedShape> shapesOf(const std::vector<CollectionScan>& scans) {
+    std::vector<EvaluatedShape> shapes(scans.size());
+    for (std::size_t i = 0; i < scans.size(); ++i) static_cast<CollectionScan&>(shapes[i]) = scans[i];
     return shapes;
 }
 
@@ -81,7 +69,7 @@ Result<void> describeShapes(std::vector<EvaluatedShape>& shapes, const ScanFlags
     RunContext quiet = context;  // progress is counted in shapes, not in stages of one of them
     quiet.progress = nullptr;
     std::atomic<std::size_t> done{0};
-    return forEach(shapes.size(), threads, context, [&](std::size_t i) -> std::optional<Error> {
+    return forEachItem(shapes.size(), threads, context, [&](std::size_t i) -> std::optional<Error> {
         EvaluatedShape& shape = shapes[i];
         const auto start = RunContext::Clock::now();
         const auto scan = loadScan(shape.path, flags, fileSeed(flags.seed, shape.name), quiet);
@@ -107,17 +95,18 @@ Result<ScoreMatrix> scorePairs(const std::vector<EvaluatedShape>& rows,
     const std::size_t width = columns.size();
     ScoreMatrix scores(rows.size() * width, 0.0);
     std::atomic<std::size_t> done{0};
-    const auto scored = forEach(rows.size(), threads, context, [&](std::size_t r) -> std::optional<Error> {
-        for (std::size_t c = symmetric ? r : 0; c < width; ++c) {
-            if (!rows[r].signature || !columns[c].signature) continue;
-            const double value = score(*rows[r].signature, *columns[c].signature, options);
-            scores[r * width + c] = value;
-            // Only this task writes (c, r): its row starts right of the diagonal.
-            if (symmetric) scores[c * width + r] = value;
-        }
-        progress(++done);
-        return std::nullopt;
-    });
+    const auto scored =
+        forEachItem(rows.size(), threads, context, [&](std::size_t r) -> std::optional<Error> {
+            for (std::size_t c = symmetric ? r : 0; c < width; ++c) {
+                if (!rows[r].signature || !columns[c].signature) continue;
+                const double value = score(*rows[r].signature, *columns[c].signature, options);
+                scores[r * width + c] = value;
+                // Only this task writes (c, r): its row starts right of the diagonal.
+                if (symmetric) scores[c * width + r] = value;
+            }
+            progress(++done);
+            return std::nullopt;
+        });
     if (!scored) return fail(scored.error());
     return scores;
 }

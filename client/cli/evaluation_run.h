@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "client/cli/retrieval_task.h"
 #include "client/cli/scan_source.h"
 #include "core/base/error.h"
 #include "core/base/run_context.h"
@@ -17,10 +18,7 @@
 
 namespace shapedb::cli {
 
-struct EvaluatedShape {
-    std::string path;   ///< as found
-    std::string name;   ///< relative to the folder it was found in; decides its seed
-    std::string label;  ///< name of the folder that holds the file
+struct EvaluatedShape : CollectionScan {
     /// Set exactly when `failure` is not. A shape without one scores 0 against everything.
     std::optional<Signature> signature;
     std::optional<Error> failure;
@@ -30,9 +28,16 @@ struct EvaluatedShape {
 /// One a processor this program may use.
 [[nodiscard]] unsigned defaultThreads();
 
-/// Every scan file under each root, in the order of the roots and, within one, of the paths.
-/// Errors: those of listScanFiles.
-[[nodiscard]] Result<std::vector<EvaluatedShape>> listShapes(const std::vector<std::string>& roots);
+/// Runs body(i) for all i below `count` on `threads` threads, at least 1; items are handed out one
+/// at a time because their costs differ widely. An error that the body returns ends the run and is
+/// its result (with several threads, one of those returned).
+///
+/// Errors: that of the body; kCancelled, kDeadlineExceeded; kOutOfMemory.
+[[nodiscard]] Result<void> forEachItem(std::size_t count, unsigned threads, const RunContext& context,
+                                       const std::function<std::optional<Error>(std::size_t)>& body);
+
+/// The scans, nothing computed yet.
+[[nodiscard]] std::vector<EvaluatedShape> shapesOf(const std::vector<CollectionScan>& scans);
 
 /// Fills in `signature` or `failure` of each shape; noise and subset come from
 /// fileSeed(flags.seed, name). Files are taken by `threads` threads, at least 1.

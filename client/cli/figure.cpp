@@ -14,6 +14,7 @@
 #include <png.h>
 
 #include "client/cli/bitmap_font.h"
+#include "client/cli/text.h"
 
 namespace shapedb::cli {
 
@@ -137,21 +138,6 @@ Result<void> writePng(const SimilarityRaster& raster, const std::string& path) {
         png_image_free(&image);
         return problem;
     });
-}
-
-std::string escapeXml(const std::string& text) {
-    std::string escaped;
-    for (const char c : text) {
-        switch (c) {
-            case '&': escaped += "&amp;"; break;
-            case '<': escaped += "&lt;"; break;
-            case '>': escaped += "&gt;"; break;
-            case '"': escaped += "&quot;"; break;
-            // Control characters have no place in XML 1.0, not even escaped.
-            default: escaped += static_cast<unsigned char>(c) < 0x20 ? '?' : c;
-        }
-    }
-    return escaped;
 }
 
 // The picture as rectangles of one colour each, white left out: from each pixel not yet covered as

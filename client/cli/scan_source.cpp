@@ -13,18 +13,23 @@ namespace shapedb::cli {
 namespace fs = std::filesystem;
 
 void addScanFlags(CLI::App& command, ScanFlags& flags) {
-    const auto group = command.add_option_group("Scans", "What is done to a scan after reading it");
+    CLI::App& group = addScanFlagsButNoise(command, flags);
     group
-        ->add_option("--noise", flags.noise,
-                     "Gaussian noise with this standard deviation, as a share of the bounding-box diagonal "
-                     "(0.01: 1 %)")
+        .add_option("--noise", flags.noise,
+                    "Gaussian noise with this standard deviation, as a share of the bounding-box diagonal "
+                    "(0.01: 1 %)")
         ->check(atLeastZero());
+}
+
+CLI::App& addScanFlagsButNoise(CLI::App& command, ScanFlags& flags) {
+    const auto group = command.add_option_group("Scans", "What is done to a scan after reading it");
     group->add_option("--points", flags.points, "Random subset of this many points (4 or more)");
     group->add_option("--seed", flags.seed, "Seed of noise, subset and mesh samples [1]");
     group
         ->add_option("--mesh-samples", flags.meshSamples,
                      "Points drawn from the surface of a file with triangles [20000]")
         ->check(aboveZero());
+    return *group;
 }
 
 std::uint64_t fileSeed(std::uint64_t seed, const std::string& name) {

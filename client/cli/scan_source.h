@@ -23,7 +23,11 @@ struct ScanFlags {
     std::uint64_t meshSamples = ReadOptions{}.meshSamples;
 };
 
+/// `flags` must outlive the parsing.
 void addScanFlags(CLI::App& command, ScanFlags& flags);
+
+/// For a command that takes several noise levels. The group of the flags, to add to.
+CLI::App& addScanFlagsButNoise(CLI::App& command, ScanFlags& flags);
 
 /// The seed of one file: depends on the run's seed and the file's name in the collection only,
 /// so that neither order nor thread count nor the other files change what a file gets.

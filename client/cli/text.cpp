@@ -88,6 +88,21 @@ std::string bar(double share, int width) {
     return text.append(static_cast<std::size_t>(std::max(0, width - used)), ' ');
 }
 
+std::string escapeXml(const std::string& text) {
+    std::string escaped;
+    for (const char c : text) {
+        switch (c) {
+            case '&': escaped += "&amp;"; break;
+            case '<': escaped += "&lt;"; break;
+            case '>': escaped += "&gt;"; break;
+            case '"': escaped += "&quot;"; break;
+            // Control characters have no place in XML 1.0, not even escaped.
+            default: escaped += static_cast<unsigned char>(c) < 0x20 ? '?' : c;
+        }
+    }
+    return escaped;
+}
+
 std::size_t displayWidth(const std::string& text) {
     return static_cast<std::size_t>(std::count_if(
         text.begin(), text.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xc0u) != 0x80u; }));

@@ -38,6 +38,9 @@ namespace shapedb::cli {
 /// A bar of `width` cells filled to `share` of [0, 1], in eighths: "█████▌    ".
 [[nodiscard]] std::string bar(double share, int width);
 
+/// For the content or an attribute of an XML element; control characters become `?`.
+[[nodiscard]] std::string escapeXml(const std::string& text);
+
 /// How many terminal columns a UTF-8 text takes (code points; no wide or combining ones).
 [[nodiscard]] std::size_t displayWidth(const std::string& text);
 

@@ -18,24 +18,19 @@ class EvaluationRun : public CommandTest {
     }
 
     std::vector<EvaluatedShape> described(unsigned threads, const ScanFlags& flags = {}) {
-        auto shapes = listShapes({path("set")});
-        EXPECT_TRUE(shapes);
+        std::vector<EvaluatedShape> shapes = listed();
         const auto done =
-            describeShapes(*shapes, flags, parametersOf(Profile::kPaper), threads, [](std::size_t) {}, {});
+            describeShapes(shapes, flags, parametersOf(Profile::kPaper), threads, [](std::size_t) {}, {});
         EXPECT_TRUE(done) << done.error().message;
-        return *shapes;
+        return shapes;
+    }
+
+    std::vector<EvaluatedShape> listed() const {
+        const auto scans = listCollection({path("set")});
+        EXPECT_TRUE(scans);
+        return shapesOf(*scans);
     }
 };
-
-TEST_F(EvaluationRun, ListsNamesAndLabels) {
-    const auto shapes = listShapes({path("set")});
-    ASSERT_TRUE(shapes);
-    ASSERT_EQ(shapes->size(), 4u);
-    EXPECT_EQ((*shapes)[0].name, "bell/1.xyz");
-    EXPECT_EQ((*shapes)[0].label, "bell");
-    EXPECT_EQ((*shapes)[3].name, "round/2.xyz");
-    EXPECT_FALSE(listShapes({path("nowhere")}));
-}
 
 TEST_F(EvaluationRun, AShapeThatCannotBeSegmentedIsAFailureAndScoresZero) {
     const auto shapes = described(2);
@@ -78,11 +73,10 @@ TEST_F(EvaluationRun, HalfThePairsGiveTheWholeMatrix) {
 }
 
 TEST_F(EvaluationRun, CountsEveryShapeOnce) {
-    auto shapes = listShapes({path("set")});
-    ASSERT_TRUE(shapes);
+    std::vector<EvaluatedShape> shapes = listed();
     std::mutex mutex;
     std::vector<std::size_t> counts;
-    const auto done = describeShapes(*shapes, {}, parametersOf(Profile::kPaper), 3,
+    const auto done = describeShapes(shapes, {}, parametersOf(Profile::kPaper), 3,
                                      [&](std::size_t count) {
                                          const std::lock_guard<std::mutex> lock(mutex);
                                          counts.push_back(count);
@@ -93,17 +87,16 @@ TEST_F(EvaluationRun, CountsEveryShapeOnce) {
 }
 
 TEST_F(EvaluationRun, StopsWhenCancelled) {
-    auto shapes = listShapes({path("set")});
-    ASSERT_TRUE(shapes);
+    std::vector<EvaluatedShape> shapes = listed();
     std::atomic<bool> cancel{true};
     RunContext context;
     context.cancel = &cancel;
     const auto done = describeShapes(
-        *shapes, {}, parametersOf(Profile::kPaper), 2, [](std::size_t) {}, context);
+        shapes, {}, parametersOf(Profile::kPaper), 2, [](std::size_t) {}, context);
     ASSERT_FALSE(done);
     EXPECT_EQ(done.error().code, ErrorCode::kCancelled);
     const auto scores = scorePairs(
-        *shapes, *shapes, {}, 2, [](std::size_t) {}, context);
+        shapes, shapes, {}, 2, [](std::size_t) {}, context);
     ASSERT_FALSE(scores);
     EXPECT_EQ(scores.error().code, ErrorCode::kCancelled);
 }

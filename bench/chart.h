@@ -1,0 +1,30 @@
+// Line charts as SVG, with no library behind them.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace shapedb::bench {
+
+struct Series {
+    std::string name;                               ///< the same name has the same colour in every panel
+    std::vector<std::pair<double, double>> points;  ///< x, y; finite; joined in this order
+    bool emphasised = false;                        ///< drawn thicker
+};
+
+/// One chart. Points outside the ranges are drawn at the edge.
+struct Panel {
+    std::string title;
+    std::string xLabel;
+    std::string yLabel;
+    double xMin = 0.0, xMax = 1.0;  ///< xMin < xMax
+    double yMin = 0.0, yMax = 1.0;  ///< yMin < yMax
+    std::vector<Series> series;
+};
+
+/// Panels row by row, `columns` (at least 1) in each row, and below them one legend of all series in
+/// the order they first occur. A complete SVG document; text in any encoding of UTF-8 is escaped.
+[[nodiscard]] std::string drawCharts(const std::vector<Panel>& panels, std::size_t columns);
+
+}  // namespace shapedb::bench

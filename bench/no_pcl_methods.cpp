@@ -1,0 +1,10 @@
+// Stands in for pcl_methods.cpp where the Point Cloud Library is not wanted.
+#include "bench/peers.h"
+
+namespace shapedb::bench {
+
+std::vector<Method> peerMethods() { return {}; }
+
+std::string peerLibrary() { return {}; }
+
+}  // namespace shapedb::bench

@@ -1,0 +1,24 @@
+// Results into files.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "client/cli/console.h"
+#include "core/base/error.h"
+
+namespace shapedb::bench {
+
+/// Writes `text` to `path`, replacing what is there; whole or not at all.
+/// Errors: kFileNotWritable.
+[[nodiscard]] Result<void> writeText(const std::string& path, std::string_view text);
+
+/// --json FILE|-: to a file, or to standard output instead of the text for people. Empty: nowhere.
+/// Call `announceJson` before anything is printed. Errors: kFileNotWritable.
+void announceJson(cli::Console& console, const std::string& target);
+[[nodiscard]] Result<void> writeJson(cli::Console& console, const std::string& target,
+                                     const nlohmann::json& document);
+
+}  // namespace shapedb::bench

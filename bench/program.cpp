@@ -1,0 +1,64 @@
+#include "bench/program.h"
+
+#include <algorithm>
+#include <exception>
+#include <new>
+
+#include <CLI/CLI.hpp>
+
+#include "bench/operations.h"
+#include "client/cli/exit_code.h"
+
+namespace shapedb::bench {
+
+namespace {
+
+int finish(cli::Console& console, int exitCode) {
+    if (console.flush()) return exitCode;
+    console.note("cannot write the result: standard output is closed or its device is full");
+    return exitCode == cli::kOk ? cli::kBadData : exitCode;
+}
+
+int usageError(cli::Console& console, const CLI::App& app, const CLI::ParseError& error) {
+    std::string command = app.get_name();
+    for (const CLI::App* sub : app.get_subcommands()) command += " " + sub->get_name();
+    std::string message = error.what();
+    std::replace(message.begin(), message.end(), '\n', ' ');
+    console.failure({ErrorCode::kInvalidArgument, message + " (see '" + command + " --help')"});
+    return finish(console, cli::kUsage);
+}
+
+}  // namespace
+
+int run(int argc, const char* const* argv, cli::Console& console, const std::atomic<bool>& cancel) {
+    try {
+        Bench bench{console, cancel, {}};
+        CLI::App app("Measures ShapeDB beside what users would take instead.", kProgramName);
+        app.set_version_flag("--version", std::string(kProgramName) + " " SHAPEDB_VERSION);
+        app.require_subcommand(1);
+        addRetrievalOperation(app, bench);
+        try {
+            app.parse(argc, argv);
+        } catch (const CLI::CallForHelp&) {
+            console.text(app.help());
+            return finish(console, cli::kOk);
+        } catch (const CLI::CallForVersion&) {
+            console.text(app.version() + "\n");
+            return finish(console, cli::kOk);
+        } catch (const CLI::ParseError& error) {
+            return usageError(console, app, error);
+        }
+        const Result<int> result = bench.action();
+        console.clearProgress();
+        if (result) return finish(console, *result);
+        console.failure(result.error());
+        return finish(console, cli::exitCodeOf(result.error().code));
+    } catch (const std::bad_alloc&) {
+        console.failure({ErrorCode::kOutOfMemory, "not enough memory"});
+    } catch (const std::exception& e) {
+        console.failure({ErrorCode::kInternal, std::string("unexpected failure: ") + e.what()});
+    }
+    return finish(console, cli::kDefect);
+}
+
+}  // namespace shapedb::bench

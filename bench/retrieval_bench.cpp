@@ -1,0 +1,174 @@
+// `shapedb-bench retrieval`: our profiles beside the descriptors users would take instead, on the
+// same points in the same run.
+#include <cmath>
+#include <memory>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "bench/environment.h"
+#include "bench/operations.h"
+#include "bench/output.h"
+#include "bench/peers.h"
+#include "bench/retrieval_report.h"
+#include "bench/retrieval_run.h"
+#include "client/cli/checks.h"
+#include "client/cli/evaluation_run.h"
+#include "client/cli/exit_code.h"
+
+namespace shapedb::bench {
+
+namespace {
+
+struct RetrievalFlags {
+    std::vector<std::string> paths;
+    std::vector<std::string> gallery;
+    std::string match = "folder";
+    cli::ClassFlags classes;
+    std::vector<double> noise;
+    std::vector<std::string> methods;
+    bool noRotation = false;
+    unsigned threads = cli::defaultThreads();
+    cli::ScanFlags scan;
+    std::string json;
+    std::string markdown;
+    std::string plot;
+};
+
+/// Of leave-one-out; the scans of a gallery's queries are as noisy as they are.
+const std::vector<double> kDefaultNoise = {0.0, 0.005, 0.01};
+
+Result<RetrievalTask> taskOf(const RetrievalFlags& flags) {
+    RetrievalTask task;
+    if (flags.gallery.empty()) {
+        if (flags.paths.size() != 1) {
+            return fail(ErrorCode::kInvalidArgument,
+                        "leave-one-out takes one folder of class folders; to rank queries against other "
+                        "shapes give --gallery");
+        }
+        auto scans = cli::listClasses(flags.paths.front(), flags.classes);
+        if (!scans) return fail(scans.error());
+        task.queries = std::move(*scans);
+        return task;
+    }
+    if (flags.classes.any() || !flags.plot.empty()) {
+        return fail(ErrorCode::kInvalidArgument,
+                    "--classes, --except-classes and --plot are for leave-one-out; leave --gallery out");
+    }
+    const auto match = cli::matchFromName(flags.match);
+    if (!match) return fail(match.error());
+    task.match = *match;
+    auto queries = cli::listCollection(flags.paths);
+    if (!queries) return fail(queries.error());
+    auto gallery = cli::listCollection(flags.gallery);
+    if (!gallery) return fail(gallery.error());
+    task.queries = std::move(*queries);
+    task.gallery = std::move(*gallery);
+    return task;
+}
+
+RetrievalSettings settingsOf(const RetrievalFlags& flags) {
+    RetrievalSettings settings;
+    settings.scan = flags.scan;
+    settings.rotate = !flags.noRotation;
+    settings.threads = flags.threads;
+    settings.noise = flags.noise;
+    if (settings.noise.empty())
+        settings.noise = flags.gallery.empty() ? kDefaultNoise : std::vector<double>{0.0};
+    return settings;
+}
+
+/// Names every failure once; says whether a file could not be read.
+int reportFailures(cli::Console& console, const std::vector<LevelResult>& levels) {
+    bool unreadable = false;
+    for (const LevelResult& level : levels) {
+        for (const MethodResult& method : level.methods) {
+            for (const ScanFailure& failure : method.failures) {
+                // A file that nobody can read is one failure, not one for every method.
+                if (failure.unreadable && &method != &level.methods.front()) continue;
+                unreadable = unreadable || failure.unreadable;
+                const std::string who = failure.unreadable ? "" : method.title + ": ";
+                const bool named = failure.error.message.find(failure.path) != std::string::npos;
+                console.note(who + (named ? "" : failure.path + ": ") + failure.error.message);
+            }
+        }
+    }
+    return unreadable ? cli::kSomeFailed : cli::kOk;
+}
+
+Result<int> runOperation(Bench& bench, const RetrievalFlags& flags) {
+    const auto methods = methodsNamed(flags.methods);
+    if (!methods) return fail(methods.error());
+    const auto task = taskOf(flags);
+    if (!task) return fail(task.error());
+    const RetrievalSettings settings = settingsOf(flags);
+    const auto levels = runRetrieval(
+        *task, settings, *methods,
+        [&](const std::string& what, std::size_t done, std::size_t total) {
+            bench.console.progress(what, done, total);
+        },
+        bench.context());
+    if (!levels) return fail(levels.error());
+    const RetrievalReportData data{*task, settings, *levels, environment(), peerLibrary()};
+    if (!flags.plot.empty()) {
+        if (const auto ok = writeText(flags.plot, retrievalCharts(*levels)); !ok) return fail(ok.error());
+    }
+    if (!flags.markdown.empty()) {
+        if (const auto ok = writeText(flags.markdown, retrievalMarkdown(data)); !ok) return fail(ok.error());
+    }
+    if (const auto ok = writeJson(bench.console, flags.json, retrievalJson(data)); !ok)
+        return fail(ok.error());
+    const int exitCode = reportFailures(bench.console, *levels);
+    bench.console.text(retrievalText(data));
+    return exitCode;
+}
+
+}  // namespace
+
+void addRetrievalOperation(CLI::App& app, Bench& bench) {
+    auto flags = std::make_shared<RetrievalFlags>();
+    CLI::App* command = app.add_subcommand(
+        "retrieval",
+        "Our profiles beside D2 and the descriptors of the Point Cloud Library, on the same points: "
+        "leave-one-out over DIR/CLASS/*, or queries against a gallery");
+    command
+        ->add_option("DIR", flags->paths,
+                     "Folder of class folders; with --gallery: queries (files or folders)")
+        ->required();
+    command->add_option("--gallery", flags->gallery, "Rank the queries against these files or folders")
+        ->type_name("DIR");
+    command
+        ->add_option("--match", flags->match,
+                     "With --gallery, what makes an entry right: the same folder name or file name")
+        ->check(CLI::IsMember({"folder", "stem"}))
+        ->capture_default_str();
+    cli::addClassFlags(*command, flags->classes);
+    command->add_option("--methods", flags->methods, "Only these: default, paper, esf, vfh, gasd, d2")
+        ->delimiter(',')
+        ->type_name("A,B,...");
+    CLI::App& scans = cli::addScanFlagsButNoise(*command, flags->scan);
+    scans
+        .add_option("--noise", flags->noise,
+                    "Noise levels: standard deviation as a share of the bounding-box diagonal "
+                    "[0,0.005,0.01; with --gallery 0]")
+        ->delimiter(',')
+        ->check(cli::atLeastZero())
+        ->type_name("S,S,...");
+    scans.add_flag("--no-rotation", flags->noRotation, "Do not turn each scan at random first");
+    command
+        ->add_option("--threads", flags->threads,
+                     "Scans described at a time; each measurement is one thread's")
+        ->check(CLI::Range(1, 1024))
+        ->capture_default_str();
+    command->add_option("--json", flags->json, "All figures as JSON; '-' is standard output")
+        ->type_name("FILE|-");
+    command->add_option("--markdown", flags->markdown, "The tables for a document")->type_name("FILE");
+    command->add_option("--plot", flags->plot, "Precision over recall, and each measure over the noise")
+        ->type_name("FILE.svg");
+    command->callback([&bench, flags] {
+        announceJson(bench.console, flags->json);
+        bench.action = [&bench, flags] { return runOperation(bench, *flags); };
+    });
+}
+
+}  // namespace shapedb::bench

@@ -1,0 +1,83 @@
+// The work of `shapedb-bench retrieval`: every method on the same points, then the same questions.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "bench/method.h"
+#include "client/cli/retrieval_task.h"
+#include "client/cli/scan_source.h"
+#include "core/base/error.h"
+#include "core/base/run_context.h"
+#include "core/evaluation/metrics.h"
+
+namespace shapedb::bench {
+
+struct RetrievalTask {
+    std::vector<cli::CollectionScan> queries;
+    /// Empty: leave-one-out, each query against all other queries, right when the label is the same.
+    std::vector<cli::CollectionScan> gallery;
+    cli::Match match = cli::Match::kFolder;  ///< with a gallery
+};
+
+struct RetrievalSettings {
+    cli::ScanFlags scan;                ///< its noise is not used
+    std::vector<double> noise = {0.0};  ///< levels, shares of the bounding-box diagonal
+    /// Turn every scan by a random rotation of its own before any method sees it, so that none
+    /// gains from models that are stored upright.
+    bool rotate = true;
+    unsigned threads = 1;  ///< at least 1; each measurement is one thread's
+};
+
+/// A scan that a method could not describe: it matches nothing and is ranked last.
+struct ScanFailure {
+    std::string path;
+    Error error;
+    bool unreadable = false;  ///< no method ever saw its points
+};
+
+/// How one query against a gallery ended.
+struct QueryResult {
+    std::string query;     ///< name
+    std::size_t rank = 0;  ///< of the first right entry, from 1; 0: none, or not ranked
+    std::string firstHit;  ///< name of the first entry; empty when nothing was ranked
+    double score = 0.0;    ///< of the first entry
+};
+
+struct MethodResult {
+    std::string name, title, comparison;  ///< of the method
+    RetrievalMetrics metrics;             ///< leave-one-out
+    std::vector<double> precision;        ///< leave-one-out: see precisionAtRecall
+    GalleryReport gallery;                ///< gallery
+    std::vector<QueryResult> queries;     ///< gallery
+    std::vector<ScanFailure> failures;
+    double secondsPerShape = 0.0;  ///< to describe one, processor time of one thread
+    double secondsPerPair = 0.0;   ///< to compare two
+};
+
+struct LevelResult {
+    double noise = 0.0;
+    std::vector<MethodResult> methods;
+};
+
+/// `progress(what, done, total)` may be called from any thread.
+using Progress = std::function<void(const std::string& what, std::size_t done, std::size_t total)>;
+
+/// Results by noise level in the order given, methods in the order given. Deterministic in task,
+/// settings and methods but for the times, and for ESF, which PCL draws from its own clock.
+///
+/// Noise is added first, exactly as `shapedb evaluate` adds it, then the subset is taken, then the
+/// scan is turned. With a gallery, noise and subset are the queries' alone: the gallery is what a
+/// user has stored.
+///
+/// Errors: kInvalidArgument (--points), kCancelled, kDeadlineExceeded, kOutOfMemory.
+[[nodiscard]] Result<std::vector<LevelResult>> runRetrieval(const RetrievalTask& task,
+                                                            const RetrievalSettings& settings,
+                                                            const std::vector<Method>& methods,
+                                                            const Progress& progress,
+                                                            const RunContext& context);
+
+}  // namespace shapedb::bench
