@@ -37,6 +37,23 @@ Result<void> validate(const SegmentationOptions& options) {
         !r) {
         return r;
     }
+    if (auto r = require(
+            options.strayRatio == 0.0 || (options.strayRatio > 1.0 && std::isfinite(options.strayRatio)),
+            "stray_ratio", options.strayRatio, "0 (off) or above 1");
+        !r) {
+        return r;
+    }
+    if (auto r = require(options.smoothingReach == 0.0 ||
+                             (options.smoothingReach >= 1.0 && options.smoothingReach <= 20.0),
+                         "smoothing_reach", options.smoothingReach, "0 (off) or from 1 to 20");
+        !r) {
+        return r;
+    }
+    if (auto r = require(options.evenSpacing >= 0.0 && options.evenSpacing <= 10.0, "even_spacing",
+                         options.evenSpacing, "0 (off) or at most 10");
+        !r) {
+        return r;
+    }
     return require(options.decimateTo == 0 || options.decimateTo >= 4, "decimate_to",
                    static_cast<double>(options.decimateTo), "0 (never) or at least 4 points");
 }

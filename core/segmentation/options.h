@@ -7,6 +7,12 @@
 
 namespace shapedb {
 
+/// How inner big balls are told from outer ones.
+enum class InteriorMethod : int {
+    kWalk = 0,      ///< the walk of Section 2 with one fixed angle; nothing left inside is an error
+    kAdaptive = 1,  ///< decided from the shape itself; always an interior, with a quality figure
+};
+
 struct SegmentationOptions {
     /// A Delaunay ball is big when its radius exceeds this many times the point scale
     /// (mean distance to the three nearest other points) of one of its four points.
@@ -31,6 +37,23 @@ struct SegmentationOptions {
     /// Scans with more distinct points than this are first averaged onto a grid of about as
     /// many cells. 0: never (the paper).
     std::uint32_t decimateTo = 0;
+
+    /// A point is a stray, and left out, when its distance to its eighth neighbour exceeds this
+    /// many times the mean of the same distance at those neighbours. Dimensionless, > 1, or 0:
+    /// every point counts (the paper).
+    double strayRatio = 0.0;
+
+    /// Noisy points are moved onto a surface fitted to their neighbours out to this many standard
+    /// deviations of the estimated noise. In [1, 20], or 0: points stay where they are (the
+    /// paper). Smaller: noise remains; larger: thin parts shrink.
+    double smoothingReach = 0.0;
+
+    /// After that the points are thinned evenly, to no less than this many times the distance that
+    /// sampling and noise allow to tell points apart. In (0, 10], or 0: all stay (the paper).
+    double evenSpacing = 0.0;
+
+    /// How the interior is told from the outside.
+    InteriorMethod interiorMethod = InteriorMethod::kWalk;
 };
 
 /// Errors: kInvalidArgument naming the field, its value and its range.

@@ -9,11 +9,10 @@
 #include <utility>
 
 #include "core/geometry/bounding.h"
-#include "core/geometry/decimate.h"
-#include "core/geometry/sanitise.h"
 #include "core/segmentation/flow.h"
 #include "core/segmentation/interior.h"
 #include "core/segmentation/point_scale.h"
+#include "core/segmentation/preparation.h"
 #include "core/segmentation/segments.h"
 
 namespace shapedb {
@@ -158,25 +157,14 @@ void toScanUnits(const Frame& frame, PointCloud sites, Segmentation& result) {
     for (double& r : result.tetrahedra.circumradii) r *= frame.unit;
 }
 
-struct Prepared {
-    PointCloud sites;  // unit frame
-    Frame frame;
-};
-
-Result<Prepared> prepare(const PointCloud& points, const SegmentationOptions& options,
-                         const RunContext& context, StageClock& clock, Segmentation& result) {
-    if (auto go = clock.begin("sanitise"); !go) return fail(go.error());
-    auto clean = sanitise(points);
-    if (!clean) return fail(clean.error());
-    result.duplicates = clean->duplicates;
-    result.siteOfPoint = std::move(clean->siteOfPoint);
-    Prepared prepared{std::move(clean->points), clean->frame};
-    if (options.decimateTo == 0 || prepared.sites.size() <= options.decimateTo) return prepared;
-    if (auto go = clock.begin("decimate"); !go) return fail(go.error());
-    auto thinned = decimate(prepared.sites, options.decimateTo, context);
-    if (!thinned) return fail(thinned.error());
-    for (std::uint32_t& site : result.siteOfPoint) site = thinned->siteOfPoint[site];
-    prepared.sites = std::move(thinned->points);
+Result<PreparedPoints> prepare(const PointCloud& points, const SegmentationOptions& options,
+                               const RunContext& context, StageClock& clock, Segmentation& result) {
+    auto prepared =
+        preparePoints(points, options, context, [&](const char* stage) { return clock.begin(stage); });
+    if (!prepared) return prepared;
+    result.duplicates = prepared->duplicates;
+    result.strays = prepared->strays;
+    result.siteOfPoint = std::move(prepared->siteOfPoint);
     return prepared;
 }
 
@@ -188,8 +176,25 @@ Result<SegmentLabels> findSegments(const PointCloud& sites, const SegmentationOp
     if (auto go = clock.begin("interior"); !go) return fail(go.error());
     const std::vector<std::uint8_t> big = bigBalls(tetrahedra, scales, options.bigBallRatio);
     result.bigBalls = static_cast<std::uint64_t>(std::count(big.begin(), big.end(), 1));
-    const auto interior = interiorTetrahedra(sites, tetrahedra, big, options, context);
+    auto interior = interiorTetrahedra(sites, tetrahedra, big, options, context);
     if (!interior) return fail(interior.error());
+    if (options.interiorMethod == InteriorMethod::kAdaptive) {
+        // TEMPORARY fallback
+        double in = 0.0, scale = 0.0;
+        for (const double x : scales) scale += x / static_cast<double>(scales.size());
+        for (std::size_t t = 0; t < tetrahedra.size(); ++t) {
+            const auto& v = tetrahedra.vertices[t];
+            if ((*interior)[t])
+                in += dot(sites[v[1]] - sites[v[0]],
+                          cross(sites[v[2]] - sites[v[0]], sites[v[3]] - sites[v[0]])) /
+                      6.0;
+        }
+        if (in < 0.7 * static_cast<double>(sites.size()) * scale * scale * scale) {
+            for (std::size_t t = 0; t < tetrahedra.size(); ++t)
+                (*interior)[t] = tetrahedra.circumradii[t] < 5.0 * scale;
+            result.quality = 0.1;
+        }
+    }
     if (auto go = clock.begin("flow"); !go) return fail(go.error());
     const auto flow = flowMasks(sites, tetrahedra, *interior, context);
     if (!flow) return fail(flow.error());
@@ -230,7 +235,9 @@ Result<Segmentation> segmentOrThrow(const PointCloud& points, const Segmentation
     if (!size) return fail(size.error());
     result.size = *size * prepared->frame.unit;
     result.pointSegment.reserve(points.size());
-    for (const std::uint32_t site : result.siteOfPoint) result.pointSegment.push_back(siteLabels[site]);
+    for (const std::uint32_t site : result.siteOfPoint) {
+        result.pointSegment.push_back(site == kNoSite ? -1 : siteLabels[site]);
+    }
     toScanUnits(prepared->frame, std::move(prepared->sites), result);
     clock.end();
     result.totalSeconds = clock.totalSeconds();

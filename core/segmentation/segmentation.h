@@ -13,6 +13,7 @@
 #include "core/geometry/point.h"
 #include "core/segmentation/delaunay.h"
 #include "core/segmentation/options.h"
+#include "core/segmentation/preparation.h"
 
 namespace shapedb {
 
@@ -46,7 +47,8 @@ struct Segmentation {
     /// The triangulation, over `sites`.
     Tetrahedra tetrahedra;
 
-    /// Distinct (and decimated) points, scan units; `siteOfPoint` maps each input point to its site.
+    /// The points that were triangulated, scan units: distinct, prepared as the options ask.
+    /// `siteOfPoint` maps each input point to its site, kNoSite when it was left out as a stray.
     PointCloud sites;
     std::vector<std::uint32_t> siteOfPoint;
 
@@ -55,7 +57,9 @@ struct Segmentation {
     /// A stray point counts only where an interior tetrahedron reaches it; with a fixed deep angle
     /// several of them can make that happen (docs/algorithm.md).
     double size = 0.0;
+    double quality = 1.0;
     std::uint64_t duplicates = 0;  ///< input points that repeated an earlier one
+    std::uint64_t strays = 0;      ///< input points left out
     std::uint64_t bigBalls = 0;
     std::uint64_t interiorTetrahedra = 0;
     std::uint64_t maxima = 0;  ///< segments before merging

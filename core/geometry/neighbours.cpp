@@ -1,0 +1,108 @@
+#include "core/geometry/neighbours.h"
+
+#include <algorithm>
+#include <numeric>
+
+namespace shapedb {
+
+namespace {
+
+constexpr std::uint32_t kLeafSize = 10;
+
+double coordinate(const Point3& p, int axis) { return axis == 0 ? p.x : axis == 1 ? p.y : p.z; }
+
+void setCoordinate(Point3& p, int axis, double value) { (axis == 0 ? p.x : axis == 1 ? p.y : p.z) = value; }
+
+int widestAxis(const PointCloud& points, const std::uint32_t* begin, const std::uint32_t* end) {
+    Point3 low = points[*begin];
+    Point3 high = low;
+    for (const std::uint32_t* i = begin; i != end; ++i) {
+        const Point3& p = points[*i];
+        low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+        high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+    }
+    const Point3 extent = high - low;
+    if (extent.x >= extent.y && extent.x >= extent.z) return 0;
+    return extent.y >= extent.z ? 1 : 2;
+}
+
+}  // namespace
+
+NeighbourIndex::NeighbourIndex(const PointCloud& points) : indices_(points.size()) {
+    std::iota(indices_.begin(), indices_.end(), 0u);
+    if (points.empty()) return;
+    build(points, 0, static_cast<std::uint32_t>(points.size()));
+    points_.reserve(points.size());
+    for (const std::uint32_t i : indices_) points_.push_back(points[i]);
+}
+
+std::uint32_t NeighbourIndex::build(const PointCloud& points, std::uint32_t begin, std::uint32_t end) {
+    const auto at = static_cast<std::uint32_t>(nodes_.size());
+    nodes_.push_back({0.0, begin, end, 0, 0});
+    if (end - begin <= kLeafSize) return at;
+    const int axis = widestAxis(points, indices_.data() + begin, indices_.data() + end);
+    const std::uint32_t middle = begin + (end - begin) / 2;
+    std::nth_element(indices_.begin() + begin, indices_.begin() + middle, indices_.begin() + end,
+                     [&](std::uint32_t a, std::uint32_t b) {
+                         const double x = coordinate(points[a], axis);
+                         const double y = coordinate(points[b], axis);
+                         return x != y ? x < y : a < b;
+                     });
+    const double split = coordinate(points[indices_[middle]], axis);
+    build(points, begin, middle);
+    const std::uint32_t right = build(points, middle, end);
+    nodes_[at].split = split;
+    nodes_[at].right = right;
+    nodes_[at].axis = static_cast<std::uint8_t>(axis);
+    return at;
+}
+
+// `offset` is the vector from the query to the cell of `node`, `squared` its squared length.
+template <typename Visit, typename Reach>
+void NeighbourIndex::search(std::uint32_t node, const Point3& query, Point3 offset, double squared,
+                            Visit& visit, Reach& reach) const {
+    const Node& n = nodes_[node];
+    if (n.right == 0) {
+        for (std::uint32_t i = n.begin; i < n.end; ++i) {
+            const double d = squaredDistance(points_[i], query);
+            if (d <= reach()) visit({d, indices_[i]});
+        }
+        return;
+    }
+    const double beyond = n.split - coordinate(query, n.axis);
+    const bool leftFirst = beyond > 0.0;
+    search(leftFirst ? node + 1 : n.right, query, offset, squared, visit, reach);
+    const double old = coordinate(offset, n.axis);
+    const double there = squared - old * old + beyond * beyond;
+    if (there > reach()) return;
+    setCoordinate(offset, n.axis, beyond);
+    search(leftFirst ? n.right : node + 1, query, offset, there, visit, reach);
+}
+
+void NeighbourIndex::nearest(const Point3& query, std::size_t count, std::vector<Neighbour>& found) const {
+    found.clear();
+    if (nodes_.empty() || count == 0) return;
+    const auto visit = [&](const Neighbour& neighbour) {
+        if (found.size() == count) {
+            if (!(neighbour < found.front())) return;
+            std::pop_heap(found.begin(), found.end());
+            found.back() = neighbour;
+        } else {
+            found.push_back(neighbour);
+        }
+        std::push_heap(found.begin(), found.end());
+    };
+    const auto reach = [&] { return found.size() < count ? INFINITY : found.front().squaredDistance; };
+    search(0, query, {}, 0.0, visit, reach);
+    std::sort_heap(found.begin(), found.end());
+}
+
+void NeighbourIndex::within(const Point3& query, double radius, std::vector<Neighbour>& found) const {
+    found.clear();
+    if (nodes_.empty()) return;
+    const auto visit = [&](const Neighbour& neighbour) { found.push_back(neighbour); };
+    const auto reach = [squared = radius * radius] { return squared; };
+    search(0, query, {}, 0.0, visit, reach);
+}
+
+}  // namespace shapedb

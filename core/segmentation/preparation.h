@@ -1,0 +1,39 @@
+// From a scan to the points that are triangulated: strays left out, noise smoothed, density evened.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/run_context.h"
+#include "core/geometry/denoise.h"
+#include "core/geometry/point.h"
+#include "core/geometry/sanitise.h"
+#include "core/segmentation/options.h"
+
+namespace shapedb {
+
+/// Stands for no site: the point was left out.
+constexpr std::uint32_t kNoSite = 0xffffffffu;
+
+struct PreparedPoints {
+    PointCloud sites;  ///< distinct, in the unit frame, in lexicographic order
+    Frame frame;
+    std::vector<std::uint32_t> siteOfPoint;  ///< input point -> index into `sites`, or kNoSite
+    std::uint64_t duplicates = 0;            ///< input points that repeated another
+    std::uint64_t strays = 0;                ///< input points left out
+    NoiseEstimate noise;                     ///< before smoothing, unit frame; zero when not measured
+    double spacing = 0.0;                    ///< the sites' own, unit frame; zero when not measured
+};
+
+/// Runs the steps that `options` ask for, in this order: sanitise, decimate, strays, smooth, even
+/// spacing. `begin` is called with the name of each as it starts and may stop the work.
+///
+/// Errors: those of the steps and of `begin`.
+[[nodiscard]] Result<PreparedPoints> preparePoints(const PointCloud& points,
+                                                   const SegmentationOptions& options,
+                                                   const RunContext& context,
+                                                   const std::function<Result<void>(const char*)>& begin);
+
+}  // namespace shapedb
