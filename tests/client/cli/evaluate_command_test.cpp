@@ -77,6 +77,19 @@ TEST_F(EvaluateCommand, TheMeanIsTheMeanOfTheClasses) {
     }
 }
 
+TEST_F(EvaluateCommand, OnlyTheClassesAskedForAreMeasured) {
+    const auto only = evaluate({samples(), "--classes", "human,mug", "--per-class"});
+    EXPECT_EQ(only["queries"], 6);
+    EXPECT_EQ(only["shapes"], 6);
+    EXPECT_FALSE(only["per_class"].contains("airplane"));
+    EXPECT_EQ(only["only_classes"], nlohmann::json({"human", "mug"}));
+    const auto except = evaluate({samples(), "--except-classes", "airplane", "--per-class"});
+    EXPECT_EQ(only["per_class"], except["per_class"]);
+    const auto refused = evaluate({samples(), "--classes", "humans"}, 2);
+    EXPECT_NE(refused["error"]["message"].get<std::string>().find("airplane, human, mug"), std::string::npos);
+    evaluate({samples(), "--gallery", samples(), "--classes", "human"}, 2);
+}
+
 TEST_F(EvaluateCommand, SameForAnyNumberOfThreads) {
     const std::vector<std::string> noisy = {samples(), "--noise", "0.005", "--points", "2000", "--per-class"};
     const auto with = [&](const char* threads) {
