@@ -2,6 +2,8 @@
 # Installs the Debian 12 packages that ShapeDB needs, and only those that are missing.
 #   scripts/install-deps.sh             everything to build, test and check
 #   scripts/install-deps.sh --runtime   only what the built programs load
+#   scripts/install-deps.sh --bench     that to build and the Point Cloud Library, whose descriptors
+#                                       shapedb-bench measures beside ours (SHAPEDB_BENCH_PCL)
 set -euo pipefail
 
 build_packages=(
@@ -16,9 +18,14 @@ runtime_packages=(
   ca-certificates libgmpxx4ldbl libmpfr6 libtbb12 libgrpc++1.51 libprotobuf32 libsqlite3-0
   libzstd1 libssl3 libspdlog1.10 libpng16-16 liblzf1
 )
+bench_packages=(libpcl-dev)
 
-packages=("${build_packages[@]}")
-[ "${1:-}" = "--runtime" ] && packages=("${runtime_packages[@]}")
+case "${1:-}" in
+  "") packages=("${build_packages[@]}") ;;
+  --runtime) packages=("${runtime_packages[@]}") ;;
+  --bench) packages=("${build_packages[@]}" "${bench_packages[@]}") ;;
+  *) echo "install-deps: unknown option $1; there are --runtime and --bench" >&2; exit 2 ;;
+esac
 
 missing=()
 for package in "${packages[@]}"; do
