@@ -37,6 +37,17 @@ Result<void> validate(const SegmentationOptions& options) {
         !r) {
         return r;
     }
+    if (auto r = require(options.mergeContrast == 0.0 ||
+                             (options.mergeContrast >= 1.0 && std::isfinite(options.mergeContrast)),
+                         "merge_contrast", options.mergeContrast, "0 (off) or at least 1");
+        !r) {
+        return r;
+    }
+    if (auto r = require(options.minSegmentShare >= 0.0 && options.minSegmentShare <= 1.0,
+                         "min_segment_share", options.minSegmentShare, "between 0 and 1");
+        !r) {
+        return r;
+    }
     if (auto r = require(
             options.strayRatio == 0.0 || (options.strayRatio > 1.0 && std::isfinite(options.strayRatio)),
             "stray_ratio", options.strayRatio, "0 (off) or above 1");

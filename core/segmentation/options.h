@@ -34,6 +34,19 @@ struct SegmentationOptions {
     /// circumradii of the triangle. Section 3.3. Dimensionless, >= 1.
     double mergeRatio = 1.5;
 
+    /// Above 0, segments merge by contrast instead (hierarchy.h): up to this ratio of the thicker
+    /// segment's radius to the narrowest of both radii and the passage between them.
+    /// Dimensionless, >= 1, or 0: by mergeRatio (the paper). Larger: fewer, larger segments.
+    double mergeContrast = 0.0;
+
+    /// With mergeContrast: a segment lighter than this share of all volume joins the neighbour
+    /// with the widest passage. In [0, 1].
+    double minSegmentShare = 0.004;
+
+    /// With mergeContrast: so does the lightest while there are more segments than this that touch
+    /// another. 0: no limit.
+    std::uint32_t maxSegments = 16;
+
     /// Scans with more distinct points than this are first averaged onto a grid of about as
     /// many cells. 0: never (the paper).
     std::uint32_t decimateTo = 0;

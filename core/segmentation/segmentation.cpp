@@ -10,6 +10,7 @@
 
 #include "core/geometry/bounding.h"
 #include "core/segmentation/flow.h"
+#include "core/segmentation/hierarchy.h"
 #include "core/segmentation/interior.h"
 #include "core/segmentation/point_scale.h"
 #include "core/segmentation/preparation.h"
@@ -203,7 +204,10 @@ Result<SegmentLabels> findSegments(const PointCloud& sites, const SegmentationOp
     if (!fine) return fail(fine.error());
     result.maxima = fine->peaks.size();
     if (auto go = clock.begin("merge"); !go) return fail(go.error());
-    return mergeSegments(sites, tetrahedra, *fine, options.mergeRatio);
+    if (options.mergeContrast == 0.0) return mergeSegments(sites, tetrahedra, *fine, options.mergeRatio);
+    return mergeSegmentsByContrast(sites, tetrahedra, *flow, *fine,
+                                   {options.mergeContrast, options.minSegmentShare, options.maxSegments},
+                                   context);
 }
 
 Result<Segmentation> segmentOrThrow(const PointCloud& points, const SegmentationOptions& options,

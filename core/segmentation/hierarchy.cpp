@@ -1,0 +1,287 @@
+#include "core/segmentation/hierarchy.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <queue>
+#include <tuple>
+#include <unordered_map>
+#include <utility>
+
+namespace shapedb {
+
+namespace {
+
+constexpr std::size_t kStepsBetweenCheckpoints = 4096;
+
+// A group's pairs are looked at again when its radius has moved by this share of itself.
+constexpr double kRadiusDrift = 1e-3;
+
+// Weight of a flat segment, as a share of all volume: it must not weigh nothing.
+constexpr double kLeastWeight = 1e-12;
+
+bool flowsTowards(const Tetrahedra& tetrahedra, const std::vector<std::uint8_t>& flow, std::uint32_t from,
+                  std::uint32_t to) {
+    for (std::size_t facet = 0; facet < 4; ++facet) {
+        if (tetrahedra.neighbours[from][facet] == to) return ((flow[from] >> facet) & 1u) != 0;
+    }
+    return false;
+}
+
+double facetArea(const PointCloud& points, const Tetrahedra& tetrahedra, std::uint32_t t, std::size_t facet) {
+    const auto& v = tetrahedra.vertices[t];
+    const Point3 a = points[v[(facet + 1) % 4]];
+    return 0.5 * length(cross(points[v[(facet + 2) % 4]] - a, points[v[(facet + 3) % 4]] - a));
+}
+
+// The ball narrowest on the way between two circumcentres: that of the facet where the way crosses
+// it, otherwise the smaller of the two.
+double facetPassage(const PointCloud& points, const Tetrahedra& tetrahedra,
+                    const std::vector<std::uint8_t>& flow, std::uint32_t t, std::size_t facet) {
+    const std::uint32_t next = tetrahedra.neighbours[t][facet];
+    const double smaller = std::min(tetrahedra.circumradii[t], tetrahedra.circumradii[next]);
+    if (((flow[t] >> facet) & 1u) != 0 || flowsTowards(tetrahedra, flow, next, t)) return smaller;
+    return std::min(smaller, facetCircumradius(points, tetrahedra, t, static_cast<int>(facet)));
+}
+
+// The groups while they grow: radii, weights, and passages to neighbours.
+class Groups {
+  public:
+    explicit Groups(const SegmentGraph& graph)
+        : parent_(graph.volumes.size()),
+          weight_(graph.volumes),
+          logRadius_(graph.volumes.size()),
+          passages_(graph.volumes.size()) {
+        for (const double volume : graph.volumes) total_ += volume;
+        const double least = std::max(kLeastWeight * total_, std::numeric_limits<double>::min());
+        for (std::uint32_t i = 0; i < parent_.size(); ++i) {
+            parent_[i] = i;
+            weight_[i] = std::max(weight_[i], least);
+            logRadius_[i] = std::log(graph.radii[i]);
+        }
+        for (const SegmentContact& c : graph.contacts) {
+            passages_[c.first][c.second] = c.passage;
+            passages_[c.second][c.first] = c.passage;
+        }
+    }
+
+    std::uint32_t size() const { return static_cast<std::uint32_t>(parent_.size()); }
+    double totalVolume() const { return total_; }
+    bool isGroup(std::uint32_t i) const { return parent_[i] == i; }
+    double weight(std::uint32_t group) const { return weight_[group]; }
+    double logRadius(std::uint32_t group) const { return logRadius_[group]; }
+    const std::unordered_map<std::uint32_t, double>& neighbours(std::uint32_t group) const {
+        return passages_[group];
+    }
+
+    double contrast(std::uint32_t a, std::uint32_t b) const {
+        const double ra = std::exp(logRadius_[a]);
+        const double rb = std::exp(logRadius_[b]);
+        return std::max(ra, rb) / std::min({ra, rb, passages_[a].at(b)});
+    }
+
+    std::uint32_t groupOf(std::uint32_t i) {
+        while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+        return i;
+    }
+
+    // Joins two groups that touch. The one with fewer neighbours goes into the other: returns the
+    // one that remains, and the neighbours that are now new to it.
+    std::pair<std::uint32_t, std::vector<std::uint32_t>> join(std::uint32_t a, std::uint32_t b) {
+        if (std::make_pair(passages_[a].size(), b) < std::make_pair(passages_[b].size(), a)) std::swap(a, b);
+        const double weight = weight_[a] + weight_[b];
+        logRadius_[a] = (weight_[a] * logRadius_[a] + weight_[b] * logRadius_[b]) / weight;
+        weight_[a] = weight;
+        parent_[b] = a;
+        std::vector<std::uint32_t> moved;
+        passages_[a].erase(b);
+        for (const auto& [next, passage] : passages_[b]) {
+            if (next == a) continue;
+            passages_[next].erase(b);
+            double& widest = passages_[a][next];
+            widest = std::max(widest, passage);
+            passages_[next][a] = widest;
+            moved.push_back(next);
+        }
+        passages_[b] = {};
+        return {a, std::move(moved)};
+    }
+
+  private:
+    std::vector<std::uint32_t> parent_;
+    std::vector<double> weight_;
+    std::vector<double> logRadius_;
+    std::vector<std::unordered_map<std::uint32_t, double>> passages_;
+    double total_ = 0.0;
+};
+
+// A pair of groups waiting to merge; equal contrasts by index, so that the order of pushing
+// does not matter.
+struct Candidate {
+    double contrast;
+    std::uint32_t a;
+    std::uint32_t b;
+    bool operator<(const Candidate& o) const {
+        return std::tie(contrast, a, b) > std::tie(o.contrast, o.a, o.b);  // least first
+    }
+};
+
+Result<void> mergeAlike(Groups& groups, double limit, const RunContext& context) {
+    std::priority_queue<Candidate> queue;
+    const auto consider = [&](std::uint32_t a, std::uint32_t b) {
+        const double contrast = groups.contrast(a, b);
+        if (contrast <= limit) queue.push({contrast, std::min(a, b), std::max(a, b)});
+    };
+    std::vector<double> seenRadius(groups.size());
+    for (std::uint32_t a = 0; a < groups.size(); ++a) {
+        seenRadius[a] = groups.logRadius(a);
+        for (const auto& [b, passage] : groups.neighbours(a)) {
+            if (a < b) consider(a, b);
+        }
+    }
+    for (std::size_t step = 1; !queue.empty(); ++step) {
+        if (step % kStepsBetweenCheckpoints == 0) {
+            if (auto go = context.checkpoint(); !go) return go;
+        }
+        const Candidate best = queue.top();
+        queue.pop();
+        if (!groups.isGroup(best.a) || !groups.isGroup(best.b)) continue;
+        if (groups.contrast(best.a, best.b) > best.contrast) {
+            consider(best.a, best.b);
+            continue;
+        }
+        const auto [joined, moved] = groups.join(best.a, best.b);
+        if (std::abs(groups.logRadius(joined) - seenRadius[joined]) > kRadiusDrift) {
+            seenRadius[joined] = groups.logRadius(joined);
+            for (const auto& [next, passage] : groups.neighbours(joined)) consider(joined, next);
+        } else {
+            for (const std::uint32_t next : moved) consider(joined, next);
+        }
+    }
+    return {};
+}
+
+std::uint32_t widestNeighbour(const Groups& groups, std::uint32_t group) {
+    std::uint32_t best = group;
+    double widest = -1.0;
+    for (const auto& [next, passage] : groups.neighbours(group)) {
+        if (passage > widest || (passage == widest && next < best)) {
+            widest = passage;
+            best = next;
+        }
+    }
+    return best;
+}
+
+Result<void> absorbLight(Groups& groups, const ContrastMerging& options, const RunContext& context) {
+    std::priority_queue<Candidate> lightest;
+    for (std::uint32_t i = 0; i < groups.size(); ++i) {
+        if (groups.isGroup(i)) lightest.push({groups.weight(i), i, 0});
+    }
+    std::size_t left = lightest.size();
+    const double least = options.minShare * groups.totalVolume();
+    for (std::size_t step = 1; !lightest.empty(); ++step) {
+        if (step % kStepsBetweenCheckpoints == 0) {
+            if (auto go = context.checkpoint(); !go) return go;
+        }
+        const Candidate light = lightest.top();
+        lightest.pop();
+        if (!groups.isGroup(light.a) || groups.weight(light.a) != light.contrast) continue;
+        const bool tooMany = options.maxSegments > 0 && left > options.maxSegments;
+        if (light.contrast >= least && !tooMany) break;
+        if (groups.neighbours(light.a).empty()) continue;
+        const std::uint32_t joined = groups.join(light.a, widestNeighbour(groups, light.a)).first;
+        --left;
+        lightest.push({groups.weight(joined), joined, 0});
+    }
+    return {};
+}
+
+}  // namespace
+
+Result<std::vector<SegmentContact>> segmentContacts(const PointCloud& points, const Tetrahedra& tetrahedra,
+                                                    const std::vector<std::uint8_t>& flow,
+                                                    const std::vector<std::int32_t>& labels,
+                                                    const RunContext& context) {
+    std::vector<SegmentContact> facets;
+    for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
+        if (t % kStepsBetweenCheckpoints == 0) {
+            if (auto go = context.checkpoint(); !go) return fail(go.error());
+        }
+        if (labels[t] < 0) continue;
+        for (std::size_t facet = 0; facet < 4; ++facet) {
+            const std::uint32_t next = tetrahedra.neighbours[t][facet];
+            if (next == kNoTetrahedron || next < t || labels[next] < 0 || labels[next] == labels[t]) continue;
+            const auto [low, high] = std::minmax(labels[t], labels[next]);
+            facets.push_back({static_cast<std::uint32_t>(low), static_cast<std::uint32_t>(high),
+                              facetPassage(points, tetrahedra, flow, t, facet),
+                              facetArea(points, tetrahedra, t, facet)});
+        }
+    }
+    // Stable: areas add up in the order of the tetrahedra.
+    std::stable_sort(facets.begin(), facets.end(), [](const SegmentContact& a, const SegmentContact& b) {
+        return std::tie(a.first, a.second) < std::tie(b.first, b.second);
+    });
+    std::vector<SegmentContact> contacts;
+    for (const SegmentContact& facet : facets) {
+        if (contacts.empty() || contacts.back().first != facet.first ||
+            contacts.back().second != facet.second) {
+            contacts.push_back(facet);
+            continue;
+        }
+        contacts.back().passage = std::max(contacts.back().passage, facet.passage);
+        contacts.back().area += facet.area;
+    }
+    return contacts;
+}
+
+Result<std::vector<std::uint32_t>> mergeByContrast(const SegmentGraph& graph, const ContrastMerging& options,
+                                                   const RunContext& context) {
+    Groups groups(graph);
+    if (auto go = mergeAlike(groups, options.contrast, context); !go) return fail(go.error());
+    if (auto go = absorbLight(groups, options, context); !go) return fail(go.error());
+    std::vector<std::uint32_t> dense(groups.size(), groups.size());
+    std::vector<std::uint32_t> result(groups.size());
+    std::uint32_t count = 0;
+    for (std::uint32_t i = 0; i < groups.size(); ++i) {
+        std::uint32_t& index = dense[groups.groupOf(i)];
+        if (index == groups.size()) index = count++;
+        result[i] = index;
+    }
+    return result;
+}
+
+Result<SegmentLabels> mergeSegmentsByContrast(const PointCloud& points, const Tetrahedra& tetrahedra,
+                                              const std::vector<std::uint8_t>& flow,
+                                              const SegmentLabels& fine, const ContrastMerging& options,
+                                              const RunContext& context) {
+    SegmentGraph graph;
+    auto contacts = segmentContacts(points, tetrahedra, flow, fine.ofTetrahedron, context);
+    if (!contacts) return fail(contacts.error());
+    graph.contacts = std::move(*contacts);
+    graph.volumes.assign(fine.peaks.size(), 0.0);
+    for (std::size_t t = 0; t < tetrahedra.size(); ++t) {
+        const std::int32_t segment = fine.ofTetrahedron[t];
+        if (segment < 0) continue;
+        const auto& v = tetrahedra.vertices[t];
+        const Point3 a = points[v[0]];
+        const double six = dot(points[v[1]] - a, cross(points[v[2]] - a, points[v[3]] - a));
+        graph.volumes[static_cast<std::size_t>(segment)] += std::max(0.0, six / 6.0);
+    }
+    for (const std::uint32_t peak : fine.peaks) graph.radii.push_back(tetrahedra.circumradii[peak]);
+    const auto groups = mergeByContrast(graph, options, context);
+    if (!groups) return fail(groups.error());
+    // Fine segments come by falling peak (islands last), so the first of a group has its peak.
+    SegmentLabels merged;
+    for (std::size_t s = 0; s < groups->size(); ++s) {
+        if ((*groups)[s] == merged.peaks.size()) merged.peaks.push_back(fine.peaks[s]);
+    }
+    merged.ofTetrahedron.reserve(tetrahedra.size());
+    for (const std::int32_t segment : fine.ofTetrahedron) {
+        merged.ofTetrahedron.push_back(
+            segment < 0 ? -1 : static_cast<std::int32_t>((*groups)[static_cast<std::size_t>(segment)]));
+    }
+    return merged;
+}
+
+}  // namespace shapedb
