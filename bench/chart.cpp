@@ -151,8 +151,11 @@ std::string drawCharts(const std::vector<Panel>& panels, std::size_t columns) {
         const Scale scale{panels[i]};
         svg += "<g transform=\"translate(" + number(static_cast<double>(i % across) * kPanelWidth) + " " +
                number(static_cast<double>(i / across) * kPanelHeight) + ")\">\n" + axes(panels[i], scale);
-        for (const Series& series : panels[i].series) {
-            svg += curve(series, scale, colourOf(legend, series.name));
+        for (const bool emphasised : {false, true}) {  // those in front
+            for (const Series& series : panels[i].series) {
+                if (series.emphasised != emphasised) continue;
+                svg += curve(series, scale, colourOf(legend, series.name));
+            }
         }
         svg += "</g>\n";
     }

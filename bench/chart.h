@@ -10,7 +10,7 @@ namespace shapedb::bench {
 struct Series {
     std::string name;                               ///< the same name has the same colour in every panel
     std::vector<std::pair<double, double>> points;  ///< x, y; finite; joined in this order
-    bool emphasised = false;                        ///< drawn thicker
+    bool emphasised = false;                        ///< drawn thicker and in front
 };
 
 /// One chart. Points outside the ranges are drawn at the edge.

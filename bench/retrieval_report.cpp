@@ -261,7 +261,6 @@ Panel measurePanel(const std::vector<LevelResult>& levels, const Measure& measur
     Panel panel;
     panel.title = measure.title;
     panel.xLabel = "noise, % of the diagonal";
-    panel.yLabel = measure.title;
     double most = 0.0;
     for (const LevelResult& level : levels) most = std::max(most, 100.0 * level.noise);
     panel.xMax = most > 0.0 ? most : 1.0;
