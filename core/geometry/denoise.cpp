@@ -29,6 +29,10 @@ constexpr double kHarmlessRatio = 0.1;
 
 // Along a plateau the spread grows with less than this power of the neighbourhood's width.
 constexpr double kPlateauSlope = 0.85;
+// Slopes that differ by no more than this are one plateau; one this much steeper ends it: there the
+// neighbourhoods have reached the far side of the part.
+constexpr double kPlateauTolerance = 0.05;
+constexpr double kPlateauEnds = 0.15;
 
 constexpr double kReachInSpacings = 2.6;  // pi * 2.6^2: about twenty neighbours
 constexpr std::size_t kQuadricMinimum = 12;
@@ -190,8 +194,10 @@ NoiseEstimate estimateNoise(const PointCloud& points, const NeighbourIndex& inde
     double flattest = kPlateauSlope;
     for (std::size_t s = 1; s < spreads.sizes; ++s) {
         const double slope = std::log(across[s] / across[s - 1]) / std::log(along[s] / along[s - 1]);
-        if (!(slope < flattest)) continue;
-        flattest = slope;
+        const bool found = flattest < kPlateauSlope;
+        if (found && slope > flattest + kPlateauEnds) break;
+        if (slope > flattest + (found ? kPlateauTolerance : 0.0)) continue;
+        flattest = std::min(flattest, slope);
         estimate = {across[s], spacingFrom(along[s], kNeighbourhoods[s])};
     }
     return estimate;

@@ -11,11 +11,17 @@
 
 namespace shapedb {
 
-/// Per point 1 when it is a stray: the distance to its eighth nearest neighbour exceeds
-/// `ratio` times the mean of that distance at those eight. A comparison with the
-/// neighbourhood, not with the scan: points of a sparsely sampled region are no strays.
+/// Per point 1 when it is a stray. The reach of a point is the distance to its eighth nearest
+/// neighbour. A point is a stray when
+/// - its reach exceeds `ratio` times the mean reach of those eight: it stands off a surface; or
+/// - its reach exceeds 2.5 times what nine in ten points have, and its neighbours surround it in
+///   space instead of lying along a surface: it belongs to a haze; or
+/// - it belongs to a group of less than 1 % of the points that no short link joins to the rest.
+/// A region of a surface that is sampled more sparsely, a thin part, and a part apart that
+/// holds more points are none of these.
 ///
-/// `index` must hold `points`. Errors: kCancelled, kDeadlineExceeded, kOutOfMemory.
+/// `index` must hold `points`. The same points in any pose give the same answer up to rounding.
+/// Errors: kCancelled, kDeadlineExceeded, kOutOfMemory.
 [[nodiscard]] Result<std::vector<std::uint8_t>> findStrays(const PointCloud& points,
                                                            const NeighbourIndex& index, double ratio,
                                                            const RunContext& context = {});

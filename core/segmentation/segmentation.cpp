@@ -165,8 +165,26 @@ Result<PreparedPoints> prepare(const PointCloud& points, const SegmentationOptio
     if (!prepared) return prepared;
     result.duplicates = prepared->duplicates;
     result.strays = prepared->strays;
+    result.noise = prepared->noise.sigma * prepared->frame.unit;
     result.siteOfPoint = std::move(prepared->siteOfPoint);
     return prepared;
+}
+
+// Per tetrahedron 1 when it is interior; notes in the result how that was found.
+Result<std::vector<std::uint8_t>> findInterior(const PointCloud& sites, const std::vector<std::uint8_t>& big,
+                                               const std::vector<double>& scales,
+                                               const SegmentationOptions& options, const RunContext& context,
+                                               Segmentation& result) {
+    if (options.interiorMethod == InteriorMethod::kWalk) {
+        result.angleDegrees = options.deepAngleDegrees;
+        return interiorTetrahedra(sites, result.tetrahedra, big, options, context);
+    }
+    auto interior = adaptiveInterior(sites, result.tetrahedra, big, scales, context);
+    if (!interior) return fail(interior.error());
+    result.interiorSource = interior->source;
+    result.angleDegrees = interior->angleDegrees;
+    result.quality = interior->quality;
+    return std::move(interior->inside);
 }
 
 Result<SegmentLabels> findSegments(const PointCloud& sites, const SegmentationOptions& options,
@@ -177,25 +195,8 @@ Result<SegmentLabels> findSegments(const PointCloud& sites, const SegmentationOp
     if (auto go = clock.begin("interior"); !go) return fail(go.error());
     const std::vector<std::uint8_t> big = bigBalls(tetrahedra, scales, options.bigBallRatio);
     result.bigBalls = static_cast<std::uint64_t>(std::count(big.begin(), big.end(), 1));
-    auto interior = interiorTetrahedra(sites, tetrahedra, big, options, context);
+    const auto interior = findInterior(sites, big, scales, options, context, result);
     if (!interior) return fail(interior.error());
-    if (options.interiorMethod == InteriorMethod::kAdaptive) {
-        // TEMPORARY fallback
-        double in = 0.0, scale = 0.0;
-        for (const double x : scales) scale += x / static_cast<double>(scales.size());
-        for (std::size_t t = 0; t < tetrahedra.size(); ++t) {
-            const auto& v = tetrahedra.vertices[t];
-            if ((*interior)[t])
-                in += dot(sites[v[1]] - sites[v[0]],
-                          cross(sites[v[2]] - sites[v[0]], sites[v[3]] - sites[v[0]])) /
-                      6.0;
-        }
-        if (in < 0.7 * static_cast<double>(sites.size()) * scale * scale * scale) {
-            for (std::size_t t = 0; t < tetrahedra.size(); ++t)
-                (*interior)[t] = tetrahedra.circumradii[t] < 5.0 * scale;
-            result.quality = 0.1;
-        }
-    }
     if (auto go = clock.begin("flow"); !go) return fail(go.error());
     const auto flow = flowMasks(sites, tetrahedra, *interior, context);
     if (!flow) return fail(flow.error());

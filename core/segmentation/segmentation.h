@@ -11,6 +11,7 @@
 #include "core/base/error.h"
 #include "core/base/run_context.h"
 #include "core/geometry/point.h"
+#include "core/segmentation/adaptive_interior.h"
 #include "core/segmentation/delaunay.h"
 #include "core/segmentation/options.h"
 #include "core/segmentation/preparation.h"
@@ -57,7 +58,13 @@ struct Segmentation {
     /// A stray point counts only where an interior tetrahedron reaches it; with a fixed deep angle
     /// several of them can make that happen (docs/algorithm.md).
     double size = 0.0;
+    /// How the interior was found and how much it deserves trust, in [0, 1]: see
+    /// AdaptiveInterior. InteriorMethod::kWalk does not judge: 1.
+    InteriorSource interiorSource = InteriorSource::kWalk;
     double quality = 1.0;
+    double angleDegrees = 0.0;  ///< deep angle of the walk; 0 when the interior comes from elsewhere
+    double noise = 0.0;  ///< estimated standard deviation before smoothing, scan units; 0: not measured
+
     std::uint64_t duplicates = 0;  ///< input points that repeated an earlier one
     std::uint64_t strays = 0;      ///< input points left out
     std::uint64_t bigBalls = 0;
