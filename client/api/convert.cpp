@@ -150,6 +150,8 @@ SegmentationReport fromWire(const v1::SegmentationReport& from) {
     to.points = from.points();
     to.pointsUsed = from.points_used();
     to.duplicates = from.duplicates();
+    to.strays = from.strays();
+    if (from.has_quality()) to.quality = from.quality();
     to.tetrahedra = from.tetrahedra();
     to.interiorTetrahedra = from.interior_tetrahedra();
     to.maxima = from.maxima();
@@ -205,6 +207,15 @@ Collection fromWire(const v1::Collection& from) {
     to.parameters.hullAngleDegrees = segmentation.hull_angle_degrees();
     to.parameters.mergeRatio = segmentation.merge_ratio();
     to.parameters.decimateTo = segmentation.decimate_to();
+    to.parameters.mergeContrast = segmentation.merge_contrast();
+    to.parameters.minSegmentShare = segmentation.min_segment_share();
+    to.parameters.maxSegments = segmentation.max_segments();
+    to.parameters.strayRatio = segmentation.stray_ratio();
+    to.parameters.smoothingReach = segmentation.smoothing_reach();
+    to.parameters.evenSpacing = segmentation.even_spacing();
+    to.parameters.interiorMethod = segmentation.interior_method() == v1::INTERIOR_METHOD_ADAPTIVE
+                                       ? InteriorMethod::kAdaptive
+                                       : InteriorMethod::kWalk;
     to.parameters.maxPoints = from.signature().max_points();
     to.generation = from.generation();
     to.created = fromWire(from.created());

@@ -26,6 +26,17 @@ void fillParameters(const Parameters& from, Message* to) {
     if (from.hullAngleDegrees) to->mutable_segmentation()->set_hull_angle_degrees(*from.hullAngleDegrees);
     if (from.mergeRatio) to->mutable_segmentation()->set_merge_ratio(*from.mergeRatio);
     if (from.decimateTo) to->mutable_segmentation()->set_decimate_to(*from.decimateTo);
+    if (from.mergeContrast) to->mutable_segmentation()->set_merge_contrast(*from.mergeContrast);
+    if (from.minSegmentShare) to->mutable_segmentation()->set_min_segment_share(*from.minSegmentShare);
+    if (from.maxSegments) to->mutable_segmentation()->set_max_segments(*from.maxSegments);
+    if (from.strayRatio) to->mutable_segmentation()->set_stray_ratio(*from.strayRatio);
+    if (from.smoothingReach) to->mutable_segmentation()->set_smoothing_reach(*from.smoothingReach);
+    if (from.evenSpacing) to->mutable_segmentation()->set_even_spacing(*from.evenSpacing);
+    if (from.interiorMethod) {
+        to->mutable_segmentation()->set_interior_method(*from.interiorMethod == InteriorMethod::kWalk
+                                                            ? v1::INTERIOR_METHOD_WALK
+                                                            : v1::INTERIOR_METHOD_ADAPTIVE);
+    }
     if (from.maxPoints) to->mutable_signature()->set_max_points(*from.maxPoints);
 }
 

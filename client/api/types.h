@@ -30,8 +30,14 @@ constexpr const char* kOffsetKey = "shapedb.offset";
 
 /// Which published form of the method is used.
 enum class Profile {
-    kDefault,  ///< what we recommend: dense scans are averaged onto a grid first
-    kPaper,    ///< Dey and Goswami 2004 as published: all points, no decimation
+    kDefault,  ///< what we recommend: the method made to stand noise, strays and uneven density
+    kPaper,    ///< Dey and Goswami 2004 as published: all points, as they are
+};
+
+/// How the interior of a shape is told from its outside.
+enum class InteriorMethod {
+    kWalk,      ///< the paper's walk with one fixed angle; nothing left inside is an error
+    kAdaptive,  ///< decided from the shape itself; always an interior, with a quality figure
 };
 
 /// What decides the signature of a scan. What is not set is the profile's default when a
@@ -42,8 +48,16 @@ struct Parameters {
     std::optional<double> deepAngleDegrees;   ///< degrees, in (0, 90)
     std::optional<double> hullAngleDegrees;   ///< degrees, in (0, 90)
     std::optional<double> mergeRatio;         ///< >= 1
-    std::optional<std::uint32_t> decimateTo;  ///< grid cells; 0: never average
-    std::optional<std::uint32_t> maxPoints;   ///< heaviest segments kept, 1 to 16
+    std::optional<std::uint32_t> decimateTo;  ///< grid cells, >= 4; 0: never average
+    /// >= 1: segments merge by contrast up to this; 0: by mergeRatio.
+    std::optional<double> mergeContrast;
+    std::optional<double> minSegmentShare;         ///< of all volume, [0, 1]; with mergeContrast
+    std::optional<std::uint32_t> maxSegments;      ///< with mergeContrast; 0: no limit
+    std::optional<double> strayRatio;              ///< > 1; 0: no point is left out
+    std::optional<double> smoothingReach;          ///< in deviations of the noise, [1, 20]; 0: off
+    std::optional<double> evenSpacing;             ///< (0, 10]; 0: no point is thinned away
+    std::optional<InteriorMethod> interiorMethod;  ///< how the interior is found
+    std::optional<std::uint32_t> maxPoints;        ///< heaviest segments kept, 1 to 16
 };
 
 /// Names one shape. An empty collection is "default".
@@ -156,8 +170,11 @@ struct StageTime {
 /// How long and how much each stage of a segmentation took.
 struct SegmentationReport {
     std::uint64_t points = 0;
-    std::uint64_t pointsUsed = 0;  ///< after merging duplicates and decimation
+    std::uint64_t pointsUsed = 0;  ///< after leaving out strays, merging duplicates and thinning
     std::uint64_t duplicates = 0;
+    std::uint64_t strays = 0;  ///< points left out
+    /// How well the interior could be told from the outside, [0, 1]. Always 1 with kWalk.
+    double quality = 1.0;
     std::uint64_t tetrahedra = 0;
     std::uint64_t interiorTetrahedra = 0;
     std::uint64_t maxima = 0;  ///< segments before merging

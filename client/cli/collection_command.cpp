@@ -28,21 +28,13 @@ const char* profileText(const client::Collection& collection) {
 }
 
 json toJson(const client::Collection& collection) {
-    const client::Parameters& parameters = collection.parameters;
     return {{"name", collection.name},
             {"description", collection.description},
             {"generation", collection.generation},
             {"shapes", collection.shapes},
             {"shapes_ready", collection.shapesReady},
             {"shapes_failed", collection.shapesFailed},
-            {"parameters",
-             {{"profile", profileText(collection)},
-              {"big_ball_ratio", parameters.bigBallRatio.value_or(0.0)},
-              {"deep_angle_degrees", parameters.deepAngleDegrees.value_or(0.0)},
-              {"hull_angle_degrees", parameters.hullAngleDegrees.value_or(0.0)},
-              {"merge_ratio", parameters.mergeRatio.value_or(0.0)},
-              {"decimate_to", parameters.decimateTo.value_or(0)},
-              {"max_points", parameters.maxPoints.value_or(0)}}}};
+            {"parameters", cli::toJson(collection.parameters)}};
 }
 
 std::string toText(const std::vector<client::Collection>& collections) {

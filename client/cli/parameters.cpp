@@ -3,13 +3,59 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "client/cli/text.h"
+
 namespace shapedb::cli {
 
 namespace {
 
-template <typename T>
-void overrideWith(T& value, const std::optional<T>& given) {
-    if (given) value = *given;
+/// Calls visit(flag, name, member of client::Parameters, member of SegmentationOptions, help) for
+/// each parameter that is a number.
+template <typename Visitor>
+void visitNumbers(Visitor&& visit) {
+    using Given = client::Parameters;
+    using Used = SegmentationOptions;
+    visit("--big-ball-ratio", "big_ball_ratio", &Given::bigBallRatio, &Used::bigBallRatio,
+          "A Delaunay ball is big above this many point spacings (rho), above 0");
+    visit("--deep-angle", "deep_angle_degrees", &Given::deepAngleDegrees, &Used::deepAngleDegrees,
+          "Big balls intersect deeply below this angle, above 0 and below 90 degrees");
+    visit("--hull-angle", "hull_angle_degrees", &Given::hullAngleDegrees, &Used::hullAngleDegrees,
+          "The walk enters through hull facets below this angle, above 0 and below 90 degrees");
+    visit("--merge-ratio", "merge_ratio", &Given::mergeRatio, &Used::mergeRatio,
+          "Segments merge when both peaks are within this many radii of their triangle, 1 or more");
+    visit("--merge-contrast", "merge_contrast", &Given::mergeContrast, &Used::mergeContrast,
+          "Segments merge by contrast instead, up to this ratio of radius to passage, 1 or more; 0: by "
+          "--merge-ratio");
+    visit("--min-segment-share", "min_segment_share", &Given::minSegmentShare, &Used::minSegmentShare,
+          "With --merge-contrast: lighter segments join a neighbour, share of the volume, 0 to 1");
+    visit("--max-segments", "max_segments", &Given::maxSegments, &Used::maxSegments,
+          "With --merge-contrast: merge on while there are more; 0: no limit");
+    visit("--decimate-to", "decimate_to", &Given::decimateTo, &Used::decimateTo,
+          "Average denser scans onto a grid of about this many cells, 4 or more; 0: never");
+    visit("--stray-ratio", "stray_ratio", &Given::strayRatio, &Used::strayRatio,
+          "Leave out points this many times further from others than their neighbours are, above 1; 0: none");
+    visit("--smoothing-reach", "smoothing_reach", &Given::smoothingReach, &Used::smoothingReach,
+          "Smooth noise out to this many of its standard deviations, 1 to 20; 0: no smoothing");
+    visit("--even-spacing", "even_spacing", &Given::evenSpacing, &Used::evenSpacing,
+          "Thin points to this many times the distance that tells them apart, up to 10; 0: keep all");
+}
+
+const char* nameOf(InteriorMethod method) { return method == InteriorMethod::kWalk ? "walk" : "adaptive"; }
+
+const char* nameOf(client::InteriorMethod method) {
+    return method == client::InteriorMethod::kWalk ? "walk" : "adaptive";
+}
+
+std::string text(const char* value) { return value; }
+std::string text(double value) { return formatNumber(value); }
+std::string text(std::uint32_t value) { return std::to_string(value); }
+
+/// " [2]", or " [2; paper 3]" when the profiles differ.
+template <typename Value>
+std::string defaults(Value standard, Value paper) {
+    const std::string first = text(standard);
+    const std::string second = text(paper);
+    return " [" + first + (first == second ? "" : "; paper " + second) + "]";
 }
 
 }  // namespace
@@ -21,49 +67,57 @@ Result<ShapeParameters> ParameterFlags::resolve() const {
         if (!named) return fail(named.error());
         parameters = parametersOf(*named);
     }
-    overrideWith(parameters.segmentation.bigBallRatio, bigBallRatio);
-    overrideWith(parameters.segmentation.deepAngleDegrees, deepAngle);
-    overrideWith(parameters.segmentation.hullAngleDegrees, hullAngle);
-    overrideWith(parameters.segmentation.mergeRatio, mergeRatio);
-    overrideWith(parameters.segmentation.decimateTo, decimateTo);
-    overrideWith(parameters.signature.maxPoints, maxPoints);
+    visitNumbers([&](const char*, const char*, auto given, auto used, const char*) {
+        if (numbers.*given) parameters.segmentation.*used = *(numbers.*given);
+    });
+    if (interior) {
+        parameters.segmentation.interiorMethod =
+            *interior == "walk" ? InteriorMethod::kWalk : InteriorMethod::kAdaptive;
+    }
+    if (numbers.maxPoints) parameters.signature.maxPoints = *numbers.maxPoints;
     if (const auto valid = validate(parameters); !valid) return fail(valid.error());
     return parameters;
 }
 
 client::Parameters ParameterFlags::forServer() const {
-    client::Parameters parameters;
-    if (profile)
+    client::Parameters parameters = numbers;
+    if (profile) {
         parameters.profile = *profile == "paper" ? client::Profile::kPaper : client::Profile::kDefault;
-    parameters.bigBallRatio = bigBallRatio;
-    parameters.deepAngleDegrees = deepAngle;
-    parameters.hullAngleDegrees = hullAngle;
-    parameters.mergeRatio = mergeRatio;
-    parameters.decimateTo = decimateTo;
-    parameters.maxPoints = maxPoints;
+    }
+    if (interior) {
+        parameters.interiorMethod =
+            *interior == "walk" ? client::InteriorMethod::kWalk : client::InteriorMethod::kAdaptive;
+    }
     return parameters;
 }
 
 bool ParameterFlags::any() const {
-    return profile || bigBallRatio || deepAngle || hullAngle || mergeRatio || decimateTo || maxPoints;
+    bool given = profile || interior || numbers.maxPoints;
+    visitNumbers([&](const char*, const char*, auto member, auto, const char*) {
+        given = given || (numbers.*member).has_value();
+    });
+    return given;
 }
 
 void addParameterFlags(CLI::App& command, ParameterFlags& flags) {
+    const ShapeParameters standard = parametersOf(Profile::kDefault);
+    const ShapeParameters paper = parametersOf(Profile::kPaper);
     const auto group = command.add_option_group("Method", "How a scan becomes segments and a signature");
     group->add_option("--profile", flags.profile, "Named set of parameters [default]")
         ->check(CLI::IsMember({"paper", "default"}));
-    group->add_option("--big-ball-ratio", flags.bigBallRatio,
-                      "A Delaunay ball is big above this many point spacings (rho) [0.5]");
-    group->add_option("--deep-angle", flags.deepAngle,
-                      "Big balls intersect deeply below this angle, degrees [20]");
-    group->add_option("--hull-angle", flags.hullAngle,
-                      "The walk enters through hull facets below this angle, degrees [5]");
-    group->add_option("--merge-ratio", flags.mergeRatio,
-                      "Segments merge when both peaks are within this many radii of their triangle [1.5]");
-    group->add_option("--decimate-to", flags.decimateTo,
-                      "Average denser scans onto a grid of about this many cells; 0: never");
-    group->add_option("--max-points,--segments", flags.maxPoints,
-                      "Heaviest segments kept in the signature, 1 to 16 [7]");
+    visitNumbers([&](const char* flag, const char*, auto given, auto used, const char* help) {
+        group->add_option(flag, flags.numbers.*given,
+                          help + defaults(standard.segmentation.*used, paper.segmentation.*used));
+    });
+    group
+        ->add_option("--interior", flags.interior,
+                     "How the interior is found: the paper's walk, or decided from the shape itself" +
+                         defaults(nameOf(standard.segmentation.interiorMethod),
+                                  nameOf(paper.segmentation.interiorMethod)))
+        ->check(CLI::IsMember({"walk", "adaptive"}));
+    group->add_option("--max-points,--segments", flags.numbers.maxPoints,
+                      "Heaviest segments kept in the signature, 1 to " + std::to_string(kMaxSignaturePoints) +
+                          defaults(standard.signature.maxPoints, paper.signature.maxPoints));
 }
 
 ScoreOptions ScoreFlags::resolve() const {
@@ -80,13 +134,24 @@ void addScoreFlags(CLI::App& command, ScoreFlags& flags) {
 }
 
 nlohmann::json toJson(const ShapeParameters& parameters) {
-    return {{"profile", profileName(parameters.profile)},
-            {"big_ball_ratio", parameters.segmentation.bigBallRatio},
-            {"deep_angle_degrees", parameters.segmentation.deepAngleDegrees},
-            {"hull_angle_degrees", parameters.segmentation.hullAngleDegrees},
-            {"merge_ratio", parameters.segmentation.mergeRatio},
-            {"decimate_to", parameters.segmentation.decimateTo},
-            {"max_points", parameters.signature.maxPoints}};
+    nlohmann::json out = {{"profile", profileName(parameters.profile)},
+                          {"interior_method", nameOf(parameters.segmentation.interiorMethod)},
+                          {"max_points", parameters.signature.maxPoints}};
+    visitNumbers([&](const char*, const char* name, auto, auto used, const char*) {
+        out[name] = parameters.segmentation.*used;
+    });
+    return out;
+}
+
+nlohmann::json toJson(const client::Parameters& parameters) {
+    nlohmann::json out = {
+        {"profile", parameters.profile == client::Profile::kPaper ? "paper" : "default"},
+        {"interior_method", nameOf(parameters.interiorMethod.value_or(client::InteriorMethod::kWalk))},
+        {"max_points", parameters.maxPoints.value_or(0)}};
+    visitNumbers([&](const char*, const char* name, auto given, auto, const char*) {
+        out[name] = (parameters.*given).value_or(0);
+    });
+    return out;
 }
 
 }  // namespace shapedb::cli

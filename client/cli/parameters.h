@@ -21,12 +21,8 @@ namespace shapedb::cli {
 /// --profile and one flag per parameter; what is not given keeps the profile's value.
 struct ParameterFlags {
     std::optional<std::string> profile;
-    std::optional<double> bigBallRatio;
-    std::optional<double> deepAngle;
-    std::optional<double> hullAngle;
-    std::optional<double> mergeRatio;
-    std::optional<std::uint32_t> decimateTo;
-    std::optional<std::uint32_t> maxPoints;
+    std::optional<std::string> interior;
+    client::Parameters numbers;  ///< all but `profile` and `interiorMethod`, which have a name
 
     /// For segmenting here. Errors: kInvalidArgument naming the value and its range.
     [[nodiscard]] Result<ShapeParameters> resolve() const;
@@ -48,6 +44,9 @@ struct ScoreFlags {
 
 void addScoreFlags(CLI::App& command, ScoreFlags& flags);
 
+/// One member a parameter, by its name in the API.
 [[nodiscard]] nlohmann::json toJson(const ShapeParameters& parameters);
+/// The same of a server's collection.
+[[nodiscard]] nlohmann::json toJson(const client::Parameters& parameters);
 
 }  // namespace shapedb::cli

@@ -47,17 +47,15 @@ std::string segmentText(const SegmentFlags& flags, const Scan& scan, const Shape
     if (scan.skippedNonFinite > 0) {
         text += formatCount(scan.skippedNonFinite, "point", "points") + " without a measurement left out\n";
     }
-    if (report.pointsUsed != report.points) {
-        text += formatCount(report.pointsUsed) + " after merging " +
-                formatCount(report.duplicates, "duplicate", "duplicates") +
-                (report.pointsUsed + report.duplicates < report.points ? " and averaging onto a grid" : "") +
-                "\n";
-    }
+    text += preparationText(report);
     text += formatCount(report.segments, "segment", "segments") + ", volume " + formatNumber(report.volume) +
             ", from " + formatCount(report.tetrahedra) + " tetrahedra (profile " +
             profileName(parameters.profile) + ") in " + formatSeconds(report.totalSeconds) + ", " +
-            formatSeconds(report.delaunaySeconds) + " of it Delaunay\n\n";
-    text += "The " + std::to_string(signature.points.size()) + " heaviest:\n" + signatureTable(signature);
+            formatSeconds(report.delaunaySeconds) + " of it Delaunay\n";
+    if (parameters.segmentation.interiorMethod == InteriorMethod::kAdaptive) {
+        text += qualityText(report.quality);
+    }
+    text += "\nThe " + std::to_string(signature.points.size()) + " heaviest:\n" + signatureTable(signature);
     if (!flags.out.empty()) text += "\nPoints coloured by segment: " + flags.out + "\n";
     return text;
 }

@@ -19,6 +19,8 @@ namespace {
 constexpr std::size_t kPairsTold = 3;
 /// Pairs that contribute less than this share of the similarity are not worth a reader's time.
 constexpr double kShareWorthTelling = 0.01;
+/// Below, the user should know before trusting what follows.
+constexpr double kQualityWorthWarning = 0.5;
 
 json pointJson(const Point3& p) { return json::array({p.x, p.y, p.z}); }
 
@@ -131,6 +133,8 @@ client::SegmentationReport reportOf(const Segmentation& segmentation) {
     report.points = segmentation.pointSegment.size();
     report.pointsUsed = segmentation.sites.size();
     report.duplicates = segmentation.duplicates;
+    report.strays = segmentation.strays;
+    report.quality = segmentation.quality;
     report.tetrahedra = segmentation.tetrahedra.size();
     report.interiorTetrahedra = segmentation.interiorTetrahedra;
     report.maxima = segmentation.maxima;
@@ -176,6 +180,8 @@ json toJson(const client::SegmentationReport& report) {
     return {{"points", report.points},
             {"points_used", report.pointsUsed},
             {"duplicates", report.duplicates},
+            {"strays", report.strays},
+            {"quality", report.quality},
             {"tetrahedra", report.tetrahedra},
             {"interior_tetrahedra", report.interiorTetrahedra},
             {"maxima", report.maxima},
@@ -184,6 +190,33 @@ json toJson(const client::SegmentationReport& report) {
             {"delaunay_seconds", report.delaunaySeconds},
             {"total_seconds", report.totalSeconds},
             {"stages", stages}};
+}
+
+std::string preparationText(const client::SegmentationReport& report) {
+    if (report.pointsUsed == report.points) return {};
+    std::vector<std::string> steps;
+    if (report.strays > 0) steps.push_back("leaving out " + formatCount(report.strays, "stray", "strays"));
+    if (report.duplicates > 0) {
+        steps.push_back("merging " + formatCount(report.duplicates, "duplicate", "duplicates"));
+    }
+    if (report.pointsUsed + report.duplicates + report.strays < report.points) {
+        steps.emplace_back("averaging and thinning");
+    }
+    std::string text = formatCount(report.pointsUsed) + " after ";
+    for (std::size_t i = 0; i < steps.size(); ++i) {
+        if (i > 0) text += i + 1 == steps.size() ? " and " : ", ";
+        text += steps[i];
+    }
+    return text + "\n";
+}
+
+std::string qualityText(double quality) {
+    std::string text = "interior quality " + formatFixed(quality, 2) + " of 1";
+    if (quality < kQualityWorthWarning) {
+        text +=
+            ": open, thin or noisy, so volumes and segments are a guess; more sides or less noise would help";
+    }
+    return text + "\n";
 }
 
 json toJson(const client::Explanation& explanation) {

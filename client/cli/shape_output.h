@@ -26,6 +26,11 @@ namespace shapedb::cli {
 [[nodiscard]] nlohmann::json toJson(const client::Explanation& explanation);
 [[nodiscard]] nlohmann::json toJson(const client::Shape& shape);
 
+/// How many points were used and where the others went, a line; empty when all were.
+[[nodiscard]] std::string preparationText(const client::SegmentationReport& report);
+/// How well the interior was told from the outside, a line; says what to do when it is low.
+[[nodiscard]] std::string qualityText(double quality);
+
 /// Lower-case hexadecimal digits of binary data (a checksum).
 [[nodiscard]] std::string hexText(const std::string& bytes);
 

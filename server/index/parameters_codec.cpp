@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <exception>
 #include <limits>
+#include <optional>
 #include <set>
 #include <utility>
 
@@ -97,6 +98,44 @@ Json parseStrictly(const std::string& text) {
     });
 }
 
+/// Persisted.
+const char* nameOf(InteriorMethod method) {
+    switch (method) {
+        case InteriorMethod::kWalk: return "walk";
+        case InteriorMethod::kAdaptive: return "adaptive";
+    }
+    return "walk";
+}
+
+std::optional<InteriorMethod> interiorMethodFrom(const std::string& name) {
+    for (const InteriorMethod method : {InteriorMethod::kWalk, InteriorMethod::kAdaptive}) {
+        if (name == nameOf(method)) return method;
+    }
+    return std::nullopt;
+}
+
+Result<void> readSegmentation(const Json& json, SegmentationOptions& options) {
+    ObjectReader reader(json, "segmentation.");
+    reader.read("big_ball_ratio", options.bigBallRatio);
+    reader.read("deep_angle_degrees", options.deepAngleDegrees);
+    reader.read("hull_angle_degrees", options.hullAngleDegrees);
+    reader.read("merge_ratio", options.mergeRatio);
+    reader.read("decimate_to", options.decimateTo);
+    reader.read("merge_contrast", options.mergeContrast);
+    reader.read("min_segment_share", options.minSegmentShare);
+    reader.read("max_segments", options.maxSegments);
+    reader.read("stray_ratio", options.strayRatio);
+    reader.read("smoothing_reach", options.smoothingReach);
+    reader.read("even_spacing", options.evenSpacing);
+    std::string method = nameOf(options.interiorMethod);
+    reader.read("interior_method", method);
+    if (const std::string problem = reader.problem(); !problem.empty()) return damaged(problem);
+    const auto known = interiorMethodFrom(method);
+    if (!known) return damaged("'segmentation.interior_method' is '" + method + "'");
+    options.interiorMethod = *known;
+    return {};
+}
+
 }  // namespace
 
 std::string encodeParameters(const ShapeParameters& parameters) {
@@ -107,7 +146,14 @@ std::string encodeParameters(const ShapeParameters& parameters) {
                             {"deep_angle_degrees", segmentation.deepAngleDegrees},
                             {"hull_angle_degrees", segmentation.hullAngleDegrees},
                             {"merge_ratio", segmentation.mergeRatio},
-                            {"decimate_to", segmentation.decimateTo}};
+                            {"decimate_to", segmentation.decimateTo},
+                            {"merge_contrast", segmentation.mergeContrast},
+                            {"min_segment_share", segmentation.minSegmentShare},
+                            {"max_segments", segmentation.maxSegments},
+                            {"stray_ratio", segmentation.strayRatio},
+                            {"smoothing_reach", segmentation.smoothingReach},
+                            {"even_spacing", segmentation.evenSpacing},
+                            {"interior_method", nameOf(segmentation.interiorMethod)}};
     json["signature"] = {{"max_points", parameters.signature.maxPoints}};
     return json.dump();
 }
@@ -125,15 +171,13 @@ Result<ShapeParameters> decodeParameters(const std::string& text) {
 
         const Result<Profile> profile = profileFromName(name);
         if (!profile) return damaged(profile.error().message);
-        ShapeParameters parameters = parametersOf(*profile);
-
-        ObjectReader segmentation(segmentationJson != nullptr ? *segmentationJson : empty, "segmentation.");
-        segmentation.read("big_ball_ratio", parameters.segmentation.bigBallRatio);
-        segmentation.read("deep_angle_degrees", parameters.segmentation.deepAngleDegrees);
-        segmentation.read("hull_angle_degrees", parameters.segmentation.hullAngleDegrees);
-        segmentation.read("merge_ratio", parameters.segmentation.mergeRatio);
-        segmentation.read("decimate_to", parameters.segmentation.decimateTo);
-        if (const std::string problem = segmentation.problem(); !problem.empty()) return damaged(problem);
+        ShapeParameters parameters = parametersOf(Profile::kPaper);
+        parameters.profile = *profile;
+        if (const auto read = readSegmentation(segmentationJson != nullptr ? *segmentationJson : empty,
+                                               parameters.segmentation);
+            !read) {
+            return fail(read.error());
+        }
 
         ObjectReader signature(signatureJson != nullptr ? *signatureJson : empty, "signature.");
         signature.read("max_points", parameters.signature.maxPoints);

@@ -1,7 +1,7 @@
 // The text in which a collection's parameters are stored: JSON with every field.
 //
-// The names are persisted: never rename one. A field added later takes, in older text, the
-// default of the stored profile.
+// The names are persisted: never rename one. Text of an older server lacks the fields added since;
+// they take the value that it worked with: off, as in the profile "paper", whatever the profile.
 #pragma once
 
 #include <string>

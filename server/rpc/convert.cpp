@@ -21,6 +21,14 @@ pb::Profile toProto(Profile profile) {
     return pb::PROFILE_DEFAULT;
 }
 
+pb::InteriorMethod toProto(InteriorMethod method) {
+    switch (method) {
+        case InteriorMethod::kWalk: return pb::INTERIOR_METHOD_WALK;
+        case InteriorMethod::kAdaptive: return pb::INTERIOR_METHOD_ADAPTIVE;
+    }
+    return pb::INTERIOR_METHOD_WALK;
+}
+
 tl::unexpected<Error> unknownNumber(const char* field, int value) {
     return fail(ErrorCode::kInvalidArgument,
                 std::string(field) + ": " + std::to_string(value) + " is not a value this server knows");
@@ -75,6 +83,13 @@ void toProto(const store::Collection& collection, const ShapeParameters& paramet
     segmentation->set_hull_angle_degrees(parameters.segmentation.hullAngleDegrees);
     segmentation->set_merge_ratio(parameters.segmentation.mergeRatio);
     segmentation->set_decimate_to(parameters.segmentation.decimateTo);
+    segmentation->set_merge_contrast(parameters.segmentation.mergeContrast);
+    segmentation->set_min_segment_share(parameters.segmentation.minSegmentShare);
+    segmentation->set_max_segments(parameters.segmentation.maxSegments);
+    segmentation->set_stray_ratio(parameters.segmentation.strayRatio);
+    segmentation->set_smoothing_reach(parameters.segmentation.smoothingReach);
+    segmentation->set_even_spacing(parameters.segmentation.evenSpacing);
+    segmentation->set_interior_method(toProto(parameters.segmentation.interiorMethod));
     out->mutable_signature()->set_max_points(parameters.signature.maxPoints);
     out->set_generation(collection.generation);
     toProto(collection.createdAt, out->mutable_created());
@@ -99,6 +114,8 @@ void toProto(const Segmentation& segmentation, pb::SegmentationReport* out) {
     out->set_points(segmentation.siteOfPoint.size());
     out->set_points_used(segmentation.sites.size());
     out->set_duplicates(segmentation.duplicates);
+    out->set_strays(segmentation.strays);
+    out->set_quality(segmentation.quality);
     out->set_tetrahedra(segmentation.tetrahedra.size());
     out->set_interior_tetrahedra(segmentation.interiorTetrahedra);
     out->set_maxima(segmentation.maxima);
@@ -172,6 +189,18 @@ Result<ShapeParameters> parametersFrom(pb::Profile profile, const pb::Segmentati
     if (segmentation.has_hull_angle_degrees()) options.hullAngleDegrees = segmentation.hull_angle_degrees();
     if (segmentation.has_merge_ratio()) options.mergeRatio = segmentation.merge_ratio();
     if (segmentation.has_decimate_to()) options.decimateTo = segmentation.decimate_to();
+    if (segmentation.has_merge_contrast()) options.mergeContrast = segmentation.merge_contrast();
+    if (segmentation.has_min_segment_share()) options.minSegmentShare = segmentation.min_segment_share();
+    if (segmentation.has_max_segments()) options.maxSegments = segmentation.max_segments();
+    if (segmentation.has_stray_ratio()) options.strayRatio = segmentation.stray_ratio();
+    if (segmentation.has_smoothing_reach()) options.smoothingReach = segmentation.smoothing_reach();
+    if (segmentation.has_even_spacing()) options.evenSpacing = segmentation.even_spacing();
+    switch (static_cast<int>(segmentation.interior_method())) {
+        case pb::INTERIOR_METHOD_UNSPECIFIED: break;
+        case pb::INTERIOR_METHOD_WALK: options.interiorMethod = InteriorMethod::kWalk; break;
+        case pb::INTERIOR_METHOD_ADAPTIVE: options.interiorMethod = InteriorMethod::kAdaptive; break;
+        default: return unknownNumber("interior_method", segmentation.interior_method());
+    }
     if (signature.has_max_points()) parameters.signature.maxPoints = signature.max_points();
     if (const auto valid = validate(parameters); !valid) return fail(valid.error());
     return parameters;

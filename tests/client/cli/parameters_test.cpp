@@ -18,12 +18,19 @@ TEST(Parameters, NothingGivenIsTheDefaultProfile) {
 TEST(Parameters, EachFlagOverridesItsFieldOnly) {
     ParameterFlags flags;
     flags.profile = "paper";
-    flags.bigBallRatio = 0.75;
-    flags.deepAngle = 25.0;
-    flags.hullAngle = 6.0;
-    flags.mergeRatio = 2.0;
-    flags.decimateTo = 5000;
-    flags.maxPoints = 9;
+    flags.interior = "adaptive";
+    flags.numbers.bigBallRatio = 0.75;
+    flags.numbers.deepAngleDegrees = 25.0;
+    flags.numbers.hullAngleDegrees = 6.0;
+    flags.numbers.mergeRatio = 2.0;
+    flags.numbers.decimateTo = 5000;
+    flags.numbers.mergeContrast = 1.75;
+    flags.numbers.minSegmentShare = 0.03125;
+    flags.numbers.maxSegments = 12;
+    flags.numbers.strayRatio = 4.0;
+    flags.numbers.smoothingReach = 6.0;
+    flags.numbers.evenSpacing = 1.5;
+    flags.numbers.maxPoints = 9;
     const auto resolved = flags.resolve();
     ASSERT_TRUE(resolved) << resolved.error().message;
     EXPECT_EQ(toJson(*resolved), nlohmann::json({{"profile", "paper"},
@@ -32,20 +39,55 @@ TEST(Parameters, EachFlagOverridesItsFieldOnly) {
                                                  {"hull_angle_degrees", 6.0},
                                                  {"merge_ratio", 2.0},
                                                  {"decimate_to", 5000},
+                                                 {"merge_contrast", 1.75},
+                                                 {"min_segment_share", 0.03125},
+                                                 {"max_segments", 12},
+                                                 {"stray_ratio", 4.0},
+                                                 {"smoothing_reach", 6.0},
+                                                 {"even_spacing", 1.5},
+                                                 {"interior_method", "adaptive"},
                                                  {"max_points", 9}}));
     const client::Parameters sent = flags.forServer();
     EXPECT_EQ(sent.profile, client::Profile::kPaper);
-    EXPECT_EQ(sent.bigBallRatio, 0.75);
-    EXPECT_EQ(sent.deepAngleDegrees, 25.0);
-    EXPECT_EQ(sent.hullAngleDegrees, 6.0);
-    EXPECT_EQ(sent.mergeRatio, 2.0);
-    EXPECT_EQ(sent.decimateTo, 5000u);
-    EXPECT_EQ(sent.maxPoints, 9u);
+    EXPECT_EQ(sent.interiorMethod, client::InteriorMethod::kAdaptive);
+    EXPECT_EQ(toJson(sent), toJson(*resolved)) << "what a collection shows is what a scan here would get";
+}
+
+TEST(Parameters, AnySingleFlagIsNoticed) {
+    ParameterFlags contrast;
+    contrast.numbers.mergeContrast = 0.0;
+    EXPECT_TRUE(contrast.any()) << "0 given is not nothing given";
+    ParameterFlags interior;
+    interior.interior = "walk";
+    EXPECT_TRUE(interior.any());
+    EXPECT_EQ(interior.forServer().interiorMethod, client::InteriorMethod::kWalk);
+    ParameterFlags points;
+    points.numbers.maxPoints = 3;
+    EXPECT_TRUE(points.any());
+}
+
+TEST(Parameters, ZeroTurnsOffWhatTheProfileTurnsOn) {
+    ParameterFlags flags;
+    flags.numbers.decimateTo = 0;
+    flags.numbers.mergeContrast = 0.0;
+    flags.numbers.strayRatio = 0.0;
+    flags.numbers.smoothingReach = 0.0;
+    flags.numbers.evenSpacing = 0.0;
+    flags.interior = "walk";
+    flags.numbers.deepAngleDegrees = 20.0;
+    const auto resolved = flags.resolve();
+    ASSERT_TRUE(resolved) << resolved.error().message;
+    nlohmann::json expected = toJson(parametersOf(Profile::kPaper));
+    expected["profile"] = "default";
+    for (const char* name : {"min_segment_share", "max_segments", "max_points"}) {
+        expected[name] = toJson(*resolved)[name];
+    }
+    EXPECT_EQ(toJson(*resolved), expected);
 }
 
 TEST(Parameters, OutOfRangeIsRefusedWithItsRange) {
     ParameterFlags flags;
-    flags.deepAngle = 90.0;
+    flags.numbers.deepAngleDegrees = 90.0;
     const auto resolved = flags.resolve();
     ASSERT_FALSE(resolved);
     EXPECT_EQ(resolved.error().code, ErrorCode::kInvalidArgument);

@@ -112,6 +112,37 @@ TEST(ShapeOutput, SignaturePointsHaveTheDocumentedKeys) {
         EXPECT_TRUE(points[0].contains(key)) << key;
 }
 
+TEST(ShapeOutput, PointsThatWereNotUsedAreAccountedFor) {
+    client::SegmentationReport report;
+    report.points = report.pointsUsed = 1000;
+    EXPECT_EQ(preparationText(report), "");
+    report.pointsUsed = 990;
+    report.strays = 10;
+    EXPECT_EQ(preparationText(report), "990 after leaving out 10 strays\n");
+    report.duplicates = 1;
+    report.pointsUsed = 500;
+    EXPECT_EQ(preparationText(report),
+              "500 after leaving out 10 strays, merging 1 duplicate and averaging and thinning\n");
+    report.strays = report.duplicates = 0;
+    EXPECT_EQ(preparationText(report), "500 after averaging and thinning\n");
+    report.duplicates = 500;
+    EXPECT_EQ(preparationText(report), "500 after merging 500 duplicates\n");
+}
+
+TEST(ShapeOutput, LowQualityIsExplained) {
+    EXPECT_EQ(qualityText(0.937), "interior quality 0.94 of 1\n");
+    EXPECT_NE(qualityText(0.1).find("guess"), std::string::npos);
+}
+
+TEST(ShapeOutput, ReportInJson) {
+    client::SegmentationReport report;
+    report.strays = 3;
+    report.quality = 0.25;
+    const nlohmann::json document = toJson(report);
+    EXPECT_EQ(document["strays"], 3);
+    EXPECT_EQ(document["quality"], 0.25);
+}
+
 TEST(ShapeOutput, ShapeInJson) {
     client::Shape shape;
     shape.key = "cup";

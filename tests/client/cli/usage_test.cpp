@@ -23,6 +23,13 @@ TEST_F(Usage, WrongCommandLinesAreExitCodeTwo) {
         {"segment", "a.ply", "--points", "3"},
         {"segment", "a.ply", "--deep-angle", "90"},
         {"segment", "a.ply", "--segments", "33"},
+        {"segment", "a.ply", "--interior", "guess"},
+        {"segment", "a.ply", "--merge-contrast", "0.5"},
+        {"segment", "a.ply", "--min-segment-share", "1.5"},
+        {"segment", "a.ply", "--stray-ratio", "1"},
+        {"segment", "a.ply", "--smoothing-reach", "21"},
+        {"segment", "a.ply", "--even-spacing", "-1"},
+        {"segment", "a.ply", "--max-segments", "-1"},
         {"segment", "a.ply", "--no-such-flag"},
         {"sample"},
         {"sample", "x", "--count", "0"},
@@ -72,7 +79,10 @@ TEST_F(Usage, HelpAndVersionAreOnStandardOutput) {
         EXPECT_EQ(run.err, "");
     }
     EXPECT_EQ(runCommand({"--version"}).out.rfind("shapedb ", 0), 0u);
-    EXPECT_NE(runCommand({"segment", "--help"}).out.find("--deep-angle"), std::string::npos);
+    const std::string help = runCommand({"segment", "--help"}).out;
+    for (const char* flag : {"--deep-angle", "--merge-contrast", "--stray-ratio", "--interior"}) {
+        EXPECT_NE(help.find(flag), std::string::npos) << flag;
+    }
 }
 
 TEST_F(Usage, JsonMayStandBeforeOrAfterTheCommand) {

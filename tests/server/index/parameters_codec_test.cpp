@@ -14,6 +14,13 @@ void expectSame(const ShapeParameters& a, const ShapeParameters& b) {
     EXPECT_EQ(a.segmentation.hullAngleDegrees, b.segmentation.hullAngleDegrees);
     EXPECT_EQ(a.segmentation.mergeRatio, b.segmentation.mergeRatio);
     EXPECT_EQ(a.segmentation.decimateTo, b.segmentation.decimateTo);
+    EXPECT_EQ(a.segmentation.mergeContrast, b.segmentation.mergeContrast);
+    EXPECT_EQ(a.segmentation.minSegmentShare, b.segmentation.minSegmentShare);
+    EXPECT_EQ(a.segmentation.maxSegments, b.segmentation.maxSegments);
+    EXPECT_EQ(a.segmentation.strayRatio, b.segmentation.strayRatio);
+    EXPECT_EQ(a.segmentation.smoothingReach, b.segmentation.smoothingReach);
+    EXPECT_EQ(a.segmentation.evenSpacing, b.segmentation.evenSpacing);
+    EXPECT_EQ(a.segmentation.interiorMethod, b.segmentation.interiorMethod);
     EXPECT_EQ(a.signature.maxPoints, b.signature.maxPoints);
 }
 
@@ -21,7 +28,31 @@ void expectSame(const ShapeParameters& a, const ShapeParameters& b) {
 TEST(ParametersCodec, TextIsFrozen) {
     EXPECT_EQ(encodeParameters(parametersOf(Profile::kPaper)),
               R"({"profile":"paper","segmentation":{"big_ball_ratio":0.5,"deep_angle_degrees":20.0,)"
-              R"("hull_angle_degrees":5.0,"merge_ratio":1.5,"decimate_to":0},"signature":{"max_points":7}})");
+              R"("hull_angle_degrees":5.0,"merge_ratio":1.5,"decimate_to":0,"merge_contrast":0.0,)"
+              R"("min_segment_share":0.004,"max_segments":16,"stray_ratio":0.0,"smoothing_reach":0.0,)"
+              R"("even_spacing":0.0,"interior_method":"walk"},"signature":{"max_points":7}})");
+}
+
+// What servers wrote before the method learnt of noise: their collections go on as they were, though
+// the profile of the same name now turns more on.
+TEST(ParametersCodec, TextOfOlderServersMeansWhatItMeant) {
+    for (const char* name : {"paper", "default"}) {
+        const auto decoded =
+            decodeParameters(std::string(R"({"profile":")") + name +
+                             R"(","segmentation":{"big_ball_ratio":0.5,"deep_angle_degrees":20.0,)"
+                             R"("hull_angle_degrees":5.0,"merge_ratio":1.5,"decimate_to":50000},)"
+                             R"("signature":{"max_points":7}})");
+        ASSERT_TRUE(decoded) << decoded.error().message;
+        ShapeParameters expected = parametersOf(Profile::kPaper);
+        expected.profile = *profileFromName(name);
+        expected.segmentation.decimateTo = 50'000;
+        expectSame(*decoded, expected);
+        EXPECT_EQ(decoded->segmentation.mergeContrast, 0.0);
+        EXPECT_EQ(decoded->segmentation.strayRatio, 0.0);
+        EXPECT_EQ(decoded->segmentation.smoothingReach, 0.0);
+        EXPECT_EQ(decoded->segmentation.evenSpacing, 0.0);
+        EXPECT_EQ(decoded->segmentation.interiorMethod, InteriorMethod::kWalk);
+    }
 }
 
 TEST(ParametersCodec, RoundTripIsExact) {
@@ -34,6 +65,14 @@ TEST(ParametersCodec, RoundTripIsExact) {
         parameters.segmentation.mergeRatio = random.uniform(1.0, 9.0);
         parameters.segmentation.decimateTo =
             i % 3 == 0 ? 0 : 1'000 + static_cast<std::uint32_t>(random.below(100'000));
+        parameters.segmentation.mergeContrast = i % 4 == 0 ? 0.0 : random.uniform(1.0, 9.0);
+        parameters.segmentation.minSegmentShare = random.uniform(0.0, 1.0);
+        parameters.segmentation.maxSegments = static_cast<std::uint32_t>(random.below(100));
+        parameters.segmentation.strayRatio = i % 4 == 1 ? 0.0 : random.uniform(1.1, 9.0);
+        parameters.segmentation.smoothingReach = i % 4 == 2 ? 0.0 : random.uniform(1.0, 20.0);
+        parameters.segmentation.evenSpacing = i % 4 == 3 ? 0.0 : random.uniform(0.1, 10.0);
+        parameters.segmentation.interiorMethod =
+            i % 5 < 2 ? InteriorMethod::kWalk : InteriorMethod::kAdaptive;
         parameters.signature.maxPoints = 1 + static_cast<std::uint32_t>(random.below(kMaxSignaturePoints));
         const std::string text = encodeParameters(parameters);
         const auto decoded = decodeParameters(text);
@@ -43,12 +82,14 @@ TEST(ParametersCodec, RoundTripIsExact) {
     }
 }
 
-TEST(ParametersCodec, MissingFieldsTakeTheProfilesDefaults) {
+TEST(ParametersCodec, MissingFieldsAreOff) {
     for (const Profile profile : {Profile::kPaper, Profile::kDefault}) {
         const auto decoded =
             decodeParameters(std::string(R"({"profile":")") + profileName(profile) + R"("})");
         ASSERT_TRUE(decoded) << decoded.error().message;
-        expectSame(*decoded, parametersOf(profile));
+        ShapeParameters expected = parametersOf(Profile::kPaper);
+        expected.profile = profile;
+        expectSame(*decoded, expected);
     }
     const auto partly = decodeParameters(R"({"profile":"paper","segmentation":{"merge_ratio":2}})");
     ASSERT_TRUE(partly);
@@ -76,6 +117,10 @@ TEST(ParametersCodec, EverythingElseIsRefusedByName) {
         {R"({"profile":"paper","segmentation":{"decimate_to":-1}})", "segmentation.decimate_to"},
         {R"({"profile":"paper","segmentation":{"decimate_to":4294967296}})", "segmentation.decimate_to"},
         {R"({"profile":"paper","segmentation":{"deep_angle_degrees":90}})", "90"},
+        {R"({"profile":"paper","segmentation":{"interior_method":"guess"}})", "guess"},
+        {R"({"profile":"paper","segmentation":{"interior_method":1}})", "segmentation.interior_method"},
+        {R"({"profile":"paper","segmentation":{"merge_contrast":0.5}})", "merge_contrast"},
+        {R"({"profile":"paper","segmentation":{"max_segments":1.5}})", "segmentation.max_segments"},
         {R"({"profile":"paper","signature":{"max_points":1.5}})", "signature.max_points"},
         {R"({"profile":"paper","signature":{"max_points":33}})", "33"},
         {"{\"profile\":\"\xff\"}", ""},

@@ -33,6 +33,19 @@ TEST(ParametersFrom, EveryFieldArrives) {
     segmentation.set_hull_angle_degrees(6.0);
     segmentation.set_merge_ratio(1.75);
     segmentation.set_decimate_to(5'000);
+    segmentation.set_merge_contrast(1.25);
+    segmentation.set_min_segment_share(0.01);
+    segmentation.set_max_segments(12);
+    segmentation.set_stray_ratio(3.0);
+    segmentation.set_smoothing_reach(5.0);
+    segmentation.set_even_spacing(1.0);
+    segmentation.set_interior_method(pb::INTERIOR_METHOD_ADAPTIVE);
+    // A field added to the message and forgotten here would show.
+    const auto* fields = pb::SegmentationParameters::descriptor();
+    for (int i = 0; i < fields->field_count(); ++i) {
+        ASSERT_TRUE(segmentation.GetReflection()->HasField(segmentation, fields->field(i)))
+            << fields->field(i)->name();
+    }
     pb::SignatureParameters signature;
     signature.set_max_points(11);
     const auto parameters = parametersFrom(pb::PROFILE_PAPER, segmentation, signature, {});
@@ -52,6 +65,24 @@ TEST(ParametersFrom, RefusesUnknownProfilesAndBadValues) {
     const auto refused = parametersFrom(pb::PROFILE_PAPER, segmentation, {}, {});
     ASSERT_FALSE(refused);
     EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
+    pb::SegmentationParameters method;
+    method.set_interior_method(static_cast<pb::InteriorMethod>(9));
+    const auto unknown = parametersFrom(pb::PROFILE_PAPER, method, {}, {});
+    ASSERT_FALSE(unknown);
+    EXPECT_NE(unknown.error().message.find("interior_method"), std::string::npos);
+}
+
+TEST(ParametersFrom, AMethodLeftUnspecifiedKeepsTheBase) {
+    ShapeParameters current = parametersOf(Profile::kPaper);
+    current.segmentation.interiorMethod = InteriorMethod::kAdaptive;
+    pb::SegmentationParameters segmentation;
+    segmentation.set_interior_method(pb::INTERIOR_METHOD_UNSPECIFIED);
+    const auto kept = parametersFrom(pb::PROFILE_UNSPECIFIED, segmentation, {}, current);
+    ASSERT_TRUE(kept);
+    EXPECT_EQ(kept->segmentation.interiorMethod, InteriorMethod::kAdaptive);
+    segmentation.set_interior_method(pb::INTERIOR_METHOD_WALK);
+    EXPECT_EQ(parametersFrom(pb::PROFILE_UNSPECIFIED, segmentation, {}, current)->segmentation.interiorMethod,
+              InteriorMethod::kWalk);
 }
 
 TEST(Enums, RoundTripAndRefuseTheUnknown) {
@@ -111,6 +142,22 @@ TEST(Shapes, AllFieldsArrive) {
     EXPECT_EQ(message.updated().seconds(), 2);
     EXPECT_EQ(message.failure().error(), "no_interior");
     EXPECT_EQ(message.failure().message(), "why");
+}
+
+TEST(Reports, SayWhatWasLeftOutAndHowSureTheInteriorIs) {
+    Segmentation segmentation;
+    segmentation.siteOfPoint.resize(10);
+    segmentation.sites.resize(6);
+    segmentation.duplicates = 1;
+    segmentation.strays = 3;
+    segmentation.quality = 0.25;
+    pb::SegmentationReport report;
+    toProto(segmentation, &report);
+    EXPECT_EQ(report.points(), 10u);
+    EXPECT_EQ(report.points_used(), 6u);
+    EXPECT_EQ(report.duplicates(), 1u);
+    EXPECT_EQ(report.strays(), 3u);
+    EXPECT_EQ(report.quality(), 0.25);
 }
 
 TEST(Signatures, AreInScanUnits) {
