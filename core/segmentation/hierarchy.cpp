@@ -20,30 +20,6 @@ constexpr double kRadiusDrift = 1e-3;
 // Weight of a flat segment, as a share of all volume: it must not weigh nothing.
 constexpr double kLeastWeight = 1e-12;
 
-bool flowsTowards(const Tetrahedra& tetrahedra, const std::vector<std::uint8_t>& flow, std::uint32_t from,
-                  std::uint32_t to) {
-    for (std::size_t facet = 0; facet < 4; ++facet) {
-        if (tetrahedra.neighbours[from][facet] == to) return ((flow[from] >> facet) & 1u) != 0;
-    }
-    return false;
-}
-
-double facetArea(const PointCloud& points, const Tetrahedra& tetrahedra, std::uint32_t t, std::size_t facet) {
-    const auto& v = tetrahedra.vertices[t];
-    const Point3 a = points[v[(facet + 1) % 4]];
-    return 0.5 * length(cross(points[v[(facet + 2) % 4]] - a, points[v[(facet + 3) % 4]] - a));
-}
-
-// The ball narrowest on the way between two circumcentres: that of the facet where the way crosses
-// it, otherwise the smaller of the two.
-double facetPassage(const PointCloud& points, const Tetrahedra& tetrahedra,
-                    const std::vector<std::uint8_t>& flow, std::uint32_t t, std::size_t facet) {
-    const std::uint32_t next = tetrahedra.neighbours[t][facet];
-    const double smaller = std::min(tetrahedra.circumradii[t], tetrahedra.circumradii[next]);
-    if (((flow[t] >> facet) & 1u) != 0 || flowsTowards(tetrahedra, flow, next, t)) return smaller;
-    return std::min(smaller, facetCircumradius(points, tetrahedra, t, static_cast<int>(facet)));
-}
-
 // The groups while they grow: radii, weights, and passages to neighbours.
 class Groups {
   public:
@@ -198,42 +174,6 @@ Result<void> absorbLight(Groups& groups, const ContrastMerging& options, const R
 }
 
 }  // namespace
-
-Result<std::vector<SegmentContact>> segmentContacts(const PointCloud& points, const Tetrahedra& tetrahedra,
-                                                    const std::vector<std::uint8_t>& flow,
-                                                    const std::vector<std::int32_t>& labels,
-                                                    const RunContext& context) {
-    std::vector<SegmentContact> facets;
-    for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
-        if (t % kStepsBetweenCheckpoints == 0) {
-            if (auto go = context.checkpoint(); !go) return fail(go.error());
-        }
-        if (labels[t] < 0) continue;
-        for (std::size_t facet = 0; facet < 4; ++facet) {
-            const std::uint32_t next = tetrahedra.neighbours[t][facet];
-            if (next == kNoTetrahedron || next < t || labels[next] < 0 || labels[next] == labels[t]) continue;
-            const auto [low, high] = std::minmax(labels[t], labels[next]);
-            facets.push_back({static_cast<std::uint32_t>(low), static_cast<std::uint32_t>(high),
-                              facetPassage(points, tetrahedra, flow, t, facet),
-                              facetArea(points, tetrahedra, t, facet)});
-        }
-    }
-    // Stable: areas add up in the order of the tetrahedra.
-    std::stable_sort(facets.begin(), facets.end(), [](const SegmentContact& a, const SegmentContact& b) {
-        return std::tie(a.first, a.second) < std::tie(b.first, b.second);
-    });
-    std::vector<SegmentContact> contacts;
-    for (const SegmentContact& facet : facets) {
-        if (contacts.empty() || contacts.back().first != facet.first ||
-            contacts.back().second != facet.second) {
-            contacts.push_back(facet);
-            continue;
-        }
-        contacts.back().passage = std::max(contacts.back().passage, facet.passage);
-        contacts.back().area += facet.area;
-    }
-    return contacts;
-}
 
 Result<std::vector<std::uint32_t>> mergeByContrast(const SegmentGraph& graph, const ContrastMerging& options,
                                                    const RunContext& context) {

@@ -9,30 +9,11 @@
 #include "core/base/error.h"
 #include "core/base/run_context.h"
 #include "core/geometry/point.h"
+#include "core/segmentation/contacts.h"
 #include "core/segmentation/delaunay.h"
 #include "core/segmentation/segments.h"
 
 namespace shapedb {
-
-/// Where two segments touch.
-struct SegmentContact {
-    std::uint32_t first = 0;   ///< index of a segment
-    std::uint32_t second = 0;  ///< index of another, above `first`
-    /// Radius of the largest ball that passes from one into the other without entering a sample
-    /// point, unit of the points, > 0: the saddle between their maxima along the Voronoi edges.
-    double passage = 0.0;
-    double area = 0.0;  ///< of the triangles they share, unit of the points squared, >= 0
-};
-
-/// The contacts of all segments, by `first`, then `second`; each pair once.
-///
-/// Preconditions: `flow` as flowMasks returns it for the labelled tetrahedra; labels below
-/// 2^31. Errors: kCancelled, kDeadlineExceeded.
-[[nodiscard]] Result<std::vector<SegmentContact>> segmentContacts(const PointCloud& points,
-                                                                  const Tetrahedra& tetrahedra,
-                                                                  const std::vector<std::uint8_t>& flow,
-                                                                  const std::vector<std::int32_t>& labels,
-                                                                  const RunContext& context = {});
 
 /// What merging needs to know of the segments.
 struct SegmentGraph {

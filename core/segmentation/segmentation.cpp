@@ -6,6 +6,7 @@
 #include <new>
 #include <numeric>
 #include <string>
+#include <tuple>
 #include <utility>
 
 #include "core/geometry/bounding.h"
@@ -93,6 +94,21 @@ Segment toSegment(const Moments& m, std::uint32_t peak, const Tetrahedra& tetrah
     return segment;
 }
 
+// Contacts between labels become contacts between segments, scan units.
+void describeContacts(const std::vector<std::int32_t>& rank, const Frame& frame, Segmentation& result) {
+    std::vector<SegmentContact> described;
+    for (const SegmentContact& contact : result.contacts) {
+        const auto [low, high] = std::minmax(rank[contact.first], rank[contact.second]);
+        if (low < 0) continue;
+        described.push_back({static_cast<std::uint32_t>(low), static_cast<std::uint32_t>(high),
+                             contact.passage * frame.unit, contact.area * frame.unit * frame.unit});
+    }
+    std::sort(described.begin(), described.end(), [](const SegmentContact& a, const SegmentContact& b) {
+        return std::tie(a.first, a.second) < std::tie(b.first, b.second);
+    });
+    result.contacts = std::move(described);
+}
+
 // Fills result.segments by falling volume and result.tetrahedronSegment to match. Segments
 // whose tetrahedra are all flat to the last digit have no volume and are left out.
 void describeSegments(const PointCloud& points, const SegmentLabels& labels, const Frame& frame,
@@ -125,6 +141,7 @@ void describeSegments(const PointCloud& points, const SegmentLabels& labels, con
     for (const std::int32_t segment : labels.ofTetrahedron) {
         result.tetrahedronSegment.push_back(segment < 0 ? -1 : rank[static_cast<std::size_t>(segment)]);
     }
+    describeContacts(rank, frame, result);
 }
 
 // Segment of each site: that of the largest ball among the segmented tetrahedra around it.
@@ -205,10 +222,16 @@ Result<SegmentLabels> findSegments(const PointCloud& sites, const SegmentationOp
     if (!fine) return fail(fine.error());
     result.maxima = fine->peaks.size();
     if (auto go = clock.begin("merge"); !go) return fail(go.error());
-    if (options.mergeContrast == 0.0) return mergeSegments(sites, tetrahedra, *fine, options.mergeRatio);
-    return mergeSegmentsByContrast(sites, tetrahedra, *flow, *fine,
-                                   {options.mergeContrast, options.minSegmentShare, options.maxSegments},
-                                   context);
+    auto merged = options.mergeContrast == 0.0
+                      ? Result<SegmentLabels>(mergeSegments(sites, tetrahedra, *fine, options.mergeRatio))
+                      : mergeSegmentsByContrast(
+                            sites, tetrahedra, *flow, *fine,
+                            {options.mergeContrast, options.minSegmentShare, options.maxSegments}, context);
+    if (!merged) return merged;
+    auto contacts = segmentContacts(sites, tetrahedra, *flow, merged->ofTetrahedron, context);
+    if (!contacts) return fail(contacts.error());
+    result.contacts = std::move(*contacts);
+    return merged;
 }
 
 Result<Segmentation> segmentOrThrow(const PointCloud& points, const SegmentationOptions& options,

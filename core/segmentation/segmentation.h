@@ -12,6 +12,7 @@
 #include "core/base/run_context.h"
 #include "core/geometry/point.h"
 #include "core/segmentation/adaptive_interior.h"
+#include "core/segmentation/contacts.h"
 #include "core/segmentation/delaunay.h"
 #include "core/segmentation/options.h"
 #include "core/segmentation/preparation.h"
@@ -37,6 +38,9 @@ struct StageTime {
 struct Segmentation {
     /// By falling volume; equal volumes by centroid. Never empty.
     std::vector<Segment> segments;
+
+    /// Which segments touch (indices into `segments`), scan units; by first, then second index.
+    std::vector<SegmentContact> contacts;
 
     /// For each input point the index of its segment, -1 when it touches none: of the inner
     /// tetrahedra around the point, the one with the largest ball decides.

@@ -54,33 +54,52 @@ Result<void> claim(const Tetrahedra& tetrahedra, const std::vector<std::uint8_t>
     return {};
 }
 
+// Label of the labelled neighbour with the largest ball, -1 when there is none.
+std::int32_t labelOfLargestNeighbour(const Tetrahedra& tetrahedra, const SegmentLabels& labels,
+                                     std::uint32_t t) {
+    std::int32_t label = -1;
+    double largest = -1.0;
+    for (const std::uint32_t next : tetrahedra.neighbours[t]) {
+        if (next == kNoTetrahedron || labels.ofTetrahedron[next] < 0) continue;
+        if (tetrahedra.circumradii[next] <= largest) continue;
+        largest = tetrahedra.circumradii[next];
+        label = labels.ofTetrahedron[next];
+    }
+    return label;
+}
+
 // Gives unlabelled tetrahedra next to labelled ones the label of the neighbour with the largest
-// ball, one layer at a time so that the order of the tetrahedra does not matter. Returns those
-// that no label reaches.
-std::vector<std::uint32_t> growIntoLeftovers(const Tetrahedra& tetrahedra,
-                                             std::vector<std::uint32_t> leftovers, SegmentLabels& labels) {
-    while (true) {
-        std::vector<std::pair<std::uint32_t, std::int32_t>> layer;
-        std::vector<std::uint32_t> rest;
-        for (const std::uint32_t t : leftovers) {
-            std::int32_t label = -1;
-            double largest = -1.0;
-            for (const std::uint32_t next : tetrahedra.neighbours[t]) {
-                if (next == kNoTetrahedron || labels.ofTetrahedron[next] < 0) continue;
-                if (tetrahedra.circumradii[next] <= largest) continue;
-                largest = tetrahedra.circumradii[next];
-                label = labels.ofTetrahedron[next];
+// ball, one layer at a time so that the order of the tetrahedra does not matter. Each layer is
+// found from the one before it: the time is that of one look at every leftover.
+Result<void> growIntoLeftovers(const Tetrahedra& tetrahedra, const std::vector<std::uint8_t>& interior,
+                               const std::vector<std::uint32_t>& leftovers, std::size_t& steps,
+                               const RunContext& context, SegmentLabels& labels) {
+    std::vector<std::uint32_t> layer;
+    for (const std::uint32_t t : leftovers) {
+        if (labelOfLargestNeighbour(tetrahedra, labels, t) >= 0) layer.push_back(t);
+    }
+    while (!layer.empty()) {
+        std::vector<std::int32_t> chosen;
+        chosen.reserve(layer.size());
+        for (const std::uint32_t t : layer) {
+            if (++steps % kStepsBetweenCheckpoints == 0) {
+                if (auto go = context.checkpoint(); !go) return go;
             }
-            if (label < 0) {
-                rest.push_back(t);
-            } else {
-                layer.emplace_back(t, label);
+            chosen.push_back(labelOfLargestNeighbour(tetrahedra, labels, t));
+        }
+        for (std::size_t i = 0; i < layer.size(); ++i) labels.ofTetrahedron[layer[i]] = chosen[i];
+        std::vector<std::uint32_t> following;
+        for (const std::uint32_t t : layer) {
+            for (const std::uint32_t next : tetrahedra.neighbours[t]) {
+                if (next == kNoTetrahedron || !interior[next] || labels.ofTetrahedron[next] >= 0) continue;
+                following.push_back(next);
             }
         }
-        if (layer.empty()) return rest;
-        for (const auto& [t, label] : layer) labels.ofTetrahedron[t] = label;
-        leftovers = std::move(rest);
+        std::sort(following.begin(), following.end());
+        following.erase(std::unique(following.begin(), following.end()), following.end());
+        layer = std::move(following);
     }
+    return {};
 }
 
 // Tetrahedra in reach of no maximum: one segment per connected group, around its largest ball.
@@ -148,7 +167,10 @@ Result<SegmentLabels> stableManifolds(const Tetrahedra& tetrahedra, const std::v
     for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
         if (interior[t] && labels.ofTetrahedron[t] < 0) leftovers.push_back(t);
     }
-    labelIslands(tetrahedra, interior, growIntoLeftovers(tetrahedra, std::move(leftovers), labels), labels);
+    if (auto go = growIntoLeftovers(tetrahedra, interior, leftovers, steps, context, labels); !go) {
+        return fail(go.error());
+    }
+    labelIslands(tetrahedra, interior, std::move(leftovers), labels);
     return labels;
 }
 
