@@ -28,8 +28,8 @@ constexpr double kNormalRadius = 0.04;
 /// deviations) give it none, and it would never end.
 constexpr double kThinnestForEsf = 1e-3;
 
-/// Centred on the mean and scaled so that the farthest point lies at distance 1. VFH takes lengths
-/// as they are, and single precision far from the origin would be noise.
+/// Centred on the mean, because single precision far from the origin would be noise and because VFH
+/// looks from there; scaled so that the farthest point lies at distance 1.
 Result<Cloud::Ptr> toCloud(const PointCloud& points) {
     if (points.size() < 4) return fail(ErrorCode::kTooFewPoints, "fewer than 4 points");
     Point3 mean;
@@ -98,6 +98,9 @@ Result<Histogram> vfh(const Cloud::Ptr& cloud) {
     estimation.setInputNormals(normals);
     estimation.setIndices(indices);
     estimation.setSearchMethod(tree);
+    // Off by default; on, VFH retrieves better by far, and a peer is to be measured at its best.
+    estimation.setNormalizeDistance(true);
+    estimation.setFillSizeComponent(true);
     pcl::PointCloud<pcl::VFHSignature308> result;
     estimation.compute(result);
     return histogramOf("VFH", result);
