@@ -150,9 +150,10 @@ std::uint32_t widestNeighbour(const Groups& groups, std::uint32_t group) {
 }
 
 Result<void> absorbLight(Groups& groups, const ContrastMerging& options, const RunContext& context) {
+    // Only groups that touch another: a lump apart can join none, nor take a place from the others.
     std::priority_queue<Candidate> lightest;
     for (std::uint32_t i = 0; i < groups.size(); ++i) {
-        if (groups.isGroup(i)) lightest.push({groups.weight(i), i, 0});
+        if (!groups.neighbours(i).empty()) lightest.push({groups.weight(i), i, 0});
     }
     std::size_t left = lightest.size();
     const double least = options.minShare * groups.totalVolume();
@@ -165,10 +166,13 @@ Result<void> absorbLight(Groups& groups, const ContrastMerging& options, const R
         if (!groups.isGroup(light.a) || groups.weight(light.a) != light.contrast) continue;
         const bool tooMany = options.maxSegments > 0 && left > options.maxSegments;
         if (light.contrast >= least && !tooMany) break;
-        if (groups.neighbours(light.a).empty()) continue;
         const std::uint32_t joined = groups.join(light.a, widestNeighbour(groups, light.a)).first;
         --left;
-        lightest.push({groups.weight(joined), joined, 0});
+        if (groups.neighbours(joined).empty()) {
+            --left;
+        } else {
+            lightest.push({groups.weight(joined), joined, 0});
+        }
     }
     return {};
 }
