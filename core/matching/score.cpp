@@ -5,6 +5,8 @@
 #include <sstream>
 
 #include "core/matching/alignment.h"
+#include "core/matching/attribute_score.h"
+#include "core/matching/part_match.h"
 
 namespace shapedb {
 
@@ -18,6 +20,8 @@ bool comesFirst(const Signature& a, const Signature& b) {
         const SignaturePoint& q = b.points[i];
         if (p.weight != q.weight) return p.weight < q.weight;
         if (p.position != q.position) return p.position < q.position;
+        if (p.covariance != q.covariance) return p.covariance < q.covariance;
+        if (p.peakRadius != q.peakRadius) return p.peakRadius < q.peakRadius;
     }
     return a.scale < b.scale;
 }
@@ -38,6 +42,18 @@ Scaled inCommonScale(const Signature& a, const Signature& b, const ScoreOptions&
 
 bool identical(const Signature& a, const Signature& b, const ScoreOptions& options) {
     return sameShape(a, b) && (!options.keepScale || a.scale == b.scale);
+}
+
+bool bothAttributed(const Signature& a, const Signature& b) {
+    return a.attributes.has_value() && b.attributes.has_value();
+}
+
+// Only a shape itself scores 1, however little another differs.
+double belowOne(double score) { return std::min(score, std::nextafter(1.0, 0.0)); }
+
+double attributedScore(const Signature& a, const Signature& b, double agreement,
+                       const ScoreOptions& options) {
+    return belowOne(attributeScore(attributeDistance(a, b, options), agreement));
 }
 
 bool isDegenerate(const Signature& a, const Signature& b) {
@@ -96,7 +112,58 @@ Motion scanMotion(const Signature& a, const Signature& b, const ScoreOptions& op
     return motion;
 }
 
+// Scan coordinates of b to scan coordinates of a, from frame of b to frame of a.
+Motion bodyMotion(const Signature& a, const Signature& b, const ScoreOptions& options,
+                  const PartMatch& match) {
+    const Body& from = b.attributes->body;
+    const Body& to = a.attributes->body;
+    Motion motion;
+    motion.scale = options.keepScale ? 1.0 : a.scale / b.scale;
+    motion.reflected = match.reflected;
+    for (std::size_t row = 0; row < 3; ++row) {
+        for (std::size_t column = 0; column < 3; ++column) {
+            double sum = 0.0;
+            for (std::size_t i = 0; i < 3; ++i) {
+                for (std::size_t j = 0; j < 3; ++j) {
+                    sum += to.axes[i][row] * match.rotation[i][j] * from.axes[j][column];
+                }
+            }
+            motion.rotation[row][column] = sum;
+        }
+    }
+    const Point3 centreA = a.origin + a.scale * to.centre;
+    const Point3 centreB = b.origin + b.scale * from.centre;
+    motion.translation = centreA - motion.scale * rotate(motion.rotation, centreB);
+    return motion;
+}
+
+Explanation explainAttributed(const Signature& a, const Signature& b, const ScoreOptions& options) {
+    const Body& bodyA = a.attributes->body;
+    const Body& bodyB = b.attributes->body;
+    const PartMatch match = matchParts(bodyA, bodyB, options);
+    Explanation result;
+    result.score = identical(a, b, options) ? 1.0 : attributedScore(a, b, match.agreement, options);
+    result.similarity = match.agreement;
+    result.dissimilarity = std::max(0.0, 1.0 - match.agreement);
+    result.degenerate = isDegenerate(a, b);
+    result.motion = bodyMotion(a, b, options, match);
+    result.terms = scoreTerms(a, b, options, match.agreement);
+    const PartPairs pairs = partPairs(bodyA, bodyB, match, options);
+    for (std::size_t i = 0; i < pairs.count; ++i) {
+        const PartPair& pair = pairs.pairs[i];
+        result.matches.push_back({pair.a, pair.b, pair.gain / match.agreement, pair.distance});
+    }
+    std::sort(result.matches.begin(), result.matches.end(), [](const PointMatch& x, const PointMatch& y) {
+        if (x.share != y.share) return x.share > y.share;
+        return x.a != y.a ? x.a < y.a : x.b < y.b;
+    });
+    result.unmatchedA = missing(a.points.size(), result.matches, &PointMatch::a);
+    result.unmatchedB = missing(b.points.size(), result.matches, &PointMatch::b);
+    return result;
+}
+
 Explanation explainOrdered(const Signature& a, const Signature& b, const ScoreOptions& options) {
+    if (bothAttributed(a, b)) return explainAttributed(a, b, options);
     const Scaled scaled = inCommonScale(a, b, options);
     const BestAlignment best = bestAlignment(scaled.a, scaled.b, options);
     Explanation result;
@@ -130,12 +197,22 @@ Result<void> validate(const ScoreOptions& options) {
 double score(const Signature& a, const Signature& b, const ScoreOptions& options) {
     if (identical(a, b, options)) return 1.0;
     if (comesFirst(b, a)) return score(b, a, options);
+    if (bothAttributed(a, b)) {
+        const PartMatch match = matchParts(a.attributes->body, b.attributes->body, options);
+        return attributedScore(a, b, match.agreement, options);
+    }
     const Scaled scaled = inCommonScale(a, b, options);
     return finalScore(bestAlignment(scaled.a, scaled.b, options).matches.similarity, scaled, a, b, options);
 }
 
 double scoreUpperBound(const Signature& a, const Signature& b, const ScoreOptions& options) {
     if (identical(a, b, options)) return 1.0;
+    if (bothAttributed(a, b)) {
+        const bool swapped = comesFirst(b, a);
+        const Body& first = (swapped ? b : a).attributes->body;
+        const Body& second = (swapped ? a : b).attributes->body;
+        return attributedScore(a, b, partAgreementBound(first, second, options), options);
+    }
     const Scaled scaled = inCommonScale(a, b, options);
     const double most = std::min({similarityBound(scaled.a, scaled.b, options.kernelWidth),
                                   similarityBound(scaled.b, scaled.a, options.kernelWidth)}) *
@@ -149,8 +226,9 @@ Explanation explain(const Signature& a, const Signature& b, const ScoreOptions& 
     if (!comesFirst(b, a)) return explainOrdered(a, b, options);
     Explanation result = explainOrdered(b, a, options);
     result.motion = inverse(result.motion);
-    // Distances so far are in units of b's scale.
-    const double unit = inCommonUnit(b, a, options) / inCommonUnit(a, b, options);
+    // Distances so far are in units of b's scale; parts are compared each in its own.
+    const double unit =
+        bothAttributed(a, b) ? 1.0 : inCommonUnit(b, a, options) / inCommonUnit(a, b, options);
     for (PointMatch& match : result.matches) {
         std::swap(match.a, match.b);
         match.distance *= unit;

@@ -1,5 +1,6 @@
 // How alike two signatures are: Section 4.2 of the paper. The score is the best over all
-// alignments of the two weighted point sets.
+// alignments of the two weighted point sets; signatures with attributes (the default profile) also
+// compare what the segments and the shapes as a whole are like (attribute_score.h).
 #pragma once
 
 #include <cstdint>
@@ -31,10 +32,16 @@ constexpr double kDegenerateCeiling = 0.9;
 /// Errors: kInvalidArgument naming the field, its value and its range.
 [[nodiscard]] Result<void> validate(const ScoreOptions& options);
 
-/// Score of the best alignment: similarity / (similarity + dissimilarity) in [0, 1], where the
-/// similarity is the sum over matched pairs (one to one) of min(weights) * kernel(distance), and
-/// the dissimilarity is the weight of either side that this leaves over. 1 when `sameShape(a, b)`
-/// (with keepScale also of the same scale); symmetric bit for bit. When one signature has a
+/// For two signatures with attributes: 1 / (1 + D^2) in (0, 1], where D is the mean of eight
+/// distances, each in units of what two unrelated shapes typically differ by: seven statistics and
+/// the parts under their best alignment (attribute_score.h, part_match.h). Two unrelated shapes
+/// score about 0.5, two scans of one object above 0.9. Below 1 unless `sameShape(a, b)` (with
+/// keepScale also of the same scale); symmetric bit for bit.
+///
+/// Otherwise, points and weights alone, as published. Score of the best alignment: similarity / (similarity +
+/// dissimilarity) in [0, 1], where the similarity is the sum over matched pairs (one to one) of min(weights)
+/// * kernel(distance), and the dissimilarity is the weight of either side that this leaves over. 1 when
+/// `sameShape(a, b)` (with keepScale also of the same scale); symmetric bit for bit. When one signature has a
 /// single point and they are not the same, the score is at most kDegenerateCeiling: one weighted
 /// point leaves the rotation open and says too little.
 ///
@@ -42,10 +49,18 @@ constexpr double kDegenerateCeiling = 0.9;
 /// Thread-safe, allocates nothing.
 [[nodiscard]] double score(const Signature& a, const Signature& b, const ScoreOptions& options);
 
-/// Never below `score` of the same arguments, and cheaper by the number of alignments:
+/// Never below `score` of the same arguments, and cheaper by the number of alignments (of two
+/// signatures with attributes everything but the alignment is exact):
 /// a motion keeps distances from the anchor, so each point can at best meet a point of the
 /// other at its own distance from the anchor.
 [[nodiscard]] double scoreUpperBound(const Signature& a, const Signature& b, const ScoreOptions& options);
+
+/// One of the distances that make up a score of signatures with attributes.
+struct ScoreTerm {
+    const char* name = "";  ///< static storage: "chords", "parts", ...
+    double distance = 0.0;  ///< >= 0; 1: as two unrelated shapes typically differ
+    double weight = 0.0;    ///< in the mean; all terms' sum to 1
+};
 
 struct PointMatch {
     std::uint32_t a = 0;    ///< index into a.points
@@ -57,12 +72,14 @@ struct PointMatch {
 /// The alignment that achieves the score, and what it lays on what.
 struct Explanation {
     double score = 0.0;  ///< as `score`
-    /// Matched weight, each pair discounted by its distance; in cubes of the common unit: each
-    /// signature's own scale, or with keepScale the larger of the two.
+    /// With attributes: the parts' agreement and what it lacks to 1. Otherwise: matched weight, each pair
+    /// discounted by its distance; in cubes of the common unit: each signature's own scale, or with keepScale
+    /// the larger of the two.
     double similarity = 0.0;
     double dissimilarity = 0.0;       ///< weight of either side that found no match; same unit
     Motion motion;                    ///< scan coordinates of b to scan coordinates of a
-    std::vector<PointMatch> matches;  ///< by falling share
+    std::vector<PointMatch> matches;  ///< by falling share; with attributes a point may occur twice
+    std::vector<ScoreTerm> terms;     ///< with attributes: what the score is made of
     std::vector<std::uint32_t> unmatchedA;
     std::vector<std::uint32_t> unmatchedB;
     bool degenerate = false;  ///< a single-point signature left the rotation open

@@ -6,8 +6,22 @@ namespace shapedb {
 
 namespace {
 
-// Dense enough for 20,000-point detail twice over; a larger scan gains noise, not shape.
-constexpr std::uint32_t kDefaultDecimation = 50000;
+// Denser scans gain noise, not shape: docs/interior.md has the figures.
+constexpr std::uint32_t kDefaultDecimation = 20000;
+
+void recommend(ShapeParameters& parameters) {
+    SegmentationOptions& segmentation = parameters.segmentation;
+    segmentation.decimateTo = kDefaultDecimation;
+    segmentation.strayRatio = 3.0;
+    segmentation.smoothingReach = 5.0;
+    segmentation.evenSpacing = 1.0;
+    segmentation.interiorMethod = InteriorMethod::kAdaptive;
+    segmentation.mergeContrast = 1.25;
+    segmentation.minSegmentShare = 0.004;
+    segmentation.maxSegments = 12;
+    parameters.signature.maxPoints = 12;
+    parameters.signature.attributes = true;
+}
 
 }  // namespace
 
@@ -32,7 +46,7 @@ ShapeParameters parametersOf(Profile profile) {
     parameters.profile = profile;
     switch (profile) {
         case Profile::kPaper: break;
-        case Profile::kDefault: parameters.segmentation.decimateTo = kDefaultDecimation; break;
+        case Profile::kDefault: recommend(parameters); break;
     }
     return parameters;
 }
@@ -47,7 +61,7 @@ Result<Description> describe(const PointCloud& points, const ShapeParameters& pa
     if (auto valid = validate(parameters); !valid) return fail(valid.error());
     auto segmentation = segment(points, parameters.segmentation, context);
     if (!segmentation) return fail(segmentation.error());
-    auto signature = makeSignature(*segmentation, parameters.signature);
+    auto signature = makeSignature(*segmentation, parameters.signature, context);
     if (!signature) return fail(signature.error());
     return Description{std::move(*segmentation), std::move(*signature)};
 }

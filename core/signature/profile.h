@@ -13,7 +13,7 @@ namespace shapedb {
 /// The numbers are persisted in collection parameters: never renumber.
 enum class Profile : int {
     kPaper = 0,    ///< points and weights exactly as published; all points, no decimation
-    kDefault = 1,  ///< dense scans are averaged onto a grid first; otherwise as kPaper
+    kDefault = 1,  ///< for real scans: prepared points, adaptive interior, attributes; what we recommend
 };
 
 /// "paper" or "default".

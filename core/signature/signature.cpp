@@ -5,6 +5,7 @@
 #include <limits>
 #include <new>
 #include <string>
+#include <utility>
 
 #include <Eigen/Eigenvalues>
 
@@ -16,6 +17,20 @@ Result<void> validate(const SignatureOptions& options) {
                                                  "; it must be 1 to " + std::to_string(kMaxSignaturePoints));
 }
 
+namespace {
+
+bool samePartSizes(const Signature& a, const Signature& b) {
+    for (std::size_t i = 0; i < a.points.size(); ++i) {
+        const SignaturePoint& p = a.points[i];
+        const SignaturePoint& q = b.points[i];
+        if (p.peakRadius != q.peakRadius || p.covariance != q.covariance || p.volumeShare != q.volumeShare)
+            return false;
+    }
+    return true;
+}
+
+}  // namespace
+
 bool sameShape(const Signature& a, const Signature& b) noexcept {
     if (a.points.size() != b.points.size()) return false;
     for (std::size_t i = 0; i < a.points.size(); ++i) {
@@ -23,7 +38,9 @@ bool sameShape(const Signature& a, const Signature& b) noexcept {
         const SignaturePoint& q = b.points[i];
         if (p.position != q.position || p.weight != q.weight) return false;
     }
-    return true;
+    if (a.attributes.has_value() != b.attributes.has_value()) return false;
+    return !a.attributes || (a.attributes->statistics == b.attributes->statistics &&
+                             a.attributes->quality == b.attributes->quality && samePartSizes(a, b));
 }
 
 Point3 pointPosition(const Signature& signature, std::size_t i) {
@@ -88,12 +105,30 @@ Result<Signature> makeSignatureOrThrow(const Segmentation& segmentation, const S
     return signature;
 }
 
+Result<ShapeAttributes> attributesOf(const Segmentation& segmentation, const Signature& signature,
+                                     const RunContext& context) {
+    auto statistics = shapeStatistics(interiorView(segmentation), context);
+    if (!statistics) return fail(statistics.error());
+    ShapeAttributes attributes;
+    attributes.statistics = *statistics;
+    attributes.quality =
+        static_cast<std::uint8_t>(std::lround(255.0 * std::clamp(segmentation.quality, 0.0, 1.0)));
+    attributes.body = bodyOf(signature.points);
+    return attributes;
+}
+
 }  // namespace
 
-Result<Signature> makeSignature(const Segmentation& segmentation, const SignatureOptions& options) {
+Result<Signature> makeSignature(const Segmentation& segmentation, const SignatureOptions& options,
+                                const RunContext& context) {
     if (auto valid = validate(options); !valid) return fail(valid.error());
     try {
-        return makeSignatureOrThrow(segmentation, options);
+        auto signature = makeSignatureOrThrow(segmentation, options);
+        if (!signature || !options.attributes) return signature;
+        auto attributes = attributesOf(segmentation, *signature, context);
+        if (!attributes) return fail(attributes.error());
+        signature->attributes = std::move(*attributes);
+        return signature;
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::kOutOfMemory, "not enough memory for a signature");
     }

@@ -4,17 +4,25 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/run_context.h"
 #include "core/geometry/point.h"
 #include "core/segmentation/segmentation.h"
+#include "core/signature/parts.h"
+#include "core/signature/statistics.h"
 
 namespace shapedb {
 
 struct SignatureOptions {
     /// Heaviest segments kept. The paper: "less than ten". 1 to kMaxSignaturePoints.
     std::uint32_t maxPoints = 7;
+
+    /// Also keep what the shape says as a whole (ShapeAttributes). False: points and weights
+    /// alone, as published.
+    bool attributes = false;
 };
 
 /// Alignments grow with the fourth power of the points.
@@ -35,11 +43,19 @@ struct SignaturePoint {
     std::array<float, 6> covariance{};
 };
 
+/// What the default profile knows of a shape beyond points and weights.
+struct ShapeAttributes {
+    ShapeStatistics statistics{};
+    std::uint8_t quality = 255;  ///< of the interior, in steps of 1/255: Segmentation::quality
+    Body body;                   ///< of the signature's points; not persisted: `bodyOf`
+};
+
 struct Signature {
     std::vector<SignaturePoint> points;  ///< by falling weight; 1 to kMaxSignaturePoints
     double scale = 1.0;                  ///< smallest diagonal of a box around the interior, scan units, > 0
     Point3 origin;                       ///< heaviest representative point, scan units
     double volume = 0.0;                 ///< of the whole interior, scan units cubed
+    std::optional<ShapeAttributes> attributes;  ///< with SignatureOptions::attributes
 };
 
 /// True when all numbers that enter a score are the same, bit for bit.
@@ -53,8 +69,9 @@ struct Signature {
 [[nodiscard]] std::array<double, 3> pointExtents(const Signature& signature, std::size_t i);
 
 /// Errors: kInvalidArgument (options); kNoInterior (no segment heavy enough for single precision);
-/// kOutOfMemory.
+/// kCancelled, kDeadlineExceeded; kOutOfMemory.
 [[nodiscard]] Result<Signature> makeSignature(const Segmentation& segmentation,
-                                              const SignatureOptions& options);
+                                              const SignatureOptions& options,
+                                              const RunContext& context = {});
 
 }  // namespace shapedb

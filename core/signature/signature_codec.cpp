@@ -11,7 +11,8 @@ namespace {
 
 // Persisted: never change. docs/signature-format.md describes every byte.
 constexpr char kMagic[4] = {'S', 'D', 'B', 'G'};
-constexpr std::uint16_t kVersion = 1;
+constexpr std::uint16_t kPointsOnly = 1;      // version 1
+constexpr std::uint16_t kWithAttributes = 2;  // version 2: the same, and the statistics
 constexpr std::size_t kHeaderBytes = 52;
 constexpr std::size_t kPointBytes = 48;
 constexpr std::size_t kChecksumBytes = 4;
@@ -63,6 +64,10 @@ class Reader {
         }
         at_ += sizeof(Unsigned);
         return value;
+    }
+    void takeBytes(std::uint8_t* out, std::size_t count) {
+        std::memcpy(out, at_, count);
+        at_ += count;
     }
     float takeFloat() {
         const auto bits = takeUnsigned<std::uint32_t>();
@@ -133,10 +138,10 @@ Result<void> checkNumbers(const Signature& signature) {
 
 std::string encodeSignature(const Signature& signature) {
     std::string out(kMagic, sizeof kMagic);
-    out.reserve(kHeaderBytes + kPointBytes * signature.points.size() + kChecksumBytes);
-    putUnsigned(out, kVersion);
+    out.reserve(kHeaderBytes + kPointBytes * signature.points.size() + kStatisticBins + kChecksumBytes);
+    putUnsigned(out, signature.attributes ? kWithAttributes : kPointsOnly);
     putUnsigned(out, static_cast<std::uint16_t>(signature.points.size()));
-    putUnsigned(out, std::uint32_t{0});
+    putUnsigned(out, signature.attributes ? std::uint32_t{signature.attributes->quality} : 0u);
     putDouble(out, signature.scale);
     putDouble(out, signature.origin.x);
     putDouble(out, signature.origin.y);
@@ -148,6 +153,9 @@ std::string encodeSignature(const Signature& signature) {
         putFloat(out, point.volumeShare);
         putFloat(out, point.peakRadius);
         for (const float v : point.covariance) putFloat(out, v);
+    }
+    if (signature.attributes) {
+        for (const std::uint8_t bin : signature.attributes->statistics) putUnsigned(out, bin);
     }
     putUnsigned(out, crc32(out.data(), out.size()));
     return out;
@@ -161,11 +169,13 @@ Result<Signature> decodeSignature(const std::string& bytes) {
         return malformed("it does not begin with SDBG");
     Reader reader(bytes.data() + sizeof kMagic);
     const auto version = reader.takeUnsigned<std::uint16_t>();
-    if (version != kVersion) return malformed("version " + std::to_string(version) + " is unknown");
+    if (version != kPointsOnly && version != kWithAttributes)
+        return malformed("version " + std::to_string(version) + " is unknown");
+    const std::size_t statisticBytes = version == kWithAttributes ? kStatisticBins : 0;
     const auto count = reader.takeUnsigned<std::uint16_t>();
     if (count < 1 || count > kMaxSignaturePoints)
         return malformed(std::to_string(count) + " points announced");
-    if (bytes.size() != kHeaderBytes + kPointBytes * count + kChecksumBytes) {
+    if (bytes.size() != kHeaderBytes + kPointBytes * count + statisticBytes + kChecksumBytes) {
         return malformed(std::to_string(bytes.size()) + " bytes do not fit " + std::to_string(count) +
                          " points");
     }
@@ -173,7 +183,8 @@ Result<Signature> decodeSignature(const std::string& bytes) {
     if (checksum.takeUnsigned<std::uint32_t>() != crc32(bytes.data(), bytes.size() - kChecksumBytes)) {
         return malformed("the checksum does not agree");
     }
-    if (reader.takeUnsigned<std::uint32_t>() != 0) return malformed("reserved bytes are in use");
+    const auto quality = reader.takeUnsigned<std::uint32_t>();
+    if (quality > (version == kWithAttributes ? 255u : 0u)) return malformed("reserved bytes are in use");
     try {
         Signature signature;
         signature.scale = reader.takeDouble();
@@ -183,6 +194,12 @@ Result<Signature> decodeSignature(const std::string& bytes) {
         signature.volume = reader.takeDouble();
         for (std::uint16_t i = 0; i < count; ++i) signature.points.push_back(takePoint(reader));
         if (auto valid = checkNumbers(signature); !valid) return fail(valid.error());
+        if (version == kWithAttributes) {
+            ShapeAttributes& attributes = signature.attributes.emplace();
+            attributes.quality = static_cast<std::uint8_t>(quality);
+            reader.takeBytes(attributes.statistics.data(), attributes.statistics.size());
+            attributes.body = bodyOf(signature.points);
+        }
         return signature;
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::kOutOfMemory, "not enough memory to decode a signature");

@@ -1,0 +1,84 @@
+#include "core/matching/attribute_score.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+
+namespace shapedb {
+
+namespace {
+
+// What two unrelated shapes differ by (median over pairs of different synthetic families): it
+// gives every term an equal say, whatever the number of its bins.
+constexpr std::array<double, kStatisticKinds> kTypical{2.43, 3.64, 4.64, 1.18, 4.04, 0.90, 3.68};
+constexpr double kTypicalDisagreement = 0.65;
+
+// Parts say both which parts there are and where they lie: two of the statistics' worth.
+constexpr double kPartsWeight = 2.0;
+
+// An interior that could not be told still says something.
+constexpr double kLeastTrust = 0.1;
+
+constexpr double kBinsPerUnit = 255.0;
+
+// Falls faster than the quality: a thickness off by half spoils its histograms altogether.
+double trust(const Signature& a, const Signature& b) {
+    const double worse = std::min(a.attributes->quality, b.attributes->quality) / 255.0;
+    return std::max(kLeastTrust, worse * std::sqrt(worse));
+}
+
+double termDistance(const Signature& a, const Signature& b, std::size_t kind) {
+    const StatisticLayout& layout = kStatistics[kind];
+    const std::uint8_t* x = a.attributes->statistics.data() + layout.offset;
+    const std::uint8_t* y = b.attributes->statistics.data() + layout.offset;
+    int sum = 0;
+    for (std::size_t i = 0; i < layout.count; ++i)
+        sum += std::abs(static_cast<int>(x[i]) - static_cast<int>(y[i]));
+    return sum / (kBinsPerUnit * kTypical[kind]);
+}
+
+double termWeight(std::size_t kind, double trust) { return kStatistics[kind].ofInterior ? trust : 1.0; }
+
+double scaleDistance(const Signature& a, const Signature& b, const ScoreOptions& options) {
+    return options.keepScale ? std::abs(std::log2(std::max(a.scale, b.scale) / std::min(a.scale, b.scale)))
+                             : 0.0;
+}
+
+}  // namespace
+
+AttributeDistance attributeDistance(const Signature& a, const Signature& b, const ScoreOptions& options) {
+    AttributeDistance result;
+    const double interior = trust(a, b);
+    for (std::size_t kind = 0; kind < kStatisticKinds; ++kind) {
+        const double weight = termWeight(kind, interior);
+        result.statistics += weight * termDistance(a, b, kind);
+        result.totalWeight += weight;
+    }
+    result.partsWeight = kPartsWeight * interior;
+    result.totalWeight += result.partsWeight;
+    result.scale = scaleDistance(a, b, options);
+    return result;
+}
+
+double attributeScore(const AttributeDistance& distance, double agreement) {
+    const double parts = std::max(0.0, 1.0 - agreement) / kTypicalDisagreement;
+    const double mean = (distance.statistics + distance.partsWeight * parts) / distance.totalWeight;
+    return 1.0 / (1.0 + mean * mean + distance.scale * distance.scale);
+}
+
+std::vector<ScoreTerm> scoreTerms(const Signature& a, const Signature& b, const ScoreOptions& options,
+                                  double agreement) {
+    const AttributeDistance distance = attributeDistance(a, b, options);
+    const double interior = trust(a, b);
+    std::vector<ScoreTerm> terms;
+    for (std::size_t kind = 0; kind < kStatisticKinds; ++kind) {
+        terms.push_back({kStatistics[kind].name, termDistance(a, b, kind),
+                         termWeight(kind, interior) / distance.totalWeight});
+    }
+    terms.push_back({"parts", std::max(0.0, 1.0 - agreement) / kTypicalDisagreement,
+                     distance.partsWeight / distance.totalWeight});
+    return terms;
+}
+
+}  // namespace shapedb

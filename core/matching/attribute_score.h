@@ -1,0 +1,33 @@
+// The score of signatures with attributes: what the parts of two shapes, and the shapes as a
+// whole, differ by, as one distance. docs/scoring.md derives it.
+#pragma once
+
+#include "core/matching/part_match.h"
+#include "core/matching/score.h"
+#include "core/signature/signature.h"
+
+namespace shapedb {
+
+/// Distances of the statistics and of the parts, each in units of what two unrelated shapes
+/// typically differ by, are averaged with these weights; those that come from the interior count
+/// as much as the poorer of both interiors can be trusted.
+struct AttributeDistance {
+    double statistics = 0.0;  ///< weighted sum over the statistics
+    double partsWeight = 0.0;
+    double totalWeight = 0.0;  ///< with the parts'
+    double scale = 0.0;        ///< with keepScale: octaves between the sizes, else 0
+};
+
+/// Both with attributes. Everything but the parts; exact and quick: sums of byte differences.
+[[nodiscard]] AttributeDistance attributeDistance(const Signature& a, const Signature& b,
+                                                  const ScoreOptions& options);
+
+/// 1 / (1 + D^2), D the mean of the distances where the parts agree by `agreement`: falls as the
+/// agreement falls, in (0, 1]. So 0.5 is what unrelated shapes typically score.
+[[nodiscard]] double attributeScore(const AttributeDistance& distance, double agreement);
+
+/// Name, distance and weight of every term, in a fixed order; the weights sum to 1.
+[[nodiscard]] std::vector<ScoreTerm> scoreTerms(const Signature& a, const Signature& b,
+                                                const ScoreOptions& options, double agreement);
+
+}  // namespace shapedb

@@ -1,0 +1,50 @@
+// How well the parts of two bodies agree: the best over all alignments of their weighted points
+// (Section 4.2), where each point brings the attributes of its segment.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "core/matching/score.h"
+#include "core/signature/parts.h"
+
+namespace shapedb {
+
+/// What two parts are worth to each other under an alignment that brings them to distance d:
+///   min(shares) * likeness of their sizes * (k(difference of radii) + k(d)) / 2
+/// with k the kernel of alignment.h. Half is due wherever the limb points (pose), half only where it
+/// lies on its counterpart. Each part of either side counts with its best counterpart;
+/// `agreement` is the mean of both sides, in [0, 1].
+struct PartMatch {
+    double agreement = 0.0;
+    Matrix3 rotation = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};  ///< frame of b to frame of a
+    bool reflected = false;
+};
+
+/// The best alignment: with origin on origin, the axes of the two frames on each other in every
+/// sense, and the heaviest outlying parts of a on parts of b like them. `options`: reflection,
+/// kernelWidth. `prune` stops an alignment that cannot win and changes nothing.
+[[nodiscard]] PartMatch matchParts(const Body& a, const Body& b, const ScoreOptions& options,
+                                   bool prune = true);
+
+/// Never below matchParts(a, b, options).agreement: no motion brings two parts nearer than their
+/// radii differ.
+[[nodiscard]] double partAgreementBound(const Body& a, const Body& b, const ScoreOptions& options);
+
+/// Part of a and part of b, and what they add to the agreement.
+struct PartPair {
+    std::uint8_t a = 0;
+    std::uint8_t b = 0;
+    double gain = 0.0;
+    double distance = 0.0;  ///< under the alignment, units of the scale
+};
+struct PartPairs {
+    std::array<PartPair, 2 * kMaxSignaturePoints> pairs;
+    std::size_t count = 0;
+};
+
+/// Who met whom under `match`; the gains sum to its agreement.
+[[nodiscard]] PartPairs partPairs(const Body& a, const Body& b, const PartMatch& match,
+                                  const ScoreOptions& options);
+
+}  // namespace shapedb

@@ -1,0 +1,151 @@
+#include "core/signature/interior_view.h"
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+
+#include <Eigen/Eigenvalues>
+
+#include "core/base/random.h"
+
+namespace shapedb {
+
+namespace {
+
+constexpr std::uint64_t kSeed = 2004;  // the year of the paper; any number does
+
+double tetrahedronVolume(const Point3& a, const Point3& b, const Point3& c, const Point3& d) {
+    return std::abs(dot(b - a, cross(c - a, d - a))) / 6.0;
+}
+
+struct PrincipalFrame {
+    Point3 centre;
+    std::array<Point3, 3> axes;  // by falling spread
+};
+
+// Centroid and principal axes of the interior, from the segments' moments.
+PrincipalFrame principalFrame(const Segmentation& segmentation) {
+    PrincipalFrame frame;
+    for (const Segment& segment : segmentation.segments) {
+        frame.centre = frame.centre + (segment.volume / segmentation.volume) * segment.centroid;
+    }
+    Eigen::Matrix3d moments = Eigen::Matrix3d::Zero();
+    const double unit = 1.0 / segmentation.size;
+    for (const Segment& segment : segmentation.segments) {
+        const double share = segment.volume / segmentation.volume;
+        const Point3 d = unit * (segment.centroid - frame.centre);
+        const Eigen::Vector3d v(d.x, d.y, d.z);
+        const auto& c = segment.covariance;
+        Eigen::Matrix3d own;
+        own << c[0], c[1], c[2], c[1], c[3], c[4], c[2], c[4], c[5];
+        moments += share * (own * (unit * unit) + v * v.transpose());
+    }
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(moments);
+    for (int axis = 0; axis < 3; ++axis) {
+        const Eigen::Vector3d u = solver.eigenvectors().col(2 - axis);
+        frame.axes[static_cast<std::size_t>(axis)] = {u[0], u[1], u[2]};
+    }
+    return frame;
+}
+
+void takeTetrahedra(const Segmentation& segmentation, InteriorView& view) {
+    const Tetrahedra& all = segmentation.tetrahedra;
+    std::vector<std::uint32_t> index(all.size(), kNoTetrahedron);
+    std::uint32_t count = 0;
+    for (std::size_t t = 0; t < all.size(); ++t) {
+        if (segmentation.tetrahedronSegment[t] >= 0) index[t] = count++;
+    }
+    view.vertices.reserve(count);
+    view.neighbours.reserve(count);
+    view.volumes.reserve(count);
+    view.centroids.reserve(count);
+    view.radii.reserve(count);
+    for (std::size_t t = 0; t < all.size(); ++t) {
+        if (index[t] == kNoTetrahedron) continue;
+        const auto& v = all.vertices[t];
+        std::array<std::uint32_t, 4> neighbours;
+        for (std::size_t f = 0; f < 4; ++f) {
+            const std::uint32_t other = all.neighbours[t][f];
+            neighbours[f] = other == kNoTetrahedron ? kNoTetrahedron : index[other];
+        }
+        const Point3& a = view.sites[v[0]];
+        const Point3& b = view.sites[v[1]];
+        const Point3& c = view.sites[v[2]];
+        const Point3& d = view.sites[v[3]];
+        view.vertices.push_back(v);
+        view.neighbours.push_back(neighbours);
+        view.volumes.push_back(tetrahedronVolume(a, b, c, d));
+        view.centroids.push_back(0.25 * (a + b + c + d));
+        view.radii.push_back(std::min(1.0, all.circumradii[t] / segmentation.size));
+    }
+    view.volume = std::accumulate(view.volumes.begin(), view.volumes.end(), 0.0);
+}
+
+// Stratified by volume along the order of the tetrahedra: less scatter than free draws.
+void drawInner(InteriorView& view, Random& random) {
+    view.inner.reserve(InteriorView::kSamples);
+    view.innerOwner.reserve(InteriorView::kSamples);
+    double passed = 0.0;
+    std::size_t t = 0;
+    for (std::size_t i = 0; i < InteriorView::kSamples; ++i) {
+        const double target = (static_cast<double>(i) + random.uniform()) /
+                              static_cast<double>(InteriorView::kSamples) * view.volume;
+        while (t + 1 < view.volumes.size() && passed + view.volumes[t] < target) passed += view.volumes[t++];
+        std::array<double, 3> cut{random.uniform(), random.uniform(), random.uniform()};
+        std::sort(cut.begin(), cut.end());
+        const auto& v = view.vertices[t];
+        view.inner.push_back(cut[0] * view.sites[v[0]] + (cut[1] - cut[0]) * view.sites[v[1]] +
+                             (cut[2] - cut[1]) * view.sites[v[2]] + (1.0 - cut[2]) * view.sites[v[3]]);
+        view.innerOwner.push_back(static_cast<std::uint32_t>(t));
+    }
+}
+
+void drawSurface(InteriorView& view, Random& random) {
+    std::vector<std::uint8_t> touched(view.sites.size(), 0);
+    for (const auto& v : view.vertices) {
+        for (const std::uint32_t site : v) touched[site] = 1;
+    }
+    std::vector<std::uint32_t> candidates;
+    for (std::uint32_t i = 0; i < touched.size(); ++i) {
+        if (touched[i] != 0) candidates.push_back(i);
+    }
+    const std::size_t wanted = std::min(candidates.size(), InteriorView::kSamples);
+    view.surface.reserve(wanted);
+    for (std::size_t i = 0; i < wanted; ++i) {
+        std::swap(candidates[i], candidates[i + random.below(candidates.size() - i)]);
+        view.surface.push_back(view.sites[candidates[i]]);
+    }
+}
+
+double meanDistance(const PointCloud& points) {
+    double sum = 0.0;
+    for (std::size_t i = 1; i < points.size(); ++i) {
+        for (std::size_t j = 0; j < i; ++j) sum += distance(points[i], points[j]);
+    }
+    const double n = static_cast<double>(points.size());
+    return sum / (n * (n - 1.0) / 2.0);
+}
+
+}  // namespace
+
+InteriorView interiorView(const Segmentation& segmentation) {
+    InteriorView view;
+    const PrincipalFrame frame = principalFrame(segmentation);
+    const double unit = 1.0 / segmentation.size;
+    view.sites.reserve(segmentation.sites.size());
+    for (const Point3& site : segmentation.sites) {
+        const Point3 d = unit * (site - frame.centre);
+        view.sites.push_back({dot(d, frame.axes[0]), dot(d, frame.axes[1]), dot(d, frame.axes[2])});
+    }
+    takeTetrahedra(segmentation, view);
+    Random random(kSeed);
+    drawInner(view, random);
+    drawSurface(view, random);
+    view.meanSurfaceDistance = meanDistance(view.surface);
+    for (std::size_t t = 0; t < view.volumes.size(); ++t) {
+        view.meanRadius += view.volumes[t] / view.volume * length(view.centroids[t]);
+    }
+    return view;
+}
+
+}  // namespace shapedb

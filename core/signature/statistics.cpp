@@ -1,0 +1,137 @@
+#include "core/signature/statistics.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/random.h"
+#include "core/signature/histogram.h"
+#include "core/signature/inner_distances.h"
+#include "core/signature/shell_harmonics.h"
+#include "core/signature/voxels.h"
+
+namespace shapedb {
+
+namespace {
+
+constexpr std::size_t kThicknessBins = 6;
+constexpr std::size_t kPlaceBins = 10;
+constexpr std::size_t kChordLengths = 12;
+constexpr std::size_t kChordShares = 4;
+constexpr std::size_t kBendingBins = 24;
+constexpr std::size_t kDistanceBins = 32;
+constexpr std::size_t kChords = 60000;
+constexpr std::uint64_t kSeed = 145;
+
+const StatisticLayout& layout(Statistic statistic) {
+    return kStatistics[static_cast<std::size_t>(statistic)];
+}
+
+std::uint8_t* binsOf(ShapeStatistics& statistics, Statistic statistic) {
+    return statistics.data() + layout(statistic).offset;
+}
+
+// Local thickness in octaves of the mean distance between surface points: from 1/32 of it (a
+// sheet) to 1.4 times (no ball that fits is larger).
+SoftBin thicknessBin(const InteriorView& view, std::size_t t) {
+    return softBin(std::log2(view.radii[t] / view.meanSurfaceDistance), -5.0, 0.5, kThicknessBins);
+}
+
+void thicknessByRadius(const InteriorView& view, std::uint8_t* out) {
+    Histogram histogram(kThicknessBins, kPlaceBins);
+    for (std::size_t t = 0; t < view.volumes.size(); ++t) {
+        const double radius = length(view.centroids[t]) / view.meanRadius;
+        histogram.add(thicknessBin(view, t), softBin(radius, 0.0, 2.2, kPlaceBins), view.volumes[t]);
+    }
+    histogram.writeRoots(out);
+}
+
+// Mean inner distance of each cell to the sources it is connected with, in units of the overall
+// mean: about 0.7 in the middle of a body, above 1.5 at the tips of its limbs.
+std::vector<double> centrality(const InnerDistances& inner) {
+    std::vector<double> result(inner.centres.size(), 0.0);
+    for (std::size_t c = 0; c < result.size(); ++c) {
+        double sum = 0.0;
+        double count = 0.0;
+        for (const auto& row : inner.distance) {
+            if (row[c] >= InnerDistances::kUnreached) continue;
+            sum += row[c];
+            count += 1.0;
+        }
+        result[c] = count > 0.0 ? sum / count / inner.mean : 2.0;
+    }
+    return result;
+}
+
+void thicknessByCentrality(const InteriorView& view, const InnerDistances& inner, std::uint8_t* out) {
+    const std::vector<double> central = centrality(inner);
+    Histogram histogram(kThicknessBins, kPlaceBins);
+    for (std::size_t t = 0; t < view.volumes.size(); ++t) {
+        const SoftBin place = softBin(central[inner.cellOfTetrahedron[t]], 0.4, 1.8, kPlaceBins);
+        histogram.add(thicknessBin(view, t), place, view.volumes[t]);
+    }
+    histogram.writeRoots(out);
+}
+
+void bending(const InnerDistances& inner, std::uint8_t* out) {
+    Histogram histogram(1, kBendingBins);
+    for (std::size_t s = 0; s < inner.sources.size(); ++s) {
+        const Point3& from = inner.centres[inner.sources[s]];
+        for (std::size_t c = 0; c < inner.centres.size(); ++c) {
+            if (c == inner.sources[s] || inner.distance[s][c] >= InnerDistances::kUnreached) continue;
+            const double straight = distance(from, inner.centres[c]) / inner.mean;
+            histogram.add(softBin(straight, 0.0, 2.6, kBendingBins), inner.volumes[c]);
+        }
+    }
+    histogram.writeRoots(out);
+}
+
+void surfaceDistances(const InteriorView& view, std::uint8_t* out) {
+    Histogram histogram(1, kDistanceBins);
+    for (std::size_t i = 1; i < view.surface.size(); ++i) {
+        for (std::size_t j = 0; j < i; ++j) {
+            histogram.add(softBin(distance(view.surface[i], view.surface[j]), 0.0, 1.0, kDistanceBins), 1.0);
+        }
+    }
+    histogram.writeRoots(out);
+}
+
+void chords(const InteriorView& view, std::uint8_t* out) {
+    const Voxels voxels(view);
+    Random random(kSeed);
+    Histogram histogram(kChordLengths, kChordShares);
+    const std::size_t n = view.surface.size();
+    for (std::size_t i = 0; i < kChords; ++i) {
+        const Point3& a = view.surface[random.below(n)];
+        const Point3& b = view.surface[random.below(n)];
+        const double d = distance(a, b);
+        if (!(d > 0.0)) continue;
+        histogram.add(softBin(d / view.meanSurfaceDistance, 0.0, 2.4, kChordLengths),
+                      softBin(voxels.shareInside(a, b), 0.0, 1.0, kChordShares), 1.0);
+    }
+    histogram.writeRoots(out);
+}
+
+void harmonics(const PointCloud& points, std::uint8_t* out) {
+    const ShellEnergies energies = shellHarmonics(points);
+    for (std::size_t i = 0; i < energies.size(); ++i) out[i] = Histogram::rootByte(energies[i]);
+}
+
+}  // namespace
+
+Result<ShapeStatistics> shapeStatistics(const InteriorView& view, const RunContext& context) {
+    ShapeStatistics result{};
+    const auto inner = innerDistances(view, context);
+    if (!inner) return fail(inner.error());
+    thicknessByCentrality(view, *inner, binsOf(result, Statistic::kThicknessByCentrality));
+    thicknessByRadius(view, binsOf(result, Statistic::kThicknessByRadius));
+    bending(*inner, binsOf(result, Statistic::kBending));
+    harmonics(view.inner, binsOf(result, Statistic::kInteriorHarmonics));
+    if (auto ok = context.checkpoint(); !ok) return fail(ok.error());
+    chords(view, binsOf(result, Statistic::kChords));
+    if (auto ok = context.checkpoint(); !ok) return fail(ok.error());
+    surfaceDistances(view, binsOf(result, Statistic::kSurfaceDistances));
+    harmonics(view.surface, binsOf(result, Statistic::kSurfaceHarmonics));
+    return result;
+}
+
+}  // namespace shapedb
