@@ -61,10 +61,13 @@ class Groups {
         return i;
     }
 
-    // Joins two groups that touch. The one with fewer neighbours goes into the other: returns the
-    // one that remains, and the neighbours that are now new to it.
+    // Joins two groups that touch. The one with fewer neighbours, or else less weight, goes into the
+    // other: returns the one that remains, and the neighbours that are now new to it.
     std::pair<std::uint32_t, std::vector<std::uint32_t>> join(std::uint32_t a, std::uint32_t b) {
-        if (std::make_pair(passages_[a].size(), b) < std::make_pair(passages_[b].size(), a)) std::swap(a, b);
+        if (std::make_tuple(passages_[a].size(), weight_[a], b) <
+            std::make_tuple(passages_[b].size(), weight_[b], a)) {
+            std::swap(a, b);
+        }
         const double weight = weight_[a] + weight_[b];
         logRadius_[a] = (weight_[a] * logRadius_[a] + weight_[b] * logRadius_[b]) / weight;
         weight_[a] = weight;
