@@ -37,6 +37,7 @@ int run(int argc, const char* const* argv, cli::Console& console, const std::ato
         app.set_version_flag("--version", std::string(kProgramName) + " " SHAPEDB_VERSION);
         app.require_subcommand(1);
         addRetrievalOperation(app, bench);
+        addInteriorOperation(app, bench);
         try {
             app.parse(argc, argv);
         } catch (const CLI::CallForHelp&) {

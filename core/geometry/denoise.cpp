@@ -34,7 +34,7 @@ constexpr double kPlateauSlope = 0.85;
 constexpr double kPlateauTolerance = 0.05;
 constexpr double kPlateauEnds = 0.15;
 
-constexpr double kReachInSpacings = 2.6;  // pi * 2.6^2: about twenty neighbours
+constexpr double kReachInSpacings = 4.0;  // pi * 4^2: about fifty neighbours
 constexpr std::size_t kQuadricMinimum = 12;
 constexpr double kMaxMoveInSigmas = 3.0;
 constexpr std::size_t kPointsBetweenCheckpoints = 4096;

@@ -30,7 +30,7 @@ struct NoiseEstimate {
 
 /// Each point moved along the local normal onto a quadric fitted to its neighbours (moving least
 /// squares, weights falling with distance). The neighbourhoods reach `reachInSigmas` times the noise
-/// and hold at least about twenty points. No point moves farther than three sigma.
+/// and hold at least about fifty points. No point moves farther than three sigma.
 /// Points with noise below a share of the spacing come back unchanged.
 ///
 /// `index` must hold `points`. Errors: kCancelled, kDeadlineExceeded, kOutOfMemory.

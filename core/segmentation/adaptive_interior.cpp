@@ -158,9 +158,15 @@ Result<AdaptiveInterior> adaptiveInterior(const PointCloud& points, const Tetrah
     const Judge judge(points, tetrahedra, scales);
     const auto leaks = leakAngles(points, tetrahedra, big, context);
     if (!leaks) return fail(leaks.error());
+    Candidate preferred = judge.judged(leftByWalk(big, *leaks, kAngles[0]));
+    // No other interior costs less than nothing, so none can be clearly better than this one.
+    if (preferred.parted >= kLeastParted && preferred.cost() <= kTolerance) {
+        return chosen(std::move(preferred), InteriorSource::kWalk, kAngles[0]);
+    }
     std::array<Candidate, kAngles.size()> walks;
-    double least = INFINITY;
-    for (std::size_t i = 0; i < kAngles.size(); ++i) {
+    walks[0] = std::move(preferred);
+    double least = walks[0].cost();
+    for (std::size_t i = 1; i < kAngles.size(); ++i) {
         walks[i] = judge.judged(leftByWalk(big, *leaks, kAngles[i]));
         least = std::min(least, walks[i].cost());
     }

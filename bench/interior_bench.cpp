@@ -1,0 +1,229 @@
+// `shapedb-bench interior`: how well the interior and the size of damaged scans agree with those of
+// the clean scan.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "bench/environment.h"
+#include "bench/operations.h"
+#include "client/cli/exit_code.h"
+#include "client/cli/retrieval_task.h"
+#include "client/io/scan_reader.h"
+#include "core/base/random.h"
+#include "core/geometry/bounding.h"
+#include "core/geometry/noise.h"
+#include "core/segmentation/segmentation.h"
+#include "core/signature/profile.h"
+
+namespace shapedb::bench {
+
+namespace {
+
+constexpr std::uint64_t kSeed = 1;
+constexpr double kOutlierShare = 0.01;
+constexpr double kKeptShare = 0.8;
+
+enum class Damage { kNoise, kOutliers, kCap };
+
+struct Condition {
+    const char* name;
+    Damage damage;
+    double noise;  // share of the box diagonal
+};
+
+constexpr std::array<Condition, 7> kConditions = {{
+    {"clean", Damage::kNoise, 0.0},
+    {"0.25 %", Damage::kNoise, 0.0025},
+    {"0.5 %", Damage::kNoise, 0.005},
+    {"1 %", Damage::kNoise, 0.01},
+    {"2 %", Damage::kNoise, 0.02},
+    {"1 % strays", Damage::kOutliers, 0.0},
+    {"cap missing", Damage::kCap, 0.0},
+}};
+
+Point3 randomDirection(Random& random) {
+    const double z = random.uniform(-1.0, 1.0);
+    const double angle = random.uniform(0.0, 6.283185307179586);
+    const double across = std::sqrt(1.0 - z * z);
+    return {across * std::cos(angle), across * std::sin(angle), z};
+}
+
+// Points uniform in the box of the cloud, as many as kOutlierShare of it.
+void addOutliers(PointCloud& points) {
+    Point3 low = points.front();
+    Point3 high = low;
+    for (const Point3& p : points) {
+        low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+        high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+    }
+    Random random(kSeed);
+    const auto count = static_cast<std::size_t>(kOutlierShare * static_cast<double>(points.size()));
+    for (std::size_t i = 0; i < count; ++i) {
+        points.push_back(
+            {random.uniform(low.x, high.x), random.uniform(low.y, high.y), random.uniform(low.z, high.z)});
+    }
+}
+
+// Cuts off what lies farthest in a random direction.
+void cutCap(PointCloud& points) {
+    Random random(kSeed);
+    const Point3 direction = randomDirection(random);
+    std::sort(points.begin(), points.end(),
+              [&](const Point3& a, const Point3& b) { return dot(a, direction) < dot(b, direction); });
+    points.resize(static_cast<std::size_t>(kKeptShare * static_cast<double>(points.size())));
+}
+
+Result<PointCloud> damaged(PointCloud points, const Condition& condition) {
+    switch (condition.damage) {
+        case Damage::kNoise: {
+            if (auto added = addGaussianNoise(points, condition.noise, kSeed); !added)
+                return fail(added.error());
+            break;
+        }
+        case Damage::kOutliers: addOutliers(points); break;
+        case Damage::kCap: cutCap(points); break;
+    }
+    return points;
+}
+
+// Of one shape or the mean over a class.
+struct Figures {
+    double volumeError = 0.0;  // |volume / true volume - 1|, at most 1
+    double worst = 0.0;
+    double sizeError = 0.0;
+    double quality = 0.0;
+    double seconds = 0.0;
+    std::size_t shapes = 0;
+    std::size_t failed = 0;
+
+    void add(const Figures& other) {
+        volumeError += other.volumeError;
+        worst = std::max(worst, other.worst);
+        sizeError += other.sizeError;
+        quality += other.quality;
+        seconds += other.seconds;
+        shapes += other.shapes;
+        failed += other.failed;
+    }
+    double mean(double sum) const { return shapes == 0 ? 0.0 : sum / static_cast<double>(shapes); }
+};
+
+using Row = std::array<Figures, kConditions.size()>;
+
+// The truth is what the method as published finds in the clean scan, and the box of its points.
+Result<Row> measure(const PointCloud& clean, const RunContext& context) {
+    SegmentationOptions published = parametersOf(Profile::kPaper).segmentation;
+    const auto truth = segment(clean, published, context);
+    if (!truth) return fail(truth.error());
+    const auto size = smallestBoxDiagonal(clean);
+    if (!size) return fail(size.error());
+    Row row;
+    for (std::size_t i = 0; i < kConditions.size(); ++i) {
+        const auto points = damaged(clean, kConditions[i]);
+        if (!points) return fail(points.error());
+        Figures& figures = row[i];
+        figures.shapes = 1;
+        const auto found = segment(*points, parametersOf(Profile::kDefault).segmentation, context);
+        if (!found && found.error().code == ErrorCode::kCancelled) return fail(found.error());
+        if (!found) {
+            figures = {1.0, 1.0, 1.0, 0.0, 0.0, 1, 1};
+            continue;
+        }
+        figures.volumeError = std::min(1.0, std::abs(found->volume / truth->volume - 1.0));
+        figures.worst = figures.volumeError;
+        figures.sizeError = std::abs(found->size / *size - 1.0);
+        figures.quality = found->quality;
+        figures.seconds = found->totalSeconds;
+    }
+    return row;
+}
+
+std::string cell(const char* format, double value) {
+    std::array<char, 32> buffer{};
+    std::snprintf(buffer.data(), buffer.size(), format, value);
+    return buffer.data();
+}
+
+std::string line(const std::string& name, const Row& row) {
+    std::string text = "| " + name + " |";
+    for (const Figures& f : row) {
+        text +=
+            " " + cell("%.1f", 100.0 * f.mean(f.volumeError)) + " / " + cell("%.1f", 100.0 * f.worst) + " |";
+    }
+    return text + "\n";
+}
+
+template <typename Value>
+std::string summary(const std::string& name, const Row& all, const char* format, Value value) {
+    std::string text = "| " + name + " |";
+    for (const Figures& f : all) text += " " + cell(format, value(f)) + " |";
+    return text + "\n";
+}
+
+std::string header() {
+    std::string text = "| class |";
+    std::string rule = "|---|";
+    for (const Condition& condition : kConditions) {
+        text += " " + std::string(condition.name) + " |";
+        rule += "---|";
+    }
+    return text + "\n" + rule + "\n";
+}
+
+Result<int> runInterior(const std::string& folder, std::size_t perClass, Bench& bench) {
+    const auto scans = cli::listClasses(folder, {});
+    if (!scans) return fail(scans.error());
+    std::map<std::string, Row> classes;
+    std::map<std::string, std::size_t> taken;
+    Row all;
+    for (const auto& scan : *scans) {
+        if (perClass != 0 && taken[scan.label] == perClass) continue;
+        ++taken[scan.label];
+        const auto read = readScan(scan.path);
+        if (!read) return fail(read.error());
+        const auto row = measure(read->points, bench.context());
+        if (!row) return fail(row.error());
+        for (std::size_t i = 0; i < row->size(); ++i) {
+            classes[scan.label][i].add((*row)[i]);
+            all[i].add((*row)[i]);
+        }
+        bench.console.note(scan.path);
+    }
+    std::string text = describe(environment()) + "\n\n" + header();
+    for (const auto& [name, row] : classes) text += line(name, row);
+    text += line("all: mean / worst volume error, %", all);
+    text += summary("size error, mean %", all, "%.2f",
+                    [](const Figures& f) { return 100.0 * f.mean(f.sizeError); });
+    text += summary("quality, mean", all, "%.2f", [](const Figures& f) { return f.mean(f.quality); });
+    text += summary("seconds, mean", all, "%.2f", [](const Figures& f) { return f.mean(f.seconds); });
+    text +=
+        summary("no interior", all, "%.0f", [](const Figures& f) { return static_cast<double>(f.failed); });
+    bench.console.text(text);
+    return cli::kOk;
+}
+
+}  // namespace
+
+void addInteriorOperation(CLI::App& app, Bench& bench) {
+    struct Flags {
+        std::string folder;
+        std::size_t perClass = 0;
+    };
+    auto flags = std::make_shared<Flags>();
+    CLI::App* command = app.add_subcommand(
+        "interior", "Error of the interior's volume and of the size under noise, strays and a missing cap");
+    command->add_option("folder", flags->folder, "Folder of class folders with clean, closed scans")
+        ->required();
+    command->add_option("--per-class", flags->perClass, "Shapes of each class to take (0: all)");
+    command->callback([flags, &bench] {
+        bench.action = [flags, &bench] { return runInterior(flags->folder, flags->perClass, bench); };
+    });
+}
+
+}  // namespace shapedb::bench
