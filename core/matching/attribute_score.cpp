@@ -11,21 +11,25 @@ namespace {
 
 // What two unrelated shapes differ by (median over pairs of different synthetic families): it
 // gives every term an equal say, whatever the number of its bins.
-constexpr std::array<double, kStatisticKinds> kTypical{2.43, 3.64, 4.64, 1.18, 4.04, 0.90, 3.68};
-constexpr double kTypicalDisagreement = 0.65;
+constexpr std::array<double, kStatisticKinds> kTypical{2.17, 3.27, 3.91, 1.10, 4.41, 1.27, 4.07};
+constexpr double kTypicalDisagreement = 0.9;
 
 // Parts say both which parts there are and where they lie: two of the statistics' worth.
 constexpr double kPartsWeight = 2.0;
 
 // An interior that could not be told still says something.
-constexpr double kLeastTrust = 0.1;
+constexpr double kLeastTrust = 0.05;
 
 constexpr double kBinsPerUnit = 255.0;
 
-// Falls faster than the quality: a thickness off by half spoils its histograms altogether.
+// An interior of this quality is trusted in full: closed, if noisy. Below, trust falls faster than
+// the quality, for a thickness off by half spoils its histograms altogether.
+constexpr double kTrustedQuality = 2.0 / 3.0;
+
 double trust(const Signature& a, const Signature& b) {
     const double worse = std::min(a.attributes->quality, b.attributes->quality) / 255.0;
-    return std::max(kLeastTrust, worse * std::sqrt(worse));
+    const double share = std::min(1.0, worse / kTrustedQuality);
+    return std::max(kLeastTrust, share * share);
 }
 
 double termDistance(const Signature& a, const Signature& b, std::size_t kind) {
