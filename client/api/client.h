@@ -143,7 +143,7 @@ class Client {
                                                                const RunContext& context = {}) const;
 
     [[nodiscard]] Result<Comparison> compare(const ShapeRef& query, const ShapeRef& other,
-                                             bool reflection = true, bool keepScale = false,
+                                             const CompareOptions& options = {},
                                              const RunContext& context = {}) const;
 
     // ------------------------------------------------------------------------------- collections

@@ -23,6 +23,14 @@ ShapeState fromWire(v1::ShapeState from) {
     }
 }
 
+InteriorSource fromWire(v1::InteriorSource from) {
+    switch (from) {
+        case v1::INTERIOR_SOURCE_POTENTIAL: return InteriorSource::kPotential;
+        case v1::INTERIOR_SOURCE_THICKENED: return InteriorSource::kThickened;
+        default: return InteriorSource::kWalk;
+    }
+}
+
 Motion fromWire(const v1::Motion& from) {
     Motion motion;
     motion.scale = from.scale();
@@ -46,6 +54,15 @@ const char* stateName(ShapeState state) noexcept {
         case ShapeState::kFailed: return "failed";
     }
     return "pending";
+}
+
+const char* sourceName(InteriorSource source) noexcept {
+    switch (source) {
+        case InteriorSource::kWalk: return "walk";
+        case InteriorSource::kPotential: return "potential";
+        case InteriorSource::kThickened: return "thickened";
+    }
+    return "walk";
 }
 
 const char* outcomeName(AddOutcome outcome) noexcept {
@@ -105,6 +122,7 @@ Shape fromWire(const v1::Shape& from) {
     to.created = fromWire(from.created());
     to.updated = fromWire(from.updated());
     if (from.has_failure()) to.failure = fromWire(from.failure());
+    if (from.has_quality()) to.quality = from.quality();
     return to;
 }
 
@@ -124,6 +142,7 @@ IngestEvent fromWire(const v1::IngestEvent& from) {
     to.done = from.done();
     to.total = from.total();
     if (from.has_failure()) to.failure = fromWire(from.failure());
+    if (from.has_quality()) to.quality = from.quality();
     return to;
 }
 
@@ -142,6 +161,15 @@ Signature fromWire(const v1::Signature& from) {
         std::copy_n(point.extents().begin(), count, out.extents.begin());
         to.points.push_back(out);
     }
+    if (from.has_attributes()) {
+        to.attributes.emplace();
+        to.attributes->quality = from.attributes().quality();
+        for (const v1::ShapeStatistic& statistic : from.attributes().statistics()) {
+            to.attributes->statistics.push_back({statistic.name(),
+                                                 {statistic.shares().begin(), statistic.shares().end()},
+                                                 statistic.of_interior()});
+        }
+    }
     return to;
 }
 
@@ -152,6 +180,9 @@ SegmentationReport fromWire(const v1::SegmentationReport& from) {
     to.duplicates = from.duplicates();
     to.strays = from.strays();
     if (from.has_quality()) to.quality = from.quality();
+    to.interiorSource = fromWire(from.interior_source());
+    to.angleDegrees = from.angle_degrees();
+    to.noise = from.noise();
     to.tetrahedra = from.tetrahedra();
     to.interiorTetrahedra = from.interior_tetrahedra();
     to.maxima = from.maxima();
@@ -174,6 +205,9 @@ Explanation fromWire(const v1::Explanation& from) {
     to.unmatchedQuery.assign(from.unmatched_query().begin(), from.unmatched_query().end());
     to.unmatchedHit.assign(from.unmatched_hit().begin(), from.unmatched_hit().end());
     to.degenerate = from.degenerate();
+    for (const v1::ScoreTerm& term : from.terms()) {
+        to.terms.push_back({term.name(), term.distance(), term.weight()});
+    }
     return to;
 }
 
@@ -217,6 +251,7 @@ Collection fromWire(const v1::Collection& from) {
                                        ? InteriorMethod::kAdaptive
                                        : InteriorMethod::kWalk;
     to.parameters.maxPoints = from.signature().max_points();
+    to.parameters.attributes = from.signature().attributes();
     to.generation = from.generation();
     to.created = fromWire(from.created());
     to.shapes = from.shapes();

@@ -38,6 +38,7 @@ void fillParameters(const Parameters& from, Message* to) {
                                                             : v1::INTERIOR_METHOD_ADAPTIVE);
     }
     if (from.maxPoints) to->mutable_signature()->set_max_points(*from.maxPoints);
+    if (from.attributes) to->mutable_signature()->set_attributes(*from.attributes);
 }
 
 [[nodiscard]] v1::AddMode toWire(AddMode mode);

@@ -74,13 +74,13 @@ Result<std::vector<SearchReply>> Client::searchBatch(const SearchOptions& option
     return replies;
 }
 
-Result<Comparison> Client::compare(const ShapeRef& query, const ShapeRef& other, bool reflection,
-                                   bool keepScale, const RunContext& context) const {
+Result<Comparison> Client::compare(const ShapeRef& query, const ShapeRef& other,
+                                   const CompareOptions& options, const RunContext& context) const {
     v1::CompareRequest request;
     fill(query, request.mutable_query());
     fill(other, request.mutable_other());
-    request.set_forbid_reflection(!reflection);
-    request.set_keep_scale(keepScale);
+    request.set_forbid_reflection(!options.reflection);
+    request.set_keep_scale(options.keepScale);
     const auto response = callUnary(impl_->options, context, kIdempotent, *impl_->search,
                                     &v1::SearchService::Stub::Compare, request);
     if (!response) return fail(response.error());

@@ -58,6 +58,7 @@ struct Parameters {
     std::optional<double> evenSpacing;             ///< (0, 10]; 0: no point is thinned away
     std::optional<InteriorMethod> interiorMethod;  ///< how the interior is found
     std::optional<std::uint32_t> maxPoints;        ///< heaviest segments kept, 1 to 16
+    std::optional<bool> attributes;                ///< false: points and weights alone, as published
 };
 
 /// Names one shape. An empty collection is "default".
@@ -88,6 +89,9 @@ struct Shape {
     Timestamp created;
     Timestamp updated;
     std::optional<Error> failure;  ///< set exactly when state is kFailed
+    /// How well the interior could be told from the outside, [0, 1]; not set without a signature
+    /// that has attributes.
+    std::optional<double> quality;
 };
 
 enum class AddMode {
@@ -143,6 +147,7 @@ struct IngestEvent {
     std::uint64_t done = 0;
     std::uint64_t total = 0;  ///< in the stage's own unit; 0: unknown
     std::optional<Error> failure;
+    std::optional<double> quality;  ///< when kReady: Shape::quality
 };
 
 /// One segment of a shape as its signature keeps it.
@@ -155,12 +160,36 @@ struct WeightedPoint {
     std::array<double, 3> extents{};
 };
 
+/// One histogram that no rotation, reflection, translation or scale changes.
+struct ShapeStatistic {
+    std::string name;           ///< for people: "chords"
+    std::vector<float> shares;  ///< of each bin, [0, 1]
+    bool ofInterior = false;    ///< false: of the surface alone, good for open scans too
+};
+
+/// What a signature knows of a shape beyond its weighted points.
+struct ShapeAttributes {
+    double quality = 0.0;                    ///< of the interior, [0, 1]
+    std::vector<ShapeStatistic> statistics;  ///< empty in SearchReply::query
+};
+
 struct Signature {
     std::vector<WeightedPoint> points;  ///< by falling weight; never empty
     double scale = 0.0;                 ///< diagonal of the bounding box, scan units
     double volume = 0.0;                ///< of the whole interior, scan units cubed
     std::string encoded;                ///< what searchBySignature takes
+    std::optional<ShapeAttributes> attributes;
 };
+
+/// Where an interior comes from.
+enum class InteriorSource {
+    kWalk,       ///< what a walk from outside leaves
+    kPotential,  ///< what the potential puts inside: a walk would leak in, or be shut out of a cavity
+    kThickened,  ///< no side can be told: the neighbourhood of the points
+};
+
+/// "walk", "potential" or "thickened".
+[[nodiscard]] const char* sourceName(InteriorSource source) noexcept;
 
 struct StageTime {
     std::string stage;
@@ -175,6 +204,9 @@ struct SegmentationReport {
     std::uint64_t strays = 0;  ///< points left out
     /// How well the interior could be told from the outside, [0, 1]. Always 1 with kWalk.
     double quality = 1.0;
+    InteriorSource interiorSource = InteriorSource::kWalk;
+    double angleDegrees = 0.0;  ///< deep angle of the walk; 0 when the interior comes from elsewhere
+    double noise = 0.0;         ///< estimated before smoothing, scan units; 0: not measured
     std::uint64_t tetrahedra = 0;
     std::uint64_t interiorTetrahedra = 0;
     std::uint64_t maxima = 0;  ///< segments before merging
@@ -203,12 +235,24 @@ struct SearchOptions {
     bool explanation = true;  ///< false leaves out motion and matches of each hit
 };
 
+struct CompareOptions {
+    bool reflection = true;  ///< false tells left from right
+    bool keepScale = false;  ///< true compares sizes too
+};
+
 /// Two segments that an alignment lays on each other.
 struct SegmentMatch {
     std::uint32_t query = 0;  ///< index into the query's Signature::points
     std::uint32_t hit = 0;    ///< index into the hit's
     double share = 0.0;       ///< of the similarity, [0, 1]
     double distance = 0.0;    ///< after the motion, in units of the common scale
+};
+
+/// One of the distances a score of signatures with attributes is made of.
+struct ScoreTerm {
+    std::string name;       ///< of a statistic, or "parts"
+    double distance = 0.0;  ///< 1: as far as two unrelated shapes typically differ
+    double weight = 0.0;    ///< in the mean; all terms' sum to 1
 };
 
 /// Why two shapes have their score.
@@ -219,7 +263,8 @@ struct Explanation {
     std::vector<SegmentMatch> matches;  ///< by falling share
     std::vector<std::uint32_t> unmatchedQuery;
     std::vector<std::uint32_t> unmatchedHit;
-    bool degenerate = false;  ///< a single-segment signature left the rotation open
+    bool degenerate = false;       ///< a single-segment signature left the rotation open
+    std::vector<ScoreTerm> terms;  ///< empty unless both signatures have attributes
 };
 
 struct Hit {

@@ -161,6 +161,7 @@ void waitForAll(Session& session, const client::Client& client, const AddFlags& 
             }
             shape.state = last->state;
             shape.failure = last->failure;
+            shape.quality = last->quality;
         }
         if (shape.failure) upload.failure = shape.failure;
     }
@@ -189,14 +190,22 @@ json uploadsJson(const std::vector<Upload>& uploads) {
 std::string uploadsText(const std::vector<Upload>& uploads) {
     std::map<std::string, std::size_t> outcomes;
     std::size_t stored = 0;
-    Table table({{"key"}, {"label"}, {"points", Table::Align::kRight}, {"outcome"}, {"state"}});
+    std::size_t doubtful = 0;
+    Table table({{"key"},
+                 {"label"},
+                 {"points", Table::Align::kRight},
+                 {"outcome"},
+                 {"state"},
+                 {"quality", Table::Align::kRight}});
     for (const Upload& upload : uploads) {
         if (!upload.reply) continue;
         const client::Shape& shape = upload.reply->shape;
         ++outcomes[client::outcomeName(upload.reply->outcome)];
         ++stored;
         table.add({shape.key, labelOf(shape), formatCount(shape.pointCount),
-                   client::outcomeName(upload.reply->outcome), client::stateName(shape.state)});
+                   client::outcomeName(upload.reply->outcome), client::stateName(shape.state),
+                   shape.quality ? formatFixed(*shape.quality, 2) : std::string()});
+        if (shape.quality && *shape.quality < kQualityWorthWarning) ++doubtful;
     }
     std::string text = stored > 0 && stored <= kListedFiles ? table.render() + "\n" : std::string();
     text += formatCount(stored, "scan", "scans") + " stored";
@@ -204,6 +213,10 @@ std::string uploadsText(const std::vector<Upload>& uploads) {
     for (const auto& [outcome, count] : outcomes) {
         text += separator + formatCount(count) + " " + outcome;
         separator = ", ";
+    }
+    if (doubtful > 0) {
+        text += "; in " + formatCount(doubtful) + " of them the interior is a guess (quality below " +
+                formatNumber(kQualityWorthWarning) + ")";
     }
     return text + "\n";
 }

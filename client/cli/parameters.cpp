@@ -46,6 +46,8 @@ const char* nameOf(client::InteriorMethod method) {
     return method == client::InteriorMethod::kWalk ? "walk" : "adaptive";
 }
 
+const char* onOrOff(bool value) { return value ? "on" : "off"; }
+
 std::string text(const char* value) { return value; }
 std::string text(double value) { return formatNumber(value); }
 std::string text(std::uint32_t value) { return std::to_string(value); }
@@ -75,6 +77,7 @@ Result<ShapeParameters> ParameterFlags::resolve() const {
             *interior == "walk" ? InteriorMethod::kWalk : InteriorMethod::kAdaptive;
     }
     if (numbers.maxPoints) parameters.signature.maxPoints = *numbers.maxPoints;
+    if (numbers.attributes) parameters.signature.attributes = *numbers.attributes;
     if (const auto valid = validate(parameters); !valid) return fail(valid.error());
     return parameters;
 }
@@ -92,7 +95,7 @@ client::Parameters ParameterFlags::forServer() const {
 }
 
 bool ParameterFlags::any() const {
-    bool given = profile || interior || numbers.maxPoints;
+    bool given = profile || interior || numbers.maxPoints || numbers.attributes;
     visitNumbers([&](const char*, const char*, auto member, auto, const char*) {
         given = given || (numbers.*member).has_value();
     });
@@ -118,6 +121,11 @@ void addParameterFlags(CLI::App& command, ParameterFlags& flags) {
     group->add_option("--max-points,--segments", flags.numbers.maxPoints,
                       "Heaviest segments kept in the signature, 1 to " + std::to_string(kMaxSignaturePoints) +
                           defaults(standard.signature.maxPoints, paper.signature.maxPoints));
+    group->add_flag_function(
+        "--attributes,!--no-attributes",
+        [&flags](std::int64_t count) { flags.numbers.attributes = count > 0; },
+        "Keep and score what the shape says as a whole, or points and weights alone" +
+            defaults(onOrOff(standard.signature.attributes), onOrOff(paper.signature.attributes)));
 }
 
 ScoreOptions ScoreFlags::resolve() const {
@@ -136,7 +144,8 @@ void addScoreFlags(CLI::App& command, ScoreFlags& flags) {
 nlohmann::json toJson(const ShapeParameters& parameters) {
     nlohmann::json out = {{"profile", profileName(parameters.profile)},
                           {"interior_method", nameOf(parameters.segmentation.interiorMethod)},
-                          {"max_points", parameters.signature.maxPoints}};
+                          {"max_points", parameters.signature.maxPoints},
+                          {"attributes", parameters.signature.attributes}};
     visitNumbers([&](const char*, const char* name, auto, auto used, const char*) {
         out[name] = parameters.segmentation.*used;
     });
@@ -147,7 +156,8 @@ nlohmann::json toJson(const client::Parameters& parameters) {
     nlohmann::json out = {
         {"profile", parameters.profile == client::Profile::kPaper ? "paper" : "default"},
         {"interior_method", nameOf(parameters.interiorMethod.value_or(client::InteriorMethod::kWalk))},
-        {"max_points", parameters.maxPoints.value_or(0)}};
+        {"max_points", parameters.maxPoints.value_or(0)},
+        {"attributes", parameters.attributes.value_or(false)}};
     visitNumbers([&](const char*, const char* name, auto given, auto, const char*) {
         out[name] = (parameters.*given).value_or(0);
     });

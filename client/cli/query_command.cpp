@@ -60,7 +60,7 @@ std::string replyText(const QueryFlags& flags, const client::SearchReply& reply)
         text += flags.path + ": " + formatCount(reply.report->points, "point", "points") + ", " +
                 formatCount(reply.report->segments, "segment", "segments") + ", segmented in " +
                 formatSeconds(reply.secondsSegment) + "\n";
-        if (reply.report->quality < 1.0) text += qualityText(reply.report->quality);
+        if (reply.report->quality < 1.0) text += interiorText(*reply.report);
     }
     text += formatCount(reply.candidates, "shape", "shapes") + " searched";
     if (reply.filtered != reply.candidates) text += ", " + formatCount(reply.filtered) + " of them asked for";

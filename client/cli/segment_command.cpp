@@ -35,6 +35,7 @@ nlohmann::json segmentJson(const SegmentFlags& flags, const Scan& scan, const Sh
     document["parameters"] = toJson(parameters);
     document["scale"] = signature.scale;
     document["signature"] = pointsJson(signature);
+    if (signature.attributes) document["statistics"] = statisticsJson(signature);
     if (!flags.out.empty()) document["out"] = flags.out;
     return document;
 }
@@ -53,7 +54,7 @@ std::string segmentText(const SegmentFlags& flags, const Scan& scan, const Shape
             profileName(parameters.profile) + ") in " + formatSeconds(report.totalSeconds) + ", " +
             formatSeconds(report.delaunaySeconds) + " of it Delaunay\n";
     if (parameters.segmentation.interiorMethod == InteriorMethod::kAdaptive) {
-        text += qualityText(report.quality);
+        text += interiorText(report);
     }
     text += "\nThe " + std::to_string(signature.points.size()) + " heaviest:\n" + signatureTable(signature);
     if (!flags.out.empty()) text += "\nPoints coloured by segment: " + flags.out + "\n";

@@ -39,6 +39,7 @@ std::string shapeText(const client::Shape& shape) {
             {"failure", std::string(errorCodeName(shape.failure->code)) + ": " + shape.failure->message});
     }
     table.add({"points", formatCount(shape.pointCount)});
+    if (shape.quality) table.add({"quality", formatFixed(*shape.quality, 2) + " of 1"});
     for (const auto& [name, value] : shape.metadata) table.add({name, value});
     return table.render();
 }
@@ -73,9 +74,16 @@ CommandResult runSignature(Session& session, const KeyFlags& flags) {
     if (!signature) return fail(signature.error());
     json document = toJson(*signature);
     document["key"] = flags.shape.key;
+    std::string text = flags.shape.key + ": volume " + formatNumber(signature->volume) + ", diagonal " +
+                       formatNumber(signature->scale) + "\n";
+    if (signature->attributes) {
+        document["statistics"] = statisticsJson(*signature);
+        text += qualityText(signature->attributes->quality);
+    }
+    text += "\n" + signatureTable(*signature);
+    if (signature->attributes) text += "\n" + statisticsTable(*signature);
     session.console().document(document);
-    session.console().text(flags.shape.key + ": volume " + formatNumber(signature->volume) + ", diagonal " +
-                           formatNumber(signature->scale) + "\n\n" + signatureTable(*signature));
+    session.console().text(text);
     return kOk;
 }
 
@@ -85,6 +93,7 @@ json eventJson(const client::IngestEvent& event) {
         document.update({{"stage", event.stage}, {"done", event.done}, {"total", event.total}});
     }
     if (event.failure) document["failure"] = toJson(*event.failure);
+    if (event.quality) document["quality"] = *event.quality;
     return document;
 }
 
@@ -108,7 +117,8 @@ CommandResult runWatch(Session& session, const KeyFlags& flags) {
     document["key"] = flags.shape.key;
     document["events"] = events;
     session.console().document(document);
-    session.console().text(flags.shape.key + ": " + client::stateName(last->state) + "\n");
+    session.console().text(flags.shape.key + ": " + client::stateName(last->state) +
+                           (last->quality ? ", " + qualityText(*last->quality) : "\n"));
     if (!last->failure) return kOk;
     session.console().note(flags.shape.key + ": " + last->failure->message);
     return exitCodeOf(last->failure->code);

@@ -1,8 +1,10 @@
 #include "client/cli/shape_output.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <ctime>
+#include <set>
 
 #include <nlohmann/json.hpp>
 
@@ -19,8 +21,6 @@ namespace {
 constexpr std::size_t kPairsTold = 3;
 /// Pairs that contribute less than this share of the similarity are not worth a reader's time.
 constexpr double kShareWorthTelling = 0.01;
-/// Below, the user should know before trusting what follows.
-constexpr double kQualityWorthWarning = 0.5;
 
 json pointJson(const Point3& p) { return json::array({p.x, p.y, p.z}); }
 
@@ -81,6 +81,14 @@ std::string unmatchedText(const client::Explanation& explanation, const client::
     return text.empty() ? text : "Without a partner: " + text + ".\n";
 }
 
+std::string termsText(const client::Explanation& explanation) {
+    std::string text;
+    for (const client::ScoreTerm& term : explanation.terms) {
+        text += (text.empty() ? "" : ", ") + term.name + " " + formatFixed(term.distance, 2);
+    }
+    return text.empty() ? text : "Differences, 1 being what unrelated shapes differ by: " + text + ".\n";
+}
+
 std::string motionText(const client::Explanation& explanation, const std::string& hitName) {
     const Motion& motion = explanation.motion;
     std::string text = "To get there " + hitName + " is ";
@@ -95,10 +103,34 @@ std::string motionText(const client::Explanation& explanation, const std::string
     return text + (motion.reflected ? ".\n" : " and not mirrored.\n");
 }
 
+client::ShapeAttributes toClient(const ShapeAttributes& attributes) {
+    client::ShapeAttributes out;
+    out.quality = attributes.quality / 255.0;
+    for (const StatisticLayout& layout : kStatistics) {
+        client::ShapeStatistic statistic{layout.name, {}, layout.ofInterior};
+        for (std::size_t i = layout.offset; i < std::size_t{layout.offset} + layout.count; ++i) {
+            const float root = static_cast<float>(attributes.statistics[i]) / 255.0f;
+            statistic.shares.push_back(root * root);
+        }
+        out.statistics.push_back(std::move(statistic));
+    }
+    return out;
+}
+
+client::InteriorSource toClient(InteriorSource source) {
+    switch (source) {
+        case InteriorSource::kWalk: return client::InteriorSource::kWalk;
+        case InteriorSource::kPotential: return client::InteriorSource::kPotential;
+        case InteriorSource::kThickened: return client::InteriorSource::kThickened;
+    }
+    return client::InteriorSource::kWalk;
+}
+
 }  // namespace
 
 client::Signature toClient(const Signature& signature) {
     client::Signature out;
+    if (signature.attributes) out.attributes = toClient(*signature.attributes);
     out.scale = signature.scale;
     out.volume = signature.volume;
     out.encoded = encodeSignature(signature);
@@ -125,6 +157,9 @@ client::Explanation toClient(const Explanation& explanation) {
     out.unmatchedQuery = explanation.unmatchedA;
     out.unmatchedHit = explanation.unmatchedB;
     out.degenerate = explanation.degenerate;
+    for (const ScoreTerm& term : explanation.terms) {
+        out.terms.push_back({term.name, term.distance, term.weight});
+    }
     return out;
 }
 
@@ -135,6 +170,9 @@ client::SegmentationReport reportOf(const Segmentation& segmentation) {
     report.duplicates = segmentation.duplicates;
     report.strays = segmentation.strays;
     report.quality = segmentation.quality;
+    report.interiorSource = toClient(segmentation.interiorSource);
+    report.angleDegrees = segmentation.angleDegrees;
+    report.noise = segmentation.noise;
     report.tetrahedra = segmentation.tetrahedra.size();
     report.interiorTetrahedra = segmentation.interiorTetrahedra;
     report.maxima = segmentation.maxima;
@@ -170,8 +208,19 @@ json pointsJson(const client::Signature& signature) {
     return points;
 }
 
+json statisticsJson(const client::Signature& signature) {
+    json statistics = json::object();
+    if (!signature.attributes) return statistics;
+    for (const client::ShapeStatistic& statistic : signature.attributes->statistics) {
+        statistics[statistic.name] = statistic.shares;
+    }
+    return statistics;
+}
+
 json toJson(const client::Signature& signature) {
-    return {{"points", pointsJson(signature)}, {"scale", signature.scale}, {"volume", signature.volume}};
+    json out = {{"points", pointsJson(signature)}, {"scale", signature.scale}, {"volume", signature.volume}};
+    if (signature.attributes) out["quality"] = signature.attributes->quality;
+    return out;
 }
 
 json toJson(const client::SegmentationReport& report) {
@@ -182,6 +231,9 @@ json toJson(const client::SegmentationReport& report) {
             {"duplicates", report.duplicates},
             {"strays", report.strays},
             {"quality", report.quality},
+            {"interior_source", client::sourceName(report.interiorSource)},
+            {"angle_degrees", report.angleDegrees},
+            {"estimated_noise", report.noise},
             {"tetrahedra", report.tetrahedra},
             {"interior_tetrahedra", report.interiorTetrahedra},
             {"maxima", report.maxima},
@@ -219,6 +271,19 @@ std::string qualityText(double quality) {
     return text + "\n";
 }
 
+std::string interiorText(const client::SegmentationReport& report) {
+    std::string text = "interior: ";
+    switch (report.interiorSource) {
+        case client::InteriorSource::kWalk:
+            text += "what a walk from outside leaves at " + formatNumber(report.angleDegrees) + " degrees";
+            break;
+        case client::InteriorSource::kPotential: text += "what the potential puts inside"; break;
+        case client::InteriorSource::kThickened: text += "the neighbourhood of the points"; break;
+    }
+    if (report.noise > 0.0) text += "; noise " + formatNumber(report.noise);
+    return text + "\n" + qualityText(report.quality);
+}
+
 json toJson(const client::Explanation& explanation) {
     json matches = json::array();
     for (const client::SegmentMatch& match : explanation.matches) {
@@ -226,6 +291,10 @@ json toJson(const client::Explanation& explanation) {
                            {"hit", match.hit},
                            {"share", match.share},
                            {"distance", match.distance}});
+    }
+    json terms = json::array();
+    for (const client::ScoreTerm& term : explanation.terms) {
+        terms.push_back({{"name", term.name}, {"distance", term.distance}, {"weight", term.weight}});
     }
     const Motion& motion = explanation.motion;
     return {{"similarity", explanation.similarity},
@@ -239,7 +308,8 @@ json toJson(const client::Explanation& explanation) {
             {"matches", matches},
             {"unmatched_query", explanation.unmatchedQuery},
             {"unmatched_hit", explanation.unmatchedHit},
-            {"degenerate", explanation.degenerate}};
+            {"degenerate", explanation.degenerate},
+            {"terms", terms}};
 }
 
 json toJson(const client::Shape& shape) {
@@ -256,6 +326,7 @@ json toJson(const client::Shape& shape) {
     if (shape.failure) {
         out["failure"] = {{"name", errorCodeName(shape.failure->code)}, {"message", shape.failure->message}};
     }
+    if (shape.quality) out["quality"] = *shape.quality;
     return out;
 }
 
@@ -274,6 +345,23 @@ std::string signatureTable(const client::Signature& signature) {
     return table.render();
 }
 
+std::string statisticsTable(const client::Signature& signature) {
+    static constexpr std::array<const char*, 9> kHeights = {" ", "▁", "▂", "▃", "▄", "▅", "▆", "▇", "█"};
+    if (!signature.attributes) return {};
+    Table table({{"statistic"}, {"how it is spread"}});
+    for (const client::ShapeStatistic& statistic : signature.attributes->statistics) {
+        const auto largest = std::max_element(statistic.shares.begin(), statistic.shares.end());
+        std::string spread;
+        for (const float share : statistic.shares) {
+            // Roots, as the score compares them: a rare bin is still seen.
+            const double height = *largest > 0.0f ? std::sqrt(share / *largest) : 0.0;
+            spread += kHeights[static_cast<std::size_t>(std::lround(8.0 * std::clamp(height, 0.0, 1.0)))];
+        }
+        table.add({statistic.name, spread});
+    }
+    return table.render();
+}
+
 double rotationDegrees(const Motion& motion) {
     const double trace = motion.rotation[0][0] + motion.rotation[1][1] + motion.rotation[2][2];
     const double cosine = motion.reflected ? (trace + 1.0) / 2.0 : (trace - 1.0) / 2.0;
@@ -282,11 +370,14 @@ double rotationDegrees(const Motion& motion) {
 
 std::string explanationText(const client::Explanation& explanation, const client::Signature& query,
                             const std::string& queryName, const std::string& hitName) {
-    if (explanation.matches.empty())
-        return "No segment of " + queryName + " lies on one of " + hitName + ".\n";
+    if (explanation.matches.empty()) {
+        return "No segment of " + queryName + " lies on one of " + hitName + ".\n" + termsText(explanation);
+    }
+    std::set<std::uint32_t> matched;
+    for (const auto& match : explanation.matches) matched.insert(match.query);
     double matchedVolume = 0.0;
-    for (const auto& match : explanation.matches) matchedVolume += volumeShareOf(query, match.query);
-    const std::size_t count = explanation.matches.size();
+    for (const std::uint32_t index : matched) matchedVolume += volumeShareOf(query, index);
+    const std::size_t count = matched.size();
     std::string text = formatCount(count) + " of " + formatCount(query.points.size(), "segment", "segments") +
                        " of " + queryName + ", " + formatPercent(matchedVolume) + " of its volume, " +
                        (count == 1 ? "lies" : "lie") + " on segments of " + hitName + ": " +
@@ -294,7 +385,7 @@ std::string explanationText(const client::Explanation& explanation, const client
     text += explanation.degenerate
                 ? "One of the two is a single segment, so nothing fixes how it is turned.\n"
                 : motionText(explanation, hitName);
-    return text + unmatchedText(explanation, query, queryName, hitName);
+    return text + unmatchedText(explanation, query, queryName, hitName) + termsText(explanation);
 }
 
 }  // namespace shapedb::cli

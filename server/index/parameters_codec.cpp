@@ -42,6 +42,16 @@ class ObjectReader {
         }
     }
 
+    void read(const char* name, bool& value) {
+        if (const Json* member = find(name)) {
+            if (member->is_boolean()) {
+                value = member->get<bool>();
+            } else {
+                note("is neither true nor false", name);
+            }
+        }
+    }
+
     void read(const char* name, std::string& value) {
         if (const Json* member = find(name)) {
             if (member->is_string()) {
@@ -154,7 +164,8 @@ std::string encodeParameters(const ShapeParameters& parameters) {
                             {"smoothing_reach", segmentation.smoothingReach},
                             {"even_spacing", segmentation.evenSpacing},
                             {"interior_method", nameOf(segmentation.interiorMethod)}};
-    json["signature"] = {{"max_points", parameters.signature.maxPoints}};
+    json["signature"] = {{"max_points", parameters.signature.maxPoints},
+                         {"attributes", parameters.signature.attributes}};
     return json.dump();
 }
 
@@ -181,6 +192,7 @@ Result<ShapeParameters> decodeParameters(const std::string& text) {
 
         ObjectReader signature(signatureJson != nullptr ? *signatureJson : empty, "signature.");
         signature.read("max_points", parameters.signature.maxPoints);
+        signature.read("attributes", parameters.signature.attributes);
         if (const std::string problem = signature.problem(); !problem.empty()) return damaged(problem);
 
         if (const Result<void> valid = validate(parameters); !valid) return damaged(valid.error().message);

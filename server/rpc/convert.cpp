@@ -29,6 +29,15 @@ pb::InteriorMethod toProto(InteriorMethod method) {
     return pb::INTERIOR_METHOD_WALK;
 }
 
+pb::InteriorSource toProto(InteriorSource source) {
+    switch (source) {
+        case InteriorSource::kWalk: return pb::INTERIOR_SOURCE_WALK;
+        case InteriorSource::kPotential: return pb::INTERIOR_SOURCE_POTENTIAL;
+        case InteriorSource::kThickened: return pb::INTERIOR_SOURCE_THICKENED;
+    }
+    return pb::INTERIOR_SOURCE_UNSPECIFIED;
+}
+
 tl::unexpected<Error> unknownNumber(const char* field, int value) {
     return fail(ErrorCode::kInvalidArgument,
                 std::string(field) + ": " + std::to_string(value) + " is not a value this server knows");
@@ -59,7 +68,13 @@ void toProto(const Error& failure, pb::Failure* out) {
     out->set_message(failure.message);
 }
 
-void toProto(const store::Shape& shape, const std::string& collection, pb::Shape* out) {
+std::optional<double> qualityOf(const Signature& signature) {
+    if (!signature.attributes) return std::nullopt;
+    return signature.attributes->quality / 255.0;
+}
+
+void toProto(const store::Shape& shape, const std::string& collection, const SignatureSet::EntryPtr& entry,
+             pb::Shape* out) {
     out->set_collection(collection);
     out->set_key(shape.key);
     out->set_id(shape.id);
@@ -71,6 +86,8 @@ void toProto(const store::Shape& shape, const std::string& collection, pb::Shape
     toProto(shape.createdAt, out->mutable_created());
     toProto(shape.updatedAt, out->mutable_updated());
     if (shape.failure) toProto(*shape.failure, out->mutable_failure());
+    const auto quality = entry ? qualityOf(entry->signature) : std::nullopt;
+    if (quality) out->set_quality(*quality);
 }
 
 void toProto(const store::Collection& collection, const ShapeParameters& parameters, pb::Collection* out) {
@@ -91,8 +108,22 @@ void toProto(const store::Collection& collection, const ShapeParameters& paramet
     segmentation->set_even_spacing(parameters.segmentation.evenSpacing);
     segmentation->set_interior_method(toProto(parameters.segmentation.interiorMethod));
     out->mutable_signature()->set_max_points(parameters.signature.maxPoints);
+    out->mutable_signature()->set_attributes(parameters.signature.attributes);
     out->set_generation(collection.generation);
     toProto(collection.createdAt, out->mutable_created());
+}
+
+void toProto(const ShapeAttributes& attributes, pb::ShapeAttributes* out) {
+    out->set_quality(attributes.quality / 255.0);
+    for (const StatisticLayout& layout : kStatistics) {
+        pb::ShapeStatistic* statistic = out->add_statistics();
+        statistic->set_name(layout.name);
+        statistic->set_of_interior(layout.ofInterior);
+        for (std::size_t i = layout.offset; i < std::size_t{layout.offset} + layout.count; ++i) {
+            const float root = static_cast<float>(attributes.statistics[i]) / 255.0f;
+            statistic->add_shares(root * root);
+        }
+    }
 }
 
 void toProto(const Signature& signature, pb::Signature* out) {
@@ -108,6 +139,7 @@ void toProto(const Signature& signature, pb::Signature* out) {
     out->set_scale(signature.scale);
     out->set_volume(signature.volume);
     out->set_encoded(encodeSignature(signature));
+    if (signature.attributes) toProto(*signature.attributes, out->mutable_attributes());
 }
 
 void toProto(const Segmentation& segmentation, pb::SegmentationReport* out) {
@@ -116,6 +148,9 @@ void toProto(const Segmentation& segmentation, pb::SegmentationReport* out) {
     out->set_duplicates(segmentation.duplicates);
     out->set_strays(segmentation.strays);
     out->set_quality(segmentation.quality);
+    out->set_interior_source(toProto(segmentation.interiorSource));
+    out->set_angle_degrees(segmentation.angleDegrees);
+    out->set_noise(segmentation.noise);
     out->set_tetrahedra(segmentation.tetrahedra.size());
     out->set_interior_tetrahedra(segmentation.interiorTetrahedra);
     out->set_maxima(segmentation.maxima);
@@ -150,6 +185,12 @@ void toProto(const Explanation& explanation, pb::Explanation* out) {
     for (const std::uint32_t segment : explanation.unmatchedA) out->add_unmatched_query(segment);
     for (const std::uint32_t segment : explanation.unmatchedB) out->add_unmatched_hit(segment);
     out->set_degenerate(explanation.degenerate);
+    for (const ScoreTerm& term : explanation.terms) {
+        pb::ScoreTerm* part = out->add_terms();
+        part->set_name(term.name);
+        part->set_distance(term.distance);
+        part->set_weight(term.weight);
+    }
 }
 
 Result<std::optional<store::ShapeState>> fromProto(pb::ShapeState state) {
@@ -202,6 +243,7 @@ Result<ShapeParameters> parametersFrom(pb::Profile profile, const pb::Segmentati
         default: return unknownNumber("interior_method", segmentation.interior_method());
     }
     if (signature.has_max_points()) parameters.signature.maxPoints = signature.max_points();
+    if (signature.has_attributes()) parameters.signature.attributes = signature.attributes();
     if (const auto valid = validate(parameters); !valid) return fail(valid.error());
     return parameters;
 }

@@ -19,7 +19,9 @@ namespace shapedb::rpc {
 
 namespace pb = shapedb::v1;
 
-void toProto(const store::Shape& shape, const std::string& collection, pb::Shape* out);
+/// `entry` is the signature that serves, null when there is none.
+void toProto(const store::Shape& shape, const std::string& collection, const SignatureSet::EntryPtr& entry,
+             pb::Shape* out);
 [[nodiscard]] pb::ShapeState toProto(store::ShapeState state);
 void toProto(const Error& failure, pb::Failure* out);
 void toProto(const store::Collection& collection, const ShapeParameters& parameters, pb::Collection* out);
@@ -27,6 +29,9 @@ void toProto(const Signature& signature, pb::Signature* out);
 void toProto(const Segmentation& segmentation, pb::SegmentationReport* out);
 void toProto(const Explanation& explanation, pb::Explanation* out);
 void toProto(store::TimestampMs time, google::protobuf::Timestamp* out);
+
+/// How well the interior behind a signature could be told; empty when it has no attributes.
+[[nodiscard]] std::optional<double> qualityOf(const Signature& signature);
 
 /// Empty for UNSPECIFIED. Errors: kInvalidArgument (a number without a name).
 [[nodiscard]] Result<std::optional<store::ShapeState>> fromProto(pb::ShapeState state);

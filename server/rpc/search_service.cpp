@@ -52,12 +52,15 @@ Result<void> search(const Services& services, const Call& call, const Prepared& 
     response->set_filtered(found->filtered);
     response->set_scored(found->scored);
     toProto(query, response->mutable_query());
+    if (response->query().has_attributes()) {
+        response->mutable_query()->mutable_attributes()->clear_statistics();
+    }
     for (const SearchHit& hit : found->hits) {
         const auto shape = services.store.getShapeById(hit.entry->id);
         if (!shape && shape.error().code == ErrorCode::kNotFound) continue;  // deleted meanwhile
         if (!shape) return fail(shape.error());
         pb::Hit* out = response->add_hits();
-        toProto(*shape, prepared.collection->collection.name, out->mutable_shape());
+        toProto(*shape, prepared.collection->collection.name, hit.entry, out->mutable_shape());
         out->set_score(hit.score);
         if (prepared.explain) {
             toProto(explain(query, hit.entry->signature, prepared.options.score), out->mutable_explanation());

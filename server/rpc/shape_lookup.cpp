@@ -28,6 +28,11 @@ Result<SignatureSet::EntryPtr> findSignature(const FoundShape& found) {
     return fail(ErrorCode::kNotReady, name + " yet: wait until it is READY (WatchIngest)");
 }
 
+SignatureSet::EntryPtr servingSignature(const Services& services, const store::Shape& shape) {
+    const auto collection = services.index.byId(shape.collectionId);
+    return collection ? (*collection)->signatures.find(shape.id) : nullptr;
+}
+
 Result<store::Shape> followIngest(
     const Services& services, std::int64_t shapeId, const std::function<Result<void>()>& checkpoint,
     const std::function<Result<void>(const store::Shape&, const ingest::ProgressBoard::Status&)>& onChange) {
@@ -37,6 +42,12 @@ Result<store::Shape> followIngest(
         const ingest::ProgressBoard::Status status = watch->status();
         auto shape = services.store.getShapeById(shapeId);
         if (!shape) return shape;
+        if (shape->state == store::ShapeState::kReady) {
+            // Stored a moment before it is searched: who hears READY must find it.
+            if (const auto refreshed = services.index.refresh(shape->collectionId, shapeId); !refreshed) {
+                return fail(refreshed.error());
+            }
+        }
         if (const auto told = onChange(*shape, status); !told) return fail(told.error());
         if (shape->state != store::ShapeState::kPending) return shape;
         const auto lookAgain = ingest::ProgressBoard::Clock::now() + kReadStateAgain;

@@ -24,9 +24,12 @@ struct FoundShape {
 /// The cached signature of a shape. Errors: kNotReady, saying whether it is pending or why it failed.
 [[nodiscard]] Result<SignatureSet::EntryPtr> findSignature(const FoundShape& found);
 
-/// Follows a shape until it is no longer pending; calls `onChange` with its row and where the
-/// work stands, at once and after each change. Returns the final row.
-/// Errors: kNotFound (deleted meanwhile), what `onChange` and `checkpoint` return.
+/// The signature that serves a shape now; null when there is none.
+[[nodiscard]] SignatureSet::EntryPtr servingSignature(const Services& services, const store::Shape& shape);
+
+/// Follows a shape until it is no longer pending, and when it is ready searches find it; calls `onChange`
+/// with its row and where the work stands, at once and after each change. Returns the final row. Errors:
+/// kNotFound (deleted meanwhile), what `onChange` and `checkpoint` return.
 [[nodiscard]] Result<store::Shape> followIngest(
     const Services& services, std::int64_t shapeId, const std::function<Result<void>()>& checkpoint,
     const std::function<Result<void>(const store::Shape&, const ingest::ProgressBoard::Status&)>& onChange);

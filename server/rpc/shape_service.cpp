@@ -168,7 +168,7 @@ Result<void> ShapeServiceHandler::addShape(Call& call, grpc::ServerReader<v1::Ad
         put.shape = *settled;
     }
     response.set_outcome(outcomeOf(put.outcome));
-    toProto(put.shape, collectionName, response.mutable_shape());
+    toProto(put.shape, collectionName, servingSignature(services_, put.shape), response.mutable_shape());
     return {};
 }
 
@@ -177,7 +177,8 @@ grpc::Status ShapeServiceHandler::GetShape(grpc::ServerContext* context, const v
     return handle(services_, context, "GetShape", [&](Call& call) -> Result<void> {
         const auto found = findShape(services_, call, request->shape());
         if (!found) return fail(found.error());
-        toProto(found->shape, found->collection->collection.name, response->mutable_shape());
+        toProto(found->shape, found->collection->collection.name,
+                found->collection->signatures.find(found->shape.id), response->mutable_shape());
         return {};
     });
 }
@@ -204,7 +205,8 @@ grpc::Status ShapeServiceHandler::ListShapes(grpc::ServerContext* context,
         std::size_t sent = 0;
         for (; sent < std::min(pageSize, shapes->size()) && bytes < kMaxPageBytes; ++sent) {
             pb::Shape* shape = response->add_shapes();
-            toProto((*shapes)[sent], (*collection)->collection.name, shape);
+            toProto((*shapes)[sent], (*collection)->collection.name,
+                    (*collection)->signatures.find((*shapes)[sent].id), shape);
             bytes += shape->ByteSizeLong();
         }
         if (sent < shapes->size()) response->set_next_cursor(encodeCursor(listing, (*shapes)[sent - 1].id));
@@ -248,7 +250,8 @@ grpc::Status ShapeServiceHandler::DeleteShape(grpc::ServerContext* context,
         if (const auto refreshed = services_.index.refresh(shape->collectionId, shape->id); !refreshed) {
             services_.log->error("deleted shape is still searched", telemetry::fieldsOf(refreshed.error()));
         }
-        toProto(*shape, (*collection)->collection.name, response->mutable_shape());
+        toProto(*shape, (*collection)->collection.name, (*collection)->signatures.find(shape->id),
+                response->mutable_shape());
         return {};
     });
 }
@@ -271,6 +274,11 @@ grpc::Status ShapeServiceHandler::WatchIngest(grpc::ServerContext* context,
                 event.set_total(status.total);
             }
             if (shape.failure) toProto(*shape.failure, event.mutable_failure());
+            if (shape.state == store::ShapeState::kReady) {
+                const auto entry = servingSignature(services_, shape);
+                const auto quality = entry ? qualityOf(entry->signature) : std::nullopt;
+                if (quality) event.set_quality(*quality);
+            }
             const std::string text = event.SerializeAsString();
             if (text == last) return {};
             last = text;

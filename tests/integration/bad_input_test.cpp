@@ -125,7 +125,15 @@ TEST_F(BadInput, ScanWithoutInteriorCannotBeSearchedAndEndsAsFailed) {
     const Scan scan = openSheet();
     expectRefused(searchByScan(client, searchOptions(collection), scan), StatusCode::INVALID_ARGUMENT,
                   "no_interior");
-    expectRefused(segmentScan(client, {}, scan), StatusCode::INVALID_ARGUMENT, "no_interior");
+    pb::SegmentHeader header;
+    header.set_profile(pb::PROFILE_PAPER);
+    header.set_summary_only(true);
+    expectRefused(segmentScan(client, header, scan), StatusCode::INVALID_ARGUMENT, "no_interior");
+    // The recommended method always answers, and says what that is worth.
+    header.set_profile(pb::PROFILE_DEFAULT);
+    const auto adaptive = segmentScan(client, header, scan);
+    ASSERT_TRUE(adaptive.ok()) << adaptive;
+    EXPECT_LT(adaptive.messages[0].summary().report().quality(), 0.5);
     // Only the segmentation can tell: stored, and FAILED with the reason.
     const auto added = addAndWait(client, collection, "open", scan);
     ASSERT_TRUE(added.ok()) << added;

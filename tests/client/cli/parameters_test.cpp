@@ -31,6 +31,7 @@ TEST(Parameters, EachFlagOverridesItsFieldOnly) {
     flags.numbers.smoothingReach = 6.0;
     flags.numbers.evenSpacing = 1.5;
     flags.numbers.maxPoints = 9;
+    flags.numbers.attributes = true;
     const auto resolved = flags.resolve();
     ASSERT_TRUE(resolved) << resolved.error().message;
     EXPECT_EQ(toJson(*resolved), nlohmann::json({{"profile", "paper"},
@@ -46,7 +47,8 @@ TEST(Parameters, EachFlagOverridesItsFieldOnly) {
                                                  {"smoothing_reach", 6.0},
                                                  {"even_spacing", 1.5},
                                                  {"interior_method", "adaptive"},
-                                                 {"max_points", 9}}));
+                                                 {"max_points", 9},
+                                                 {"attributes", true}}));
     const client::Parameters sent = flags.forServer();
     EXPECT_EQ(sent.profile, client::Profile::kPaper);
     EXPECT_EQ(sent.interiorMethod, client::InteriorMethod::kAdaptive);
@@ -74,6 +76,7 @@ TEST(Parameters, ZeroTurnsOffWhatTheProfileTurnsOn) {
     flags.numbers.smoothingReach = 0.0;
     flags.numbers.evenSpacing = 0.0;
     flags.interior = "walk";
+    flags.numbers.attributes = false;
     flags.numbers.deepAngleDegrees = 20.0;
     const auto resolved = flags.resolve();
     ASSERT_TRUE(resolved) << resolved.error().message;

@@ -79,6 +79,42 @@ TEST_F(SegmentCommand, AgreesWithTheLibrary) {
     EXPECT_EQ(document["signature"][0]["weight"], pointVolume(expected->signature, 0));
 }
 
+TEST_F(SegmentCommand, FlagsBeyondThePaperReachTheMethod) {
+    const std::vector<std::string> base = {"segment", dumbbell(), "--json", "--profile", "paper"};
+    const auto with = [&](const std::vector<std::string>& more) {
+        auto arguments = base;
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        const CommandRun run = runCommand(arguments);
+        EXPECT_EQ(run.exitCode, 0) << run.err;
+        return run.json();
+    };
+    const auto plain = with({});
+    EXPECT_EQ(plain["parameters"]["attributes"], false);
+    EXPECT_FALSE(plain.contains("statistics"));
+    EXPECT_EQ(plain["quality"], 1.0);
+    const auto all = with({"--interior", "adaptive", "--merge-contrast", "1.25", "--max-segments", "2",
+                           "--min-segment-share", "0.01", "--stray-ratio", "3", "--smoothing-reach", "5",
+                           "--even-spacing", "1", "--attributes"});
+    ShapeParameters parameters = parametersOf(Profile::kPaper);
+    parameters.segmentation.interiorMethod = InteriorMethod::kAdaptive;
+    parameters.segmentation.mergeContrast = 1.25;
+    parameters.segmentation.maxSegments = 2;
+    parameters.segmentation.minSegmentShare = 0.01;
+    parameters.segmentation.strayRatio = 3.0;
+    parameters.segmentation.smoothingReach = 5.0;
+    parameters.segmentation.evenSpacing = 1.0;
+    parameters.signature.attributes = true;
+    const auto expected = describe(readScan(path("dumbbell.xyz"))->points, parameters);
+    ASSERT_TRUE(expected) << expected.error().message;
+    EXPECT_EQ(all["segments"], expected->segmentation.segments.size());
+    EXPECT_EQ(all["volume"], expected->segmentation.volume);
+    EXPECT_EQ(all["points_used"], expected->segmentation.sites.size());
+    EXPECT_EQ(all["quality"], expected->segmentation.quality);
+    EXPECT_EQ(all["estimated_noise"], expected->segmentation.noise);
+    EXPECT_EQ(all["statistics"].size(), kStatistics.size());
+    EXPECT_FALSE(with({"--no-attributes"}).contains("statistics"));
+}
+
 TEST_F(SegmentCommand, LabelledPlyHasThePointsAndLabelsOfTheSegmentation) {
     const CommandRun run =
         runCommand({"segment", dumbbell(), "--json", "--profile", "paper", "--out", path("out.ply")});

@@ -138,9 +138,72 @@ TEST(ShapeOutput, ReportInJson) {
     client::SegmentationReport report;
     report.strays = 3;
     report.quality = 0.25;
+    report.interiorSource = client::InteriorSource::kThickened;
+    report.noise = 0.5;
     const nlohmann::json document = toJson(report);
     EXPECT_EQ(document["strays"], 3);
     EXPECT_EQ(document["quality"], 0.25);
+    EXPECT_EQ(document["interior_source"], "thickened");
+    EXPECT_EQ(document["angle_degrees"], 0.0);
+    EXPECT_EQ(document["estimated_noise"], 0.5);
+}
+
+TEST(ShapeOutput, InteriorSaysWhereItComesFromAndItsNoise) {
+    client::SegmentationReport report;
+    report.angleDegrees = 22.0;
+    report.quality = 0.75;
+    EXPECT_EQ(interiorText(report),
+              "interior: what a walk from outside leaves at 22 degrees\ninterior quality 0.75 of 1\n");
+    report.interiorSource = client::InteriorSource::kPotential;
+    report.noise = 0.01;
+    EXPECT_EQ(interiorText(report),
+              "interior: what the potential puts inside; noise 0.01\ninterior quality 0.75 of 1\n");
+}
+
+TEST(ShapeOutput, ASegmentMatchedTwiceCountsOnceAndTermsAreTold) {
+    client::Explanation explanation;
+    explanation.matches = {{0, 1, 0.6, 0.0}, {0, 2, 0.4, 0.0}};
+    explanation.terms = {{"chords", 0.123, 0.5}, {"parts", 1.0, 0.5}};
+    const std::string text = explanationText(explanation, signatureOf({0.5, 0.2}), "a", "b");
+    EXPECT_EQ(text.rfind("1 of 2 segments of a, 50 % of its volume, lies on segments of b: 1 on 2 ", 0), 0u)
+        << text;
+    EXPECT_NE(text.find("1 being what unrelated shapes differ by: chords 0.12, parts 1.00.\n"),
+              std::string::npos)
+        << text;
+    const nlohmann::json document = toJson(explanation);
+    EXPECT_EQ(document["terms"][1], nlohmann::json({{"name", "parts"}, {"distance", 1.0}, {"weight", 0.5}}));
+}
+
+TEST(ShapeOutput, AttributesAreToldByStatistic) {
+    client::Signature signature = signatureOf({1.0});
+    EXPECT_EQ(statisticsTable(signature), "");
+    EXPECT_TRUE(statisticsJson(signature).empty());
+    EXPECT_FALSE(toJson(signature).contains("quality"));
+    signature.attributes.emplace();
+    signature.attributes->quality = 0.75;
+    signature.attributes->statistics = {
+        {"chords", {0.0f, 0.25f, 1.0f}, true}, {"nothing", {0.0f}, false}, {"no bins", {}, false}};
+    const std::string table = statisticsTable(signature);
+    EXPECT_NE(table.find("chords"), std::string::npos);
+    EXPECT_NE(table.find(" ▄█"), std::string::npos) << "roots of shares: " << table;
+    EXPECT_EQ(statisticsJson(signature)["chords"], nlohmann::json({0.0, 0.25, 1.0}));
+    EXPECT_EQ(toJson(signature)["quality"], 0.75);
+}
+
+TEST(ShapeOutput, ASignatureMadeHereIsToldAsTheServerWould) {
+    Signature signature;
+    signature.points.resize(1);
+    EXPECT_FALSE(toClient(signature).attributes.has_value());
+    signature.attributes.emplace();
+    signature.attributes->quality = 51;
+    signature.attributes->statistics[0] = 255;
+    const client::Signature told = toClient(signature);
+    ASSERT_TRUE(told.attributes.has_value());
+    EXPECT_NEAR(told.attributes->quality, 0.2, 1e-12);
+    ASSERT_EQ(told.attributes->statistics.size(), kStatistics.size());
+    EXPECT_EQ(told.attributes->statistics[0].name, "chords");
+    EXPECT_EQ(told.attributes->statistics[0].shares[0], 1.0f);
+    EXPECT_EQ(told.attributes->statistics[0].shares[1], 0.0f);
 }
 
 TEST(ShapeOutput, ShapeInJson) {
@@ -157,6 +220,9 @@ TEST(ShapeOutput, ShapeInJson) {
     EXPECT_EQ(document["failure"]["name"], "no_interior");
     EXPECT_EQ(document["created"], "1970-01-02T00:00:00Z");
     EXPECT_FALSE(toJson(client::Shape{}).contains("failure"));
+    EXPECT_FALSE(toJson(client::Shape{}).contains("quality"));
+    shape.quality = 0.5;
+    EXPECT_EQ(toJson(shape)["quality"], 0.5);
 }
 
 }  // namespace

@@ -22,6 +22,7 @@ void expectSame(const ShapeParameters& a, const ShapeParameters& b) {
     EXPECT_EQ(a.segmentation.evenSpacing, b.segmentation.evenSpacing);
     EXPECT_EQ(a.segmentation.interiorMethod, b.segmentation.interiorMethod);
     EXPECT_EQ(a.signature.maxPoints, b.signature.maxPoints);
+    EXPECT_EQ(a.signature.attributes, b.signature.attributes);
 }
 
 // The text is in databases: these names stay.
@@ -30,7 +31,8 @@ TEST(ParametersCodec, TextIsFrozen) {
               R"({"profile":"paper","segmentation":{"big_ball_ratio":0.5,"deep_angle_degrees":20.0,)"
               R"("hull_angle_degrees":5.0,"merge_ratio":1.5,"decimate_to":0,"merge_contrast":0.0,)"
               R"("min_segment_share":0.004,"max_segments":16,"stray_ratio":0.0,"smoothing_reach":0.0,)"
-              R"("even_spacing":0.0,"interior_method":"walk"},"signature":{"max_points":7}})");
+              R"("even_spacing":0.0,"interior_method":"walk"},"signature":{"max_points":7,)"
+              R"("attributes":false}})");
 }
 
 // What servers wrote before the method learnt of noise: their collections go on as they were, though
@@ -52,6 +54,7 @@ TEST(ParametersCodec, TextOfOlderServersMeansWhatItMeant) {
         EXPECT_EQ(decoded->segmentation.smoothingReach, 0.0);
         EXPECT_EQ(decoded->segmentation.evenSpacing, 0.0);
         EXPECT_EQ(decoded->segmentation.interiorMethod, InteriorMethod::kWalk);
+        EXPECT_FALSE(decoded->signature.attributes);
     }
 }
 
@@ -74,6 +77,7 @@ TEST(ParametersCodec, RoundTripIsExact) {
         parameters.segmentation.interiorMethod =
             i % 5 < 2 ? InteriorMethod::kWalk : InteriorMethod::kAdaptive;
         parameters.signature.maxPoints = 1 + static_cast<std::uint32_t>(random.below(kMaxSignaturePoints));
+        parameters.signature.attributes = i % 2 == 0;
         const std::string text = encodeParameters(parameters);
         const auto decoded = decodeParameters(text);
         ASSERT_TRUE(decoded) << decoded.error().message;
@@ -118,6 +122,7 @@ TEST(ParametersCodec, EverythingElseIsRefusedByName) {
         {R"({"profile":"paper","segmentation":{"decimate_to":4294967296}})", "segmentation.decimate_to"},
         {R"({"profile":"paper","segmentation":{"deep_angle_degrees":90}})", "90"},
         {R"({"profile":"paper","segmentation":{"interior_method":"guess"}})", "guess"},
+        {R"({"profile":"paper","signature":{"attributes":1}})", "signature.attributes"},
         {R"({"profile":"paper","segmentation":{"interior_method":1}})", "segmentation.interior_method"},
         {R"({"profile":"paper","segmentation":{"merge_contrast":0.5}})", "merge_contrast"},
         {R"({"profile":"paper","segmentation":{"max_segments":1.5}})", "segmentation.max_segments"},

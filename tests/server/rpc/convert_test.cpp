@@ -48,6 +48,7 @@ TEST(ParametersFrom, EveryFieldArrives) {
     }
     pb::SignatureParameters signature;
     signature.set_max_points(11);
+    signature.set_attributes(true);
     const auto parameters = parametersFrom(pb::PROFILE_PAPER, segmentation, signature, {});
     ASSERT_TRUE(parameters);
     // And back: the collection message says the same.
@@ -128,7 +129,8 @@ TEST(Shapes, AllFieldsArrive) {
     shape.updatedAt = 2'000;
     shape.failure = Error{ErrorCode::kNoInterior, "why"};
     pb::Shape message;
-    toProto(shape, "parts", &message);
+    toProto(shape, "parts", nullptr, &message);
+    EXPECT_FALSE(message.has_quality());
     EXPECT_EQ(message.collection(), "parts");
     EXPECT_EQ(message.id(), 5);
     EXPECT_EQ(message.key(), "k");
@@ -144,6 +146,17 @@ TEST(Shapes, AllFieldsArrive) {
     EXPECT_EQ(message.failure().message(), "why");
 }
 
+TEST(Shapes, QualityIsThatOfTheServingSignature) {
+    auto entry = std::make_shared<IndexEntry>();
+    pb::Shape plain;
+    toProto(store::Shape(), "parts", entry, &plain);
+    EXPECT_FALSE(plain.has_quality()) << "a signature without attributes does not judge";
+    entry->signature.attributes.emplace().quality = 51;
+    pb::Shape judged;
+    toProto(store::Shape(), "parts", entry, &judged);
+    EXPECT_NEAR(judged.quality(), 0.2, 1e-12);
+}
+
 TEST(Reports, SayWhatWasLeftOutAndHowSureTheInteriorIs) {
     Segmentation segmentation;
     segmentation.siteOfPoint.resize(10);
@@ -151,6 +164,9 @@ TEST(Reports, SayWhatWasLeftOutAndHowSureTheInteriorIs) {
     segmentation.duplicates = 1;
     segmentation.strays = 3;
     segmentation.quality = 0.25;
+    segmentation.interiorSource = InteriorSource::kPotential;
+    segmentation.angleDegrees = 17.5;
+    segmentation.noise = 0.125;
     pb::SegmentationReport report;
     toProto(segmentation, &report);
     EXPECT_EQ(report.points(), 10u);
@@ -158,6 +174,9 @@ TEST(Reports, SayWhatWasLeftOutAndHowSureTheInteriorIs) {
     EXPECT_EQ(report.duplicates(), 1u);
     EXPECT_EQ(report.strays(), 3u);
     EXPECT_EQ(report.quality(), 0.25);
+    EXPECT_EQ(report.interior_source(), pb::INTERIOR_SOURCE_POTENTIAL);
+    EXPECT_EQ(report.angle_degrees(), 17.5);
+    EXPECT_EQ(report.noise(), 0.125);
 }
 
 TEST(Signatures, AreInScanUnits) {
@@ -183,6 +202,43 @@ TEST(Signatures, AreInScanUnits) {
     EXPECT_EQ(message.scale(), 10.0);
     EXPECT_EQ(message.volume(), 600.0);
     EXPECT_EQ(message.encoded(), encodeSignature(signature));
+    EXPECT_FALSE(message.has_attributes());
+}
+
+TEST(Signatures, AttributesAreSharesByName) {
+    ShapeAttributes attributes;
+    attributes.quality = 255;
+    for (std::size_t i = 0; i < kStatisticBins; ++i) attributes.statistics[i] = static_cast<std::uint8_t>(i);
+    Signature signature;
+    signature.points.resize(1);
+    signature.attributes = attributes;
+    pb::Signature message;
+    toProto(signature, &message);
+    ASSERT_TRUE(message.has_attributes());
+    EXPECT_EQ(message.attributes().quality(), 1.0);
+    ASSERT_EQ(static_cast<std::size_t>(message.attributes().statistics_size()), kStatistics.size());
+    std::size_t bin = 0;
+    for (std::size_t s = 0; s < kStatistics.size(); ++s) {
+        const pb::ShapeStatistic& statistic = message.attributes().statistics(static_cast<int>(s));
+        EXPECT_EQ(statistic.name(), kStatistics[s].name);
+        EXPECT_EQ(statistic.of_interior(), kStatistics[s].ofInterior);
+        for (const float share : statistic.shares()) {
+            const double root = (bin++ % 256) / 255.0;
+            EXPECT_NEAR(share, root * root, 1e-6);
+        }
+    }
+    EXPECT_EQ(bin, kStatisticBins);
+}
+
+TEST(Explanations, TermsArrive) {
+    Explanation explanation;
+    explanation.terms = {{"chords", 0.5, 0.25}, {"parts", 1.5, 0.75}};
+    pb::Explanation message;
+    toProto(explanation, &message);
+    ASSERT_EQ(message.terms_size(), 2);
+    EXPECT_EQ(message.terms(1).name(), "parts");
+    EXPECT_EQ(message.terms(1).distance(), 1.5);
+    EXPECT_EQ(message.terms(1).weight(), 0.75);
 }
 
 }  // namespace

@@ -1,0 +1,147 @@
+// The default profile on a live server: quality of the interior, attributes, terms of a score.
+#include "core/matching/score.h"
+#include "core/signature/profile.h"
+#include "core/signature/signature_codec.h"
+#include "tests/integration/support/live_test.h"
+
+namespace shapedb::testing {
+namespace {
+
+/// The points that a scanner above the shape sees.
+Scan fromAbove(const Scan& scan) {
+    Scan seen;
+    for (std::size_t i = 0; i + 2 < scan.size(); i += 3) {
+        if (scan[i + 2] > 0.0f) seen.insert(seen.end(), {scan[i], scan[i + 1], scan[i + 2]});
+    }
+    return seen;
+}
+
+/// A collection with the recommended parameters beside the one of the test, which has the paper's.
+class AttributesRpc : public LiveTest {
+  protected:
+    AttributesRpc() : recommended(collection + "-default") {
+        const auto created = createCollection(client, recommended, pb::PROFILE_DEFAULT);
+        EXPECT_TRUE(created.ok()) << created;
+    }
+
+    Reply<pb::GetSignatureResponse> signatureOf(const std::string& inCollection, const std::string& key) {
+        pb::GetSignatureRequest request;
+        request.mutable_shape()->set_collection(inCollection);
+        request.mutable_shape()->set_key(key);
+        return unary(*client.shapes, &pb::ShapeService::Stub::GetSignature, request);
+    }
+
+    std::string recommended;
+};
+
+TEST_F(AttributesRpc, QualityIsToldWhereverAShapeIs) {
+    const Scan closed = dumbbell(1, 4'000);
+    const auto added = addAndWait(client, recommended, "closed", closed);
+    ASSERT_TRUE(added.ok()) << added;
+    ASSERT_TRUE(added.value.shape().has_quality());
+    const double quality = added.value.shape().quality();
+    EXPECT_GT(quality, 0.8);
+    EXPECT_LE(quality, 1.0);
+    const auto half = addAndWait(client, recommended, "half", fromAbove(closed));
+    ASSERT_TRUE(half.ok()) << half;
+    EXPECT_EQ(half.value.shape().state(), pb::SHAPE_STATE_READY);
+    EXPECT_LT(half.value.shape().quality(), quality);
+
+    EXPECT_EQ(getShape(client, recommended, "closed").value.quality(), quality);
+    for (const pb::Shape& shape : listAll(client, recommended)) {
+        EXPECT_EQ(shape.quality(), shape.key() == "closed" ? quality : half.value.shape().quality());
+    }
+    pb::WatchIngestRequest watch;
+    watch.mutable_shape()->set_collection(recommended);
+    watch.mutable_shape()->set_key("closed");
+    CallContext context;
+    const auto reader = client.shapes->WatchIngest(&context, watch);
+    const auto events = testing::drain(context, *reader);
+    ASSERT_EQ(events.messages.size(), 1u) << events;
+    EXPECT_EQ(events.messages[0].quality(), quality);
+    EXPECT_EQ(signatureOf(recommended, "closed").value.signature().attributes().quality(), quality);
+    const auto found = searchByScan(client, searchOptions(recommended), closed);
+    ASSERT_TRUE(found.ok()) << found;
+    ASSERT_GE(found.value.hits_size(), 1);
+    EXPECT_EQ(found.value.hits(0).shape().quality(), quality);
+    EXPECT_NEAR(found.value.report().quality(), quality, 0.5 / 255.0);
+    EXPECT_EQ(found.value.query().attributes().quality(), quality);
+    EXPECT_EQ(found.value.query().attributes().statistics_size(), 0) << "a query is not repeated in full";
+}
+
+// The paper does not judge: no figure is better than one that means nothing.
+TEST_F(AttributesRpc, ThePaperHasNoAttributes) {
+    const auto added = addAndWait(client, collection, "k", dumbbell());
+    ASSERT_TRUE(added.ok()) << added;
+    EXPECT_FALSE(added.value.shape().has_quality());
+    EXPECT_FALSE(signatureOf(collection, "k").value.signature().has_attributes());
+}
+
+TEST_F(AttributesRpc, SignatureIsTheOneOfTheLibrary) {
+    const Scan scan = dumbbell(3, 4'000);
+    ASSERT_TRUE(addAndWait(client, recommended, "k", scan).ok());
+    const auto expected = describe(unpack(scan), parametersOf(Profile::kDefault));
+    ASSERT_TRUE(expected);
+    ASSERT_TRUE(expected->signature.attributes.has_value());
+    const auto reply = signatureOf(recommended, "k");
+    ASSERT_TRUE(reply.ok()) << reply;
+    EXPECT_EQ(reply.value.signature().encoded(), encodeSignature(expected->signature));
+    const pb::ShapeAttributes& attributes = reply.value.signature().attributes();
+    ASSERT_EQ(static_cast<std::size_t>(attributes.statistics_size()), kStatistics.size());
+    for (std::size_t i = 0; i < kStatistics.size(); ++i) {
+        const pb::ShapeStatistic& statistic = attributes.statistics(static_cast<int>(i));
+        EXPECT_EQ(statistic.name(), kStatistics[i].name);
+        EXPECT_EQ(statistic.shares_size(), kStatistics[i].count);
+    }
+
+    pb::SegmentHeader header;
+    header.set_profile(pb::PROFILE_DEFAULT);
+    header.set_summary_only(true);
+    const auto stateless = segmentScan(client, header, scan);
+    ASSERT_TRUE(stateless.ok()) << stateless;
+    const pb::SegmentationSummary& summary = stateless.messages[0].summary();
+    EXPECT_EQ(summary.signature().encoded(), reply.value.signature().encoded());
+    EXPECT_EQ(summary.report().quality(), expected->segmentation.quality);
+    EXPECT_EQ(summary.report().strays(), expected->segmentation.strays);
+    EXPECT_EQ(summary.report().noise(), expected->segmentation.noise);
+    EXPECT_EQ(summary.report().angle_degrees(), expected->segmentation.angleDegrees);
+    EXPECT_NE(summary.report().interior_source(), pb::INTERIOR_SOURCE_UNSPECIFIED);
+}
+
+TEST_F(AttributesRpc, TermsSayWhatTheScoreIsMadeOf) {
+    ASSERT_TRUE(addAndWait(client, recommended, "a", dumbbell(1, 4'000)).ok());
+    ASSERT_TRUE(addAndWait(client, recommended, "b", familyScan("mug", 1, 1)).ok());
+    pb::CompareRequest request;
+    request.mutable_query()->set_collection(recommended);
+    request.mutable_query()->set_key("a");
+    *request.mutable_other() = request.query();
+    request.mutable_other()->set_key("b");
+    const auto compared = unary(*client.searches, &pb::SearchService::Stub::Compare, request);
+    ASSERT_TRUE(compared.ok()) << compared;
+    const auto decoded = [&](const char* key) {
+        return *decodeSignature(signatureOf(recommended, key).value.signature().encoded());
+    };
+    const Explanation expected = explain(decoded("a"), decoded("b"), {});
+    EXPECT_EQ(compared.value.score(), expected.score);
+    const auto& terms = compared.value.explanation().terms();
+    ASSERT_EQ(static_cast<std::size_t>(terms.size()), expected.terms.size());
+    ASSERT_GT(terms.size(), 1);
+    double weights = 0.0;
+    for (int i = 0; i < terms.size(); ++i) {
+        EXPECT_EQ(terms[i].name(), expected.terms[static_cast<std::size_t>(i)].name);
+        EXPECT_EQ(terms[i].distance(), expected.terms[static_cast<std::size_t>(i)].distance);
+        weights += terms[i].weight();
+    }
+    EXPECT_NEAR(weights, 1.0, 1e-9);
+
+    pb::SearchByKeyRequest search;
+    *search.mutable_options() = searchOptions(recommended);
+    search.set_key("a");
+    const auto found = unary(*client.searches, &pb::SearchService::Stub::SearchByKey, search);
+    ASSERT_TRUE(found.ok()) << found;
+    ASSERT_EQ(found.value.hits_size(), 1);
+    EXPECT_EQ(found.value.hits(0).explanation().terms_size(), terms.size());
+}
+
+}  // namespace
+}  // namespace shapedb::testing
