@@ -23,10 +23,13 @@ constexpr double kLeastWeight = 1e-12;
 // The groups while they grow: radii, weights, and passages to neighbours.
 class Groups {
   public:
+    using Passages = std::vector<std::pair<std::uint32_t, double>>;
+
     explicit Groups(const SegmentGraph& graph)
         : parent_(graph.volumes.size()),
           weight_(graph.volumes),
           logRadius_(graph.volumes.size()),
+          radius_(graph.volumes.size()),
           passages_(graph.volumes.size()) {
         for (const double volume : graph.volumes) total_ += volume;
         const double least = std::max(kLeastWeight * total_, std::numeric_limits<double>::min());
@@ -34,6 +37,7 @@ class Groups {
             parent_[i] = i;
             weight_[i] = std::max(weight_[i], least);
             logRadius_[i] = std::log(graph.radii[i]);
+            radius_[i] = graph.radii[i];
         }
         for (const SegmentContact& c : graph.contacts) {
             passages_[c.first][c.second] = c.passage;
@@ -50,10 +54,9 @@ class Groups {
         return passages_[group];
     }
 
-    double contrast(std::uint32_t a, std::uint32_t b) const {
-        const double ra = std::exp(logRadius_[a]);
-        const double rb = std::exp(logRadius_[b]);
-        return std::max(ra, rb) / std::min({ra, rb, passages_[a].at(b)});
+    double contrast(std::uint32_t a, std::uint32_t b, double passage) const {
+        const auto [least, most] = std::minmax(radius_[a], radius_[b]);
+        return most / std::min(least, passage);
     }
 
     std::uint32_t groupOf(std::uint32_t i) {
@@ -62,17 +65,18 @@ class Groups {
     }
 
     // Joins two groups that touch. The one with fewer neighbours, or else less weight, goes into the
-    // other: returns the one that remains, and the neighbours that are now new to it.
-    std::pair<std::uint32_t, std::vector<std::uint32_t>> join(std::uint32_t a, std::uint32_t b) {
+    // other: returns the one that remains, and the neighbours it got by this, with their passages.
+    std::pair<std::uint32_t, Passages> join(std::uint32_t a, std::uint32_t b) {
         if (std::make_tuple(passages_[a].size(), weight_[a], b) <
             std::make_tuple(passages_[b].size(), weight_[b], a)) {
             std::swap(a, b);
         }
         const double weight = weight_[a] + weight_[b];
         logRadius_[a] = (weight_[a] * logRadius_[a] + weight_[b] * logRadius_[b]) / weight;
+        radius_[a] = std::exp(logRadius_[a]);
         weight_[a] = weight;
         parent_[b] = a;
-        std::vector<std::uint32_t> moved;
+        Passages moved;
         passages_[a].erase(b);
         for (const auto& [next, passage] : passages_[b]) {
             if (next == a) continue;
@@ -80,7 +84,7 @@ class Groups {
             double& widest = passages_[a][next];
             widest = std::max(widest, passage);
             passages_[next][a] = widest;
-            moved.push_back(next);
+            moved.emplace_back(next, widest);
         }
         passages_[b] = {};
         return {a, std::move(moved)};
@@ -90,6 +94,7 @@ class Groups {
     std::vector<std::uint32_t> parent_;
     std::vector<double> weight_;
     std::vector<double> logRadius_;
+    std::vector<double> radius_;
     std::vector<std::unordered_map<std::uint32_t, double>> passages_;
     double total_ = 0.0;
 };
@@ -107,15 +112,15 @@ struct Candidate {
 
 Result<void> mergeAlike(Groups& groups, double limit, const RunContext& context) {
     std::priority_queue<Candidate> queue;
-    const auto consider = [&](std::uint32_t a, std::uint32_t b) {
-        const double contrast = groups.contrast(a, b);
+    const auto consider = [&](std::uint32_t a, std::uint32_t b, double passage) {
+        const double contrast = groups.contrast(a, b, passage);
         if (contrast <= limit) queue.push({contrast, std::min(a, b), std::max(a, b)});
     };
     std::vector<double> seenRadius(groups.size());
     for (std::uint32_t a = 0; a < groups.size(); ++a) {
         seenRadius[a] = groups.logRadius(a);
         for (const auto& [b, passage] : groups.neighbours(a)) {
-            if (a < b) consider(a, b);
+            if (a < b) consider(a, b, passage);
         }
     }
     for (std::size_t step = 1; !queue.empty(); ++step) {
@@ -125,16 +130,17 @@ Result<void> mergeAlike(Groups& groups, double limit, const RunContext& context)
         const Candidate best = queue.top();
         queue.pop();
         if (!groups.isGroup(best.a) || !groups.isGroup(best.b)) continue;
-        if (groups.contrast(best.a, best.b) > best.contrast) {
-            consider(best.a, best.b);
+        const double passage = groups.neighbours(best.a).at(best.b);
+        if (groups.contrast(best.a, best.b, passage) > best.contrast) {
+            consider(best.a, best.b, passage);
             continue;
         }
         const auto [joined, moved] = groups.join(best.a, best.b);
         if (std::abs(groups.logRadius(joined) - seenRadius[joined]) > kRadiusDrift) {
             seenRadius[joined] = groups.logRadius(joined);
-            for (const auto& [next, passage] : groups.neighbours(joined)) consider(joined, next);
+            for (const auto& [next, width] : groups.neighbours(joined)) consider(joined, next, width);
         } else {
-            for (const std::uint32_t next : moved) consider(joined, next);
+            for (const auto& [next, width] : moved) consider(joined, next, width);
         }
     }
     return {};
