@@ -70,10 +70,14 @@ void addOutliers(PointCloud& points) {
     }
 }
 
-// Cuts off what lies farthest in a random direction.
-void cutCap(PointCloud& points) {
+Point3 capDirection() {
     Random random(kSeed);
-    const Point3 direction = randomDirection(random);
+    return randomDirection(random);
+}
+
+// Cuts off what lies farthest in a direction.
+void cutCap(PointCloud& points) {
+    const Point3 direction = capDirection();
     std::sort(points.begin(), points.end(),
               [&](const Point3& a, const Point3& b) { return dot(a, direction) < dot(b, direction); });
     points.resize(static_cast<std::size_t>(kKeptShare * static_cast<double>(points.size())));
@@ -116,17 +120,42 @@ struct Figures {
 
 using Row = std::array<Figures, kConditions.size()>;
 
-// The truth is what the method as published finds in the clean scan, and the box of its points.
+// Of the interior without what lies beyond the last point that the cut of a cap left.
+double volumeBelow(const Segmentation& whole, const PointCloud& left) {
+    const Point3 direction = capDirection();
+    const double height = dot(left.back(), direction);
+    double sum = 0.0;
+    for (std::size_t t = 0; t < whole.tetrahedra.size(); ++t) {
+        if (whole.tetrahedronSegment[t] < 0) continue;
+        const auto& v = whole.tetrahedra.vertices[t];
+        const Point3& a = whole.sites[v[0]];
+        const Point3& b = whole.sites[v[1]];
+        const Point3& c = whole.sites[v[2]];
+        const Point3& d = whole.sites[v[3]];
+        if (0.25 * dot(a + b + c + d, direction) > height) continue;
+        sum += dot(b - a, cross(c - a, d - a)) / 6.0;
+    }
+    return sum;
+}
+
+// The truth is what the method as published finds in the clean scan (below the cut, for a missing cap),
+// and the box of the points that are left.
 Result<Row> measure(const PointCloud& clean, const RunContext& context) {
     SegmentationOptions published = parametersOf(Profile::kPaper).segmentation;
     const auto truth = segment(clean, published, context);
     if (!truth) return fail(truth.error());
-    const auto size = smallestBoxDiagonal(clean);
-    if (!size) return fail(size.error());
+    const auto wholeSize = smallestBoxDiagonal(clean);
+    if (!wholeSize) return fail(wholeSize.error());
     Row row;
     for (std::size_t i = 0; i < kConditions.size(); ++i) {
         const auto points = damaged(clean, kConditions[i]);
         if (!points) return fail(points.error());
+        double volume = truth->volume;
+        double size = *wholeSize;
+        if (kConditions[i].damage == Damage::kCap) {
+            volume = volumeBelow(*truth, *points);
+            size = smallestBoxDiagonal(*points).value_or(size);
+        }
         Figures& figures = row[i];
         figures.shapes = 1;
         const auto found = segment(*points, parametersOf(Profile::kDefault).segmentation, context);
@@ -135,9 +164,9 @@ Result<Row> measure(const PointCloud& clean, const RunContext& context) {
             figures = {1.0, 1.0, 1.0, 0.0, 0.0, 1, 1};
             continue;
         }
-        figures.volumeError = std::min(1.0, std::abs(found->volume / truth->volume - 1.0));
+        figures.volumeError = std::min(1.0, std::abs(found->volume / volume - 1.0));
         figures.worst = figures.volumeError;
-        figures.sizeError = std::abs(found->size / *size - 1.0);
+        figures.sizeError = std::abs(found->size / size - 1.0);
         figures.quality = found->quality;
         figures.seconds = found->totalSeconds;
     }

@@ -17,6 +17,7 @@ namespace shapedb {
 
 namespace {
 
+constexpr double kPi = 3.14159265358979323846;
 constexpr std::size_t kSamples = 500;
 constexpr std::array<std::size_t, 10> kNeighbourhoods = {12, 16, 24, 32, 48, 64, 96, 128, 192, 256};
 
@@ -35,6 +36,10 @@ constexpr double kPlateauTolerance = 0.05;
 constexpr double kPlateauEnds = 0.15;
 
 constexpr double kReachInSpacings = 4.0;  // pi * 4^2: about fifty neighbours
+// A point with fewer than this share of the neighbours that its reach should hold lies off the
+// surface and looks for it farther away.
+constexpr double kEnoughShare = 0.5;
+constexpr double kWiderReach = 1.6;
 constexpr std::size_t kQuadricMinimum = 12;
 constexpr double kMaxMoveInSigmas = 3.0;
 constexpr std::size_t kPointsBetweenCheckpoints = 4096;
@@ -101,7 +106,7 @@ Spreads measureSpreads(const PointCloud& points, const NeighbourIndex& index) {
 
 // A disc of radius r spreads by r / 2 along either axis.
 double spacingFrom(double along, std::size_t neighbours) {
-    return 2.0 * along * std::sqrt(3.14159265358979323846 / static_cast<double>(neighbours));
+    return 2.0 * along * std::sqrt(kPi / static_cast<double>(neighbours));
 }
 
 // The local frame of a neighbourhood: two directions along the surface and one across.
@@ -161,8 +166,9 @@ Point3 projected(const PointCloud& points, std::uint32_t at, const std::vector<N
     return points[at] + Point3{move.x(), move.y(), move.z()};
 }
 
+// With fewer than `enough` neighbours in its reach a point looks farther.
 Result<PointCloud> smoothOnce(const PointCloud& points, const NeighbourIndex& index, double reach,
-                              double limit, const RunContext& context) {
+                              double enough, double limit, const RunContext& context) {
     PointCloud moved(points.size());
     std::vector<Neighbour> found;
     std::vector<Eigen::Vector3d> offsets;
@@ -172,8 +178,13 @@ Result<PointCloud> smoothOnce(const PointCloud& points, const NeighbourIndex& in
         if (done++ % kPointsBetweenCheckpoints == 0) {
             if (auto go = context.checkpoint(); !go) return fail(go.error());
         }
-        index.within(points[i], reach, found);
-        moved[i] = projected(points, i, found, reach, limit, offsets, weights);
+        double own = reach;
+        index.within(points[i], own, found);
+        if (static_cast<double>(found.size()) < enough) {
+            own *= kWiderReach;
+            index.within(points[i], own, found);
+        }
+        moved[i] = projected(points, i, found, own, limit, offsets, weights);
     }
     return moved;
 }
@@ -208,7 +219,9 @@ Result<PointCloud> smooth(const PointCloud& points, const NeighbourIndex& index,
     try {
         if (!(noise.sigma > kHarmlessRatio * noise.spacing)) return points;
         const double reach = std::max(reachInSigmas * noise.sigma, kReachInSpacings * noise.spacing);
-        return smoothOnce(points, index, reach, kMaxMoveInSigmas * noise.sigma, context);
+        const double expected = kPi * (reach / noise.spacing) * (reach / noise.spacing);
+        return smoothOnce(points, index, reach, kEnoughShare * expected, kMaxMoveInSigmas * noise.sigma,
+                          context);
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::kOutOfMemory,
                     "not enough memory to smooth " + std::to_string(points.size()) + " points");

@@ -17,6 +17,10 @@ TEST(SegmentationOptions, DefaultsAreThePapers) {
     EXPECT_EQ(options.hullAngleDegrees, 5.0);
     EXPECT_EQ(options.mergeRatio, 1.5);
     EXPECT_EQ(options.decimateTo, 0U);
+    EXPECT_EQ(options.strayRatio, 0.0);
+    EXPECT_EQ(options.smoothingReach, 0.0);
+    EXPECT_EQ(options.evenSpacing, 0.0);
+    EXPECT_EQ(options.interiorMethod, InteriorMethod::kWalk);
 }
 
 // Sets one field to each value; the error must name the field.
@@ -41,6 +45,9 @@ TEST(SegmentationOptions, EachFieldHasItsRange) {
     expectRefused(&SegmentationOptions::hullAngleDegrees, "hull_angle_degrees", {0.0, 90.0, -5.0, nan, inf});
     expectRefused(&SegmentationOptions::mergeRatio, "merge_ratio", {0.999, 0.0, -2.0, nan, inf});
     expectRefused(&SegmentationOptions::decimateTo, "decimate_to", {1, 2, 3});
+    expectRefused(&SegmentationOptions::strayRatio, "stray_ratio", {1.0, 0.5, -3.0, nan, inf});
+    expectRefused(&SegmentationOptions::smoothingReach, "smoothing_reach", {0.5, 20.1, -1.0, nan, inf});
+    expectRefused(&SegmentationOptions::evenSpacing, "even_spacing", {10.1, -1.0, nan, inf});
 }
 
 TEST(SegmentationOptions, EndsOfTheRangesAreAllowed) {
