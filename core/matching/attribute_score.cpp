@@ -22,6 +22,14 @@ constexpr double kLeastTrust = 0.05;
 
 constexpr double kBinsPerUnit = 255.0;
 
+// The distance, in units of what unrelated shapes differ by, at which a score has fallen to 0.5.
+constexpr double kHalfWay = 0.5;
+
+double scoreOf(double distance) {
+    const double d = distance / kHalfWay;
+    return 1.0 / (1.0 + d * d);
+}
+
 // An interior of this quality is trusted in full: closed, if noisy. Below, trust falls faster than
 // the quality, for a thickness off by half spoils its histograms altogether.
 constexpr double kTrustedQuality = 2.0 / 3.0;
@@ -68,8 +76,14 @@ AttributeDistance attributeDistance(const Signature& a, const Signature& b, cons
 double attributeScore(const AttributeDistance& distance, double agreement) {
     const double parts = std::max(0.0, 1.0 - agreement) / kTypicalDisagreement;
     const double mean = (distance.statistics + distance.partsWeight * parts) / distance.totalWeight;
-    return 1.0 / (1.0 + mean * mean + distance.scale * distance.scale);
+    return scoreOf(std::hypot(mean, distance.scale));
 }
+
+ScoreTerm containmentTerm(double share) {
+    return {"contained parts", std::max(0.0, 1.0 - share) / kTypicalDisagreement, 1.0};
+}
+
+double containmentScore(double share) { return scoreOf(containmentTerm(share).distance); }
 
 std::vector<ScoreTerm> scoreTerms(const Signature& a, const Signature& b, const ScoreOptions& options,
                                   double agreement) {

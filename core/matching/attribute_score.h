@@ -22,9 +22,14 @@ struct AttributeDistance {
 [[nodiscard]] AttributeDistance attributeDistance(const Signature& a, const Signature& b,
                                                   const ScoreOptions& options);
 
-/// 1 / (1 + D^2), D the mean of the distances where the parts agree by `agreement`: falls as the
-/// agreement falls, in (0, 1]. So 0.5 is what unrelated shapes typically score.
+/// 1 / (1 + (2 D)^2), D the mean of the distances where the parts agree by `agreement`: falls as
+/// the agreement falls, in (0, 1]. Unrelated shapes (D = 1) typically score 0.2.
 [[nodiscard]] double attributeScore(const AttributeDistance& distance, double agreement);
+
+/// The same with the contained share of a piece as the only term.
+[[nodiscard]] double containmentScore(double share);
+/// Its one term.
+[[nodiscard]] ScoreTerm containmentTerm(double share);
 
 /// Name, distance and weight of every term, in a fixed order; the weights sum to 1.
 [[nodiscard]] std::vector<ScoreTerm> scoreTerms(const Signature& a, const Signature& b,

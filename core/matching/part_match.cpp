@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/matching/alignment.h"
+#include "core/matching/tripod.h"
 
 namespace shapedb {
 
@@ -13,8 +14,7 @@ namespace {
 constexpr double kSizeWidth = 0.5;
 // Parts whose likeness (sizes and radii) is below this are not worth an alignment of their own.
 constexpr double kAlikeEnough = 0.4;
-constexpr std::size_t kOutlying = 3;   // parts of a that lead alignments
-constexpr double kNoDirection = 1e-3;  // nearer to the centre than this a part has no direction
+constexpr std::size_t kOutlying = 3;  // parts of a that lead alignments
 
 using Row = std::array<double, kMaxSignaturePoints>;
 
@@ -88,29 +88,6 @@ double agreementUnder(const Table& table, const Matrix3& rotation, double width)
     });
 }
 
-// Right-handed orthonormal: x along `first`, y in the half plane of `second`.
-bool tripod(const Point3& first, const Point3& second, std::array<Point3, 3>& out) {
-    const double size = length(first);
-    if (size < kNoDirection) return false;
-    out[0] = (1.0 / size) * first;
-    const Point3 across = second - dot(second, out[0]) * out[0];
-    const double off = length(across);
-    if (off < kNoDirection) return false;
-    out[1] = (1.0 / off) * across;
-    out[2] = cross(out[0], out[1]);
-    return true;
-}
-
-// The orthogonal map that takes tripod `from` to tripod `to`; mirrored: with its third axis turned over.
-Matrix3 mapping(const std::array<Point3, 3>& from, const std::array<Point3, 3>& to, bool mirrored) {
-    const double sign = mirrored ? -1.0 : 1.0;
-    const auto row = [&](double x, double y, double z) {
-        const Point3 r = x * from[0] + y * from[1] + (sign * z) * from[2];
-        return std::array<double, 3>{r.x, r.y, r.z};
-    };
-    return {row(to[0].x, to[1].x, to[2].x), row(to[0].y, to[1].y, to[2].y), row(to[0].z, to[1].z, to[2].z)};
-}
-
 class Search {
   public:
     Search(const Table& table, const ScoreOptions& options, double most, bool prune)
@@ -131,7 +108,7 @@ class Search {
         for (const std::size_t i : leaders) {
             for (const std::size_t k : leaders) {
                 if (i == k || i == kNone || k == kNone) continue;
-                std::array<Point3, 3> to;
+                Tripod to;
                 if (!tripod(table_.positionA[i], table_.positionA[k], to)) continue;
                 for (std::size_t j = 0; j < b.parts.size(); ++j) {
                     if (!alike(a, b, i, j)) continue;
@@ -167,11 +144,11 @@ class Search {
         return table_.worth[i][j] * table_.radially[i][j] >= kAlikeEnough * most;
     }
 
-    void tryTripods(const std::array<Point3, 3>& to, std::size_t j, std::size_t l) {
-        std::array<Point3, 3> from;
+    void tryTripods(const Tripod& to, std::size_t j, std::size_t l) {
+        Tripod from;
         if (!tripod(table_.positionB[j], table_.positionB[l], from)) return;
-        tryRotation(mapping(from, to, false), false);
-        tryRotation(mapping(from, to, true), true);
+        tryRotation(tripodMap(from, to, false), false);
+        tryRotation(tripodMap(from, to, true), true);
     }
 
     void tryRotation(const Matrix3& rotation, bool reflected) {

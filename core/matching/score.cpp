@@ -6,6 +6,7 @@
 
 #include "core/matching/alignment.h"
 #include "core/matching/attribute_score.h"
+#include "core/matching/containment.h"
 #include "core/matching/part_match.h"
 
 namespace shapedb {
@@ -69,7 +70,8 @@ double ratio(double similarity, const AnchoredPoints& a, const AnchoredPoints& b
 double finalScore(double similarity, const Scaled& scaled, const Signature& a, const Signature& b,
                   const ScoreOptions& options) {
     if (identical(a, b, options)) return 1.0;
-    const double value = ratio(similarity, scaled.a, scaled.b);
+    const double value = options.partial ? belowOne(std::min(1.0, similarity / scaled.a.totalWeight))
+                                         : ratio(similarity, scaled.a, scaled.b);
     return isDegenerate(a, b) ? std::min(value, kDegenerateCeiling) : value;
 }
 
@@ -137,6 +139,66 @@ Motion bodyMotion(const Signature& a, const Signature& b, const ScoreOptions& op
     return motion;
 }
 
+// The scale of b's lengths against a's when sizes are kept, else 0: to be found.
+double knownScale(const Signature& a, const Signature& b, const ScoreOptions& options) {
+    return options.keepScale ? a.scale / b.scale : 0.0;
+}
+
+double partialScore(const Signature& a, const Signature& b, double share, const ScoreOptions& options) {
+    return identical(a, b, options) ? 1.0 : belowOne(containmentScore(share));
+}
+
+// Scan coordinates of b (the whole) to scan coordinates of a (the piece).
+Motion pieceMotion(const Signature& a, const Signature& b, const ScoreOptions& options,
+                   const Containment& found) {
+    PartMatch turn;
+    turn.rotation = found.rotation;
+    turn.reflected = found.reflected;
+    Motion motion = bodyMotion(a, b, options, turn);
+    const double s = a.scale / b.scale / found.scale;
+    motion.scale = options.keepScale ? 1.0 : s;
+    const auto inScan = [](const Signature& of, const Point3& inFrame) {
+        const Body& body = of.attributes->body;
+        Point3 p = body.centre;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            const double along = axis == 0 ? inFrame.x : (axis == 1 ? inFrame.y : inFrame.z);
+            p = p + along * Point3{body.axes[axis][0], body.axes[axis][1], body.axes[axis][2]};
+        }
+        return of.origin + of.scale * p;
+    };
+    motion.translation = inScan(a, found.to) - motion.scale * rotate(motion.rotation, inScan(b, found.from));
+    return motion;
+}
+
+void addPairs(const PartPairs& pairs, double total, const Signature& a, const Signature& b,
+              Explanation& result) {
+    for (std::size_t i = 0; i < pairs.count; ++i) {
+        const PartPair& pair = pairs.pairs[i];
+        result.matches.push_back({pair.a, pair.b, pair.gain / total, pair.distance});
+    }
+    std::sort(result.matches.begin(), result.matches.end(), [](const PointMatch& x, const PointMatch& y) {
+        if (x.share != y.share) return x.share > y.share;
+        return x.a != y.a ? x.a < y.a : x.b < y.b;
+    });
+    result.unmatchedA = missing(a.points.size(), result.matches, &PointMatch::a);
+    result.unmatchedB = missing(b.points.size(), result.matches, &PointMatch::b);
+}
+
+Explanation explainPartial(const Signature& a, const Signature& b, const ScoreOptions& options) {
+    const Body& piece = a.attributes->body;
+    const Body& whole = b.attributes->body;
+    const Containment found = containment(piece, whole, knownScale(a, b, options), options);
+    Explanation result;
+    result.score = partialScore(a, b, found.share, options);
+    result.similarity = found.share;
+    result.dissimilarity = 1.0 - found.share;
+    result.degenerate = isDegenerate(a, b);
+    result.motion = pieceMotion(a, b, options, found);
+    result.terms = {containmentTerm(found.share)};
+    addPairs(containedPairs(piece, whole, found, options), found.share, a, b, result);
+    return result;
+}
+
 Explanation explainAttributed(const Signature& a, const Signature& b, const ScoreOptions& options) {
     const Body& bodyA = a.attributes->body;
     const Body& bodyB = b.attributes->body;
@@ -148,17 +210,7 @@ Explanation explainAttributed(const Signature& a, const Signature& b, const Scor
     result.degenerate = isDegenerate(a, b);
     result.motion = bodyMotion(a, b, options, match);
     result.terms = scoreTerms(a, b, options, match.agreement);
-    const PartPairs pairs = partPairs(bodyA, bodyB, match, options);
-    for (std::size_t i = 0; i < pairs.count; ++i) {
-        const PartPair& pair = pairs.pairs[i];
-        result.matches.push_back({pair.a, pair.b, pair.gain / match.agreement, pair.distance});
-    }
-    std::sort(result.matches.begin(), result.matches.end(), [](const PointMatch& x, const PointMatch& y) {
-        if (x.share != y.share) return x.share > y.share;
-        return x.a != y.a ? x.a < y.a : x.b < y.b;
-    });
-    result.unmatchedA = missing(a.points.size(), result.matches, &PointMatch::a);
-    result.unmatchedB = missing(b.points.size(), result.matches, &PointMatch::b);
+    addPairs(partPairs(bodyA, bodyB, match, options), match.agreement, a, b, result);
     return result;
 }
 
@@ -196,7 +248,12 @@ Result<void> validate(const ScoreOptions& options) {
 
 double score(const Signature& a, const Signature& b, const ScoreOptions& options) {
     if (identical(a, b, options)) return 1.0;
-    if (comesFirst(b, a)) return score(b, a, options);
+    if (options.partial && bothAttributed(a, b)) {
+        const double scale = knownScale(a, b, options);
+        const Containment found = containment(a.attributes->body, b.attributes->body, scale, options);
+        return partialScore(a, b, found.share, options);
+    }
+    if (comesFirst(b, a) && !options.partial) return score(b, a, options);
     if (bothAttributed(a, b)) {
         const PartMatch match = matchParts(a.attributes->body, b.attributes->body, options);
         return attributedScore(a, b, match.agreement, options);
@@ -207,6 +264,11 @@ double score(const Signature& a, const Signature& b, const ScoreOptions& options
 
 double scoreUpperBound(const Signature& a, const Signature& b, const ScoreOptions& options) {
     if (identical(a, b, options)) return 1.0;
+    if (options.partial && bothAttributed(a, b)) {
+        const double share =
+            containmentBound(a.attributes->body, b.attributes->body, knownScale(a, b, options));
+        return partialScore(a, b, share, options);
+    }
     if (bothAttributed(a, b)) {
         const bool swapped = comesFirst(b, a);
         const Body& first = (swapped ? b : a).attributes->body;
@@ -217,13 +279,15 @@ double scoreUpperBound(const Signature& a, const Signature& b, const ScoreOption
     const double most = std::min({similarityBound(scaled.a, scaled.b, options.kernelWidth),
                                   similarityBound(scaled.b, scaled.a, options.kernelWidth)}) *
                         kBoundMargin;
-    const double whole = std::max(most, scaled.a.totalWeight + scaled.b.totalWeight - most);
+    const double whole = options.partial ? scaled.a.totalWeight
+                                         : std::max(most, scaled.a.totalWeight + scaled.b.totalWeight - most);
     const double bound = std::min(1.0, most / whole * kBoundMargin);
     return isDegenerate(a, b) ? std::min(bound, kDegenerateCeiling) : bound;
 }
 
 Explanation explain(const Signature& a, const Signature& b, const ScoreOptions& options) {
-    if (!comesFirst(b, a)) return explainOrdered(a, b, options);
+    if (options.partial && bothAttributed(a, b)) return explainPartial(a, b, options);
+    if (options.partial || !comesFirst(b, a)) return explainOrdered(a, b, options);
     Explanation result = explainOrdered(b, a, options);
     result.motion = inverse(result.motion);
     // Distances so far are in units of b's scale; parts are compared each in its own.

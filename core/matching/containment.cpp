@@ -1,0 +1,193 @@
+#include "core/matching/containment.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/matching/alignment.h"
+#include "core/matching/tripod.h"
+
+namespace shapedb {
+
+namespace {
+
+constexpr double kSizeWidth = 0.5;     // octaves, as in part_match.cpp
+constexpr double kAlikeEnough = 0.4;   // parts less alike lead no alignment
+constexpr std::size_t kLeaders = 3;    // parts of the piece that lead
+constexpr double kLargestScale = 1.5;  // a piece is not much larger than its whole
+constexpr double kSmallestScale = 1.0 / 16.0;
+
+using Points = std::array<Point3, kMaxSignaturePoints>;
+
+double difference(const Part& p, const Part& q, std::size_t i) {
+    return static_cast<double>(q.size[i]) - static_cast<double>(p.size[i]);
+}
+
+// Octaves by which q is larger than p.
+double octaves(const Part& p, const Part& q) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < p.size.size(); ++i) sum += difference(p, q, i);
+    return sum / static_cast<double>(p.size.size());
+}
+
+double likeness(const Part& p, const Part& q, double octavesLarger) {
+    double squared = 0.0;
+    for (std::size_t i = 0; i < p.size.size(); ++i) {
+        const double d = difference(p, q, i) - octavesLarger;
+        squared += d * d;
+    }
+    return kernel(squared / static_cast<double>(p.size.size()), kSizeWidth);
+}
+
+Point3 placeOf(const Part& part) { return {part.position[0], part.position[1], part.position[2]}; }
+
+double totalShare(const Body& body) {
+    double sum = 0.0;
+    for (const Part& part : body.parts) sum += part.share;
+    return sum;
+}
+
+Points placed(const Body& whole, const Containment& c) {
+    Points result;
+    for (std::size_t j = 0; j < whole.parts.size(); ++j) {
+        result[j] = (1.0 / c.scale) * rotate(c.rotation, placeOf(whole.parts[j]) - c.from) + c.to;
+    }
+    return result;
+}
+
+double pairGain(const Part& p, const Part& q, const Point3& placedQ, double scale, double width) {
+    // The width is a length of the whole.
+    const double gap = squaredDistance(placeOf(p), placedQ) * scale * scale;
+    const double near = kernel(gap, width);
+    return near > 0.0 ? static_cast<double>(p.share) * near * likeness(p, q, std::log2(scale)) : 0.0;
+}
+
+class Search {
+  public:
+    Search(const Body& piece, const Body& whole, double knownScale, const ScoreOptions& options)
+        : piece_(piece),
+          whole_(whole),
+          knownScale_(knownScale),
+          options_(options),
+          total_(totalShare(piece)) {}
+
+    Containment run() {
+        const std::size_t leaders = std::min(kLeaders, piece_.parts.size());
+        for (std::size_t p = 0; p < leaders; ++p) {
+            for (std::size_t q = 0; q < whole_.parts.size(); ++q) anchor(p, q, leaders);
+        }
+        return best_;
+    }
+
+  private:
+    // Part p of the piece lies on part q of the whole.
+    void anchor(std::size_t p, std::size_t q, std::size_t leaders) {
+        Containment trial;
+        const double free = octaves(piece_.parts[p], whole_.parts[q]);
+        trial.scale =
+            knownScale_ > 0.0 ? knownScale_ : std::clamp(std::exp2(free), kSmallestScale, kLargestScale);
+        if (!alike(p, q, trial.scale)) return;
+        trial.from = placeOf(whole_.parts[q]);
+        trial.to = placeOf(piece_.parts[p]);
+        keepBest(trial);
+        for (std::size_t i = 0; i < leaders; ++i) {
+            for (std::size_t k = 0; k < leaders; ++k) {
+                if (i != p && k != p && (i != k || leaders == 2)) turn(trial, q, i, k);
+            }
+        }
+    }
+
+    // Parts i and k of the piece are seen from p as parts j and l of the whole from q.
+    void turn(Containment trial, std::size_t q, std::size_t i, std::size_t k) {
+        Tripod to;
+        const Point3 axis = placeOf(piece_.parts[i]) - trial.to;
+        const Point3 side = i == k ? anyAcross(axis) : placeOf(piece_.parts[k]) - trial.to;
+        if (!tripod(axis, side, to)) return;
+        for (std::size_t j = 0; j < whole_.parts.size(); ++j) {
+            if (j == q || !alike(i, j, trial.scale)) continue;
+            for (std::size_t l = 0; l < whole_.parts.size(); ++l) {
+                if (l == q || l == j || !alike(k, l, trial.scale)) continue;
+                Tripod from;
+                if (!tripod(placeOf(whole_.parts[j]) - trial.from, placeOf(whole_.parts[l]) - trial.from,
+                            from))
+                    continue;
+                for (const bool reflected : {false, true}) {
+                    if (reflected && !options_.reflection) continue;
+                    trial.rotation = tripodMap(from, to, reflected);
+                    trial.reflected = reflected;
+                    keepBest(trial);
+                }
+            }
+        }
+    }
+
+    bool alike(std::size_t p, std::size_t q, double scale) const {
+        return likeness(piece_.parts[p], whole_.parts[q], std::log2(scale)) >= kAlikeEnough;
+    }
+
+    void keepBest(Containment& trial) {
+        const Points at = placed(whole_, trial);
+        double sum = 0.0;
+        for (const Part& part : piece_.parts) {
+            double best = 0.0;
+            for (std::size_t j = 0; j < whole_.parts.size(); ++j) {
+                best =
+                    std::max(best, pairGain(part, whole_.parts[j], at[j], trial.scale, options_.kernelWidth));
+            }
+            sum += best;
+        }
+        trial.share = std::min(1.0, sum / total_);
+        if (trial.share > best_.share) best_ = trial;
+    }
+
+    const Body& piece_;
+    const Body& whole_;
+    double knownScale_;
+    const ScoreOptions& options_;
+    double total_;
+    Containment best_;
+};
+
+}  // namespace
+
+Containment containment(const Body& piece, const Body& whole, double knownScale,
+                        const ScoreOptions& options) {
+    return Search(piece, whole, knownScale, options).run();
+}
+
+double containmentBound(const Body& piece, const Body& whole, double knownScale) {
+    double sum = 0.0;
+    for (const Part& p : piece.parts) {
+        double best = 0.0;
+        for (const Part& q : whole.parts) {
+            // Free to choose, the scale that fits a pair best is its mean ratio.
+            const double larger = knownScale > 0.0 ? std::log2(knownScale) : octaves(p, q);
+            best = std::max(best, likeness(p, q, larger));
+        }
+        sum += static_cast<double>(p.share) * best;
+    }
+    return std::min(1.0, sum / totalShare(piece) * kBoundMargin);
+}
+
+PartPairs containedPairs(const Body& piece, const Body& whole, const Containment& found,
+                         const ScoreOptions& options) {
+    const Points at = placed(whole, found);
+    const double total = totalShare(piece);
+    PartPairs result;
+    for (std::size_t i = 0; i < piece.parts.size(); ++i) {
+        PartPair best;
+        best.a = static_cast<std::uint8_t>(i);
+        for (std::size_t j = 0; j < whole.parts.size(); ++j) {
+            const double gain =
+                pairGain(piece.parts[i], whole.parts[j], at[j], found.scale, options.kernelWidth) / total;
+            if (gain <= best.gain) continue;
+            best.b = static_cast<std::uint8_t>(j);
+            best.gain = gain;
+            best.distance = distance(placeOf(piece.parts[i]), at[j]);
+        }
+        if (best.gain > 0.0) result.pairs[result.count++] = best;
+    }
+    return result;
+}
+
+}  // namespace shapedb
