@@ -87,6 +87,7 @@ void fill(const SearchOptions& from, v1::SearchOptions* to) {
     to->set_filter(from.filter);
     to->set_forbid_reflection(!from.reflection);
     to->set_keep_scale(from.keepScale);
+    to->set_partial(from.partial);
     to->set_no_explanation(!from.explanation);
 }
 

@@ -81,6 +81,7 @@ Result<Comparison> Client::compare(const ShapeRef& query, const ShapeRef& other,
     fill(other, request.mutable_other());
     request.set_forbid_reflection(!options.reflection);
     request.set_keep_scale(options.keepScale);
+    request.set_partial(options.partial);
     const auto response = callUnary(impl_->options, context, kIdempotent, *impl_->search,
                                     &v1::SearchService::Stub::Compare, request);
     if (!response) return fail(response.error());

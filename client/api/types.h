@@ -232,12 +232,14 @@ struct SearchOptions {
     std::string filter{};     ///< the k best of those that pass
     bool reflection = true;   ///< false tells left from right
     bool keepScale = false;   ///< true compares sizes too
+    bool partial = false;     ///< true: the query may be a one-sided scan or a piece of a hit
     bool explanation = true;  ///< false leaves out motion and matches of each hit
 };
 
 struct CompareOptions {
     bool reflection = true;  ///< false tells left from right
     bool keepScale = false;  ///< true compares sizes too
+    bool partial = false;    ///< true: how much of the query is contained in the other
 };
 
 /// Two segments that an alignment lays on each other.

@@ -56,7 +56,8 @@ Result<client::Comparison> compareStored(Session& session, const CompareFlags& f
     const auto client = connectToServer(session);
     if (!client) return fail(client.error());
     return client->compare({flags.collection, flags.a}, {flags.collection, flags.b},
-                           {!flags.score.noReflection, flags.score.keepScale}, session.context());
+                           {!flags.score.noReflection, flags.score.keepScale, flags.score.partial},
+                           session.context());
 }
 
 CommandResult runCompare(Session& session, const CompareFlags& flags) {

@@ -76,7 +76,8 @@ json settingsJson(const EvaluateFlags& flags, const ShapeParameters& parameters)
                      {"points", flags.scan.points ? json(*flags.scan.points) : json(nullptr)},
                      {"threads", flags.threads},
                      {"reflection", !flags.score.noReflection},
-                     {"keep_scale", flags.score.keepScale}};
+                     {"keep_scale", flags.score.keepScale},
+                     {"partial", flags.score.partial}};
     if (!flags.classes.only.empty()) settings["only_classes"] = flags.classes.only;
     if (!flags.classes.except.empty()) settings["except_classes"] = flags.classes.except;
     return settings;

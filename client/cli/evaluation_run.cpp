@@ -91,7 +91,7 @@ Result<ScoreMatrix> scorePairs(const std::vector<EvaluatedShape>& rows,
                                const std::vector<EvaluatedShape>& columns, const ScoreOptions& options,
                                unsigned threads, const std::function<void(std::size_t rowsDone)>& progress,
                                const RunContext& context) {
-    const bool symmetric = &rows == &columns;
+    const bool symmetric = &rows == &columns && !options.partial;
     const std::size_t width = columns.size();
     ScoreMatrix scores(rows.size() * width, 0.0);
     std::atomic<std::size_t> done{0};

@@ -49,8 +49,9 @@ struct EvaluatedShape : CollectionScan {
                                           const std::function<void(std::size_t done)>& progress,
                                           const RunContext& context);
 
-/// Row-major scores of `rows` x `columns`. Passing the same vector twice scores each pair once:
-/// a score is symmetric bit for bit. Shapes without a signature score 0.
+/// Row-major scores of `rows` x `columns`. Passing the same vector twice scores each pair once,
+/// because a score is symmetric bit for bit, unless it is partial: of the row in the column. Shapes without a
+/// signature score 0.
 ///
 /// Errors: kCancelled, kDeadlineExceeded.
 [[nodiscard]] Result<ScoreMatrix> scorePairs(const std::vector<EvaluatedShape>& rows,

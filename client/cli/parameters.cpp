@@ -132,6 +132,7 @@ ScoreOptions ScoreFlags::resolve() const {
     ScoreOptions options;
     options.reflection = !noReflection;
     options.keepScale = keepScale;
+    options.partial = partial;
     return options;
 }
 
@@ -139,6 +140,9 @@ void addScoreFlags(CLI::App& command, ScoreFlags& flags) {
     command.add_flag("--no-reflection", flags.noReflection, "Tell left from right: no mirrored alignments");
     command.add_flag("--keep-scale", flags.keepScale,
                      "Compare sizes too: shapes are not scaled to each other");
+    command.add_flag(
+        "--partial", flags.partial,
+        "The query may be a one-sided scan or a broken piece: score how much of it is in the other");
 }
 
 nlohmann::json toJson(const ShapeParameters& parameters) {

@@ -34,10 +34,11 @@ struct ParameterFlags {
 /// `flags` must outlive the parsing.
 void addParameterFlags(CLI::App& command, ParameterFlags& flags);
 
-/// --no-reflection and --keep-scale.
+/// --no-reflection, --keep-scale and --partial.
 struct ScoreFlags {
     bool noReflection = false;
     bool keepScale = false;
+    bool partial = false;
 
     [[nodiscard]] ScoreOptions resolve() const;
 };

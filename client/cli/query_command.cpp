@@ -93,6 +93,7 @@ CommandResult runQuery(Session& session, const QueryFlags& flags) {
     client::SearchOptions options = flags.options;
     options.reflection = !flags.score.noReflection;
     options.keepScale = flags.score.keepScale;
+    options.partial = flags.score.partial;
     options.explanation = !flags.noExplanation;
     const RunContext context = session.context();
     Scan scan;

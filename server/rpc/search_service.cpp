@@ -37,6 +37,7 @@ Result<Prepared> prepare(const Services& services, Call& call, const pb::SearchO
     prepared.options.filter = std::move(*filter);
     prepared.options.score.reflection = !options.forbid_reflection();
     prepared.options.score.keepScale = options.keep_scale();
+    prepared.options.score.partial = options.partial();
     prepared.explain = !options.no_explanation();
     return prepared;
 }
@@ -220,6 +221,7 @@ grpc::Status SearchServiceHandler::Compare(grpc::ServerContext* context, const v
         ScoreOptions options;
         options.reflection = !request->forbid_reflection();
         options.keepScale = request->keep_scale();
+        options.partial = request->partial();
         const Explanation explanation = explain(signatures[0], signatures[1], options);
         response->set_score(explanation.score);
         toProto(explanation, response->mutable_explanation());

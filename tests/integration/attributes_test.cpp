@@ -143,5 +143,40 @@ TEST_F(AttributesRpc, TermsSayWhatTheScoreIsMadeOf) {
     EXPECT_EQ(found.value.hits(0).explanation().terms_size(), terms.size());
 }
 
+// What is seen from one side is in the whole, and not the other way round.
+TEST_F(AttributesRpc, PartialReachesTheScoreAndItsDirection) {
+    const Scan whole = dumbbell(1, 4'000);
+    ASSERT_TRUE(addAndWait(client, recommended, "whole", whole).ok());
+    ASSERT_TRUE(addAndWait(client, recommended, "half", fromAbove(whole)).ok());
+    const auto decoded = [&](const char* key) {
+        return *decodeSignature(signatureOf(recommended, key).value.signature().encoded());
+    };
+    const Signature signatures[2] = {decoded("half"), decoded("whole")};
+    const char* keys[2] = {"half", "whole"};
+    ScoreOptions partial;
+    partial.partial = true;
+    for (int i = 0; i < 2; ++i) {
+        const double expected = score(signatures[i], signatures[1 - i], partial);
+        pb::CompareRequest request;
+        request.mutable_query()->set_collection(recommended);
+        request.mutable_query()->set_key(keys[i]);
+        *request.mutable_other() = request.query();
+        request.mutable_other()->set_key(keys[1 - i]);
+        request.set_partial(true);
+        const auto compared = unary(*client.searches, &pb::SearchService::Stub::Compare, request);
+        ASSERT_TRUE(compared.ok()) << compared;
+        EXPECT_EQ(compared.value.score(), expected) << keys[i];
+
+        pb::SearchByKeyRequest search;
+        *search.mutable_options() = searchOptions(recommended);
+        search.mutable_options()->set_partial(true);
+        search.set_key(keys[i]);
+        const auto found = unary(*client.searches, &pb::SearchService::Stub::SearchByKey, search);
+        ASSERT_TRUE(found.ok()) << found;
+        ASSERT_EQ(found.value.hits_size(), 1);
+        EXPECT_EQ(found.value.hits(0).score(), expected) << keys[i];
+    }
+}
+
 }  // namespace
 }  // namespace shapedb::testing

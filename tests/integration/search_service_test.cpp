@@ -151,12 +151,16 @@ TEST_F(SearchRpc, ScoreOptionsReachTheScore) {
             pb::SearchOptions options = searchOptions(collection, 50);
             options.set_forbid_reflection(forbidReflection);
             options.set_keep_scale(keepScale);
-            const auto reply = byKey("human/1", options, true);
-            ASSERT_TRUE(reply.ok()) << reply;
-            ScoreOptions own;
-            own.reflection = !forbidReflection;
-            own.keepScale = keepScale;
-            expectHits(reply.value, bruteForce(entry("human/1").signature, own), 50);
+            for (const bool partial : {false, true}) {
+                options.set_partial(partial);
+                const auto reply = byKey("human/1", options, true);
+                ASSERT_TRUE(reply.ok()) << reply;
+                ScoreOptions own;
+                own.reflection = !forbidReflection;
+                own.keepScale = keepScale;
+                own.partial = partial;
+                expectHits(reply.value, bruteForce(entry("human/1").signature, own), 50);
+            }
         }
     }
 }

@@ -66,10 +66,14 @@ TEST_F(EvaluationRun, SameForAnyNumberOfThreads) {
 TEST_F(EvaluationRun, HalfThePairsGiveTheWholeMatrix) {
     const auto shapes = described(2);
     const auto copy = shapes;
-    const auto half = scorePairs(shapes, shapes, {}, 2, [](std::size_t) {}, {});
-    const auto full = scorePairs(shapes, copy, {}, 2, [](std::size_t) {}, {});
-    ASSERT_TRUE(half && full);
-    EXPECT_EQ(*half, *full);
+    for (const bool partial : {false, true}) {
+        ScoreOptions options;
+        options.partial = partial;
+        const auto half = scorePairs(shapes, shapes, options, 2, [](std::size_t) {}, {});
+        const auto full = scorePairs(shapes, copy, options, 2, [](std::size_t) {}, {});
+        ASSERT_TRUE(half && full);
+        EXPECT_EQ(*half, *full) << "partial " << partial;
+    }
 }
 
 TEST_F(EvaluationRun, CountsEveryShapeOnce) {

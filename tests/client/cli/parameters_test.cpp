@@ -99,8 +99,10 @@ TEST(Parameters, OutOfRangeIsRefusedWithItsRange) {
 TEST(Parameters, ScoreFlagsTurnReflectionOffAndScaleOn) {
     EXPECT_TRUE(ScoreFlags{}.resolve().reflection);
     EXPECT_FALSE(ScoreFlags{}.resolve().keepScale);
-    EXPECT_FALSE((ScoreFlags{true, true}.resolve().reflection));
-    EXPECT_TRUE((ScoreFlags{true, true}.resolve().keepScale));
+    EXPECT_FALSE((ScoreFlags{true, true, false}.resolve().reflection));
+    EXPECT_TRUE((ScoreFlags{true, true, false}.resolve().keepScale));
+    EXPECT_FALSE(ScoreFlags{}.resolve().partial);
+    EXPECT_TRUE((ScoreFlags{false, false, true}.resolve().partial));
 }
 
 }  // namespace
