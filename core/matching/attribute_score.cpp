@@ -14,6 +14,9 @@ namespace {
 constexpr std::array<double, kStatisticKinds> kTypical{2.17, 3.27, 3.91, 1.10, 4.41, 1.27, 4.07};
 constexpr double kTypicalDisagreement = 0.9;
 
+// Of a piece, what its whole contains of it against what the two look like.
+constexpr double kContainedWeight = 0.5;
+
 // Parts say both which parts there are and where they lie: two of the statistics' worth.
 constexpr double kPartsWeight = 2.0;
 
@@ -57,6 +60,12 @@ double scaleDistance(const Signature& a, const Signature& b, const ScoreOptions&
                              : 0.0;
 }
 
+double disagreement(double agreement) { return std::max(0.0, 1.0 - agreement) / kTypicalDisagreement; }
+
+double meanDistance(const AttributeDistance& distance, double agreement) {
+    return (distance.statistics + distance.partsWeight * disagreement(agreement)) / distance.totalWeight;
+}
+
 }  // namespace
 
 AttributeDistance attributeDistance(const Signature& a, const Signature& b, const ScoreOptions& options) {
@@ -74,16 +83,13 @@ AttributeDistance attributeDistance(const Signature& a, const Signature& b, cons
 }
 
 double attributeScore(const AttributeDistance& distance, double agreement) {
-    const double parts = std::max(0.0, 1.0 - agreement) / kTypicalDisagreement;
-    const double mean = (distance.statistics + distance.partsWeight * parts) / distance.totalWeight;
-    return scoreOf(std::hypot(mean, distance.scale));
+    return scoreOf(std::hypot(meanDistance(distance, agreement), distance.scale));
 }
 
-ScoreTerm containmentTerm(double share) {
-    return {"contained parts", std::max(0.0, 1.0 - share) / kTypicalDisagreement, 1.0};
+double pieceScore(const AttributeDistance& distance, double agreement, double share) {
+    return scoreOf((1.0 - kContainedWeight) * meanDistance(distance, agreement) +
+                   kContainedWeight * disagreement(share));
 }
-
-double containmentScore(double share) { return scoreOf(containmentTerm(share).distance); }
 
 std::vector<ScoreTerm> scoreTerms(const Signature& a, const Signature& b, const ScoreOptions& options,
                                   double agreement) {
@@ -94,8 +100,15 @@ std::vector<ScoreTerm> scoreTerms(const Signature& a, const Signature& b, const 
         terms.push_back({kStatistics[kind].name, termDistance(a, b, kind),
                          termWeight(kind, interior) / distance.totalWeight});
     }
-    terms.push_back({"parts", std::max(0.0, 1.0 - agreement) / kTypicalDisagreement,
-                     distance.partsWeight / distance.totalWeight});
+    terms.push_back({"parts", disagreement(agreement), distance.partsWeight / distance.totalWeight});
+    return terms;
+}
+
+std::vector<ScoreTerm> pieceTerms(const Signature& a, const Signature& b, const ScoreOptions& options,
+                                  double agreement, double share) {
+    std::vector<ScoreTerm> terms = scoreTerms(a, b, options, agreement);
+    for (ScoreTerm& term : terms) term.weight *= 1.0 - kContainedWeight;
+    terms.push_back({"contained parts", disagreement(share), kContainedWeight});
     return terms;
 }
 

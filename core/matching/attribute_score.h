@@ -26,13 +26,16 @@ struct AttributeDistance {
 /// the agreement falls, in (0, 1]. Unrelated shapes (D = 1) typically score 0.2.
 [[nodiscard]] double attributeScore(const AttributeDistance& distance, double agreement);
 
-/// The same with the contained share of a piece as the only term.
-[[nodiscard]] double containmentScore(double share);
-/// Its one term.
-[[nodiscard]] ScoreTerm containmentTerm(double share);
+/// For a piece and its whole: half D as above (without the sizes' difference), for a piece still
+/// resembles its whole, half by the share of the piece that the whole contains. Falls as either does.
+[[nodiscard]] double pieceScore(const AttributeDistance& distance, double agreement, double share);
 
 /// Name, distance and weight of every term, in a fixed order; the weights sum to 1.
 [[nodiscard]] std::vector<ScoreTerm> scoreTerms(const Signature& a, const Signature& b,
                                                 const ScoreOptions& options, double agreement);
+
+/// The same of a piece: with the term of what the whole contains of it.
+[[nodiscard]] std::vector<ScoreTerm> pieceTerms(const Signature& a, const Signature& b,
+                                                const ScoreOptions& options, double agreement, double share);
 
 }  // namespace shapedb

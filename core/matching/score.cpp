@@ -144,8 +144,17 @@ double knownScale(const Signature& a, const Signature& b, const ScoreOptions& op
     return options.keepScale ? a.scale / b.scale : 0.0;
 }
 
-double partialScore(const Signature& a, const Signature& b, double share, const ScoreOptions& options) {
-    return identical(a, b, options) ? 1.0 : belowOne(containmentScore(share));
+double partialScore(const Signature& a, const Signature& b, double agreement, double share,
+                    const ScoreOptions& options) {
+    if (identical(a, b, options)) return 1.0;
+    return belowOne(pieceScore(attributeDistance(a, b, options), agreement, share));
+}
+
+// Symmetric bit for bit, as `score` makes it.
+double agreementOf(const Signature& a, const Signature& b, const ScoreOptions& options) {
+    const bool swapped = comesFirst(b, a);
+    return matchParts((swapped ? b : a).attributes->body, (swapped ? a : b).attributes->body, options)
+        .agreement;
 }
 
 // Scan coordinates of b (the whole) to scan coordinates of a (the piece).
@@ -189,12 +198,13 @@ Explanation explainPartial(const Signature& a, const Signature& b, const ScoreOp
     const Body& whole = b.attributes->body;
     const Containment found = containment(piece, whole, knownScale(a, b, options), options);
     Explanation result;
-    result.score = partialScore(a, b, found.share, options);
+    const double agreement = agreementOf(a, b, options);
+    result.score = partialScore(a, b, agreement, found.share, options);
     result.similarity = found.share;
     result.dissimilarity = 1.0 - found.share;
     result.degenerate = isDegenerate(a, b);
     result.motion = pieceMotion(a, b, options, found);
-    result.terms = {containmentTerm(found.share)};
+    result.terms = pieceTerms(a, b, options, agreement, found.share);
     addPairs(containedPairs(piece, whole, found, options), found.share, a, b, result);
     return result;
 }
@@ -251,7 +261,7 @@ double score(const Signature& a, const Signature& b, const ScoreOptions& options
     if (options.partial && bothAttributed(a, b)) {
         const double scale = knownScale(a, b, options);
         const Containment found = containment(a.attributes->body, b.attributes->body, scale, options);
-        return partialScore(a, b, found.share, options);
+        return partialScore(a, b, agreementOf(a, b, options), found.share, options);
     }
     if (comesFirst(b, a) && !options.partial) return score(b, a, options);
     if (bothAttributed(a, b)) {
@@ -264,16 +274,15 @@ double score(const Signature& a, const Signature& b, const ScoreOptions& options
 
 double scoreUpperBound(const Signature& a, const Signature& b, const ScoreOptions& options) {
     if (identical(a, b, options)) return 1.0;
-    if (options.partial && bothAttributed(a, b)) {
-        const double share =
-            containmentBound(a.attributes->body, b.attributes->body, knownScale(a, b, options));
-        return partialScore(a, b, share, options);
-    }
     if (bothAttributed(a, b)) {
         const bool swapped = comesFirst(b, a);
         const Body& first = (swapped ? b : a).attributes->body;
         const Body& second = (swapped ? a : b).attributes->body;
-        return attributedScore(a, b, partAgreementBound(first, second, options), options);
+        const double agreement = partAgreementBound(first, second, options);
+        if (!options.partial) return attributedScore(a, b, agreement, options);
+        const double share =
+            containmentBound(a.attributes->body, b.attributes->body, knownScale(a, b, options));
+        return partialScore(a, b, agreement, share, options);
     }
     const Scaled scaled = inCommonScale(a, b, options);
     const double most = std::min({similarityBound(scaled.a, scaled.b, options.kernelWidth),

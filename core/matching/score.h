@@ -49,8 +49,8 @@ constexpr double kDegenerateCeiling = 0.9;
 /// single point and they are not the same, the score is at most kDegenerateCeiling: one weighted
 /// point leaves the rotation open and says too little.
 ///
-/// Partial: with attributes the same with the parts of `a` that find no like in `b` as the only
-/// distance (containment.h); otherwise similarity / weight of `a`. 1 still only for the same shape.
+/// Partial, with attributes: half D, half what of `a` finds no like in `b` (containment.h);
+/// otherwise similarity / weight of `a`. Not symmetric; 1 still only for the same shape.
 ///
 /// Both must be valid (as made by makeSignature or decodeSignature), the options valid.
 /// Thread-safe, allocates nothing.
