@@ -32,12 +32,49 @@ constexpr double kTolerance = 0.2;
 // An interior whose boundary parts fewer points than this has leaked out.
 constexpr double kLeastParted = 0.35;
 
+// An interior that bridges more than this is peeled: between the handles of pliers seen from one side
+// there is a web that nothing holds, below each handle a bridge that closes it.
+constexpr double kWorthPeeling = 0.15;
+constexpr std::array<double, 8> kPeelWidths = {48.0, 32.0, 24.0, 16.0, 12.0, 9.0, 7.0, 5.0};
+constexpr double kLeastWalkPeel = 9.0;  // what a walk leaves has few webs, and thin parts to lose
+// Webs are the smaller part: what loses more of its volume was no web but a body seen from one side.
+constexpr double kBodyShare = 0.5;
+
 // The thickened interior: balls up to this many scales.
 constexpr double kThickness = 3.0;
 
 double volumeOf(const PointCloud& points, const std::array<std::uint32_t, 4>& v) {
     const Point3& o = points[v[0]];
     return dot(points[v[1]] - o, cross(points[v[2]] - o, points[v[3]] - o)) / 6.0;
+}
+
+double volumeOf(const PointCloud& points, const Tetrahedra& tetrahedra,
+                const std::vector<std::uint8_t>& inside) {
+    double sum = 0.0;
+    for (std::size_t t = 0; t < inside.size(); ++t) {
+        if (inside[t] != 0) sum += volumeOf(points, tetrahedra.vertices[t]);
+    }
+    return sum;
+}
+
+// Area of facet i, and its circumradius in mean scales of its corners.
+struct Extent {
+    double area = 0.0;
+    double width = 0.0;
+};
+
+Extent extentOf(const PointCloud& points, const std::array<std::uint32_t, 4>& v, std::size_t i,
+                const std::vector<double>& scales) {
+    const std::uint32_t a = v[(i + 1) % 4];
+    const std::uint32_t b = v[(i + 2) % 4];
+    const std::uint32_t c = v[(i + 3) % 4];
+    const Point3 ab = points[b] - points[a];
+    const Point3 ac = points[c] - points[a];
+    const double area = 0.5 * length(cross(ab, ac));
+    // The circumradius is the product of the edges over four times the area.
+    const double edges = length(ab) * length(ac) * distance(points[b], points[c]);
+    const double scale = (scales[a] + scales[b] + scales[c]) / 3.0;
+    return {area, area > 0.0 ? edges / (4.0 * area * scale) : INFINITY};
 }
 
 struct Facet {
@@ -52,23 +89,44 @@ std::vector<Facet> measureFacets(const PointCloud& points, const Tetrahedra& tet
     std::vector<Facet> facets;
     facets.reserve(2 * tetrahedra.size() + points.size());
     for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
-        const auto& v = tetrahedra.vertices[t];
         for (std::size_t i = 0; i < 4; ++i) {
             const std::uint32_t next = tetrahedra.neighbours[t][i];
             if (next != kNoTetrahedron && next < t) continue;
-            const std::uint32_t a = v[(i + 1) % 4];
-            const std::uint32_t b = v[(i + 2) % 4];
-            const std::uint32_t c = v[(i + 3) % 4];
-            const Point3 ab = points[b] - points[a];
-            const Point3 ac = points[c] - points[a];
-            const double area = 0.5 * length(cross(ab, ac));
-            // The circumradius is the product of the edges over four times the area.
-            const double edges = length(ab) * length(ac) * distance(points[b], points[c]);
-            const double limit = kBridge * (scales[a] + scales[b] + scales[c]) / 3.0;
-            facets.push_back({t, next, area, edges > limit * 4.0 * area});
+            const Extent extent = extentOf(points, tetrahedra.vertices[t], i, scales);
+            facets.push_back({t, next, extent.area, extent.width > kBridge});
         }
     }
     return facets;
+}
+
+// What is left when everything that can be reached from outside through facets wider than
+// `width` scales is taken away.
+std::vector<std::uint8_t> peeled(const PointCloud& points, const Tetrahedra& tetrahedra,
+                                 const std::vector<double>& scales, std::vector<std::uint8_t> inside,
+                                 double width) {
+    const auto open = [&](std::uint32_t t, std::size_t facet) {
+        return extentOf(points, tetrahedra.vertices[t], facet, scales).width > width;
+    };
+    std::vector<std::uint32_t> taken;
+    for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
+        for (std::size_t facet = 0; inside[t] != 0 && facet < 4; ++facet) {
+            const std::uint32_t next = tetrahedra.neighbours[t][facet];
+            if ((next != kNoTetrahedron && inside[next] != 0) || !open(t, facet)) continue;
+            inside[t] = 0;
+            taken.push_back(t);
+        }
+    }
+    while (!taken.empty()) {
+        const std::uint32_t t = taken.back();
+        taken.pop_back();
+        for (std::size_t facet = 0; facet < 4; ++facet) {
+            const std::uint32_t next = tetrahedra.neighbours[t][facet];
+            if (next == kNoTetrahedron || inside[next] == 0 || !open(t, facet)) continue;
+            inside[next] = 0;
+            taken.push_back(next);
+        }
+    }
+    return inside;
 }
 
 struct Candidate {
@@ -122,6 +180,22 @@ std::vector<std::uint8_t> leftByWalk(const std::vector<std::uint8_t>& big, const
     return inside;
 }
 
+// The candidate, or what is left of it when webs are peeled off, if that costs less.
+Candidate withoutWebs(const PointCloud& points, const Tetrahedra& tetrahedra,
+                      const std::vector<double>& scales, const Judge& judge, double leastWidth,
+                      Candidate candidate) {
+    if (candidate.bridged <= kWorthPeeling) return candidate;
+    const std::vector<std::uint8_t> whole = candidate.inside;
+    const double enough = kBodyShare * volumeOf(points, tetrahedra, whole);
+    for (const double width : kPeelWidths) {
+        if (width < leastWidth) break;
+        Candidate rest = judge.judged(peeled(points, tetrahedra, scales, whole, width));
+        const bool better = rest.parted >= kLeastParted && rest.cost() < candidate.cost();
+        if (better && volumeOf(points, tetrahedra, rest.inside) >= enough) candidate = std::move(rest);
+    }
+    return candidate;
+}
+
 AdaptiveInterior chosen(Candidate candidate, InteriorSource source, double angleDegrees) {
     const double quality = candidate.parted * candidate.covered * candidate.covered;
     return {std::move(candidate.inside), source, angleDegrees, quality};
@@ -156,12 +230,15 @@ Result<AdaptiveInterior> adaptiveInterior(const PointCloud& points, const Tetrah
                                           const std::vector<std::uint8_t>& big,
                                           const std::vector<double>& scales, const RunContext& context) {
     const Judge judge(points, tetrahedra, scales);
+    const auto trimmed = [&](Candidate candidate, double leastWidth) {
+        return withoutWebs(points, tetrahedra, scales, judge, leastWidth, std::move(candidate));
+    };
     const auto leaks = leakAngles(points, tetrahedra, big, context);
     if (!leaks) return fail(leaks.error());
     Candidate preferred = judge.judged(leftByWalk(big, *leaks, kAngles[0]));
     // No other interior costs less than nothing, so none can be clearly better than this one.
     if (preferred.parted >= kLeastParted && preferred.cost() <= kTolerance) {
-        return chosen(std::move(preferred), InteriorSource::kWalk, kAngles[0]);
+        return chosen(trimmed(std::move(preferred), kLeastWalkPeel), InteriorSource::kWalk, kAngles[0]);
     }
     std::array<Candidate, kAngles.size()> walks;
     walks[0] = std::move(preferred);
@@ -178,9 +255,10 @@ Result<AdaptiveInterior> adaptiveInterior(const PointCloud& points, const Tetrah
     least = std::min(least, spread.cost());
     for (std::size_t i = 0; i < kAngles.size(); ++i) {
         if (walks[i].parted < kLeastParted || walks[i].cost() > least + kTolerance) continue;
-        return chosen(std::move(walks[i]), InteriorSource::kWalk, kAngles[i]);
+        return chosen(trimmed(std::move(walks[i]), kLeastWalkPeel), InteriorSource::kWalk, kAngles[i]);
     }
-    if (spread.parted >= kLeastParted) return chosen(std::move(spread), InteriorSource::kPotential, 0.0);
+    if (spread.parted >= kLeastParted)
+        return chosen(trimmed(std::move(spread), 0.0), InteriorSource::kPotential, 0.0);
     return thickened(points, tetrahedra, scales);
 }
 

@@ -124,6 +124,21 @@ TEST(AdaptiveInterior, OpenSurfacesGetAnAnswerThatIsNotTrusted) {
     }
 }
 
+TEST(AdaptiveInterior, SeenFromAboveTwoBarsAreNoPlate) {
+    // The upper halves of two parallel rods of radius 0.1, 0.6 apart, as a sensor above a table sees them.
+    Random random(21);
+    PointCloud points;
+    for (int i = 0; i < 6000; ++i) {
+        const double angle = random.uniform(0.0, 3.14159265358979323846);
+        const double side = i % 2 == 0 ? -0.3 : 0.3;
+        points.push_back({random.uniform(-1.0, 1.0), side + 0.1 * std::cos(angle), 0.1 * std::sin(angle)});
+    }
+    const Segmentation s = found(points);
+    const double halfRods = 2.0 * 2.0 * 0.5 * 3.14159265358979323846 * 0.01;
+    EXPECT_NEAR(s.volume / halfRods, 1.0, 0.1);
+    EXPECT_LT(s.quality, 0.7);
+}
+
 TEST(AdaptiveInterior, AnOpenCupIsNotFilled) {
     // Outer ball of radius 1 without its top, inner one of 0.8, and the rim between them.
     Random random(13);
