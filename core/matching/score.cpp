@@ -23,6 +23,7 @@ bool comesFirst(const Signature& a, const Signature& b) {
         if (p.position != q.position) return p.position < q.position;
         if (p.covariance != q.covariance) return p.covariance < q.covariance;
         if (p.peakRadius != q.peakRadius) return p.peakRadius < q.peakRadius;
+        if (p.volumeShare != q.volumeShare) return p.volumeShare < q.volumeShare;
     }
     return a.scale < b.scale;
 }

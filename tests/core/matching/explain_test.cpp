@@ -19,6 +19,7 @@ using testing_support::describeSignature;
 using testing_support::disturbed;
 using testing_support::randomReflection;
 using testing_support::randomSignature;
+using testing_support::scoreOptions;
 using testing_support::signatureOf;
 using testing_support::turned;
 
@@ -145,14 +146,14 @@ TEST(Explain, KeepsSizesWhenAskedTo) {
     Signature a = signatureOf({{0, 0, 0, 0.5}, {0.1, 0, 0, 0.25}});
     Signature b = a;
     a.scale = 2.0;
-    const Explanation free = explain(a, b, {true, false, 0.1});
+    const Explanation free = explain(a, b, scoreOptions(true, false, 0.1));
     EXPECT_EQ(free.score, 1.0);
     EXPECT_EQ(free.motion.scale, 2.0);
-    const Explanation kept = explain(a, b, {true, true, 0.1});
+    const Explanation kept = explain(a, b, scoreOptions(true, true, 0.1));
     EXPECT_EQ(kept.motion.scale, 1.0);
     ASSERT_EQ(kept.matches.size(), 2u);
     EXPECT_NEAR(kept.matches[1].distance, 0.05, 1e-6);  // of a's scale: 0.1 in the scan
-    const Explanation back = explain(b, a, {true, true, 0.1});
+    const Explanation back = explain(b, a, scoreOptions(true, true, 0.1));
     EXPECT_NEAR(back.matches[1].distance, 0.1, 1e-6);  // of the smaller b's: again 0.1
 }
 

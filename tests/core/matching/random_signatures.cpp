@@ -129,6 +129,14 @@ Signature turned(Signature signature, const Matrix3& rotation) {
     return signature;
 }
 
+ScoreOptions scoreOptions(bool reflection, bool keepScale, double kernelWidth) {
+    ScoreOptions options;
+    options.reflection = reflection;
+    options.keepScale = keepScale;
+    options.kernelWidth = kernelWidth;
+    return options;
+}
+
 Matrix3 randomReflection(Random& random) {
     Matrix3 r = randomRotation(random);
     for (double& x : r[0]) x = -x;

@@ -5,6 +5,7 @@
 
 #include "core/base/random.h"
 #include "core/geometry/motion.h"
+#include "core/matching/score.h"
 #include "core/signature/signature.h"
 
 namespace shapedb::testing_support {
@@ -34,6 +35,9 @@ Signature disturbed(Signature signature, Random& random, double noise);
 
 /// Every position through a rotation (or reflection), as another pose of the scan would give.
 Signature turned(Signature signature, const Matrix3& rotation);
+
+/// By position, for the tests' many combinations.
+ScoreOptions scoreOptions(bool reflection, bool keepScale, double kernelWidth = 0.1);
 
 /// A random orthonormal matrix of determinant -1.
 Matrix3 randomReflection(Random& random);

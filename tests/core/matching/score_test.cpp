@@ -24,14 +24,15 @@ using testing_support::Matching;
 using testing_support::plainScore;
 using testing_support::randomReflection;
 using testing_support::randomSignature;
+using testing_support::scoreOptions;
 using testing_support::signatureOf;
 using testing_support::turned;
 
 bool sameBits(double x, double y) { return std::memcmp(&x, &y, sizeof x) == 0; }
 
 std::array<ScoreOptions, 4> everyOption(double kernelWidth = 0.1) {
-    return {ScoreOptions{true, false, kernelWidth}, ScoreOptions{false, false, kernelWidth},
-            ScoreOptions{true, true, kernelWidth}, ScoreOptions{false, true, kernelWidth}};
+    return {scoreOptions(true, false, kernelWidth), scoreOptions(false, false, kernelWidth),
+            scoreOptions(true, true, kernelWidth), scoreOptions(false, true, kernelWidth)};
 }
 
 ScoreOptions randomOptions(Random& random) {
@@ -181,9 +182,9 @@ TEST(Score, TellsLeftFromRightOnlyWithoutReflection) {
         {{0, 0, 0, 0.05}, {0.45, 0, 0, 0.02}, {0, 0.35, 0, 0.02}, {0, 0, 0.25, 0.02}, {0.45, 0.1, 0, 0.02}});
     const Matrix3 mirror = {{{1, 0, 0}, {0, 1, 0}, {0, 0, -1}}};
     const Signature other = turned(chiral, mirror);
-    EXPECT_GE(score(chiral, other, {true, false, 0.1}), 1.0 - 1e-5);
-    EXPECT_LT(score(chiral, other, {false, false, 0.1}), 0.95);
-    EXPECT_LT(score(chiral, other, {false, false, 0.05}), 0.9);
+    EXPECT_GE(score(chiral, other, scoreOptions(true, false, 0.1)), 1.0 - 1e-5);
+    EXPECT_LT(score(chiral, other, scoreOptions(false, false, 0.1)), 0.95);
+    EXPECT_LT(score(chiral, other, scoreOptions(false, false, 0.05)), 0.9);
 
     Random random(7);
     int clearlyBelow = 0;
@@ -191,8 +192,8 @@ TEST(Score, TellsLeftFromRightOnlyWithoutReflection) {
         Signature shape = randomSignature(random, Kind::kEqualWeight, 7);
         while (shape.points.size() < 6) shape = randomSignature(random, Kind::kEqualWeight, 7);
         const Signature copy = turned(shape, randomReflection(random));
-        const double told = score(shape, copy, {false, false, 0.05});
-        const double untold = score(shape, copy, {true, false, 0.05});
+        const double told = score(shape, copy, scoreOptions(false, false, 0.05));
+        const double untold = score(shape, copy, scoreOptions(true, false, 0.05));
         EXPECT_LE(told, untold);
         clearlyBelow += told < 0.95 ? 1 : 0;
     }
@@ -204,8 +205,8 @@ TEST(Score, ReflectionCanOnlyRaiseIt) {
     for (int round = 0; round < 2000; ++round) {
         const Pair pair = randomPair(random);
         const bool keepScale = round % 2 == 0;
-        EXPECT_GE(score(pair.a, pair.b, {true, keepScale, 0.1}),
-                  score(pair.a, pair.b, {false, keepScale, 0.1}));
+        EXPECT_GE(score(pair.a, pair.b, scoreOptions(true, keepScale, 0.1)),
+                  score(pair.a, pair.b, scoreOptions(false, keepScale, 0.1)));
     }
 }
 
@@ -215,9 +216,9 @@ TEST(Score, KeepScaleComparesSizes) {
         const Signature a = randomSignature(random, Kind::kPlain, 7);
         Signature b = a;
         b.scale = a.scale * 2.0;
-        EXPECT_EQ(score(a, b, {true, false, 0.1}), 1.0);
+        EXPECT_EQ(score(a, b, scoreOptions(true, false, 0.1)), 1.0);
         // Every pair has at most the smaller's weight, an eighth of the larger's.
-        const double kept = score(a, b, {true, true, 0.1});
+        const double kept = score(a, b, scoreOptions(true, true, 0.1));
         EXPECT_LE(kept, 0.125 + 1e-12);
         EXPECT_GT(kept, 0.0);
         // Only the ratio of sizes matters.
@@ -225,9 +226,10 @@ TEST(Score, KeepScaleComparesSizes) {
         Signature b10 = b;
         a10.scale *= 8.0;
         b10.scale *= 8.0;
-        EXPECT_TRUE(sameBits(kept, score(a10, b10, {true, true, 0.1})));
+        EXPECT_TRUE(sameBits(kept, score(a10, b10, scoreOptions(true, true, 0.1))));
         b.scale = std::nextafter(a.scale, 1e9);
-        EXPECT_GE(score(a, b, {true, true, 0.1}), a.points.size() == 1 ? kDegenerateCeiling : 1.0 - 1e-9);
+        EXPECT_GE(score(a, b, scoreOptions(true, true, 0.1)),
+                  a.points.size() == 1 ? kDegenerateCeiling : 1.0 - 1e-9);
     }
 }
 
@@ -245,8 +247,8 @@ TEST(Score, ASinglePointNeverMakesTwoShapesTheSame) {
     }
     Signature larger = ball;
     larger.scale = 1.01;
-    EXPECT_EQ(score(ball, larger, {true, false, 0.1}), 1.0);
-    EXPECT_LE(score(ball, larger, {true, true, 0.1}), kDegenerateCeiling);
+    EXPECT_EQ(score(ball, larger, scoreOptions(true, false, 0.1)), 1.0);
+    EXPECT_LE(score(ball, larger, scoreOptions(true, true, 0.1)), kDegenerateCeiling);
 }
 
 TEST(Score, ComparesByHandAsWritten) {
@@ -265,14 +267,14 @@ TEST(Score, KernelWidthHasARangeAndTheErrorSaysIt) {
     const double nan = std::numeric_limits<double>::quiet_NaN();
     const double infinite = std::numeric_limits<double>::infinity();
     for (const double width : {0.0, -0.1, -0.0, 1e-7, 1e-200, 2e6, nan, infinite, -infinite}) {
-        const auto result = validate(ScoreOptions{true, false, width});
+        const auto result = validate(scoreOptions(true, false, width));
         ASSERT_FALSE(result) << width;
         EXPECT_EQ(result.error().code, ErrorCode::kInvalidArgument);
         EXPECT_NE(result.error().message.find("kernel_width"), std::string::npos);
         EXPECT_NE(result.error().message.find("1e-06 to 1e+06"), std::string::npos) << result.error().message;
     }
     for (const double width : {kMinKernelWidth, 0.01, 0.1, 1.0, kMaxKernelWidth}) {
-        EXPECT_TRUE(validate(ScoreOptions{true, false, width})) << width;
+        EXPECT_TRUE(validate(scoreOptions(true, false, width))) << width;
     }
 }
 

@@ -9,6 +9,7 @@
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
+#include "tests/core/matching/attributed_signatures.h"
 #include "tests/core/matching/random_signatures.h"
 
 namespace shapedb {
@@ -114,6 +115,56 @@ TEST(TopK, EqualsBruteForceBitForBit) {
         EXPECT_LE(result->scored, passing);
         EXPECT_GE(result->scored, result->hits.size());
     }
+}
+
+// With attributes, as the default profile makes them; some without among them, some twice.
+TEST(TopK, EqualsBruteForceOnScansBitForBit) {
+    const auto& scans = testing_support::scannedFamilies(1, 1);
+    Random random(10);
+    std::vector<SignatureSet::EntryPtr> entries;
+    std::int64_t id = 1;
+    for (const auto& scan : scans) {
+        entries.push_back(entryOf(id++, scan.signature));
+        for (int copy = 0; copy < 8; ++copy) {
+            entries.push_back(entryOf(
+                id++, testing_support::disturbedAttributed(scan.signature, random, random.uniform(0, 0.05))));
+        }
+        entries.push_back(entryOf(id++, scan.signature));
+        Signature plain = scan.signature;
+        plain.attributes.reset();
+        entries.push_back(entryOf(id++, plain));
+    }
+    const SignatureSet set = SignatureSet().with(entries, {});
+    for (int round = 0; round < 150; ++round) {
+        const SearchOptions options = randomOptions(random, set);
+        Signature query = scans[random.below(scans.size())].signature;
+        if (round % 3 == 0) query = testing_support::disturbedAttributed(query, random, 0.02);
+        if (round % 10 == 0) query.attributes.reset();
+        const auto result = topK(query, set, options);
+        ASSERT_TRUE(result) << result.error().message;
+        expectSameHits(result->hits, bruteForce(query, set, options));
+        if (HasFatalFailure()) FAIL() << "round " << round << " k " << options.k << " of " << set.size();
+    }
+}
+
+TEST(TopK, RulesMostScansOutWithoutAligning) {
+    const auto& scans = testing_support::scannedFamilies(1, 1);
+    Random random(11);
+    std::vector<SignatureSet::EntryPtr> entries;
+    for (std::int64_t id = 1; id <= 1300; ++id) {
+        const auto& scan = scans[static_cast<std::size_t>(id) % scans.size()];
+        entries.push_back(entryOf(id, testing_support::disturbedAttributed(scan.signature, random, 0.02)));
+    }
+    const SignatureSet set = SignatureSet().with(entries, {});
+    SearchOptions options;
+    options.k = 10;
+    std::uint64_t scored = 0;
+    for (const auto& scan : scans) {
+        const auto result = topK(scan.signature, set, options);
+        ASSERT_TRUE(result);
+        scored += result->scored;
+    }
+    EXPECT_LT(scored / scans.size(), set.size() / 4);
 }
 
 TEST(TopK, BreaksTiesByIdAtEveryK) {

@@ -1,0 +1,114 @@
+#include "tests/core/matching/attributed_signatures.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "core/signature/profile.h"
+#include "core/synthetic/families.h"
+#include "tests/core/matching/random_signatures.h"
+
+namespace shapedb::testing_support {
+
+namespace {
+
+std::array<float, 6> turnedCovariance(const std::array<float, 6>& c, const Matrix3& r) {
+    const Matrix3 own = {{{c[0], c[1], c[2]}, {c[1], c[3], c[4]}, {c[2], c[4], c[5]}}};
+    const auto entry = [&](std::size_t i, std::size_t j) {
+        double sum = 0.0;
+        for (std::size_t k = 0; k < 3; ++k) {
+            for (std::size_t l = 0; l < 3; ++l) sum += r[i][k] * own[k][l] * r[j][l];
+        }
+        return static_cast<float>(sum);
+    };
+    return {entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)};
+}
+
+std::uint8_t byteNear(double value) {
+    return static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0, 255.0)));
+}
+
+}  // namespace
+
+void updateBody(Signature& signature) { signature.attributes->body = bodyOf(signature.points); }
+
+Signature randomAttributed(Random& random, std::size_t maxPoints) {
+    Signature signature = randomSignature(random, maxPoints);
+    const bool alike = random.below(3) == 0;  // parts of one size: any may meet any
+    for (SignaturePoint& p : signature.points) {
+        const auto extent = [&] {
+            return alike ? 0.05f : static_cast<float>(0.1 * std::exp(random.normal()));
+        };
+        const float x = extent(), y = extent(), z = extent();
+        p.covariance = turnedCovariance({x * x, 0, 0, y * y, 0, z * z}, randomRotation(random));
+        p.peakRadius = alike ? 0.1f : static_cast<float>(0.1 * std::exp(random.normal()));
+    }
+    ShapeAttributes& attributes = signature.attributes.emplace();
+    attributes.quality = static_cast<std::uint8_t>(random.below(4) == 0 ? 255 : random.below(256));
+    for (std::uint8_t& bin : attributes.statistics) {
+        bin = random.below(2) == 0 ? 0 : static_cast<std::uint8_t>(random.below(120));
+    }
+    updateBody(signature);
+    return signature;
+}
+
+Signature disturbedAttributed(Signature signature, Random& random, double noise) {
+    double sharesBefore = 0.0;
+    double sharesAfter = 0.0;
+    for (const SignaturePoint& p : signature.points) sharesBefore += p.volumeShare;
+    for (std::size_t i = 0; i < signature.points.size(); ++i) {
+        SignaturePoint& p = signature.points[i];
+        const auto nearly = [&](float x) {
+            return x * static_cast<float>(std::exp(noise * random.normal()));
+        };
+        for (float& x : p.position) x = i == 0 ? 0.0f : x + static_cast<float>(noise * random.normal());
+        const float weight = nearly(p.weight);
+        p.weight = i == 0 ? weight : std::min(weight, signature.points[i - 1].weight);
+        p.volumeShare = nearly(p.volumeShare);
+        sharesAfter += p.volumeShare;
+        p.peakRadius = nearly(p.peakRadius);
+        const float wider = nearly(1.0f);
+        for (float& c : p.covariance) c *= wider;
+    }
+    for (SignaturePoint& p : signature.points) {
+        p.volumeShare *= static_cast<float>(sharesBefore / sharesAfter);
+    }
+    for (std::uint8_t& bin : signature.attributes->statistics) {
+        if (bin > 0) bin = byteNear(bin + 200.0 * noise * random.normal());
+    }
+    signature.attributes->quality = byteNear(signature.attributes->quality + 200.0 * noise * random.normal());
+    updateBody(signature);
+    return signature;
+}
+
+Signature turnedAttributed(Signature signature, const Matrix3& rotation) {
+    Signature result = turned(std::move(signature), rotation);
+    for (SignaturePoint& p : result.points) p.covariance = turnedCovariance(p.covariance, rotation);
+    updateBody(result);
+    return result;
+}
+
+const std::vector<Scan>& scannedFamilies(std::size_t members, std::size_t scans) {
+    static std::map<std::pair<std::size_t, std::size_t>, std::vector<Scan>> made;
+    std::vector<Scan>& all = made[{members, scans}];
+    if (!all.empty()) return all;
+    std::uint64_t seed = 1;
+    for (const FamilyInfo& family : listFamilies()) {
+        for (std::size_t member = 0; member < members; ++member) {
+            const Solid solid = makeMember(family.name, member, 1).value();
+            for (std::size_t scan = 0; scan < scans; ++scan) {
+                ScanOptions options;
+                options.count = 3000;
+                options.noise = 0.002;
+                options.seed = seed++;
+                const PointCloud points = scanOf(solid, options).value();
+                all.push_back({family.name, member,
+                               describe(points, parametersOf(Profile::kDefault)).value().signature});
+            }
+        }
+    }
+    return all;
+}
+
+}  // namespace shapedb::testing_support

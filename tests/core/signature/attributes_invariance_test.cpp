@@ -1,0 +1,195 @@
+// What must not change the attributes of a signature, and how little noise may.
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstdlib>
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "core/base/random.h"
+#include "core/geometry/motion.h"
+#include "core/signature/profile.h"
+#include "core/signature/signature_codec.h"
+#include "core/synthetic/families.h"
+#include "core/synthetic/named_shapes.h"
+
+namespace shapedb {
+namespace {
+
+constexpr std::size_t kPoints = 4000;
+
+Signature describeDefault(const PointCloud& points) {
+    return describe(points, parametersOf(Profile::kDefault)).value().signature;
+}
+
+PointCloud shuffled(PointCloud points, std::uint64_t seed) {
+    Random random(seed);
+    for (std::size_t i = points.size(); i > 1; --i) std::swap(points[i - 1], points[random.below(i)]);
+    return points;
+}
+
+Motion anyMotion(Random& random, int turn, int turns) {
+    Motion motion;
+    motion.rotation = randomRotation(random);
+    motion.scale = std::pow(10.0, -6.0 + 12.0 * turn / (turns - 1));
+    motion.reflected = turn % 2 == 1;
+    if (motion.reflected) {
+        for (auto& row : motion.rotation) row[2] = -row[2];
+    }
+    const double reach = 30.0 * motion.scale;
+    motion.translation = {random.uniform(-reach, reach), random.uniform(-reach, reach),
+                          random.uniform(-reach, reach)};
+    return motion;
+}
+
+// Mean difference of a bin, [0, 1], of each statistic.
+std::vector<double> differences(const Signature& a, const Signature& b) {
+    std::vector<double> result;
+    for (const StatisticLayout& layout : kStatistics) {
+        double sum = 0.0;
+        for (std::size_t i = layout.offset; i < layout.offset + layout.count; ++i) {
+            sum += std::abs(a.attributes->statistics[i] - b.attributes->statistics[i]) / 255.0;
+        }
+        result.push_back(sum / layout.count);
+    }
+    return result;
+}
+
+double total(const std::vector<double>& all) {
+    double sum = 0.0;
+    for (const double d : all) sum += d;
+    return sum;
+}
+
+struct Named {
+    std::string name;
+    PointCloud points;
+};
+
+std::vector<Named> shapes() {
+    std::vector<Named> all;
+    all.push_back({"dumbbell", sampleBoundary(makeDumbbell().solid, kPoints, 1).value()});
+    all.push_back({"jack", sampleBoundary(makeJack().solid, kPoints, 1).value()});
+    ScanOptions options;
+    options.count = kPoints;
+    options.randomPose = false;
+    for (const char* family : {"animal", "mug"}) {
+        all.push_back({family, scanOf(makeMember(family, 0, 1).value(), options).value()});
+    }
+    return all;
+}
+
+TEST(AttributesInvariance, MotionsChangeStatisticsFarLessThanAnotherShape) {
+    const auto all = shapes();
+    std::vector<Signature> still;
+    for (const Named& shape : all) still.push_back(describeDefault(shape.points));
+    double nearestOther = 1e9;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+        for (std::size_t j = 0; j < i; ++j) {
+            nearestOther = std::min(nearestOther, total(differences(still[i], still[j])));
+        }
+    }
+    Random random(21);
+    constexpr int kTurns = 4;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+        for (int turn = 0; turn < kTurns; ++turn) {
+            const Motion motion = anyMotion(random, turn, kTurns);
+            const Signature moved = describeDefault(shuffled(applyToCloud(motion, all[i].points), 9U + turn));
+            EXPECT_LT(total(differences(still[i], moved)), 0.3 * nearestOther) << all[i].name << " " << turn;
+            EXPECT_NEAR(moved.attributes->quality, still[i].attributes->quality, 12) << all[i].name;
+            EXPECT_NEAR(moved.scale / motion.scale / still[i].scale, 1.0, 0.01) << all[i].name;
+        }
+    }
+}
+
+TEST(AttributesInvariance, ResamplingAndNoiseChangeLessThanAnotherShape) {
+    const std::vector<std::string> families = {"animal", "human", "mug", "hammer"};
+    std::vector<Signature> first;
+    std::vector<Signature> second;
+    for (const std::string& family : families) {
+        const Solid solid = makeMember(family, 0, 1).value();
+        ScanOptions options;
+        options.count = kPoints;
+        first.push_back(describeDefault(scanOf(solid, options).value()));
+        options.seed = 2;
+        options.noise = 0.003;
+        second.push_back(describeDefault(scanOf(solid, options).value()));
+    }
+    for (std::size_t i = 0; i < families.size(); ++i) {
+        const double own = total(differences(first[i], second[i]));
+        for (std::size_t j = 0; j < families.size(); ++j) {
+            if (i == j) continue;
+            EXPECT_LT(own, 0.7 * total(differences(first[i], second[j])))
+                << families[i] << " " << families[j];
+        }
+    }
+}
+
+TEST(AttributesInvariance, PointOrderChangesNoBit) {
+    for (const Named& shape : shapes()) {
+        const std::string bytes = encodeSignature(describeDefault(shape.points));
+        EXPECT_EQ(encodeSignature(describeDefault(shuffled(shape.points, 5))), bytes) << shape.name;
+    }
+}
+
+TEST(AttributesInvariance, PowersOfTwoChangeNoBit) {
+    const PointCloud points = sampleBoundary(makeJack().solid, 2000, 1).value();
+    const Signature still = describeDefault(points);
+    for (const int exponent : {-20, 1, 30}) {
+        PointCloud scaled = points;
+        for (Point3& p : scaled) p = std::ldexp(1.0, exponent) * p;
+        const Signature moved = describeDefault(scaled);
+        EXPECT_TRUE(sameShape(still, moved)) << exponent;
+        EXPECT_EQ(moved.attributes->statistics, still.attributes->statistics);
+    }
+}
+
+TEST(AttributesInvariance, AreKeptOnlyWhenAskedFor) {
+    const PointCloud points = sampleBoundary(makeDumbbell().solid, 2000, 1).value();
+    ShapeParameters parameters = parametersOf(Profile::kDefault);
+    const Description with = describe(points, parameters).value();
+    ASSERT_TRUE(with.signature.attributes);
+    EXPECT_EQ(with.signature.attributes->quality,
+              static_cast<int>(std::lround(255.0 * with.segmentation.quality)));
+    parameters.signature.attributes = false;
+    const Signature without = describe(points, parameters).value().signature;
+    EXPECT_FALSE(without.attributes);
+    EXPECT_FALSE(sameShape(without, with.signature));
+    ASSERT_EQ(without.points.size(), with.signature.points.size());
+    for (std::size_t i = 0; i < without.points.size(); ++i) {
+        EXPECT_EQ(without.points[i].position, with.signature.points[i].position) << "the same points";
+    }
+    EXPECT_FALSE(parametersOf(Profile::kPaper).signature.attributes) << "as published";
+
+    std::atomic<bool> cancel{true};
+    RunContext context;
+    context.cancel = &cancel;
+    SignatureOptions options;
+    options.attributes = true;
+    EXPECT_EQ(makeSignature(with.segmentation, options, context).error().code, ErrorCode::kCancelled);
+}
+
+// What tells two signatures apart tells them apart here too.
+TEST(AttributesInvariance, SameShapeComparesAttributes) {
+    const PointCloud points = sampleBoundary(makeDumbbell().solid, 2000, 1).value();
+    const Signature a = describeDefault(points);
+    EXPECT_TRUE(sameShape(a, a));
+    const auto differs = [&](const std::function<void(Signature&)>& change) {
+        Signature b = a;
+        change(b);
+        EXPECT_FALSE(sameShape(a, b));
+        EXPECT_FALSE(sameShape(b, a));
+    };
+    differs([](Signature& s) { s.attributes->statistics[351] ^= 1; });
+    differs([](Signature& s) { s.attributes->quality ^= 1; });
+    differs([](Signature& s) { s.points.back().peakRadius *= 1.01f; });
+    differs([](Signature& s) { s.points.back().covariance[4] += 0.01f; });
+    differs([](Signature& s) { s.points.back().volumeShare *= 0.99f; });
+}
+
+}  // namespace
+}  // namespace shapedb

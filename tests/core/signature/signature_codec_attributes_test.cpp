@@ -1,0 +1,216 @@
+// Version 2 of the format: signatures with attributes.
+#include <cmath>
+#include <cstdint>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "core/base/random.h"
+#include "core/signature/profile.h"
+#include "core/signature/signature_codec.h"
+#include "core/synthetic/families.h"
+
+namespace shapedb {
+namespace {
+
+Signature onePoint() {
+    Signature signature;
+    signature.scale = 2.5;
+    signature.origin = {1.0, -2.0, 0.125};
+    signature.volume = 3.75;
+    signature.points.resize(1);
+    signature.points[0] = {{0.0f, 0.0f, 0.0f}, 0.125f, 0.75f, 0.25f, {0.01f, 0.0f, 0.0f, 0.02f, 0.0f, 0.03f}};
+    ShapeAttributes& attributes = signature.attributes.emplace();
+    attributes.quality = 200;
+    for (std::size_t i = 0; i < kStatisticBins; ++i) {
+        attributes.statistics[i] = static_cast<std::uint8_t>(7 * i + 3);
+    }
+    attributes.body = bodyOf(signature.points);
+    return signature;
+}
+
+Signature randomAttributed(Random& random, std::size_t count) {
+    Signature signature;
+    signature.scale = std::exp(random.uniform(-80, 80));
+    signature.volume = std::exp(random.uniform(-80, 80));
+    signature.origin = {random.normal() * 1e30, random.normal(), random.normal() * 1e-30};
+    for (std::size_t i = 0; i < count; ++i) {
+        SignaturePoint point;
+        if (i > 0) {
+            for (float& v : point.position) v = static_cast<float>(random.normal());
+        }
+        point.weight = 1.0f / static_cast<float>(i + 1);
+        point.volumeShare = static_cast<float>(1.0 - random.uniform());
+        point.peakRadius = static_cast<float>(random.uniform(0.1, 1));
+        for (float& v : point.covariance) v = static_cast<float>(random.normal());
+        signature.points.push_back(point);
+    }
+    ShapeAttributes& attributes = signature.attributes.emplace();
+    attributes.quality = static_cast<std::uint8_t>(random.below(256));
+    for (std::uint8_t& bin : attributes.statistics) bin = static_cast<std::uint8_t>(random.below(256));
+    attributes.body = bodyOf(signature.points);
+    return signature;
+}
+
+// By the bytes alone, most significant bit last; so that only the checks of numbers can refuse.
+std::string withChecksum(std::string bytes) {
+    bytes.resize(bytes.size() - 4);
+    std::uint32_t crc = 0xffffffffu;
+    for (const char c : bytes) {
+        for (int bit = 0; bit < 8; ++bit) {
+            const std::uint32_t in = (static_cast<unsigned char>(c) >> bit) & 1u;
+            crc = ((crc ^ in) & 1u) != 0 ? (crc >> 1) ^ 0xedb88320u : crc >> 1;
+        }
+    }
+    for (int i = 0; i < 4; ++i) bytes.push_back(static_cast<char>((~crc >> (8 * i)) & 0xffu));
+    return bytes;
+}
+
+void expectMalformed(const std::string& bytes, const std::string& word = "") {
+    const auto decoded = decodeSignature(bytes);
+    ASSERT_FALSE(decoded) << word;
+    EXPECT_EQ(decoded.error().code, ErrorCode::kMalformedSignature);
+    EXPECT_NE(decoded.error().message.find(word), std::string::npos) << decoded.error().message;
+}
+
+void expectSameBody(const Body& a, const Body& b) {
+    EXPECT_EQ(a.centre, b.centre);
+    EXPECT_EQ(a.axes, b.axes);
+    ASSERT_EQ(a.parts.size(), b.parts.size());
+    for (std::size_t i = 0; i < a.parts.size(); ++i) {
+        EXPECT_EQ(a.parts[i].position, b.parts[i].position);
+        EXPECT_EQ(a.parts[i].radius, b.parts[i].radius);
+        EXPECT_EQ(a.parts[i].share, b.parts[i].share);
+        EXPECT_EQ(a.parts[i].size, b.parts[i].size);
+    }
+}
+
+// What is stored today must be readable for ever: these bytes never change.
+TEST(SignatureCodecAttributes, GoldenBytes) {
+    const std::string head =
+        "53444247"          // SDBG
+        "0200"              // version 2
+        "0100"              // one point
+        "c8000000"          // quality 200
+        "0000000000000440"  // scale 2.5
+        "000000000000f03f"
+        "00000000000000c0"
+        "000000000000c03f"          // origin 1, -2, 0.125
+        "0000000000000e40"          // volume 3.75
+        "000000000000000000000000"  // position
+        "0000003e0000403f0000803e"  // weight, share, peak radius
+        "0ad7233c00000000000000000ad7a33c000000008fc2f53c";
+    std::string golden;
+    for (std::size_t i = 0; i < head.size(); i += 2) {
+        golden.push_back(static_cast<char>(std::stoi(head.substr(i, 2), nullptr, 16)));
+    }
+    for (int i = 0; i < 352; ++i) golden.push_back(static_cast<char>((7 * i + 3) % 256));
+    for (const int byte : {0x0a, 0xa8, 0x99, 0xe0}) golden.push_back(static_cast<char>(byte));
+    EXPECT_EQ(encodeSignature(onePoint()), golden);
+    const auto decoded = decodeSignature(golden);
+    ASSERT_TRUE(decoded) << decoded.error().message;
+    EXPECT_EQ(decoded->attributes->quality, 200);
+    EXPECT_EQ(decoded->attributes->statistics[351], (7 * 351 + 3) % 256);
+}
+
+TEST(SignatureCodecAttributes, DecodeIsTheInverse) {
+    Random random(1);
+    for (std::size_t count = 1; count <= kMaxSignaturePoints; ++count) {
+        const Signature signature = randomAttributed(random, count);
+        const std::string bytes = encodeSignature(signature);
+        EXPECT_EQ(bytes.size(), 56U + 48U * count + 352U);
+        const auto decoded = decodeSignature(bytes);
+        ASSERT_TRUE(decoded) << decoded.error().message;
+        ASSERT_TRUE(decoded->attributes);
+        EXPECT_TRUE(sameShape(*decoded, signature));
+        EXPECT_EQ(decoded->attributes->quality, signature.attributes->quality);
+        EXPECT_EQ(decoded->attributes->statistics, signature.attributes->statistics);
+        expectSameBody(decoded->attributes->body, signature.attributes->body);
+        EXPECT_EQ(encodeSignature(*decoded), bytes);
+
+        // The same points without attributes are version 1, and stay without.
+        Signature plain = signature;
+        plain.attributes.reset();
+        const std::string older = encodeSignature(plain);
+        EXPECT_EQ(older.size(), 56U + 48U * count);
+        EXPECT_EQ(older[4], 1);
+        const auto read = decodeSignature(older);
+        ASSERT_TRUE(read);
+        EXPECT_FALSE(read->attributes);
+        EXPECT_FALSE(sameShape(*read, signature));
+    }
+}
+
+TEST(SignatureCodecAttributes, DamageIsNoticed) {
+    Random random(2);
+    const std::string bytes = encodeSignature(randomAttributed(random, 3));
+    for (std::size_t i = 0; i < bytes.size(); ++i) {
+        for (int bit = 0; bit < 8; ++bit) {
+            std::string damaged = bytes;
+            damaged[i] = static_cast<char>(damaged[i] ^ (1 << bit));
+            expectMalformed(damaged);
+        }
+        expectMalformed(bytes.substr(0, i));
+    }
+    expectMalformed(bytes + '\0');
+    expectMalformed(bytes + bytes);
+}
+
+TEST(SignatureCodecAttributes, HeaderIsChecked) {
+    const std::string bytes = encodeSignature(onePoint());
+    const auto changed = [&](std::size_t at, int value) {
+        std::string other = bytes;
+        other[at] = static_cast<char>(value);
+        return withChecksum(other);
+    };
+    EXPECT_TRUE(decodeSignature(changed(8, 200))) << "the forged checksum is right";
+    for (const int quality : {0, 255}) {
+        const auto decoded = decodeSignature(changed(8, quality));
+        ASSERT_TRUE(decoded) << quality;
+        EXPECT_EQ(decoded->attributes->quality, quality);
+    }
+    for (const std::size_t at : {9U, 10U, 11U}) expectMalformed(changed(at, 1), "reserved");
+    expectMalformed(changed(4, 1), "do not fit");
+    expectMalformed(changed(4, 3), "version 3 is unknown");
+    expectMalformed(changed(5, 2), "unknown");
+    expectMalformed(changed(6, 0), "0 points");
+    expectMalformed(changed(6, 2), "do not fit");
+    expectMalformed(changed(6, 17), "17 points");
+    // 352 bytes of statistics are not seven points and a bit of version 1.
+    for (int count = 2; count <= 16; ++count) expectMalformed(changed(6, count), "do not fit");
+}
+
+TEST(SignatureCodecAttributes, RandomBytesAreRefused) {
+    Random random(3);
+    for (int round = 0; round < 2000; ++round) {
+        std::string bytes = encodeSignature(onePoint());
+        const std::size_t from = random.below(bytes.size());
+        for (std::size_t i = from; i < bytes.size() && i < from + 8; ++i) {
+            bytes[i] = static_cast<char>(random.below(256));
+        }
+        const auto decoded = decodeSignature(withChecksum(bytes));  // anything but a crash
+        if (decoded) {
+            EXPECT_EQ(encodeSignature(*decoded), withChecksum(bytes));
+        }
+    }
+}
+
+TEST(SignatureCodecAttributes, DefaultProfileFitsAKilobyte) {
+    const std::size_t most = parametersOf(Profile::kDefault).signature.maxPoints;
+    Random random(4);
+    EXPECT_LE(encodeSignature(randomAttributed(random, most)).size(), 1024U);
+    ScanOptions options;
+    options.count = 4000;
+    const PointCloud points = scanOf(makeMember("octopus", 0, 1).value(), options).value();
+    const Signature signature = describe(points, parametersOf(Profile::kDefault)).value().signature;
+    ASSERT_TRUE(signature.attributes);
+    const std::string bytes = encodeSignature(signature);
+    EXPECT_LE(bytes.size(), 1024U);
+    const auto decoded = decodeSignature(bytes);
+    ASSERT_TRUE(decoded);
+    EXPECT_TRUE(sameShape(*decoded, signature));
+    expectSameBody(decoded->attributes->body, signature.attributes->body);
+}
+
+}  // namespace
+}  // namespace shapedb
