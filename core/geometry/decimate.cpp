@@ -36,9 +36,30 @@ std::vector<Keyed> sortedByCell(const PointCloud& points, double cell) {
     return keyed;
 }
 
-std::size_t countCells(const std::vector<Keyed>& keyed) {
-    std::size_t cells = keyed.empty() ? 0 : 1;
-    for (std::size_t i = 1; i < keyed.size(); ++i) cells += keyed[i].first != keyed[i - 1].first;
+// How many cells are occupied, without sorting: a table of keys with linear probing.
+std::size_t countCells(const PointCloud& points, double cell) {
+    constexpr std::uint64_t kFree = ~std::uint64_t{0};
+    std::vector<std::uint64_t> table(1 << 12, kFree);
+    std::size_t cells = 0;
+    const auto slotOf = [&](std::uint64_t key) {
+        std::size_t slot = (key * 0x9e3779b97f4a7c15ULL) >> 20;
+        for (slot &= table.size() - 1; table[slot] != kFree && table[slot] != key;) {
+            slot = (slot + 1) & (table.size() - 1);
+        }
+        return slot;
+    };
+    for (const Point3& p : points) {
+        const std::uint64_t key = cellKey(p, cell);
+        const std::size_t slot = slotOf(key);
+        if (table[slot] == key) continue;
+        table[slot] = key;
+        if (2 * ++cells <= table.size()) continue;
+        std::vector<std::uint64_t> old(2 * table.size(), kFree);
+        old.swap(table);
+        for (const std::uint64_t known : old) {
+            if (known != kFree) table[slotOf(known)] = known;
+        }
+    }
     return cells;
 }
 
@@ -70,16 +91,13 @@ Result<DecimatedPoints> decimateOrThrow(const PointCloud& points, std::size_t ta
     double fine = kMinCell;
     double coarse = kMaxCell;
     double cell = std::clamp(2.0 / std::sqrt(static_cast<double>(target)), fine, coarse);
-    std::vector<Keyed> best;
     double bestCell = coarse;
     for (int step = 0; step < kMaxSteps; ++step) {
         if (const auto go = context.checkpoint(); !go) return fail(go.error());
-        std::vector<Keyed> keyed = sortedByCell(points, cell);
-        const std::size_t cells = countCells(keyed);
+        const std::size_t cells = countCells(points, cell);
         const double share = static_cast<double>(cells) / static_cast<double>(target);
         if (cells <= target) {
             coarse = cell;
-            best = std::move(keyed);
             bestCell = cell;
             if (share >= kAcceptedShare || cell <= kMinCell) break;
         } else {
@@ -91,8 +109,7 @@ Result<DecimatedPoints> decimateOrThrow(const PointCloud& points, std::size_t ta
         const bool bisect = step >= kSecantSteps && step % 2 == 0;
         cell = !bisect && guess > fine && guess < coarse ? guess : std::sqrt(fine * coarse);
     }
-    if (best.empty()) best = sortedByCell(points, bestCell);
-    return averageCells(points, best, bestCell);
+    return averageCells(points, sortedByCell(points, bestCell), bestCell);
 }
 
 }  // namespace
