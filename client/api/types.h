@@ -252,7 +252,7 @@ struct SegmentMatch {
 
 /// One of the distances a score of signatures with attributes is made of.
 struct ScoreTerm {
-    std::string name;       ///< of a statistic, or "parts"
+    std::string name;       ///< of a statistic, "parts", or of a partial score "contained parts"
     double distance = 0.0;  ///< 1: as far as two unrelated shapes typically differ
     double weight = 0.0;    ///< in the mean; all terms' sum to 1
 };

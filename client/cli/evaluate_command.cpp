@@ -199,7 +199,9 @@ std::string leaveOneOutText(const EvaluateFlags& flags, const ShapeParameters& p
         text += formatCount(failures.size(), "shape", "shapes") +
                 " could not be segmented and counted as matching nothing.\n";
     }
-    return text + timingText(timing, shapes.size(), shapes.size() * (shapes.size() - 1) / 2);
+    // A partial score has a direction: each pair is scored both ways.
+    const std::size_t pairs = shapes.size() * (shapes.size() - 1) / (flags.score.partial ? 1 : 2);
+    return text + timingText(timing, shapes.size(), pairs);
 }
 
 CommandResult runLeaveOneOut(Session& session, const EvaluateFlags& flags) {
