@@ -20,6 +20,7 @@ struct SegmentationOptions {
     /// parts are lost.
     double bigBallRatio = 0.5;
 
+    /// For InteriorMethod::kWalk, as is hullAngleDegrees.
     /// Two big balls intersect deeply when their spheres meet at an angle below this.
     /// Section 2 names the property but no figure. Degrees, in (0, 90). Larger: the outside
     /// eats further into the shape; smaller: the outside stops short and pockets count as inside.

@@ -86,7 +86,8 @@ struct Segmentation {
 /// Thread-safe (no shared state). Memory: about 600 bytes a distinct point at the peak.
 ///
 /// Errors: those of `sanitise` and `triangulate`; kInvalidArgument (options); kNoInterior
-/// when the walk from outside reaches every big ball (an open surface, too much noise);
+/// when the walk from outside reaches every big ball (an open surface, too much noise; with
+/// InteriorMethod::kAdaptive only when not even the neighbourhood of the points has a volume);
 /// kCancelled, kDeadlineExceeded; kOutOfMemory.
 [[nodiscard]] Result<Segmentation> segment(const PointCloud& points, const SegmentationOptions& options,
                                            const RunContext& context = {});

@@ -124,6 +124,26 @@ TEST(AdaptiveInterior, OpenSurfacesGetAnAnswerThatIsNotTrusted) {
     }
 }
 
+TEST(AdaptiveInterior, PointsInNoOrderAtAllStillGiveAnAnswer) {
+    Random random(22);
+    PointCloud cloud;
+    for (int i = 0; i < 3000; ++i) cloud.push_back({random.uniform(), random.uniform(), random.uniform()});
+    const Segmentation s = found(cloud);
+    EXPECT_LT(s.quality, 0.5);
+    EXPECT_GT(s.volume, 0.0);
+    EXPECT_LE(s.volume, 1.0);
+    // From the smallest possible cloud on: a result or the documented error.
+    for (std::size_t count = 4; count < 40; ++count) {
+        const auto few = segment(
+            PointCloud(cloud.begin(), cloud.begin() + static_cast<std::ptrdiff_t>(count)), adaptive());
+        if (few) {
+            EXPECT_GT(few->volume, 0.0) << count;
+        } else {
+            EXPECT_EQ(few.error().code, ErrorCode::kNoInterior) << few.error().message;
+        }
+    }
+}
+
 TEST(AdaptiveInterior, SeenFromAboveTwoBarsAreNoPlate) {
     // The upper halves of two parallel rods of radius 0.1, 0.6 apart, as a sensor above a table sees them.
     Random random(21);
