@@ -105,15 +105,15 @@ void drawSurface(InteriorView& view, Random& random) {
     for (const auto& v : view.vertices) {
         for (const std::uint32_t site : v) touched[site] = 1;
     }
-    std::vector<std::uint32_t> candidates;
-    for (std::uint32_t i = 0; i < touched.size(); ++i) {
-        if (touched[i] != 0) candidates.push_back(i);
+    for (std::size_t i = 0; i < touched.size(); ++i) {
+        if (touched[i] != 0) view.touched.push_back(view.sites[i]);
     }
-    const std::size_t wanted = std::min(candidates.size(), InteriorView::kSamples);
+    PointCloud left = view.touched;
+    const std::size_t wanted = std::min(left.size(), InteriorView::kSamples);
     view.surface.reserve(wanted);
     for (std::size_t i = 0; i < wanted; ++i) {
-        std::swap(candidates[i], candidates[i + random.below(candidates.size() - i)]);
-        view.surface.push_back(view.sites[candidates[i]]);
+        std::swap(left[i], left[i + random.below(left.size() - i)]);
+        view.surface.push_back(left[i]);
     }
 }
 

@@ -25,7 +25,8 @@ struct InteriorView {
 
     PointCloud inner;                       ///< kSamples points evenly spread over the interior
     std::vector<std::uint32_t> innerOwner;  ///< the tetrahedron each lies in
-    PointCloud surface;                     ///< up to kSamples of the sites the interior touches
+    PointCloud touched;                     ///< all sites the interior touches
+    PointCloud surface;                     ///< up to kSamples of them
 
     double meanSurfaceDistance = 0.0;  ///< between two points of `surface`
     double meanRadius = 0.0;           ///< of the interior's matter, from the origin

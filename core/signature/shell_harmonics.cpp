@@ -1,7 +1,7 @@
 #include "core/signature/shell_harmonics.h"
 
 #include <cmath>
-#include <vector>
+#include <numeric>
 
 #include "core/signature/histogram.h"
 
@@ -50,25 +50,28 @@ void evaluate(const Point3& direction, std::array<double, kCoefficients>& out) {
 
 }  // namespace
 
-ShellEnergies shellHarmonics(const PointCloud& points) {
+ShellEnergies shellHarmonics(const PointCloud& points, const std::vector<double>& weights) {
+    double total = static_cast<double>(points.size());
+    if (!weights.empty()) total = std::accumulate(weights.begin(), weights.end(), 0.0);
+    const auto share = [&](std::size_t i) { return (weights.empty() ? 1.0 : weights[i]) / total; };
     Point3 centre;
-    const double share = 1.0 / static_cast<double>(points.size());
-    for (const Point3& p : points) centre = centre + share * p;
+    for (std::size_t i = 0; i < points.size(); ++i) centre = centre + share(i) * points[i];
     double meanRadius = 0.0;
-    for (const Point3& p : points) meanRadius += share * distance(p, centre);
+    for (std::size_t i = 0; i < points.size(); ++i) meanRadius += share(i) * distance(points[i], centre);
     ShellEnergies energies{};
     if (!(meanRadius > 0.0)) return energies;
 
     std::array<std::array<double, kCoefficients>, kShells> sums{};
     std::array<double, kCoefficients> values{};
-    for (const Point3& p : points) {
+    for (std::size_t n = 0; n < points.size(); ++n) {
+        const Point3& p = points[n];
         const double radius = distance(p, centre);
         if (!(radius > 0.0)) continue;
         evaluate((1.0 / radius) * (p - centre), values);
         const SoftBin shell = softBin(radius, 0.0, 2.0 * meanRadius, kShells);
         for (std::size_t i = 0; i < kCoefficients; ++i) {
-            sums[shell.bin][i] += share * (1.0 - shell.share) * values[i];
-            sums[shell.bin + 1][i] += share * shell.share * values[i];
+            sums[shell.bin][i] += share(n) * (1.0 - shell.share) * values[i];
+            sums[shell.bin + 1][i] += share(n) * shell.share * values[i];
         }
     }
     for (std::size_t shell = 0; shell < kShells; ++shell) {

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <vector>
 
 #include "core/geometry/point.h"
 
@@ -16,7 +17,8 @@ constexpr std::size_t kDegrees = 8;  ///< 1 to 8; degree 0 is the radii alone, w
 /// direction of one shell would give 1. In [0, 1].
 using ShellEnergies = std::array<double, kShells * kDegrees>;
 
-/// Points all equally weighted; at least one. All at one place: all 0.
-[[nodiscard]] ShellEnergies shellHarmonics(const PointCloud& points);
+/// At least one point. `weights` as many, none below 0, their sum above 0; or empty: all equal. All at
+/// one place: all 0.
+[[nodiscard]] ShellEnergies shellHarmonics(const PointCloud& points, const std::vector<double>& weights = {});
 
 }  // namespace shapedb

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "core/base/random.h"
 #include "core/signature/histogram.h"
@@ -111,8 +112,8 @@ void chords(const InteriorView& view, std::uint8_t* out) {
     histogram.writeRoots(out);
 }
 
-void harmonics(const PointCloud& points, std::uint8_t* out) {
-    const ShellEnergies energies = shellHarmonics(points);
+void harmonics(const PointCloud& points, const std::vector<double>& weights, std::uint8_t* out) {
+    const ShellEnergies energies = shellHarmonics(points, weights);
     for (std::size_t i = 0; i < energies.size(); ++i) out[i] = Histogram::rootByte(energies[i]);
 }
 
@@ -125,12 +126,12 @@ Result<ShapeStatistics> shapeStatistics(const InteriorView& view, const RunConte
     thicknessByCentrality(view, *inner, binsOf(result, Statistic::kThicknessByCentrality));
     thicknessByRadius(view, binsOf(result, Statistic::kThicknessByRadius));
     bending(*inner, binsOf(result, Statistic::kBending));
-    harmonics(view.inner, binsOf(result, Statistic::kInteriorHarmonics));
+    harmonics(view.centroids, view.volumes, binsOf(result, Statistic::kInteriorHarmonics));
     if (auto ok = context.checkpoint(); !ok) return fail(ok.error());
     chords(view, binsOf(result, Statistic::kChords));
     if (auto ok = context.checkpoint(); !ok) return fail(ok.error());
     surfaceDistances(view, binsOf(result, Statistic::kSurfaceDistances));
-    harmonics(view.surface, binsOf(result, Statistic::kSurfaceHarmonics));
+    harmonics(view.touched, {}, binsOf(result, Statistic::kSurfaceHarmonics));
     return result;
 }
 
