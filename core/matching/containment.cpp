@@ -171,9 +171,10 @@ double containmentBound(const Body& piece, const Body& whole, double knownScale)
 
 PartPairs containedPairs(const Body& piece, const Body& whole, const Containment& found,
                          const ScoreOptions& options) {
+    PartPairs result;
+    if (!(found.share > 0.0)) return result;  // nothing was laid on anything
     const Points at = placed(whole, found);
     const double total = totalShare(piece);
-    PartPairs result;
     for (std::size_t i = 0; i < piece.parts.size(); ++i) {
         PartPair best;
         best.a = static_cast<std::uint8_t>(i);
