@@ -53,7 +53,17 @@ double termDistance(const Signature& a, const Signature& b, std::size_t kind) {
     return sum / (kBinsPerUnit * kTypical[kind]);
 }
 
-double termWeight(std::size_t kind, double trust) { return kStatistics[kind].ofInterior ? trust : 1.0; }
+// One side of a shape does not tell how thick it is. But closed over its open side it is filled
+// much as the whole is, which a piece can rely on.
+bool restsOnThickness(std::size_t kind) {
+    return kind == static_cast<std::size_t>(Statistic::kThicknessByCentrality) ||
+           kind == static_cast<std::size_t>(Statistic::kThicknessByRadius);
+}
+
+double termWeight(std::size_t kind, double trust, const ScoreOptions& options) {
+    const bool doubted = options.partial ? restsOnThickness(kind) : kStatistics[kind].ofInterior;
+    return doubted ? trust : 1.0;
+}
 
 double scaleDistance(const Signature& a, const Signature& b, const ScoreOptions& options) {
     return options.keepScale ? std::abs(std::log2(std::max(a.scale, b.scale) / std::min(a.scale, b.scale)))
@@ -72,7 +82,7 @@ AttributeDistance attributeDistance(const Signature& a, const Signature& b, cons
     AttributeDistance result;
     const double interior = trust(a, b);
     for (std::size_t kind = 0; kind < kStatisticKinds; ++kind) {
-        const double weight = termWeight(kind, interior);
+        const double weight = termWeight(kind, interior, options);
         result.statistics += weight * termDistance(a, b, kind);
         result.totalWeight += weight;
     }
@@ -98,7 +108,7 @@ std::vector<ScoreTerm> scoreTerms(const Signature& a, const Signature& b, const 
     std::vector<ScoreTerm> terms;
     for (std::size_t kind = 0; kind < kStatisticKinds; ++kind) {
         terms.push_back({kStatistics[kind].name, termDistance(a, b, kind),
-                         termWeight(kind, interior) / distance.totalWeight});
+                         termWeight(kind, interior, options) / distance.totalWeight});
     }
     terms.push_back({"parts", disagreement(agreement), distance.partsWeight / distance.totalWeight});
     return terms;

@@ -9,8 +9,9 @@
 namespace shapedb {
 
 /// Distances of the statistics and of the parts, each in units of what two unrelated shapes
-/// typically differ by, are averaged with these weights; those that come from the interior count
-/// as much as the poorer of both interiors can be trusted.
+/// typically differ by, are averaged with these weights; those that come from the interior (of a
+/// piece: only those that rest on thickness) count as much as the poorer of both interiors can be
+/// trusted.
 struct AttributeDistance {
     double statistics = 0.0;  ///< weighted sum over the statistics
     double partsWeight = 0.0;
