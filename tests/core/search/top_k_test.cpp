@@ -136,7 +136,8 @@ TEST(TopK, EqualsBruteForceOnScansBitForBit) {
     }
     const SignatureSet set = SignatureSet().with(entries, {});
     for (int round = 0; round < 150; ++round) {
-        const SearchOptions options = randomOptions(random, set);
+        SearchOptions options = randomOptions(random, set);
+        options.score.partial = round % 4 == 0;
         Signature query = scans[random.below(scans.size())].signature;
         if (round % 3 == 0) query = testing_support::disturbedAttributed(query, random, 0.02);
         if (round % 10 == 0) query.attributes.reset();

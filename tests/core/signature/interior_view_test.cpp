@@ -108,6 +108,10 @@ TEST(InteriorView, DrawsEvenlyByVolumeAndFromTheSurface) {
             touched.insert({view.sites[site].x, view.sites[site].y, view.sites[site].z});
         }
     }
+    std::set<std::array<double, 3>> listed;
+    for (const Point3& p : view.touched) listed.insert({p.x, p.y, p.z});
+    EXPECT_EQ(listed, touched);
+    EXPECT_EQ(view.touched.size(), touched.size()) << "each once";
     double sum = 0.0;
     for (const Point3& p : view.surface) {
         surface.insert({p.x, p.y, p.z});

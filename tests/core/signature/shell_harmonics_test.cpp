@@ -1,6 +1,7 @@
 #include "core/signature/shell_harmonics.h"
 
 #include <cmath>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -36,26 +37,30 @@ double legendre(std::size_t degree, double x) {
 
 // By the addition theorem, without any spherical harmonic: the energy of degree l is the sum over all
 // pairs of points of P_l of the angle between them.
-ShellEnergies plainEnergies(const PointCloud& points) {
-    const double n = static_cast<double>(points.size());
+ShellEnergies plainEnergies(const PointCloud& points, const std::vector<double>& weights) {
+    double n = 0.0;
+    for (const double w : weights) n += w;
     Point3 centre;
-    for (const Point3& p : points) centre = centre + p;
+    for (std::size_t i = 0; i < points.size(); ++i) centre = centre + weights[i] * points[i];
     centre = (1.0 / n) * centre;
     double mean = 0.0;
-    for (const Point3& p : points) mean += distance(p, centre) / n;
+    for (std::size_t i = 0; i < points.size(); ++i) mean += weights[i] * distance(points[i], centre) / n;
     ShellEnergies energies{};
     for (std::size_t shell = 0; shell < kShells; ++shell) {
         for (std::size_t degree = 1; degree <= kDegrees; ++degree) {
             double energy = 0.0;
-            for (const Point3& p : points) {
-                const double wp = triangle(distance(p, centre), 0.0, 2.0 * mean, kShells, shell) / n;
-                if (wp == 0.0) continue;
-                for (const Point3& q : points) {
-                    const double wq = triangle(distance(q, centre), 0.0, 2.0 * mean, kShells, shell) / n;
-                    if (wq == 0.0) continue;
-                    const double cosine =
-                        dot(p - centre, q - centre) / (distance(p, centre) * distance(q, centre));
-                    energy += wp * wq * legendre(degree, cosine);
+            const auto weightIn = [&](std::size_t i) {
+                return weights[i] / n *
+                       triangle(distance(points[i], centre), 0.0, 2.0 * mean, kShells, shell);
+            };
+            for (std::size_t i = 0; i < points.size(); ++i) {
+                if (weightIn(i) == 0.0) continue;
+                for (std::size_t j = 0; j < points.size(); ++j) {
+                    if (weightIn(j) == 0.0) continue;
+                    const Point3 p = points[i] - centre;
+                    const Point3 q = points[j] - centre;
+                    energy +=
+                        weightIn(i) * weightIn(j) * legendre(degree, dot(p, q) / (length(p) * length(q)));
                 }
             }
             energies[shell * kDegrees + degree - 1] = energy;
@@ -67,10 +72,15 @@ ShellEnergies plainEnergies(const PointCloud& points) {
 TEST(ShellHarmonics, AgreeWithTheAdditionTheorem) {
     for (const std::size_t count : {2U, 3U, 10U, 120U}) {
         const PointCloud points = lopsided(count, count);
-        const ShellEnergies fast = shellHarmonics(points);
-        const ShellEnergies plain = plainEnergies(points);
-        for (std::size_t i = 0; i < fast.size(); ++i) {
-            EXPECT_NEAR(fast[i] * fast[i], plain[i], 1e-12) << count << " points, energy " << i;
+        std::vector<double> weights(count, 1.0);
+        for (const bool weighted : {false, true}) {
+            Random random(count);
+            for (double& w : weights) w = weighted ? random.uniform(0.0, 1e-3) : 1.0;
+            const ShellEnergies fast = shellHarmonics(points, weighted ? weights : std::vector<double>{});
+            const ShellEnergies plain = plainEnergies(points, weights);
+            for (std::size_t i = 0; i < fast.size(); ++i) {
+                EXPECT_NEAR(fast[i] * fast[i], plain[i], 1e-12) << count << " points, energy " << i;
+            }
         }
     }
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <set>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -161,15 +162,16 @@ TEST(Statistics, SurfaceDistancesAndHarmonicsAreTheirDefinitions) {
         }
         expectBins(binsOf(*statistics, Statistic::kSurfaceDistances), rootsOf(sums), "surface distances");
 
-        const auto harmonics = [](const PointCloud& points) {
+        const auto harmonics = [](const PointCloud& points, const std::vector<double>& weights) {
             std::vector<std::uint8_t> bytes;
-            for (const double e : shellHarmonics(points)) {
+            for (const double e : shellHarmonics(points, weights)) {
                 bytes.push_back(static_cast<std::uint8_t>(std::floor(255.0 * std::sqrt(e) + 0.5)));
             }
             return bytes;
         };
-        EXPECT_EQ(binsOf(*statistics, Statistic::kInteriorHarmonics), harmonics(view.inner));
-        EXPECT_EQ(binsOf(*statistics, Statistic::kSurfaceHarmonics), harmonics(view.surface));
+        EXPECT_EQ(binsOf(*statistics, Statistic::kInteriorHarmonics),
+                  harmonics(view.centroids, view.volumes));
+        EXPECT_EQ(binsOf(*statistics, Statistic::kSurfaceHarmonics), harmonics(view.touched, {}));
     }
 }
 
