@@ -21,7 +21,7 @@ constexpr double kContainedWeight = 0.5;
 constexpr double kPartsWeight = 2.0;
 
 // An interior that could not be told still says something.
-constexpr double kLeastTrust = 0.05;
+constexpr double kLeastTrust = 0.01;
 
 constexpr double kBinsPerUnit = 255.0;
 
@@ -33,14 +33,14 @@ double scoreOf(double distance) {
     return 1.0 / (1.0 + d * d);
 }
 
-// An interior of this quality is trusted in full: closed, if noisy. Below, trust falls faster than
-// the quality, for a thickness off by half spoils its histograms altogether.
-constexpr double kTrustedQuality = 2.0 / 3.0;
+// An interior of this quality is trusted in full. Below it is a guess, and trust falls fast: a
+// thickness off by half spoils its histograms altogether.
+constexpr double kTrustedQuality = 0.5;
 
 double trust(const Signature& a, const Signature& b) {
     const double worse = std::min(a.attributes->quality, b.attributes->quality) / 255.0;
     const double share = std::min(1.0, worse / kTrustedQuality);
-    return std::max(kLeastTrust, share * share);
+    return std::max(kLeastTrust, share * share * share * share);
 }
 
 double termDistance(const Signature& a, const Signature& b, std::size_t kind) {

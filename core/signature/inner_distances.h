@@ -15,7 +15,7 @@ namespace shapedb {
 /// Lengths in the view's unit.
 struct InnerDistances {
     static constexpr std::size_t kCells = 1500;
-    static constexpr std::size_t kSources = 96;
+    static constexpr std::size_t kSources = 192;
     static constexpr double kUnreached = 1e300;  ///< between two pieces of an interior in pieces
 
     std::vector<std::uint32_t> cellOfTetrahedron;

@@ -100,30 +100,27 @@ void drawInner(InteriorView& view, Random& random) {
     }
 }
 
-void drawSurface(InteriorView& view, Random& random) {
+void takeSurface(InteriorView& view) {
     std::vector<std::uint8_t> touched(view.sites.size(), 0);
     for (const auto& v : view.vertices) {
         for (const std::uint32_t site : v) touched[site] = 1;
     }
     for (std::size_t i = 0; i < touched.size(); ++i) {
-        if (touched[i] != 0) view.touched.push_back(view.sites[i]);
-    }
-    PointCloud left = view.touched;
-    const std::size_t wanted = std::min(left.size(), InteriorView::kSamples);
-    view.surface.reserve(wanted);
-    for (std::size_t i = 0; i < wanted; ++i) {
-        std::swap(left[i], left[i + random.below(left.size() - i)]);
-        view.surface.push_back(left[i]);
+        if (touched[i] != 0) view.surface.push_back(view.sites[i]);
     }
 }
 
-double meanDistance(const PointCloud& points) {
+double meanDistance(const PointCloud& points, Random& random) {
     double sum = 0.0;
-    for (std::size_t i = 1; i < points.size(); ++i) {
-        for (std::size_t j = 0; j < i; ++j) sum += distance(points[i], points[j]);
+    double pairs = 0.0;
+    for (std::size_t i = 0; i < InteriorView::kPairs; ++i) {
+        const std::size_t a = random.below(points.size());
+        const std::size_t b = random.below(points.size());
+        if (a == b) continue;
+        sum += distance(points[a], points[b]);
+        pairs += 1.0;
     }
-    const double n = static_cast<double>(points.size());
-    return sum / (n * (n - 1.0) / 2.0);
+    return sum / pairs;
 }
 
 }  // namespace
@@ -140,8 +137,8 @@ InteriorView interiorView(const Segmentation& segmentation) {
     takeTetrahedra(segmentation, view);
     Random random(kSeed);
     drawInner(view, random);
-    drawSurface(view, random);
-    view.meanSurfaceDistance = meanDistance(view.surface);
+    takeSurface(view);
+    view.meanSurfaceDistance = meanDistance(view.surface, random);
     for (std::size_t t = 0; t < view.volumes.size(); ++t) {
         view.meanRadius += view.volumes[t] / view.volume * length(view.centroids[t]);
     }

@@ -25,13 +25,13 @@ struct InteriorView {
 
     PointCloud inner;                       ///< kSamples points evenly spread over the interior
     std::vector<std::uint32_t> innerOwner;  ///< the tetrahedron each lies in
-    PointCloud touched;                     ///< all sites the interior touches
-    PointCloud surface;                     ///< up to kSamples of them
+    PointCloud surface;                     ///< the sites the interior touches
 
-    double meanSurfaceDistance = 0.0;  ///< between two points of `surface`
+    double meanSurfaceDistance = 0.0;  ///< between two points of `surface`, by kPairs draws
     double meanRadius = 0.0;           ///< of the interior's matter, from the origin
 
     static constexpr std::size_t kSamples = 2048;
+    static constexpr std::size_t kPairs = 400000;
 };
 
 /// Deterministic: the same segmentation gives the same view. The draws follow the order of the

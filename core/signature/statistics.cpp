@@ -20,7 +20,7 @@ constexpr std::size_t kChordLengths = 12;
 constexpr std::size_t kChordShares = 4;
 constexpr std::size_t kBendingBins = 24;
 constexpr std::size_t kDistanceBins = 32;
-constexpr std::size_t kChords = 60000;
+constexpr std::size_t kChords = 100000;
 constexpr std::uint64_t kSeed = 145;
 
 const StatisticLayout& layout(Statistic statistic) {
@@ -87,11 +87,15 @@ void bending(const InnerDistances& inner, std::uint8_t* out) {
 }
 
 void surfaceDistances(const InteriorView& view, std::uint8_t* out) {
+    Random random(kSeed);
     Histogram histogram(1, kDistanceBins);
-    for (std::size_t i = 1; i < view.surface.size(); ++i) {
-        for (std::size_t j = 0; j < i; ++j) {
-            histogram.add(softBin(distance(view.surface[i], view.surface[j]), 0.0, 1.0, kDistanceBins), 1.0);
-        }
+    const std::size_t n = view.surface.size();
+    for (std::size_t i = 0; i < InteriorView::kPairs; ++i) {
+        const std::size_t a = random.below(n);
+        const std::size_t b = random.below(n);
+        if (a == b) continue;
+        const double d = distance(view.surface[a], view.surface[b]);
+        histogram.add(softBin(d, 0.0, 1.0, kDistanceBins), 1.0);
     }
     histogram.writeRoots(out);
 }
@@ -131,7 +135,7 @@ Result<ShapeStatistics> shapeStatistics(const InteriorView& view, const RunConte
     chords(view, binsOf(result, Statistic::kChords));
     if (auto ok = context.checkpoint(); !ok) return fail(ok.error());
     surfaceDistances(view, binsOf(result, Statistic::kSurfaceDistances));
-    harmonics(view.touched, {}, binsOf(result, Statistic::kSurfaceHarmonics));
+    harmonics(view.surface, {}, binsOf(result, Statistic::kSurfaceHarmonics));
     return result;
 }
 

@@ -55,7 +55,6 @@ void drawPoints(InteriorView& view) {
         view.inner.push_back(p);
         view.innerOwner.push_back(static_cast<std::uint32_t>(t));
     }
-    view.touched = view.sites;
     view.surface = view.sites;
     if (view.surface.size() > 400) view.surface.resize(400);
     double sum = 0.0;

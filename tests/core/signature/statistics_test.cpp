@@ -160,7 +160,12 @@ TEST(Statistics, SurfaceDistancesAndHarmonicsAreTheirDefinitions) {
                 for (std::size_t bin = 0; bin < 32; ++bin) sums[bin] += triangle(d, 0.0, 1.0, 32, bin);
             }
         }
-        expectBins(binsOf(*statistics, Statistic::kSurfaceDistances), rootsOf(sums), "surface distances");
+        // Of all pairs, kPairs draws: a root strays by less than 1/255 from draw to draw.
+        const auto drawn = binsOf(*statistics, Statistic::kSurfaceDistances);
+        const auto all = rootsOf(sums);
+        for (std::size_t bin = 0; bin < drawn.size(); ++bin) {
+            EXPECT_NEAR(static_cast<double>(drawn[bin]), static_cast<double>(all[bin]), 2.5) << bin;
+        }
 
         const auto harmonics = [](const PointCloud& points, const std::vector<double>& weights) {
             std::vector<std::uint8_t> bytes;
@@ -171,7 +176,7 @@ TEST(Statistics, SurfaceDistancesAndHarmonicsAreTheirDefinitions) {
         };
         EXPECT_EQ(binsOf(*statistics, Statistic::kInteriorHarmonics),
                   harmonics(view.centroids, view.volumes));
-        EXPECT_EQ(binsOf(*statistics, Statistic::kSurfaceHarmonics), harmonics(view.touched, {}));
+        EXPECT_EQ(binsOf(*statistics, Statistic::kSurfaceHarmonics), harmonics(view.surface, {}));
     }
 }
 
