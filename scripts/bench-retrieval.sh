@@ -39,4 +39,4 @@ replace() {
 replace models "$work/models.md"
 replace tools "$work/tools.md"
 cp "$work/models.svg" docs/images/retrieval.svg
-[ -z "${KEEP:-}" ] || cp "$work"/*.json "$KEEP"/
+[ -z "${KEEP:-}" ] || { mkdir -p "$KEEP" && cp "$work"/*.json "$KEEP"/; }
