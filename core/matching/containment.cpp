@@ -11,32 +11,19 @@ namespace shapedb {
 
 namespace {
 
-constexpr double kSizeWidth = 0.5;     // octaves, as in part_match.cpp
-constexpr double kAlikeEnough = 0.4;   // parts less alike lead no alignment
 constexpr std::size_t kLeaders = 3;    // parts of the piece that lead
 constexpr double kLargestScale = 1.5;  // a piece is not much larger than its whole
 constexpr double kSmallestScale = 1.0 / 16.0;
 
 using Points = std::array<Point3, kMaxSignaturePoints>;
 
-double difference(const Part& p, const Part& q, std::size_t i) {
-    return static_cast<double>(q.size[i]) - static_cast<double>(p.size[i]);
-}
-
 // Octaves by which q is larger than p.
 double octaves(const Part& p, const Part& q) {
     double sum = 0.0;
-    for (std::size_t i = 0; i < p.size.size(); ++i) sum += difference(p, q, i);
-    return sum / static_cast<double>(p.size.size());
-}
-
-double likeness(const Part& p, const Part& q, double octavesLarger) {
-    double squared = 0.0;
     for (std::size_t i = 0; i < p.size.size(); ++i) {
-        const double d = difference(p, q, i) - octavesLarger;
-        squared += d * d;
+        sum += static_cast<double>(q.size[i]) - static_cast<double>(p.size[i]);
     }
-    return kernel(squared / static_cast<double>(p.size.size()), kSizeWidth);
+    return sum / static_cast<double>(p.size.size());
 }
 
 Point3 placeOf(const Part& part) { return {part.position[0], part.position[1], part.position[2]}; }
@@ -59,7 +46,7 @@ double pairGain(const Part& p, const Part& q, const Point3& placedQ, double scal
     // The width is a length of the whole.
     const double gap = squaredDistance(placeOf(p), placedQ) * scale * scale;
     const double near = kernel(gap, width);
-    return near > 0.0 ? static_cast<double>(p.share) * near * likeness(p, q, std::log2(scale)) : 0.0;
+    return near > 0.0 ? static_cast<double>(p.share) * near * sizeLikeness(p, q, std::log2(scale)) : 0.0;
 }
 
 class Search {
@@ -122,7 +109,7 @@ class Search {
     }
 
     bool alike(std::size_t p, std::size_t q, double scale) const {
-        return likeness(piece_.parts[p], whole_.parts[q], std::log2(scale)) >= kAlikeEnough;
+        return sizeLikeness(piece_.parts[p], whole_.parts[q], std::log2(scale)) >= kAlikeEnough;
     }
 
     void keepBest(Containment& trial) {
@@ -162,7 +149,7 @@ double containmentBound(const Body& piece, const Body& whole, double knownScale)
         for (const Part& q : whole.parts) {
             // Free to choose, the scale that fits a pair best is its mean ratio.
             const double larger = knownScale > 0.0 ? std::log2(knownScale) : octaves(p, q);
-            best = std::max(best, likeness(p, q, larger));
+            best = std::max(best, sizeLikeness(p, q, larger));
         }
         sum += static_cast<double>(p.share) * best;
     }

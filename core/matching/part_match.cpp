@@ -12,8 +12,6 @@ namespace {
 
 // Parts are alike when their four logarithmic sizes differ by about half an octave.
 constexpr double kSizeWidth = 0.5;
-// Parts whose likeness (sizes and radii) is below this are not worth an alignment of their own.
-constexpr double kAlikeEnough = 0.4;
 constexpr std::size_t kOutlying = 3;  // parts of a that lead alignments
 
 using Row = std::array<double, kMaxSignaturePoints>;
@@ -27,15 +25,6 @@ struct Table {
     std::array<Row, kMaxSignaturePoints> radially;  // kernel of the difference of radii
 };
 
-double likeness(const Part& p, const Part& q) {
-    double squared = 0.0;
-    for (std::size_t i = 0; i < p.size.size(); ++i) {
-        const double d = static_cast<double>(p.size[i]) - static_cast<double>(q.size[i]);
-        squared += d * d;
-    }
-    return kernel(squared / static_cast<double>(p.size.size()), kSizeWidth);
-}
-
 Table tableOf(const Body& a, const Body& b, double width) {
     Table table;
     table.countA = a.parts.size();
@@ -48,7 +37,7 @@ Table tableOf(const Body& a, const Body& b, double width) {
         for (std::size_t j = 0; j < table.countB; ++j) {
             const double gap = leastGap(radius, length(table.positionB[j]));
             table.worth[i][j] = 0.5 * static_cast<double>(std::min(a.parts[i].share, b.parts[j].share)) *
-                                likeness(a.parts[i], b.parts[j]);
+                                sizeLikeness(a.parts[i], b.parts[j]);
             table.radially[i][j] = kernel(gap * gap, width);
         }
     }
@@ -172,6 +161,15 @@ double boundOf(const Table& table) {
 }
 
 }  // namespace
+
+double sizeLikeness(const Part& p, const Part& q, double octavesLarger) {
+    double squared = 0.0;
+    for (std::size_t i = 0; i < p.size.size(); ++i) {
+        const double d = static_cast<double>(q.size[i]) - static_cast<double>(p.size[i]) - octavesLarger;
+        squared += d * d;
+    }
+    return kernel(squared / static_cast<double>(p.size.size()), kSizeWidth);
+}
 
 PartMatch matchParts(const Body& a, const Body& b, const ScoreOptions& options, bool prune) {
     const Table table = tableOf(a, b, options.kernelWidth);

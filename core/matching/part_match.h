@@ -21,6 +21,13 @@ struct PartMatch {
     bool reflected = false;
 };
 
+/// How alike two parts are in size, [0, 1]: the kernel of the root mean square difference of their
+/// four logarithmic sizes, of width half an octave, where q is expected to be `octavesLarger`.
+[[nodiscard]] double sizeLikeness(const Part& p, const Part& q, double octavesLarger = 0.0);
+
+/// Parts whose likeness (and place) is below this lead no alignment of their own.
+constexpr double kAlikeEnough = 0.4;
+
 /// The best alignment: with origin on origin, the axes of the two frames on each other in every
 /// sense, and the heaviest outlying parts of a on parts of b like them. `options`: reflection,
 /// kernelWidth. `prune` stops an alignment that cannot win and changes nothing.
