@@ -107,7 +107,7 @@ client::ShapeAttributes toClient(const ShapeAttributes& attributes) {
     client::ShapeAttributes out;
     out.quality = attributes.quality / 255.0;
     for (const StatisticLayout& layout : kStatistics) {
-        client::ShapeStatistic statistic{layout.name, {}, layout.ofInterior};
+        client::ShapeStatistic statistic{layout.name, {}, layout.ground == Ground::kInside};
         for (std::size_t i = layout.offset; i < std::size_t{layout.offset} + layout.count; ++i) {
             const float root = static_cast<float>(attributes.statistics[i]) / 255.0f;
             statistic.shares.push_back(root * root);

@@ -11,17 +11,32 @@ namespace {
 
 // What two unrelated shapes differ by (median over pairs of different synthetic families): it
 // gives every term an equal say, whatever the number of its bins.
-constexpr std::array<double, kStatisticKinds> kTypical{2.17, 3.24, 3.93, 1.10, 4.62, 1.27, 4.20};
+constexpr std::array<double, kStatisticKinds> kTypical{2.17, 3.24, 3.93, 1.10, 4.62,
+                                                       1.27, 4.20, 1.69, 2.95, 0.76};
 constexpr double kTypicalDisagreement = 0.9;
 
-// Of a piece, what its whole contains of it against what the two look like.
-constexpr double kContainedWeight = 0.5;
+// How much a statistic counts where the interior is told, and where it is a guess: the scan then
+// shows one side of the surface, or thin parts in noise. Two sides of a surface and one of them have
+// the same outline as they lie, and nearly the same distances.
+struct GroundWeight {
+    double told;
+    double guessed;
+};
+constexpr GroundWeight weightOf(Ground ground) {
+    switch (ground) {
+        case Ground::kInside: return {1.0, 0.01};
+        case Ground::kSurface: return {1.0, 0.5};
+        case Ground::kOutline: return {0.5, 1.0};
+    }
+    return {1.0, 1.0};
+}
+
+// Of a piece, what its whole contains of it against what the two look like: segments of a guess are
+// cut otherwise than those of the whole.
+constexpr GroundWeight kContainedWeight{0.5, 0.25};
 
 // Parts say both which parts there are and where they lie: two of the statistics' worth.
 constexpr double kPartsWeight = 2.0;
-
-// An interior that could not be told still says something.
-constexpr double kLeastTrust = 0.01;
 
 constexpr double kBinsPerUnit = 255.0;
 
@@ -40,29 +55,37 @@ constexpr double kTrustedQuality = 0.5;
 double trust(const Signature& a, const Signature& b) {
     const double worse = std::min(a.attributes->quality, b.attributes->quality) / 255.0;
     const double share = std::min(1.0, worse / kTrustedQuality);
-    return std::max(kLeastTrust, share * share * share * share);
+    return share * share * share * share;
+}
+
+int difference(const std::uint8_t* x, const std::uint8_t* y, std::size_t count) {
+    int sum = 0;
+    for (std::size_t i = 0; i < count; ++i) sum += std::abs(static_cast<int>(x[i]) - static_cast<int>(y[i]));
+    return sum;
 }
 
 double termDistance(const Signature& a, const Signature& b, std::size_t kind) {
     const StatisticLayout& layout = kStatistics[kind];
     const std::uint8_t* x = a.attributes->statistics.data() + layout.offset;
     const std::uint8_t* y = b.attributes->statistics.data() + layout.offset;
-    int sum = 0;
-    for (std::size_t i = 0; i < layout.count; ++i)
-        sum += std::abs(static_cast<int>(x[i]) - static_cast<int>(y[i]));
+    int sum = difference(x, y, layout.count);
+    if (layout.reversibleRows > 0) {
+        const std::size_t columns = layout.count / layout.reversibleRows;
+        int reversed = 0;
+        for (std::size_t from = 0; from < layout.count; from += columns) {
+            reversed += difference(x + from, y + (layout.count - columns - from), columns);
+        }
+        sum = std::min(sum, reversed);
+    }
     return sum / (kBinsPerUnit * kTypical[kind]);
 }
 
-// One side of a shape does not tell how thick it is. But closed over its open side it is filled
-// much as the whole is, which a piece can rely on.
-bool restsOnThickness(std::size_t kind) {
-    return kind == static_cast<std::size_t>(Statistic::kThicknessByCentrality) ||
-           kind == static_cast<std::size_t>(Statistic::kThicknessByRadius);
+double between(const GroundWeight& weight, double trust) {
+    return trust * weight.told + (1.0 - trust) * weight.guessed;
 }
 
-double termWeight(std::size_t kind, double trust, const ScoreOptions& options) {
-    const bool doubted = options.partial ? restsOnThickness(kind) : kStatistics[kind].ofInterior;
-    return doubted ? trust : 1.0;
+double termWeight(std::size_t kind, double trust) {
+    return between(weightOf(kStatistics[kind].ground), trust);
 }
 
 double scaleDistance(const Signature& a, const Signature& b, const ScoreOptions& options) {
@@ -82,12 +105,13 @@ AttributeDistance attributeDistance(const Signature& a, const Signature& b, cons
     AttributeDistance result;
     const double interior = trust(a, b);
     for (std::size_t kind = 0; kind < kStatisticKinds; ++kind) {
-        const double weight = termWeight(kind, interior, options);
+        const double weight = termWeight(kind, interior);
         result.statistics += weight * termDistance(a, b, kind);
         result.totalWeight += weight;
     }
-    result.partsWeight = kPartsWeight * interior;
+    result.partsWeight = kPartsWeight * between(weightOf(Ground::kInside), interior);
     result.totalWeight += result.partsWeight;
+    result.containedWeight = between(kContainedWeight, interior);
     result.scale = scaleDistance(a, b, options);
     return result;
 }
@@ -97,8 +121,8 @@ double attributeScore(const AttributeDistance& distance, double agreement) {
 }
 
 double pieceScore(const AttributeDistance& distance, double agreement, double share) {
-    return scoreOf((1.0 - kContainedWeight) * meanDistance(distance, agreement) +
-                   kContainedWeight * disagreement(share));
+    return scoreOf((1.0 - distance.containedWeight) * meanDistance(distance, agreement) +
+                   distance.containedWeight * disagreement(share));
 }
 
 std::vector<ScoreTerm> scoreTerms(const Signature& a, const Signature& b, const ScoreOptions& options,
@@ -108,7 +132,7 @@ std::vector<ScoreTerm> scoreTerms(const Signature& a, const Signature& b, const 
     std::vector<ScoreTerm> terms;
     for (std::size_t kind = 0; kind < kStatisticKinds; ++kind) {
         terms.push_back({kStatistics[kind].name, termDistance(a, b, kind),
-                         termWeight(kind, interior, options) / distance.totalWeight});
+                         termWeight(kind, interior) / distance.totalWeight});
     }
     terms.push_back({"parts", disagreement(agreement), distance.partsWeight / distance.totalWeight});
     return terms;
@@ -117,8 +141,9 @@ std::vector<ScoreTerm> scoreTerms(const Signature& a, const Signature& b, const 
 std::vector<ScoreTerm> pieceTerms(const Signature& a, const Signature& b, const ScoreOptions& options,
                                   double agreement, double share) {
     std::vector<ScoreTerm> terms = scoreTerms(a, b, options, agreement);
-    for (ScoreTerm& term : terms) term.weight *= 1.0 - kContainedWeight;
-    terms.push_back({"contained parts", disagreement(share), kContainedWeight});
+    const double contained = between(kContainedWeight, trust(a, b));
+    for (ScoreTerm& term : terms) term.weight *= 1.0 - contained;
+    terms.push_back({"contained parts", disagreement(share), contained});
     return terms;
 }
 

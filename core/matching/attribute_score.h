@@ -9,14 +9,14 @@
 namespace shapedb {
 
 /// Distances of the statistics and of the parts, each in units of what two unrelated shapes
-/// typically differ by, are averaged with these weights; those that come from the interior (of a
-/// piece: only those that rest on thickness) count as much as the poorer of both interiors can be
-/// trusted.
+/// typically differ by, are averaged with these weights. How far the poorer of both interiors can be
+/// trusted decides: what rests on it then counts for all or for nearly nothing, the outline the more.
 struct AttributeDistance {
     double statistics = 0.0;  ///< weighted sum over the statistics
     double partsWeight = 0.0;
-    double totalWeight = 0.0;  ///< with the parts'
-    double scale = 0.0;        ///< with keepScale: octaves between the sizes, else 0
+    double totalWeight = 0.0;      ///< with the parts'
+    double scale = 0.0;            ///< with keepScale: octaves between the sizes, else 0
+    double containedWeight = 0.0;  ///< of a piece: what is contained, against all of the above, [0, 1]
 };
 
 /// Both with attributes. Everything but the parts; exact and quick: sums of byte differences.
@@ -27,8 +27,8 @@ struct AttributeDistance {
 /// the agreement falls, in (0, 1]. Unrelated shapes (D = 1) typically score 0.2.
 [[nodiscard]] double attributeScore(const AttributeDistance& distance, double agreement);
 
-/// For a piece and its whole: half D as above (without the sizes' difference), for a piece still
-/// resembles its whole, half by the share of the piece that the whole contains. Falls as either does.
+/// For a piece and its whole: D as above (without the sizes' difference), for a piece still resembles
+/// its whole, and by up to a half the share of the piece that the whole contains. Falls as either does.
 [[nodiscard]] double pieceScore(const AttributeDistance& distance, double agreement, double share);
 
 /// Name, distance and weight of every term, in a fixed order; the weights sum to 1.

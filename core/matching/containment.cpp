@@ -42,11 +42,23 @@ Points placed(const Body& whole, const Containment& c) {
     return result;
 }
 
-double pairGain(const Part& p, const Part& q, const Point3& placedQ, double scale, double width) {
+double pairGain(const Part& p, const Point3& placedQ, double likeness, double scale, double width) {
     // The width is a length of the whole.
     const double gap = squaredDistance(placeOf(p), placedQ) * scale * scale;
-    const double near = kernel(gap, width);
-    return near > 0.0 ? static_cast<double>(p.share) * near * sizeLikeness(p, q, std::log2(scale)) : 0.0;
+    return static_cast<double>(p.share) * kernel(gap, width) * likeness;
+}
+
+// How alike each part of the piece and each of the whole are in size, at a scale.
+using Likenesses = std::array<std::array<double, kMaxSignaturePoints>, kMaxSignaturePoints>;
+Likenesses likenesses(const Body& piece, const Body& whole, double scale) {
+    Likenesses table;
+    const double larger = std::log2(scale);
+    for (std::size_t p = 0; p < piece.parts.size(); ++p) {
+        for (std::size_t q = 0; q < whole.parts.size(); ++q) {
+            table[p][q] = sizeLikeness(piece.parts[p], whole.parts[q], larger);
+        }
+    }
+    return table;
 }
 
 class Search {
@@ -73,7 +85,8 @@ class Search {
         const double free = octaves(piece_.parts[p], whole_.parts[q]);
         trial.scale =
             knownScale_ > 0.0 ? knownScale_ : std::clamp(std::exp2(free), kSmallestScale, kLargestScale);
-        if (!alike(p, q, trial.scale)) return;
+        alike_ = likenesses(piece_, whole_, trial.scale);
+        if (!alike(p, q) || atMost() <= best_.share) return;
         trial.from = placeOf(whole_.parts[q]);
         trial.to = placeOf(piece_.parts[p]);
         keepBest(trial);
@@ -91,9 +104,9 @@ class Search {
         const Point3 side = i == k ? anyAcross(axis) : placeOf(piece_.parts[k]) - trial.to;
         if (!tripod(axis, side, to)) return;
         for (std::size_t j = 0; j < whole_.parts.size(); ++j) {
-            if (j == q || !alike(i, j, trial.scale)) continue;
+            if (j == q || !alike(i, j)) continue;
             for (std::size_t l = 0; l < whole_.parts.size(); ++l) {
-                if (l == q || l == j || !alike(k, l, trial.scale)) continue;
+                if (l == q || l == j || !alike(k, l)) continue;
                 Tripod from;
                 if (!tripod(placeOf(whole_.parts[j]) - trial.from, placeOf(whole_.parts[l]) - trial.from,
                             from))
@@ -108,18 +121,28 @@ class Search {
         }
     }
 
-    bool alike(std::size_t p, std::size_t q, double scale) const {
-        return sizeLikeness(piece_.parts[p], whole_.parts[q], std::log2(scale)) >= kAlikeEnough;
+    bool alike(std::size_t p, std::size_t q) const { return alike_[p][q] >= kAlikeEnough; }
+
+    // What no turn about the anchor can exceed: every part of the piece on the one most like it. The
+    // same sum as keepBest's of terms no smaller, so that leaving an anchor out changes nothing.
+    double atMost() const {
+        double sum = 0.0;
+        for (std::size_t p = 0; p < piece_.parts.size(); ++p) {
+            double best = 0.0;
+            for (std::size_t q = 0; q < whole_.parts.size(); ++q) best = std::max(best, alike_[p][q]);
+            sum += static_cast<double>(piece_.parts[p].share) * best;
+        }
+        return std::min(1.0, sum / total_);
     }
 
     void keepBest(Containment& trial) {
         const Points at = placed(whole_, trial);
         double sum = 0.0;
-        for (const Part& part : piece_.parts) {
+        for (std::size_t i = 0; i < piece_.parts.size(); ++i) {
             double best = 0.0;
             for (std::size_t j = 0; j < whole_.parts.size(); ++j) {
-                best =
-                    std::max(best, pairGain(part, whole_.parts[j], at[j], trial.scale, options_.kernelWidth));
+                best = std::max(
+                    best, pairGain(piece_.parts[i], at[j], alike_[i][j], trial.scale, options_.kernelWidth));
             }
             sum += best;
         }
@@ -132,6 +155,7 @@ class Search {
     double knownScale_;
     const ScoreOptions& options_;
     double total_;
+    Likenesses alike_{};  // at the scale of the present anchor
     Containment best_;
 };
 
@@ -161,13 +185,14 @@ PartPairs containedPairs(const Body& piece, const Body& whole, const Containment
     PartPairs result;
     if (!(found.share > 0.0)) return result;  // nothing was laid on anything
     const Points at = placed(whole, found);
+    const Likenesses alike = likenesses(piece, whole, found.scale);
     const double total = totalShare(piece);
     for (std::size_t i = 0; i < piece.parts.size(); ++i) {
         PartPair best;
         best.a = static_cast<std::uint8_t>(i);
         for (std::size_t j = 0; j < whole.parts.size(); ++j) {
             const double gain =
-                pairGain(piece.parts[i], whole.parts[j], at[j], found.scale, options.kernelWidth) / total;
+                pairGain(piece.parts[i], at[j], alike[i][j], found.scale, options.kernelWidth) / total;
             if (gain <= best.gain) continue;
             best.b = static_cast<std::uint8_t>(j);
             best.gain = gain;

@@ -21,7 +21,7 @@ struct ScoreOptions {
     bool keepScale = false;
     /// Asks how much of the first shape (the query) the second contains: a one-sided scan or a
     /// broken piece finds its whole. Not symmetric, and without keepScale the piece's size is taken
-    /// from the parts that match. Slower: up to a millisecond a pair.
+    /// from the parts that match. Slower by several times.
     bool partial = false;
     /// How far apart two points may lie and still count as the same part, in units of the shapes'
     /// common size: a pair at distance d counts for kernel(d) = (1 - d^2 / (8 width^2))^4 of its
@@ -36,8 +36,8 @@ constexpr double kDegenerateCeiling = 0.9;
 /// Errors: kInvalidArgument naming the field, its value and its range.
 [[nodiscard]] Result<void> validate(const ScoreOptions& options);
 
-/// For two signatures with attributes: 1 / (1 + (2 D)^2) in (0, 1], where D is the mean of eight
-/// distances, each in units of what two unrelated shapes typically differ by: seven statistics and
+/// For two signatures with attributes: 1 / (1 + (2 D)^2) in (0, 1], where D is the mean of
+/// distances, each in units of what two unrelated shapes typically differ by: the statistics and
 /// the parts under their best alignment (attribute_score.h, part_match.h). Two unrelated shapes
 /// score about 0.2, two scans of one object above 0.9. Below 1 unless `sameShape(a, b)` (with
 /// keepScale also of the same scale); symmetric bit for bit.
@@ -49,7 +49,7 @@ constexpr double kDegenerateCeiling = 0.9;
 /// single point and they are not the same, the score is at most kDegenerateCeiling: one weighted
 /// point leaves the rotation open and says too little.
 ///
-/// Partial, with attributes: half D, half what of `a` finds no like in `b` (containment.h);
+/// Partial, with attributes: D and, by up to a half, what of `a` finds no like in `b` (containment.h);
 /// otherwise similarity / weight of `a`. Not symmetric; 1 still only for the same shape.
 ///
 /// Both must be valid (as made by makeSignature or decodeSignature), the options valid.

@@ -31,6 +31,11 @@ bool samePartSizes(const Signature& a, const Signature& b) {
 
 }  // namespace
 
+float volumeShareOf(float weight, double scale, double volume) noexcept {
+    const double share = static_cast<double>(weight) * (scale * scale * scale) / volume;
+    return static_cast<float>(std::min(1.0, share));
+}
+
 bool sameShape(const Signature& a, const Signature& b) noexcept {
     if (a.points.size() != b.points.size()) return false;
     for (std::size_t i = 0; i < a.points.size(); ++i) {
@@ -87,7 +92,7 @@ Result<Signature> makeSignatureOrThrow(const Segmentation& segmentation, const S
         point.position = {static_cast<float>(position.x), static_cast<float>(position.y),
                           static_cast<float>(position.z)};
         point.weight = static_cast<float>(segment.volume * inverse * inverse * inverse);
-        point.volumeShare = static_cast<float>(segment.volume / segmentation.volume);
+        point.volumeShare = volumeShareOf(point.weight, signature.scale, signature.volume);
         // A segment without a maximum may peak in a flat tetrahedron, of any circumradius.
         point.peakRadius = static_cast<float>(
             std::min<double>(segment.peakRadius * inverse, std::numeric_limits<float>::max()));

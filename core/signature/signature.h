@@ -58,6 +58,10 @@ struct Signature {
     std::optional<ShapeAttributes> attributes;  ///< with SignatureOptions::attributes
 };
 
+/// The share of the whole interior that a weighted point of this weight stands for: in [0, 1], 0 only when
+/// it is below single precision.
+[[nodiscard]] float volumeShareOf(float weight, double scale, double volume) noexcept;
+
 /// True when all numbers that enter a score are the same, bit for bit.
 [[nodiscard]] bool sameShape(const Signature& a, const Signature& b) noexcept;
 

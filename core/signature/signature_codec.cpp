@@ -12,15 +12,31 @@ namespace {
 // Persisted: never change. docs/signature-format.md describes every byte.
 constexpr char kMagic[4] = {'S', 'D', 'B', 'G'};
 constexpr std::uint16_t kPointsOnly = 1;      // version 1
-constexpr std::uint16_t kWithAttributes = 2;  // version 2: the same, and the statistics
+constexpr std::uint16_t kWithAttributes = 2;  // version 2: shares follow from weights; and the statistics
 constexpr std::size_t kHeaderBytes = 52;
-constexpr std::size_t kPointBytes = 48;
 constexpr std::size_t kChecksumBytes = 4;
+
+// What the version decides.
+struct Layout {
+    std::size_t pointBytes;
+    std::size_t statisticBytes;
+
+    std::size_t size(std::size_t points) const {
+        return kHeaderBytes + pointBytes * points + statisticBytes + kChecksumBytes;
+    }
+};
+Layout layoutOf(std::uint16_t version) {
+    return version == kWithAttributes ? Layout{44, kStatisticBins} : Layout{48, 0};
+}
+constexpr std::size_t kLeastBytes = kHeaderBytes + 48 + kChecksumBytes;
 
 // No scan that `sanitise` accepts is larger or smaller (scan units): beyond, a motion between two
 // shapes would overflow.
 constexpr double kLargestSize = 1e40;
 constexpr double kSmallestSize = 1e-40;
+
+// Weights are single precision: that of the only segment may exceed the volume by its rounding.
+constexpr double kShareRounding = 1e-6;
 
 // CRC-32 (IEEE 802.3, reflected), bit by bit: a few hundred bytes do not need a table.
 std::uint32_t crc32(const char* bytes, std::size_t size) {
@@ -86,11 +102,12 @@ class Reader {
     const char* at_;
 };
 
-SignaturePoint takePoint(Reader& reader) {
+SignaturePoint takePoint(Reader& reader, std::uint16_t version, const Signature& of) {
     SignaturePoint point;
     for (float& v : point.position) v = reader.takeFloat();
     point.weight = reader.takeFloat();
-    point.volumeShare = reader.takeFloat();
+    point.volumeShare =
+        version == kWithAttributes ? volumeShareOf(point.weight, of.scale, of.volume) : reader.takeFloat();
     point.peakRadius = reader.takeFloat();
     for (float& v : point.covariance) v = reader.takeFloat();
     return point;
@@ -108,7 +125,7 @@ tl::unexpected<Error> malformed(const std::string& what) {
     return fail(ErrorCode::kMalformedSignature, "not a valid signature: " + what);
 }
 
-Result<void> checkNumbers(const Signature& signature) {
+Result<void> checkNumbers(const Signature& signature, std::uint16_t version) {
     const Point3& o = signature.origin;
     if (!(signature.scale >= kSmallestSize && signature.scale <= kLargestSize))
         return malformed("the scale is not between 1e-40 and 1e40");
@@ -122,6 +139,9 @@ Result<void> checkNumbers(const Signature& signature) {
         const std::string name = "point " + std::to_string(i);
         if (!allFinite(p)) return malformed(name + " has a number that is not finite");
         if (!(p.weight > 0.0f)) return malformed(name + " has no positive weight");
+        const double cube = signature.scale * signature.scale * signature.scale;
+        if (version == kWithAttributes && p.weight * cube > signature.volume * (1.0 + kShareRounding))
+            return malformed(name + " outweighs the whole volume");
         if (!(p.volumeShare > 0.0f) || p.volumeShare > 1.0f)
             return malformed(name + " has a volume share outside (0, 1]");
         if (!(p.peakRadius > 0.0f)) return malformed(name + " has no positive peak radius");
@@ -138,8 +158,9 @@ Result<void> checkNumbers(const Signature& signature) {
 
 std::string encodeSignature(const Signature& signature) {
     std::string out(kMagic, sizeof kMagic);
-    out.reserve(kHeaderBytes + kPointBytes * signature.points.size() + kStatisticBins + kChecksumBytes);
-    putUnsigned(out, signature.attributes ? kWithAttributes : kPointsOnly);
+    const std::uint16_t version = signature.attributes ? kWithAttributes : kPointsOnly;
+    out.reserve(layoutOf(version).size(signature.points.size()));
+    putUnsigned(out, version);
     putUnsigned(out, static_cast<std::uint16_t>(signature.points.size()));
     putUnsigned(out, signature.attributes ? std::uint32_t{signature.attributes->quality} : 0u);
     putDouble(out, signature.scale);
@@ -150,7 +171,7 @@ std::string encodeSignature(const Signature& signature) {
     for (const SignaturePoint& point : signature.points) {
         for (const float v : point.position) putFloat(out, v);
         putFloat(out, point.weight);
-        putFloat(out, point.volumeShare);
+        if (version == kPointsOnly) putFloat(out, point.volumeShare);
         putFloat(out, point.peakRadius);
         for (const float v : point.covariance) putFloat(out, v);
     }
@@ -162,7 +183,7 @@ std::string encodeSignature(const Signature& signature) {
 }
 
 Result<Signature> decodeSignature(const std::string& bytes) {
-    if (bytes.size() < kHeaderBytes + kPointBytes + kChecksumBytes) {
+    if (bytes.size() < kLeastBytes) {
         return malformed(std::to_string(bytes.size()) + " bytes are too few");
     }
     if (std::memcmp(bytes.data(), kMagic, sizeof kMagic) != 0)
@@ -171,11 +192,10 @@ Result<Signature> decodeSignature(const std::string& bytes) {
     const auto version = reader.takeUnsigned<std::uint16_t>();
     if (version != kPointsOnly && version != kWithAttributes)
         return malformed("version " + std::to_string(version) + " is unknown");
-    const std::size_t statisticBytes = version == kWithAttributes ? kStatisticBins : 0;
     const auto count = reader.takeUnsigned<std::uint16_t>();
     if (count < 1 || count > kMaxSignaturePoints)
         return malformed(std::to_string(count) + " points announced");
-    if (bytes.size() != kHeaderBytes + kPointBytes * count + statisticBytes + kChecksumBytes) {
+    if (bytes.size() != layoutOf(version).size(count)) {
         return malformed(std::to_string(bytes.size()) + " bytes do not fit " + std::to_string(count) +
                          " points");
     }
@@ -192,8 +212,10 @@ Result<Signature> decodeSignature(const std::string& bytes) {
         signature.origin.y = reader.takeDouble();
         signature.origin.z = reader.takeDouble();
         signature.volume = reader.takeDouble();
-        for (std::uint16_t i = 0; i < count; ++i) signature.points.push_back(takePoint(reader));
-        if (auto valid = checkNumbers(signature); !valid) return fail(valid.error());
+        for (std::uint16_t i = 0; i < count; ++i) {
+            signature.points.push_back(takePoint(reader, version, signature));
+        }
+        if (auto valid = checkNumbers(signature, version); !valid) return fail(valid.error());
         if (version == kWithAttributes) {
             ShapeAttributes& attributes = signature.attributes.emplace();
             attributes.quality = static_cast<std::uint8_t>(quality);

@@ -10,12 +10,13 @@
 
 namespace shapedb {
 
-/// Little-endian on every machine; 56 + 48 bytes a point, and 352 with attributes: at most 984
-/// bytes with the 12 points of the default profile.
+/// Little-endian on every machine; 56 + 48 bytes a point; with attributes 488 + 44 bytes a point: at most
+/// 1016 bytes with the 12 points of the default profile.
 [[nodiscard]] std::string encodeSignature(const Signature& signature);
 
-/// The exact inverse. Errors: kMalformedSignature (too short or long, wrong magic, unknown
-/// version, checksum, a number out of its range: the message says which).
+/// The exact inverse for signatures as makeSignature makes them (with attributes, the volume shares
+/// are not stored: they follow from the weights). Errors: kMalformedSignature (too short or long, wrong
+/// magic, unknown version, checksum, a number out of its range: the message says which).
 [[nodiscard]] Result<Signature> decodeSignature(const std::string& bytes);
 
 }  // namespace shapedb

@@ -5,8 +5,10 @@
 #include <vector>
 
 #include "core/base/random.h"
+#include "core/signature/footprint.h"
 #include "core/signature/histogram.h"
 #include "core/signature/inner_distances.h"
+#include "core/signature/local_spread.h"
 #include "core/signature/shell_harmonics.h"
 #include "core/signature/voxels.h"
 
@@ -20,6 +22,11 @@ constexpr std::size_t kChordLengths = 12;
 constexpr std::size_t kChordShares = 4;
 constexpr std::size_t kBendingBins = 24;
 constexpr std::size_t kDistanceBins = 32;
+constexpr std::size_t kSpreadMiddles = 5;
+constexpr std::size_t kSpreadShortests = 4;
+constexpr std::size_t kOutlinePlaces = 10;
+constexpr std::size_t kOutlineWidths = 4;
+constexpr std::size_t kOutlineDistances = 20;
 constexpr std::size_t kChords = 100000;
 constexpr std::uint64_t kSeed = 145;
 
@@ -116,6 +123,37 @@ void chords(const InteriorView& view, std::uint8_t* out) {
     histogram.writeRoots(out);
 }
 
+void spread(const InteriorView& view, std::uint8_t* out) {
+    Histogram histogram(kSpreadMiddles, kSpreadShortests);
+    for (const LocalSpread& s : localSpread(view.surface)) {
+        histogram.add(softBin(s.middle, 0.0, 1.0, kSpreadMiddles),
+                      softBin(s.shortest, 0.0, 0.8, kSpreadShortests), 1.0);
+    }
+    histogram.writeRoots(out);
+}
+
+// Octaves from the long axis of the outline: from a hair, 1/64 of the length, to the corners of a square.
+void placesInOutline(const std::vector<OutlinePoint>& outline, std::uint8_t* out) {
+    Histogram histogram(kOutlinePlaces, kOutlineWidths);
+    for (const OutlinePoint& p : outline) {
+        const double across = std::log2(std::max(std::abs(p[1]), 1e-4));
+        histogram.add(softBin(p[0], 0.0, 1.0, kOutlinePlaces), softBin(across, -6.0, -0.5, kOutlineWidths),
+                      1.0);
+    }
+    histogram.writeRoots(out);
+}
+
+void distancesInOutline(const std::vector<OutlinePoint>& outline, std::uint8_t* out) {
+    Random random(kSeed);
+    Histogram histogram(1, kOutlineDistances);
+    for (std::size_t i = 0; i < kChords && outline.size() > 1; ++i) {
+        const OutlinePoint& a = outline[random.below(outline.size())];
+        const OutlinePoint& b = outline[random.below(outline.size())];
+        histogram.add(softBin(std::hypot(a[0] - b[0], a[1] - b[1]), 0.0, 1.1, kOutlineDistances), 1.0);
+    }
+    histogram.writeRoots(out);
+}
+
 void harmonics(const PointCloud& points, const std::vector<double>& weights, std::uint8_t* out) {
     const ShellEnergies energies = shellHarmonics(points, weights);
     for (std::size_t i = 0; i < energies.size(); ++i) out[i] = Histogram::rootByte(energies[i]);
@@ -136,6 +174,11 @@ Result<ShapeStatistics> shapeStatistics(const InteriorView& view, const RunConte
     if (auto ok = context.checkpoint(); !ok) return fail(ok.error());
     surfaceDistances(view, binsOf(result, Statistic::kSurfaceDistances));
     harmonics(view.surface, {}, binsOf(result, Statistic::kSurfaceHarmonics));
+    if (auto ok = context.checkpoint(); !ok) return fail(ok.error());
+    spread(view, binsOf(result, Statistic::kSpread));
+    const std::vector<OutlinePoint> outline = footprint(view.surface);
+    placesInOutline(outline, binsOf(result, Statistic::kFootprint));
+    distancesInOutline(outline, binsOf(result, Statistic::kFootprintDistances));
     return result;
 }
 

@@ -22,28 +22,43 @@ enum class Statistic : std::uint8_t {
     kInteriorHarmonics,      ///< spherical-harmonic energies of the interior in shells
     kSurfaceDistances,       ///< distances between surface points (D2), in units of the size
     kSurfaceHarmonics,       ///< as the interior's, of the surface points
+    kSpread,                 ///< rod, sheet or body: spread of the surface around its points
+    kFootprint,              ///< the outline: place along it by distance from its long axis
+    kFootprintDistances,     ///< distances between points of the outline, in units of its length
 };
-constexpr std::size_t kStatisticKinds = 7;
+constexpr std::size_t kStatisticKinds = 10;
+
+/// What a scan must show for a statistic of it to hold.
+enum class Ground : std::uint8_t {
+    kInside,   ///< all of the surface, so that the inside can be told
+    kSurface,  ///< the surface; of one side most of it holds (a chord's share inside hardly depends
+               ///< on how thick a thin shape is taken to be)
+    kOutline,  ///< one side, seen as it lies
+};
 
 struct StatisticLayout {
     const char* name;      ///< for people: "chords"; static storage
     std::uint16_t offset;  ///< of its first bin
     std::uint16_t count;   ///< bins
-    /// False: the surface decides, so it holds for open scans too (a chord's share inside hardly
-    /// depends on how thick a thin shape is taken to be).
-    bool ofInterior;
+    Ground ground;
+    /// Above 0: which end comes first is chance, so two shapes are also compared with one's rows in
+    /// reverse; as many rows as this.
+    std::uint16_t reversibleRows;
 };
 
 constexpr std::array<StatisticLayout, kStatisticKinds> kStatistics{{
-    {"chords", 0, 48, false},
-    {"thickness by centrality", 48, 60, true},
-    {"thickness by radius", 108, 60, true},
-    {"bending", 168, 24, true},
-    {"interior harmonics", 192, 64, true},
-    {"surface distances", 256, 32, false},
-    {"surface harmonics", 288, 64, false},
+    {"chords", 0, 48, Ground::kSurface, 0},
+    {"thickness by centrality", 48, 60, Ground::kInside, 0},
+    {"thickness by radius", 108, 60, Ground::kInside, 0},
+    {"bending", 168, 24, Ground::kInside, 0},
+    {"interior harmonics", 192, 64, Ground::kInside, 0},
+    {"surface distances", 256, 32, Ground::kSurface, 0},
+    {"surface harmonics", 288, 64, Ground::kSurface, 0},
+    {"spread", 352, 20, Ground::kInside, 0},
+    {"footprint", 372, 40, Ground::kOutline, 10},
+    {"footprint distances", 412, 20, Ground::kOutline, 0},
 }};
-constexpr std::size_t kStatisticBins = 352;
+constexpr std::size_t kStatisticBins = 432;
 
 /// Each bin is the square root of its share of the whole, [0, 1], in steps of 1/255: differences
 /// of roots weigh a rare bin that is there or not like a small change of a full one (Hellinger).

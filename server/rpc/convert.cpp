@@ -118,7 +118,7 @@ void toProto(const ShapeAttributes& attributes, pb::ShapeAttributes* out) {
     for (const StatisticLayout& layout : kStatistics) {
         pb::ShapeStatistic* statistic = out->add_statistics();
         statistic->set_name(layout.name);
-        statistic->set_of_interior(layout.ofInterior);
+        statistic->set_of_interior(layout.ground == Ground::kInside);
         for (std::size_t i = layout.offset; i < std::size_t{layout.offset} + layout.count; ++i) {
             const float root = static_cast<float>(attributes.statistics[i]) / 255.0f;
             statistic->add_shares(root * root);

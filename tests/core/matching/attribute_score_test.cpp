@@ -259,7 +259,7 @@ TEST(AttributeScore, TrustsAnInteriorAsMuchAsItDeserves) {
         double surface = 0.0;
         const auto terms = scoreTerms(a, b, {}, 0.5);
         for (std::size_t kind = 0; kind < kStatisticKinds; ++kind) {
-            (kStatistics[kind].ofInterior ? interior : surface) += terms[kind].weight;
+            (kStatistics[kind].ground == Ground::kInside ? interior : surface) += terms[kind].weight;
         }
         interior += terms.back().weight;
         EXPECT_NEAR(interior + surface, 1.0, 1e-12);
@@ -282,6 +282,62 @@ TEST(AttributeScore, TrustsAnInteriorAsMuchAsItDeserves) {
     a.attributes->quality = 20;
     b.attributes->quality = 20;
     EXPECT_LT(weights(a, b), before - 0.1);
+}
+
+// One side of a surface has the outline of both: it gains what the rest loses.
+TEST(AttributeScore, AGuessedInteriorLeavesTheOutlineToDecide) {
+    Random random(81);
+    Signature a = randomAttributed(random);
+    Signature b = randomAttributed(random);
+    b.attributes->quality = 255;
+    const auto weights = [&](int quality) {
+        a.attributes->quality = static_cast<std::uint8_t>(quality);
+        std::array<double, 3> sums{};
+        const auto terms = scoreTerms(a, b, {}, 0.5);
+        for (std::size_t kind = 0; kind < kStatisticKinds; ++kind) {
+            sums[static_cast<std::size_t>(kStatistics[kind].ground)] += terms[kind].weight;
+        }
+        return sums;
+    };
+    const auto told = weights(255);
+    const auto guessed = weights(0);
+    EXPECT_EQ(told, weights(128)) << "a half is trusted in full";
+    EXPECT_GT(guessed[2], 4.0 * told[2]);
+    EXPECT_LT(guessed[0], 0.02);
+    // Surface against outline: 1 to a half when told, a half to 1 when guessed; three kinds to two.
+    EXPECT_NEAR(told[1] / told[2], 3.0, 1e-9);
+    EXPECT_NEAR(guessed[1] / guessed[2], 0.75, 1e-9);
+    // Of a piece, so does what its whole contains of it.
+    a.attributes->quality = 255;
+    EXPECT_DOUBLE_EQ(pieceTerms(a, b, {}, 0.5, 0.5).back().weight, 0.5);
+    a.attributes->quality = 0;
+    EXPECT_DOUBLE_EQ(pieceTerms(a, b, {}, 0.5, 0.5).back().weight, 0.25);
+}
+
+TEST(AttributeScore, WhichEndOfAnOutlineComesFirstDoesNotCount) {
+    Random random(82);
+    for (int round = 0; round < 100; ++round) {
+        const Pair pair = randomPair(random);
+        Signature turned = pair.b;
+        for (const StatisticLayout& layout : kStatistics) {
+            if (layout.reversibleRows == 0) continue;
+            const int columns = layout.count / layout.reversibleRows;
+            for (int row = 0; row < layout.reversibleRows; ++row) {
+                const auto from = pair.b.attributes->statistics.begin() + layout.offset +
+                                  (layout.reversibleRows - 1 - row) * columns;
+                std::copy(from, from + columns,
+                          turned.attributes->statistics.begin() + layout.offset + row * columns);
+            }
+        }
+        ASSERT_NE(turned.attributes->statistics, pair.b.attributes->statistics);
+        for (const ScoreOptions& options : everyOption()) {
+            EXPECT_TRUE(sameBits(score(pair.a, pair.b, options), score(pair.a, turned, options)));
+            expectSound(pair.b, turned, options);
+        }
+        const auto terms = scoreTerms(pair.b, turned, {}, 1.0);
+        for (std::size_t kind = 0; kind < kStatisticKinds; ++kind) EXPECT_EQ(terms[kind].distance, 0.0);
+        EXPECT_LT(score(pair.b, turned, {}), 1.0) << "not the same bytes";
+    }
 }
 
 void expectTermsMakeTheScore(const Signature& a, const Signature& b, const ScoreOptions& options,

@@ -50,11 +50,22 @@ Motion anyMotion(Random& random, int turn, int turns) {
 std::vector<double> differences(const Signature& a, const Signature& b) {
     std::vector<double> result;
     for (const StatisticLayout& layout : kStatistics) {
-        double sum = 0.0;
-        for (std::size_t i = layout.offset; i < layout.offset + layout.count; ++i) {
-            sum += std::abs(a.attributes->statistics[i] - b.attributes->statistics[i]) / 255.0;
+        const int rows = layout.reversibleRows > 0 ? layout.reversibleRows : 1;
+        const int columns = layout.count / rows;
+        double straight = 0.0;
+        double reversed = 0.0;
+        for (int row = 0; row < rows; ++row) {
+            for (int column = 0; column < columns; ++column) {
+                const auto bin = [&](const Signature& s, int r) {
+                    return s.attributes
+                               ->statistics[static_cast<std::size_t>(layout.offset + r * columns + column)] /
+                           255.0;
+                };
+                straight += std::abs(bin(a, row) - bin(b, row));
+                reversed += std::abs(bin(a, row) - bin(b, rows - 1 - row));
+            }
         }
-        result.push_back(sum / layout.count);
+        result.push_back((rows > 1 ? std::min(straight, reversed) : straight) / layout.count);
     }
     return result;
 }

@@ -19,7 +19,8 @@ Signature onePoint() {
     signature.origin = {1.0, -2.0, 0.125};
     signature.volume = 3.75;
     signature.points.resize(1);
-    signature.points[0] = {{0.0f, 0.0f, 0.0f}, 0.125f, 0.75f, 0.25f, {0.01f, 0.0f, 0.0f, 0.02f, 0.0f, 0.03f}};
+    signature.points[0] = {
+        {0.0f, 0.0f, 0.0f}, 0.125f, 0.125f * 15.625f / 3.75f, 0.25f, {0.01f, 0.0f, 0.0f, 0.02f, 0.0f, 0.03f}};
     ShapeAttributes& attributes = signature.attributes.emplace();
     attributes.quality = 200;
     for (std::size_t i = 0; i < kStatisticBins; ++i) {
@@ -32,7 +33,7 @@ Signature onePoint() {
 Signature randomAttributed(Random& random, std::size_t count) {
     Signature signature;
     signature.scale = std::exp(random.uniform(-80, 80));
-    signature.volume = std::exp(random.uniform(-80, 80));
+    signature.volume = signature.scale * signature.scale * signature.scale * random.uniform(1, 100);
     signature.origin = {random.normal() * 1e30, random.normal(), random.normal() * 1e-30};
     for (std::size_t i = 0; i < count; ++i) {
         SignaturePoint point;
@@ -40,7 +41,7 @@ Signature randomAttributed(Random& random, std::size_t count) {
             for (float& v : point.position) v = static_cast<float>(random.normal());
         }
         point.weight = 1.0f / static_cast<float>(i + 1);
-        point.volumeShare = static_cast<float>(1.0 - random.uniform());
+        point.volumeShare = volumeShareOf(point.weight, signature.scale, signature.volume);
         point.peakRadius = static_cast<float>(random.uniform(0.1, 1));
         for (float& v : point.covariance) v = static_cast<float>(random.normal());
         signature.points.push_back(point);
@@ -98,19 +99,20 @@ TEST(SignatureCodecAttributes, GoldenBytes) {
         "000000000000c03f"          // origin 1, -2, 0.125
         "0000000000000e40"          // volume 3.75
         "000000000000000000000000"  // position
-        "0000003e0000403f0000803e"  // weight, share, peak radius
+        "0000003e0000803e"          // weight, peak radius; the share follows from the weight
         "0ad7233c00000000000000000ad7a33c000000008fc2f53c";
     std::string golden;
     for (std::size_t i = 0; i < head.size(); i += 2) {
         golden.push_back(static_cast<char>(std::stoi(head.substr(i, 2), nullptr, 16)));
     }
-    for (int i = 0; i < 352; ++i) golden.push_back(static_cast<char>((7 * i + 3) % 256));
-    for (const int byte : {0x0a, 0xa8, 0x99, 0xe0}) golden.push_back(static_cast<char>(byte));
+    for (int i = 0; i < 432; ++i) golden.push_back(static_cast<char>((7 * i + 3) % 256));
+    for (const int byte : {0x7a, 0x99, 0x93, 0xff}) golden.push_back(static_cast<char>(byte));
     EXPECT_EQ(encodeSignature(onePoint()), golden);
     const auto decoded = decodeSignature(golden);
     ASSERT_TRUE(decoded) << decoded.error().message;
     EXPECT_EQ(decoded->attributes->quality, 200);
-    EXPECT_EQ(decoded->attributes->statistics[351], (7 * 351 + 3) % 256);
+    EXPECT_EQ(decoded->attributes->statistics[431], (7 * 431 + 3) % 256);
+    EXPECT_FLOAT_EQ(decoded->points[0].volumeShare, 0.5208333f);
 }
 
 TEST(SignatureCodecAttributes, DecodeIsTheInverse) {
@@ -118,7 +120,7 @@ TEST(SignatureCodecAttributes, DecodeIsTheInverse) {
     for (std::size_t count = 1; count <= kMaxSignaturePoints; ++count) {
         const Signature signature = randomAttributed(random, count);
         const std::string bytes = encodeSignature(signature);
-        EXPECT_EQ(bytes.size(), 56U + 48U * count + 352U);
+        EXPECT_EQ(bytes.size(), 56U + 44U * count + 432U);
         const auto decoded = decodeSignature(bytes);
         ASSERT_TRUE(decoded) << decoded.error().message;
         ASSERT_TRUE(decoded->attributes);
@@ -176,8 +178,20 @@ TEST(SignatureCodecAttributes, HeaderIsChecked) {
     expectMalformed(changed(6, 0), "0 points");
     expectMalformed(changed(6, 2), "do not fit");
     expectMalformed(changed(6, 17), "17 points");
-    // 352 bytes of statistics are not seven points and a bit of version 1.
+    // 432 bytes of statistics are not nine points of version 1.
     for (int count = 2; count <= 16; ++count) expectMalformed(changed(6, count), "do not fit");
+}
+
+TEST(SignatureCodecAttributes, APointIsNoHeavierThanTheWhole) {
+    Signature signature = onePoint();
+    signature.volume = 0.125 * 15.625;  // all of it in the one point
+    const auto whole = decodeSignature(encodeSignature(signature));
+    ASSERT_TRUE(whole);
+    EXPECT_EQ(whole->points[0].volumeShare, 1.0f);
+    signature.volume *= 0.999;
+    expectMalformed(encodeSignature(signature), "point 0 outweighs the whole volume");
+    signature.volume = 1e300;  // so light that nothing is left in single precision
+    expectMalformed(encodeSignature(signature), "share");
 }
 
 TEST(SignatureCodecAttributes, RandomBytesAreRefused) {

@@ -10,7 +10,9 @@
 
 #include <gtest/gtest.h>
 
+#include "core/signature/footprint.h"
 #include "core/signature/inner_distances.h"
+#include "core/signature/local_spread.h"
 #include "core/signature/profile.h"
 #include "core/signature/shell_harmonics.h"
 #include "core/synthetic/named_shapes.h"
@@ -71,11 +73,13 @@ TEST(Statistics, FillTheirBinsWithoutGapOrOverlap) {
         names.insert(layout.name);
     }
     EXPECT_EQ(next, kStatisticBins);
-    EXPECT_EQ(kStatisticBins, 352U) << "persisted";
+    EXPECT_EQ(kStatisticBins, 432U) << "persisted";
     EXPECT_EQ(names.size(), kStatisticKinds);
     EXPECT_STREQ(kStatistics[static_cast<std::size_t>(Statistic::kChords)].name, "chords");
     EXPECT_STREQ(kStatistics[static_cast<std::size_t>(Statistic::kSurfaceHarmonics)].name,
                  "surface harmonics");
+    EXPECT_STREQ(kStatistics[static_cast<std::size_t>(Statistic::kFootprintDistances)].name,
+                 "footprint distances");
 }
 
 TEST(Statistics, ThicknessByRadiusIsItsDefinition) {
@@ -177,6 +181,42 @@ TEST(Statistics, SurfaceDistancesAndHarmonicsAreTheirDefinitions) {
         EXPECT_EQ(binsOf(*statistics, Statistic::kInteriorHarmonics),
                   harmonics(view.centroids, view.volumes));
         EXPECT_EQ(binsOf(*statistics, Statistic::kSurfaceHarmonics), harmonics(view.surface, {}));
+    }
+}
+
+TEST(Statistics, SpreadAndFootprintAreTheirDefinitions) {
+    for (const InteriorView& view : someViews()) {
+        const auto statistics = shapeStatistics(view);
+        ASSERT_TRUE(statistics);
+        std::vector<double> spreads(5 * 4, 0.0);
+        for (const LocalSpread& s : localSpread(view.surface)) {
+            for (std::size_t bin = 0; bin < spreads.size(); ++bin) {
+                spreads[bin] +=
+                    triangle(s.middle, 0.0, 1.0, 5, bin / 4) * triangle(s.shortest, 0.0, 0.8, 4, bin % 4);
+            }
+        }
+        expectBins(binsOf(*statistics, Statistic::kSpread), rootsOf(spreads), "spread");
+
+        const std::vector<OutlinePoint> outline = footprint(view.surface);
+        std::vector<double> places(10 * 4, 0.0);
+        std::vector<double> distances(20, 0.0);
+        for (const OutlinePoint& p : outline) {
+            const double octaves = std::log2(std::abs(p[1]) + 1e-300);
+            for (std::size_t bin = 0; bin < places.size(); ++bin) {
+                places[bin] +=
+                    triangle(p[0], 0.0, 1.0, 10, bin / 4) * triangle(octaves, -6.0, -0.5, 4, bin % 4);
+            }
+            for (const OutlinePoint& q : outline) {
+                const double d = std::hypot(p[0] - q[0], p[1] - q[1]);
+                for (std::size_t bin = 0; bin < 20; ++bin) distances[bin] += triangle(d, 0.0, 1.1, 20, bin);
+            }
+        }
+        expectBins(binsOf(*statistics, Statistic::kFootprint), rootsOf(places), "footprint");
+        const auto drawn = binsOf(*statistics, Statistic::kFootprintDistances);
+        const auto all = rootsOf(distances);
+        for (std::size_t bin = 0; bin < drawn.size(); ++bin) {
+            EXPECT_NEAR(static_cast<double>(drawn[bin]), static_cast<double>(all[bin]), 3.0) << bin;
+        }
     }
 }
 

@@ -221,7 +221,7 @@ TEST(Signatures, AttributesAreSharesByName) {
     for (std::size_t s = 0; s < kStatistics.size(); ++s) {
         const pb::ShapeStatistic& statistic = message.attributes().statistics(static_cast<int>(s));
         EXPECT_EQ(statistic.name(), kStatistics[s].name);
-        EXPECT_EQ(statistic.of_interior(), kStatistics[s].ofInterior);
+        EXPECT_EQ(statistic.of_interior(), kStatistics[s].ground == Ground::kInside);
         for (const float share : statistic.shares()) {
             const double root = (bin++ % 256) / 255.0;
             EXPECT_NEAR(share, root * root, 1e-6);
