@@ -10,6 +10,9 @@ tests=OFF
 [ "${1:-}" = "--tests" ] && tests=ON
 build_dir=${BUILD_DIR:-build}
 
+# Paths below this folder count as relative, so that clones share what ccache keeps.
+export CCACHE_BASEDIR="$PWD"
+
 cmake -S . -B "$build_dir" -G Ninja \
   -DCMAKE_BUILD_TYPE="${BUILD_TYPE:-Release}" \
   -DSHAPEDB_BUILD_TESTS="$tests" \
