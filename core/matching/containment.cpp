@@ -85,8 +85,11 @@ class Search {
         const double free = octaves(piece_.parts[p], whole_.parts[q]);
         trial.scale =
             knownScale_ > 0.0 ? knownScale_ : std::clamp(std::exp2(free), kSmallestScale, kLargestScale);
+        const double larger = std::log2(trial.scale);
+        if (sizeLikeness(piece_.parts[p], whole_.parts[q], larger) < kAlikeEnough) return;
         alike_ = likenesses(piece_, whole_, trial.scale);
-        if (!alike(p, q) || atMost() <= best_.share) return;
+        boundRests();
+        if (hopeless(0.0, 0)) return;
         trial.from = placeOf(whole_.parts[q]);
         trial.to = placeOf(piece_.parts[p]);
         keepBest(trial);
@@ -123,16 +126,21 @@ class Search {
 
     bool alike(std::size_t p, std::size_t q) const { return alike_[p][q] >= kAlikeEnough; }
 
-    // What no turn about the anchor can exceed: every part of the piece on the one most like it. The
-    // same sum as keepBest's of terms no smaller, so that leaving an anchor out changes nothing.
-    double atMost() const {
-        double sum = 0.0;
-        for (std::size_t p = 0; p < piece_.parts.size(); ++p) {
+    // What the parts from each one on can add at most, however the piece is turned: each lies on the
+    // part of the whole most like it.
+    void boundRests() {
+        const std::size_t count = piece_.parts.size();
+        rest_[count] = 0.0;
+        for (std::size_t p = count; p-- > 0;) {
             double best = 0.0;
             for (std::size_t q = 0; q < whole_.parts.size(); ++q) best = std::max(best, alike_[p][q]);
-            sum += static_cast<double>(piece_.parts[p].share) * best;
+            rest_[p] = rest_[p + 1] + static_cast<double>(piece_.parts[p].share) * best;
         }
-        return std::min(1.0, sum / total_);
+    }
+
+    // Parts before `next` add `sum`: the best so far cannot be beaten. Leaving off there changes nothing.
+    bool hopeless(double sum, std::size_t next) const {
+        return (sum + rest_[next]) * kBoundMargin <= best_.share * total_;
     }
 
     void keepBest(Containment& trial) {
@@ -145,6 +153,7 @@ class Search {
                     best, pairGain(piece_.parts[i], at[j], alike_[i][j], trial.scale, options_.kernelWidth));
             }
             sum += best;
+            if (hopeless(sum, i + 1)) return;
         }
         trial.share = std::min(1.0, sum / total_);
         if (trial.share > best_.share) best_ = trial;
@@ -155,7 +164,8 @@ class Search {
     double knownScale_;
     const ScoreOptions& options_;
     double total_;
-    Likenesses alike_{};  // at the scale of the present anchor
+    Likenesses alike_{};                                  // at the scale of the present anchor
+    std::array<double, kMaxSignaturePoints + 1> rest_{};  // at that scale too
     Containment best_;
 };
 

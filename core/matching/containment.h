@@ -23,7 +23,7 @@ struct Containment {
 /// a second one in the direction of a second and a third to its side. Each part of the piece counts
 /// its volume times the likeness of sizes and the kernel of the distance to its best counterpart.
 /// `knownScale` > 0 fixes the scale (sizes kept); 0: taken from the parts that are laid on each
-/// other. Not symmetric. `options`: reflection, kernelWidth. Costs about ten times a score without.
+/// other. Not symmetric. `options`: reflection, kernelWidth. Costs about six times a score without.
 [[nodiscard]] Containment containment(const Body& piece, const Body& whole, double knownScale,
                                       const ScoreOptions& options);
 

@@ -21,14 +21,14 @@ struct Layout {
     std::size_t pointBytes;
     std::size_t statisticBytes;
 
-    std::size_t size(std::size_t points) const {
+    constexpr std::size_t size(std::size_t points) const {
         return kHeaderBytes + pointBytes * points + statisticBytes + kChecksumBytes;
     }
 };
-Layout layoutOf(std::uint16_t version) {
+constexpr Layout layoutOf(std::uint16_t version) {
     return version == kWithAttributes ? Layout{44, kStatisticBins} : Layout{48, 0};
 }
-constexpr std::size_t kLeastBytes = kHeaderBytes + 48 + kChecksumBytes;
+constexpr std::size_t kLeastBytes = layoutOf(kPointsOnly).size(1);
 
 // No scan that `sanitise` accepts is larger or smaller (scan units): beyond, a motion between two
 // shapes would overflow.
