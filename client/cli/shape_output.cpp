@@ -109,8 +109,7 @@ client::ShapeAttributes toClient(const ShapeAttributes& attributes) {
     for (const StatisticLayout& layout : kStatistics) {
         client::ShapeStatistic statistic{layout.name, {}, layout.ground == Ground::kInside};
         for (std::size_t i = layout.offset; i < std::size_t{layout.offset} + layout.count; ++i) {
-            const float root = static_cast<float>(attributes.statistics[i]) / 255.0f;
-            statistic.shares.push_back(root * root);
+            statistic.shares.push_back(static_cast<float>(shareOfLevel(attributes.statistics[i])));
         }
         out.statistics.push_back(std::move(statistic));
     }

@@ -38,8 +38,6 @@ constexpr GroundWeight kContainedWeight{0.5, 0.25};
 // Parts say both which parts there are and where they lie: two of the statistics' worth.
 constexpr double kPartsWeight = 2.0;
 
-constexpr double kBinsPerUnit = 255.0;
-
 // The distance, in units of what unrelated shapes differ by, at which a score has fallen to 0.5.
 constexpr double kHalfWay = 0.5;
 
@@ -52,10 +50,14 @@ double scoreOf(double distance) {
 // thickness off by half spoils its histograms altogether.
 constexpr double kTrustedQuality = 0.5;
 
-double trust(const Signature& a, const Signature& b) {
-    const double worse = std::min(a.attributes->quality, b.attributes->quality) / 255.0;
+double trust(std::uint8_t qualityA, std::uint8_t qualityB) {
+    const double worse = std::min(qualityA, qualityB) / 255.0;
     const double share = std::min(1.0, worse / kTrustedQuality);
     return share * share * share * share;
+}
+
+double trust(const Signature& a, const Signature& b) {
+    return trust(a.attributes->quality, b.attributes->quality);
 }
 
 int difference(const std::uint8_t* x, const std::uint8_t* y, std::size_t count) {
@@ -77,7 +79,7 @@ double termDistance(const Signature& a, const Signature& b, std::size_t kind) {
         }
         sum = std::min(sum, reversed);
     }
-    return sum / (kBinsPerUnit * kTypical[kind]);
+    return sum * kRootPerLevel / kTypical[kind];
 }
 
 double between(const GroundWeight& weight, double trust) {
@@ -89,8 +91,7 @@ double termWeight(std::size_t kind, double trust) {
 }
 
 double scaleDistance(const Signature& a, const Signature& b, const ScoreOptions& options) {
-    return options.keepScale ? std::abs(std::log2(std::max(a.scale, b.scale) / std::min(a.scale, b.scale)))
-                             : 0.0;
+    return options.keepScale ? octavesBetween(a.scale, b.scale) : 0.0;
 }
 
 double disagreement(double agreement) { return std::max(0.0, 1.0 - agreement) / kTypicalDisagreement; }
@@ -123,6 +124,34 @@ double attributeScore(const AttributeDistance& distance, double agreement) {
 double pieceScore(const AttributeDistance& distance, double agreement, double share) {
     return scoreOf((1.0 - distance.containedWeight) * meanDistance(distance, agreement) +
                    distance.containedWeight * disagreement(share));
+}
+
+LevelWeights levelWeights(std::uint8_t qualityA, std::uint8_t qualityB) {
+    const double interior = trust(qualityA, qualityB);
+    LevelWeights weights;
+    double total = kPartsWeight * between(weightOf(Ground::kInside), interior);
+    for (std::size_t kind = 0; kind < kStatisticKinds; ++kind) {
+        weights.perLevel[kind] = termWeight(kind, interior) * kRootPerLevel / kTypical[kind];
+        total += termWeight(kind, interior);
+    }
+    for (double& weight : weights.perLevel) weight /= total;
+    weights.partial = 1.0 - between(kContainedWeight, interior);
+    return weights;
+}
+
+double farthestFor(double score) {
+    // Near 1 a difference of rounding in the score is one of 1e-8 in the distance.
+    return score > 0.0 ? kHalfWay * std::sqrt(std::max(0.0, 1.0 / score - 1.0)) * (1.0 + 1e-9) + 1e-7
+                       : INFINITY;
+}
+
+double scoreAt(double distance) {
+    // Distance 0 may be a shape itself.
+    return distance > 0.0 ? std::min(1.0, scoreOf(distance) * (1.0 + 1e-9)) : 1.0;
+}
+
+double octavesBetween(double scaleA, double scaleB) {
+    return std::abs(std::log2(std::max(scaleA, scaleB) / std::min(scaleA, scaleB)));
 }
 
 std::vector<ScoreTerm> scoreTerms(const Signature& a, const Signature& b, const ScoreOptions& options,

@@ -2,6 +2,9 @@
 // whole, differ by, as one distance. docs/scoring.md derives it.
 #pragma once
 
+#include <array>
+#include <cstdint>
+
 #include "core/matching/part_match.h"
 #include "core/matching/score.h"
 #include "core/signature/signature.h"
@@ -30,6 +33,24 @@ struct AttributeDistance {
 /// For a piece and its whole: D as above (without the sizes' difference), for a piece still resembles
 /// its whole, and by up to a half the share of the piece that the whole contains. Falls as either does.
 [[nodiscard]] double pieceScore(const AttributeDistance& distance, double agreement, double share);
+
+/// What a level of difference in each statistic adds to the mean distance D of two shapes whose
+/// interiors have these qualities, and what the rest may add: for bounds of many candidates.
+struct LevelWeights {
+    std::array<double, kStatisticKinds> perLevel{};  ///< of D
+    double partial = 1.0;  ///< of a piece: how much of D is left beside what is contained
+};
+[[nodiscard]] LevelWeights levelWeights(std::uint8_t qualityA, std::uint8_t qualityB);
+
+/// The largest mean distance with which a score of at least `score` (in [0, 1]) can be had, a little
+/// more for rounding; infinite for 0.
+[[nodiscard]] double farthestFor(double score);
+
+/// No score of shapes at this mean distance or farther is larger; a little more for rounding.
+[[nodiscard]] double scoreAt(double distance);
+
+/// How many octaves lie between two sizes: what keepScale adds, across to the mean distance.
+[[nodiscard]] double octavesBetween(double scaleA, double scaleB);
 
 /// Name, distance and weight of every term, in a fixed order; the weights sum to 1.
 [[nodiscard]] std::vector<ScoreTerm> scoreTerms(const Signature& a, const Signature& b,

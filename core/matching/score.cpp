@@ -13,17 +13,28 @@ namespace shapedb {
 
 namespace {
 
-// A total order on what is scored, so that score(a, b) and score(b, a) are one computation.
+bool comesFirst(const ShapeAttributes& a, const ShapeAttributes& b) {
+    if (a.body.parts.size() != b.body.parts.size()) return a.body.parts.size() < b.body.parts.size();
+    for (std::size_t i = 0; i < a.body.parts.size(); ++i) {
+        const Part& p = a.body.parts[i];
+        const Part& q = b.body.parts[i];
+        if (p.share != q.share) return p.share < q.share;
+        if (p.position != q.position) return p.position < q.position;
+        if (p.size != q.size) return p.size < q.size;
+    }
+    if (a.quality != b.quality) return a.quality < b.quality;
+    return a.statistics < b.statistics;
+}
+
+// An order on what is scored, so that score(a, b) and score(b, a) are one computation.
 bool comesFirst(const Signature& a, const Signature& b) {
+    if (a.attributes && b.attributes) return comesFirst(*a.attributes, *b.attributes);
     if (a.points.size() != b.points.size()) return a.points.size() < b.points.size();
     for (std::size_t i = 0; i < a.points.size(); ++i) {
         const SignaturePoint& p = a.points[i];
         const SignaturePoint& q = b.points[i];
         if (p.weight != q.weight) return p.weight < q.weight;
         if (p.position != q.position) return p.position < q.position;
-        if (p.covariance != q.covariance) return p.covariance < q.covariance;
-        if (p.peakRadius != q.peakRadius) return p.peakRadius < q.peakRadius;
-        if (p.volumeShare != q.volumeShare) return p.volumeShare < q.volumeShare;
     }
     return a.scale < b.scale;
 }

@@ -1,68 +1,94 @@
 #include "core/search/signature_set.h"
 
 #include <algorithm>
-#include <iterator>
 #include <utility>
 
 namespace shapedb {
 
 namespace {
 
-using EntryPtr = SignatureSet::EntryPtr;
-using Block = SignatureSet::Block;
+using BlockPtr = std::shared_ptr<const SignatureBlock>;
+using Updates = std::vector<const IndexEntry*>;
 
-bool idLess(const EntryPtr& a, const EntryPtr& b) { return a->id < b->id; }
+bool idLess(const IndexEntry* a, const IndexEntry* b) { return a->id < b->id; }
 
-// The entries of a block with the changes whose ids fall into its range.
-Block applyChanges(const Block& block, std::vector<EntryPtr>::const_iterator updatesBegin,
-                   std::vector<EntryPtr>::const_iterator updatesEnd,
-                   const std::vector<std::int64_t>& removed) {
-    Block merged;
+// A row of the next set: of an old block, or new.
+struct Source {
+    const SignatureBlock* block = nullptr;
+    std::size_t row = 0;
+    const IndexEntry* entry = nullptr;
+};
+
+// The rows of a block with the changes whose ids fall into its range.
+std::vector<Source> applyChanges(const SignatureBlock& block, Updates::const_iterator updatesBegin,
+                                 Updates::const_iterator updatesEnd,
+                                 const std::vector<std::int64_t>& removed) {
+    std::vector<Source> merged;
     merged.reserve(block.size() + static_cast<std::size_t>(updatesEnd - updatesBegin));
     auto update = updatesBegin;
-    for (const EntryPtr& entry : block) {
-        for (; update != updatesEnd && (*update)->id < entry->id; ++update) merged.push_back(*update);
-        if (update != updatesEnd && (*update)->id == entry->id) {
-            merged.push_back(*update++);
-        } else if (!std::binary_search(removed.begin(), removed.end(), entry->id)) {
-            merged.push_back(entry);
+    for (std::size_t row = 0; row < block.size(); ++row) {
+        const std::int64_t id = block.id(row);
+        for (; update != updatesEnd && (*update)->id < id; ++update) merged.push_back({nullptr, 0, *update});
+        if (update != updatesEnd && (*update)->id == id) {
+            merged.push_back({nullptr, 0, *update++});
+        } else if (!std::binary_search(removed.begin(), removed.end(), id)) {
+            merged.push_back({&block, row, nullptr});
         }
     }
-    merged.insert(merged.end(), update, updatesEnd);
+    for (; update != updatesEnd; ++update) merged.push_back({nullptr, 0, *update});
     return merged;
+}
+
+BlockPtr blockOf(std::vector<Source>::const_iterator begin, std::vector<Source>::const_iterator end) {
+    auto block = std::make_shared<SignatureBlock>();
+    block->reserve(static_cast<std::size_t>(end - begin));
+    for (auto source = begin; source != end; ++source) {
+        if (source->entry != nullptr) {
+            block->append(*source->entry);
+        } else {
+            block->append(*source->block, source->row);
+        }
+    }
+    block->shrink();
+    return block;
 }
 
 }  // namespace
 
-SignatureSet SignatureSet::with(std::vector<EntryPtr> updates, std::vector<std::int64_t> removedIds) const {
-    std::sort(updates.begin(), updates.end(), idLess);
+SignatureSet SignatureSet::with(const std::vector<IndexEntry>& updates,
+                                std::vector<std::int64_t> removedIds) const {
+    Updates sorted;
+    sorted.reserve(updates.size());
+    for (const IndexEntry& entry : updates) sorted.push_back(&entry);
+    std::sort(sorted.begin(), sorted.end(), idLess);
     std::sort(removedIds.begin(), removedIds.end());
     SignatureSet next;
-    auto update = updates.cbegin();
-    const auto keep = [&next](std::shared_ptr<const Block> block) {
+    auto update = sorted.cbegin();
+    const auto keep = [&next](BlockPtr block) {
         next.size_ += block->size();
         next.blocks_.push_back(std::move(block));
     };
     // Splits what has outgrown a block, evenly: cutting off only the excess would leave a block of
     // one entry for each id that arrives late.
-    const auto keepSplit = [&keep](const Block& entries) {
-        const std::size_t parts = (entries.size() + kBlockSize - 1) / kBlockSize;
+    const auto keepSplit = [&keep](const std::vector<Source>& rows) {
+        const std::size_t parts = (rows.size() + kBlockSize - 1) / kBlockSize;
         for (std::size_t part = 0; part < parts; ++part) {
-            const std::size_t begin = part * entries.size() / parts;
-            const std::size_t end = (part + 1) * entries.size() / parts;
-            keep(std::make_shared<const Block>(entries.begin() + static_cast<std::ptrdiff_t>(begin),
-                                               entries.begin() + static_cast<std::ptrdiff_t>(end)));
+            keep(blockOf(rows.begin() + static_cast<std::ptrdiff_t>(part * rows.size() / parts),
+                         rows.begin() + static_cast<std::ptrdiff_t>((part + 1) * rows.size() / parts)));
         }
     };
     for (std::size_t b = 0; b < blocks_.size(); ++b) {
-        const Block& block = *blocks_[b];
-        // A block answers for the ids up to the next block's first.
-        auto updatesEnd = updates.cend();
+        const SignatureBlock& block = *blocks_[b];
+        // A block answers for the ids up to the next block's first; the last one for all that follow
+        // as long as it has room.
+        auto updatesEnd = sorted.cend();
         if (b + 1 < blocks_.size()) {
-            updatesEnd = std::lower_bound(update, updates.cend(), blocks_[b + 1]->front(), idLess);
+            const std::int64_t bound = blocks_[b + 1]->id(0);
+            updatesEnd =
+                std::find_if(update, sorted.cend(), [&](const IndexEntry* e) { return e->id >= bound; });
         }
-        const auto removedFrom = std::lower_bound(removedIds.begin(), removedIds.end(), block.front()->id);
-        const bool removes = removedFrom != removedIds.end() && *removedFrom <= block.back()->id;
+        const auto removedFrom = std::lower_bound(removedIds.begin(), removedIds.end(), block.id(0));
+        const bool removes = removedFrom != removedIds.end() && *removedFrom <= block.id(block.size() - 1);
         if (update == updatesEnd && !removes) {
             keep(blocks_[b]);
         } else {
@@ -70,30 +96,38 @@ SignatureSet SignatureSet::with(std::vector<EntryPtr> updates, std::vector<std::
         }
         update = updatesEnd;
     }
-    keepSplit(Block(update, updates.cend()));
+    if (blocks_.empty()) keepSplit(applyChanges({}, update, sorted.cend(), {}));
     return next;
 }
 
-EntryPtr SignatureSet::find(std::int64_t id) const {
+std::size_t SignatureSet::attributedCount() const {
+    std::size_t count = 0;
+    for (const BlockPtr& block : blocks_) count += block->attributedCount();
+    return count;
+}
+
+SignatureSet::Place SignatureSet::find(std::int64_t id) const {
     auto block = std::upper_bound(blocks_.begin(), blocks_.end(), id,
-                                  [](std::int64_t wanted, const auto& b) { return wanted < b->front()->id; });
-    if (block == blocks_.begin()) return nullptr;
+                                  [](std::int64_t wanted, const BlockPtr& b) { return wanted < b->id(0); });
+    if (block == blocks_.begin()) return {};
     --block;
-    const auto entry =
-        std::lower_bound((*block)->begin(), (*block)->end(), id,
-                         [](const EntryPtr& e, std::int64_t wanted) { return e->id < wanted; });
-    return entry != (*block)->end() && (*entry)->id == id ? *entry : nullptr;
+    std::size_t low = 0;
+    std::size_t high = (*block)->size();
+    while (low < high) {
+        const std::size_t middle = (low + high) / 2;
+        if ((*block)->id(middle) < id) {
+            low = middle + 1;
+        } else {
+            high = middle;
+        }
+    }
+    if (low == (*block)->size() || (*block)->id(low) != id) return {};
+    return {block->get(), low};
 }
 
 std::size_t SignatureSet::memoryBytes() const {
-    std::size_t bytes = 0;
-    for (const auto& block : blocks_) {
-        for (const EntryPtr& entry : *block) {
-            bytes += sizeof(EntryPtr) + sizeof(IndexEntry) + entry->key.capacity() +
-                     entry->signature.points.capacity() * sizeof(SignaturePoint);
-            for (const auto& [key, value] : entry->metadata) bytes += key.capacity() + value.capacity() + 96;
-        }
-    }
+    std::size_t bytes = blocks_.capacity() * sizeof(BlockPtr);
+    for (const BlockPtr& block : blocks_) bytes += block->memoryBytes();
     return bytes;
 }
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cmath>
 #include <exception>
 #include <new>
 #include <string>
@@ -10,114 +9,238 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include "core/search/statistics_bound.h"
+
 namespace shapedb {
 
 namespace {
 
+// Blocks looked through before the best scores so far are used against the next, larger slice.
+constexpr std::size_t kFirstSlice = 4;
+constexpr std::size_t kSliceGrowth = 8;
+
+// Candidates scored before the best scores so far are used against the rest.
+constexpr std::size_t kFirstChunk = 32;
+constexpr std::size_t kLargestChunk = 1024;
+
+// Candidates that one thread takes at a time.
+constexpr std::size_t kGrain = 4;
+
 struct Candidate {
-    double bound = 0.0;
-    const SignatureSet::EntryPtr* entry = nullptr;
+    double bound = 0.0;  // its score is no larger
+    const SignatureBlock* block = nullptr;
+    std::uint32_t row = 0;
+
+    std::int64_t id() const { return block->id(row); }
+};
+
+struct BlockBounds {
+    std::vector<Candidate> candidates;
+    std::uint64_t filtered = 0;
+    StatisticsBound::Counts counts;
 };
 
 bool ranksBefore(const SearchHit& a, const SearchHit& b) {
-    return a.score != b.score ? a.score > b.score : a.entry->id < b.entry->id;
+    return a.score != b.score ? a.score > b.score : a.id < b.id;
 }
 
-Result<void> checkOptions(const SearchOptions& options) {
+bool visitedBefore(const Candidate& a, const Candidate& b) {
+    return a.bound != b.bound ? a.bound > b.bound : a.id() < b.id();
+}
+
+Result<void> check(const Signature& query, const SignatureSet& set, const SearchOptions& options) {
     if (options.k == 0) return fail(ErrorCode::kInvalidArgument, "k is 0; ask for at least 1 hit");
     if (!(options.threshold >= 0.0 && options.threshold <= 1.0)) {
         return fail(ErrorCode::kInvalidArgument,
                     "threshold is " + std::to_string(options.threshold) + "; it must be 0 to 1");
     }
+    if (!query.attributes && set.attributedCount() > 0) {
+        return fail(ErrorCode::kInvalidArgument,
+                    "the query's signature has points and weights alone, those of the collection have "
+                    "attributes: make the query's with the collection's profile");
+    }
     return validate(options.score);
 }
 
-// What passes filter and exclusion, with its upper bound.
-Result<std::vector<Candidate>> boundCandidates(const Signature& query, const SignatureSet& set,
-                                               const SearchOptions& options, const RunContext& context) {
-    std::vector<std::vector<Candidate>> perBlock(set.blocks().size());
+// Runs work(i) for begin <= i < end in parallel until the context stops it.
+template <typename Work>
+Result<void> parallelUntilStopped(std::size_t begin, std::size_t end, std::size_t grain,
+                                  const RunContext& context, const Work& work) {
     std::atomic<bool> stop{false};
-    tbb::parallel_for(std::size_t{0}, set.blocks().size(), [&](std::size_t b) {
-        if (stop.load(std::memory_order_relaxed)) return;
-        if (!context.checkpoint()) {
-            stop = true;
-            return;
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(begin, end, grain), [&](const auto& range) {
+        Signature scratch;
+        for (std::size_t i = range.begin(); i < range.end(); ++i) {
+            if (stop.load(std::memory_order_relaxed)) return;
+            if (!context.checkpoint()) {
+                stop = true;
+                return;
+            }
+            work(i, scratch);
         }
-        for (const auto& entry : *set.blocks()[b]) {
-            if (options.excludeId && entry->id == *options.excludeId) continue;
-            if (!options.filter.matches(entry->metadata)) continue;
-            perBlock[b].push_back({scoreUpperBound(query, entry->signature, options.score), &entry});
-        }
-    });
-    if (auto go = context.checkpoint(); !go) return fail(go.error());
-    std::vector<Candidate> all;
-    for (const auto& block : perBlock) all.insert(all.end(), block.begin(), block.end());
-    return all;
-}
-
-// Scores candidates[begin, end) in parallel. Signatures of many points take milliseconds each, so
-// a stop is looked for before each.
-Result<void> scoreChunk(const Signature& query, const std::vector<Candidate>& candidates, std::size_t begin,
-                        std::size_t end, const ScoreOptions& options, std::vector<double>& scores,
-                        const RunContext& context) {
-    scores.resize(end - begin);
-    std::atomic<bool> stop{false};
-    tbb::parallel_for(begin, end, [&](std::size_t i) {
-        if (stop.load(std::memory_order_relaxed)) return;
-        if (!context.checkpoint()) {
-            stop = true;
-            return;
-        }
-        scores[i - begin] = score(query, (*candidates[i].entry)->signature, options);
     });
     return context.checkpoint();
 }
 
-Result<SearchResult> searchOrThrow(const Signature& query, const SignatureSet& set,
-                                   const SearchOptions& options, const RunContext& context) {
-    SearchResult result;
-    result.candidates = set.size();
-    auto candidates = boundCandidates(query, set, options, context);
-    if (!candidates) return fail(candidates.error());
-    result.filtered = candidates->size();
-    std::sort(candidates->begin(), candidates->end(), [](const Candidate& a, const Candidate& b) {
-        return a.bound != b.bound ? a.bound > b.bound : (*a.entry)->id < (*b.entry)->id;
-    });
-    // Chunks grow: small at first, while the k-th score rises fast, then large for the cores.
-    std::vector<double> scores;
-    std::size_t chunk = 32;
-    for (std::size_t begin = 0; begin < candidates->size();) {
-        const bool full = result.hits.size() == options.k;
-        const double needed = full ? result.hits.back().score : options.threshold;
-        // A candidate whose bound equals the k-th score may still win by its smaller id.
-        std::size_t end = begin;
-        while (end < candidates->size() && end - begin < chunk && (*candidates)[end].bound >= needed) ++end;
-        if (end == begin) break;
-        if (auto done = scoreChunk(query, *candidates, begin, end, options.score, scores, context); !done) {
-            return fail(done.error());
-        }
-        result.scored += end - begin;
-        for (std::size_t i = begin; i < end; ++i) {
-            if (scores[i - begin] >= options.threshold) {
-                result.hits.push_back({*(*candidates)[i].entry, scores[i - begin]});
+class Searcher {
+  public:
+    Searcher(const Signature& query, const SignatureSet& set, const SearchOptions& options,
+             const RunContext& context)
+        : query_(query), options_(options), context_(context) {
+        if (query.attributes) statistics_.emplace(query, options.score);
+        result_.counts.candidates = set.size();
+        // Spread evenly: shapes that came together are often alike.
+        order_.reserve(set.blocks().size());
+        std::size_t stride = 1;
+        while (stride * kFirstSlice < set.blocks().size()) stride *= 2;
+        for (std::size_t step = stride; step >= 1; step /= 2) {
+            for (std::size_t b = step == stride ? 0 : step; b < set.blocks().size();
+                 b += step == stride ? step : 2 * step) {
+                order_.push_back(set.blocks()[b].get());
             }
         }
-        std::sort(result.hits.begin(), result.hits.end(), ranksBefore);
-        if (result.hits.size() > options.k) result.hits.resize(options.k);
-        begin = end;
-        chunk = std::min<std::size_t>(chunk * 2, 4096);
-        context.report("search", begin, candidates->size());
     }
-    return result;
-}
+
+    Result<SearchResult> run() {
+        if (auto go = context_.checkpoint(); !go) return fail(go.error());
+        std::size_t slice = kFirstSlice;
+        for (std::size_t begin = 0; begin < order_.size();) {
+            const std::size_t end = std::min(order_.size(), begin + slice);
+            auto candidates = boundSlice(begin, end);
+            if (!candidates) return fail(candidates.error());
+            if (auto done = visit(*candidates); !done) return fail(done.error());
+            begin = end;
+            slice *= kSliceGrowth;
+            blocksDone_ = end;
+        }
+        return std::move(result_);
+    }
+
+  private:
+    // No candidate below this can be among the hits.
+    double needed() const {
+        return result_.hits.size() == options_.k ? result_.hits.back().score : options_.threshold;
+    }
+
+    // Which rows pass filter and exclusion; empty: all.
+    std::vector<std::uint8_t> wantedRows(const SignatureBlock& block) const {
+        const bool excludes = options_.excludeId && block.id(0) <= *options_.excludeId &&
+                              *options_.excludeId <= block.id(block.size() - 1);
+        if (options_.filter.acceptsAll() && !excludes) return {};
+        constexpr std::uint8_t kUnknown = 2;
+        std::vector<std::uint8_t> passes(block.metadataCount(), kUnknown);
+        std::vector<std::uint8_t> wanted(block.size());
+        for (std::size_t row = 0; row < block.size(); ++row) {
+            std::uint8_t& pass = passes[block.metadataNumber(row)];
+            if (pass == kUnknown) pass = options_.filter.matches(block.metadata(row)) ? 1 : 0;
+            wanted[row] = excludes && block.id(row) == *options_.excludeId ? 0 : pass;
+        }
+        return wanted;
+    }
+
+    void boundByPoints(const SignatureBlock& block, const std::vector<std::uint8_t>& wanted, double least,
+                       Signature& scratch, BlockBounds& bounds) const {
+        for (std::uint32_t row = 0; row < block.size(); ++row) {
+            if ((!wanted.empty() && wanted[row] == 0) || block.attributed(row)) continue;
+            ++bounds.counts.afterFirstHalf;
+            ++bounds.counts.afterStatistics;
+            block.scored(row, scratch);
+            const double bound = scoreUpperBound(query_, scratch, options_.score);
+            if (bound >= least) bounds.candidates.push_back({bound, &block, row});
+        }
+    }
+
+    BlockBounds boundBlock(const SignatureBlock& block, double least, Signature& scratch) const {
+        BlockBounds bounds;
+        const std::vector<std::uint8_t> wanted = wantedRows(block);
+        bounds.filtered = wanted.empty()
+                              ? block.size()
+                              : static_cast<std::uint64_t>(std::count(wanted.begin(), wanted.end(), 1));
+        if (bounds.filtered == 0) return bounds;
+        if (statistics_) {
+            std::vector<StatisticsBound::Left> left;
+            statistics_->scan(block, wanted, least, left, bounds.counts);
+            bounds.candidates.reserve(left.size());
+            for (const auto& row : left)
+                bounds.candidates.push_back({scoreAt(row.distance), &block, row.row});
+        }
+        if (block.attributedCount() < block.size()) boundByPoints(block, wanted, least, scratch, bounds);
+        return bounds;
+    }
+
+    Result<std::vector<Candidate>> boundSlice(std::size_t begin, std::size_t end) {
+        std::vector<BlockBounds> perBlock(end - begin);
+        const double least = needed();
+        auto done = parallelUntilStopped(begin, end, 1, context_, [&](std::size_t b, Signature& scratch) {
+            perBlock[b - begin] = boundBlock(*order_[b], least, scratch);
+        });
+        if (!done) return fail(done.error());
+        std::vector<Candidate> all;
+        for (const BlockBounds& block : perBlock) {
+            all.insert(all.end(), block.candidates.begin(), block.candidates.end());
+            result_.counts.filtered += block.filtered;
+            result_.counts.afterFirstHalf += block.counts.afterFirstHalf;
+            result_.counts.afterStatistics += block.counts.afterStatistics;
+        }
+        std::sort(all.begin(), all.end(), visitedBefore);
+        return all;
+    }
+
+    // Scores candidates by falling bound until no bound reaches the k-th score.
+    Result<void> visit(const std::vector<Candidate>& candidates) {
+        std::size_t chunk = kFirstChunk;
+        for (std::size_t begin = 0; begin < candidates.size();) {
+            const double least = needed();
+            // A candidate whose bound equals the k-th score may still win by its smaller id.
+            std::size_t end = begin;
+            while (end < candidates.size() && end - begin < chunk && candidates[end].bound >= least) ++end;
+            if (end == begin) break;
+            if (auto done = scoreChunk(candidates, begin, end, least); !done) return done;
+            begin = end;
+            chunk = std::min(chunk * 2, kLargestChunk);
+            context_.report("search", blocksDone_, order_.size());
+        }
+        return {};
+    }
+
+    Result<void> scoreChunk(const std::vector<Candidate>& candidates, std::size_t begin, std::size_t end,
+                            double least) {
+        constexpr double kRuledOut = -1.0;
+        std::vector<double> scores(end - begin, kRuledOut);
+        // Signatures of many points take milliseconds each, so a stop is looked for before each.
+        auto done =
+            parallelUntilStopped(begin, end, kGrain, context_, [&](std::size_t i, Signature& scratch) {
+                candidates[i].block->scored(candidates[i].row, scratch);
+                if (scratch.attributes && scoreUpperBound(query_, scratch, options_.score) < least) return;
+                scores[i - begin] = score(query_, scratch, options_.score);
+            });
+        if (!done) return done;
+        for (std::size_t i = begin; i < end; ++i) {
+            if (scores[i - begin] == kRuledOut) continue;
+            ++result_.counts.scored;
+            if (scores[i - begin] >= options_.threshold)
+                result_.hits.push_back({candidates[i].id(), scores[i - begin]});
+        }
+        std::sort(result_.hits.begin(), result_.hits.end(), ranksBefore);
+        if (result_.hits.size() > options_.k) result_.hits.resize(options_.k);
+        return {};
+    }
+
+    const Signature& query_;
+    const SearchOptions& options_;
+    const RunContext& context_;
+    std::optional<StatisticsBound> statistics_;
+    std::vector<const SignatureBlock*> order_;
+    std::size_t blocksDone_ = 0;
+    SearchResult result_;
+};
 
 }  // namespace
 
 Result<SearchResult> topK(const Signature& query, const SignatureSet& set, const SearchOptions& options,
                           const RunContext& context) {
-    if (auto valid = checkOptions(options); !valid) return fail(valid.error());
+    if (auto valid = check(query, set, options); !valid) return fail(valid.error());
     try {
-        return searchOrThrow(query, set, options, context);
+        return Searcher(query, set, options, context).run();
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::kOutOfMemory,
                     "not enough memory to search " + std::to_string(set.size()) + " signatures");

@@ -22,23 +22,31 @@ struct SearchOptions {
 };
 
 struct SearchHit {
-    SignatureSet::EntryPtr entry;
+    std::int64_t id = 0;
     double score = 0.0;
 };
 
-struct SearchResult {
-    std::vector<SearchHit> hits;   ///< by falling score, equal scores by rising id
-    std::uint64_t candidates = 0;  ///< in the snapshot
-    std::uint64_t filtered = 0;    ///< of these, passed filter and exclusion
-    std::uint64_t scored = 0;      ///< of these, not ruled out by a bound: scored in full
+/// How many candidates each step of a search left to the next.
+struct SearchCounts {
+    std::uint64_t candidates = 0;       ///< in the snapshot
+    std::uint64_t filtered = 0;         ///< of these, passed filter and exclusion
+    std::uint64_t afterFirstHalf = 0;   ///< of these, not ruled out by the first half of their statistics
+    std::uint64_t afterStatistics = 0;  ///< nor by all statistics
+    std::uint64_t scored = 0;           ///< nor by their parts: scored in full
 };
 
-/// Visits candidates by falling upper bound and stops when no bound can reach the k-th
-/// score. Uses the calling thread's oneTBB arena. The counts may vary with the number of
-/// threads, the hits never do.
+struct SearchResult {
+    std::vector<SearchHit> hits;  ///< by falling score, equal scores by rising id
+    SearchCounts counts;
+};
+
+/// Climbs a ladder of bounds, from sums of differences of the statistics (256 bytes a shape) to the
+/// full score, each only for what the one before leaves; looks through a small share of the snapshot
+/// first, whose best scores then rule out most of the rest. Uses the calling thread's oneTBB arena.
+/// The counts may vary with the number of threads, the hits never do.
 ///
-/// Errors: kInvalidArgument (k, threshold, kernel width), kCancelled, kDeadlineExceeded,
-/// kOutOfMemory.
+/// Errors: kInvalidArgument (k, threshold, kernel width; a query of weighted points alone where
+/// signatures have attributes), kCancelled, kDeadlineExceeded, kOutOfMemory.
 [[nodiscard]] Result<SearchResult> topK(const Signature& query, const SignatureSet& set,
                                         const SearchOptions& options, const RunContext& context = {});
 

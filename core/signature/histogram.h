@@ -8,6 +8,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/signature/statistic_level.h"
+
 namespace shapedb {
 
 /// Where a value falls among n bins over [low, high]: `bin` gets 1 - share, bin + 1 gets share.
@@ -38,15 +40,11 @@ class Histogram {
         addInRow(row.bin + 1, column, weight * row.share);
     }
 
-    /// Square roots of the bins' shares of the sum, in steps of 1/255. All 0 when nothing was added.
-    void writeRoots(std::uint8_t* out) const {
+    /// Levels of the bins' shares of the sum. All 0 when nothing was added.
+    void writeLevels(std::uint8_t* out) const {
         double sum = 0.0;
         for (const double b : bins_) sum += b;
-        for (std::size_t i = 0; i < bins_.size(); ++i) out[i] = rootByte(sum > 0.0 ? bins_[i] / sum : 0.0);
-    }
-
-    static std::uint8_t rootByte(double share) {
-        return static_cast<std::uint8_t>(std::lround(255.0 * std::sqrt(std::clamp(share, 0.0, 1.0))));
+        for (std::size_t i = 0; i < bins_.size(); ++i) out[i] = levelOf(sum > 0.0 ? bins_[i] / sum : 0.0);
     }
 
   private:

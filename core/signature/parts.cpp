@@ -18,7 +18,15 @@ Eigen::Matrix3d covarianceOf(const SignaturePoint& point) {
     return m;
 }
 
+constexpr double kSmallestSize = -10.0;  // log2(kSmallestLength)
+static_assert(kSmallestLength == 1.0 / 1024.0, "kSmallestSize is its logarithm");
+
 float logLength(double length) { return static_cast<float>(std::log2(std::max(length, kSmallestLength))); }
+
+template <typename Integer>
+Integer nearest(double value, double low, double high) {
+    return static_cast<Integer>(std::lround(std::clamp(value, low, high)));
+}
 
 Point3 positionOf(const SignaturePoint& point) {
     return {point.position[0], point.position[1], point.position[2]};
@@ -47,7 +55,6 @@ Part partOf(const SignaturePoint& point, const Body& body) {
     Part part;
     const Point3 p = rotate(body.axes, positionOf(point) - body.centre);
     part.position = {static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)};
-    part.radius = static_cast<float>(length(p));
     part.share = point.volumeShare;
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covarianceOf(point), Eigen::EigenvaluesOnly);
     for (int axis = 0; axis < 3; ++axis) {
@@ -56,10 +63,45 @@ Part partOf(const SignaturePoint& point, const Body& body) {
     }
     // A flat tetrahedron may carry any radius: none larger than the shape means anything.
     part.size[3] = logLength(std::min(1.0, static_cast<double>(point.peakRadius)));
-    return part;
+    return unpacked(packed(part));
 }
 
 }  // namespace
+
+PackedPart packed(const Part& part) noexcept {
+    PackedPart result;
+    for (std::size_t i = 0; i < 3; ++i) {
+        result.position[i] = nearest<std::int16_t>(part.position[i] * kPositionSteps, -32767.0, 32767.0);
+    }
+    // Rounded down, so that the shares of a whole do not add up to more; a little room for the float.
+    result.share = nearest<std::uint16_t>(std::floor(part.share * kShareSteps + 0.01), 1.0, kShareSteps);
+    for (std::size_t i = 0; i < 4; ++i) {
+        result.size[i] = nearest<std::uint8_t>((part.size[i] - kSmallestSize) * kSizeSteps, 0.0, 255.0);
+    }
+    return result;
+}
+
+Part unpacked(const PackedPart& part) noexcept {
+    Part result;
+    for (std::size_t i = 0; i < 3; ++i) {
+        result.position[i] = static_cast<float>(part.position[i] / kPositionSteps);
+    }
+    result.radius =
+        static_cast<float>(length(Point3{result.position[0], result.position[1], result.position[2]}));
+    result.share = static_cast<float>(part.share / kShareSteps);
+    for (std::size_t i = 0; i < 4; ++i) {
+        result.size[i] = static_cast<float>(kSmallestSize + part.size[i] / kSizeSteps);
+    }
+    return result;
+}
+
+bool operator==(const PackedPart& a, const PackedPart& b) noexcept {
+    return a.position == b.position && a.share == b.share && a.size == b.size;
+}
+
+bool operator==(const Part& a, const Part& b) noexcept {
+    return a.position == b.position && a.share == b.share && a.size == b.size;
+}
 
 Body bodyOf(const std::vector<SignaturePoint>& points) {
     Body body;

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "core/geometry/motion.h"
@@ -13,7 +14,20 @@ namespace shapedb {
 
 struct SignaturePoint;
 
-/// One segment. Lengths in units of Signature::scale.
+/// One segment as it is kept: 12 bytes, and all that is scored of it.
+struct PackedPart {
+    std::array<std::int16_t, 3> position{};  ///< in steps of 1/kPositionSteps
+    std::uint16_t share = 1;                 ///< in steps of 1/kShareSteps, at least 1
+    std::array<std::uint8_t, 4> size{};      ///< in steps of 1/kSizeSteps octave above kSmallestLength
+};
+
+/// Finer than the noise of any scan by far.
+constexpr double kPositionSteps = 16384.0;
+constexpr double kShareSteps = 65535.0;
+constexpr double kSizeSteps = 24.0;  // up to 10.6 octaves: sizes are below 1
+
+/// One segment as it is compared. Lengths in units of Signature::scale. All numbers are multiples of
+/// the steps of a PackedPart, so that packing loses nothing.
 struct Part {
     std::array<float, 3> position{};  ///< centroid, in the body's frame
     float radius = 0.0f;              ///< distance from the body's centre: length of `position`
@@ -25,6 +39,14 @@ struct Part {
 
 /// Smaller lengths are below the noise of any scanner and count as this.
 constexpr double kSmallestLength = 1.0 / 1024.0;
+
+/// The nearest that can be kept; numbers out of range count as the nearest in range.
+[[nodiscard]] PackedPart packed(const Part& part) noexcept;
+/// packed(unpacked(p)) is p again, for a share of at least 1.
+[[nodiscard]] Part unpacked(const PackedPart& part) noexcept;
+
+[[nodiscard]] bool operator==(const PackedPart& a, const PackedPart& b) noexcept;
+[[nodiscard]] bool operator==(const Part& a, const Part& b) noexcept;
 
 /// The parts of a body and its frame: origin at the centroid of all parts, axes along the principal
 /// axes of their matter together, by falling spread, right-handed. The signs of the axes, and axes

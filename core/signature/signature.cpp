@@ -17,35 +17,25 @@ Result<void> validate(const SignatureOptions& options) {
                                                  "; it must be 1 to " + std::to_string(kMaxSignaturePoints));
 }
 
-namespace {
-
-bool samePartSizes(const Signature& a, const Signature& b) {
-    for (std::size_t i = 0; i < a.points.size(); ++i) {
-        const SignaturePoint& p = a.points[i];
-        const SignaturePoint& q = b.points[i];
-        if (p.peakRadius != q.peakRadius || p.covariance != q.covariance || p.volumeShare != q.volumeShare)
-            return false;
-    }
-    return true;
-}
-
-}  // namespace
-
 float volumeShareOf(float weight, double scale, double volume) noexcept {
     const double share = static_cast<double>(weight) * (scale * scale * scale) / volume;
     return static_cast<float>(std::min(1.0, share));
 }
 
 bool sameShape(const Signature& a, const Signature& b) noexcept {
+    if (a.attributes.has_value() != b.attributes.has_value()) return false;
+    if (a.attributes) {
+        return a.attributes->quality == b.attributes->quality &&
+               a.attributes->statistics == b.attributes->statistics &&
+               a.attributes->body.parts == b.attributes->body.parts;
+    }
     if (a.points.size() != b.points.size()) return false;
     for (std::size_t i = 0; i < a.points.size(); ++i) {
         const SignaturePoint& p = a.points[i];
         const SignaturePoint& q = b.points[i];
         if (p.position != q.position || p.weight != q.weight) return false;
     }
-    if (a.attributes.has_value() != b.attributes.has_value()) return false;
-    return !a.attributes || (a.attributes->statistics == b.attributes->statistics &&
-                             a.attributes->quality == b.attributes->quality && samePartSizes(a, b));
+    return true;
 }
 
 Point3 pointPosition(const Signature& signature, std::size_t i) {

@@ -11,8 +11,9 @@ namespace {
 
 // Persisted: never change. docs/signature-format.md describes every byte.
 constexpr char kMagic[4] = {'S', 'D', 'B', 'G'};
-constexpr std::uint16_t kPointsOnly = 1;      // version 1
-constexpr std::uint16_t kWithAttributes = 2;  // version 2: shares follow from weights; and the statistics
+constexpr std::uint16_t kPointsOnly = 1;  // version 1
+constexpr std::uint16_t kWithRoots = 2;   // version 2: shares follow from weights; and the statistics
+constexpr std::uint16_t kWithLevels = 3;  // version 3: the statistics as levels, two in a byte
 constexpr std::size_t kHeaderBytes = 52;
 constexpr std::size_t kChecksumBytes = 4;
 
@@ -26,8 +27,13 @@ struct Layout {
     }
 };
 constexpr Layout layoutOf(std::uint16_t version) {
-    return version == kWithAttributes ? Layout{44, kStatisticBins} : Layout{48, 0};
+    switch (version) {
+        case kWithRoots: return {44, kStatisticBins};
+        case kWithLevels: return {44, kStatisticBins / 2};
+        default: return {48, 0};
+    }
 }
+static_assert(kStatisticBins % 2 == 0, "two levels in a byte");
 constexpr std::size_t kLeastBytes = layoutOf(kPointsOnly).size(1);
 
 // No scan that `sanitise` accepts is larger or smaller (scan units): beyond, a motion between two
@@ -81,10 +87,6 @@ class Reader {
         at_ += sizeof(Unsigned);
         return value;
     }
-    void takeBytes(std::uint8_t* out, std::size_t count) {
-        std::memcpy(out, at_, count);
-        at_ += count;
-    }
     float takeFloat() {
         const auto bits = takeUnsigned<std::uint32_t>();
         float value = 0.0f;
@@ -107,7 +109,7 @@ SignaturePoint takePoint(Reader& reader, std::uint16_t version, const Signature&
     for (float& v : point.position) v = reader.takeFloat();
     point.weight = reader.takeFloat();
     point.volumeShare =
-        version == kWithAttributes ? volumeShareOf(point.weight, of.scale, of.volume) : reader.takeFloat();
+        version == kPointsOnly ? reader.takeFloat() : volumeShareOf(point.weight, of.scale, of.volume);
     point.peakRadius = reader.takeFloat();
     for (float& v : point.covariance) v = reader.takeFloat();
     return point;
@@ -140,7 +142,7 @@ Result<void> checkNumbers(const Signature& signature, std::uint16_t version) {
         if (!allFinite(p)) return malformed(name + " has a number that is not finite");
         if (!(p.weight > 0.0f)) return malformed(name + " has no positive weight");
         const double cube = signature.scale * signature.scale * signature.scale;
-        if (version == kWithAttributes && p.weight * cube > signature.volume * (1.0 + kShareRounding))
+        if (version != kPointsOnly && p.weight * cube > signature.volume * (1.0 + kShareRounding))
             return malformed(name + " outweighs the whole volume");
         if (!(p.volumeShare > 0.0f) || p.volumeShare > 1.0f)
             return malformed(name + " has a volume share outside (0, 1]");
@@ -154,11 +156,31 @@ Result<void> checkNumbers(const Signature& signature, std::uint16_t version) {
     return {};
 }
 
+void putStatistics(std::string& out, const ShapeStatistics& levels) {
+    for (std::size_t i = 0; i < levels.size(); i += 2) {
+        putUnsigned(out, static_cast<std::uint8_t>(levels[i] | (levels[i + 1] << 4)));
+    }
+}
+
+ShapeStatistics takeStatistics(Reader& reader, std::uint16_t version) {
+    ShapeStatistics levels;
+    for (std::size_t i = 0; i < levels.size();) {
+        const auto byte = reader.takeUnsigned<std::uint8_t>();
+        if (version == kWithRoots) {
+            levels[i++] = levelOfRootByte(byte);
+        } else {
+            levels[i++] = byte & 0x0fu;
+            levels[i++] = byte >> 4;
+        }
+    }
+    return levels;
+}
+
 }  // namespace
 
 std::string encodeSignature(const Signature& signature) {
     std::string out(kMagic, sizeof kMagic);
-    const std::uint16_t version = signature.attributes ? kWithAttributes : kPointsOnly;
+    const std::uint16_t version = signature.attributes ? kWithLevels : kPointsOnly;
     out.reserve(layoutOf(version).size(signature.points.size()));
     putUnsigned(out, version);
     putUnsigned(out, static_cast<std::uint16_t>(signature.points.size()));
@@ -175,9 +197,7 @@ std::string encodeSignature(const Signature& signature) {
         putFloat(out, point.peakRadius);
         for (const float v : point.covariance) putFloat(out, v);
     }
-    if (signature.attributes) {
-        for (const std::uint8_t bin : signature.attributes->statistics) putUnsigned(out, bin);
-    }
+    if (signature.attributes) putStatistics(out, signature.attributes->statistics);
     putUnsigned(out, crc32(out.data(), out.size()));
     return out;
 }
@@ -190,7 +210,7 @@ Result<Signature> decodeSignature(const std::string& bytes) {
         return malformed("it does not begin with SDBG");
     Reader reader(bytes.data() + sizeof kMagic);
     const auto version = reader.takeUnsigned<std::uint16_t>();
-    if (version != kPointsOnly && version != kWithAttributes)
+    if (version < kPointsOnly || version > kWithLevels)
         return malformed("version " + std::to_string(version) + " is unknown");
     const auto count = reader.takeUnsigned<std::uint16_t>();
     if (count < 1 || count > kMaxSignaturePoints)
@@ -204,7 +224,7 @@ Result<Signature> decodeSignature(const std::string& bytes) {
         return malformed("the checksum does not agree");
     }
     const auto quality = reader.takeUnsigned<std::uint32_t>();
-    if (quality > (version == kWithAttributes ? 255u : 0u)) return malformed("reserved bytes are in use");
+    if (quality > (version == kPointsOnly ? 0u : 255u)) return malformed("reserved bytes are in use");
     try {
         Signature signature;
         signature.scale = reader.takeDouble();
@@ -216,10 +236,10 @@ Result<Signature> decodeSignature(const std::string& bytes) {
             signature.points.push_back(takePoint(reader, version, signature));
         }
         if (auto valid = checkNumbers(signature, version); !valid) return fail(valid.error());
-        if (version == kWithAttributes) {
+        if (version != kPointsOnly) {
             ShapeAttributes& attributes = signature.attributes.emplace();
             attributes.quality = static_cast<std::uint8_t>(quality);
-            reader.takeBytes(attributes.statistics.data(), attributes.statistics.size());
+            attributes.statistics = takeStatistics(reader, version);
             attributes.body = bodyOf(signature.points);
         }
         return signature;

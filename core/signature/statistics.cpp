@@ -50,7 +50,7 @@ void thicknessByRadius(const InteriorView& view, std::uint8_t* out) {
         const double radius = length(view.centroids[t]) / view.meanRadius;
         histogram.add(thicknessBin(view, t), softBin(radius, 0.0, 2.2, kPlaceBins), view.volumes[t]);
     }
-    histogram.writeRoots(out);
+    histogram.writeLevels(out);
 }
 
 // Mean inner distance of each cell to the sources it is connected with, in units of the overall
@@ -77,7 +77,7 @@ void thicknessByCentrality(const InteriorView& view, const InnerDistances& inner
         const SoftBin place = softBin(central[inner.cellOfTetrahedron[t]], 0.4, 1.8, kPlaceBins);
         histogram.add(thicknessBin(view, t), place, view.volumes[t]);
     }
-    histogram.writeRoots(out);
+    histogram.writeLevels(out);
 }
 
 void bending(const InnerDistances& inner, std::uint8_t* out) {
@@ -90,7 +90,7 @@ void bending(const InnerDistances& inner, std::uint8_t* out) {
             histogram.add(softBin(straight, 0.0, 2.6, kBendingBins), inner.volumes[c]);
         }
     }
-    histogram.writeRoots(out);
+    histogram.writeLevels(out);
 }
 
 void surfaceDistances(const InteriorView& view, std::uint8_t* out) {
@@ -104,7 +104,7 @@ void surfaceDistances(const InteriorView& view, std::uint8_t* out) {
         const double d = distance(view.surface[a], view.surface[b]);
         histogram.add(softBin(d, 0.0, 1.0, kDistanceBins), 1.0);
     }
-    histogram.writeRoots(out);
+    histogram.writeLevels(out);
 }
 
 void chords(const InteriorView& view, std::uint8_t* out) {
@@ -120,7 +120,7 @@ void chords(const InteriorView& view, std::uint8_t* out) {
         histogram.add(softBin(d / view.meanSurfaceDistance, 0.0, 2.4, kChordLengths),
                       softBin(voxels.shareInside(a, b), 0.0, 1.0, kChordShares), 1.0);
     }
-    histogram.writeRoots(out);
+    histogram.writeLevels(out);
 }
 
 void spread(const InteriorView& view, std::uint8_t* out) {
@@ -129,7 +129,7 @@ void spread(const InteriorView& view, std::uint8_t* out) {
         histogram.add(softBin(s.middle, 0.0, 1.0, kSpreadMiddles),
                       softBin(s.shortest, 0.0, 0.8, kSpreadShortests), 1.0);
     }
-    histogram.writeRoots(out);
+    histogram.writeLevels(out);
 }
 
 // Octaves from the long axis of the outline: from a hair, 1/64 of the length, to the corners of a square.
@@ -140,7 +140,7 @@ void placesInOutline(const std::vector<OutlinePoint>& outline, std::uint8_t* out
         histogram.add(softBin(p[0], 0.0, 1.0, kOutlinePlaces), softBin(across, -6.0, -0.5, kOutlineWidths),
                       1.0);
     }
-    histogram.writeRoots(out);
+    histogram.writeLevels(out);
 }
 
 void distancesInOutline(const std::vector<OutlinePoint>& outline, std::uint8_t* out) {
@@ -151,12 +151,12 @@ void distancesInOutline(const std::vector<OutlinePoint>& outline, std::uint8_t* 
         const OutlinePoint& b = outline[random.below(outline.size())];
         histogram.add(softBin(std::hypot(a[0] - b[0], a[1] - b[1]), 0.0, 1.1, kOutlineDistances), 1.0);
     }
-    histogram.writeRoots(out);
+    histogram.writeLevels(out);
 }
 
 void harmonics(const PointCloud& points, const std::vector<double>& weights, std::uint8_t* out) {
     const ShellEnergies energies = shellHarmonics(points, weights);
-    for (std::size_t i = 0; i < energies.size(); ++i) out[i] = Histogram::rootByte(energies[i]);
+    for (std::size_t i = 0; i < energies.size(); ++i) out[i] = levelOf(energies[i]);
 }
 
 }  // namespace

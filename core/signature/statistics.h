@@ -10,6 +10,7 @@
 #include "core/base/error.h"
 #include "core/base/run_context.h"
 #include "core/signature/interior_view.h"
+#include "core/signature/statistic_level.h"
 
 namespace shapedb {
 
@@ -60,8 +61,9 @@ constexpr std::array<StatisticLayout, kStatisticKinds> kStatistics{{
 }};
 constexpr std::size_t kStatisticBins = 432;
 
-/// Each bin is the square root of its share of the whole, [0, 1], in steps of 1/255: differences
-/// of roots weigh a rare bin that is there or not like a small change of a full one (Hellinger).
+/// The level (0 to kTopLevel) of each bin, a step of the square root of its share of the whole:
+/// differences of roots weigh a rare bin that is there or not like a small change of a full one
+/// (Hellinger).
 using ShapeStatistics = std::array<std::uint8_t, kStatisticBins>;
 
 /// Deterministic. Errors: kCancelled, kDeadlineExceeded.

@@ -16,22 +16,17 @@ namespace {
 constexpr std::size_t kLoadBatch = 2'000;
 
 /// Empty when the signature is damaged; the damage is logged.
-SignatureSet::EntryPtr makeEntry(const store::Shape& shape, const std::string& bytes,
-                                 telemetry::Logger& log) {
+std::optional<IndexEntry> makeEntry(const store::Shape& shape, const std::string& bytes,
+                                    telemetry::Logger& log) {
     Result<Signature> signature = decodeSignature(bytes);
     if (!signature) {
         auto fields = telemetry::fieldsOf(signature.error());
         fields.push_back({"shape", shape.id});
         fields.push_back({"key", shape.key});
         log.error("stored signature is damaged: left out of searches until a rebuild", fields);
-        return nullptr;
+        return std::nullopt;
     }
-    auto entry = std::make_shared<IndexEntry>();
-    entry->id = shape.id;
-    entry->key = shape.key;
-    entry->metadata = shape.metadata;
-    entry->signature = std::move(*signature);
-    return entry;
+    return IndexEntry{shape.id, shape.metadata, std::move(*signature)};
 }
 
 Result<ShapeParameters> parametersOf(const store::Collection& collection) {
@@ -97,20 +92,21 @@ Result<SnapshotPtr> CollectionIndex::read(const store::Collection& collection,
     if (!parameters) return fail(parameters.error());
     snapshot->parameters = *parameters;
 
-    std::vector<SignatureSet::EntryPtr> entries;
     std::int64_t afterId = 0;
     for (;;) {
         if (const auto go = context.checkpoint(); !go) return fail(go.error());
         const auto rows = store_.loadIndex(collection.id, afterId, kLoadBatch);
         if (!rows) return fail(rows.error());
+        std::vector<IndexEntry> entries;
+        entries.reserve(rows->size());
         for (const store::IndexRow& row : *rows) {
             if (auto entry = makeEntry(row.shape, row.signature.bytes, *log_))
-                entries.push_back(std::move(entry));
+                entries.push_back(std::move(*entry));
         }
+        snapshot->signatures = snapshot->signatures.with(entries, {});
         if (rows->size() < kLoadBatch) break;
         afterId = rows->back().shape.id;
     }
-    snapshot->signatures = SignatureSet().with(std::move(entries), {});
     return SnapshotPtr(std::move(snapshot));
 }
 
@@ -214,7 +210,7 @@ Result<void> CollectionIndex::applyDirty(Slot& slot) {
 
     const bool wasStale = std::exchange(slot.stale, true);  // until all is applied
     const SnapshotPtr before = slot.current();
-    std::vector<SignatureSet::EntryPtr> updates;
+    std::vector<IndexEntry> updates;
     std::vector<std::int64_t> removed;
     for (const std::int64_t id : ids) {
         const auto shape = store_.getShapeById(id);
@@ -224,15 +220,15 @@ Result<void> CollectionIndex::applyDirty(Slot& slot) {
         }
         // Of another generation: a switch is being completed, and its reload brings this shape.
         if (row && row->generation != before->collection.generation) continue;
-        SignatureSet::EntryPtr entry = row ? makeEntry(*shape, row->bytes, *log_) : nullptr;
+        auto entry = row ? makeEntry(*shape, row->bytes, *log_) : std::nullopt;
         if (entry) {
-            updates.push_back(std::move(entry));
+            updates.push_back(std::move(*entry));
         } else {
             removed.push_back(id);
         }
     }
     auto next = std::make_shared<Snapshot>(*before);
-    next->signatures = before->signatures.with(std::move(updates), std::move(removed));
+    next->signatures = before->signatures.with(updates, std::move(removed));
     slot.publish(std::move(next));
     slot.stale = wasStale;
     return {};

@@ -68,12 +68,7 @@ void toProto(const Error& failure, pb::Failure* out) {
     out->set_message(failure.message);
 }
 
-std::optional<double> qualityOf(const Signature& signature) {
-    if (!signature.attributes) return std::nullopt;
-    return signature.attributes->quality / 255.0;
-}
-
-void toProto(const store::Shape& shape, const std::string& collection, const SignatureSet::EntryPtr& entry,
+void toProto(const store::Shape& shape, const std::string& collection, std::optional<double> quality,
              pb::Shape* out) {
     out->set_collection(collection);
     out->set_key(shape.key);
@@ -86,7 +81,6 @@ void toProto(const store::Shape& shape, const std::string& collection, const Sig
     toProto(shape.createdAt, out->mutable_created());
     toProto(shape.updatedAt, out->mutable_updated());
     if (shape.failure) toProto(*shape.failure, out->mutable_failure());
-    const auto quality = entry ? qualityOf(entry->signature) : std::nullopt;
     if (quality) out->set_quality(*quality);
 }
 
@@ -120,8 +114,7 @@ void toProto(const ShapeAttributes& attributes, pb::ShapeAttributes* out) {
         statistic->set_name(layout.name);
         statistic->set_of_interior(layout.ground == Ground::kInside);
         for (std::size_t i = layout.offset; i < std::size_t{layout.offset} + layout.count; ++i) {
-            const float root = static_cast<float>(attributes.statistics[i]) / 255.0f;
-            statistic->add_shares(root * root);
+            statistic->add_shares(static_cast<float>(shareOfLevel(attributes.statistics[i])));
         }
     }
 }

@@ -19,8 +19,8 @@ namespace shapedb::rpc {
 
 namespace pb = shapedb::v1;
 
-/// `entry` is the signature that serves, null when there is none.
-void toProto(const store::Shape& shape, const std::string& collection, const SignatureSet::EntryPtr& entry,
+/// `quality` is that of the signature that serves, if there is one and it says.
+void toProto(const store::Shape& shape, const std::string& collection, std::optional<double> quality,
              pb::Shape* out);
 [[nodiscard]] pb::ShapeState toProto(store::ShapeState state);
 void toProto(const Error& failure, pb::Failure* out);
@@ -29,9 +29,6 @@ void toProto(const Signature& signature, pb::Signature* out);
 void toProto(const Segmentation& segmentation, pb::SegmentationReport* out);
 void toProto(const Explanation& explanation, pb::Explanation* out);
 void toProto(store::TimestampMs time, google::protobuf::Timestamp* out);
-
-/// How well the interior behind a signature could be told; empty when it has no attributes.
-[[nodiscard]] std::optional<double> qualityOf(const Signature& signature);
 
 /// Empty for UNSPECIFIED. Errors: kInvalidArgument (a number without a name).
 [[nodiscard]] Result<std::optional<store::ShapeState>> fromProto(pb::ShapeState state);

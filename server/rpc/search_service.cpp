@@ -42,6 +42,17 @@ Result<Prepared> prepare(const Services& services, Call& call, const pb::SearchO
     return prepared;
 }
 
+/// Leaves the explanation out where what was scored has been replaced meanwhile.
+Result<void> explainHit(const Services& services, const Prepared& prepared, const Signature& query,
+                        const SearchHit& hit, pb::Hit* out) {
+    const auto signature = storedSignature(services, *prepared.collection, hit.id);
+    if (!signature && signature.error().code == ErrorCode::kDataLoss) return fail(signature.error());
+    if (!signature) return {};
+    const Explanation explanation = explain(query, *signature, prepared.options.score);
+    if (explanation.score == hit.score) toProto(explanation, out->mutable_explanation());
+    return {};
+}
+
 /// Searches and fills `response`; `room` is what the whole answer may still grow by, bytes.
 Result<void> search(const Services& services, const Call& call, const Prepared& prepared,
                     const Signature& query, std::size_t& room, pb::SearchResponse* response) {
@@ -49,22 +60,24 @@ Result<void> search(const Services& services, const Call& call, const Prepared& 
     const auto found =
         services.searches.run(query, prepared.collection->signatures, prepared.options, call.run());
     if (!found) return fail(found.error());
-    response->set_candidates(found->candidates);
-    response->set_filtered(found->filtered);
-    response->set_scored(found->scored);
+    response->set_candidates(found->counts.candidates);
+    response->set_filtered(found->counts.filtered);
+    response->set_scored(found->counts.scored);
     toProto(query, response->mutable_query());
     if (response->query().has_attributes()) {
         response->mutable_query()->mutable_attributes()->clear_statistics();
     }
     for (const SearchHit& hit : found->hits) {
-        const auto shape = services.store.getShapeById(hit.entry->id);
+        const auto shape = services.store.getShapeById(hit.id);
         if (!shape && shape.error().code == ErrorCode::kNotFound) continue;  // deleted meanwhile
         if (!shape) return fail(shape.error());
         pb::Hit* out = response->add_hits();
-        toProto(*shape, prepared.collection->collection.name, hit.entry, out->mutable_shape());
+        toProto(*shape, prepared.collection->collection.name,
+                qualityIn(prepared.collection->signatures, hit.id), out->mutable_shape());
         out->set_score(hit.score);
         if (prepared.explain) {
-            toProto(explain(query, hit.entry->signature, prepared.options.score), out->mutable_explanation());
+            const auto explained = explainHit(services, prepared, query, hit, out);
+            if (!explained) return explained;
         }
         const std::size_t bytes = out->ByteSizeLong();
         if (bytes > room) {
@@ -81,7 +94,7 @@ Result<void> search(const Services& services, const Call& call, const Prepared& 
 
 /// A stored shape as a query.
 struct StoredQuery {
-    SignatureSet::EntryPtr entry;
+    Signature signature;
     std::int64_t id = 0;
 };
 
@@ -93,9 +106,9 @@ Result<StoredQuery> storedQuery(const Services& services, const Prepared& prepar
                                               prepared.collection->collection.name + "'");
     }
     if (!shape) return fail(shape.error());
-    auto entry = findSignature({prepared.collection, *shape});
-    if (!entry) return fail(entry.error());
-    return StoredQuery{*entry, shape->id};
+    auto signature = findSignature(services, {prepared.collection, *shape});
+    if (!signature) return fail(signature.error());
+    return StoredQuery{std::move(*signature), shape->id};
 }
 
 Result<void> searchOne(const Services& services, const Call& call, const Prepared& prepared,
@@ -107,7 +120,7 @@ Result<void> searchOne(const Services& services, const Call& call, const Prepare
             if (!stored) return fail(stored.error());
             Prepared without = prepared;
             without.options.excludeId = stored->id;
-            return search(services, call, without, stored->entry->signature, room, response);
+            return search(services, call, without, stored->signature, room, response);
         }
         case v1::SearchBatchRequest::Query::kSignature: {
             const auto signature = decodeSignature(query.signature());
@@ -132,7 +145,7 @@ grpc::Status SearchServiceHandler::SearchByKey(grpc::ServerContext* context,
         if (!stored) return fail(stored.error());
         if (!request->include_self()) prepared->options.excludeId = stored->id;
         std::size_t room = kMaxAnswerBytes;
-        return search(services_, call, *prepared, stored->entry->signature, room, response);
+        return search(services_, call, *prepared, stored->signature, room, response);
     });
 }
 
@@ -211,12 +224,13 @@ grpc::Status SearchServiceHandler::Compare(grpc::ServerContext* context, const v
         const pb::ShapeRef* refs[2] = {&request->query(), &request->other()};
         for (int i = 0; i < 2; ++i) {
             const auto found = findShape(services_, call, *refs[i]);
-            const auto entry =
-                found ? findSignature(*found) : Result<SignatureSet::EntryPtr>(fail(found.error()));
-            if (!entry) {
-                return fail(entry.error().code, (i == 0 ? "query: " : "other: ") + entry.error().message);
+            auto signature =
+                found ? findSignature(services_, *found) : Result<Signature>(fail(found.error()));
+            if (!signature) {
+                return fail(signature.error().code,
+                            (i == 0 ? "query: " : "other: ") + signature.error().message);
             }
-            signatures[i] = (*entry)->signature;
+            signatures[i] = std::move(*signature);
         }
         ScoreOptions options;
         options.reflection = !request->forbid_reflection();

@@ -1,5 +1,6 @@
 #include "server/rpc/shape_lookup.h"
 
+#include "core/signature/signature_codec.h"
 #include "server/rpc/limits.h"
 #include "server/rpc/request_checks.h"
 
@@ -19,8 +20,10 @@ Result<FoundShape> findShape(const Services& services, Call& call, const pb::Sha
     return FoundShape{*collection, *shape};
 }
 
-Result<SignatureSet::EntryPtr> findSignature(const FoundShape& found) {
-    if (auto entry = found.collection->signatures.find(found.shape.id)) return entry;
+Result<Signature> findSignature(const Services& services, const FoundShape& found) {
+    if (found.collection->signatures.find(found.shape.id)) {
+        return storedSignature(services, *found.collection, found.shape.id);
+    }
     const std::string name = "shape '" + found.shape.key + "' has no signature";
     if (found.shape.failure) {
         return fail(ErrorCode::kNotReady, name + ": it cannot be segmented: " + found.shape.failure->message);
@@ -28,9 +31,31 @@ Result<SignatureSet::EntryPtr> findSignature(const FoundShape& found) {
     return fail(ErrorCode::kNotReady, name + " yet: wait until it is READY (WatchIngest)");
 }
 
-SignatureSet::EntryPtr servingSignature(const Services& services, const store::Shape& shape) {
+Result<Signature> storedSignature(const Services& services, const index::Snapshot& searched,
+                                  std::int64_t shapeId) {
+    const auto row = services.store.getSignature(shapeId);
+    if (!row) return fail(row.error());
+    if (row->generation != searched.collection.generation) {
+        return fail(ErrorCode::kNotReady, "a rebuild of collection '" + searched.collection.name +
+                                              "' is being put in place: try again");
+    }
+    auto signature = decodeSignature(row->bytes);
+    if (!signature) {
+        return fail(ErrorCode::kDataLoss, "the signature of shape " + std::to_string(shapeId) +
+                                              " is damaged: " + signature.error().message);
+    }
+    return signature;
+}
+
+std::optional<double> qualityIn(const SignatureSet& signatures, std::int64_t shapeId) {
+    const SignatureSet::Place place = signatures.find(shapeId);
+    if (!place || !place.block->attributed(place.row)) return std::nullopt;
+    return place.block->quality(place.row) / 255.0;
+}
+
+std::optional<double> servingQuality(const Services& services, const store::Shape& shape) {
     const auto collection = services.index.byId(shape.collectionId);
-    return collection ? (*collection)->signatures.find(shape.id) : nullptr;
+    return collection ? qualityIn((*collection)->signatures, shape.id) : std::nullopt;
 }
 
 Result<store::Shape> followIngest(

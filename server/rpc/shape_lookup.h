@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "core/base/error.h"
@@ -21,11 +22,19 @@ struct FoundShape {
 /// Errors: kNotFound (collection or key, named), kInvalidArgument (key).
 [[nodiscard]] Result<FoundShape> findShape(const Services& services, Call& call, const pb::ShapeRef& ref);
 
-/// The cached signature of a shape. Errors: kNotReady, saying whether it is pending or why it failed.
-[[nodiscard]] Result<SignatureSet::EntryPtr> findSignature(const FoundShape& found);
+/// The stored signature of a shape that searches of its collection find. Errors: kNotReady, saying
+/// whether it is pending, why it failed or that a rebuild is being put in place; kDataLoss.
+[[nodiscard]] Result<Signature> findSignature(const Services& services, const FoundShape& found);
 
-/// The signature that serves a shape now; null when there is none.
-[[nodiscard]] SignatureSet::EntryPtr servingSignature(const Services& services, const store::Shape& shape);
+/// The stored signature behind a hit: what the index searched leaves out. Errors: kNotFound, kNotReady
+/// (also: of another generation than `searched`), kDataLoss.
+[[nodiscard]] Result<Signature> storedSignature(const Services& services, const index::Snapshot& searched,
+                                                std::int64_t shapeId);
+
+/// How well the interior of a shape that searches find could be told, [0, 1]; empty when there is no
+/// such shape or its profile does not say.
+[[nodiscard]] std::optional<double> servingQuality(const Services& services, const store::Shape& shape);
+[[nodiscard]] std::optional<double> qualityIn(const SignatureSet& signatures, std::int64_t shapeId);
 
 /// Follows a shape until it is no longer pending, and when it is ready searches find it; calls `onChange`
 /// with its row and where the work stands, at once and after each change. Returns the final row. Errors:

@@ -168,7 +168,7 @@ Result<void> ShapeServiceHandler::addShape(Call& call, grpc::ServerReader<v1::Ad
         put.shape = *settled;
     }
     response.set_outcome(outcomeOf(put.outcome));
-    toProto(put.shape, collectionName, servingSignature(services_, put.shape), response.mutable_shape());
+    toProto(put.shape, collectionName, servingQuality(services_, put.shape), response.mutable_shape());
     return {};
 }
 
@@ -178,7 +178,7 @@ grpc::Status ShapeServiceHandler::GetShape(grpc::ServerContext* context, const v
         const auto found = findShape(services_, call, request->shape());
         if (!found) return fail(found.error());
         toProto(found->shape, found->collection->collection.name,
-                found->collection->signatures.find(found->shape.id), response->mutable_shape());
+                qualityIn(found->collection->signatures, found->shape.id), response->mutable_shape());
         return {};
     });
 }
@@ -206,7 +206,7 @@ grpc::Status ShapeServiceHandler::ListShapes(grpc::ServerContext* context,
         for (; sent < std::min(pageSize, shapes->size()) && bytes < kMaxPageBytes; ++sent) {
             pb::Shape* shape = response->add_shapes();
             toProto((*shapes)[sent], (*collection)->collection.name,
-                    (*collection)->signatures.find((*shapes)[sent].id), shape);
+                    qualityIn((*collection)->signatures, (*shapes)[sent].id), shape);
             bytes += shape->ByteSizeLong();
         }
         if (sent < shapes->size()) response->set_next_cursor(encodeCursor(listing, (*shapes)[sent - 1].id));
@@ -250,7 +250,7 @@ grpc::Status ShapeServiceHandler::DeleteShape(grpc::ServerContext* context,
         if (const auto refreshed = services_.index.refresh(shape->collectionId, shape->id); !refreshed) {
             services_.log->error("deleted shape is still searched", telemetry::fieldsOf(refreshed.error()));
         }
-        toProto(*shape, (*collection)->collection.name, (*collection)->signatures.find(shape->id),
+        toProto(*shape, (*collection)->collection.name, qualityIn((*collection)->signatures, shape->id),
                 response->mutable_shape());
         return {};
     });
@@ -275,9 +275,7 @@ grpc::Status ShapeServiceHandler::WatchIngest(grpc::ServerContext* context,
             }
             if (shape.failure) toProto(*shape.failure, event.mutable_failure());
             if (shape.state == store::ShapeState::kReady) {
-                const auto entry = servingSignature(services_, shape);
-                const auto quality = entry ? qualityOf(entry->signature) : std::nullopt;
-                if (quality) event.set_quality(*quality);
+                if (const auto quality = servingQuality(services_, shape)) event.set_quality(*quality);
             }
             const std::string text = event.SerializeAsString();
             if (text == last) return {};
@@ -297,9 +295,9 @@ grpc::Status ShapeServiceHandler::GetSignature(grpc::ServerContext* context,
     return handle(services_, context, "GetSignature", [&](Call& call) -> Result<void> {
         const auto found = findShape(services_, call, request->shape());
         if (!found) return fail(found.error());
-        const auto entry = findSignature(*found);
-        if (!entry) return fail(entry.error());
-        toProto((*entry)->signature, response->mutable_signature());
+        const auto signature = findSignature(services_, *found);
+        if (!signature) return fail(signature.error());
+        toProto(*signature, response->mutable_signature());
         return {};
     });
 }

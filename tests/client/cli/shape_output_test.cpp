@@ -196,13 +196,13 @@ TEST(ShapeOutput, ASignatureMadeHereIsToldAsTheServerWould) {
     EXPECT_FALSE(toClient(signature).attributes.has_value());
     signature.attributes.emplace();
     signature.attributes->quality = 51;
-    signature.attributes->statistics[0] = 255;
+    signature.attributes->statistics[0] = 15;
     const client::Signature told = toClient(signature);
     ASSERT_TRUE(told.attributes.has_value());
     EXPECT_NEAR(told.attributes->quality, 0.2, 1e-12);
     ASSERT_EQ(told.attributes->statistics.size(), kStatistics.size());
     EXPECT_EQ(told.attributes->statistics[0].name, "chords");
-    EXPECT_EQ(told.attributes->statistics[0].shares[0], 1.0f);
+    EXPECT_EQ(told.attributes->statistics[0].shares[0], 0.5f);
     EXPECT_EQ(told.attributes->statistics[0].shares[1], 0.0f);
 }
 

@@ -47,7 +47,7 @@ Signature randomAttributed(Random& random, std::size_t maxPoints) {
     ShapeAttributes& attributes = signature.attributes.emplace();
     attributes.quality = static_cast<std::uint8_t>(random.below(4) == 0 ? 255 : random.below(256));
     for (std::uint8_t& bin : attributes.statistics) {
-        bin = random.below(2) == 0 ? 0 : static_cast<std::uint8_t>(random.below(120));
+        bin = random.below(2) == 0 ? 0 : static_cast<std::uint8_t>(random.below(8));
     }
     updateBody(signature);
     return signature;
@@ -75,7 +75,7 @@ Signature disturbedAttributed(Signature signature, Random& random, double noise)
         p.volumeShare *= static_cast<float>(sharesBefore / sharesAfter);
     }
     for (std::uint8_t& bin : signature.attributes->statistics) {
-        if (bin > 0) bin = byteNear(bin + 200.0 * noise * random.normal());
+        if (bin > 0) bin = std::min(kTopLevel, byteNear(bin + 12.0 * noise * random.normal()));
     }
     signature.attributes->quality = byteNear(signature.attributes->quality + 200.0 * noise * random.normal());
     updateBody(signature);

@@ -16,7 +16,7 @@ namespace {
 constexpr std::size_t kMembers = 4;
 
 struct Library {
-    std::vector<std::string> labels;  // of id i + 1
+    std::vector<IndexEntry> entries;  // of id i + 1
     SignatureSet set;
 };
 
@@ -37,37 +37,36 @@ const std::vector<std::string>& families() {
 
 Library makeLibrary() {
     Library library;
-    std::vector<SignatureSet::EntryPtr> entries;
     for (const std::string& family : families()) {
         for (std::size_t member = 0; member < kMembers; ++member) {
-            auto entry = std::make_shared<IndexEntry>();
-            entry->id = static_cast<std::int64_t>(entries.size()) + 1;
-            entry->metadata["label"] = family;
-            entry->signature = scanned(family, member, 100 + entries.size());
-            library.labels.push_back(family);
-            entries.push_back(std::move(entry));
+            IndexEntry entry;
+            entry.id = static_cast<std::int64_t>(library.entries.size()) + 1;
+            entry.metadata["label"] = family;
+            entry.signature = scanned(family, member, 100 + library.entries.size());
+            library.entries.push_back(std::move(entry));
         }
     }
-    library.set = SignatureSet().with(std::move(entries), {});
+    library.set = SignatureSet().with(library.entries, {});
     return library;
 }
 
 TEST(Retrieval, FindsItselfFirstAndItsFamilyMostly) {
     const Library library = makeLibrary();
     std::size_t right = 0;
-    for (const auto& entry : *library.set.blocks().front()) {
+    for (const IndexEntry& entry : library.entries) {
         SearchOptions options;
         options.k = 3;
-        const auto self = topK(entry->signature, library.set, options);
+        const auto self = topK(entry.signature, library.set, options);
         ASSERT_TRUE(self);
-        EXPECT_EQ(self->hits.front().entry, entry);
+        EXPECT_EQ(self->hits.front().id, entry.id);
         EXPECT_EQ(self->hits.front().score, 1.0);
 
-        options.excludeId = entry->id;
-        const auto others = topK(entry->signature, library.set, options);
+        options.excludeId = entry.id;
+        const auto others = topK(entry.signature, library.set, options);
         ASSERT_TRUE(others);
-        EXPECT_NE(others->hits.front().entry, entry);
-        right += others->hits.front().entry->metadata.at("label") == entry->metadata.at("label") ? 1u : 0u;
+        EXPECT_NE(others->hits.front().id, entry.id);
+        const auto nearest = static_cast<std::size_t>(others->hits.front().id - 1);
+        right += library.entries[nearest].metadata.at("label") == entry.metadata.at("label") ? 1u : 0u;
     }
     const double nearest = static_cast<double>(right) / static_cast<double>(library.set.size());
     std::cout << "nearest neighbour of the same family: " << nearest << " of " << library.set.size()
@@ -84,7 +83,7 @@ TEST(Retrieval, FindsTheShapeOfANewScan) {
             const Signature query = scanned(families()[f], member, 900 + queries);
             const auto result = topK(query, library.set, {});
             ASSERT_TRUE(result);
-            first += result->hits.front().entry->id == static_cast<std::int64_t>(queries) + 1 ? 1u : 0u;
+            first += result->hits.front().id == static_cast<std::int64_t>(queries) + 1 ? 1u : 0u;
             ++queries;
         }
     }
@@ -96,24 +95,20 @@ TEST(Retrieval, FindsTheShapeOfANewScan) {
 // The default profile does better than the paper's on the same task.
 TEST(Retrieval, DefaultProfileFindsTheShapeOfANewScan) {
     const auto& scans = testing_support::scannedFamilies(2, 2);
-    std::vector<SignatureSet::EntryPtr> entries;
+    std::vector<IndexEntry> entries;
     for (std::size_t i = 0; i < scans.size(); i += 2) {
-        auto entry = std::make_shared<IndexEntry>();
-        entry->id = static_cast<std::int64_t>(i);
-        entry->metadata["label"] = scans[i].family;
-        entry->signature = scans[i].signature;
-        entries.push_back(std::move(entry));
+        entries.push_back({static_cast<std::int64_t>(i), {}, scans[i].signature});
     }
-    const SignatureSet set = SignatureSet().with(std::move(entries), {});
+    const SignatureSet set = SignatureSet().with(entries, {});
     std::size_t shape = 0;
     std::size_t family = 0;
     std::size_t queries = 0;
     for (std::size_t i = 1; i < scans.size(); i += 2) {
         const auto result = topK(scans[i].signature, set, {});
         ASSERT_TRUE(result);
-        const auto& nearest = *result->hits.front().entry;
-        shape += nearest.id == static_cast<std::int64_t>(i) - 1 ? 1u : 0u;
-        family += nearest.metadata.at("label") == scans[i].family ? 1u : 0u;
+        const auto nearest = static_cast<std::size_t>(result->hits.front().id);
+        shape += nearest == i - 1 ? 1u : 0u;
+        family += scans[nearest].family == scans[i].family ? 1u : 0u;
         ++queries;
     }
     const double all = static_cast<double>(queries);

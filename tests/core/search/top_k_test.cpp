@@ -20,19 +20,27 @@ using testing_support::randomSignature;
 
 bool sameBits(double x, double y) { return std::memcmp(&x, &y, sizeof x) == 0; }
 
-SignatureSet::EntryPtr entryOf(std::int64_t id, Signature signature) {
-    auto entry = std::make_shared<IndexEntry>();
-    entry->id = id;
-    entry->key = "shape-" + std::to_string(id);
-    entry->metadata["third"] = std::to_string(id % 3);
-    if (id % 5 == 0) entry->metadata["fifth"] = "yes";
-    entry->signature = std::move(signature);
+IndexEntry entryOf(std::int64_t id, Signature signature) {
+    IndexEntry entry;
+    entry.id = id;
+    entry.metadata["third"] = std::to_string(id % 3);
+    if (id % 5 == 0) entry.metadata["fifth"] = "yes";
+    entry.signature = std::move(signature);
     return entry;
 }
 
+// What was put into a set, in full: the plain reference scores these.
+struct Library {
+    std::vector<IndexEntry> entries;
+    SignatureSet set;
+
+    explicit Library(std::vector<IndexEntry> all)
+        : entries(std::move(all)), set(SignatureSet().with(entries, {})) {}
+};
+
 // Random shapes, near copies of the query, and the same signature under several ids.
-SignatureSet randomSet(Random& random, const Signature& query, std::size_t count) {
-    std::vector<SignatureSet::EntryPtr> entries;
+Library randomLibrary(Random& random, const Signature& query, std::size_t count) {
+    std::vector<IndexEntry> entries;
     std::vector<Signature> before = {query};
     for (std::size_t i = 0; i < count; ++i) {
         Signature signature;
@@ -44,23 +52,21 @@ SignatureSet randomSet(Random& random, const Signature& query, std::size_t count
         before.push_back(signature);
         entries.push_back(entryOf(static_cast<std::int64_t>(7 * i + 1 + random.below(7)), signature));
     }
-    return SignatureSet().with(entries, {});
+    return Library(std::move(entries));
 }
 
 // Scores everything and sorts.
-std::vector<SearchHit> bruteForce(const Signature& query, const SignatureSet& set,
+std::vector<SearchHit> bruteForce(const Signature& query, const Library& library,
                                   const SearchOptions& options) {
     std::vector<SearchHit> hits;
-    for (const auto& block : set.blocks()) {
-        for (const auto& entry : *block) {
-            if (options.excludeId && *options.excludeId == entry->id) continue;
-            if (!options.filter.matches(entry->metadata)) continue;
-            const double value = score(query, entry->signature, options.score);
-            if (value >= options.threshold) hits.push_back({entry, value});
-        }
+    for (const IndexEntry& entry : library.entries) {
+        if (options.excludeId && *options.excludeId == entry.id) continue;
+        if (!options.filter.matches(entry.metadata)) continue;
+        const double value = score(query, entry.signature, options.score);
+        if (value >= options.threshold) hits.push_back({entry.id, value});
     }
     std::stable_sort(hits.begin(), hits.end(), [](const SearchHit& a, const SearchHit& b) {
-        return a.score > b.score || (a.score == b.score && a.entry->id < b.entry->id);
+        return a.score > b.score || (a.score == b.score && a.id < b.id);
     });
     if (hits.size() > options.k) hits.resize(options.k);
     return hits;
@@ -69,14 +75,15 @@ std::vector<SearchHit> bruteForce(const Signature& query, const SignatureSet& se
 void expectSameHits(const std::vector<SearchHit>& hits, const std::vector<SearchHit>& expected) {
     ASSERT_EQ(hits.size(), expected.size());
     for (std::size_t i = 0; i < hits.size(); ++i) {
-        ASSERT_EQ(hits[i].entry, expected[i].entry) << "rank " << i;
+        ASSERT_EQ(hits[i].id, expected[i].id) << "rank " << i;
         ASSERT_TRUE(sameBits(hits[i].score, expected[i].score)) << "rank " << i;
     }
 }
 
-SearchOptions randomOptions(Random& random, const SignatureSet& set) {
+SearchOptions randomOptions(Random& random, const Library& library) {
     SearchOptions options;
-    const std::vector<std::size_t> ks = {1, 2, 3, 10, 31, 32, 33, set.size(), set.size() + 1};
+    const std::vector<std::size_t> ks = {
+        1, 2, 3, 10, 31, 32, 33, library.entries.size(), library.entries.size() + 1};
     options.k = std::max<std::size_t>(1, ks[random.below(ks.size())]);
     const std::vector<double> thresholds = {0.0, 0.0, 0.0, 0.3, 0.9, 1.0, random.uniform()};
     options.threshold = thresholds[random.below(thresholds.size())];
@@ -85,35 +92,39 @@ SearchOptions randomOptions(Random& random, const SignatureSet& set) {
     options.score.reflection = random.below(2) == 0;
     options.score.keepScale = random.below(4) == 0;
     if (random.below(3) == 0) options.score.kernelWidth = random.uniform(0.01, 0.5);
-    if (random.below(3) == 0 && set.size() > 0) {
-        const auto& block = *set.blocks()[random.below(set.blocks().size())];
-        options.excludeId = block[random.below(block.size())]->id;
+    if (random.below(3) == 0 && !library.entries.empty()) {
+        options.excludeId = library.entries[random.below(library.entries.size())].id;
     }
     return options;
+}
+
+// Hits as brute force has them, and counts that make sense.
+void expectExact(const Signature& query, const Library& library, const SearchOptions& options) {
+    const auto result = topK(query, library.set, options);
+    ASSERT_TRUE(result) << result.error().message;
+    expectSameHits(result->hits, bruteForce(query, library, options));
+    std::uint64_t passing = 0;
+    for (const IndexEntry& entry : library.entries) {
+        const bool excluded = options.excludeId && *options.excludeId == entry.id;
+        passing += !excluded && options.filter.matches(entry.metadata) ? 1u : 0u;
+    }
+    const SearchCounts& counts = result->counts;
+    EXPECT_EQ(counts.candidates, library.entries.size());
+    EXPECT_EQ(counts.filtered, passing);
+    EXPECT_LE(counts.afterFirstHalf, passing);
+    EXPECT_LE(counts.afterStatistics, counts.afterFirstHalf);
+    EXPECT_LE(counts.scored, counts.afterStatistics);
+    EXPECT_GE(counts.scored, result->hits.size());
 }
 
 TEST(TopK, EqualsBruteForceBitForBit) {
     Random random(1);
     for (int round = 0; round < 400; ++round) {
         const Signature query = randomSignature(random, 7);
-        const SignatureSet set = randomSet(random, query, random.below(round % 20 == 0 ? 1500 : 150));
-        const SearchOptions options = randomOptions(random, set);
-        const auto result = topK(query, set, options);
-        ASSERT_TRUE(result) << result.error().message;
-        expectSameHits(result->hits, bruteForce(query, set, options));
-        if (HasFatalFailure()) FAIL() << "round " << round << " k " << options.k << " of " << set.size();
-
-        std::uint64_t passing = 0;
-        for (const auto& block : set.blocks()) {
-            for (const auto& entry : *block) {
-                const bool excluded = options.excludeId && *options.excludeId == entry->id;
-                passing += !excluded && options.filter.matches(entry->metadata) ? 1u : 0u;
-            }
-        }
-        EXPECT_EQ(result->candidates, set.size());
-        EXPECT_EQ(result->filtered, passing);
-        EXPECT_LE(result->scored, passing);
-        EXPECT_GE(result->scored, result->hits.size());
+        const Library library = randomLibrary(random, query, random.below(round % 20 == 0 ? 9000 : 150));
+        const SearchOptions options = randomOptions(random, library);
+        expectExact(query, library, options);
+        if (HasFatalFailure()) FAIL() << "round " << round << " k " << options.k;
     }
 }
 
@@ -121,7 +132,7 @@ TEST(TopK, EqualsBruteForceBitForBit) {
 TEST(TopK, EqualsBruteForceOnScansBitForBit) {
     const auto& scans = testing_support::scannedFamilies(1, 1);
     Random random(10);
-    std::vector<SignatureSet::EntryPtr> entries;
+    std::vector<IndexEntry> entries;
     std::int64_t id = 1;
     for (const auto& scan : scans) {
         entries.push_back(entryOf(id++, scan.signature));
@@ -134,24 +145,54 @@ TEST(TopK, EqualsBruteForceOnScansBitForBit) {
         plain.attributes.reset();
         entries.push_back(entryOf(id++, plain));
     }
-    const SignatureSet set = SignatureSet().with(entries, {});
+    const Library library(std::move(entries));
     for (int round = 0; round < 150; ++round) {
-        SearchOptions options = randomOptions(random, set);
+        SearchOptions options = randomOptions(random, library);
         options.score.partial = round % 4 == 0;
         Signature query = scans[random.below(scans.size())].signature;
         if (round % 3 == 0) query = testing_support::disturbedAttributed(query, random, 0.02);
-        if (round % 10 == 0) query.attributes.reset();
-        const auto result = topK(query, set, options);
-        ASSERT_TRUE(result) << result.error().message;
-        expectSameHits(result->hits, bruteForce(query, set, options));
-        if (HasFatalFailure()) FAIL() << "round " << round << " k " << options.k << " of " << set.size();
+        expectExact(query, library, options);
+        if (HasFatalFailure()) FAIL() << "round " << round << " k " << options.k;
     }
+}
+
+// Of several slices, each of which is ruled out by the best of those before.
+TEST(TopK, EqualsBruteForceOnManyBlocksBitForBit) {
+    const auto& scans = testing_support::scannedFamilies(1, 1);
+    Random random(12);
+    std::vector<IndexEntry> entries;
+    for (std::int64_t id = 1; id <= 9000; ++id) {
+        const Signature& base = scans[random.below(scans.size())].signature;
+        entries.push_back(
+            entryOf(id, testing_support::disturbedAttributed(base, random, random.uniform(0, 0.1))));
+        entries.back().signature.scale = std::exp(random.normal());
+    }
+    const Library library(std::move(entries));
+    for (int round = 0; round < 24; ++round) {
+        SearchOptions options = randomOptions(random, library);
+        options.k = std::min<std::size_t>(options.k, 40);
+        options.score.partial = round % 6 == 5;
+        expectExact(library.entries[random.below(library.entries.size())].signature, library, options);
+        if (HasFatalFailure()) FAIL() << "round " << round << " k " << options.k;
+    }
+}
+
+// A search cannot compare what a signature does not have.
+TEST(TopK, RefusesPointsAloneWhereSignaturesHaveAttributes) {
+    const auto& scans = testing_support::scannedFamilies(1, 1);
+    const Library library({entryOf(1, scans[0].signature)});
+    Signature query = scans[0].signature;
+    query.attributes.reset();
+    const auto result = topK(query, library.set, {});
+    ASSERT_FALSE(result);
+    EXPECT_EQ(result.error().code, ErrorCode::kInvalidArgument);
+    EXPECT_NE(result.error().message.find("attributes"), std::string::npos) << result.error().message;
 }
 
 TEST(TopK, RulesMostScansOutWithoutAligning) {
     const auto& scans = testing_support::scannedFamilies(1, 1);
     Random random(11);
-    std::vector<SignatureSet::EntryPtr> entries;
+    std::vector<IndexEntry> entries;
     for (std::int64_t id = 1; id <= 1300; ++id) {
         const auto& scan = scans[static_cast<std::size_t>(id) % scans.size()];
         entries.push_back(entryOf(id, testing_support::disturbedAttributed(scan.signature, random, 0.02)));
@@ -163,7 +204,7 @@ TEST(TopK, RulesMostScansOutWithoutAligning) {
     for (const auto& scan : scans) {
         const auto result = topK(scan.signature, set, options);
         ASSERT_TRUE(result);
-        scored += result->scored;
+        scored += result->counts.scored;
     }
     EXPECT_LT(scored / scans.size(), set.size() / 4);
 }
@@ -172,7 +213,7 @@ TEST(TopK, BreaksTiesByIdAtEveryK) {
     Random random(2);
     const Signature query = randomSignature(random, testing_support::Kind::kPlain, 7);
     const Signature other = disturbed(query, random, 0.05);
-    std::vector<SignatureSet::EntryPtr> entries;
+    std::vector<IndexEntry> entries;
     // More ties than a chunk, the copies of the query under the highest ids.
     for (std::int64_t id = 1; id <= 300; ++id) entries.push_back(entryOf(id, id > 200 ? query : other));
     const SignatureSet set = SignatureSet().with(entries, {});
@@ -183,7 +224,7 @@ TEST(TopK, BreaksTiesByIdAtEveryK) {
         ASSERT_TRUE(result);
         ASSERT_EQ(result->hits.size(), std::min<std::size_t>(k, 300));
         for (std::size_t i = 0; i < result->hits.size(); ++i) {
-            ASSERT_EQ(result->hits[i].entry->id, static_cast<std::int64_t>(i < 100 ? 201 + i : i - 99));
+            ASSERT_EQ(result->hits[i].id, static_cast<std::int64_t>(i < 100 ? 201 + i : i - 99));
             ASSERT_EQ(result->hits[i].score == 1.0, i < 100);
         }
     }
@@ -193,8 +234,9 @@ TEST(TopK, IsTheSameOnAnyNumberOfThreads) {
     Random random(3);
     for (int round = 0; round < 15; ++round) {
         const Signature query = randomSignature(random, 7);
-        const SignatureSet set = randomSet(random, query, 3000);
-        const SearchOptions options = randomOptions(random, set);
+        const Library library = randomLibrary(random, query, 3000);
+        const SignatureSet& set = library.set;
+        const SearchOptions options = randomOptions(random, library);
         const auto expected = topK(query, set, options);
         ASSERT_TRUE(expected);
         for (const int threads : {1, 2, 3, 8}) {
@@ -211,7 +253,7 @@ TEST(TopK, IsTheSameOnAnyNumberOfThreads) {
 TEST(TopK, RulesMostOutWithoutScoring) {
     Random random(4);
     const Signature query = randomSignature(random, testing_support::Kind::kPlain, 7);
-    std::vector<SignatureSet::EntryPtr> entries;
+    std::vector<IndexEntry> entries;
     for (std::int64_t id = 1; id <= 5000; ++id) {
         entries.push_back(entryOf(id, id == 4321
                                           ? disturbed(query, random, 0.01)
@@ -221,8 +263,8 @@ TEST(TopK, RulesMostOutWithoutScoring) {
     options.k = 1;
     const auto result = topK(query, SignatureSet().with(entries, {}), options);
     ASSERT_TRUE(result);
-    EXPECT_EQ(result->hits.front().entry->id, 4321);
-    EXPECT_LT(result->scored, 500u);
+    EXPECT_EQ(result->hits.front().id, 4321);
+    EXPECT_LT(result->counts.scored, 500u);
 }
 
 TEST(TopK, OfAnEmptySetIsEmpty) {
@@ -230,15 +272,16 @@ TEST(TopK, OfAnEmptySetIsEmpty) {
     const auto result = topK(randomSignature(random), SignatureSet(), {});
     ASSERT_TRUE(result);
     EXPECT_TRUE(result->hits.empty());
-    EXPECT_EQ(result->candidates, 0u);
-    EXPECT_EQ(result->filtered, 0u);
-    EXPECT_EQ(result->scored, 0u);
+    EXPECT_EQ(result->counts.candidates, 0u);
+    EXPECT_EQ(result->counts.filtered, 0u);
+    EXPECT_EQ(result->counts.scored, 0u);
 }
 
 TEST(TopK, RefusesOptionsOutOfRange) {
     Random random(6);
     const Signature query = randomSignature(random);
-    const SignatureSet set = randomSet(random, query, 10);
+    const Library library = randomLibrary(random, query, 10);
+    const SignatureSet& set = library.set;
     const auto refused = [&](const SearchOptions& options, const char* word) {
         const auto result = topK(query, set, options);
         ASSERT_FALSE(result) << word;
@@ -265,7 +308,8 @@ TEST(TopK, RefusesOptionsOutOfRange) {
 TEST(TopK, StopsWhenAsked) {
     Random random(7);
     const Signature query = randomSignature(random, testing_support::Kind::kPlain, 7);
-    const SignatureSet set = randomSet(random, query, 2000);
+    const Library library = randomLibrary(random, query, 2000);
+    const SignatureSet& set = library.set;
     SearchOptions options;
     options.k = 2000;
 
@@ -310,7 +354,7 @@ TEST(TopK, StopsInTheMiddleOfAChunk) {
         return s;
     };
     const Signature query = heavy();
-    std::vector<SignatureSet::EntryPtr> entries;
+    std::vector<IndexEntry> entries;
     for (std::int64_t id = 1; id <= 64; ++id) entries.push_back(entryOf(id, heavy()));
     const SignatureSet set = SignatureSet().with(entries, {});
     SearchOptions options;
@@ -348,7 +392,7 @@ TEST(TopK, ReportsAnExceptionOfTheCallerAsAnError) {
     const Signature query = randomSignature(random);
     RunContext context;
     context.progress = [](const char*, std::uint64_t, std::uint64_t) { throw std::runtime_error("no room"); };
-    const auto result = topK(query, randomSet(random, query, 10), {}, context);
+    const auto result = topK(query, randomLibrary(random, query, 10).set, {}, context);
     ASSERT_FALSE(result);
     EXPECT_EQ(result.error().code, ErrorCode::kInternal);
     EXPECT_NE(result.error().message.find("no room"), std::string::npos);

@@ -59,7 +59,7 @@ std::vector<double> differences(const Signature& a, const Signature& b) {
                 const auto bin = [&](const Signature& s, int r) {
                     return s.attributes
                                ->statistics[static_cast<std::size_t>(layout.offset + r * columns + column)] /
-                           255.0;
+                           15.0;
                 };
                 straight += std::abs(bin(a, row) - bin(b, row));
                 reversed += std::abs(bin(a, row) - bin(b, rows - 1 - row));
@@ -197,9 +197,11 @@ TEST(AttributesInvariance, SameShapeComparesAttributes) {
     };
     differs([](Signature& s) { s.attributes->statistics[351] ^= 1; });
     differs([](Signature& s) { s.attributes->quality ^= 1; });
-    differs([](Signature& s) { s.points.back().peakRadius *= 1.01f; });
-    differs([](Signature& s) { s.points.back().covariance[4] += 0.01f; });
-    differs([](Signature& s) { s.points.back().volumeShare *= 0.99f; });
+    differs([](Signature& s) { s.attributes->body.parts.back().size[3] += 1.0f / 24.0f; });
+    differs([](Signature& s) { s.attributes->body.parts.back().size[0] -= 1.0f / 24.0f; });
+    differs([](Signature& s) { s.attributes->body.parts.front().position[1] += 1.0f / 16384.0f; });
+    differs([](Signature& s) { s.attributes->body.parts.back().share *= 0.99f; });
+    differs([](Signature& s) { s.attributes->body.parts.pop_back(); });
 }
 
 }  // namespace

@@ -149,12 +149,15 @@ double triangle(double value, double low, double high, std::size_t count, std::s
     return std::max(0.0, 1.0 - std::abs(within - centre) / width);
 }
 
-std::vector<std::uint8_t> rootsOf(const std::vector<double>& sums) {
+std::vector<std::uint8_t> levelsOf(const std::vector<double>& sums) {
     double whole = 0.0;
     for (const double s : sums) whole += s;
     std::vector<std::uint8_t> bytes;
     for (const double s : sums) {
-        bytes.push_back(static_cast<std::uint8_t>(std::floor(255.0 * std::sqrt(s / whole) + 0.5)));
+        // By way of the nearest of 255 steps of the root, then the nearest of 15 up to the root of a half.
+        const double root = std::floor(255.0 * std::sqrt(s / whole) + 0.5) / 255.0;
+        bytes.push_back(
+            static_cast<std::uint8_t>(std::min(15.0, std::floor(15.0 * std::sqrt(2.0) * root + 0.5))));
     }
     return bytes;
 }

@@ -29,7 +29,7 @@ InteriorView viewOfCubes(const std::vector<Cube>& cubes, double side);
 double triangle(double value, double low, double high, std::size_t count, std::size_t bin);
 
 /// The bytes of a histogram of these sums: roots of their shares of the whole.
-std::vector<std::uint8_t> rootsOf(const std::vector<double>& sums);
+std::vector<std::uint8_t> levelsOf(const std::vector<double>& sums);
 
 /// Barycentric coordinates of p in tetrahedron t of the view.
 std::array<double, 4> barycentric(const InteriorView& view, std::size_t t, const Point3& p);

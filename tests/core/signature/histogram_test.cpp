@@ -10,7 +10,7 @@
 namespace shapedb {
 namespace {
 
-using testing_support::rootsOf;
+using testing_support::levelsOf;
 using testing_support::triangle;
 
 TEST(SoftBin, SharesAValueBetweenTheTwoNearestBins) {
@@ -49,15 +49,15 @@ TEST(Histogram, OfNothingIsAllZero) {
     const Histogram none(3, 4);
     std::uint8_t bytes[12];
     for (std::uint8_t& b : bytes) b = 99;
-    none.writeRoots(bytes);
+    none.writeLevels(bytes);
     for (const std::uint8_t b : bytes) EXPECT_EQ(b, 0);
     Histogram weightless(1, 4);
     weightless.add(softBin(0.3, 0.0, 1.0, 4), 0.0);
-    weightless.writeRoots(bytes);
+    weightless.writeLevels(bytes);
     for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(bytes[i], 0);
 }
 
-TEST(Histogram, WritesRootsOfShares) {
+TEST(Histogram, WritesLevelsOfShares) {
     Random random(2);
     constexpr std::size_t kRows = 3;
     constexpr std::size_t kColumns = 5;
@@ -76,12 +76,23 @@ TEST(Histogram, WritesRootsOfShares) {
         }
     }
     std::vector<std::uint8_t> bytes(kRows * kColumns);
-    histogram.writeRoots(bytes.data());
-    EXPECT_EQ(bytes, rootsOf(sums));
-    EXPECT_EQ(Histogram::rootByte(1.0), 255);
-    EXPECT_EQ(Histogram::rootByte(0.25), 128);
-    EXPECT_EQ(Histogram::rootByte(-1.0), 0);
-    EXPECT_EQ(Histogram::rootByte(7.0), 255);
+    histogram.writeLevels(bytes.data());
+    EXPECT_EQ(bytes, levelsOf(sums));
+}
+
+TEST(Levels, StandForShares) {
+    EXPECT_EQ(levelOf(-1.0), 0);
+    EXPECT_EQ(levelOf(0.0), 0);
+    EXPECT_EQ(levelOf(0.25), 11);  // 10.6
+    EXPECT_EQ(levelOf(0.5), 15);
+    EXPECT_EQ(levelOf(1.0), 15);
+    EXPECT_EQ(levelOf(7.0), 15);
+    EXPECT_EQ(shareOfLevel(0), 0.0);
+    EXPECT_NEAR(shareOfLevel(15), 0.5, 1e-12);
+    for (std::uint8_t level = 0; level <= kTopLevel; ++level) EXPECT_EQ(levelOf(shareOfLevel(level)), level);
+    for (int root = 0; root < 256; ++root) {
+        EXPECT_EQ(levelOfRootByte(static_cast<std::uint8_t>(root)), levelOf(root / 255.0 * (root / 255.0)));
+    }
 }
 
 }  // namespace

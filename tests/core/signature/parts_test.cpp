@@ -34,6 +34,9 @@ std::vector<SignaturePoint> randomPoints(Random& random, std::size_t count) {
     return points;
 }
 
+// Positions are kept in steps of 1/16384: off by half of one in each of three directions.
+constexpr double kHalfStep = 0.9 / 16384.0;
+
 Point3 at(const std::array<float, 3>& p) { return {p[0], p[1], p[2]}; }
 
 TEST(Parts, FrameIsRightHandedAndCentred) {
@@ -49,13 +52,14 @@ TEST(Parts, FrameIsRightHandedAndCentred) {
             total += points[i].weight;
             centre = centre + static_cast<double>(points[i].weight) * at(body.parts[i].position);
         }
-        EXPECT_LT(length((1.0 / total) * centre), 1e-7) << "the origin is the centroid of all matter";
+        EXPECT_LT(length((1.0 / total) * centre), kHalfStep) << "the origin is the centroid of all matter";
         for (std::size_t i = 0; i < points.size(); ++i) {
             const Part& part = body.parts[i];
             const Point3 expected = rotate(body.axes, at(points[i].position) - body.centre);
-            EXPECT_LT(distance(at(part.position), expected), 1e-6);
-            EXPECT_NEAR(part.radius, length(expected), 1e-6);
-            EXPECT_EQ(part.share, points[i].volumeShare);
+            EXPECT_LT(distance(at(part.position), expected), kHalfStep);
+            EXPECT_NEAR(part.radius, length(expected), kHalfStep);
+            EXPECT_LE(part.share, points[i].volumeShare + 1e-7);
+            EXPECT_GT(part.share, points[i].volumeShare - 1.001 / 65535.0);
         }
     }
 }
@@ -86,10 +90,10 @@ TEST(Parts, FrameLiesAlongThePrincipalAxes) {
                 }
             }
         }
-        EXPECT_GE(moments[0][0], moments[1][1] - 1e-7 * total);
-        EXPECT_GE(moments[1][1], moments[2][2] - 1e-7 * total);
+        EXPECT_GE(moments[0][0], moments[1][1] - 1e-4 * total);
+        EXPECT_GE(moments[1][1], moments[2][2] - 1e-4 * total);
         for (std::size_t i = 0; i < 3; ++i) {
-            for (std::size_t j = 0; j < i; ++j) EXPECT_LT(std::abs(moments[i][j]), 1e-6 * total);
+            for (std::size_t j = 0; j < i; ++j) EXPECT_LT(std::abs(moments[i][j]), 1e-4 * total);
         }
     }
 }

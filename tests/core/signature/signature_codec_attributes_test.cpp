@@ -1,4 +1,4 @@
-// Version 2 of the format: signatures with attributes.
+// Versions 2 and 3 of the format: signatures with attributes.
 #include <cmath>
 #include <cstdint>
 #include <string>
@@ -24,7 +24,7 @@ Signature onePoint() {
     ShapeAttributes& attributes = signature.attributes.emplace();
     attributes.quality = 200;
     for (std::size_t i = 0; i < kStatisticBins; ++i) {
-        attributes.statistics[i] = static_cast<std::uint8_t>(7 * i + 3);
+        attributes.statistics[i] = (7 * i + 3) % 16;
     }
     attributes.body = bodyOf(signature.points);
     return signature;
@@ -48,7 +48,7 @@ Signature randomAttributed(Random& random, std::size_t count) {
     }
     ShapeAttributes& attributes = signature.attributes.emplace();
     attributes.quality = static_cast<std::uint8_t>(random.below(256));
-    for (std::uint8_t& bin : attributes.statistics) bin = static_cast<std::uint8_t>(random.below(256));
+    for (std::uint8_t& bin : attributes.statistics) bin = static_cast<std::uint8_t>(random.below(16));
     attributes.body = bodyOf(signature.points);
     return signature;
 }
@@ -87,31 +87,53 @@ void expectSameBody(const Body& a, const Body& b) {
 }
 
 // What is stored today must be readable for ever: these bytes never change.
-TEST(SignatureCodecAttributes, GoldenBytes) {
-    const std::string head =
-        "53444247"          // SDBG
-        "0200"              // version 2
-        "0100"              // one point
-        "c8000000"          // quality 200
-        "0000000000000440"  // scale 2.5
-        "000000000000f03f"
-        "00000000000000c0"
-        "000000000000c03f"          // origin 1, -2, 0.125
-        "0000000000000e40"          // volume 3.75
-        "000000000000000000000000"  // position
-        "0000003e0000803e"          // weight, peak radius; the share follows from the weight
-        "0ad7233c00000000000000000ad7a33c000000008fc2f53c";
-    std::string golden;
+std::string goldenHead(const std::string& version) {
+    const std::string head = "53444247" +  // SDBG
+                             version +
+                             "0100"              // one point
+                             "c8000000"          // quality 200
+                             "0000000000000440"  // scale 2.5
+                             "000000000000f03f"
+                             "00000000000000c0"
+                             "000000000000c03f"          // origin 1, -2, 0.125
+                             "0000000000000e40"          // volume 3.75
+                             "000000000000000000000000"  // position
+                             "0000003e0000803e"  // weight, peak radius; the share follows from the weight
+                             "0ad7233c00000000000000000ad7a33c000000008fc2f53c";
+    std::string bytes;
     for (std::size_t i = 0; i < head.size(); i += 2) {
-        golden.push_back(static_cast<char>(std::stoi(head.substr(i, 2), nullptr, 16)));
+        bytes.push_back(static_cast<char>(std::stoi(head.substr(i, 2), nullptr, 16)));
     }
-    for (int i = 0; i < 432; ++i) golden.push_back(static_cast<char>((7 * i + 3) % 256));
-    for (const int byte : {0x7a, 0x99, 0x93, 0xff}) golden.push_back(static_cast<char>(byte));
+    return bytes;
+}
+
+TEST(SignatureCodecAttributes, GoldenBytes) {
+    std::string golden = goldenHead("0300");
+    for (int i = 0; i < 432; i += 2) {
+        golden.push_back(static_cast<char>((7 * i + 3) % 16 + 16 * ((7 * (i + 1) + 3) % 16)));
+    }
+    for (const int byte : {0x4c, 0x15, 0xed, 0xb2}) golden.push_back(static_cast<char>(byte));
     EXPECT_EQ(encodeSignature(onePoint()), golden);
     const auto decoded = decodeSignature(golden);
     ASSERT_TRUE(decoded) << decoded.error().message;
+    EXPECT_TRUE(sameShape(*decoded, onePoint()));
     EXPECT_EQ(decoded->attributes->quality, 200);
-    EXPECT_EQ(decoded->attributes->statistics[431], (7 * 431 + 3) % 256);
+    EXPECT_FLOAT_EQ(decoded->points[0].volumeShare, 0.5208333f);
+}
+
+// Version 2 kept roots in 255 steps: they are read as the levels a signature made today has.
+TEST(SignatureCodecAttributes, GoldenBytesOfVersion2) {
+    std::string golden = goldenHead("0200");
+    for (int i = 0; i < 432; ++i) golden.push_back(static_cast<char>((7 * i + 3) % 256));
+    for (const int byte : {0x7a, 0x99, 0x93, 0xff}) golden.push_back(static_cast<char>(byte));
+    const auto decoded = decodeSignature(golden);
+    ASSERT_TRUE(decoded) << decoded.error().message;
+    EXPECT_EQ(decoded->attributes->quality, 200);
+    EXPECT_EQ(decoded->attributes->statistics[0], 0);    // 3/255
+    EXPECT_EQ(decoded->attributes->statistics[5], 3);    // 38/255: 3.16
+    EXPECT_EQ(decoded->attributes->statistics[17], 10);  // 122/255: 10.15
+    EXPECT_EQ(decoded->attributes->statistics[36], 15);  // 255/255
+    EXPECT_EQ(encodeSignature(*decoded)[4], 3) << "and written anew in version 3";
     EXPECT_FLOAT_EQ(decoded->points[0].volumeShare, 0.5208333f);
 }
 
@@ -120,7 +142,7 @@ TEST(SignatureCodecAttributes, DecodeIsTheInverse) {
     for (std::size_t count = 1; count <= kMaxSignaturePoints; ++count) {
         const Signature signature = randomAttributed(random, count);
         const std::string bytes = encodeSignature(signature);
-        EXPECT_EQ(bytes.size(), 56U + 44U * count + 432U);
+        EXPECT_EQ(bytes.size(), 56U + 44U * count + 216U);
         const auto decoded = decodeSignature(bytes);
         ASSERT_TRUE(decoded) << decoded.error().message;
         ASSERT_TRUE(decoded->attributes);
@@ -159,7 +181,7 @@ TEST(SignatureCodecAttributes, DamageIsNoticed) {
 }
 
 TEST(SignatureCodecAttributes, HeaderIsChecked) {
-    const std::string bytes = encodeSignature(onePoint());
+    const std::string bytes = encodeSignature(onePoint());  // version 3
     const auto changed = [&](std::size_t at, int value) {
         std::string other = bytes;
         other[at] = static_cast<char>(value);
@@ -173,12 +195,14 @@ TEST(SignatureCodecAttributes, HeaderIsChecked) {
     }
     for (const std::size_t at : {9U, 10U, 11U}) expectMalformed(changed(at, 1), "reserved");
     expectMalformed(changed(4, 1), "do not fit");
-    expectMalformed(changed(4, 3), "version 3 is unknown");
+    expectMalformed(changed(4, 2), "do not fit");
+    expectMalformed(changed(4, 4), "version 4 is unknown");
+    expectMalformed(changed(4, 0), "version 0 is unknown");
     expectMalformed(changed(5, 2), "unknown");
     expectMalformed(changed(6, 0), "0 points");
     expectMalformed(changed(6, 2), "do not fit");
     expectMalformed(changed(6, 17), "17 points");
-    // 432 bytes of statistics are not nine points of version 1.
+    // 216 bytes of statistics are not points of version 1.
     for (int count = 2; count <= 16; ++count) expectMalformed(changed(6, count), "do not fit");
 }
 

@@ -23,13 +23,16 @@ namespace {
 
 using testing_support::block;
 using testing_support::horseshoe;
-using testing_support::rootsOf;
+using testing_support::levelsOf;
 using testing_support::together;
 using testing_support::triangle;
 using testing_support::viewOfCubes;
 
 constexpr std::size_t kPlaces = 10;
 constexpr std::size_t kThicknesses = 6;
+
+// What rounding to a level can take from a share of up to a tenth or so.
+constexpr double kHalfALevel = 0.02;
 
 std::vector<std::uint8_t> binsOf(const ShapeStatistics& statistics, Statistic which) {
     const StatisticLayout& layout = kStatistics[static_cast<std::size_t>(which)];
@@ -47,7 +50,7 @@ std::vector<double> sharesOf(const ShapeStatistics& statistics, Statistic which)
     std::vector<double> shares;
     double sum = 0.0;
     for (const std::uint8_t b : binsOf(statistics, which)) {
-        shares.push_back(b / 255.0 * (b / 255.0));
+        shares.push_back(shareOfLevel(b));
         sum += shares.back();
     }
     for (double& s : shares) s /= sum;
@@ -98,7 +101,7 @@ TEST(Statistics, ThicknessByRadiusIsItsDefinition) {
         }
         const auto statistics = shapeStatistics(view);
         ASSERT_TRUE(statistics);
-        expectBins(binsOf(*statistics, Statistic::kThicknessByRadius), rootsOf(sums), "thickness by radius");
+        expectBins(binsOf(*statistics, Statistic::kThicknessByRadius), levelsOf(sums), "thickness by radius");
     }
 }
 
@@ -128,7 +131,7 @@ TEST(Statistics, ThicknessByCentralityIsItsDefinition) {
         }
         const auto statistics = shapeStatistics(view);
         ASSERT_TRUE(statistics);
-        expectBins(binsOf(*statistics, Statistic::kThicknessByCentrality), rootsOf(sums),
+        expectBins(binsOf(*statistics, Statistic::kThicknessByCentrality), levelsOf(sums),
                    "thickness by centrality");
     }
 }
@@ -148,7 +151,7 @@ TEST(Statistics, BendingIsItsDefinition) {
         }
         const auto statistics = shapeStatistics(view);
         ASSERT_TRUE(statistics);
-        expectBins(binsOf(*statistics, Statistic::kBending), rootsOf(sums), "bending");
+        expectBins(binsOf(*statistics, Statistic::kBending), levelsOf(sums), "bending");
     }
 }
 
@@ -164,17 +167,19 @@ TEST(Statistics, SurfaceDistancesAndHarmonicsAreTheirDefinitions) {
                 for (std::size_t bin = 0; bin < 32; ++bin) sums[bin] += triangle(d, 0.0, 1.0, 32, bin);
             }
         }
-        // Of all pairs, kPairs draws: a root strays by less than 1/255 from draw to draw.
+        // Of all pairs, kPairs draws: a level strays by one at most.
         const auto drawn = binsOf(*statistics, Statistic::kSurfaceDistances);
-        const auto all = rootsOf(sums);
+        const auto all = levelsOf(sums);
         for (std::size_t bin = 0; bin < drawn.size(); ++bin) {
-            EXPECT_NEAR(static_cast<double>(drawn[bin]), static_cast<double>(all[bin]), 2.5) << bin;
+            EXPECT_NEAR(static_cast<double>(drawn[bin]), static_cast<double>(all[bin]), 1.0) << bin;
         }
 
         const auto harmonics = [](const PointCloud& points, const std::vector<double>& weights) {
             std::vector<std::uint8_t> bytes;
             for (const double e : shellHarmonics(points, weights)) {
-                bytes.push_back(static_cast<std::uint8_t>(std::floor(255.0 * std::sqrt(e) + 0.5)));
+                const double root = std::floor(255.0 * std::sqrt(e) + 0.5) / 255.0;
+                bytes.push_back(static_cast<std::uint8_t>(
+                    std::min(15.0, std::floor(15.0 * std::sqrt(2.0) * root + 0.5))));
             }
             return bytes;
         };
@@ -195,7 +200,7 @@ TEST(Statistics, SpreadAndFootprintAreTheirDefinitions) {
                     triangle(s.middle, 0.0, 1.0, 5, bin / 4) * triangle(s.shortest, 0.0, 0.8, 4, bin % 4);
             }
         }
-        expectBins(binsOf(*statistics, Statistic::kSpread), rootsOf(spreads), "spread");
+        expectBins(binsOf(*statistics, Statistic::kSpread), levelsOf(spreads), "spread");
 
         const std::vector<OutlinePoint> outline = footprint(view.surface);
         std::vector<double> places(10 * 4, 0.0);
@@ -211,9 +216,9 @@ TEST(Statistics, SpreadAndFootprintAreTheirDefinitions) {
                 for (std::size_t bin = 0; bin < 20; ++bin) distances[bin] += triangle(d, 0.0, 1.1, 20, bin);
             }
         }
-        expectBins(binsOf(*statistics, Statistic::kFootprint), rootsOf(places), "footprint");
+        expectBins(binsOf(*statistics, Statistic::kFootprint), levelsOf(places), "footprint");
         const auto drawn = binsOf(*statistics, Statistic::kFootprintDistances);
-        const auto all = rootsOf(distances);
+        const auto all = levelsOf(distances);
         for (std::size_t bin = 0; bin < drawn.size(); ++bin) {
             EXPECT_NEAR(static_cast<double>(drawn[bin]), static_cast<double>(all[bin]), 3.0) << bin;
         }
@@ -241,7 +246,7 @@ TEST(Statistics, ChordsAreAsLongAsAllPairsOfSurfacePoints) {
         for (std::size_t row = 0; row < 12; ++row) {
             double share = 0.0;
             for (std::size_t column = 0; column < 4; ++column) share += shares[4 * row + column];
-            EXPECT_NEAR(share, expected[row] / pairs, 0.012) << "length " << row;
+            EXPECT_NEAR(share, expected[row] / pairs, kHalfALevel) << "length " << row;
         }
     }
 }
@@ -273,7 +278,8 @@ TEST(Statistics, ABallIsAsThickAsItsRadiusEverywhere) {
     // 1/sqrt(3) = 18.5 bins, nothing beyond.
     const auto d2 = sharesOf(ofScan(makeSphere().solid), Statistic::kSurfaceDistances);
     for (std::size_t bin = 1; bin < 17; ++bin) {
-        EXPECT_NEAR(d2[bin], 2.0 * (static_cast<double>(bin) + 0.5) * 3.0 / (32.0 * 32.0), 0.008) << bin;
+        EXPECT_NEAR(d2[bin], 2.0 * (static_cast<double>(bin) + 0.5) * 3.0 / (32.0 * 32.0), kHalfALevel)
+            << bin;
     }
     for (std::size_t bin = 21; bin < 32; ++bin) EXPECT_LT(d2[bin], 0.005) << bin;
 }

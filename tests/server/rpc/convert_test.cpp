@@ -129,7 +129,7 @@ TEST(Shapes, AllFieldsArrive) {
     shape.updatedAt = 2'000;
     shape.failure = Error{ErrorCode::kNoInterior, "why"};
     pb::Shape message;
-    toProto(shape, "parts", nullptr, &message);
+    toProto(shape, "parts", std::nullopt, &message);
     EXPECT_FALSE(message.has_quality());
     EXPECT_EQ(message.collection(), "parts");
     EXPECT_EQ(message.id(), 5);
@@ -147,13 +147,11 @@ TEST(Shapes, AllFieldsArrive) {
 }
 
 TEST(Shapes, QualityIsThatOfTheServingSignature) {
-    auto entry = std::make_shared<IndexEntry>();
     pb::Shape plain;
-    toProto(store::Shape(), "parts", entry, &plain);
+    toProto(store::Shape(), "parts", std::nullopt, &plain);
     EXPECT_FALSE(plain.has_quality()) << "a signature without attributes does not judge";
-    entry->signature.attributes.emplace().quality = 51;
     pb::Shape judged;
-    toProto(store::Shape(), "parts", entry, &judged);
+    toProto(store::Shape(), "parts", 0.2, &judged);
     EXPECT_NEAR(judged.quality(), 0.2, 1e-12);
 }
 
@@ -208,7 +206,7 @@ TEST(Signatures, AreInScanUnits) {
 TEST(Signatures, AttributesAreSharesByName) {
     ShapeAttributes attributes;
     attributes.quality = 255;
-    for (std::size_t i = 0; i < kStatisticBins; ++i) attributes.statistics[i] = static_cast<std::uint8_t>(i);
+    for (std::size_t i = 0; i < kStatisticBins; ++i) attributes.statistics[i] = i % 16;
     Signature signature;
     signature.points.resize(1);
     signature.attributes = attributes;
@@ -223,8 +221,8 @@ TEST(Signatures, AttributesAreSharesByName) {
         EXPECT_EQ(statistic.name(), kStatistics[s].name);
         EXPECT_EQ(statistic.of_interior(), kStatistics[s].ground == Ground::kInside);
         for (const float share : statistic.shares()) {
-            const double root = (bin++ % 256) / 255.0;
-            EXPECT_NEAR(share, root * root, 1e-6);
+            const double root = static_cast<double>(bin++ % 16) / 15.0;
+            EXPECT_NEAR(share, root * root / 2.0, 1e-6);
         }
     }
     EXPECT_EQ(bin, kStatisticBins);
