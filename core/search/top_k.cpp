@@ -8,6 +8,7 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include "core/search/statistics_bound.h"
 
@@ -247,6 +248,26 @@ Result<SearchResult> topK(const Signature& query, const SignatureSet& set, const
     } catch (const std::exception& e) {
         return fail(ErrorCode::kInternal, std::string("search: ") + e.what());
     }
+}
+
+Result<std::vector<SearchResult>> topKBatch(const std::vector<Signature>& queries, const SignatureSet& set,
+                                            const SearchOptions& options, const RunContext& context) {
+    std::vector<Result<SearchResult>> found(queries.size(), SearchResult{});
+    tbb::parallel_for(std::size_t{0}, queries.size(), [&](std::size_t q) {
+        // Alone: what a query spreads over threads it would have to wait for.
+        tbb::task_arena alone(1);
+        found[q] = alone.execute([&] { return topK(queries[q], set, options, context); });
+    });
+    std::vector<SearchResult> results;
+    results.reserve(queries.size());
+    for (std::size_t q = 0; q < found.size(); ++q) {
+        if (!found[q]) {
+            return fail(found[q].error().code,
+                        "query " + std::to_string(q) + ": " + found[q].error().message);
+        }
+        results.push_back(std::move(*found[q]));
+    }
+    return results;
 }
 
 }  // namespace shapedb

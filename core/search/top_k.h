@@ -50,4 +50,11 @@ struct SearchResult {
 [[nodiscard]] Result<SearchResult> topK(const Signature& query, const SignatureSet& set,
                                         const SearchOptions& options, const RunContext& context = {});
 
+/// The same of many queries, each on one thread, as many at once as the arena has: a core that works
+/// alone waits for no other. Results in the order of the queries; the first error ends all.
+[[nodiscard]] Result<std::vector<SearchResult>> topKBatch(const std::vector<Signature>& queries,
+                                                          const SignatureSet& set,
+                                                          const SearchOptions& options,
+                                                          const RunContext& context = {});
+
 }  // namespace shapedb

@@ -42,11 +42,13 @@ class Index : public ::testing::Test {
         const SnapshotPtr now = snapshot();
         EXPECT_EQ(now->signatures.size(), rows.size());
         for (const store::IndexRow& row : rows) {
-            const auto entry = now->signatures.find(row.shape.id);
-            ASSERT_TRUE(entry) << row.shape.key;
-            EXPECT_EQ(entry->key, row.shape.key);
-            EXPECT_EQ(entry->metadata, row.shape.metadata);
-            EXPECT_EQ(encodeSignature(entry->signature), row.signature.bytes);
+            const auto place = now->signatures.find(row.shape.id);
+            ASSERT_TRUE(place) << row.shape.key;
+            EXPECT_EQ(place.block->metadata(place.row), row.shape.metadata);
+            Signature cached;
+            place.block->scored(place.row, cached);
+            EXPECT_TRUE(sameShape(cached, decodeSignature(row.signature.bytes).value()));
+            EXPECT_EQ(cached.scale, decodeSignature(row.signature.bytes)->scale);
         }
     }
 
@@ -105,7 +107,9 @@ TEST_F(Index, RefreshFollowsTheStore) {
     ASSERT_TRUE(store.putShape(putRequest(parts.id, "a", points, {{"label", "new"}})));
     ASSERT_TRUE(index.refresh(parts.id, a.id));
     expectSameAsStore();
-    EXPECT_EQ(snapshot()->signatures.find(a.id)->metadata.at("label"), "new");
+    const SnapshotPtr relabelled = snapshot();
+    const auto place = relabelled->signatures.find(a.id);
+    EXPECT_EQ(place.block->metadata(place.row).at("label"), "new");
 
     ASSERT_TRUE(store.deleteShape(parts.id, "a", std::nullopt));
     ASSERT_TRUE(index.refresh(parts.id, a.id));
@@ -225,7 +229,12 @@ TEST_F(Index, SwitchingReloadsParametersAndSignaturesTogether) {
     EXPECT_TRUE(*done);
     EXPECT_EQ(snapshot()->collection.generation, 2);
     EXPECT_EQ(snapshot()->parameters.signature.maxPoints, 3u);
-    EXPECT_EQ(snapshot()->signatures.find(a.id)->signature.volume, 9.0);
+    const SnapshotPtr switched = snapshot();
+    const auto place = switched->signatures.find(a.id);
+    ASSERT_TRUE(place);
+    Signature cached;
+    place.block->scored(place.row, cached);
+    EXPECT_TRUE(sameShape(cached, signatureOf(9.0)));
     EXPECT_FALSE(index.whileGeneration(parts.id, 1, [] { FAIL(); }));
     EXPECT_EQ(index.switchGeneration(999, [] { return Result<bool>(true); }).error().code,
               ErrorCode::kNotFound);

@@ -18,11 +18,11 @@
 
 namespace shapedb::testing {
 
-/// A valid signature whose volume says which one it is.
+/// A valid signature whose volume, and weight, says which one it is; up to 1000.
 inline Signature signatureOf(double volume) {
     Signature signature;
     signature.points.resize(1);
-    signature.points[0].weight = 0.5f;
+    signature.points[0].weight = static_cast<float>(volume / 1024.0);
     signature.points[0].volumeShare = 1.0f;
     signature.points[0].peakRadius = 0.25f;
     signature.points[0].covariance = {0.01f, 0.0f, 0.0f, 0.01f, 0.0f, 0.01f};

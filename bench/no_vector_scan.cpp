@@ -1,0 +1,10 @@
+// Stands in for faiss_vector_scan.cpp where FAISS is not wanted.
+#include "bench/vector_scan.h"
+
+namespace shapedb::bench {
+
+std::unique_ptr<VectorScan> makeVectorScan(std::size_t) { return nullptr; }
+
+std::string vectorScanName() { return {}; }
+
+}  // namespace shapedb::bench

@@ -1,0 +1,174 @@
+#include "bench/signature_generator.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include <tbb/parallel_for.h>
+
+#include "core/base/random.h"
+#include "core/signature/profile.h"
+#include "core/synthetic/families.h"
+
+namespace shapedb::bench {
+
+namespace {
+
+constexpr std::size_t kMembers = 8;
+constexpr std::size_t kPoints = 3000;
+constexpr double kNoise = 0.002;
+
+// What makes the spread of distances that of a labelled collection (docs/benchmarks.md): how far a
+// class lies from its first anchor, and a shape from its class.
+constexpr double kMostOfSecondAnchor = 0.25;
+constexpr double kShapeSpread = 0.34;
+constexpr double kHardSpread = 0.15;
+constexpr double kSpreadOfSpread = 0.6;  // of its logarithm
+constexpr double kMostOfThirdAnchor = 0.85;
+constexpr std::size_t kFewestClasses = 19;
+constexpr std::uint64_t kShapesPerCopy = 10;
+
+// Of the parts of a shape against those of its class, for a spread of 1.
+constexpr double kPartsMove = 0.15;
+constexpr double kPartsGrow = 0.6;
+constexpr double kPartsLost = 0.5;
+
+std::uint64_t mixed(std::uint64_t seed, std::uint64_t stream, std::uint64_t index) {
+    Random random(seed * 0x9e3779b97f4a7c15ULL + stream * 0xbf58476d1ce4e5b9ULL + index);
+    random.next();
+    return random.next();
+}
+
+// Histograms blend as shares: a shape that is t of another has t of its mass in the other's bins.
+void blendStatistics(ShapeStatistics& into, const ShapeStatistics& other, double t) {
+    for (std::size_t i = 0; i < into.size(); ++i) {
+        into[i] = levelOf((1.0 - t) * shareOfLevel(into[i]) + t * shareOfLevel(other[i]));
+    }
+}
+
+void disturbPoints(std::vector<SignaturePoint>& points, Random& random, double spread) {
+    if (points.size() > 1) {
+        // From the lightest: the heaviest, which is the origin, stays.
+        for (std::size_t i = points.size() - 1; i > 0; --i) {
+            if (random.uniform() < kPartsLost * spread)
+                points.erase(points.begin() + static_cast<std::ptrdiff_t>(i));
+        }
+    }
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        SignaturePoint& p = points[i];
+        const auto factor = [&](double sigma) {
+            return static_cast<float>(std::exp(sigma * random.normal()));
+        };
+        const auto room = static_cast<float>(kPartsMove * spread);
+        for (float& x : p.position) {
+            x = i == 0 ? 0.0f : std::clamp(x + room * static_cast<float>(random.normal()), -1.0f, 1.0f);
+        }
+        const float heavier = factor(kPartsGrow * spread);
+        p.weight *= heavier;
+        p.volumeShare *= heavier;
+        const float wider = factor(kPartsGrow * spread / 2.0);
+        p.peakRadius *= wider;
+        for (float& c : p.covariance) c *= wider * wider;
+    }
+    std::stable_sort(points.begin() + 1, points.end(),
+                     [](const SignaturePoint& a, const SignaturePoint& b) { return a.weight > b.weight; });
+    // The heaviest point is the origin, and shares are of one whole.
+    double shares = 0.0;
+    for (SignaturePoint& p : points) {
+        p.weight = std::min(p.weight, points.front().weight);
+        shares += p.volumeShare;
+    }
+    if (shares <= 1.0) return;
+    for (SignaturePoint& p : points) p.volumeShare = static_cast<float>(p.volumeShare / shares);
+}
+
+}  // namespace
+
+const char* name(Mixture mixture) noexcept {
+    switch (mixture) {
+        case Mixture::kPlain: return "plain";
+        case Mixture::kDuplicates: return "duplicates";
+        case Mixture::kHard: return "hard";
+    }
+    return "plain";
+}
+
+Result<SignatureGenerator> SignatureGenerator::create(Mixture mixture, std::size_t expected,
+                                                      std::uint64_t seed, const RunContext& context) {
+    SignatureGenerator generator;
+    generator.mixture_ = mixture;
+    generator.seed_ = seed;
+    generator.classes_ =
+        mixture == Mixture::kHard
+            ? kFewestClasses
+            : std::max(kFewestClasses, static_cast<std::size_t>(std::sqrt(static_cast<double>(expected))));
+    std::vector<std::pair<std::string, std::size_t>> members;
+    for (const FamilyInfo& family : listFamilies()) {
+        for (std::size_t member = 0; member < kMembers; ++member) members.emplace_back(family.name, member);
+    }
+    std::vector<Signature> made(members.size());
+    std::vector<std::uint8_t> good(members.size(), 0);
+    tbb::parallel_for(std::size_t{0}, members.size(), [&](std::size_t i) {
+        const auto solid = makeMember(members[i].first, members[i].second, 1);
+        ScanOptions options;
+        options.count = kPoints;
+        options.noise = kNoise;
+        options.seed = i + 1;
+        const auto points = solid ? scanOf(*solid, options) : Result<PointCloud>(fail(solid.error()));
+        if (!points) return;
+        auto description = describe(*points, parametersOf(Profile::kDefault), context);
+        if (!description) return;
+        made[i] = std::move(description->signature);
+        good[i] = 1;
+    });
+    if (auto go = context.checkpoint(); !go) return fail(go.error());
+    for (std::size_t i = 0; i < made.size(); ++i) {
+        if (good[i] != 0) generator.anchors_.push_back(std::move(made[i]));
+    }
+    if (generator.anchors_.size() < 3) return fail(ErrorCode::kInternal, "the synthetic families fail");
+    return generator;
+}
+
+std::size_t SignatureGenerator::classOf(std::uint64_t index) const {
+    return static_cast<std::size_t>(mixed(seed_, 1, index) % classes_);
+}
+
+Signature SignatureGenerator::ofClass(std::uint64_t index) const {
+    Random ofClass(mixed(seed_, 2, classOf(index)));
+    Signature signature = anchors_[ofClass.below(anchors_.size())];
+    const Signature& second = anchors_[ofClass.below(anchors_.size())];
+    blendStatistics(signature.attributes->statistics, second.attributes->statistics,
+                    ofClass.uniform(0.0, kMostOfSecondAnchor));
+    disturbPoints(signature.points, ofClass, 0.5);
+
+    Random random(mixed(seed_, 3, index));
+    const double usual = mixture_ == Mixture::kHard ? kHardSpread : kShapeSpread;
+    const double spread = std::min(kMostOfThirdAnchor, usual * std::exp(kSpreadOfSpread * random.normal()));
+    const Signature& third = anchors_[random.below(anchors_.size())];
+    blendStatistics(signature.attributes->statistics, third.attributes->statistics, spread);
+    disturbPoints(signature.points, random, spread);
+    signature.attributes->quality =
+        static_cast<std::uint8_t>(255.0 * (1.0 - 0.1 * random.uniform() * random.uniform()));
+    signature.scale = std::exp(random.normal());
+    return signature;
+}
+
+Signature SignatureGenerator::make(std::uint64_t index) const {
+    const bool copy = mixture_ == Mixture::kDuplicates && index % kShapesPerCopy == 0 && index > 0;
+    Signature signature = ofClass(copy ? index - 1 : index);
+    if (copy) {
+        // Another scan of the same object.
+        Random random(mixed(seed_, 4, index));
+        for (std::uint8_t& level : signature.attributes->statistics) {
+            if (level > 0 && level < kTopLevel && random.below(6) == 0) {
+                level = static_cast<std::uint8_t>(random.below(2) == 0 ? level - 1 : level + 1);
+            }
+        }
+        disturbPoints(signature.points, random, 0.03);
+    }
+    signature.attributes->body = bodyOf(signature.points);
+    return signature;
+}
+
+}  // namespace shapedb::bench

@@ -1,0 +1,52 @@
+// Signatures of shapes that do not exist, in any number: what a search is measured on. They are
+// drawn so that their scores are spread like those of real shapes; docs/benchmarks.md compares them.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/run_context.h"
+#include "core/signature/signature.h"
+
+namespace shapedb::bench {
+
+enum class Mixture {
+    kPlain,       ///< classes as different, and shapes within them as alike, as in a labelled collection
+    kDuplicates,  ///< every tenth is nearly a copy of another: scans of one object
+    kHard,        ///< all of a few classes, of shapes more alike than usual
+};
+[[nodiscard]] const char* name(Mixture mixture) noexcept;
+
+/// Anchors are signatures of real scans of the synthetic families (core/synthetic): about 100, of
+/// 3,000 points with 0.2 % noise. A class is a blend of two of them; a shape of the class is its blend
+/// with a third, with parts moved, resized, lost and won.
+///
+/// Immutable; `make` may be called from any number of threads.
+class SignatureGenerator {
+  public:
+    /// `expected`: of how many shapes a collection is to be drawn; their number of classes grows with
+    /// its root. Takes seconds. Errors: kCancelled.
+    [[nodiscard]] static Result<SignatureGenerator> create(Mixture mixture, std::size_t expected,
+                                                           std::uint64_t seed, const RunContext& context);
+
+    /// Shape `index`: the same for the same seed, mixture and expected size.
+    [[nodiscard]] Signature make(std::uint64_t index) const;
+    [[nodiscard]] std::size_t classOf(std::uint64_t index) const;
+    [[nodiscard]] std::size_t classes() const { return classes_; }
+    [[nodiscard]] std::size_t anchors() const { return anchors_.size(); }
+
+  private:
+    SignatureGenerator() = default;
+
+    Signature ofClass(std::uint64_t index) const;
+
+    std::vector<Signature> anchors_;
+    Mixture mixture_ = Mixture::kPlain;
+    std::size_t classes_ = 1;
+    std::uint64_t seed_ = 1;
+};
+
+}  // namespace shapedb::bench

@@ -1,0 +1,25 @@
+// What a flat scan of plain feature vectors takes: the peer of exact search.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace shapedb::bench {
+
+/// All vectors of one length in one array, searched by squared Euclidean distance.
+class VectorScan {
+  public:
+    virtual ~VectorScan() = default;
+    virtual void add(const float* vectors, std::size_t count) = 0;
+    /// The k nearest of one query; ids by rising distance.
+    [[nodiscard]] virtual std::vector<long> nearest(const float* query, std::size_t k) const = 0;
+};
+
+/// Null when this build has no peer.
+[[nodiscard]] std::unique_ptr<VectorScan> makeVectorScan(std::size_t dimension);
+/// "FAISS 1.7.3 IndexFlatL2"; empty without.
+[[nodiscard]] std::string vectorScanName();
+
+}  // namespace shapedb::bench
