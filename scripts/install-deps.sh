@@ -2,8 +2,8 @@
 # Installs the Debian 12 packages that ShapeDB needs, and only those that are missing.
 #   scripts/install-deps.sh             everything to build, test and check
 #   scripts/install-deps.sh --runtime   only what the built programs load
-#   scripts/install-deps.sh --bench     that to build and the Point Cloud Library, whose descriptors
-#                                       shapedb-bench measures beside ours (SHAPEDB_BENCH_PCL)
+#   scripts/install-deps.sh --bench     that to build, and the Point Cloud Library and FAISS, which
+#                                       shapedb-bench measures beside ours (SHAPEDB_BENCH_PCL, SHAPEDB_BENCH_FAISS)
 set -euo pipefail
 
 build_packages=(
@@ -11,14 +11,14 @@ build_packages=(
   libcgal-dev libgmp-dev libmpfr-dev libeigen3-dev libtbb-dev libexpected-dev
   libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc
   libsqlite3-dev libzstd-dev libssl-dev libspdlog-dev libtomlplusplus-dev
-  libcli11-dev nlohmann-json3-dev libpng-dev liblzf-dev
+  libcli11-dev nlohmann-json3-dev libpng-dev liblzf-dev zlib1g-dev
   libgtest-dev libgmock-dev clang-format-14
 )
 runtime_packages=(
   ca-certificates libgmpxx4ldbl libmpfr6 libtbb12 libgrpc++1.51 libprotobuf32 libsqlite3-0
-  libzstd1 libssl3 libspdlog1.10 libpng16-16 liblzf1
+  libzstd1 libssl3 libspdlog1.10 libpng16-16 liblzf1 zlib1g
 )
-bench_packages=(libpcl-dev)
+bench_packages=(libpcl-dev libfaiss-dev libopenblas-dev)
 
 case "${1:-}" in
   "") packages=("${build_packages[@]}") ;;

@@ -56,7 +56,10 @@ Part partOf(const SignaturePoint& point, const Body& body) {
     const Point3 p = rotate(body.axes, positionOf(point) - body.centre);
     part.position = {static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)};
     part.share = point.volumeShare;
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covarianceOf(point), Eigen::EigenvaluesOnly);
+    // In closed form: eight digits are enough for steps of three percent, and a server that starts
+    // does this ten million times.
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+    solver.computeDirect(covarianceOf(point), Eigen::EigenvaluesOnly);
     for (int axis = 0; axis < 3; ++axis) {
         part.size[static_cast<std::size_t>(axis)] =
             logLength(std::sqrt(std::max(0.0, solver.eigenvalues()[2 - axis])));

@@ -6,6 +6,9 @@
 #include <optional>
 #include <utility>
 
+#include <tbb/parallel_for.h>
+#include <tbb/task_group.h>
+
 #include "core/signature/signature_codec.h"
 #include "server/index/parameters_codec.h"
 
@@ -13,7 +16,7 @@ namespace shapedb::index {
 namespace {
 
 /// Rows of one read: large enough to be cheap, small enough to leave the writer its turn.
-constexpr std::size_t kLoadBatch = 2'000;
+constexpr std::size_t kLoadBatch = 4'096;
 
 /// Empty when the signature is damaged; the damage is logged.
 std::optional<IndexEntry> makeEntry(const store::Shape& shape, const std::string& bytes,
@@ -27,6 +30,21 @@ std::optional<IndexEntry> makeEntry(const store::Shape& shape, const std::string
         return std::nullopt;
     }
     return IndexEntry{shape.id, shape.metadata, std::move(*signature)};
+}
+
+/// `set` with what these rows say; decodes them in parallel.
+SignatureSet withRows(const SignatureSet& set, const std::vector<store::IndexRow>& rows,
+                      telemetry::Logger& log) {
+    std::vector<std::optional<IndexEntry>> decoded(rows.size());
+    tbb::parallel_for(std::size_t{0}, rows.size(), [&](std::size_t i) {
+        decoded[i] = makeEntry(rows[i].shape, rows[i].signature.bytes, log);
+    });
+    std::vector<IndexEntry> entries;
+    entries.reserve(rows.size());
+    for (std::optional<IndexEntry>& entry : decoded) {
+        if (entry) entries.push_back(std::move(*entry));
+    }
+    return set.with(entries, {});
 }
 
 Result<ShapeParameters> parametersOf(const store::Collection& collection) {
@@ -92,21 +110,26 @@ Result<SnapshotPtr> CollectionIndex::read(const store::Collection& collection,
     if (!parameters) return fail(parameters.error());
     snapshot->parameters = *parameters;
 
+    // One batch is decoded while the next is read.
+    std::vector<store::IndexRow> decoding;
+    tbb::task_group decoder;
+    Result<void> done;
     std::int64_t afterId = 0;
     for (;;) {
-        if (const auto go = context.checkpoint(); !go) return fail(go.error());
-        const auto rows = store_.loadIndex(collection.id, afterId, kLoadBatch);
-        if (!rows) return fail(rows.error());
-        std::vector<IndexEntry> entries;
-        entries.reserve(rows->size());
-        for (const store::IndexRow& row : *rows) {
-            if (auto entry = makeEntry(row.shape, row.signature.bytes, *log_))
-                entries.push_back(std::move(*entry));
-        }
-        snapshot->signatures = snapshot->signatures.with(entries, {});
-        if (rows->size() < kLoadBatch) break;
-        afterId = rows->back().shape.id;
+        done = context.checkpoint();
+        if (!done) break;
+        auto rows = store_.loadIndex(collection.id, afterId, kLoadBatch);
+        decoder.wait();
+        if (!rows) done = fail(rows.error());
+        if (!done) break;
+        decoding = std::move(*rows);
+        const bool last = decoding.size() < kLoadBatch;
+        if (!decoding.empty()) afterId = decoding.back().shape.id;
+        decoder.run([&] { snapshot->signatures = withRows(snapshot->signatures, decoding, *log_); });
+        if (last) break;
     }
+    decoder.wait();
+    if (!done) return fail(done.error());
     return SnapshotPtr(std::move(snapshot));
 }
 
