@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <exception>
 #include <new>
 #include <string>
@@ -241,7 +242,10 @@ Result<SearchResult> topK(const Signature& query, const SignatureSet& set, const
                           const RunContext& context) {
     if (auto valid = check(query, set, options); !valid) return fail(valid.error());
     try {
-        return Searcher(query, set, options, context).run();
+        const auto began = RunContext::Clock::now();
+        auto result = Searcher(query, set, options, context).run();
+        if (result) result->seconds = std::chrono::duration<double>(RunContext::Clock::now() - began).count();
+        return result;
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::kOutOfMemory,
                     "not enough memory to search " + std::to_string(set.size()) + " signatures");
@@ -250,24 +254,37 @@ Result<SearchResult> topK(const Signature& query, const SignatureSet& set, const
     }
 }
 
-Result<std::vector<SearchResult>> topKBatch(const std::vector<Signature>& queries, const SignatureSet& set,
+Result<std::vector<SearchResult>> topKBatch(const std::vector<BatchQuery>& queries, const SignatureSet& set,
                                             const SearchOptions& options, const RunContext& context) {
-    std::vector<Result<SearchResult>> found(queries.size(), SearchResult{});
-    tbb::parallel_for(std::size_t{0}, queries.size(), [&](std::size_t q) {
-        // Alone: what a query spreads over threads it would have to wait for.
-        tbb::task_arena alone(1);
-        found[q] = alone.execute([&] { return topK(queries[q], set, options, context); });
-    });
-    std::vector<SearchResult> results;
-    results.reserve(queries.size());
-    for (std::size_t q = 0; q < found.size(); ++q) {
-        if (!found[q]) {
-            return fail(found[q].error().code,
-                        "query " + std::to_string(q) + ": " + found[q].error().message);
+    try {
+        std::vector<Result<SearchResult>> found(queries.size(), SearchResult{});
+        std::atomic<bool> failed{false};
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, queries.size(), 1), [&](const auto& range) {
+            // Alone: what a query spreads over threads it would have to wait for.
+            tbb::task_arena alone(1);
+            for (std::size_t q = range.begin(); q < range.end() && !failed.load(); ++q) {
+                SearchOptions own = options;
+                own.excludeId = queries[q].excludeId;
+                found[q] = alone.execute([&] { return topK(queries[q].signature, set, own, context); });
+                if (!found[q]) failed = true;
+            }
+        });
+        std::vector<SearchResult> results;
+        results.reserve(queries.size());
+        for (std::size_t q = 0; q < found.size(); ++q) {
+            if (!found[q]) {
+                return fail(found[q].error().code,
+                            "query " + std::to_string(q) + ": " + found[q].error().message);
+            }
+            results.push_back(std::move(*found[q]));
         }
-        results.push_back(std::move(*found[q]));
+        return results;
+    } catch (const std::bad_alloc&) {
+        return fail(ErrorCode::kOutOfMemory,
+                    "not enough memory for " + std::to_string(queries.size()) + " searches at once");
+    } catch (const std::exception& e) {
+        return fail(ErrorCode::kInternal, std::string("search: ") + e.what());
     }
-    return results;
 }
 
 }  // namespace shapedb

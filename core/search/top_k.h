@@ -38,6 +38,7 @@ struct SearchCounts {
 struct SearchResult {
     std::vector<SearchHit> hits;  ///< by falling score, equal scores by rising id
     SearchCounts counts;
+    double seconds = 0.0;  ///< taken
 };
 
 /// Climbs a ladder of bounds, from sums of differences of the statistics (256 bytes a shape) to the
@@ -50,9 +51,15 @@ struct SearchResult {
 [[nodiscard]] Result<SearchResult> topK(const Signature& query, const SignatureSet& set,
                                         const SearchOptions& options, const RunContext& context = {});
 
-/// The same of many queries, each on one thread, as many at once as the arena has: a core that works
-/// alone waits for no other. Results in the order of the queries; the first error ends all.
-[[nodiscard]] Result<std::vector<SearchResult>> topKBatch(const std::vector<Signature>& queries,
+struct BatchQuery {
+    Signature signature;
+    std::optional<std::int64_t> excludeId;  ///< in the place of SearchOptions::excludeId
+};
+
+/// The same of many queries, each on one thread, as many at once as the arena has: none waits for
+/// another. Results in the order of the queries; the first error ends all and names the query ("query
+/// 3: ...", from 0). Errors: as `topK`.
+[[nodiscard]] Result<std::vector<SearchResult>> topKBatch(const std::vector<BatchQuery>& queries,
                                                           const SignatureSet& set,
                                                           const SearchOptions& options,
                                                           const RunContext& context = {});

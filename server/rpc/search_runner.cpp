@@ -20,4 +20,13 @@ Result<SearchResult> SearchRunner::run(const Signature& query, const SignatureSe
     return result;
 }
 
+Result<std::vector<SearchResult>> SearchRunner::runBatch(const std::vector<BatchQuery>& queries,
+                                                         const SignatureSet& set,
+                                                         const SearchOptions& options,
+                                                         const RunContext& context) {
+    auto results = arena_->tasks.execute([&] { return topKBatch(queries, set, options, context); });
+    if (results) count_.fetch_add(results->size());
+    return results;
+}
+
 }  // namespace shapedb::rpc

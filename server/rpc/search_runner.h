@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "core/base/error.h"
 #include "core/search/top_k.h"
@@ -20,6 +21,12 @@ class SearchRunner {
     /// As `shapedb::topK`.
     [[nodiscard]] Result<SearchResult> run(const Signature& query, const SignatureSet& set,
                                            const SearchOptions& options, const RunContext& context);
+
+    /// As `shapedb::topKBatch`.
+    [[nodiscard]] Result<std::vector<SearchResult>> runBatch(const std::vector<BatchQuery>& queries,
+                                                             const SignatureSet& set,
+                                                             const SearchOptions& options,
+                                                             const RunContext& context);
 
     /// Searches that ended well since start.
     [[nodiscard]] std::uint64_t count() const { return count_.load(); }

@@ -1,6 +1,5 @@
 #include "server/rpc/search_service.h"
 
-#include <chrono>
 #include <utility>
 
 #include "core/signature/signature_codec.h"
@@ -53,21 +52,18 @@ Result<void> explainHit(const Services& services, const Prepared& prepared, cons
     return {};
 }
 
-/// Searches and fills `response`; `room` is what the whole answer may still grow by, bytes.
-Result<void> search(const Services& services, const Call& call, const Prepared& prepared,
-                    const Signature& query, std::size_t& room, pb::SearchResponse* response) {
-    const auto began = std::chrono::steady_clock::now();
-    const auto found =
-        services.searches.run(query, prepared.collection->signatures, prepared.options, call.run());
-    if (!found) return fail(found.error());
-    response->set_candidates(found->counts.candidates);
-    response->set_filtered(found->counts.filtered);
-    response->set_scored(found->counts.scored);
+/// Fills `response`; `room` is what the whole answer may still grow by, bytes.
+Result<void> answer(const Services& services, const Prepared& prepared, const Signature& query,
+                    const SearchResult& found, std::size_t& room, pb::SearchResponse* response) {
+    response->set_candidates(found.counts.candidates);
+    response->set_filtered(found.counts.filtered);
+    response->set_scored(found.counts.scored);
+    response->set_seconds_search(found.seconds);
     toProto(query, response->mutable_query());
     if (response->query().has_attributes()) {
         response->mutable_query()->mutable_attributes()->clear_statistics();
     }
-    for (const SearchHit& hit : found->hits) {
+    for (const SearchHit& hit : found.hits) {
         const auto shape = services.store.getShapeById(hit.id);
         if (!shape && shape.error().code == ErrorCode::kNotFound) continue;  // deleted meanwhile
         if (!shape) return fail(shape.error());
@@ -87,9 +83,15 @@ Result<void> search(const Services& services, const Call& call, const Prepared& 
         }
         room -= bytes;
     }
-    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
-    response->set_seconds_search(took.count());
     return {};
+}
+
+Result<void> search(const Services& services, const Call& call, const Prepared& prepared,
+                    const Signature& query, std::size_t& room, pb::SearchResponse* response) {
+    const auto found =
+        services.searches.run(query, prepared.collection->signatures, prepared.options, call.run());
+    if (!found) return fail(found.error());
+    return answer(services, prepared, query, *found, room, response);
 }
 
 /// A stored shape as a query.
@@ -111,25 +113,48 @@ Result<StoredQuery> storedQuery(const Services& services, const Prepared& prepar
     return StoredQuery{std::move(*signature), shape->id};
 }
 
-Result<void> searchOne(const Services& services, const Call& call, const Prepared& prepared,
-                       const v1::SearchBatchRequest::Query& query, std::size_t& room,
-                       v1::SearchResponse* response) {
+Result<BatchQuery> batchQuery(const Services& services, const Prepared& prepared,
+                              const v1::SearchBatchRequest::Query& query) {
     switch (query.by_case()) {
         case v1::SearchBatchRequest::Query::kKey: {
-            const auto stored = storedQuery(services, prepared, query.key());
+            auto stored = storedQuery(services, prepared, query.key());
             if (!stored) return fail(stored.error());
-            Prepared without = prepared;
-            without.options.excludeId = stored->id;
-            return search(services, call, without, stored->signature, room, response);
+            return BatchQuery{std::move(stored->signature), stored->id};
         }
         case v1::SearchBatchRequest::Query::kSignature: {
-            const auto signature = decodeSignature(query.signature());
+            auto signature = decodeSignature(query.signature());
             if (!signature) return fail(signature.error());
-            return search(services, call, prepared, *signature, room, response);
+            return BatchQuery{std::move(*signature), std::nullopt};
         }
         case v1::SearchBatchRequest::Query::BY_NOT_SET: break;
     }
     return fail(ErrorCode::kInvalidArgument, "neither key nor signature is set");
+}
+
+Result<void> ofQuery(int i, const Error& error) {
+    return fail(error.code, "query " + std::to_string(i) + ": " + error.message);
+}
+
+/// All queries are read first and searched at once.
+Result<void> searchBatch(const Services& services, const Call& call, const Prepared& prepared,
+                         const v1::SearchBatchRequest& request, v1::SearchBatchResponse* response) {
+    std::vector<BatchQuery> queries;
+    for (int i = 0; i < request.queries_size(); ++i) {
+        auto query = batchQuery(services, prepared, request.queries(i));
+        if (!query) return ofQuery(i, query.error());
+        queries.push_back(std::move(*query));
+    }
+    const auto found =
+        services.searches.runBatch(queries, prepared.collection->signatures, prepared.options, call.run());
+    if (!found) return fail(found.error());
+    std::size_t room = kMaxAnswerBytes;
+    for (int i = 0; i < request.queries_size(); ++i) {
+        const auto at = static_cast<std::size_t>(i);
+        const auto done =
+            answer(services, prepared, queries[at].signature, (*found)[at], room, response->add_responses());
+        if (!done) return ofQuery(i, done.error());
+    }
+    return {};
 }
 
 }  // namespace
@@ -206,14 +231,7 @@ grpc::Status SearchServiceHandler::SearchBatch(grpc::ServerContext* context,
         }
         const auto prepared = prepare(services_, call, request->options());
         if (!prepared) return fail(prepared.error());
-        std::size_t room = kMaxAnswerBytes;
-        for (int i = 0; i < count; ++i) {
-            const auto done =
-                searchOne(services_, call, *prepared, request->queries(i), room, response->add_responses());
-            if (!done)
-                return fail(done.error().code, "query " + std::to_string(i) + ": " + done.error().message);
-        }
-        return {};
+        return searchBatch(services_, call, *prepared, *request, response);
     });
 }
 

@@ -177,6 +177,48 @@ TEST(TopK, EqualsBruteForceOnManyBlocksBitForBit) {
     }
 }
 
+TEST(TopK, OfABatchIsThatOfEachQuery) {
+    const auto& scans = testing_support::scannedFamilies(1, 1);
+    Random random(13);
+    std::vector<IndexEntry> entries;
+    for (std::int64_t id = 1; id <= 2500; ++id) {
+        const Signature& base = scans[random.below(scans.size())].signature;
+        entries.push_back(entryOf(id, testing_support::disturbedAttributed(base, random, 0.05)));
+    }
+    const Library library(std::move(entries));
+    std::vector<BatchQuery> queries;
+    for (std::size_t q = 0; q < 23; ++q) {
+        const IndexEntry& entry = library.entries[random.below(library.entries.size())];
+        queries.push_back(
+            {entry.signature, q % 2 == 0 ? std::optional<std::int64_t>(entry.id) : std::nullopt});
+    }
+    SearchOptions options;
+    options.filter = Filter::parse("third=1").value();
+    const auto together = topKBatch(queries, library.set, options);
+    ASSERT_TRUE(together) << together.error().message;
+    ASSERT_EQ(together->size(), queries.size());
+    for (std::size_t q = 0; q < queries.size(); ++q) {
+        options.excludeId = queries[q].excludeId;
+        expectSameHits((*together)[q].hits, bruteForce(queries[q].signature, library, options));
+    }
+    EXPECT_TRUE(topKBatch({}, library.set, options)->empty());
+}
+
+TEST(TopK, OfABatchNamesTheQueryThatFails) {
+    const auto& scans = testing_support::scannedFamilies(1, 1);
+    const Library library({entryOf(1, scans[0].signature)});
+    BatchQuery good{scans[0].signature, std::nullopt};
+    BatchQuery bad = good;
+    bad.signature.attributes.reset();
+    const auto result = topKBatch({good, bad}, library.set, {});
+    ASSERT_FALSE(result);
+    EXPECT_EQ(result.error().message.rfind("query 1: ", 0), 0u) << result.error().message;
+    std::atomic<bool> cancel{true};
+    RunContext context;
+    context.cancel = &cancel;
+    EXPECT_EQ(topKBatch({good}, library.set, {}, context).error().code, ErrorCode::kCancelled);
+}
+
 // A search cannot compare what a signature does not have.
 TEST(TopK, RefusesPointsAloneWhereSignaturesHaveAttributes) {
     const auto& scans = testing_support::scannedFamilies(1, 1);

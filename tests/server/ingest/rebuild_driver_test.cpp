@@ -101,9 +101,9 @@ class Driver : public ::testing::Test {
         EXPECT_EQ(snapshot->parameters.signature.maxPoints, maxPoints);
         const auto shapes = store.listShapes(parts.id, 0, 1'000, {});
         for (const auto& shape : *shapes) {
-            const auto entry = snapshot->signatures.find(shape.id);
-            ASSERT_TRUE(entry) << shape.key;
-            EXPECT_EQ(entry->signature.scale, maxPoints) << shape.key;
+            const auto place = snapshot->signatures.find(shape.id);
+            ASSERT_TRUE(place) << shape.key;
+            EXPECT_EQ(place.block->scale(place.row), maxPoints) << shape.key;
         }
     }
 
@@ -259,7 +259,7 @@ TEST_F(Driver, ShapesThatComeAndGoMeanwhile) {
     expectAllOf(3);
     const auto snapshot = *index.byName("parts");
     EXPECT_EQ(snapshot->signatures.size(), 10u);
-    EXPECT_EQ(snapshot->signatures.find(store.getShape(parts.id, "0")->id)->signature.volume, 50.0);
+    EXPECT_EQ(cachedVolume(snapshot->signatures, store.getShape(parts.id, "0")->id), 50.0);
 }
 
 TEST_F(Driver, StoreFailuresAreOutlived) {

@@ -86,7 +86,7 @@ TEST_F(Pool, TurnsScansIntoSearchedSignatures) {
     EXPECT_EQ(pool->ingested(), 101u);
     const auto snapshot = *index.byName("parts");
     EXPECT_EQ(snapshot->signatures.size(), 101u);
-    EXPECT_EQ(snapshot->signatures.find(shape("7").id)->signature.volume, 9.0);
+    EXPECT_EQ(cachedVolume(snapshot->signatures, shape("7").id), 9.0);
     EXPECT_EQ(shape("7").state, store::ShapeState::kReady);
 }
 
@@ -140,7 +140,7 @@ TEST_F(Pool, ReplacedPointsStopOnlyTheOldJob) {
     ASSERT_TRUE(eventually([&] { return settled("k"); }));
     EXPECT_EQ(shape("k").state, store::ShapeState::kReady);
     ASSERT_TRUE(eventually([&] { return idle(); }));
-    EXPECT_EQ((*index.byName("parts"))->signatures.find(replaced.id)->signature.volume, 2.0);
+    EXPECT_EQ(cachedVolume((*index.byName("parts"))->signatures, replaced.id), 2.0);
     EXPECT_EQ(pool->ingested(), 1u);
 }
 

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/search/signature_set.h"
 #include "core/signature/profile.h"
 #include "core/signature/signature_codec.h"
 #include "server/index/parameters_codec.h"
@@ -28,6 +29,15 @@ inline Signature signatureOf(double volume) {
     signature.points[0].covariance = {0.01f, 0.0f, 0.0f, 0.01f, 0.0f, 0.01f};
     signature.volume = volume;
     return signature;
+}
+
+/// What searches find of a shape made by `signatureOf`: its volume; 0 when it is not there.
+inline double cachedVolume(const SignatureSet& signatures, std::int64_t id) {
+    const SignatureSet::Place place = signatures.find(id);
+    if (!place) return 0.0;
+    Signature cached;
+    place.block->scored(place.row, cached);
+    return cached.points.at(0).weight * 1024.0;
 }
 
 /// Points whose first coordinate is `tag`.
