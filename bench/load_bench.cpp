@@ -111,10 +111,10 @@ void report(const LatencyFigures& figures, const LoadSettings& settings, Report&
         {"ingest meanwhile", cli::formatFixed(figures.busyScansPerSecond, 2) + " scans/s", "", true});
 }
 
-void report(const StartFigures& figures, const LoadSettings& settings, Report& report) {
+void report(const StartFigures& figures, const LoadSettings&, Report& report) {
     const bool fast = figures.firstAnswerSeconds <= kMostStartSeconds;
     const bool small = figures.residentRatio <= kMostResidentRatio;
-    report.parts["startup"] = {{"shapes", settings.startShapes},
+    report.parts["startup"] = {{"shapes", figures.shapes},
                                {"serving_seconds", figures.servingSeconds},
                                {"first_answer_seconds", figures.firstAnswerSeconds},
                                {"most_seconds", kMostStartSeconds},
@@ -126,7 +126,7 @@ void report(const StartFigures& figures, const LoadSettings& settings, Report& r
                                {"database_bytes", figures.databaseBytes},
                                {"kept", fast && small}};
     report.lines.push_back(
-        {"start with " + cli::formatCount(settings.startShapes) + ": serving / first answer",
+        {"start with " + cli::formatCount(figures.shapes) + ": serving / first answer",
          cli::formatSeconds(figures.servingSeconds) + " / " + cli::formatSeconds(figures.firstAnswerSeconds),
          "<= " + cli::formatSeconds(kMostStartSeconds), fast});
     report.lines.push_back({"start: resident / peak / cache",
@@ -253,6 +253,10 @@ void addLoadOperation(CLI::App& app, Bench& bench) {
     command->add_option("--start-shapes", settings.startShapes, "startup: stored signatures")
         ->check(CLI::Range(1, 100'000'000))
         ->capture_default_str();
+    command
+        ->add_option("--start-data", settings.startData,
+                     "startup: data directory to start on; made, and kept, where there is none")
+        ->type_name("DIR");
     command->add_option("--upload-bytes", settings.uploadBytes, "upload: size of the scan, 12 bytes a point")
         ->check(CLI::Range(120'000, 600'000'000))
         ->capture_default_str();

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <filesystem>
 #include <mutex>
 #include <thread>
 
@@ -368,15 +369,17 @@ Result<StartFigures> measureStart(const LoadSettings& settings, const LoadProgre
                                   const RunContext& context) {
     const auto directory = WorkDirectory::create(settings.directory);
     if (!directory) return fail(directory.error());
-    const std::string data = directory->path() + "/data";
+    const std::string data = settings.startData.empty() ? directory->path() + "/data" : settings.startData;
     const auto source = SignatureSource::create(settings.seed, settings.threads, cancelledBy(context));
     if (!source) return fail(source.error());
     RunContext reporting = context;
     reporting.progress = [&](const char*, std::uint64_t done, std::uint64_t total) {
         progress("storing signatures", done, total);
     };
-    if (const auto filled = fillDataDirectory(data, *source, settings.startShapes, reporting); !filled)
-        return fail(filled.error());
+    if (!std::filesystem::exists(data)) {
+        if (const auto filled = fillDataDirectory(data, *source, settings.startShapes, reporting); !filled)
+            return fail(filled.error());
+    }
     const std::string query = source->encoded(settings.startShapes);
 
     StartFigures figures;
@@ -390,6 +393,7 @@ Result<StartFigures> measureStart(const LoadSettings& settings, const LoadProgre
         answered.push_back(start->answered);
         figures.resident = std::max(figures.resident, start->memory.resident);
         figures.peak = std::max(figures.peak, start->memory.peak);
+        figures.shapes = start->stats.cachedSignatures;
         figures.cache = start->stats.cacheBytes;
         figures.databaseBytes = start->stats.databaseBytes;
     }

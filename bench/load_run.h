@@ -25,6 +25,7 @@ struct LoadSettings {
     double querySeconds = 120.0;     ///< latency: for these, idle and busy each, about
     std::uint32_t k = 10;
     std::uint64_t startShapes = 1'000'000;
+    std::string startData;  ///< startup: data directory to use; made, and kept, where there is none
     std::uint64_t uploadBytes = 100'000'000;  ///< 12 a point
 };
 
@@ -59,6 +60,7 @@ struct LatencyFigures {
 };
 
 struct StartFigures {
+    std::uint64_t shapes = 0;         ///< with a signature
     double servingSeconds = 0.0;      ///< from exec until health says SERVING; median of the rounds
     double firstAnswerSeconds = 0.0;  ///< from exec until a first search was answered; the same
     std::uint64_t resident = 0;       ///< bytes after that answer; largest of the rounds
