@@ -38,5 +38,7 @@ struct Bench {
 void addRetrievalOperation(CLI::App& app, Bench& bench);
 void addInteriorOperation(CLI::App& app, Bench& bench);
 void addLoadOperation(CLI::App& app, Bench& bench);
+void addInstructionsOperation(CLI::App& app, Bench& bench);
+void addJobOperation(CLI::App& app, Bench& bench);
 
 }  // namespace shapedb::bench

@@ -46,6 +46,8 @@ int run(int argc, const char* const* argv, cli::Console& console, const std::ato
         addRetrievalOperation(app, bench);
         addInteriorOperation(app, bench);
         addLoadOperation(app, bench);
+        addInstructionsOperation(app, bench);
+        addJobOperation(app, bench);
         try {
             app.parse(argc, argv);
         } catch (const CLI::CallForHelp&) {

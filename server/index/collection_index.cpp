@@ -2,9 +2,13 @@
 
 #include <algorithm>
 #include <exception>
+#include <iterator>
 #include <new>
 #include <optional>
 #include <utility>
+
+#include <oneapi/tbb/parallel_pipeline.h>
+#include <oneapi/tbb/task_arena.h>
 
 #include "core/signature/signature_codec.h"
 #include "server/index/parameters_codec.h"
@@ -14,6 +18,13 @@ namespace {
 
 /// Rows of one read: large enough to be cheap, small enough to leave the writer its turn.
 constexpr std::size_t kLoadBatch = 2'000;
+/// One collection is read again while searches go on: they keep the other processors.
+constexpr std::size_t kBatchesWhileServing = 1;
+
+/// Two for each processor: one is decoded while the next waits.
+std::size_t batchesOfAllProcessors() {
+    return 2 * static_cast<std::size_t>(oneapi::tbb::this_task_arena::max_concurrency());
+}
 
 /// Empty when the signature is damaged; the damage is logged.
 SignatureSet::EntryPtr makeEntry(const store::Shape& shape, const std::string& bytes,
@@ -89,7 +100,57 @@ CollectionIndex::CollectionIndex(store::Store& store, telemetry::LoggerPtr log)
 
 CollectionIndex::~CollectionIndex() = default;
 
-Result<SnapshotPtr> CollectionIndex::read(const store::Collection& collection,
+/// One thread reads from the store while others decode what was read before: decoding takes longer.
+/// At most `batches` are in the making at one moment; 1 takes a single processor.
+Result<std::vector<SignatureSet::EntryPtr>> CollectionIndex::readEntries(std::int64_t collectionId,
+                                                                         std::size_t batches,
+                                                                         const RunContext& context) const {
+    namespace flow = oneapi::tbb;
+    using Rows = std::shared_ptr<const std::vector<store::IndexRow>>;
+    using Entries = std::shared_ptr<std::vector<SignatureSet::EntryPtr>>;
+    std::optional<Error> failure;
+    std::int64_t afterId = 0;
+    bool last = false;
+    const auto readBatch = [&](flow::flow_control& control) -> Rows {
+        const auto stop = [&](const Error& error) {
+            failure = error;
+            control.stop();
+            return Rows();
+        };
+        if (last) {
+            control.stop();
+            return {};
+        }
+        if (const auto go = context.checkpoint(); !go) return stop(go.error());
+        auto rows = store_.loadIndex(collectionId, afterId, kLoadBatch);
+        if (!rows) return stop(rows.error());
+        last = rows->size() < kLoadBatch;
+        if (!rows->empty()) afterId = rows->back().shape.id;
+        return std::make_shared<const std::vector<store::IndexRow>>(std::move(*rows));
+    };
+    const auto decodeBatch = [&](const Rows& rows) {
+        auto decoded = std::make_shared<std::vector<SignatureSet::EntryPtr>>();
+        decoded->reserve(rows->size());
+        for (const store::IndexRow& row : *rows) {
+            if (auto entry = makeEntry(row.shape, row.signature.bytes, *log_))
+                decoded->push_back(std::move(entry));
+        }
+        return decoded;
+    };
+    std::vector<SignatureSet::EntryPtr> entries;
+    const auto append = [&](const Entries& decoded) {
+        entries.insert(entries.end(), std::make_move_iterator(decoded->begin()),
+                       std::make_move_iterator(decoded->end()));
+    };
+    flow::parallel_pipeline(batches,
+                            flow::make_filter<void, Rows>(flow::filter_mode::serial_in_order, readBatch) &
+                                flow::make_filter<Rows, Entries>(flow::filter_mode::parallel, decodeBatch) &
+                                flow::make_filter<Entries, void>(flow::filter_mode::serial_in_order, append));
+    if (failure) return fail(*failure);
+    return entries;
+}
+
+Result<SnapshotPtr> CollectionIndex::read(const store::Collection& collection, std::size_t batches,
                                           const RunContext& context) const {
     auto snapshot = std::make_shared<Snapshot>();
     snapshot->collection = collection;
@@ -97,20 +158,9 @@ Result<SnapshotPtr> CollectionIndex::read(const store::Collection& collection,
     if (!parameters) return fail(parameters.error());
     snapshot->parameters = *parameters;
 
-    std::vector<SignatureSet::EntryPtr> entries;
-    std::int64_t afterId = 0;
-    for (;;) {
-        if (const auto go = context.checkpoint(); !go) return fail(go.error());
-        const auto rows = store_.loadIndex(collection.id, afterId, kLoadBatch);
-        if (!rows) return fail(rows.error());
-        for (const store::IndexRow& row : *rows) {
-            if (auto entry = makeEntry(row.shape, row.signature.bytes, *log_))
-                entries.push_back(std::move(entry));
-        }
-        if (rows->size() < kLoadBatch) break;
-        afterId = rows->back().shape.id;
-    }
-    snapshot->signatures = SignatureSet().with(std::move(entries), {});
+    auto entries = readEntries(collection.id, batches, context);
+    if (!entries) return fail(entries.error());
+    snapshot->signatures = SignatureSet().with(std::move(*entries), {});
     return SnapshotPtr(std::move(snapshot));
 }
 
@@ -129,7 +179,7 @@ Result<void> CollectionIndex::loadAllUnguarded(const RunContext& context) {
     if (!collections) return fail(collections.error());
     Directory next;
     for (const store::Collection& collection : *collections) {
-        Result<SnapshotPtr> snapshot = read(collection, context);
+        Result<SnapshotPtr> snapshot = read(collection, batchesOfAllProcessors(), context);
         if (!snapshot) return fail(snapshot.error());
         auto slot = std::make_shared<Slot>();
         slot->publish(*snapshot);
@@ -244,7 +294,7 @@ Result<void> CollectionIndex::reloadLocked(Slot& slot) {
     slot.takeDirty();
     const auto collection = store_.getCollection(slot.current()->collection.name);
     if (!collection) return fail(collection.error());
-    Result<SnapshotPtr> snapshot = read(*collection, {});
+    Result<SnapshotPtr> snapshot = read(*collection, kBatchesWhileServing, {});
     if (!snapshot) return fail(snapshot.error());
     slot.publish(*snapshot);
     slot.stale = false;
