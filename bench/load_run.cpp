@@ -252,6 +252,7 @@ Result<PointCloud> makeLargeScan(std::uint64_t count, const LoadSettings& settin
 struct Start {
     double serving = 0.0;
     double answered = 0.0;
+    double processor = 0.0;
     MemoryUse memory;
     client::Stats stats;
 };
@@ -269,6 +270,9 @@ Result<Start> startOnce(const LoadSettings& settings, const std::string& data, c
     if (*health != client::Health::kServing)
         return fail(ErrorCode::kUnavailable, "the server listens but does not say that it serves");
     start.serving = since(began);
+    const auto processor = server->processorSeconds();
+    if (!processor) return fail(processor.error());
+    start.processor = *processor;
     client::SearchOptions options;
     options.k = settings.k;
     const auto reply = client->searchBySignature(options, query, cancelledBy(context));
@@ -385,12 +389,14 @@ Result<StartFigures> measureStart(const LoadSettings& settings, const LoadProgre
     StartFigures figures;
     std::vector<double> serving;
     std::vector<double> answered;
+    std::vector<double> processor;
     for (std::size_t round = 0; round < settings.rounds; ++round) {
         progress("starts", round, settings.rounds);
         const auto start = startOnce(settings, data, query, context);
         if (!start) return fail(start.error());
         serving.push_back(start->serving);
         answered.push_back(start->answered);
+        processor.push_back(start->processor);
         figures.resident = std::max(figures.resident, start->memory.resident);
         figures.peak = std::max(figures.peak, start->memory.peak);
         figures.shapes = start->stats.cachedSignatures;
@@ -399,6 +405,7 @@ Result<StartFigures> measureStart(const LoadSettings& settings, const LoadProgre
     }
     figures.servingSeconds = percentile(serving, kMedian);
     figures.firstAnswerSeconds = percentile(answered, kMedian);
+    figures.processorSeconds = percentile(processor, kMedian);
     if (figures.cache > 0)
         figures.residentRatio = static_cast<double>(figures.resident) / static_cast<double>(figures.cache);
     return figures;

@@ -63,6 +63,7 @@ struct StartFigures {
     std::uint64_t shapes = 0;         ///< with a signature
     double servingSeconds = 0.0;      ///< from exec until health says SERVING; median of the rounds
     double firstAnswerSeconds = 0.0;  ///< from exec until a first search was answered; the same
+    double processorSeconds = 0.0;    ///< until it served, all threads; median of the rounds
     std::uint64_t resident = 0;       ///< bytes after that answer; largest of the rounds
     std::uint64_t peak = 0;
     std::uint64_t cache = 0;     ///< bytes the server says its cache holds

@@ -1,5 +1,6 @@
 #include "server/ingest/background_thread.h"
 
+#include <algorithm>
 #include <thread>
 
 #include <gtest/gtest.h>
@@ -20,7 +21,7 @@ TEST(BackgroundThread, LowersOnlyTheThreadThatAsks) {
         inside = niceOfThisThread();
     });
     thread.join();
-    EXPECT_EQ(inside, 10);
+    EXPECT_EQ(inside, std::min(19, before + 10));
     EXPECT_EQ(niceOfThisThread(), before);
 }
 
