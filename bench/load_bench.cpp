@@ -112,11 +112,12 @@ void report(const LatencyFigures& figures, const LoadSettings& settings, Report&
 }
 
 void report(const StartFigures& figures, const LoadSettings&, Report& report) {
-    const bool fast = figures.firstAnswerSeconds <= kMostStartSeconds;
+    const bool fast = figures.servingSeconds <= kMostStartSeconds;
     const bool small = figures.residentRatio <= kMostResidentRatio;
     report.parts["startup"] = {{"shapes", figures.shapes},
                                {"serving_seconds", figures.servingSeconds},
                                {"first_answer_seconds", figures.firstAnswerSeconds},
+                               {"processor_seconds", figures.processorSeconds},
                                {"most_seconds", kMostStartSeconds},
                                {"resident_bytes", figures.resident},
                                {"peak_bytes", figures.peak},
@@ -125,10 +126,13 @@ void report(const StartFigures& figures, const LoadSettings&, Report& report) {
                                {"most_resident_ratio", kMostResidentRatio},
                                {"database_bytes", figures.databaseBytes},
                                {"kept", fast && small}};
-    report.lines.push_back(
-        {"start with " + cli::formatCount(figures.shapes) + ": serving / first answer",
-         cli::formatSeconds(figures.servingSeconds) + " / " + cli::formatSeconds(figures.firstAnswerSeconds),
-         "<= " + cli::formatSeconds(kMostStartSeconds), fast});
+    report.lines.push_back({"start with " + cli::formatCount(figures.shapes) + ": until it serves",
+                            cli::formatSeconds(figures.servingSeconds),
+                            "<= " + cli::formatSeconds(kMostStartSeconds), fast});
+    report.lines.push_back({"start: processor time / until a first answer",
+                            cli::formatSeconds(figures.processorSeconds) + " / " +
+                                cli::formatSeconds(figures.firstAnswerSeconds),
+                            "", true});
     report.lines.push_back({"start: resident / peak / cache",
                             cli::formatBytes(figures.resident) + " / " + cli::formatBytes(figures.peak) +
                                 " / " + cli::formatBytes(figures.cache),
