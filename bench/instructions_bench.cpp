@@ -25,6 +25,7 @@ struct InstructionFlags {
     bool update = false;
     std::string valgrind = "valgrind";
     std::string program;
+    std::string folder;
 };
 
 const Job* findJob(const std::string& name) {
@@ -34,14 +35,21 @@ const Job* findJob(const std::string& name) {
     return nullptr;
 }
 
+/// `folder`, or `own` when that is empty; what takes long to make is made where it is missing.
+Result<JobFolder> inputFolder(const WorkDirectory& own, const std::string& folder) {
+    JobFolder input{folder.empty() ? own.path() : folder};
+    if (!std::filesystem::exists(input.signatures())) {
+        if (const auto made = prepareJobs(input, cli::defaultThreads()); !made) return fail(made.error());
+    }
+    return input;
+}
+
 Result<int> runJob(const std::string& name, const std::string& folder) {
     const auto own = WorkDirectory::create("");
     if (!own) return fail(own.error());
-    const JobFolder where{folder.empty() ? own->path() : folder};
-    if (!std::filesystem::exists(where.signatures())) {
-        if (const auto made = prepareJobs(where, cli::defaultThreads()); !made) return fail(made.error());
-    }
-    const auto work = findJob(name)->prepare(where);
+    const auto where = inputFolder(*own, folder);
+    if (!where) return fail(where.error());
+    const auto work = findJob(name)->prepare(*where);
     if (!work) return fail(work.error());
     if (const auto done = runCounted(*work); !done) return fail(done.error());
     return cli::kOk;
@@ -52,15 +60,15 @@ Result<Counts> countAll(const InstructionFlags& flags, Bench& bench) {
     const auto environment = countingEnvironment(flags.valgrind);
     if (!environment) return fail(environment.error());
     counts.environment = *environment;
-    const auto prepared = WorkDirectory::create("");
-    if (!prepared) return fail(prepared.error());
-    const JobFolder input{prepared->path()};
+    const auto own = WorkDirectory::create("");
+    if (!own) return fail(own.error());
     // Here and not under callgrind, where it would take minutes.
-    if (const auto made = prepareJobs(input, cli::defaultThreads()); !made) return fail(made.error());
+    const auto input = inputFolder(*own, flags.folder);
+    if (!input) return fail(input.error());
     for (const Job& job : jobs()) {
         bench.console.progress(job.name, counts.jobs.size(), jobs().size());
         if (const auto go = bench.context().checkpoint(); !go) return fail(go.error());
-        const auto count = countInstructions(flags.valgrind, flags.program, job.name, input.path);
+        const auto count = countInstructions(flags.valgrind, flags.program, job.name, input->path);
         if (!count) return fail(count.error());
         counts.jobs[job.name] = *count;
     }
@@ -112,6 +120,8 @@ void addInstructionsOperation(CLI::App& app, Bench& bench) {
     command->add_flag("--update", flags->update, "Write what was counted to BASELINE instead of comparing");
     command->add_option("--valgrind", flags->valgrind, "The program that counts")->capture_default_str();
     command->add_option("--program", flags->program, "The shapedb-bench to count [this one]");
+    command->add_option("--folder", flags->folder,
+                        "Where the jobs' files are; what is missing is made [temporary]");
     command->callback(
         [flags, &bench] { bench.action = [flags, &bench] { return runInstructions(*flags, bench); }; });
 }

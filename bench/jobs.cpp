@@ -202,7 +202,7 @@ const std::vector<Job>& jobs() {
 }
 
 Result<void> prepareJobs(const JobFolder& folder, unsigned threads) {
-    const auto source = SignatureSource::create(kSeed, threads, {});
+    const auto source = SignatureSource::create(kSeed, kSourcePoints, threads, {});
     if (!source) return fail(source.error());
     std::string bytes;
     for (std::size_t i = 0; i < kSignatures; ++i) {

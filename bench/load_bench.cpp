@@ -245,6 +245,11 @@ void addLoadOperation(CLI::App& app, Bench& bench) {
     command->add_option("--shapes", settings.shapes, "latency: stored signatures")
         ->check(CLI::Range(1, 100'000'000))
         ->capture_default_str();
+    command
+        ->add_option("--source-points", settings.sourcePoints,
+                     "Points of the scans that stored signatures are made from")
+        ->check(CLI::Range(100, 1'000'000))
+        ->capture_default_str();
     command->add_option("--queries", settings.queries, "latency: queries idle, and as many busy")
         ->check(CLI::Range(1, 1'000'000))
         ->capture_default_str();

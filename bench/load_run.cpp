@@ -23,8 +23,6 @@ using Clock = std::chrono::steady_clock;
 
 /// Clients for each worker: enough that a worker never waits for the next scan.
 constexpr unsigned kClientsPerWorker = 2;
-/// Queries are made from signatures that are not stored.
-constexpr std::uint64_t kQuerySeed = 1'000'003;
 constexpr std::size_t kDistinctQueries = 64;
 constexpr std::size_t kWarmUpQueries = 3;
 constexpr std::chrono::milliseconds kWarmUp{1'500};
@@ -157,13 +155,10 @@ double medianOf(const std::vector<IngestRound>& rounds, double (*value)(const In
     return percentile(std::move(values), kMedian);
 }
 
-/// Some queries, encoded, that are not among the stored.
-Result<std::vector<std::string>> makeQueries(const LoadSettings& settings, const RunContext& context) {
-    const auto source =
-        SignatureSource::create(settings.seed + kQuerySeed, settings.threads, cancelledBy(context));
-    if (!source) return fail(source.error());
+/// Some queries that are not among the `stored`.
+std::vector<std::string> makeQueries(const SignatureSource& source, std::uint64_t stored) {
     std::vector<std::string> queries;
-    for (std::size_t i = 0; i < kDistinctQueries; ++i) queries.push_back(source->encoded(i));
+    for (std::size_t i = 0; i < kDistinctQueries; ++i) queries.push_back(source.encoded(stored + i));
     return queries;
 }
 
@@ -347,7 +342,8 @@ Result<LatencyFigures> measureLatency(const LoadSettings& settings, const LoadPr
     const auto directory = WorkDirectory::create(settings.directory);
     if (!directory) return fail(directory.error());
     const std::string data = directory->path() + "/data";
-    const auto source = SignatureSource::create(settings.seed, settings.threads, cancelledBy(context));
+    const auto source =
+        SignatureSource::create(settings.seed, settings.sourcePoints, settings.threads, cancelledBy(context));
     if (!source) return fail(source.error());
     RunContext reporting = context;
     reporting.progress = [&](const char*, std::uint64_t done, std::uint64_t total) {
@@ -355,8 +351,7 @@ Result<LatencyFigures> measureLatency(const LoadSettings& settings, const LoadPr
     };
     if (const auto filled = fillDataDirectory(data, *source, settings.shapes, reporting); !filled)
         return fail(filled.error());
-    const auto queries = makeQueries(settings, context);
-    if (!queries) return fail(queries.error());
+    const std::vector<std::string> queries = makeQueries(*source, settings.shapes);
     const auto scans =
         makeScans(settings.scans, settings.scanPoints, settings.seed, settings.threads, context);
     if (!scans) return fail(scans.error());
@@ -366,7 +361,7 @@ Result<LatencyFigures> measureLatency(const LoadSettings& settings, const LoadPr
     if (!client) return fail(client.error());
     const auto uploader = connect(*server);
     if (!uploader) return fail(uploader.error());
-    return measureLatencyOf(settings, *client, *uploader, *queries, *scans, progress, context);
+    return measureLatencyOf(settings, *client, *uploader, queries, *scans, progress, context);
 }
 
 Result<StartFigures> measureStart(const LoadSettings& settings, const LoadProgress& progress,
@@ -374,7 +369,8 @@ Result<StartFigures> measureStart(const LoadSettings& settings, const LoadProgre
     const auto directory = WorkDirectory::create(settings.directory);
     if (!directory) return fail(directory.error());
     const std::string data = settings.startData.empty() ? directory->path() + "/data" : settings.startData;
-    const auto source = SignatureSource::create(settings.seed, settings.threads, cancelledBy(context));
+    const auto source =
+        SignatureSource::create(settings.seed, settings.sourcePoints, settings.threads, cancelledBy(context));
     if (!source) return fail(source.error());
     RunContext reporting = context;
     reporting.progress = [&](const char*, std::uint64_t done, std::uint64_t total) {

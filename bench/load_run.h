@@ -19,10 +19,11 @@ struct LoadSettings {
     unsigned threads = 2;  ///< ingest workers of the server, and threads of the loop beside it
     std::size_t rounds = 3;
     std::size_t scanPoints = 20'000;
-    std::size_t scans = 24;          ///< ingest: of one round
-    std::uint64_t shapes = 100'000;  ///< latency: stored
-    std::size_t queries = 300;       ///< latency: at most, idle and busy each
-    double querySeconds = 120.0;     ///< latency: for these, idle and busy each, about
+    std::size_t scans = 24;            ///< ingest: of one round
+    std::uint64_t shapes = 100'000;    ///< latency: stored
+    std::size_t sourcePoints = 4'000;  ///< of the scans that stored signatures are made from
+    std::size_t queries = 300;         ///< latency: at most, idle and busy each
+    double querySeconds = 120.0;       ///< latency: for these, idle and busy each, about
     std::uint32_t k = 10;
     std::uint64_t startShapes = 1'000'000;
     std::string startData;  ///< startup: data directory to use; made, and kept, where there is none

@@ -23,7 +23,6 @@ namespace {
 
 constexpr double kScanNoise = 0.005;  // of the diagonal
 constexpr std::size_t kRealPerFamily = 4;
-constexpr std::size_t kRealPoints = 8'000;
 // How far a made signature may lie from its real ones: about what two shapes of one family differ.
 constexpr double kPositionSpread = 0.05;  // of the scale
 constexpr double kWeightSpread = 0.15;
@@ -115,13 +114,13 @@ Result<std::vector<PointCloud>> makeScans(std::size_t count, std::size_t points,
     return scans;
 }
 
-Result<SignatureSource> SignatureSource::create(std::uint64_t seed, unsigned threads,
+Result<SignatureSource> SignatureSource::create(std::uint64_t seed, std::size_t points, unsigned threads,
                                                 const RunContext& context) {
     SignatureSource source;
     source.seed_ = seed;
     source.real_.resize(kRealPerFamily * listFamilies().size());
     const auto made = forEach(source.real_.size(), threads, context, [&](std::size_t i) -> Result<void> {
-        const auto scan = makeScan(i, kRealPoints, seed);
+        const auto scan = makeScan(i, points, seed);
         if (!scan) return fail(scan.error());
         RunContext stoppable;
         stoppable.cancel = context.cancel;

@@ -18,13 +18,16 @@ namespace shapedb::bench {
                                                         std::uint64_t seed, unsigned threads,
                                                         const RunContext& context);
 
+/// Of the scans behind a SignatureSource: enough for the segments that 20,000 show.
+constexpr std::size_t kSourcePoints = 4'000;
+
 /// Signatures like those of a large collection: real ones of synthetic scans, and between and around
 /// them as many others as wanted. Immutable; thread-safe.
 class SignatureSource {
   public:
-    /// Describes some tens of scans with the default profile. Errors: those of `describe`.
-    [[nodiscard]] static Result<SignatureSource> create(std::uint64_t seed, unsigned threads,
-                                                        const RunContext& context);
+    /// Describes some tens of scans of `points` points with the default profile. Errors: those of `describe`.
+    [[nodiscard]] static Result<SignatureSource> create(std::uint64_t seed, std::size_t points,
+                                                        unsigned threads, const RunContext& context);
 
     /// Number `index`, encoded. Same seed and index: same bytes.
     [[nodiscard]] std::string encoded(std::uint64_t index) const;
