@@ -4,6 +4,8 @@
 #include <ctime>
 #include <fstream>
 
+#include <nlohmann/json.hpp>
+
 #include "client/cli/evaluation_run.h"
 #include "client/cli/text.h"
 
@@ -61,6 +63,16 @@ std::string describe(const Environment& environment) {
     return environment.date + ", " + environment.processor + ", " +
            cli::formatCount(environment.cores, "core", "cores") + ", " + environment.compiler + ", " +
            environment.buildType + ", ShapeDB " + environment.version;
+}
+
+nlohmann::json environmentJson(const Environment& environment) {
+    return {{"date", environment.date},
+            {"processor", environment.processor},
+            {"cores", environment.cores},
+            {"compiler", environment.compiler},
+            {"build_type", environment.buildType},
+            {"optimised", environment.optimised},
+            {"version", environment.version}};
 }
 
 }  // namespace shapedb::bench

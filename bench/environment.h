@@ -3,6 +3,8 @@
 
 #include <string>
 
+#include <nlohmann/json_fwd.hpp>
+
 namespace shapedb::bench {
 
 struct Environment {
@@ -19,5 +21,8 @@ struct Environment {
 
 /// One line: "2026-01-31, AMD EPYC ..., 2 cores, g++ 12.2.0, Release, ShapeDB 0.1.0".
 [[nodiscard]] std::string describe(const Environment& environment);
+
+/// The same with a name for each.
+[[nodiscard]] nlohmann::json environmentJson(const Environment& environment);
 
 }  // namespace shapedb::bench

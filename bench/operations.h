@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <functional>
+#include <string>
 
 #include "client/cli/console.h"
 #include "core/base/error.h"
@@ -20,6 +21,7 @@ struct Bench {
     /// Where text for people goes, progress and notes.
     cli::Console& console;
     const std::atomic<bool>& cancel;  ///< set by Ctrl-C
+    std::string command;              ///< as the user wrote it, program first
 
     /// Set by the subcommand the user named; run after the whole command line was read. Its value
     /// is the exit code.
@@ -36,5 +38,8 @@ struct Bench {
 void addRetrievalOperation(CLI::App& app, Bench& bench);
 void addInteriorOperation(CLI::App& app, Bench& bench);
 void addTopKOperation(CLI::App& app, Bench& bench);
+void addLoadOperation(CLI::App& app, Bench& bench);
+void addInstructionsOperation(CLI::App& app, Bench& bench);
+void addJobOperation(CLI::App& app, Bench& bench);
 
 }  // namespace shapedb::bench

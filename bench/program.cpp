@@ -19,6 +19,13 @@ int finish(cli::Console& console, int exitCode) {
     return exitCode == cli::kOk ? cli::kBadData : exitCode;
 }
 
+/// Without the folder of the program: figures are compared between machines.
+std::string commandLine(int argc, const char* const* argv) {
+    std::string text = kProgramName;
+    for (int i = 1; i < argc; ++i) text += std::string(" ") + argv[i];
+    return text;
+}
+
 int usageError(cli::Console& console, const CLI::App& app, const CLI::ParseError& error) {
     std::string command = app.get_name();
     for (const CLI::App* sub : app.get_subcommands()) command += " " + sub->get_name();
@@ -32,13 +39,16 @@ int usageError(cli::Console& console, const CLI::App& app, const CLI::ParseError
 
 int run(int argc, const char* const* argv, cli::Console& console, const std::atomic<bool>& cancel) {
     try {
-        Bench bench{console, cancel, {}};
+        Bench bench{console, cancel, commandLine(argc, argv), {}};
         CLI::App app("Measures ShapeDB beside what users would take instead.", kProgramName);
         app.set_version_flag("--version", std::string(kProgramName) + " " SHAPEDB_VERSION);
         app.require_subcommand(1);
         addRetrievalOperation(app, bench);
         addInteriorOperation(app, bench);
         addTopKOperation(app, bench);
+        addLoadOperation(app, bench);
+        addInstructionsOperation(app, bench);
+        addJobOperation(app, bench);
         try {
             app.parse(argc, argv);
         } catch (const CLI::CallForHelp&) {

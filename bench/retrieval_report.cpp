@@ -223,16 +223,6 @@ json methodJson(const MethodResult& method, const MethodResult* unit, bool galle
     return out;
 }
 
-json environmentJson(const Environment& environment) {
-    return {{"date", environment.date},
-            {"processor", environment.processor},
-            {"cores", environment.cores},
-            {"compiler", environment.compiler},
-            {"build_type", environment.buildType},
-            {"optimised", environment.optimised},
-            {"version", environment.version}};
-}
-
 /// Our recommended profile is what the reader looks for.
 Series seriesOf(const MethodResult& method) {
     Series series;

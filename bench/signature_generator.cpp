@@ -15,8 +15,6 @@ namespace shapedb::bench {
 
 namespace {
 
-constexpr std::size_t kMembers = 8;
-constexpr std::size_t kPoints = 3000;
 constexpr double kNoise = 0.002;
 
 // What makes the spread of distances that of a labelled collection (docs/benchmarks.md): how far a
@@ -64,23 +62,31 @@ void disturbPoints(std::vector<SignaturePoint>& points, Random& random, double s
         for (float& x : p.position) {
             x = i == 0 ? 0.0f : std::clamp(x + room * static_cast<float>(random.normal()), -1.0f, 1.0f);
         }
-        const float heavier = factor(kPartsGrow * spread);
-        p.weight *= heavier;
-        p.volumeShare *= heavier;
+        p.weight *= factor(kPartsGrow * spread);
         const float wider = factor(kPartsGrow * spread / 2.0);
         p.peakRadius *= wider;
         for (float& c : p.covariance) c *= wider * wider;
     }
     std::stable_sort(points.begin() + 1, points.end(),
                      [](const SignaturePoint& a, const SignaturePoint& b) { return a.weight > b.weight; });
-    // The heaviest point is the origin, and shares are of one whole.
-    double shares = 0.0;
-    for (SignaturePoint& p : points) {
-        p.weight = std::min(p.weight, points.front().weight);
-        shares += p.volumeShare;
-    }
-    if (shares <= 1.0) return;
-    for (SignaturePoint& p : points) p.volumeShare = static_cast<float>(p.volumeShare / shares);
+    // The heaviest point is the origin.
+    for (SignaturePoint& p : points) p.weight = std::min(p.weight, points.front().weight);
+}
+
+// Volume and shares that go with the weights, where so much of the interior is in the points.
+void fitVolume(Signature& signature, double share) {
+    const double cube = signature.scale * signature.scale * signature.scale;
+    double weights = 0.0;
+    for (const SignaturePoint& p : signature.points) weights += p.weight;
+    signature.volume = weights * cube / share;
+    for (SignaturePoint& p : signature.points)
+        p.volumeShare = volumeShareOf(p.weight, signature.scale, signature.volume);
+}
+
+double shareInPoints(const Signature& signature) {
+    double share = 0.0;
+    for (const SignaturePoint& p : signature.points) share += p.volumeShare;
+    return std::min(share, 0.999);
 }
 
 }  // namespace
@@ -94,28 +100,26 @@ const char* name(Mixture mixture) noexcept {
     return "plain";
 }
 
-Result<SignatureGenerator> SignatureGenerator::create(Mixture mixture, std::size_t expected,
-                                                      std::uint64_t seed, const RunContext& context) {
+Result<SignatureGenerator> SignatureGenerator::create(const Options& options, const RunContext& context) {
     SignatureGenerator generator;
-    generator.mixture_ = mixture;
-    generator.seed_ = seed;
-    generator.classes_ =
-        mixture == Mixture::kHard
-            ? kFewestClasses
-            : std::max(kFewestClasses, static_cast<std::size_t>(std::sqrt(static_cast<double>(expected))));
+    generator.mixture_ = options.mixture;
+    generator.seed_ = options.seed;
+    const auto root = static_cast<std::size_t>(std::sqrt(static_cast<double>(options.expected)));
+    generator.classes_ = options.mixture == Mixture::kHard ? kFewestClasses : std::max(kFewestClasses, root);
     std::vector<std::pair<std::string, std::size_t>> members;
     for (const FamilyInfo& family : listFamilies()) {
-        for (std::size_t member = 0; member < kMembers; ++member) members.emplace_back(family.name, member);
+        for (std::size_t member = 0; member < options.members; ++member)
+            members.emplace_back(family.name, member);
     }
     std::vector<Signature> made(members.size());
     std::vector<std::uint8_t> good(members.size(), 0);
     tbb::parallel_for(std::size_t{0}, members.size(), [&](std::size_t i) {
         const auto solid = makeMember(members[i].first, members[i].second, 1);
-        ScanOptions options;
-        options.count = kPoints;
-        options.noise = kNoise;
-        options.seed = i + 1;
-        const auto points = solid ? scanOf(*solid, options) : Result<PointCloud>(fail(solid.error()));
+        ScanOptions scan;
+        scan.count = options.points;
+        scan.noise = kNoise;
+        scan.seed = i + 1;
+        const auto points = solid ? scanOf(*solid, scan) : Result<PointCloud>(fail(solid.error()));
         if (!points) return;
         auto description = describe(*points, parametersOf(Profile::kDefault), context);
         if (!description) return;
@@ -137,6 +141,7 @@ std::size_t SignatureGenerator::classOf(std::uint64_t index) const {
 Signature SignatureGenerator::ofClass(std::uint64_t index) const {
     Random ofClass(mixed(seed_, 2, classOf(index)));
     Signature signature = anchors_[ofClass.below(anchors_.size())];
+    const double share = shareInPoints(signature);
     const Signature& second = anchors_[ofClass.below(anchors_.size())];
     blendStatistics(signature.attributes->statistics, second.attributes->statistics,
                     ofClass.uniform(0.0, kMostOfSecondAnchor));
@@ -151,6 +156,7 @@ Signature SignatureGenerator::ofClass(std::uint64_t index) const {
     signature.attributes->quality =
         static_cast<std::uint8_t>(255.0 * (1.0 - 0.1 * random.uniform() * random.uniform()));
     signature.scale = std::exp(random.normal());
+    fitVolume(signature, share);
     return signature;
 }
 
@@ -165,7 +171,9 @@ Signature SignatureGenerator::make(std::uint64_t index) const {
                 level = static_cast<std::uint8_t>(random.below(2) == 0 ? level - 1 : level + 1);
             }
         }
+        const double share = shareInPoints(signature);
         disturbPoints(signature.points, random, 0.03);
+        fitVolume(signature, share);
     }
     signature.attributes->body = bodyOf(signature.points);
     return signature;

@@ -20,19 +20,25 @@ enum class Mixture {
 };
 [[nodiscard]] const char* name(Mixture mixture) noexcept;
 
-/// Anchors are signatures of real scans of the synthetic families (core/synthetic): about 100, of
-/// 3,000 points with 0.2 % noise. A class is a blend of two of them; a shape of the class is its blend
+/// Anchors are signatures of scans of the synthetic families (core/synthetic): about 100, with 0.2 %
+/// noise. A class is a blend of two of them; a shape of the class is its blend
 /// with a third, with parts moved, resized, lost and won.
 ///
 /// Immutable; `make` may be called from any number of threads.
 class SignatureGenerator {
   public:
-    /// `expected`: of how many shapes a collection is to be drawn; their number of classes grows with
-    /// its root. Takes seconds. Errors: kCancelled.
-    [[nodiscard]] static Result<SignatureGenerator> create(Mixture mixture, std::size_t expected,
-                                                           std::uint64_t seed, const RunContext& context);
+    struct Options {
+        Mixture mixture = Mixture::kPlain;
+        /// Of how many shapes a collection is to be drawn: classes grow with the root of it.
+        std::uint64_t expected = 1000;
+        std::uint64_t seed = 1;
+        std::size_t points = 3000;  ///< of each scan behind an anchor
+        std::size_t members = 8;    ///< of each family
+    };
+    /// Takes seconds. Errors: kCancelled.
+    [[nodiscard]] static Result<SignatureGenerator> create(const Options& options, const RunContext& context);
 
-    /// Shape `index`: the same for the same seed, mixture and expected size.
+    /// Shape `index`: the same for the same options. As decodeSignature(encodeSignature()) would give it.
     [[nodiscard]] Signature make(std::uint64_t index) const;
     [[nodiscard]] std::size_t classOf(std::uint64_t index) const;
     [[nodiscard]] std::size_t classes() const { return classes_; }

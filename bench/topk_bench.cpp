@@ -75,7 +75,7 @@ class TopKRun {
         : flags_(flags), shapes_(shapes), mixture_(mixture), bench_(bench) {}
 
     Result<nlohmann::json> run() {
-        auto generator = SignatureGenerator::create(mixture_, shapes_, flags_.seed, bench_.context());
+        auto generator = SignatureGenerator::create({mixture_, shapes_, flags_.seed}, bench_.context());
         if (!generator) return fail(generator.error());
         generator_.emplace(std::move(*generator));
         options_.k = flags_.k;

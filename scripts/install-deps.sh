@@ -12,7 +12,7 @@ build_packages=(
   libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc
   libsqlite3-dev libzstd-dev libssl-dev libspdlog-dev libtomlplusplus-dev
   libcli11-dev nlohmann-json3-dev libpng-dev liblzf-dev zlib1g-dev
-  libgtest-dev libgmock-dev clang-format-14
+  libgtest-dev libgmock-dev clang-format-14 valgrind
 )
 runtime_packages=(
   ca-certificates libgmpxx4ldbl libmpfr6 libtbb12 libgrpc++1.51 libprotobuf32 libsqlite3-0

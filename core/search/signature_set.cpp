@@ -81,6 +81,7 @@ SignatureSet SignatureSet::with(const std::vector<IndexEntry>& updates,
         const SignatureBlock& block = *blocks_[b];
         // A block answers for the ids up to the next block's first; the last one for all that follow
         // as long as it has room.
+        const bool lastAndFull = b + 1 == blocks_.size() && block.size() == kBlockSize;
         auto updatesEnd = sorted.cend();
         if (b + 1 < blocks_.size()) {
             const std::int64_t bound = blocks_[b + 1]->id(0);
@@ -89,7 +90,11 @@ SignatureSet SignatureSet::with(const std::vector<IndexEntry>& updates,
         }
         const auto removedFrom = std::lower_bound(removedIds.begin(), removedIds.end(), block.id(0));
         const bool removes = removedFrom != removedIds.end() && *removedFrom <= block.id(block.size() - 1);
-        if (update == updatesEnd && !removes) {
+        const bool follow = update != updatesEnd && (*update)->id > block.id(block.size() - 1);
+        if (lastAndFull && follow && !removes) {
+            keep(blocks_[b]);
+            keepSplit(applyChanges({}, update, updatesEnd, {}));
+        } else if (update == updatesEnd && !removes) {
             keep(blocks_[b]);
         } else {
             keepSplit(applyChanges(block, update, updatesEnd, removedIds));

@@ -13,6 +13,13 @@ void require(int ok) {
     if (ok != 1) throw std::bad_alloc();
 }
 
+// Looked up once: EVP_sha256() is searched for by name at each use, which takes as long as hashing some
+// hundred bytes.
+const EVP_MD* algorithm() {
+    static const EVP_MD* const found = EVP_MD_fetch(nullptr, "SHA256", nullptr);
+    return found != nullptr ? found : EVP_sha256();
+}
+
 }  // namespace
 
 struct Sha256::Context {
@@ -27,7 +34,7 @@ struct Sha256::Context {
 };
 
 Sha256::Sha256() : context_(std::make_unique<Context>()) {
-    require(EVP_DigestInit_ex(context_->evp, EVP_sha256(), nullptr));
+    require(EVP_DigestInit_ex(context_->evp, algorithm(), nullptr));
 }
 
 Sha256::~Sha256() = default;
@@ -41,14 +48,14 @@ void Sha256::update(const void* data, std::size_t size) {
 Sha256Digest Sha256::finish() {
     Sha256Digest digest{};
     require(EVP_DigestFinal_ex(context_->evp, digest.data(), nullptr));
-    require(EVP_DigestInit_ex(context_->evp, EVP_sha256(), nullptr));
+    require(EVP_DigestInit_ex(context_->evp, algorithm(), nullptr));
     return digest;
 }
 
 Sha256Digest sha256(const void* data, std::size_t size) {
-    Sha256 hash;
-    hash.update(data, size);
-    return hash.finish();
+    Sha256Digest digest{};
+    require(EVP_Digest(size > 0 ? data : "", size, digest.data(), nullptr, algorithm(), nullptr));
+    return digest;
 }
 
 std::string toHex(const Sha256Digest& digest) {

@@ -6,8 +6,8 @@
 #include <optional>
 #include <utility>
 
-#include <tbb/parallel_for.h>
-#include <tbb/task_group.h>
+#include <oneapi/tbb/parallel_pipeline.h>
+#include <oneapi/tbb/task_arena.h>
 
 #include "core/signature/signature_codec.h"
 #include "server/index/parameters_codec.h"
@@ -16,7 +16,14 @@ namespace shapedb::index {
 namespace {
 
 /// Rows of one read: large enough to be cheap, small enough to leave the writer its turn.
-constexpr std::size_t kLoadBatch = 4'096;
+constexpr std::size_t kLoadBatch = 2 * SignatureSet::kBlockSize;
+/// One collection is read again while searches go on: they keep the other processors.
+constexpr std::size_t kBatchesWhileServing = 1;
+
+/// Two for each processor: one is decoded while the next waits.
+std::size_t batchesOfAllProcessors() {
+    return 2 * static_cast<std::size_t>(oneapi::tbb::this_task_arena::max_concurrency());
+}
 
 /// Empty when the signature is damaged; the damage is logged.
 std::optional<IndexEntry> makeEntry(const store::Shape& shape, const std::string& bytes,
@@ -30,21 +37,6 @@ std::optional<IndexEntry> makeEntry(const store::Shape& shape, const std::string
         return std::nullopt;
     }
     return IndexEntry{shape.id, shape.metadata, std::move(*signature)};
-}
-
-/// `set` with what these rows say; decodes them in parallel.
-SignatureSet withRows(const SignatureSet& set, const std::vector<store::IndexRow>& rows,
-                      telemetry::Logger& log) {
-    std::vector<std::optional<IndexEntry>> decoded(rows.size());
-    tbb::parallel_for(std::size_t{0}, rows.size(), [&](std::size_t i) {
-        decoded[i] = makeEntry(rows[i].shape, rows[i].signature.bytes, log);
-    });
-    std::vector<IndexEntry> entries;
-    entries.reserve(rows.size());
-    for (std::optional<IndexEntry>& entry : decoded) {
-        if (entry) entries.push_back(std::move(*entry));
-    }
-    return set.with(entries, {});
 }
 
 Result<ShapeParameters> parametersOf(const store::Collection& collection) {
@@ -102,7 +94,53 @@ CollectionIndex::CollectionIndex(store::Store& store, telemetry::LoggerPtr log)
 
 CollectionIndex::~CollectionIndex() = default;
 
-Result<SnapshotPtr> CollectionIndex::read(const store::Collection& collection,
+/// One thread reads from the store while others decode what was read before: decoding takes longer.
+/// At most `batches` are in the making at one moment; 1 takes a single processor.
+Result<SignatureSet> CollectionIndex::readSignatures(std::int64_t collectionId, std::size_t batches,
+                                                     const RunContext& context) const {
+    namespace flow = oneapi::tbb;
+    using Rows = std::shared_ptr<const std::vector<store::IndexRow>>;
+    using Entries = std::shared_ptr<std::vector<IndexEntry>>;
+    std::optional<Error> failure;
+    std::int64_t afterId = 0;
+    bool last = false;
+    const auto readBatch = [&](flow::flow_control& control) -> Rows {
+        const auto stop = [&](const Error& error) {
+            failure = error;
+            control.stop();
+            return Rows();
+        };
+        if (last) {
+            control.stop();
+            return {};
+        }
+        if (const auto go = context.checkpoint(); !go) return stop(go.error());
+        auto rows = store_.loadIndex(collectionId, afterId, kLoadBatch);
+        if (!rows) return stop(rows.error());
+        last = rows->size() < kLoadBatch;
+        if (!rows->empty()) afterId = rows->back().shape.id;
+        return std::make_shared<const std::vector<store::IndexRow>>(std::move(*rows));
+    };
+    const auto decodeBatch = [&](const Rows& rows) {
+        auto decoded = std::make_shared<std::vector<IndexEntry>>();
+        decoded->reserve(rows->size());
+        for (const store::IndexRow& row : *rows) {
+            if (auto entry = makeEntry(row.shape, row.signature.bytes, *log_))
+                decoded->push_back(std::move(*entry));
+        }
+        return decoded;
+    };
+    SignatureSet signatures;
+    const auto append = [&](const Entries& decoded) { signatures = signatures.with(*decoded, {}); };
+    flow::parallel_pipeline(batches,
+                            flow::make_filter<void, Rows>(flow::filter_mode::serial_in_order, readBatch) &
+                                flow::make_filter<Rows, Entries>(flow::filter_mode::parallel, decodeBatch) &
+                                flow::make_filter<Entries, void>(flow::filter_mode::serial_in_order, append));
+    if (failure) return fail(*failure);
+    return signatures;
+}
+
+Result<SnapshotPtr> CollectionIndex::read(const store::Collection& collection, std::size_t batches,
                                           const RunContext& context) const {
     auto snapshot = std::make_shared<Snapshot>();
     snapshot->collection = collection;
@@ -110,26 +148,9 @@ Result<SnapshotPtr> CollectionIndex::read(const store::Collection& collection,
     if (!parameters) return fail(parameters.error());
     snapshot->parameters = *parameters;
 
-    // One batch is decoded while the next is read.
-    std::vector<store::IndexRow> decoding;
-    tbb::task_group decoder;
-    Result<void> done;
-    std::int64_t afterId = 0;
-    for (;;) {
-        done = context.checkpoint();
-        if (!done) break;
-        auto rows = store_.loadIndex(collection.id, afterId, kLoadBatch);
-        decoder.wait();
-        if (!rows) done = fail(rows.error());
-        if (!done) break;
-        decoding = std::move(*rows);
-        const bool last = decoding.size() < kLoadBatch;
-        if (!decoding.empty()) afterId = decoding.back().shape.id;
-        decoder.run([&] { snapshot->signatures = withRows(snapshot->signatures, decoding, *log_); });
-        if (last) break;
-    }
-    decoder.wait();
-    if (!done) return fail(done.error());
+    auto signatures = readSignatures(collection.id, batches, context);
+    if (!signatures) return fail(signatures.error());
+    snapshot->signatures = std::move(*signatures);
     return SnapshotPtr(std::move(snapshot));
 }
 
@@ -148,7 +169,7 @@ Result<void> CollectionIndex::loadAllUnguarded(const RunContext& context) {
     if (!collections) return fail(collections.error());
     Directory next;
     for (const store::Collection& collection : *collections) {
-        Result<SnapshotPtr> snapshot = read(collection, context);
+        Result<SnapshotPtr> snapshot = read(collection, batchesOfAllProcessors(), context);
         if (!snapshot) return fail(snapshot.error());
         auto slot = std::make_shared<Slot>();
         slot->publish(*snapshot);
@@ -263,7 +284,7 @@ Result<void> CollectionIndex::reloadLocked(Slot& slot) {
     slot.takeDirty();
     const auto collection = store_.getCollection(slot.current()->collection.name);
     if (!collection) return fail(collection.error());
-    Result<SnapshotPtr> snapshot = read(*collection, {});
+    Result<SnapshotPtr> snapshot = read(*collection, kBatchesWhileServing, {});
     if (!snapshot) return fail(snapshot.error());
     slot.publish(*snapshot);
     slot.stale = false;

@@ -44,7 +44,7 @@ class CollectionIndex {
     CollectionIndex(store::Store& store, telemetry::LoggerPtr log);
     ~CollectionIndex();
 
-    /// Reads everything anew and swaps it in at the end (start, restore). Signatures that
+    /// Reads everything anew, on all processors, and swaps it in at the end (start, restore). Signatures that
     /// cannot be decoded are logged and left out. Errors: kCancelled, kDeadlineExceeded;
     /// kDataLoss: parameters of a collection, which is named.
     [[nodiscard]] Result<void> loadAll(const RunContext& context = {});
@@ -96,7 +96,10 @@ class CollectionIndex {
 
     SlotPtr find(std::int64_t collectionId) const;
     Result<void> loadAllUnguarded(const RunContext& context);
-    Result<SnapshotPtr> read(const store::Collection& collection, const RunContext& context) const;
+    Result<SnapshotPtr> read(const store::Collection& collection, std::size_t batches,
+                             const RunContext& context) const;
+    Result<SignatureSet> readSignatures(std::int64_t collectionId, std::size_t batches,
+                                        const RunContext& context) const;
     Result<void> reloadLocked(Slot& slot);
     Result<void> applyDirty(Slot& slot);
     void insert(Directory& directory, SlotPtr slot) const;

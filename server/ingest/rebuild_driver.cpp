@@ -8,6 +8,7 @@
 
 #include "core/signature/signature_codec.h"
 #include "server/index/parameters_codec.h"
+#include "server/ingest/background_thread.h"
 
 namespace shapedb::ingest {
 namespace {
@@ -54,7 +55,12 @@ Result<void> RebuildDriver::enqueueRunning() {
 
 Result<void> RebuildDriver::start() {
     if (const auto queued = enqueueRunning(); !queued) return queued;
-    for (int i = 0; i < std::max(1, options_.threads); ++i) threads_.emplace_back([this] { run(); });
+    for (int i = 0; i < std::max(1, options_.threads); ++i) {
+        threads_.emplace_back([this] {
+            becomeBackgroundThread();
+            run();
+        });
+    }
     return {};
 }
 

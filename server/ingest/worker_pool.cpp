@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/signature/signature_codec.h"
+#include "server/ingest/background_thread.h"
 
 namespace shapedb::ingest {
 namespace {
@@ -57,7 +58,12 @@ Result<void> WorkerPool::recover() {
 
 Result<void> WorkerPool::start() {
     if (const auto recovered = recover(); !recovered) return recovered;
-    for (int i = 0; i < std::max(1, options_.threads); ++i) threads_.emplace_back([this] { run(); });
+    for (int i = 0; i < std::max(1, options_.threads); ++i) {
+        threads_.emplace_back([this] {
+            becomeBackgroundThread();
+            run();
+        });
+    }
     return {};
 }
 
@@ -255,7 +261,7 @@ WorkerPool::Outcome WorkerPool::attempt(Running& running) {
         }();
         return gone ? giveUp(job, collection.error()) : Outcome::kStoreFailed;
     }
-    const auto points = store_.loadPoints(job.shapeId);
+    auto points = store_.loadPoints(job.shapeId);
     if (!points) {
         if (!isTransient(points.error().code)) return giveUp(job, points.error());
         log_->error("cannot read the points of a job", fieldsOf(job, points.error()));
@@ -267,7 +273,9 @@ WorkerPool::Outcome WorkerPool::attempt(Running& running) {
         board_.report(job.shapeId, stage, done, total);
     };
     context.report("start", 0, 0);
-    const Result<Description> description = describe_(toCloud(*points), (*collection)->parameters, context);
+    const PointCloud cloud = toCloud(*points);
+    std::vector<float>().swap(*points);  // half as much again as the cloud: not kept beside it
+    const Result<Description> description = describe_(cloud, (*collection)->parameters, context);
     if (!description) {
         if (description.error().code == ErrorCode::kCancelled && !running.superseded)
             return Outcome::kPutBack;

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <new>
 #include <utility>
 
 #include "server/rpc/limits.h"
@@ -30,7 +31,16 @@ Result<void> PointReceiver::begin(std::uint64_t announced, const std::string& sh
     }
     announced_ = announced;
     wantedChecksum_ = sha256;
+    setAside(announced);
     return {};
+}
+
+void PointReceiver::setAside(std::uint64_t points) {
+    try {
+        scan_.xyz.reserve(3 * static_cast<std::size_t>(points));
+    } catch (const std::bad_alloc&) {
+        // A machine that commits no more than it has: what arrives decides.
+    }
 }
 
 Result<void> PointReceiver::checkChunk(const std::string& xyz) const {

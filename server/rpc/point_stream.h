@@ -18,8 +18,9 @@ struct ReceivedScan {
     Sha256Digest checksum{};  ///< of the bytes as they came
 };
 
-/// Takes header and chunks in the order they came. Memory grows with what arrived, never with
-/// what was announced. One per upload; not thread-safe. After an error only destruction.
+/// Takes header and chunks in the order they came. Resident memory grows with what arrived, never with
+/// what was announced: of that only addresses are set aside, so that no growing copies the points. One per
+/// upload; not thread-safe. After an error only destruction.
 class PointReceiver {
   public:
     /// `maxPoints` as config limits.max_points; `budget` is not owned.
@@ -42,6 +43,7 @@ class PointReceiver {
     [[nodiscard]] std::uint64_t points() const { return scan_.xyz.size() / 3; }
 
   private:
+    void setAside(std::uint64_t points);
     Result<void> checkChunk(const std::string& xyz) const;
 
     std::uint64_t maxPoints_;

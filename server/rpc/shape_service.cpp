@@ -4,7 +4,6 @@
 #include <cstring>
 #include <utility>
 
-#include "core/geometry/sanitise.h"
 #include "core/search/filter.h"
 #include "server/rpc/call.h"
 #include "server/rpc/convert.h"
@@ -12,6 +11,7 @@
 #include "server/rpc/limits.h"
 #include "server/rpc/point_stream.h"
 #include "server/rpc/request_checks.h"
+#include "server/rpc/scan_check.h"
 #include "server/rpc/shape_lookup.h"
 
 namespace shapedb::rpc {
@@ -43,14 +43,6 @@ Result<void> checkHeader(const Services& services, Call& call, const pb::AddShap
     if (services.restores.restoring()) {
         return fail(ErrorCode::kUnavailable, "the database is being replaced by a backup: try again later");
     }
-    return {};
-}
-
-/// Refuses what could never be segmented, before it is stored. What only the segmentation can
-/// see (no interior) is found later and recorded as FAILED.
-Result<void> checkUsable(const std::vector<float>& xyz) {
-    const auto sanitised = sanitise(ingest::toCloud(xyz));
-    if (!sanitised) return fail(sanitised.error());
     return {};
 }
 

@@ -1,9 +1,13 @@
 #include "server/store/point_blob.h"
 
+#include <algorithm>
 #include <cstring>
+#include <memory>
 #include <new>
 
 #include <zstd.h>
+
+#include "server/store/sqlite_connection.h"
 
 namespace shapedb::store {
 
@@ -82,6 +86,88 @@ Result<std::string> encodePoints(const std::vector<float>& points, int level) tr
     return blob;
 } catch (const std::bad_alloc&) {
     return fail(ErrorCode::kOutOfMemory, "no memory to compress points");
+}
+
+namespace {
+
+/// Of one step through a plane.
+constexpr std::size_t kPieceBytes = std::size_t{1} << 17;
+
+struct FreeContext {
+    void operator()(ZSTD_CCtx* context) const noexcept { ZSTD_freeCCtx(context); }
+};
+using Compressor = std::unique_ptr<ZSTD_CCtx, FreeContext>;
+
+std::size_t orRaise(std::size_t zstdCode) {
+    if (ZSTD_isError(zstdCode) == 0) return zstdCode;
+    raise(ErrorCode::kInternal, std::string("zstd cannot compress points: ") + ZSTD_getErrorName(zstdCode));
+}
+
+}  // namespace
+
+Result<PointEncoding> PointEncoding::plan(const std::vector<float>& points, int level) {
+    PointEncoding encoding;
+    encoding.points_ = &points;
+    encoding.level_ = level;
+    const std::size_t bytes = points.size() * kFloatBytes;
+    if (bytes <= kHeldBytes) {
+        auto blob = encodePoints(points, level);
+        if (!blob) return fail(blob.error());
+        encoding.blob_ = std::move(*blob);
+        encoding.held_ = true;
+        encoding.size_ = encoding.blob_.size();
+        return encoding;
+    }
+    return guarded("compress points", [&] {
+        const std::uint64_t compressed = encoding.compress([](const void*, std::size_t) {});
+        encoding.format_ = compressed < bytes ? PointFormat::kPlanesZstd : PointFormat::kRaw;
+        encoding.size_ = 1 + std::min<std::uint64_t>(compressed, bytes);
+        return encoding;
+    });
+}
+
+void PointEncoding::write(const Sink& sink) const {
+    if (held_) return sink(blob_.data(), blob_.size());
+    const auto format = static_cast<char>(format_);
+    sink(&format, 1);
+    std::uint64_t written = points_->size() * kFloatBytes;
+    if (format_ == PointFormat::kRaw) {
+        sink(points_->data(), static_cast<std::size_t>(written));
+    } else {
+        written = compress(sink);
+    }
+    // Same library, input and pieces: zstd is deterministic.
+    if (1 + written != size_) raise(ErrorCode::kInternal, "zstd made another size of the same points");
+}
+
+/// The planes one after another through zstd; returns the bytes of the frame.
+std::uint64_t PointEncoding::compress(const Sink& sink) const {
+    const Compressor context(ZSTD_createCCtx());
+    if (!context) throw std::bad_alloc();
+    const std::size_t count = points_->size() / 3;
+    orRaise(ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, level_));
+    orRaise(ZSTD_CCtx_setPledgedSrcSize(context.get(), kPointBytes * count));
+    const auto* bytes = reinterpret_cast<const unsigned char*>(points_->data());
+    std::vector<unsigned char> piece(kPieceBytes);
+    std::vector<unsigned char> frame(ZSTD_CStreamOutSize());
+    std::uint64_t written = 0;
+    for (std::size_t k = 0; k < kPointBytes; ++k) {
+        for (std::size_t first = 0; first < count; first += kPieceBytes) {
+            const std::size_t size = std::min(kPieceBytes, count - first);
+            for (std::size_t i = 0; i < size; ++i) piece[i] = bytes[kPointBytes * (first + i) + k];
+            const bool last = k + 1 == kPointBytes && first + size == count;
+            ZSTD_inBuffer in{piece.data(), size, 0};
+            for (bool more = true; more;) {
+                ZSTD_outBuffer out{frame.data(), frame.size(), 0};
+                const std::size_t left = orRaise(
+                    ZSTD_compressStream2(context.get(), &out, &in, last ? ZSTD_e_end : ZSTD_e_continue));
+                if (out.pos > 0) sink(frame.data(), out.pos);
+                written += out.pos;
+                more = last ? left != 0 : in.pos < in.size;
+            }
+        }
+    }
+    return written;
 }
 
 Result<std::vector<float>> decodePoints(const void* blob, std::size_t size, std::uint64_t floatCount) try {

@@ -1,6 +1,7 @@
 #include "server/store/sqlite_connection.h"
 
 #include <cerrno>
+#include <limits>
 
 #include <sqlite3.h>
 
@@ -183,6 +184,10 @@ void Query::bind(int position, BlobView value) {
     check(sqlite3_bind_blob64(statement_, position, data, value.size, SQLITE_STATIC));
 }
 
+void Query::bind(int position, ZeroBlob value) {
+    check(sqlite3_bind_zeroblob64(statement_, position, value.size));
+}
+
 void Query::bindInteger(int position, std::int64_t value) {
     check(sqlite3_bind_int64(statement_, position, value));
 }
@@ -228,6 +233,25 @@ Transaction::~Transaction() {
 void Transaction::commit() {
     Query(connection_, kCommit).run();
     open_ = false;
+}
+
+BlobWriter::BlobWriter(Connection& connection, const char* table, const char* column, std::int64_t rowId)
+    : connection_(connection) {
+    constexpr int kForWriting = 1;
+    const int code =
+        sqlite3_blob_open(connection.handle(), "main", table, column, rowId, kForWriting, &blob_);
+    if (code != SQLITE_OK) connection.raiseLast(code);
+}
+
+BlobWriter::~BlobWriter() { sqlite3_blob_close(blob_); }
+
+void BlobWriter::append(const void* data, std::size_t size) {
+    // SQLite holds no blob of 2^31 bytes and refuses to write past the end of one.
+    if (size > static_cast<std::size_t>(std::numeric_limits<int>::max() - at_))
+        raise(ErrorCode::kInternal, "a blob is written past its end");
+    const int code = sqlite3_blob_write(blob_, data, static_cast<int>(size), at_);
+    if (code != SQLITE_OK) connection_.raiseLast(code);
+    at_ += static_cast<int>(size);
 }
 
 Interruptible::Interruptible(Connection& connection, const RunContext& context) : connection_(connection) {

@@ -21,6 +21,7 @@
 #include "core/base/run_context.h"
 
 struct sqlite3;
+struct sqlite3_blob;
 struct sqlite3_stmt;
 
 namespace shapedb::store {
@@ -123,6 +124,11 @@ struct BlobView {
     std::size_t size = 0;
 };
 
+/// A blob of zeros that takes no memory, to be filled by a BlobWriter.
+struct ZeroBlob {
+    std::uint64_t size = 0;
+};
+
 /// One execution of a cached statement. `sql` must be one of the constants of sqlite_sql.h:
 /// its address is the cache key. Two executions of the same text must not overlap.
 class Query {
@@ -161,11 +167,31 @@ class Query {
     }
     void bind(int position, const std::string& value);
     void bind(int position, BlobView value);
+    void bind(int position, ZeroBlob value);
     void bindInteger(int position, std::int64_t value);
     void check(int code) const;
 
     Connection& connection_;
     sqlite3_stmt* statement_;
+};
+
+/// Fills a blob that was inserted as ZeroBlob, from its start to its end, so that it is never in memory
+/// as a whole. Inside the transaction that inserted it.
+class BlobWriter {
+  public:
+    /// Names must outlive this. Throws Failure.
+    BlobWriter(Connection& connection, const char* table, const char* column, std::int64_t rowId);
+    ~BlobWriter();
+    BlobWriter(const BlobWriter&) = delete;
+    BlobWriter& operator=(const BlobWriter&) = delete;
+
+    /// Throws Failure, also when the blob is full.
+    void append(const void* data, std::size_t size);
+
+  private:
+    Connection& connection_;
+    sqlite3_blob* blob_ = nullptr;
+    int at_ = 0;
 };
 
 /// BEGIN IMMEDIATE (or a read snapshot) ... COMMIT; rolls back when not committed.

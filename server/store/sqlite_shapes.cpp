@@ -32,10 +32,17 @@ void writeMetadata(Connection& connection, std::int64_t shapeId, const Metadata&
 }
 
 void writePoints(Connection& connection, std::int64_t shapeId, const PutRequest& request,
-                 const std::string& blob) {
-    Query(connection, sql::kInsertPoints, shapeId, request.points->size() * sizeof(float), blob.size(),
-          BlobView{blob.data(), blob.size()})
-        .run();
+                 const PointEncoding& encoding) {
+    const std::size_t bytes = request.points->size() * sizeof(float);
+    if (const std::string* blob = encoding.held()) {
+        Query(connection, sql::kInsertPoints, shapeId, bytes, blob->size(),
+              BlobView{blob->data(), blob->size()})
+            .run();
+        return;
+    }
+    Query(connection, sql::kInsertPoints, shapeId, bytes, encoding.size(), ZeroBlob{encoding.size()}).run();
+    BlobWriter writer(connection, "shape_points", "points", shapeId);
+    encoding.write([&](const void* data, std::size_t size) { writer.append(data, size); });
 }
 
 BlobView view(const Checksum& checksum) { return {checksum.data(), checksum.size()}; }
@@ -84,19 +91,19 @@ void SqliteStore::queueJob(Connection& connection, const PutRequest& request, st
 }
 
 PutResult SqliteStore::insertShape(Connection& connection, const PutRequest& request,
-                                   const std::string& blob) {
+                                   const PointEncoding& encoding) {
     Query(connection, sql::kInsertShape, request.collectionId, request.key, request.points->size() / 3,
           view(request.checksum), now())
         .run();
     const std::int64_t shapeId = connection.lastInsertId();
     writeMetadata(connection, shapeId, request.metadata);
-    writePoints(connection, shapeId, request, blob);
+    writePoints(connection, shapeId, request, encoding);
     queueJob(connection, request, shapeId, 1);
     return {PutOutcome::kCreated, *findShapeById(connection, shapeId)};
 }
 
-PutResult SqliteStore::changeShape(Connection& connection, const PutRequest& request, const std::string& blob,
-                                   const Shape& existing) {
+PutResult SqliteStore::changeShape(Connection& connection, const PutRequest& request,
+                                   const PointEncoding& encoding, const Shape& existing) {
     const std::int64_t shapeId = existing.id;
     const bool samePoints = existing.checksum == request.checksum;
     if (existing.metadata != request.metadata) {
@@ -111,7 +118,7 @@ PutResult SqliteStore::changeShape(Connection& connection, const PutRequest& req
           now())
         .run();
     Query(connection, sql::kDeletePoints, shapeId).run();
-    writePoints(connection, shapeId, request, blob);
+    writePoints(connection, shapeId, request, encoding);
     // The serving signature stays until the new result arrives; what a running rebuild has
     // made of the old points is worth nothing.
     const Collection collection = requireCollection(connection, existing.collectionId);
@@ -123,21 +130,22 @@ PutResult SqliteStore::changeShape(Connection& connection, const PutRequest& req
 }
 
 Result<PutResult> SqliteStore::putShape(const PutRequest& request) {
-    // Hashing and compressing take the longest and need no lock.
-    Result<std::string> blob = guarded("store the scan", [&] {
+    // Hashing and compressing take the longest and need no lock (a large scan is compressed a second
+    // time under it).
+    const auto encoding = guarded("store the scan", [&] {
         requireValid(request);
-        return orRaise(encodePoints(*request.points, options_.pointCompressionLevel));
+        return orRaise(PointEncoding::plan(*request.points, options_.pointCompressionLevel));
     });
-    if (!blob) return fail(blob.error());
+    if (!encoding) return fail(encoding.error());
     return write("store the scan", [&](Connection& connection) -> PutResult {
         const Collection collection = requireCollection(connection, request.collectionId);
         const std::optional<Shape> existing = findShape(connection, request.collectionId, request.key);
         const bool identical =
             existing && existing->checksum == request.checksum && existing->metadata == request.metadata;
         requireAllowed(request, collection, existing, identical);
-        if (!existing) return insertShape(connection, request, *blob);
+        if (!existing) return insertShape(connection, request, *encoding);
         if (identical) return {PutOutcome::kUnchanged, *existing};
-        return changeShape(connection, request, *blob, *existing);
+        return changeShape(connection, request, *encoding, *existing);
     });
 }
 

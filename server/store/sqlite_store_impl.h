@@ -12,6 +12,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "server/store/point_blob.h"
 #include "server/store/process_lock.h"
 #include "server/store/sqlite_pool.h"
 #include "server/store/sqlite_store.h"
@@ -108,8 +109,8 @@ class SqliteStore final : public Store {
     /// anew while overlapping reads go on without a gap. Past a bound this waits for one.
     void boundWal() noexcept;
 
-    PutResult insertShape(Connection& connection, const PutRequest& request, const std::string& blob);
-    PutResult changeShape(Connection& connection, const PutRequest& request, const std::string& blob,
+    PutResult insertShape(Connection& connection, const PutRequest& request, const PointEncoding& encoding);
+    PutResult changeShape(Connection& connection, const PutRequest& request, const PointEncoding& encoding,
                           const Shape& existing);
     void queueJob(Connection& connection, const PutRequest& request, std::int64_t shapeId,
                   std::int64_t pointsVersion);

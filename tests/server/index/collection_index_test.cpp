@@ -67,6 +67,18 @@ TEST_F(Index, LoadsAllThatIsStored) {
     expectSameAsStore();
 }
 
+// More than two batches, decoded side by side: all there, in the order of their ids, none twice.
+TEST_F(Index, LoadsManyBatches) {
+    constexpr std::size_t kShapes = 4'500;
+    for (std::size_t i = 0; i < kShapes; ++i) put("shape-" + std::to_string(i), 1.0f + static_cast<float>(i));
+    ASSERT_TRUE(index.loadAll());
+    EXPECT_EQ(index.totals().signatures, kShapes);
+    expectSameAsStore();
+    ASSERT_TRUE(index.reload(parts.id));
+    EXPECT_EQ(index.totals().signatures, kShapes);
+    expectSameAsStore();
+}
+
 TEST_F(Index, NamesAndIdsFindTheSame) {
     EXPECT_EQ((*index.byName("parts"))->collection.id, parts.id);
     EXPECT_EQ((*index.byId(parts.id))->collection.name, "parts");

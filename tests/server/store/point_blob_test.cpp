@@ -113,6 +113,58 @@ TEST(PointBlob, IncompressibleStaysRaw) {
     EXPECT_EQ(blob.size(), 1 + 4 * points.size());
 }
 
+std::string written(const PointEncoding& encoding) {
+    std::string blob;
+    encoding.write(
+        [&](const void* data, std::size_t size) { blob.append(static_cast<const char*>(data), size); });
+    return blob;
+}
+
+// More than a piece, and no whole number of them.
+constexpr std::size_t kLargePoints = PointEncoding::kHeldBytes / 12 + 1'001;
+
+TEST(PointEncoding, SmallIsHeldAndTheSame) {
+    const std::vector<float> points = scan(500);
+    const auto encoding = PointEncoding::plan(points, 1);
+    ASSERT_TRUE(encoding);
+    ASSERT_NE(encoding->held(), nullptr);
+    EXPECT_EQ(*encoding->held(), encodePoints(points, 1).value());
+    EXPECT_EQ(written(*encoding), *encoding->held());
+    EXPECT_EQ(encoding->size(), encoding->held()->size());
+}
+
+TEST(PointEncoding, LargeIsWrittenInPiecesAndComesBack) {
+    const std::vector<float> points = scan(kLargePoints);
+    for (const int level : {1, 3}) {
+        const auto encoding = PointEncoding::plan(points, level);
+        ASSERT_TRUE(encoding);
+        EXPECT_EQ(encoding->held(), nullptr);
+        const std::string blob = written(*encoding);
+        EXPECT_EQ(blob.size(), encoding->size());
+        EXPECT_EQ(blob[0], 1);
+        EXPECT_LT(blob.size(), 4 * points.size());
+        const auto back = decodePoints(blob.data(), blob.size(), points.size());
+        ASSERT_TRUE(back) << back.error().message;
+        EXPECT_TRUE(sameBits(points, *back));
+    }
+}
+
+TEST(PointEncoding, LargeIncompressibleStaysRaw) {
+    Random random(5);
+    std::vector<float> points(3 * kLargePoints);
+    for (float& value : points) {
+        const auto bits = static_cast<std::uint32_t>(random.next());
+        std::memcpy(&value, &bits, 4);
+    }
+    const auto encoding = PointEncoding::plan(points, 1);
+    ASSERT_TRUE(encoding);
+    const std::string blob = written(*encoding);
+    EXPECT_EQ(blob.size(), 1 + 4 * points.size());
+    EXPECT_EQ(encoding->size(), blob.size());
+    EXPECT_EQ(blob[0], 0);
+    EXPECT_TRUE(sameBits(points, decodePoints(blob.data(), blob.size(), points.size()).value()));
+}
+
 TEST(PointBlob, DamageIsAnErrorOrHarmless) {
     const std::vector<float> points = scan(500);
     const std::string blob = encodePoints(points, 1).value();

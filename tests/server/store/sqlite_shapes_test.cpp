@@ -30,6 +30,24 @@ TEST_F(SqliteShapesTest, PutStoresAllAndQueuesAJob) {
     EXPECT_EQ(store_->loadPoints(put.shape.id).value(), points);
 }
 
+// Above PointEncoding::kHeldBytes: written into the row in pieces.
+TEST_F(SqliteShapesTest, LargeScansComeBackAndAreReplaced) {
+    const Collection c = collection();
+    for (const std::size_t count : {800'000, 900'000}) {
+        const auto points = cloud(count, count);
+        const auto put = store_->putShape(request(c.id, "large", points));
+        ASSERT_TRUE(put) << put.error().message;
+        EXPECT_EQ(store_->loadPoints(put->shape.id).value(), points);
+        EXPECT_EQ(store_->stats()->pointBytes, 12 * count);
+        EXPECT_LT(store_->stats()->storedPointBytes, 12 * count);
+        EXPECT_EQ(store_->putShape(request(c.id, "large", points))->outcome, PutOutcome::kUnchanged);
+        open();
+        EXPECT_EQ(store_->loadPoints(put->shape.id).value(), points);
+    }
+    finishAll();
+    expectSound();
+}
+
 TEST_F(SqliteShapesTest, RepeatedRequestChangesNothing) {
     const Collection c = collection();
     const auto points = cloud(1);

@@ -1,0 +1,461 @@
+#include "bench/load_run.h"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <mutex>
+#include <thread>
+
+#include <sys/resource.h>
+
+#include "bench/server_process.h"
+#include "bench/stored_shapes.h"
+#include "client/api/client.h"
+#include "core/signature/profile.h"
+
+namespace shapedb::bench {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// Clients for each worker: enough that a worker never waits for the next scan.
+constexpr unsigned kClientsPerWorker = 2;
+constexpr std::size_t kDistinctQueries = 64;
+constexpr std::size_t kWarmUpQueries = 3;
+constexpr std::chrono::milliseconds kWarmUp{1'500};
+constexpr double kMedian = 0.5;
+constexpr double kTail = 0.99;
+constexpr std::uint64_t kBytesPerPoint = 12;
+
+double since(Clock::time_point began) { return std::chrono::duration<double>(Clock::now() - began).count(); }
+
+/// Of this process, all threads.
+double processorSeconds() {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    const auto seconds = [](const timeval& t) {
+        return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+    };
+    return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+Result<client::Client> connect(const ServerProcess& server) {
+    client::ClientOptions options;
+    options.address = server.address();
+    options.deadline = std::chrono::minutes(10);
+    return client::Client::connect(options);
+}
+
+Result<ServerProcess> startServer(const LoadSettings& settings, const std::string& data,
+                                  std::vector<std::string> flags = {}) {
+    flags.insert(flags.end(), {"--ingest-threads", std::to_string(settings.threads)});
+    return ServerProcess::start(settings.server, data, flags);
+}
+
+/// Runs `work(i)` for i = 0, 1, ... on so many threads until it says false or fails; the first
+/// error. `work` must stop soon when `stop` is set.
+class Crew {
+  public:
+    using Work = std::function<Result<bool>(std::size_t i)>;
+
+    Crew(unsigned threads, std::atomic<bool>& stop, Work work) : stop_(stop), work_(std::move(work)) {
+        for (unsigned t = 0; t < threads; ++t) threads_.emplace_back([this] { run(); });
+    }
+    ~Crew() {
+        stop_ = true;
+        static_cast<void>(finish());
+    }
+    Crew(const Crew&) = delete;
+    Crew& operator=(const Crew&) = delete;
+
+    Result<void> finish() {
+        for (std::thread& thread : threads_) thread.join();
+        threads_.clear();
+        if (error_) return fail(*error_);
+        return {};
+    }
+
+  private:
+    void run() {
+        while (!stop_) {
+            const Result<bool> more = work_(next_.fetch_add(1));
+            if (more && *more) continue;
+            if (!more) {
+                const std::lock_guard<std::mutex> lock(mutex_);
+                if (!error_ && !stop_) error_ = more.error();
+                stop_ = true;
+            }
+            return;
+        }
+    }
+
+    std::atomic<bool>& stop_;
+    Work work_;
+    std::atomic<std::size_t> next_{0};
+    std::mutex mutex_;
+    std::optional<Error> error_;
+    std::vector<std::thread> threads_;
+};
+
+RunContext cancelledBy(const RunContext& context) {
+    RunContext plain;
+    plain.cancel = context.cancel;
+    return plain;
+}
+
+/// All scans described by core alone. Returns seconds.
+Result<double> describeAll(const std::vector<PointCloud>& scans, unsigned threads,
+                           const RunContext& context) {
+    const ShapeParameters parameters = parametersOf(Profile::kDefault);
+    const auto began = Clock::now();
+    std::atomic<bool> stop{false};
+    Crew crew(threads, stop, [&](std::size_t i) -> Result<bool> {
+        if (i >= scans.size()) return false;
+        const auto description = describe(scans[i], parameters, cancelledBy(context));
+        if (!description) return fail(description.error());
+        return true;
+    });
+    if (const auto done = crew.finish(); !done) return fail(done.error());
+    return since(began);
+}
+
+Result<void> addAndWait(const client::Client& client, const std::string& key, const PointCloud& scan,
+                        const RunContext& context) {
+    client::AddRequest request;
+    request.shape.key = key;
+    request.wait = true;
+    const auto added = client.addShape(request, scan, context);
+    if (!added) return fail(added.error());
+    if (added->shape.state != client::ShapeState::kReady)
+        return fail(ErrorCode::kInternal, "scan " + key + " could not be described");
+    return {};
+}
+
+/// All scans through the server. Returns seconds.
+Result<double> uploadAll(const client::Client& client, const std::vector<PointCloud>& scans,
+                         const std::string& prefix, unsigned threads, const RunContext& context) {
+    const auto began = Clock::now();
+    std::atomic<bool> stop{false};
+    Crew crew(kClientsPerWorker * threads, stop, [&](std::size_t i) -> Result<bool> {
+        if (i >= scans.size()) return false;
+        const auto added = addAndWait(client, prefix + std::to_string(i), scans[i], cancelledBy(context));
+        if (!added) return fail(added.error());
+        return true;
+    });
+    if (const auto done = crew.finish(); !done) return fail(done.error());
+    return since(began);
+}
+
+double medianOf(const std::vector<IngestRound>& rounds, double (*value)(const IngestRound&)) {
+    std::vector<double> values;
+    for (const IngestRound& round : rounds) values.push_back(value(round));
+    return percentile(std::move(values), kMedian);
+}
+
+/// Some queries that are not among the `stored`.
+std::vector<std::string> makeQueries(const SignatureGenerator& generator, std::uint64_t stored) {
+    std::vector<std::string> queries;
+    for (std::size_t i = 0; i < kDistinctQueries; ++i)
+        queries.push_back(encodeSignature(generator.make(stored + i)));
+    return queries;
+}
+
+/// Asks one query after the other; appends the seconds each took.
+Result<void> ask(const client::Client& client, const std::vector<std::string>& queries, std::uint32_t k,
+                 std::size_t count, double seconds, std::vector<double>& took, const RunContext& context) {
+    client::SearchOptions options;
+    options.k = k;
+    const auto until = Clock::now() + std::chrono::duration<double>(seconds);
+    for (std::size_t i = 0; i < count && Clock::now() < until; ++i) {
+        const auto began = Clock::now();
+        const auto reply =
+            client.searchBySignature(options, queries[took.size() % queries.size()], cancelledBy(context));
+        if (!reply) return fail(reply.error());
+        took.push_back(since(began));
+    }
+    return {};
+}
+
+Latencies latenciesOf(const std::vector<double>& took) {
+    return {took.size(), percentile(took, kMedian), percentile(took, kTail)};
+}
+
+/// Idle and busy in turn, so that what else the machine does touches both.
+Result<LatencyFigures> measureLatencyOf(const LoadSettings& settings, const client::Client& client,
+                                        const client::Client& uploader,
+                                        const std::vector<std::string>& queries,
+                                        const std::vector<PointCloud>& scans, const LoadProgress& progress,
+                                        const RunContext& context) {
+    std::vector<double> idle;
+    std::vector<double> busy;
+    const std::size_t share = (settings.queries + settings.rounds - 1) / settings.rounds;
+    const double seconds = settings.querySeconds / static_cast<double>(settings.rounds);
+    double busySeconds = 0.0;
+    std::uint64_t described = 0;
+    const auto askInto = [&](std::vector<double>& took) {
+        return ask(client, queries, settings.k, share, seconds, took, context);
+    };
+    std::vector<double> warmUp;
+    if (const auto asked = ask(client, queries, settings.k, kWarmUpQueries, seconds, warmUp, context);
+        !asked) {
+        return fail(asked.error());
+    }
+    for (std::size_t round = 0; round < settings.rounds; ++round) {
+        progress("queries", round, settings.rounds);
+        if (const auto asked = askInto(idle); !asked) return fail(asked.error());
+        std::atomic<bool> stop{false};
+        RunContext stopped;
+        stopped.cancel = &stop;
+        Crew crew(kClientsPerWorker * settings.threads, stop, [&](std::size_t i) -> Result<bool> {
+            const std::string key = "busy-" + std::to_string(round) + "-" + std::to_string(i);
+            const auto added = addAndWait(uploader, key, scans[i % scans.size()], stopped);
+            if (!added) return fail(added.error());
+            return true;
+        });
+        std::this_thread::sleep_for(kWarmUp);
+        const auto before = client.stats();
+        const auto began = Clock::now();
+        if (const auto asked = askInto(busy); !asked) return fail(asked.error());
+        busySeconds += since(began);
+        const auto after = client.stats();
+        stop = true;
+        if (const auto done = crew.finish(); !done) return fail(done.error());
+        if (!before || !after) return fail((before ? after : before).error());
+        described += after->ingested - before->ingested;
+        // What was cut off goes on in the workers; the next round is to find them idle.
+        for (auto left = client.stats(); left && left->queuedJobs > 0; left = client.stats()) {
+            if (const auto go = context.checkpoint(); !go) return fail(go.error());
+            std::this_thread::sleep_for(std::chrono::milliseconds(50));
+        }
+    }
+    LatencyFigures figures{latenciesOf(idle), latenciesOf(busy), 0.0, 0.0};
+    if (figures.idle.p99 > 0.0) figures.p99Ratio = figures.busy.p99 / figures.idle.p99;
+    if (busySeconds > 0.0) figures.busyScansPerSecond = static_cast<double>(described) / busySeconds;
+    return figures;
+}
+
+/// A cloud of `count` points on a lumpy ball, quickly.
+Result<PointCloud> makeLargeScan(std::uint64_t count, const LoadSettings& settings,
+                                 const RunContext& context) {
+    auto scans = makeScans(1, static_cast<std::size_t>(count), settings.seed, 1, context);
+    if (!scans) return fail(scans.error());
+    return std::move(scans->front());
+}
+
+struct Start {
+    double serving = 0.0;
+    double answered = 0.0;
+    double processor = 0.0;
+    MemoryUse memory;
+    client::Stats stats;
+};
+
+Result<Start> startOnce(const LoadSettings& settings, const std::string& data, const std::string& query,
+                        const RunContext& context) {
+    Start start;
+    const auto began = Clock::now();
+    const auto server = startServer(settings, data);
+    if (!server) return fail(server.error());
+    const auto client = connect(*server);
+    if (!client) return fail(client.error());
+    const auto health = client->health("", cancelledBy(context));
+    if (!health) return fail(health.error());
+    if (*health != client::Health::kServing)
+        return fail(ErrorCode::kUnavailable, "the server listens but does not say that it serves");
+    start.serving = since(began);
+    const auto processor = server->processorSeconds();
+    if (!processor) return fail(processor.error());
+    start.processor = *processor;
+    client::SearchOptions options;
+    options.k = settings.k;
+    const auto reply = client->searchBySignature(options, query, cancelledBy(context));
+    if (!reply) return fail(reply.error());
+    start.answered = since(began);
+    const auto memory = server->memory();
+    if (!memory) return fail(memory.error());
+    start.memory = *memory;
+    const auto stats = client->stats();
+    if (!stats) return fail(stats.error());
+    start.stats = *stats;
+    return start;
+}
+
+}  // namespace
+
+double percentile(std::vector<double> values, double share) {
+    if (values.empty()) return 0.0;
+    std::sort(values.begin(), values.end());
+    const double rank = std::ceil(share * static_cast<double>(values.size()));
+    return values[static_cast<std::size_t>(std::max(rank, 1.0)) - 1];
+}
+
+Result<IngestFigures> measureIngest(const LoadSettings& settings, const LoadProgress& progress,
+                                    const RunContext& context) {
+    const auto directory = WorkDirectory::create(settings.directory);
+    if (!directory) return fail(directory.error());
+    const auto scans =
+        makeScans(settings.scans, settings.scanPoints, settings.seed, settings.threads, context);
+    if (!scans) return fail(scans.error());
+    const auto server = startServer(settings, directory->path() + "/data");
+    if (!server) return fail(server.error());
+    const auto client = connect(*server);
+    if (!client) return fail(client.error());
+    if (const auto warm = addAndWait(*client, "warm-up", scans->front(), context); !warm)
+        return fail(warm.error());
+
+    IngestFigures figures;
+    for (std::size_t round = 0; round < settings.rounds; ++round) {
+        progress("ingest", round, settings.rounds);
+        const double before = processorSeconds();
+        const auto core = describeAll(*scans, settings.threads, context);
+        if (!core) return fail(core.error());
+        const double between = processorSeconds();
+        const auto serverBefore = server->processorSeconds();
+        const auto served =
+            uploadAll(*client, *scans, std::to_string(round) + "-", settings.threads, context);
+        if (!served) return fail(served.error());
+        const auto serverAfter = server->processorSeconds();
+        if (!serverBefore || !serverAfter) return fail((serverBefore ? serverAfter : serverBefore).error());
+        figures.rounds.push_back({*core, *served});
+        figures.coreProcessor += between - before;
+        figures.clientProcessor += processorSeconds() - between;
+        figures.serverProcessor += *serverAfter - *serverBefore;
+    }
+    const auto count = static_cast<double>(settings.scans);
+    figures.coreScansPerSecond =
+        count / medianOf(figures.rounds, [](const IngestRound& round) { return round.core; });
+    figures.serverScansPerSecond =
+        count / medianOf(figures.rounds, [](const IngestRound& round) { return round.server; });
+    figures.ratio =
+        medianOf(figures.rounds, [](const IngestRound& round) { return round.core / round.server; });
+    const double all = count * static_cast<double>(settings.rounds);
+    figures.coreProcessor /= all;
+    figures.serverProcessor /= all;
+    figures.clientProcessor /= all;
+    return figures;
+}
+
+Result<LatencyFigures> measureLatency(const LoadSettings& settings, const LoadProgress& progress,
+                                      const RunContext& context) {
+    const auto directory = WorkDirectory::create(settings.directory);
+    if (!directory) return fail(directory.error());
+    const std::string data = directory->path() + "/data";
+    const auto generator = SignatureGenerator::create(
+        {Mixture::kPlain, settings.shapes, settings.seed, settings.sourcePoints, settings.sourceMembers},
+        cancelledBy(context));
+    if (!generator) return fail(generator.error());
+    RunContext reporting = context;
+    reporting.progress = [&](const char*, std::uint64_t done, std::uint64_t total) {
+        progress("storing signatures", done, total);
+    };
+    if (const auto filled = fillDataDirectory(data, *generator, settings.shapes, reporting); !filled)
+        return fail(filled.error());
+    const std::vector<std::string> queries = makeQueries(*generator, settings.shapes);
+    const auto scans =
+        makeScans(settings.scans, settings.scanPoints, settings.seed, settings.threads, context);
+    if (!scans) return fail(scans.error());
+    const auto server = startServer(settings, data);
+    if (!server) return fail(server.error());
+    const auto client = connect(*server);
+    if (!client) return fail(client.error());
+    const auto uploader = connect(*server);
+    if (!uploader) return fail(uploader.error());
+    return measureLatencyOf(settings, *client, *uploader, queries, *scans, progress, context);
+}
+
+Result<StartFigures> measureStart(const LoadSettings& settings, const LoadProgress& progress,
+                                  const RunContext& context) {
+    const auto directory = WorkDirectory::create(settings.directory);
+    if (!directory) return fail(directory.error());
+    const std::string data = settings.startData.empty() ? directory->path() + "/data" : settings.startData;
+    const auto generator = SignatureGenerator::create(
+        {Mixture::kPlain, settings.startShapes, settings.seed, settings.sourcePoints, settings.sourceMembers},
+        cancelledBy(context));
+    if (!generator) return fail(generator.error());
+    RunContext reporting = context;
+    reporting.progress = [&](const char*, std::uint64_t done, std::uint64_t total) {
+        progress("storing signatures", done, total);
+    };
+    if (!std::filesystem::exists(data)) {
+        if (const auto filled = fillDataDirectory(data, *generator, settings.startShapes, reporting); !filled)
+            return fail(filled.error());
+    }
+    const std::string query = source->encoded(settings.startShapes);
+
+    StartFigures figures;
+    std::vector<double> serving;
+    std::vector<double> answered;
+    std::vector<double> processor;
+    for (std::size_t round = 0; round < settings.rounds; ++round) {
+        progress("starts", round, settings.rounds);
+        const auto start = startOnce(settings, data, query, context);
+        if (!start) return fail(start.error());
+        serving.push_back(start->serving);
+        answered.push_back(start->answered);
+        processor.push_back(start->processor);
+        figures.resident = std::max(figures.resident, start->memory.resident);
+        figures.peak = std::max(figures.peak, start->memory.peak);
+        figures.shapes = start->stats.cachedSignatures;
+        figures.cache = start->stats.cacheBytes;
+        figures.databaseBytes = start->stats.databaseBytes;
+    }
+    figures.servingSeconds = percentile(serving, kMedian);
+    figures.firstAnswerSeconds = percentile(answered, kMedian);
+    figures.processorSeconds = percentile(processor, kMedian);
+    if (figures.cache > 0)
+        figures.residentRatio = static_cast<double>(figures.resident) / static_cast<double>(figures.cache);
+    return figures;
+}
+
+Result<UploadFigures> measureUpload(const LoadSettings& settings, const LoadProgress& progress,
+                                    const RunContext& context) {
+    const auto directory = WorkDirectory::create(settings.directory);
+    if (!directory) return fail(directory.error());
+    const std::uint64_t count = settings.uploadBytes / kBytesPerPoint;
+    progress("large scan", 0, 0);
+    const auto scan = makeLargeScan(count, settings, context);
+    if (!scan) return fail(scan.error());
+    const auto small = makeScans(1, settings.scanPoints, settings.seed + 1, 1, context);
+    if (!small) return fail(small.error());
+    const auto server =
+        startServer(settings, directory->path() + "/data",
+                    {"--limits-max-points", std::to_string(std::max<std::uint64_t>(count, 5'000'000))});
+    if (!server) return fail(server.error());
+    const auto client = connect(*server);
+    if (!client) return fail(client.error());
+    // Threads, connections and arenas that every upload needs are not this one's.
+    if (const auto warm = addAndWait(*client, "warm-up", small->front(), cancelledBy(context)); !warm)
+        return fail(warm.error());
+
+    UploadFigures figures;
+    figures.pointBytes = count * kBytesPerPoint;
+    figures.exact = server->forgetPeak();
+    const auto before = server->memory();
+    if (!before) return fail(before.error());
+    client::AddRequest request;
+    request.shape.key = "large";
+    const auto began = Clock::now();
+    const auto added = client->addShape(request, *scan, cancelledBy(context));
+    if (!added) return fail(added.error());
+    // At once: a worker begins to read the scan again now.
+    const auto uploaded = server->memory();
+    figures.seconds = since(began);
+    if (!uploaded) return fail(uploaded.error());
+    const auto growthOf = [&](const MemoryUse& use) {
+        return static_cast<std::int64_t>(use.peak) - static_cast<std::int64_t>(before->resident) -
+               static_cast<std::int64_t>(figures.pointBytes);
+    };
+    figures.growth = growthOf(*uploaded);
+    progress("describing the large scan", 0, 0);
+    const auto settled = client->watchIngest(request.shape, {}, cancelledBy(context));
+    if (!settled) return fail(settled.error());
+    const auto described = server->memory();
+    if (!described) return fail(described.error());
+    figures.describeGrowth = growthOf(*described);
+    return figures;
+}
+
+}  // namespace shapedb::bench

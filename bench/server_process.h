@@ -1,0 +1,65 @@
+// A shapedbd of its own: a child process, so that its time and memory are not mixed with ours.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <sys/types.h>
+
+#include "core/base/error.h"
+
+namespace shapedb::bench {
+
+/// A directory that is gone with this object.
+class WorkDirectory {
+  public:
+    /// Below `parent`; empty: where temporary files go. Errors: kFileNotWritable.
+    [[nodiscard]] static Result<WorkDirectory> create(const std::string& parent);
+    ~WorkDirectory();
+    WorkDirectory(WorkDirectory&& other) noexcept;
+    WorkDirectory& operator=(WorkDirectory&&) = delete;
+
+    [[nodiscard]] const std::string& path() const { return path_; }
+
+  private:
+    explicit WorkDirectory(std::string path) : path_(std::move(path)) {}
+    std::string path_;
+};
+
+/// What /proc tells of a process.
+struct MemoryUse {
+    std::uint64_t resident = 0;  ///< bytes now
+    std::uint64_t peak = 0;      ///< most resident bytes since the start or since `forgetPeak`
+};
+
+/// Killed when destroyed. Not thread-safe.
+class ServerProcess {
+  public:
+    /// Starts `program` on the data directory `data` and a free port of loopback, and waits until it
+    /// listens. Its log goes to `data`.log. Errors: kFileNotReadable (no such program), kUnavailable
+    /// (it ended, or does not listen within ten minutes; the message has the end of its log).
+    [[nodiscard]] static Result<ServerProcess> start(const std::string& program, const std::string& data,
+                                                     const std::vector<std::string>& flags);
+    ~ServerProcess();
+    ServerProcess(ServerProcess&& other) noexcept;
+    ServerProcess& operator=(ServerProcess&&) = delete;
+
+    [[nodiscard]] const std::string& address() const { return address_; }
+    /// Errors: kUnavailable: it is gone.
+    [[nodiscard]] Result<MemoryUse> memory() const;
+    /// The peak counts from now on. False where the system does not allow it.
+    bool forgetPeak() const;
+    /// Processor time it took so far, all threads, seconds. Errors: as `memory`.
+    [[nodiscard]] Result<double> processorSeconds() const;
+
+  private:
+    ServerProcess() = default;
+    Result<void> awaitAddress(const std::string& log);
+
+    pid_t process_ = -1;
+    int output_ = -1;
+    std::string address_;
+};
+
+}  // namespace shapedb::bench
