@@ -14,6 +14,7 @@
 #include "bench/stored_shapes.h"
 #include "client/api/client.h"
 #include "core/signature/profile.h"
+#include "core/signature/signature_codec.h"
 
 namespace shapedb::bench {
 
@@ -383,7 +384,7 @@ Result<StartFigures> measureStart(const LoadSettings& settings, const LoadProgre
         if (const auto filled = fillDataDirectory(data, *generator, settings.startShapes, reporting); !filled)
             return fail(filled.error());
     }
-    const std::string query = source->encoded(settings.startShapes);
+    const std::string query = encodeSignature(generator->make(settings.startShapes));
 
     StartFigures figures;
     std::vector<double> serving;
