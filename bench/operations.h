@@ -35,5 +35,6 @@ struct Bench {
 /// Each adds its subcommand to `app`; both must live as long as the program.
 void addRetrievalOperation(CLI::App& app, Bench& bench);
 void addInteriorOperation(CLI::App& app, Bench& bench);
+void addSegmentOperation(CLI::App& app, Bench& bench);
 
 }  // namespace shapedb::bench

@@ -38,6 +38,7 @@ int run(int argc, const char* const* argv, cli::Console& console, const std::ato
         app.require_subcommand(1);
         addRetrievalOperation(app, bench);
         addInteriorOperation(app, bench);
+        addSegmentOperation(app, bench);
         try {
             app.parse(argc, argv);
         } catch (const CLI::CallForHelp&) {
