@@ -127,19 +127,52 @@ Result<SanitisedPoints> sanitiseChecked(const PointCloud& scan) {
     return result;
 }
 
+struct Placed {
+    Point3 at;
+    std::uint32_t index = 0;
+};
+
+// By coordinates, equal points by index. First into slices along x, as many as points, then each slice
+// by itself: linear time unless most points share a few values of x.
+std::vector<Placed> lexicographicallySorted(const PointCloud& points) {
+    std::vector<Placed> sorted(points.size());
+    if (points.empty()) return sorted;
+    const Box box = axisAlignedBox(points);
+    const double extent = box.high.x - box.low.x;
+    const auto slices = static_cast<double>(points.size());
+    const double perUnit = extent > 0.0 && std::isfinite(slices / extent) ? slices / extent : 0.0;
+    const auto sliceOf = [&](const Point3& p) {
+        return static_cast<std::size_t>(std::min(slices - 1.0, (p.x - box.low.x) * perUnit));
+    };
+    std::vector<std::uint32_t> begin(points.size() + 1, 0);
+    for (const Point3& p : points) ++begin[sliceOf(p) + 1];
+    std::partial_sum(begin.begin(), begin.end(), begin.begin());
+    for (std::uint32_t i = 0; i < points.size(); ++i) sorted[begin[sliceOf(points[i])]++] = {points[i], i};
+    std::size_t from = 0;
+    for (std::size_t slice = 0; slice < points.size(); ++slice) {
+        const std::size_t to = begin[slice];  // moved to the end of the slice while filling it
+        if (to - from > 1) {
+            std::sort(sorted.begin() + static_cast<std::ptrdiff_t>(from),
+                      sorted.begin() + static_cast<std::ptrdiff_t>(to), [](const Placed& a, const Placed& b) {
+                          if (a.at != b.at) return lexicographicLess(a.at, b.at);
+                          return a.index < b.index;
+                      });
+        }
+        from = to;
+    }
+    return sorted;
+}
+
 }  // namespace
 
 MergedPoints mergeDuplicates(const PointCloud& points) {
-    std::vector<std::uint32_t> order(points.size());
-    std::iota(order.begin(), order.end(), 0u);
-    std::sort(order.begin(), order.end(),
-              [&](std::uint32_t a, std::uint32_t b) { return lexicographicLess(points[a], points[b]); });
+    const std::vector<Placed> sorted = lexicographicallySorted(points);
     MergedPoints merged;
     merged.points.reserve(points.size());
     merged.siteOfPoint.resize(points.size());
-    for (const std::uint32_t i : order) {
-        if (merged.points.empty() || merged.points.back() != points[i]) merged.points.push_back(points[i]);
-        merged.siteOfPoint[i] = static_cast<std::uint32_t>(merged.points.size() - 1);
+    for (const Placed& p : sorted) {
+        if (merged.points.empty() || merged.points.back() != p.at) merged.points.push_back(p.at);
+        merged.siteOfPoint[p.index] = static_cast<std::uint32_t>(merged.points.size() - 1);
     }
     return merged;
 }

@@ -16,9 +16,26 @@ std::uint32_t infiniteIndex(const std::array<std::uint32_t, 4>& v) {
     return 4;
 }
 
+bool isInfinite(const std::array<std::uint32_t, 4>& v) {
+    return (static_cast<unsigned>((v[0] & kVertexBits) == kInfinite) |
+            static_cast<unsigned>(v[1] == kInfinite) | static_cast<unsigned>(v[2] == kInfinite) |
+            static_cast<unsigned>(v[3] == kInfinite)) != 0;
+}
+
+// Without branches: which it is, is random.
 std::uint32_t indexOf(const std::array<std::uint32_t, 4>& v, std::uint32_t vertex) {
-    if ((v[0] & kVertexBits) == vertex) return 0;
-    return v[1] == vertex ? 1 : v[2] == vertex ? 2 : 3;
+    return static_cast<std::uint32_t>(v[1] == vertex) + 2 * static_cast<std::uint32_t>(v[2] == vertex) +
+           3 * static_cast<std::uint32_t>(v[3] == vertex);
+}
+
+// The search for a cavity waits for memory half of its time: so what it needs next is asked for early.
+void fetchNeighbours(const CellStore& cells, std::uint32_t cell) {
+#if defined(__GNUC__)
+    for (const std::uint32_t next : cells[cell].neighbours) __builtin_prefetch(&cells[next]);
+#else
+    static_cast<void>(cells);
+    static_cast<void>(cell);
+#endif
 }
 
 // The facet opposite vertex i, in an order that makes it positive with a point on the side of that
@@ -43,11 +60,18 @@ std::uint32_t CellStore::take(std::uint32_t count) {
     return kNoCell;
 }
 
-CavityInserter::CavityInserter(const std::vector<Site>& sites, CellStore& cells, const VertexRange& range,
+CavityInserter::CavityInserter(std::vector<Site>& sites, CellStore& cells, const VertexRange& range,
                                std::uint32_t start)
-    : sites_(sites), cells_(cells), range_(range), hint_(start) {}
+    : sites_(sites),
+      cells_(cells),
+      range_(range),
+      alone_(range.begin == 0 && range.end == kInfinite),
+      hint_(start) {
+    corners_[0] = kInfinite;
+}
 
 bool CavityInserter::owns(std::uint32_t cell) const {
+    if (alone_) return true;
     const auto& v = cells_[cell].vertices;
     return range_.holds(v[0] & kVertexBits) && range_.holds(v[1]) && range_.holds(v[2]) && range_.holds(v[3]);
 }
@@ -55,9 +79,8 @@ bool CavityInserter::owns(std::uint32_t cell) const {
 bool CavityInserter::conflicts(std::uint32_t cell, const Site& p) const {
     const auto& v = cells_[cell].vertices;
     const std::array<std::uint32_t, 4> w = {v[0] & kVertexBits, v[1], v[2], v[3]};
-    const std::uint32_t infinite = infiniteIndex(w);
-    if (infinite == 4) return sideOfSphere(sites_[w[0]], sites_[w[1]], sites_[w[2]], sites_[w[3]], p) > 0;
-    const auto& f = kFacet[infinite];
+    if (!isInfinite(w)) return sideOfSphere(sites_[w[0]], sites_[w[1]], sites_[w[2]], sites_[w[3]], p) > 0;
+    const auto& f = kFacet[infiniteIndex(w)];
     const Site& a = sites_[w[f[0]]];
     const Site& b = sites_[w[f[1]]];
     const Site& c = sites_[w[f[2]]];
@@ -76,7 +99,7 @@ std::uint32_t CavityInserter::locate(const Site& p) const {
     std::uint32_t from = kNoCell;
     for (;;) {
         const auto& v = cells_[cell].vertices;
-        if (infiniteIndex(v) != 4) return cell;
+        if (isInfinite(v)) return cell;
         std::uint32_t to = kNoCell;
         bool blocked = false;
         for (std::uint32_t i = 0; i < 4 && to == kNoCell; ++i) {
@@ -84,7 +107,7 @@ std::uint32_t CavityInserter::locate(const Site& p) const {
             const std::uint32_t a = v[f[0]];
             const std::uint32_t b = v[f[1]];
             const std::uint32_t c = v[f[2]];
-            const bool open = range_.holds(a) || range_.holds(b) || range_.holds(c);
+            const bool open = alone_ || range_.holds(a) || range_.holds(b) || range_.holds(c);
             if (open && cells_[cell].neighbours[i] == from) continue;
             if (orientation(sites_[a], sites_[b], sites_[c], p) >= 0) continue;
             if (open) {
@@ -113,6 +136,7 @@ bool CavityInserter::findCavity(std::uint32_t first, const Site& p) {
     facets_.clear();
     cavity_.push_back(first);
     cells_[first].vertices[0] |= kInCavity;
+    fetchNeighbours(cells_, first);
     for (std::size_t k = 0; k < cavity_.size(); ++k) {
         const std::uint32_t cell = cavity_[k];
         for (std::uint32_t i = 0; i < 4; ++i) {
@@ -125,6 +149,7 @@ bool CavityInserter::findCavity(std::uint32_t first, const Site& p) {
                     if (!ours) return false;
                     cells_[next].vertices[0] |= kInCavity;
                     cavity_.push_back(next);
+                    fetchNeighbours(cells_, next);
                     continue;
                 }
                 if (ours) {
@@ -132,7 +157,7 @@ bool CavityInserter::findCavity(std::uint32_t first, const Site& p) {
                     around_.push_back(next);
                 }
             }
-            facets_.push_back({cell, i, kNoCell});
+            facets_.push_back({cell, next, kNoCell, static_cast<std::uint8_t>(i), {}});
         }
     }
     return true;
@@ -185,29 +210,90 @@ void CavityInserter::linkAround(const Facet& facet, std::uint32_t j) {
     }
 }
 
-void CavityInserter::fillCavity(std::uint32_t vertex) {
+// Writes the new cells and joins them to those beyond the cavity.
+void CavityInserter::placeFresh(std::uint32_t vertex) {
     for (const Facet& facet : facets_) {
-        Cell& old = cells_[facet.cell];
+        const auto& old = cells_[facet.cell].vertices;
         Cell& fresh = cells_[facet.fresh];
-        fresh.vertices = old.vertices;
-        fresh.vertices[0] &= kVertexBits;
-        fresh.neighbours = {kNoCell, kNoCell, kNoCell, kNoCell};
-        const std::uint32_t beyond = old.neighbours[facet.index];
+        fresh.vertices = {old[0] & kVertexBits, old[1], old[2], old[3]};
+        auto& v = fresh.vertices;
         // Which neighbour of the cell beyond we are shows in its vertices: others may be writing its
         // other neighbours.
-        const auto& v = fresh.vertices;
-        auto& w = cells_[beyond].vertices;
         const std::uint32_t shared = v[0] ^ v[1] ^ v[2] ^ v[3] ^ v[facet.index];
+        Cell& beyond = cells_[facet.beyond];
+        const auto& w = beyond.vertices;
         const std::uint32_t apex = (w[0] & kVertexBits) ^ w[1] ^ w[2] ^ w[3] ^ shared;
-        cells_[beyond].neighbours[indexOf(w, apex)] = facet.fresh;
-        fresh.neighbours[facet.index] = beyond;
-        fresh.vertices[facet.index] = vertex;
-        old.neighbours[facet.index] = facet.fresh;
+        beyond.neighbours[indexOf(w, apex)] = facet.fresh;
+        v[facet.index] = vertex;
+        fresh.neighbours[facet.index] = facet.beyond;
+    }
+}
+
+// Gives the corners of the cavity numbers; false when there are too many of them.
+bool CavityInserter::numberCorners() {
+    std::uint32_t count = 1;  // 0 is the vertex at infinity
+    for (Facet& facet : facets_) {
+        const auto& v = cells_[facet.cell].vertices;
+        for (std::uint32_t k = 0; k < 3; ++k) {
+            const std::uint32_t vertex = v[kFacet[facet.index][k]] & kVertexBits;
+            if (vertex == kInfinite) {
+                facet.corners[k] = 0;
+                continue;
+            }
+            if (count == kMostCorners) return false;
+            // A number counts only if it leads back to the vertex.
+            const std::uint32_t known = sites_[vertex].number;
+            const bool fresh = known >= count || corners_[known] != vertex;
+            corners_[count] = vertex;
+            const std::uint32_t number = fresh ? count : known;
+            sites_[vertex].number = number;
+            count += fresh ? 1 : 0;
+            facet.corners[k] = static_cast<std::uint8_t>(number);
+        }
+    }
+    return true;
+}
+
+// Each edge around the cavity has a facet on its left and, seen backwards, another.
+void CavityInserter::linkByTable() {
+    for (std::size_t f = 0; f < facets_.size(); ++f) {
+        const auto& c = facets_[f].corners;
+        const auto at = static_cast<std::uint16_t>(f);
+        sides_[c[0]][c[1]] = at;
+        sides_[c[1]][c[2]] = at;
+        sides_[c[2]][c[0]] = at;
+    }
+    for (const Facet& facet : facets_) {
+        const auto& c = facet.corners;
+        const auto& position = kFacet[facet.index];
+        auto& neighbours = cells_[facet.fresh].neighbours;
+        neighbours[position[2]] = facets_[sides_[c[1]][c[0]]].fresh;
+        neighbours[position[0]] = facets_[sides_[c[2]][c[1]]].fresh;
+        neighbours[position[1]] = facets_[sides_[c[0]][c[2]]].fresh;
+    }
+}
+
+// For a cavity of any size.
+void CavityInserter::linkByTurning() {
+    for (const Facet& facet : facets_) {
+        cells_[facet.cell].neighbours[facet.index] = facet.fresh;
+        for (std::uint32_t j = 0; j < 4; ++j) {
+            if (j != facet.index) cells_[facet.fresh].neighbours[j] = kNoCell;
+        }
     }
     for (const Facet& facet : facets_) {
         for (std::uint32_t j = 0; j < 4; ++j) {
             if (j != facet.index && cells_[facet.fresh].neighbours[j] == kNoCell) linkAround(facet, j);
         }
+    }
+}
+
+void CavityInserter::fillCavity(std::uint32_t vertex) {
+    placeFresh(vertex);
+    if (numberCorners()) {
+        linkByTable();
+    } else {
+        linkByTurning();
     }
     for (const std::uint32_t cell : around_) cells_[cell].vertices[0] &= kVertexBits;
     for (const std::uint32_t cell : cavity_) {

@@ -72,8 +72,7 @@ enum class Insertion {
 class CavityInserter {
   public:
     /// `start`: a cell of `range`, where the first walk begins.
-    CavityInserter(const std::vector<Site>& sites, CellStore& cells, const VertexRange& range,
-                   std::uint32_t start);
+    CavityInserter(std::vector<Site>& sites, CellStore& cells, const VertexRange& range, std::uint32_t start);
 
     /// Inserts the site `vertex`, which must be in range.
     Insertion insert(std::uint32_t vertex);
@@ -84,10 +83,15 @@ class CavityInserter {
     std::vector<std::uint32_t>& freeCells() { return free_; }
 
   private:
+    // Corners of cavities have numbers of their own; up to this many, facets meet in a table.
+    static constexpr std::uint32_t kMostCorners = 64;
+
     struct Facet {
-        std::uint32_t cell;   // inside the cavity
-        std::uint32_t index;  // of the facet in it
-        std::uint32_t fresh;  // the new cell on it
+        std::uint32_t cell;                   // inside the cavity
+        std::uint32_t beyond;                 // outside of it
+        std::uint32_t fresh;                  // the new cell on it
+        std::uint8_t index;                   // of the facet in `cell`
+        std::array<std::uint8_t, 3> corners;  // numbers of its corners, seen from inside
     };
 
     bool owns(std::uint32_t cell) const;
@@ -98,16 +102,24 @@ class CavityInserter {
     void unmark();
     bool takeFresh();
     void fillCavity(std::uint32_t vertex);
+    void placeFresh(std::uint32_t vertex);
+    bool numberCorners();
+    void linkByTable();
+    void linkByTurning();
     void linkAround(const Facet& facet, std::uint32_t j);
 
-    const std::vector<Site>& sites_;
+    std::vector<Site>& sites_;
     CellStore& cells_;
     VertexRange range_;
+    bool alone_;  // everything is in range
     std::uint32_t hint_;
     std::vector<std::uint32_t> free_;
     std::vector<std::uint32_t> cavity_;
     std::vector<std::uint32_t> around_;
     std::vector<Facet> facets_;
+    std::array<std::uint32_t, kMostCorners> corners_{};  // the vertex of each number
+    // For an edge from one corner to another: the facet to its left.
+    std::array<std::array<std::uint16_t, kMostCorners>, kMostCorners> sides_{};
 };
 
 }  // namespace shapedb

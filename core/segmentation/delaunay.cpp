@@ -39,55 +39,63 @@ Point3 circumcentre(const TetrahedronCorners& p) {
     return p[0] + (0.5 / sixVolumes) * numerator;
 }
 
-// The rank of each vertex stands for it until the end: sites are compared by rank.
 using Corners = std::array<std::uint32_t, 4>;
 
-// The even permutation of the corners that has the lowest first and the next lowest second, as
-// positions. So a tetrahedron looks the same whatever made it.
-std::array<std::uint32_t, 4> canonicalOrder(const Corners& v) {
-    std::uint32_t first = 0;
-    for (std::uint32_t i = 1; i < 4; ++i) {
-        if (v[i] < v[first]) first = i;
+// The even permutation of the corners that has the lowest first and the lowest of the others second,
+// applied to corners and neighbours. So a tetrahedron looks the same whatever made it. Two exchanges
+// keep the sense; comparing without branches, because which corner is lowest is random.
+void makeCanonical(Cell& cell) {
+    Corners& v = cell.vertices;
+    Corners& n = cell.neighbours;
+    const auto exchange = [&](std::uint32_t i, std::uint32_t j) {
+        std::swap(v[i], v[j]);
+        std::swap(n[i], n[j]);
+    };
+    const std::uint32_t low01 = v[1] < v[0] ? 1 : 0;
+    const std::uint32_t low23 = v[3] < v[2] ? 3 : 2;
+    const std::uint32_t first = v[low23] < v[low01] ? low23 : low01;
+    // The lowest to the front by exchanging both pairs: (0 1)(2 3), (0 2)(1 3) or (0 3)(1 2).
+    const Corners w = v;
+    const Corners m = n;
+    for (std::uint32_t i = 0; i < 4; ++i) {
+        v[i] = w[i ^ first];
+        n[i] = m[i ^ first];
     }
-    // The others in an order that keeps the sense, then turned.
-    static constexpr std::array<std::array<std::uint32_t, 3>, 4> kOthers = {
-        {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
-    const auto& others = kOthers[first];
-    std::uint32_t turn = 0;
-    for (std::uint32_t i = 1; i < 3; ++i) {
-        if (v[others[i]] < v[others[turn]]) turn = i;
+    if (v[2] < v[1] && v[2] < v[3]) {
+        exchange(1, 2);
+        exchange(2, 3);
+    } else if (v[3] < v[1]) {
+        exchange(1, 3);
+        exchange(2, 3);
     }
-    return {first, others[turn], others[(turn + 1) % 3], others[(turn + 2) % 3]};
 }
 
 bool isFinite(const Corners& v) {
-    return v[0] < kInfinite && v[1] < kInfinite && v[2] < kInfinite && v[3] < kInfinite;
+    return (static_cast<unsigned>(v[0] < kInfinite) & static_cast<unsigned>(v[1] < kInfinite) &
+            static_cast<unsigned>(v[2] < kInfinite) & static_cast<unsigned>(v[3] < kInfinite)) != 0;
 }
 
-Corners permuted(const Corners& v, const std::array<std::uint32_t, 4>& order) {
-    return {v[order[0]], v[order[1]], v[order[2]], v[order[3]]};
-}
-
-// The finite cells by their corners, lowest first; the corners in canonical order. The places of
-// cells in the store, which depend on the threads, leave no trace.
-std::vector<std::uint32_t> sortedCells(const CellStore& cells, std::size_t siteCount) {
-    std::vector<std::uint32_t> begin(siteCount + 1, 0);
-    const auto lowest = [](const Corners& v) { return std::min(std::min(v[0], v[1]), std::min(v[2], v[3])); };
+// The finite cells, made canonical, by their corners. The places of cells in the store, which depend on
+// the threads, leave no trace.
+std::vector<std::uint32_t> sortedCells(CellStore& cells, std::size_t siteCount) {
+    std::vector<std::uint32_t> begin(siteCount + 2, 0);
     for (std::uint32_t c = 0; c < cells.used(); ++c) {
-        if (isFinite(cells[c].vertices)) ++begin[lowest(cells[c].vertices) + 1];
+        if (!isFinite(cells[c].vertices)) continue;
+        makeCanonical(cells[c]);
+        ++begin[cells[c].vertices[0] + 2];
     }
     std::partial_sum(begin.begin(), begin.end(), begin.begin());
     std::vector<std::uint32_t> sorted(begin.back());
-    std::vector<std::uint32_t> next(begin.begin(), begin.end() - 1);
     for (std::uint32_t c = 0; c < cells.used(); ++c) {
-        if (isFinite(cells[c].vertices)) sorted[next[lowest(cells[c].vertices)]++] = c;
+        if (isFinite(cells[c].vertices)) sorted[begin[cells[c].vertices[0] + 1]++] = c;
     }
-    std::vector<std::pair<Corners, std::uint32_t>> group;
+    // Three corners in their sense belong to one tetrahedron, so the second and third decide.
+    std::vector<std::pair<std::uint64_t, std::uint32_t>> group;
     for (std::size_t v = 0; v < siteCount; ++v) {
         group.clear();
         for (std::uint32_t i = begin[v]; i < begin[v + 1]; ++i) {
             const Corners& corners = cells[sorted[i]].vertices;
-            group.emplace_back(permuted(corners, canonicalOrder(corners)), sorted[i]);
+            group.emplace_back(std::uint64_t{corners[1]} << 32 | corners[2], sorted[i]);
         }
         std::sort(group.begin(), group.end());
         for (std::size_t i = 0; i < group.size(); ++i) sorted[begin[v] + i] = group[i].second;
@@ -96,36 +104,32 @@ std::vector<std::uint32_t> sortedCells(const CellStore& cells, std::size_t siteC
 }
 
 // `order`: the point of each site.
-Tetrahedra flatten(const CellStore& cells, const std::vector<std::uint32_t>& order) {
-    const std::vector<std::uint32_t> sorted = sortedCells(cells, order.size());
+Tetrahedra flatten(CellStore& cells, const std::vector<std::uint32_t>& order) {
+    std::vector<std::uint32_t> sorted = sortedCells(cells, order.size());
     std::vector<std::uint32_t> place(cells.used(), kNoTetrahedron);
     for (std::uint32_t t = 0; t < sorted.size(); ++t) place[sorted[t]] = t;
     Tetrahedra flat;
-    flat.vertices.reserve(sorted.size());
-    flat.neighbours.reserve(sorted.size());
-    for (const std::uint32_t c : sorted) {
-        const Cell& cell = cells[c];
-        const auto positions = canonicalOrder(cell.vertices);
-        std::array<std::uint32_t, 4> vertices;
-        std::array<std::uint32_t, 4> neighbours;
+    flat.vertices.resize(sorted.size());
+    flat.neighbours.resize(sorted.size());
+    for (std::size_t t = 0; t < sorted.size(); ++t) {
+        const Cell& cell = cells[sorted[t]];
         for (std::size_t i = 0; i < 4; ++i) {
-            vertices[i] = order[cell.vertices[positions[i]]];
-            neighbours[i] = place[cell.neighbours[positions[i]]];
+            flat.vertices[t][i] = order[cell.vertices[i]];
+            flat.neighbours[t][i] = place[cell.neighbours[i]];
         }
-        flat.vertices.push_back(vertices);
-        flat.neighbours.push_back(neighbours);
     }
     return flat;
 }
 
 void measureBalls(const PointCloud& points, Tetrahedra& flat) {
-    flat.circumcentres.reserve(flat.size());
-    flat.circumradii.reserve(flat.size());
-    for (const auto& v : flat.vertices) {
+    flat.circumcentres.resize(flat.size());
+    flat.circumradii.resize(flat.size());
+    for (std::size_t t = 0; t < flat.size(); ++t) {
+        const auto& v = flat.vertices[t];
         const TetrahedronCorners corners = {points[v[0]], points[v[1]], points[v[2]], points[v[3]]};
         const Point3 centre = circumcentre(corners);
-        flat.circumcentres.push_back(centre);
-        flat.circumradii.push_back(distance(centre, corners[0]));
+        flat.circumcentres[t] = centre;
+        flat.circumradii[t] = distance(centre, corners[0]);
     }
 }
 

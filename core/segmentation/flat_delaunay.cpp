@@ -84,7 +84,7 @@ struct Share {
 
 class Builder {
   public:
-    Builder(const std::vector<Site>& sites, CellStore& cells, int threads, const RunContext& context)
+    Builder(std::vector<Site>& sites, CellStore& cells, int threads, const RunContext& context)
         : sites_(sites),
           cells_(cells),
           threads_(static_cast<std::size_t>(std::max(threads, 1))),
@@ -122,7 +122,7 @@ class Builder {
     void work(Share& share, std::thread::id reporter);
     std::uint32_t cellWithin(const VertexRange& range) const;
 
-    const std::vector<Site>& sites_;
+    std::vector<Site>& sites_;
     CellStore& cells_;
     std::size_t threads_;
     const RunContext& context_;
@@ -282,8 +282,7 @@ void Builder::work(Share& share, std::thread::id reporter) {
 
 }  // namespace
 
-Result<void> insertAll(const std::vector<Site>& sites, CellStore& cells, int threads,
-                       const RunContext& context) {
+Result<void> insertAll(std::vector<Site>& sites, CellStore& cells, int threads, const RunContext& context) {
     return Builder(sites, cells, threads, context).build();
 }
 

@@ -19,7 +19,7 @@ constexpr std::size_t kLeastParallelPoints = 50000;
 ///
 /// Errors: kCoplanar, kCollinear, kTooFewPoints (exactly so); kInternal when two sites are at the same
 /// place; kCancelled, kDeadlineExceeded; kOutOfMemory. May throw std::bad_alloc.
-[[nodiscard]] Result<void> insertAll(const std::vector<Site>& sites, CellStore& cells, int threads,
+[[nodiscard]] Result<void> insertAll(std::vector<Site>& sites, CellStore& cells, int threads,
                                      const RunContext& context);
 
 }  // namespace shapedb

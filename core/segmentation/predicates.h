@@ -15,9 +15,14 @@ struct alignas(32) Site {
     double x = 0.0;
     double y = 0.0;
     double z = 0.0;
+    std::uint32_t number = 0;  ///< scratch of whoever inserts around this site
 };
 
 inline bool samePlace(const Site& a, const Site& b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
+
+// std::max of a list compares with branches, which these values make unpredictable.
+inline double most(double a, double b, double c) { return std::max(std::max(a, b), c); }
+inline double least(double a, double b, double c) { return std::min(std::min(a, b), c); }
 
 /// What follows is exact but slow: 1, 0 or -1, from CGAL's kernel.
 [[nodiscard]] int exactOrientation(const Site& a, const Site& b, const Site& c, const Site& d);
@@ -43,12 +48,12 @@ inline bool samePlace(const Site& a, const Site& b) { return a.x == b.x && a.y =
     const double bd = bx * dy - dx * by;
     const double cd = cx * dy - dx * cy;
     const double det = bc * dz - bd * cz + cd * bz;
-    const double mx = std::max({std::abs(bx), std::abs(cx), std::abs(dx)});
-    const double my = std::max({std::abs(by), std::abs(cy), std::abs(dy)});
-    const double mz = std::max({std::abs(bz), std::abs(cz), std::abs(dz)});
+    const double mx = most(std::abs(bx), std::abs(cx), std::abs(dx));
+    const double my = most(std::abs(by), std::abs(cy), std::abs(dy));
+    const double mz = most(std::abs(bz), std::abs(cz), std::abs(dz));
     const double bound = 5.1107127829973299e-15 * mx * my * mz;
     // Guards against underflow and overflow of the products.
-    if (std::min({mx, my, mz}) >= 1e-97 && std::max({mx, my, mz}) < 1e102) {
+    if (least(mx, my, mz) >= 1e-97 && most(mx, my, mz) < 1e102) {
         if (det > bound) return 1;
         if (det < -bound) return -1;
     }
@@ -82,9 +87,9 @@ inline bool samePlace(const Site& a, const Site& b) { return a.x == b.x && a.y =
     const double mx = std::max(std::max(std::abs(ax), std::abs(bx)), std::max(std::abs(cx), std::abs(dx)));
     const double my = std::max(std::max(std::abs(ay), std::abs(by)), std::max(std::abs(cy), std::abs(dy)));
     const double mz = std::max(std::max(std::abs(az), std::abs(bz)), std::max(std::abs(cz), std::abs(dz)));
-    const double most = std::max({mx, my, mz});
-    const double bound = 1.2466136531027298e-13 * mx * my * mz * (most * most);
-    if (std::min({mx, my, mz}) >= 1e-58 && most < 1e61) {
+    const double widest = most(mx, my, mz);
+    const double bound = 1.2466136531027298e-13 * mx * my * mz * (widest * widest);
+    if (least(mx, my, mz) >= 1e-58 && widest < 1e61) {
         if (det > bound) return 1;
         if (det < -bound) return -1;
     }
