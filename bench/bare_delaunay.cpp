@@ -1,19 +1,19 @@
 #include "bench/bare_delaunay.h"
 
 #include <chrono>
-#include <iterator>
 
 #define CGAL_LINKED_WITH_TBB
 #include <CGAL/Delaunay_triangulation_3.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <boost/iterator/transform_iterator.hpp>
 
+#include "bench/stopwatch.h"
+
 namespace shapedb::bench {
 
 namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-using Clock = std::chrono::steady_clock;
 
 struct ToKernel {
     Kernel::Point_3 operator()(const Point3& p) const { return {p.x, p.y, p.z}; }
@@ -21,11 +21,12 @@ struct ToKernel {
 
 template <typename Triangulation>
 BareDelaunay insertAll(Triangulation& triangulation, const PointCloud& points) {
-    const auto start = Clock::now();
+    const auto start = std::chrono::steady_clock::now();
+    const ThreadStopwatch stopwatch;
     triangulation.insert(boost::make_transform_iterator(points.begin(), ToKernel()),
                          boost::make_transform_iterator(points.end(), ToKernel()));
-    return {std::chrono::duration<double>(Clock::now() - start).count(),
-            triangulation.number_of_finite_cells()};
+    const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - start;
+    return {stopwatch.seconds(), wall.count(), triangulation.number_of_finite_cells()};
 }
 
 }  // namespace

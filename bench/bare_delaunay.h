@@ -8,7 +8,8 @@
 namespace shapedb::bench {
 
 struct BareDelaunay {
-    double seconds = 0.0;  ///< of the range insertion alone
+    double seconds = 0.0;  ///< of this thread, for the range insertion alone
+    double wallSeconds = 0.0;
     std::size_t tetrahedra = 0;
 };
 

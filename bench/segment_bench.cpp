@@ -19,6 +19,7 @@
 #include "bench/operations.h"
 #include "bench/output.h"
 #include "bench/peak_memory.h"
+#include "bench/stopwatch.h"
 #include "client/cli/exit_code.h"
 #include "client/io/scan_reader.h"
 #include "core/geometry/sanitise.h"
@@ -46,6 +47,7 @@ struct Flags {
     std::size_t repeat = 5;
     std::size_t threads = 2;
     bool noUndecimated = false;
+    bool cgalParallel = false;
     std::string json;
 };
 
@@ -160,9 +162,9 @@ Result<void> measureUndecimated(const PointCloud& scan, const PointCloud& distin
     figures.bare.push_back(bare.seconds);
     figures.bareTetrahedra = bare.tetrahedra;
     for (Undecimated& lane : figures.undecimated) {
-        const auto start = Clock::now();
+        const ThreadStopwatch stopwatch;
         const auto found = segment(scan, undecimatedOptions(lane.profile), context);
-        lane.seconds.push_back(secondsSince(start));
+        lane.seconds.push_back(stopwatch.seconds());
         if (!found) return fail(found.error());
         lane.tetrahedra = found->tetrahedra.size();
         note(found->stages, lane.stages);
@@ -170,15 +172,15 @@ Result<void> measureUndecimated(const PointCloud& scan, const PointCloud& distin
     return {};
 }
 
-Result<void> measureParallel(const PointCloud& distinct, std::size_t threads, const RunContext& context,
-                             Parallel& parallel) {
+Result<void> measureParallel(const PointCloud& distinct, std::size_t threads, bool withCgal,
+                             const RunContext& context, Parallel& parallel) {
     for (const bool many : {false, true}) {
         const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, many ? threads : 1);
         const auto start = Clock::now();
         const auto found = triangulate(distinct, context);
         (many ? parallel.many : parallel.one).push_back(secondsSince(start));
         if (!found) return fail(found.error());
-        if (many) parallel.bareMany.push_back(bareParallelDelaunay(distinct).seconds);
+        if (many && withCgal) parallel.bareMany.push_back(bareParallelDelaunay(distinct).wallSeconds);
     }
     return {};
 }
@@ -236,8 +238,8 @@ std::string textOf(const Flags& flags, const Figures& f) {
         text += "\nDelaunay with " + std::to_string(flags.threads) +
                 " threads: " + number("%.3f s, ", median(f.parallel.many)) +
                 number("%.2f times as fast as with one (", median(f.parallel.one) / median(f.parallel.many)) +
-                number("%.3f s); CGAL's parallel one ", median(f.parallel.one)) +
-                number("%.3f s\n", median(f.parallel.bareMany));
+                number("%.3f s)\n", median(f.parallel.one));
+        if (flags.cgalParallel) text += number("CGAL's parallel one: %.3f s\n", median(f.parallel.bareMany));
     }
     for (const Whole& lane : f.whole) {
         if (lane.seconds.empty()) continue;
@@ -285,8 +287,10 @@ json documentOf(const Flags& flags, const std::string& command, const Figures& f
         document["parallel_delaunay"] = {{"threads", flags.threads},
                                          {"one_thread_seconds", median(f.parallel.one)},
                                          {"seconds", median(f.parallel.many)},
-                                         {"speed_up", median(f.parallel.one) / median(f.parallel.many)},
-                                         {"cgal_parallel_seconds", median(f.parallel.bareMany)}};
+                                         {"speed_up", median(f.parallel.one) / median(f.parallel.many)}};
+        if (flags.cgalParallel) {
+            document["parallel_delaunay"]["cgal_parallel_seconds"] = median(f.parallel.bareMany);
+        }
     }
     for (const Whole& lane : f.whole) {
         if (lane.seconds.empty()) continue;
@@ -302,6 +306,7 @@ json documentOf(const Flags& flags, const std::string& command, const Figures& f
 std::string commandOf(const Flags& flags, const Figures& f) {
     std::string command = "shapedb-bench segment ";
     command += flags.file.empty() ? "--points " + std::to_string(flags.points) : "--file " + f.source;
+    if (flags.file.empty()) command += " --noise " + json(flags.noise).dump();
     command += " --profile ";
     for (std::size_t i = 0; i < flags.profiles.size(); ++i) command += (i ? "," : "") + flags.profiles[i];
     command += " --repeat " + std::to_string(flags.repeat) + " --threads " + std::to_string(flags.threads);
@@ -327,7 +332,9 @@ Result<int> runSegment(const Flags& flags, Bench& bench) {
         bench.console.progress("segment", i, flags.repeat);
         if (!flags.noUndecimated) {
             if (auto go = measureUndecimated(*scan, distinct, context, figures); !go) return fail(go.error());
-            if (auto go = measureParallel(distinct, flags.threads, context, figures.parallel); !go)
+            if (auto go =
+                    measureParallel(distinct, flags.threads, flags.cgalParallel, context, figures.parallel);
+                !go)
                 return fail(go.error());
         }
         if (auto go = measureWhole(*scan, flags.threads, context, figures); !go) return fail(go.error());
@@ -364,6 +371,7 @@ void addSegmentOperation(CLI::App& app, Bench& bench) {
         ->capture_default_str();
     command->add_flag("--no-undecimated", flags->noUndecimated,
                       "Only from points to signature, not all points without decimation");
+    command->add_flag("--cgal-parallel", flags->cgalParallel, "CGAL's parallel insertion too");
     command->add_option("--json", flags->json, "All figures as JSON; '-' is standard output")
         ->type_name("FILE|-");
     command->callback([&bench, flags] {

@@ -60,15 +60,26 @@ std::vector<Kernel::Point_3> extremePoints(const PointCloud& points) {
 }
 
 // A convex body around its centre: normals over distances, so that a point p is inside when
-// dot(face, p - centre) < 1 for every face.
+// dot(face, inside(p)) < 1 for every face.
+// In coordinates stretched to the points' box, because the grid of directions suits round bodies.
 struct Body {
     Point3 centre;
+    Point3 stretch;
     std::vector<Point3> faces;
+
+    Point3 inside(const Point3& p) const {
+        const Point3 d = p - centre;
+        return {stretch.x * d.x, stretch.y * d.y, stretch.z * d.z};
+    }
 };
 
 // Without faces when the points span no body.
 Body spannedBy(const std::vector<Kernel::Point_3>& extreme) {
     Body body;
+    const CGAL::Bbox_3 box = CGAL::bbox_3(extreme.begin(), extreme.end());
+    body.stretch = {1.0 / (box.xmax() - box.xmin()), 1.0 / (box.ymax() - box.ymin()),
+                    1.0 / (box.zmax() - box.zmin())};
+    if (!std::isfinite(squaredLength(body.stretch))) return body;
     for (const auto& p : extreme) body.centre = body.centre + Point3{p.x(), p.y(), p.z()};
     body.centre = (1.0 / static_cast<double>(extreme.size())) * body.centre;
     CGAL::Surface_mesh<Kernel::Point_3> hull;
@@ -77,12 +88,12 @@ Body spannedBy(const std::vector<Kernel::Point_3>& extreme) {
         std::vector<Point3> corners;
         for (const auto v : CGAL::vertices_around_face(hull.halfedge(face), hull)) {
             const auto& p = hull.point(v);
-            corners.push_back(Point3{p.x(), p.y(), p.z()} - body.centre);
+            corners.push_back(body.inside({p.x(), p.y(), p.z()}));
         }
         const Point3 normal = cross(corners[1] - corners[0], corners[2] - corners[0]);
         const double height = dot(normal, corners[0]);
         // A face this close to the centre belongs to a body too flat to use.
-        if (!(height > 1e-9 * length(normal) * length(corners[0]))) return {body.centre, {}};
+        if (!(height > 1e-9 * length(normal) * length(corners[0]))) return {body.centre, body.stretch, {}};
         body.faces.push_back((1.0 / height) * normal);
     }
     return body;
@@ -112,7 +123,7 @@ class Reach {
     }
 
     bool isDeepInside(const Point3& p) const {
-        const Point3 d = p - body_.centre;
+        const Point3 d = body_.inside(p);
         const std::array<double, 3> v = {d.x, d.y, d.z};
         const std::size_t axis = std::abs(d.x) >= std::abs(d.y) ? (std::abs(d.x) >= std::abs(d.z) ? 0 : 2)
                                                                 : (std::abs(d.y) >= std::abs(d.z) ? 1 : 2);

@@ -64,28 +64,6 @@ std::pair<double, std::size_t> farthest(const PointCloud& points, Distance dista
     return {best, at};
 }
 
-// Grows a simplex greedily: far point, far from the line, far from the plane. Within a factor
-// of two of the widest, which is all a tolerance needs.
-Result<void> checkSpansSpace(const PointCloud& points) {
-    const Point3& origin = points.front();
-    const auto [reach, b] = farthest(points, [&](const Point3& p) { return distance(p, origin); });
-    const Point3 axis = (1.0 / reach) * (points[b] - origin);
-    const auto [width, c] =
-        farthest(points, [&](const Point3& p) { return length(cross(axis, p - origin)); });
-    if (width <= kFlatnessTolerance) {
-        return fail(ErrorCode::kCollinear,
-                    "all points lie on one line; a shape needs points all around its surface");
-    }
-    const Point3 across = cross(axis, points[c] - origin);
-    const Point3 normal = (1.0 / length(across)) * across;
-    const auto height = farthest(points, [&](const Point3& p) { return std::abs(dot(normal, p - origin)); });
-    if (height.first <= kFlatnessTolerance) {
-        return fail(ErrorCode::kCoplanar,
-                    "all points lie in one plane; a shape needs points all around its surface");
-    }
-    return {};
-}
-
 // The nearest multiple of kGrid. Adding zero turns -0.0 into 0.0, so that equal points have
 // equal bytes.
 Point3 onGrid(const Point3& p) {
@@ -93,7 +71,7 @@ Point3 onGrid(const Point3& p) {
     return {round(p.x), round(p.y), round(p.z)};
 }
 
-Result<SanitisedPoints> sanitiseChecked(const PointCloud& scan) {
+Result<Frame> frameOfChecked(const PointCloud& scan) {
     const Box box = axisAlignedBox(scan);
     const Point3 half = 0.5 * box.high - 0.5 * box.low;
     const double halfExtent = std::max({half.x, half.y, half.z});
@@ -105,10 +83,16 @@ Result<SanitisedPoints> sanitiseChecked(const PointCloud& scan) {
         return fail(ErrorCode::kCoordinateOutOfRange,
                     "the whole scan is smaller than 1.2e-38 units; choose a smaller unit of length");
     }
-    SanitisedPoints result;
     int exponent = 0;
     std::frexp(halfExtent, &exponent);
-    result.frame = {0.5 * box.high + 0.5 * box.low, std::ldexp(1.0, exponent)};
+    return Frame{0.5 * box.high + 0.5 * box.low, std::ldexp(1.0, exponent)};
+}
+
+Result<SanitisedPoints> sanitiseOrThrow(const PointCloud& scan) {
+    const auto frame = frameOf(scan);
+    if (!frame) return fail(frame.error());
+    SanitisedPoints result;
+    result.frame = *frame;
     const double inverse = 1.0 / result.frame.unit;  // exact: a power of two
     PointCloud scaled(scan.size());
     for (std::size_t i = 0; i < scan.size(); ++i) {
@@ -177,7 +161,29 @@ MergedPoints mergeDuplicates(const PointCloud& points) {
     return merged;
 }
 
-Result<SanitisedPoints> sanitise(const PointCloud& scan) {
+// Grows a simplex greedily: far point, far from the line, far from the plane. Within a factor
+// of two of the widest, which is all a tolerance needs.
+Result<void> checkSpansSpace(const PointCloud& points) {
+    const Point3& origin = points.front();
+    const auto [reach, b] = farthest(points, [&](const Point3& p) { return distance(p, origin); });
+    const Point3 axis = (1.0 / reach) * (points[b] - origin);
+    const auto [width, c] =
+        farthest(points, [&](const Point3& p) { return length(cross(axis, p - origin)); });
+    if (width <= kFlatnessTolerance) {
+        return fail(ErrorCode::kCollinear,
+                    "all points lie on one line; a shape needs points all around its surface");
+    }
+    const Point3 across = cross(axis, points[c] - origin);
+    const Point3 normal = (1.0 / length(across)) * across;
+    const auto height = farthest(points, [&](const Point3& p) { return std::abs(dot(normal, p - origin)); });
+    if (height.first <= kFlatnessTolerance) {
+        return fail(ErrorCode::kCoplanar,
+                    "all points lie in one plane; a shape needs points all around its surface");
+    }
+    return {};
+}
+
+Result<Frame> frameOf(const PointCloud& scan) {
     if (scan.size() < 4) {
         return fail(ErrorCode::kTooFewPoints,
                     "the scan has " + std::to_string(scan.size()) + " points; at least 4 are needed");
@@ -186,8 +192,12 @@ Result<SanitisedPoints> sanitise(const PointCloud& scan) {
         return fail(ErrorCode::kPointLimitExceeded, "the scan has more than 4,294,967,294 points");
     }
     if (const auto finite = checkCoordinates(scan); !finite) return fail(finite.error());
+    return frameOfChecked(scan);
+}
+
+Result<SanitisedPoints> sanitise(const PointCloud& scan) {
     try {
-        return sanitiseChecked(scan);
+        return sanitiseOrThrow(scan);
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::kOutOfMemory,
                     "not enough memory to sort " + std::to_string(scan.size()) + " points");
