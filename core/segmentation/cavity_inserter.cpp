@@ -38,6 +38,23 @@ void fetchNeighbours(const CellStore& cells, std::uint32_t cell) {
 #endif
 }
 
+// The one corner of each neighbour that the cell itself does not have.
+void fetchApexes(const std::vector<Site>& sites, const CellStore& cells, std::uint32_t cell) {
+#if defined(__GNUC__)
+    const auto& v = cells[cell].vertices;
+    const std::uint32_t all = v[0] ^ v[1] ^ v[2] ^ v[3];
+    for (std::size_t i = 0; i < 4; ++i) {
+        const auto& w = cells[cells[cell].neighbours[i]].vertices;
+        const std::uint32_t apex = (all ^ v[i] ^ w[0] ^ w[1] ^ w[2] ^ w[3]) & kVertexBits;
+        __builtin_prefetch(sites.data() + std::min<std::size_t>(apex, sites.size() - 1));
+    }
+#else
+    static_cast<void>(sites);
+    static_cast<void>(cells);
+    static_cast<void>(cell);
+#endif
+}
+
 // The facet opposite vertex i, in an order that makes it positive with a point on the side of that
 // vertex when appended.
 constexpr std::array<std::array<std::uint32_t, 3>, 4> kFacet = {{{2, 1, 3}, {0, 2, 3}, {1, 0, 3}, {0, 1, 2}}};
@@ -139,6 +156,7 @@ bool CavityInserter::findCavity(std::uint32_t first, const Site& p) {
     fetchNeighbours(cells_, first);
     for (std::size_t k = 0; k < cavity_.size(); ++k) {
         const std::uint32_t cell = cavity_[k];
+        fetchApexes(sites_, cells_, cell);
         for (std::uint32_t i = 0; i < 4; ++i) {
             const std::uint32_t next = cells_[cell].neighbours[i];
             const std::uint32_t marks = cells_[next].vertices[0];

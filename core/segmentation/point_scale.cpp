@@ -15,7 +15,7 @@ constexpr std::uint32_t kNone = 0xffffffffu;
 
 // How many of its nearest Delaunay neighbours each point keeps: enough that hardly ever another one
 // matters to a point next to it.
-constexpr std::size_t kKept = 6;
+constexpr std::size_t kKept = 4;
 
 // Distances are compared after rounding; so much wider the search is safe.
 constexpr double kSlack = 1.0 + 1e-12;

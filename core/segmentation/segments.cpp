@@ -16,12 +16,11 @@ bool flowsThrough(std::uint8_t mask, std::size_t facet) { return ((mask >> facet
 
 // By falling circumradius, equal ones by index.
 void sortByFallingRadius(const Tetrahedra& tetrahedra, std::vector<std::uint32_t>& indices) {
-    std::sort(indices.begin(), indices.end(), [&](std::uint32_t a, std::uint32_t b) {
-        if (tetrahedra.circumradii[a] != tetrahedra.circumradii[b]) {
-            return tetrahedra.circumradii[a] > tetrahedra.circumradii[b];
-        }
-        return a < b;
-    });
+    std::vector<std::pair<double, std::uint32_t>> keyed;
+    keyed.reserve(indices.size());
+    for (const std::uint32_t t : indices) keyed.emplace_back(-tetrahedra.circumradii[t], t);
+    std::sort(keyed.begin(), keyed.end());
+    for (std::size_t i = 0; i < keyed.size(); ++i) indices[i] = keyed[i].second;
 }
 
 constexpr std::int32_t kUnseen = -2;
