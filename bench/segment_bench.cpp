@@ -195,7 +195,9 @@ Result<void> measureWhole(const PointCloud& scan, std::size_t threads, const Run
         lane.seconds.push_back(secondsSince(start));
         if (!found) return fail(found.error());
         lane.sites = found->segmentation.sites.size();
-        note(found->segmentation.stages, lane.stages);
+        std::vector<StageTime> stages = found->segmentation.stages;
+        stages.push_back({"signature", lane.seconds.back() - found->segmentation.totalSeconds});
+        note(stages, lane.stages);
     }
     return {};
 }
