@@ -41,5 +41,6 @@ void addTopKOperation(CLI::App& app, Bench& bench);
 void addLoadOperation(CLI::App& app, Bench& bench);
 void addInstructionsOperation(CLI::App& app, Bench& bench);
 void addJobOperation(CLI::App& app, Bench& bench);
+void addSegmentOperation(CLI::App& app, Bench& bench);
 
 }  // namespace shapedb::bench

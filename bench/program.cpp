@@ -49,6 +49,7 @@ int run(int argc, const char* const* argv, cli::Console& console, const std::ato
         addLoadOperation(app, bench);
         addInstructionsOperation(app, bench);
         addJobOperation(app, bench);
+        addSegmentOperation(app, bench);
         try {
             app.parse(argc, argv);
         } catch (const CLI::CallForHelp&) {

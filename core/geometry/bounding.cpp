@@ -16,6 +16,7 @@
 
 #include "core/base/random.h"
 #include "core/geometry/motion.h"
+#include "core/geometry/outer_points.h"
 
 namespace shapedb {
 
@@ -41,8 +42,7 @@ constexpr int kCoarseDirections = 1500;
 
 PointCloud hullVertices(const PointCloud& points) {
     std::vector<Kernel::Point_3> copies;
-    copies.reserve(points.size());
-    for (const Point3& p : points) copies.emplace_back(p.x, p.y, p.z);
+    for (const Point3& p : withoutDeepInside(points)) copies.emplace_back(p.x, p.y, p.z);
     std::vector<Kernel::Point_3> extreme;
     CGAL::extreme_points_3(copies, std::back_inserter(extreme));
     PointCloud vertices;

@@ -13,6 +13,8 @@
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
 
+#include "core/geometry/parallel_points.h"
+
 namespace shapedb {
 
 namespace {
@@ -42,7 +44,6 @@ constexpr double kEnoughShare = 0.5;
 constexpr double kWiderReach = 1.6;
 constexpr std::size_t kQuadricMinimum = 12;
 constexpr double kMaxMoveInSigmas = 3.0;
-constexpr std::size_t kPointsBetweenCheckpoints = 4096;
 
 double median(std::vector<double> values) {
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -170,14 +171,8 @@ Point3 projected(const PointCloud& points, std::uint32_t at, const std::vector<N
 Result<PointCloud> smoothOnce(const PointCloud& points, const NeighbourIndex& index, double reach,
                               double enough, double limit, const RunContext& context) {
     PointCloud moved(points.size());
-    std::vector<Neighbour> found;
-    std::vector<Eigen::Vector3d> offsets;
-    std::vector<double> weights;
-    std::size_t done = 0;
-    for (const std::uint32_t i : index.order()) {
-        if (done++ % kPointsBetweenCheckpoints == 0) {
-            if (auto go = context.checkpoint(); !go) return fail(go.error());
-        }
+    const auto moveOne = [&, found = std::vector<Neighbour>(), offsets = std::vector<Eigen::Vector3d>(),
+                          weights = std::vector<double>()](std::uint32_t i) mutable {
         double own = reach;
         index.within(points[i], own, found);
         if (static_cast<double>(found.size()) < enough) {
@@ -185,7 +180,8 @@ Result<PointCloud> smoothOnce(const PointCloud& points, const NeighbourIndex& in
             index.within(points[i], own, found);
         }
         moved[i] = projected(points, i, found, own, limit, offsets, weights);
-    }
+    };
+    if (auto done = forEachPoint(index.order(), context, moveOne); !done) return fail(done.error());
     return moved;
 }
 

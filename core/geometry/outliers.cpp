@@ -9,6 +9,8 @@
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
 
+#include "core/geometry/parallel_points.h"
+
 namespace shapedb {
 
 namespace {
@@ -23,7 +25,6 @@ constexpr double kHazeFlatness = 0.25;
 constexpr double kLinkInReaches = 3.0;     // of the common reach
 constexpr double kOwnLinkInReaches = 1.5;  // of the mean reach of the two ends
 constexpr double kSmallGroupShare = 0.01;
-constexpr std::size_t kPointsBetweenCheckpoints = 4096;
 
 // Each point's nearest neighbours, without itself.
 struct Surroundings {
@@ -41,16 +42,12 @@ Result<Surroundings> measureReaches(const PointCloud& points, const NeighbourInd
     Surroundings around;
     around.near.resize(points.size() * kNeighbours);
     around.reach.resize(points.size());
-    std::vector<Neighbour> found;
-    std::size_t done = 0;
-    for (const std::uint32_t i : index.order()) {
-        if (done++ % kPointsBetweenCheckpoints == 0) {
-            if (auto go = context.checkpoint(); !go) return fail(go.error());
-        }
+    const auto measureOne = [&, found = std::vector<Neighbour>()](std::uint32_t i) mutable {
         index.nearest(points[i], kNeighbours + 1, found);  // the first is the point itself
         for (std::size_t k = 0; k < kNeighbours; ++k) around.near[i * kNeighbours + k] = found[k + 1].point;
         around.reach[i] = std::sqrt(found.back().squaredDistance);
-    }
+    };
+    if (auto done = forEachPoint(index.order(), context, measureOne); !done) return fail(done.error());
     std::vector<double> sorted = around.reach;
     const auto common =
         sorted.begin() + static_cast<std::ptrdiff_t>(kCommonShare * static_cast<double>(sorted.size() - 1));

@@ -64,6 +64,103 @@ std::pair<double, std::size_t> farthest(const PointCloud& points, Distance dista
     return {best, at};
 }
 
+// The nearest multiple of kGrid. Adding zero turns -0.0 into 0.0, so that equal points have
+// equal bytes.
+Point3 onGrid(const Point3& p) {
+    const auto round = [](double v) { return kGrid * std::nearbyint(v / kGrid) + 0.0; };
+    return {round(p.x), round(p.y), round(p.z)};
+}
+
+Result<Frame> frameOfChecked(const PointCloud& scan) {
+    const Box box = axisAlignedBox(scan);
+    const Point3 half = 0.5 * box.high - 0.5 * box.low;
+    const double halfExtent = std::max({half.x, half.y, half.z});
+    if (halfExtent == 0.0) {
+        return fail(ErrorCode::kAllPointsEqual,
+                    "all " + std::to_string(scan.size()) + " points are the same point");
+    }
+    if (halfExtent < kMinHalfExtent) {
+        return fail(ErrorCode::kCoordinateOutOfRange,
+                    "the whole scan is smaller than 1.2e-38 units; choose a smaller unit of length");
+    }
+    int exponent = 0;
+    std::frexp(halfExtent, &exponent);
+    return Frame{0.5 * box.high + 0.5 * box.low, std::ldexp(1.0, exponent)};
+}
+
+Result<SanitisedPoints> sanitiseOrThrow(const PointCloud& scan) {
+    const auto frame = frameOf(scan);
+    if (!frame) return fail(frame.error());
+    SanitisedPoints result;
+    result.frame = *frame;
+    const double inverse = 1.0 / result.frame.unit;  // exact: a power of two
+    PointCloud scaled(scan.size());
+    for (std::size_t i = 0; i < scan.size(); ++i) {
+        scaled[i] = onGrid(inverse * (scan[i] - result.frame.centre));
+    }
+    MergedPoints merged = mergeDuplicates(scaled);
+    result.duplicates = scan.size() - merged.points.size();
+    result.points = std::move(merged.points);
+    result.siteOfPoint = std::move(merged.siteOfPoint);
+    if (result.points.size() < 4) {
+        return fail(ErrorCode::kTooFewPoints, "only " + std::to_string(result.points.size()) + " of " +
+                                                  std::to_string(scan.size()) +
+                                                  " points are distinct; at least 4 are needed");
+    }
+    if (const auto spans = checkSpansSpace(result.points); !spans) return fail(spans.error());
+    return result;
+}
+
+struct Placed {
+    Point3 at;
+    std::uint32_t index = 0;
+};
+
+// By coordinates, equal points by index. First into slices along x, as many as points, then each slice
+// by itself: linear time unless most points share a few values of x.
+std::vector<Placed> lexicographicallySorted(const PointCloud& points) {
+    std::vector<Placed> sorted(points.size());
+    if (points.empty()) return sorted;
+    const Box box = axisAlignedBox(points);
+    const double extent = box.high.x - box.low.x;
+    const auto slices = static_cast<double>(points.size());
+    const double perUnit = extent > 0.0 && std::isfinite(slices / extent) ? slices / extent : 0.0;
+    const auto sliceOf = [&](const Point3& p) {
+        return static_cast<std::size_t>(std::min(slices - 1.0, (p.x - box.low.x) * perUnit));
+    };
+    std::vector<std::uint32_t> begin(points.size() + 1, 0);
+    for (const Point3& p : points) ++begin[sliceOf(p) + 1];
+    std::partial_sum(begin.begin(), begin.end(), begin.begin());
+    for (std::uint32_t i = 0; i < points.size(); ++i) sorted[begin[sliceOf(points[i])]++] = {points[i], i};
+    std::size_t from = 0;
+    for (std::size_t slice = 0; slice < points.size(); ++slice) {
+        const std::size_t to = begin[slice];  // moved to the end of the slice while filling it
+        if (to - from > 1) {
+            std::sort(sorted.begin() + static_cast<std::ptrdiff_t>(from),
+                      sorted.begin() + static_cast<std::ptrdiff_t>(to), [](const Placed& a, const Placed& b) {
+                          if (a.at != b.at) return lexicographicLess(a.at, b.at);
+                          return a.index < b.index;
+                      });
+        }
+        from = to;
+    }
+    return sorted;
+}
+
+}  // namespace
+
+MergedPoints mergeDuplicates(const PointCloud& points) {
+    const std::vector<Placed> sorted = lexicographicallySorted(points);
+    MergedPoints merged;
+    merged.points.reserve(points.size());
+    merged.siteOfPoint.resize(points.size());
+    for (const Placed& p : sorted) {
+        if (merged.points.empty() || merged.points.back() != p.at) merged.points.push_back(p.at);
+        merged.siteOfPoint[p.index] = static_cast<std::uint32_t>(merged.points.size() - 1);
+    }
+    return merged;
+}
+
 // Grows a simplex greedily: far point, far from the line, far from the plane. Within a factor
 // of two of the widest, which is all a tolerance needs.
 Result<void> checkSpansSpace(const PointCloud& points) {
@@ -86,65 +183,7 @@ Result<void> checkSpansSpace(const PointCloud& points) {
     return {};
 }
 
-// The nearest multiple of kGrid. Adding zero turns -0.0 into 0.0, so that equal points have
-// equal bytes.
-Point3 onGrid(const Point3& p) {
-    const auto round = [](double v) { return kGrid * std::nearbyint(v / kGrid) + 0.0; };
-    return {round(p.x), round(p.y), round(p.z)};
-}
-
-Result<SanitisedPoints> sanitiseChecked(const PointCloud& scan) {
-    const Box box = axisAlignedBox(scan);
-    const Point3 half = 0.5 * box.high - 0.5 * box.low;
-    const double halfExtent = std::max({half.x, half.y, half.z});
-    if (halfExtent == 0.0) {
-        return fail(ErrorCode::kAllPointsEqual,
-                    "all " + std::to_string(scan.size()) + " points are the same point");
-    }
-    if (halfExtent < kMinHalfExtent) {
-        return fail(ErrorCode::kCoordinateOutOfRange,
-                    "the whole scan is smaller than 1.2e-38 units; choose a smaller unit of length");
-    }
-    SanitisedPoints result;
-    int exponent = 0;
-    std::frexp(halfExtent, &exponent);
-    result.frame = {0.5 * box.high + 0.5 * box.low, std::ldexp(1.0, exponent)};
-    const double inverse = 1.0 / result.frame.unit;  // exact: a power of two
-    PointCloud scaled(scan.size());
-    for (std::size_t i = 0; i < scan.size(); ++i) {
-        scaled[i] = onGrid(inverse * (scan[i] - result.frame.centre));
-    }
-    MergedPoints merged = mergeDuplicates(scaled);
-    result.duplicates = scan.size() - merged.points.size();
-    result.points = std::move(merged.points);
-    result.siteOfPoint = std::move(merged.siteOfPoint);
-    if (result.points.size() < 4) {
-        return fail(ErrorCode::kTooFewPoints, "only " + std::to_string(result.points.size()) + " of " +
-                                                  std::to_string(scan.size()) +
-                                                  " points are distinct; at least 4 are needed");
-    }
-    if (const auto spans = checkSpansSpace(result.points); !spans) return fail(spans.error());
-    return result;
-}
-
-}  // namespace
-
-MergedPoints mergeDuplicates(const PointCloud& points) {
-    std::vector<std::uint32_t> order(points.size());
-    std::iota(order.begin(), order.end(), 0u);
-    std::sort(order.begin(), order.end(),
-              [&](std::uint32_t a, std::uint32_t b) { return lexicographicLess(points[a], points[b]); });
-    MergedPoints merged;
-    merged.points.reserve(points.size());
-    merged.siteOfPoint.resize(points.size());
-    for (const std::uint32_t i : order) {
-        if (merged.points.empty() || merged.points.back() != points[i]) merged.points.push_back(points[i]);
-        merged.siteOfPoint[i] = static_cast<std::uint32_t>(merged.points.size() - 1);
-    }
-    return merged;
-}
-
-Result<SanitisedPoints> sanitise(const PointCloud& scan) {
+Result<Frame> frameOf(const PointCloud& scan) {
     if (scan.size() < 4) {
         return fail(ErrorCode::kTooFewPoints,
                     "the scan has " + std::to_string(scan.size()) + " points; at least 4 are needed");
@@ -153,8 +192,12 @@ Result<SanitisedPoints> sanitise(const PointCloud& scan) {
         return fail(ErrorCode::kPointLimitExceeded, "the scan has more than 4,294,967,294 points");
     }
     if (const auto finite = checkCoordinates(scan); !finite) return fail(finite.error());
+    return frameOfChecked(scan);
+}
+
+Result<SanitisedPoints> sanitise(const PointCloud& scan) {
     try {
-        return sanitiseChecked(scan);
+        return sanitiseOrThrow(scan);
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::kOutOfMemory,
                     "not enough memory to sort " + std::to_string(scan.size()) + " points");

@@ -48,6 +48,13 @@ struct SanitisedPoints {
 /// kCollinear, kCoplanar (within kFlatnessTolerance), kOutOfMemory.
 [[nodiscard]] Result<SanitisedPoints> sanitise(const PointCloud& scan);
 
+/// The first part of `sanitise`: checks number and coordinates and finds the frame. Errors: those of
+/// `sanitise` but for distinctness and flatness.
+[[nodiscard]] Result<Frame> frameOf(const PointCloud& scan);
+
+/// The last part: whether points in the unit frame span a volume. Errors: kCollinear, kCoplanar.
+[[nodiscard]] Result<void> checkSpansSpace(const PointCloud& points);
+
 struct MergedPoints {
     PointCloud points;                       ///< distinct, in lexicographic order
     std::vector<std::uint32_t> siteOfPoint;  ///< input point -> index into `points`

@@ -8,74 +8,22 @@
 #include <numeric>
 #include <string>
 
-#include <CGAL/Delaunay_triangulation_3.h>
-#include <CGAL/Delaunay_triangulation_cell_base_3.h>
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/Spatial_sort_traits_adapter_3.h>
-#include <CGAL/Triangulation_cell_base_with_info_3.h>
-#include <CGAL/Triangulation_vertex_base_with_info_3.h>
-#include <CGAL/property_map.h>
-#include <CGAL/spatial_sort.h>
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
 
+#include "core/geometry/sanitise.h"
+#include "core/segmentation/cavity_inserter.h"
+#include "core/segmentation/curve_order.h"
 #include "core/segmentation/exact_geometry.h"
+#include "core/segmentation/flat_delaunay.h"
 
 namespace shapedb {
 
 namespace {
 
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-using VertexBase = CGAL::Triangulation_vertex_base_with_info_3<std::uint32_t, Kernel>;
-using CellBase = CGAL::Triangulation_cell_base_with_info_3<std::uint32_t, Kernel,
-                                                           CGAL::Delaunay_triangulation_cell_base_3<Kernel>>;
-using Triangulation =
-    CGAL::Delaunay_triangulation_3<Kernel, CGAL::Triangulation_data_structure_3<VertexBase, CellBase>>;
-
-constexpr std::size_t kInsertsBetweenCheckpoints = 4096;
-
 // A tetrahedron is computed exactly when its volume, as a share of the box spanned by its three
 // edges at a corner, leaves fewer than about six correct digits in double precision.
 constexpr double kFlatShare = 1e-10;
-
-// The order in which points are inserted: along a Hilbert curve, so that each insertion
-// starts next to the one before (what CGAL's range insert does, with room for checkpoints).
-std::vector<std::size_t> insertionOrder(const std::vector<Kernel::Point_3>& points) {
-    using Map = CGAL::Pointer_property_map<Kernel::Point_3>::const_type;
-    using Traits = CGAL::Spatial_sort_traits_adapter_3<Kernel, Map>;
-    std::vector<std::size_t> order(points.size());
-    std::iota(order.begin(), order.end(), std::size_t{0});
-    CGAL::spatial_sort(order.begin(), order.end(), Traits(CGAL::make_property_map(points)));
-    return order;
-}
-
-Result<void> insertAll(Triangulation& triangulation, const PointCloud& cloud, const RunContext& context) {
-    std::vector<Kernel::Point_3> points;
-    points.reserve(cloud.size());
-    for (const Point3& p : cloud) points.emplace_back(p.x, p.y, p.z);
-    const std::vector<std::size_t> order = insertionOrder(points);
-    Triangulation::Cell_handle hint;
-    for (std::size_t i = 0; i < order.size(); ++i) {
-        if (i % kInsertsBetweenCheckpoints == 0) {
-            if (auto go = context.checkpoint(); !go) return go;
-            context.report("delaunay", i, order.size());
-        }
-        const auto vertex = triangulation.insert(points[order[i]], hint);
-        vertex->info() = static_cast<std::uint32_t>(order[i]);
-        hint = vertex->cell();
-    }
-    return {};
-}
-
-Result<void> checkDimension(const Triangulation& triangulation, std::size_t given) {
-    if (triangulation.number_of_vertices() != given) {
-        return fail(ErrorCode::kInternal, "the points to triangulate are not distinct");
-    }
-    switch (triangulation.dimension()) {
-        case 3: return {};
-        case 2: return fail(ErrorCode::kCoplanar, "all points lie in one plane");
-        case 1: return fail(ErrorCode::kCollinear, "all points lie on one line");
-        default: return fail(ErrorCode::kTooFewPoints, "fewer than 4 distinct points");
-    }
-}
 
 Point3 circumcentre(const TetrahedronCorners& p) {
     const Point3 a = p[1] - p[0];
@@ -91,32 +39,130 @@ Point3 circumcentre(const TetrahedronCorners& p) {
     return p[0] + (0.5 / sixVolumes) * numerator;
 }
 
-Tetrahedra flatten(Triangulation& triangulation, const PointCloud& cloud) {
-    Tetrahedra flat;
-    const std::size_t count = triangulation.number_of_finite_cells();
-    flat.vertices.reserve(count);
-    flat.circumcentres.reserve(count);
-    flat.circumradii.reserve(count);
-    for (const auto cell : triangulation.all_cell_handles()) cell->info() = kNoTetrahedron;
-    for (const auto cell : triangulation.finite_cell_handles()) {
-        cell->info() = static_cast<std::uint32_t>(flat.vertices.size());
-        std::array<std::uint32_t, 4> vertices;
-        TetrahedronCorners corners;
-        for (std::size_t i = 0; i < 4; ++i) {
-            vertices[i] = cell->vertex(static_cast<int>(i))->info();
-            corners[i] = cloud[vertices[i]];
+using Corners = std::array<std::uint32_t, 4>;
+
+// The even permutation of the corners that has the lowest first and the lowest of the others second,
+// applied to corners and neighbours. So a tetrahedron looks the same whatever made it. Two exchanges
+// keep the sense; comparing without branches, because which corner is lowest is random.
+void makeCanonical(Cell& cell) {
+    Corners& v = cell.vertices;
+    Corners& n = cell.neighbours;
+    const auto exchange = [&](std::uint32_t i, std::uint32_t j) {
+        std::swap(v[i], v[j]);
+        std::swap(n[i], n[j]);
+    };
+    const std::uint32_t low01 = v[1] < v[0] ? 1 : 0;
+    const std::uint32_t low23 = v[3] < v[2] ? 3 : 2;
+    const std::uint32_t first = v[low23] < v[low01] ? low23 : low01;
+    // The lowest to the front by exchanging both pairs: (0 1)(2 3), (0 2)(1 3) or (0 3)(1 2).
+    const Corners w = v;
+    const Corners m = n;
+    for (std::uint32_t i = 0; i < 4; ++i) {
+        v[i] = w[i ^ first];
+        n[i] = m[i ^ first];
+    }
+    if (v[2] < v[1] && v[2] < v[3]) {
+        exchange(1, 2);
+        exchange(2, 3);
+    } else if (v[3] < v[1]) {
+        exchange(1, 3);
+        exchange(2, 3);
+    }
+}
+
+bool isFinite(const Corners& v) {
+    return (static_cast<unsigned>(v[0] < kInfinite) & static_cast<unsigned>(v[1] < kInfinite) &
+            static_cast<unsigned>(v[2] < kInfinite) & static_cast<unsigned>(v[3] < kInfinite)) != 0;
+}
+
+// The finite cells, made canonical, by their corners. The places of cells in the store, which depend on
+// the threads, leave no trace.
+std::vector<std::uint32_t> sortedCells(CellStore& cells, std::size_t siteCount) {
+    std::vector<std::uint32_t> begin(siteCount + 2, 0);
+    for (std::uint32_t c = 0; c < cells.used(); ++c) {
+        if (!isFinite(cells[c].vertices)) continue;
+        makeCanonical(cells[c]);
+        ++begin[cells[c].vertices[0] + 2];
+    }
+    std::partial_sum(begin.begin(), begin.end(), begin.begin());
+    std::vector<std::uint32_t> sorted(begin.back());
+    for (std::uint32_t c = 0; c < cells.used(); ++c) {
+        if (isFinite(cells[c].vertices)) sorted[begin[cells[c].vertices[0] + 1]++] = c;
+    }
+    // Three corners in their sense belong to one tetrahedron, so the second and third decide.
+    std::vector<std::pair<std::uint64_t, std::uint32_t>> group;
+    for (std::size_t v = 0; v < siteCount; ++v) {
+        group.clear();
+        for (std::uint32_t i = begin[v]; i < begin[v + 1]; ++i) {
+            const Corners& corners = cells[sorted[i]].vertices;
+            group.emplace_back(std::uint64_t{corners[1]} << 32 | corners[2], sorted[i]);
         }
+        std::sort(group.begin(), group.end());
+        for (std::size_t i = 0; i < group.size(); ++i) sorted[begin[v] + i] = group[i].second;
+    }
+    return sorted;
+}
+
+// `order`: the point of each site.
+Tetrahedra flatten(CellStore& cells, const std::vector<std::uint32_t>& order) {
+    std::vector<std::uint32_t> sorted = sortedCells(cells, order.size());
+    std::vector<std::uint32_t> place(cells.used(), kNoTetrahedron);
+    for (std::uint32_t t = 0; t < sorted.size(); ++t) place[sorted[t]] = t;
+    Tetrahedra flat;
+    flat.vertices.resize(sorted.size());
+    flat.neighbours.resize(sorted.size());
+    for (std::size_t t = 0; t < sorted.size(); ++t) {
+        const Cell& cell = cells[sorted[t]];
+        for (std::size_t i = 0; i < 4; ++i) {
+            flat.vertices[t][i] = order[cell.vertices[i]];
+            flat.neighbours[t][i] = place[cell.neighbours[i]];
+        }
+    }
+    return flat;
+}
+
+void measureBalls(const PointCloud& points, Tetrahedra& flat) {
+    flat.circumcentres.resize(flat.size());
+    flat.circumradii.resize(flat.size());
+    for (std::size_t t = 0; t < flat.size(); ++t) {
+        const auto& v = flat.vertices[t];
+        const TetrahedronCorners corners = {points[v[0]], points[v[1]], points[v[2]], points[v[3]]};
         const Point3 centre = circumcentre(corners);
-        flat.vertices.push_back(vertices);
-        flat.circumcentres.push_back(centre);
-        flat.circumradii.push_back(distance(centre, corners[0]));
+        flat.circumcentres[t] = centre;
+        flat.circumradii[t] = distance(centre, corners[0]);
     }
-    flat.neighbours.reserve(count);
-    for (const auto cell : triangulation.finite_cell_handles()) {
-        std::array<std::uint32_t, 4> neighbours;
-        for (int i = 0; i < 4; ++i) neighbours[static_cast<std::size_t>(i)] = cell->neighbor(i)->info();
-        flat.neighbours.push_back(neighbours);
+}
+
+Result<void> checkDistinct(const PointCloud& points) {
+    if (mergeDuplicates(points).points.size() == points.size()) return {};
+    return fail(ErrorCode::kInternal, "the points to triangulate are not distinct");
+}
+
+// As many threads as the caller's arena, and whatever limits it, allow.
+int threadsOfArena() {
+    const auto allowed = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
+    return std::min(tbb::this_task_arena::max_concurrency(), static_cast<int>(allowed));
+}
+
+Result<Tetrahedra> triangulateOrThrow(const PointCloud& points, const RunContext& context) {
+    const std::vector<std::uint32_t> order = curveOrder(points);
+    Tetrahedra flat;
+    {
+        CellStore cells;
+        std::vector<Site> sites(points.size());
+        for (std::size_t i = 0; i < sites.size(); ++i) {
+            const Point3& p = points[order[i]];
+            sites[i] = {p.x, p.y, p.z};
+        }
+        if (auto done = insertAll(sites, cells, threadsOfArena(), context); !done) {
+            if (done.error().code == ErrorCode::kCollinear || done.error().code == ErrorCode::kCoplanar) {
+                if (auto distinct = checkDistinct(points); !distinct) return fail(distinct.error());
+            }
+            return fail(done.error());
+        }
+        flat = flatten(cells, order);
     }
+    measureBalls(points, flat);
     return flat;
 }
 
@@ -125,10 +171,7 @@ Tetrahedra flatten(Triangulation& triangulation, const PointCloud& cloud) {
 Result<Tetrahedra> triangulate(const PointCloud& points, const RunContext& context) {
     if (points.size() < 4) return fail(ErrorCode::kTooFewPoints, "fewer than 4 distinct points");
     try {
-        Triangulation triangulation;
-        if (auto done = insertAll(triangulation, points, context); !done) return fail(done.error());
-        if (auto solid = checkDimension(triangulation, points.size()); !solid) return fail(solid.error());
-        return flatten(triangulation, points);
+        return triangulateOrThrow(points, context);
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::kOutOfMemory, "not enough memory for the Delaunay triangulation of " +
                                                  std::to_string(points.size()) + " points");

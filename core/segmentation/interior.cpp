@@ -55,11 +55,39 @@ double intersectionAngle(const Point3& centreA, const Point3& centreB, const Poi
     return std::atan2(length(cross(a, b)), dot(a, b));
 }
 
+namespace {
+
+// intersectionAngle < angle, most often without computing the angle.
+class DeepAngle {
+  public:
+    explicit DeepAngle(double angle) : angle_(angle), squaredCosine_(std::cos(angle) * std::cos(angle)) {}
+
+    bool between(const Point3& centreA, const Point3& centreB, const Point3& shared) const {
+        const Point3 a = centreA - shared;
+        const Point3 b = centreB - shared;
+        const double product = dot(a, b);
+        // The angle is below 90 degrees, so its cosine is positive.
+        const double squared = product > 0.0 ? product * product : 0.0;
+        const double limit = squaredCosine_ * squaredLength(a) * squaredLength(b);
+        if (squared > (1.0 + kCosineSlack) * limit) return true;
+        if (squared < (1.0 - kCosineSlack) * limit) return false;
+        return intersectionAngle(centreA, centreB, shared) < angle_;
+    }
+
+  private:
+    // Rounding moves the squares by less, whatever the angle: none is near 0 or 90 degrees.
+    static constexpr double kCosineSlack = 1e-9;
+    double angle_;
+    double squaredCosine_;
+};
+
+}  // namespace
+
 Result<std::vector<std::uint8_t>> interiorTetrahedra(const PointCloud& points, const Tetrahedra& tetrahedra,
                                                      const std::vector<std::uint8_t>& big,
                                                      const SegmentationOptions& options,
                                                      const RunContext& context) {
-    const double deepAngle = options.deepAngleDegrees * kRadiansPerDegree;
+    const DeepAngle deep(options.deepAngleDegrees * kRadiansPerDegree);
     const double cosHullAngle = std::cos(options.hullAngleDegrees * kRadiansPerDegree);
     std::vector<std::uint8_t> inside = big;
     std::vector<std::uint32_t> stack;
@@ -83,10 +111,7 @@ Result<std::vector<std::uint8_t>> interiorTetrahedra(const PointCloud& points, c
             const std::uint32_t next = tetrahedra.neighbours[t][facet];
             if (next == kNoTetrahedron || !inside[next]) continue;
             const Point3& shared = points[tetrahedra.vertices[t][(facet + 1) % 4]];
-            if (intersectionAngle(tetrahedra.circumcentres[t], tetrahedra.circumcentres[next], shared) >=
-                deepAngle) {
-                continue;
-            }
+            if (!deep.between(tetrahedra.circumcentres[t], tetrahedra.circumcentres[next], shared)) continue;
             inside[next] = 0;
             stack.push_back(next);
         }

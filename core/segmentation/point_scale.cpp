@@ -1,7 +1,9 @@
 #include "core/segmentation/point_scale.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 
 namespace shapedb {
@@ -11,79 +13,122 @@ namespace {
 constexpr std::size_t kNeighbours = 3;
 constexpr std::uint32_t kNone = 0xffffffffu;
 
-// The tetrahedra around each point, one after the other (compressed rows).
-struct Stars {
-    std::vector<std::uint32_t> begin;  // per point, plus the end of the last
-    std::vector<std::uint32_t> tetrahedra;
-};
+// How many of its nearest Delaunay neighbours each point keeps: enough that hardly ever another one
+// matters to a point next to it.
+constexpr std::size_t kKept = 4;
 
-Stars buildStars(std::size_t pointCount, const Tetrahedra& tetrahedra) {
-    Stars stars;
-    stars.begin.assign(pointCount + 1, 0);
-    for (const auto& vertices : tetrahedra.vertices) {
-        for (const std::uint32_t v : vertices) ++stars.begin[v + 1];
-    }
-    for (std::size_t v = 0; v < pointCount; ++v) stars.begin[v + 1] += stars.begin[v];
-    stars.tetrahedra.resize(stars.begin.back());
-    std::vector<std::uint32_t> next(stars.begin.begin(), stars.begin.end() - 1);
-    for (std::size_t t = 0; t < tetrahedra.size(); ++t) {
-        for (const std::uint32_t v : tetrahedra.vertices[t]) {
-            stars.tetrahedra[next[v]++] = static_cast<std::uint32_t>(t);
-        }
-    }
-    return stars;
-}
+// Distances are compared after rounding; so much wider the search is safe.
+constexpr double kSlack = 1.0 + 1e-12;
 
 // The nearest points seen so far, by rising squared distance.
-class Nearest {
-  public:
-    void offer(std::uint32_t point, double squared) {
-        if (squared >= squared_.back()) return;
-        for (const std::uint32_t known : points_) {
-            if (known == point) return;
-        }
-        std::size_t at = kNeighbours - 1;
-        for (; at > 0 && squared_[at - 1] > squared; --at) {
-            squared_[at] = squared_[at - 1];
-            points_[at] = points_[at - 1];
-        }
-        squared_[at] = squared;
-        points_[at] = point;
+template <std::size_t kCount>
+struct Nearest {
+    std::array<double, kCount> squared;
+    std::array<std::uint32_t, kCount> points;
+
+    Nearest() {
+        squared.fill(std::numeric_limits<double>::infinity());
+        points.fill(kNone);
     }
 
-    std::uint32_t point(std::size_t rank) const { return points_[rank]; }
+    void offer(std::uint32_t point, double distance) {
+        if (distance >= squared.back()) return;
+        for (const std::uint32_t known : points) {
+            if (known == point) return;
+        }
+        std::size_t at = kCount - 1;
+        for (; at > 0 && squared[at - 1] > distance; --at) {
+            squared[at] = squared[at - 1];
+            points[at] = points[at - 1];
+        }
+        squared[at] = distance;
+        points[at] = point;
+    }
+};
 
-    double meanDistance() const {
-        double sum = 0.0;
-        for (const double s : squared_) sum += std::sqrt(s);
-        return sum / static_cast<double>(kNeighbours);
+using Kept = std::vector<Nearest<kKept>>;
+
+// The nearest Delaunay neighbours of every point, in one pass over the tetrahedra.
+Kept nearestNeighbours(const PointCloud& points, const Tetrahedra& tetrahedra) {
+    Kept kept(points.size());
+    for (const auto& v : tetrahedra.vertices) {
+        for (std::size_t i = 0; i < 4; ++i) {
+            for (std::size_t j = i + 1; j < 4; ++j) {
+                const double squared = squaredDistance(points[v[i]], points[v[j]]);
+                kept[v[i]].offer(v[j], squared);
+                kept[v[j]].offer(v[i], squared);
+            }
+        }
+    }
+    return kept;
+}
+
+// The tetrahedra around a point, found by stepping through facets from one of them.
+class Stars {
+  public:
+    Stars(const Tetrahedra& tetrahedra, std::size_t pointCount) : tetrahedra_(tetrahedra), any_(pointCount) {
+        for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
+            for (const std::uint32_t v : tetrahedra.vertices[t]) any_[v] = t;
+        }
+    }
+
+    template <typename Visit>
+    void forEachVertexAround(std::uint32_t centre, Visit visit) {
+        star_.assign(1, any_[centre]);
+        for (std::size_t k = 0; k < star_.size(); ++k) {
+            const std::uint32_t t = star_[k];
+            for (std::size_t i = 0; i < 4; ++i) {
+                const std::uint32_t v = tetrahedra_.vertices[t][i];
+                if (v == centre) continue;
+                visit(v);
+                const std::uint32_t next = tetrahedra_.neighbours[t][i];
+                if (next == kNoTetrahedron || std::find(star_.begin(), star_.end(), next) != star_.end()) {
+                    continue;
+                }
+                star_.push_back(next);
+            }
+        }
     }
 
   private:
-    std::array<std::uint32_t, kNeighbours> points_{kNone, kNone, kNone};
-    std::array<double, kNeighbours> squared_{std::numeric_limits<double>::infinity(),
-                                             std::numeric_limits<double>::infinity(),
-                                             std::numeric_limits<double>::infinity()};
+    const Tetrahedra& tetrahedra_;
+    std::vector<std::uint32_t> any_;
+    std::vector<std::uint32_t> star_;
 };
 
 }  // namespace
 
+// A point q near p that is not adjacent to it is adjacent to an r inside the ball with diameter pq: grow
+// a ball from q along the way to p until it touches a point. So |rq|^2 <= |pq|^2 - |pr|^2, which bounds
+// the search around r.
 std::vector<double> pointScales(const PointCloud& points, const Tetrahedra& tetrahedra) {
-    const Stars stars = buildStars(points.size(), tetrahedra);
+    const Kept kept = nearestNeighbours(points, tetrahedra);
+    Stars stars(tetrahedra, points.size());
     std::vector<double> scales(points.size());
     for (std::uint32_t p = 0; p < points.size(); ++p) {
-        Nearest nearest;
-        const auto offerLinkOf = [&](std::uint32_t centre) {
-            for (std::uint32_t i = stars.begin[centre]; i < stars.begin[centre + 1]; ++i) {
-                for (const std::uint32_t v : tetrahedra.vertices[stars.tetrahedra[i]]) {
-                    if (v != p) nearest.offer(v, squaredDistance(points[p], points[v]));
-                }
-            }
+        Nearest<kNeighbours> nearest;
+        for (std::size_t i = 0; i < kNeighbours; ++i) {
+            nearest.squared[i] = kept[p].squared[i];
+            nearest.points[i] = kept[p].points[i];
+        }
+        const auto offer = [&](std::uint32_t q) {
+            if (q != p) nearest.offer(q, squaredDistance(points[p], points[q]));
         };
-        offerLinkOf(p);
-        // Rank 0 is final now; looking around it makes rank 1 final, and around that rank 2.
-        for (std::size_t rank = 0; rank + 1 < kNeighbours; ++rank) offerLinkOf(nearest.point(rank));
-        scales[p] = nearest.meanDistance();
+        // Rank 0 is final; looking around it makes rank 1 final, and around that rank 2.
+        for (std::size_t rank = 0; rank + 1 < kNeighbours; ++rank) {
+            const std::uint32_t r = nearest.points[rank];
+            const double reach = kSlack * nearest.squared.back() - nearest.squared[rank];
+            if (kept[r].squared.back() > reach) {
+                for (const std::uint32_t q : kept[r].points) {
+                    if (q != kNone) offer(q);
+                }
+            } else {
+                stars.forEachVertexAround(r, offer);
+            }
+        }
+        double sum = 0.0;
+        for (const double squared : nearest.squared) sum += std::sqrt(squared);
+        scales[p] = sum / static_cast<double>(kNeighbours);
     }
     return scales;
 }

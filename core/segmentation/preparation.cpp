@@ -6,6 +6,7 @@
 #include "core/geometry/decimate.h"
 #include "core/geometry/neighbours.h"
 #include "core/geometry/outliers.h"
+#include "core/geometry/scan_grid.h"
 #include "core/geometry/thin.h"
 
 namespace shapedb {
@@ -18,6 +19,9 @@ constexpr double kSpacingPerSigma = 1.0;
 // What smoothing leaves behind away from the surface is sparser than its surroundings by less
 // than a stray of the raw scan.
 constexpr double kStragglerRatio = 1.7;
+
+// Scans of more than this many times the target are not sorted before they are decimated.
+constexpr std::size_t kStreamingRatio = 4;
 
 // Composes siteOfPoint with a further step.
 void follow(std::vector<std::uint32_t>& siteOfPoint, const std::vector<std::uint32_t>& step) {
@@ -65,26 +69,45 @@ Result<void> evenOut(PreparedPoints& prepared, double multiple, const RunContext
     return {};
 }
 
+// Sanitised and decimated. Large scans go through a grid instead of being sorted first.
+Result<PreparedPoints> fewPoints(const PointCloud& points, std::size_t target, const RunContext& context,
+                                 const std::function<Result<void>(const char*)>& begin) {
+    PreparedPoints prepared;
+    if (target != 0 && points.size() > kStreamingRatio * target) {
+        if (auto go = begin("decimate"); !go) return fail(go.error());
+        auto gridded = gridScan(points, target, context);
+        if (!gridded) return fail(gridded.error());
+        if (*gridded) {
+            prepared.sites = std::move((*gridded)->points);
+            prepared.frame = (*gridded)->frame;
+            prepared.siteOfPoint = std::move((*gridded)->siteOfPoint);
+            return prepared;
+        }
+    }
+    auto clean = sanitise(points);
+    if (!clean) return fail(clean.error());
+    prepared.sites = std::move(clean->points);
+    prepared.frame = clean->frame;
+    prepared.siteOfPoint = std::move(clean->siteOfPoint);
+    prepared.duplicates = clean->duplicates;
+    if (target == 0 || prepared.sites.size() <= target) return prepared;
+    if (auto go = begin("decimate"); !go) return fail(go.error());
+    auto thinned = decimate(prepared.sites, target, context);
+    if (!thinned) return fail(thinned.error());
+    follow(prepared.siteOfPoint, thinned->siteOfPoint);
+    prepared.sites = std::move(thinned->points);
+    return prepared;
+}
+
 }  // namespace
 
 Result<PreparedPoints> preparePoints(const PointCloud& points, const SegmentationOptions& options,
                                      const RunContext& context,
                                      const std::function<Result<void>(const char*)>& begin) {
     if (auto go = begin("sanitise"); !go) return fail(go.error());
-    auto clean = sanitise(points);
-    if (!clean) return fail(clean.error());
-    PreparedPoints prepared;
-    prepared.sites = std::move(clean->points);
-    prepared.frame = clean->frame;
-    prepared.siteOfPoint = std::move(clean->siteOfPoint);
-    prepared.duplicates = clean->duplicates;
-    if (options.decimateTo != 0 && prepared.sites.size() > options.decimateTo) {
-        if (auto go = begin("decimate"); !go) return fail(go.error());
-        auto thinned = decimate(prepared.sites, options.decimateTo, context);
-        if (!thinned) return fail(thinned.error());
-        follow(prepared.siteOfPoint, thinned->siteOfPoint);
-        prepared.sites = std::move(thinned->points);
-    }
+    auto begun = fewPoints(points, options.decimateTo, context, begin);
+    if (!begun) return begun;
+    PreparedPoints prepared = std::move(*begun);
     if (options.strayRatio > 0.0) {
         if (auto go = begin("strays"); !go) return fail(go.error());
         if (auto done = leaveOutStrays(prepared, options.strayRatio, context); !done)

@@ -21,10 +21,11 @@ struct PreparedPoints {
     PointCloud sites;  ///< distinct, in the unit frame, in lexicographic order
     Frame frame;
     std::vector<std::uint32_t> siteOfPoint;  ///< input point -> index into `sites`, or kNoSite
-    std::uint64_t duplicates = 0;            ///< input points that repeated another
-    std::uint64_t strays = 0;                ///< input points left out
-    NoiseEstimate noise;                     ///< before smoothing, unit frame; zero when not measured
-    double spacing = 0.0;                    ///< the sites' own, unit frame; zero when not measured
+    std::uint64_t duplicates = 0;  ///< input points that repeated another; not counted (0) in scans large
+                                   ///< enough to be decimated as they stream by
+    std::uint64_t strays = 0;      ///< input points left out
+    NoiseEstimate noise;           ///< before smoothing, unit frame; zero when not measured
+    double spacing = 0.0;          ///< the sites' own, unit frame; zero when not measured
 };
 
 /// Runs the steps that `options` ask for, in this order: sanitise, decimate, strays, smooth, even

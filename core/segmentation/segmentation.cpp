@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "core/geometry/bounding.h"
+#include "core/segmentation/curve_order.h"
 #include "core/segmentation/flow.h"
 #include "core/segmentation/hierarchy.h"
 #include "core/segmentation/interior.h"
@@ -187,6 +188,21 @@ Result<PreparedPoints> prepare(const PointCloud& points, const SegmentationOptio
     return prepared;
 }
 
+// Sites that are neighbours in space become neighbours in memory: every later stage runs along them.
+void sortAlongCurve(PointCloud& sites, std::vector<std::uint32_t>& siteOfPoint) {
+    const std::vector<std::uint32_t> order = curveOrder(sites);
+    PointCloud sorted(sites.size());
+    std::vector<std::uint32_t> rank(sites.size());
+    for (std::uint32_t i = 0; i < order.size(); ++i) {
+        sorted[i] = sites[order[i]];
+        rank[order[i]] = i;
+    }
+    for (std::uint32_t& site : siteOfPoint) {
+        if (site != kNoSite) site = rank[site];
+    }
+    sites = std::move(sorted);
+}
+
 // Per tetrahedron 1 when it is interior; notes in the result how that was found.
 Result<std::vector<std::uint8_t>> findInterior(const PointCloud& sites, const std::vector<std::uint8_t>& big,
                                                const std::vector<double>& scales,
@@ -241,6 +257,7 @@ Result<Segmentation> segmentOrThrow(const PointCloud& points, const Segmentation
     auto prepared = prepare(points, options, context, clock, result);
     if (!prepared) return fail(prepared.error());
     if (auto go = clock.begin("delaunay"); !go) return fail(go.error());
+    sortAlongCurve(prepared->sites, result.siteOfPoint);
     auto tetrahedra = triangulate(prepared->sites, context);
     if (!tetrahedra) return fail(tetrahedra.error());
     result.tetrahedra = std::move(*tetrahedra);

@@ -69,7 +69,7 @@ struct Segmentation {
     double angleDegrees = 0.0;  ///< deep angle of the walk; 0 when the interior comes from elsewhere
     double noise = 0.0;  ///< estimated standard deviation before smoothing, scan units; 0: not measured
 
-    std::uint64_t duplicates = 0;  ///< input points that repeated an earlier one
+    std::uint64_t duplicates = 0;  ///< input points that repeated an earlier one; see PreparedPoints
     std::uint64_t strays = 0;      ///< input points left out
     std::uint64_t bigBalls = 0;
     std::uint64_t interiorTetrahedra = 0;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -13,46 +14,60 @@ constexpr std::size_t kStepsBetweenCheckpoints = 1 << 16;
 
 bool flowsThrough(std::uint8_t mask, std::size_t facet) { return ((mask >> facet) & 1u) != 0; }
 
-// Facet of `to` behind which `from` lies.
-std::size_t facetTowards(const Tetrahedra& tetrahedra, std::uint32_t to, std::uint32_t from) {
-    const auto& neighbours = tetrahedra.neighbours[to];
-    return static_cast<std::size_t>(std::find(neighbours.begin(), neighbours.end(), from) -
-                                    neighbours.begin());
-}
-
 // By falling circumradius, equal ones by index.
 void sortByFallingRadius(const Tetrahedra& tetrahedra, std::vector<std::uint32_t>& indices) {
-    std::sort(indices.begin(), indices.end(), [&](std::uint32_t a, std::uint32_t b) {
-        if (tetrahedra.circumradii[a] != tetrahedra.circumradii[b]) {
-            return tetrahedra.circumradii[a] > tetrahedra.circumradii[b];
-        }
-        return a < b;
-    });
+    std::vector<std::pair<double, std::uint32_t>> keyed;
+    keyed.reserve(indices.size());
+    for (const std::uint32_t t : indices) keyed.emplace_back(-tetrahedra.circumradii[t], t);
+    std::sort(keyed.begin(), keyed.end());
+    for (std::size_t i = 0; i < keyed.size(); ++i) indices[i] = keyed[i].second;
 }
 
-// Claims for `segment` every unclaimed tetrahedron that flows into `sink`, directly or not.
-Result<void> claim(const Tetrahedra& tetrahedra, const std::vector<std::uint8_t>& interior,
-                   const std::vector<std::uint8_t>& flow, std::uint32_t sink, std::size_t& steps,
-                   const RunContext& context, SegmentLabels& labels) {
-    const auto segment = static_cast<std::int32_t>(labels.peaks.size());
-    labels.peaks.push_back(sink);
-    labels.ofTetrahedron[sink] = segment;
-    std::vector<std::uint32_t> stack = {sink};
-    while (!stack.empty()) {
-        if (++steps % kStepsBetweenCheckpoints == 0) {
-            if (auto go = context.checkpoint(); !go) return go;
-        }
-        const std::uint32_t t = stack.back();
-        stack.pop_back();
-        for (const std::uint32_t from : tetrahedra.neighbours[t]) {
-            if (from == kNoTetrahedron || !interior[from] || labels.ofTetrahedron[from] >= 0) continue;
-            if (!flowsThrough(flow[from], facetTowards(tetrahedra, from, t))) continue;
-            labels.ofTetrahedron[from] = segment;
-            stack.push_back(from);
+constexpr std::int32_t kUnseen = -2;
+constexpr std::int32_t kOnPath = -3;  // flow has no cycles; if it had, the way would end where it closes
+constexpr std::int32_t kNoMaximum = -1;
+
+// Gives a tetrahedron the label of the strongest maximum that it flows into, directly or not: the least
+// label of the two it may flow into, found before its own. What is left by maxima that claim what flows
+// into them, strongest first, is the same; this way each tetrahedron is looked at once.
+class Downstream {
+  public:
+    Downstream(const Tetrahedra& tetrahedra, const std::vector<std::uint8_t>& interior,
+               const std::vector<std::uint8_t>& flow, std::vector<std::int32_t>& labels)
+        : tetrahedra_(tetrahedra), interior_(interior), flow_(flow), labels_(labels) {}
+
+    void follow(std::uint32_t start) {
+        path_.assign(1, start);
+        while (!path_.empty()) {
+            const std::uint32_t t = path_.back();
+            if (labels_[t] != kUnseen && labels_[t] != kOnPath) {
+                path_.pop_back();
+                continue;
+            }
+            const bool first = labels_[t] == kUnseen;
+            labels_[t] = kOnPath;
+            std::int32_t least = std::numeric_limits<std::int32_t>::max();
+            const std::size_t depth = path_.size();
+            for (std::size_t facet = 0; facet < 4; ++facet) {
+                if (!flowsThrough(flow_[t], facet)) continue;
+                const std::uint32_t next = tetrahedra_.neighbours[t][facet];
+                if (next == kNoTetrahedron || !interior_[next]) continue;
+                if (first && labels_[next] == kUnseen) path_.push_back(next);
+                if (labels_[next] >= 0) least = std::min(least, labels_[next]);
+            }
+            if (path_.size() > depth) continue;
+            labels_[t] = least == std::numeric_limits<std::int32_t>::max() ? kNoMaximum : least;
+            path_.pop_back();
         }
     }
-    return {};
-}
+
+  private:
+    const Tetrahedra& tetrahedra_;
+    const std::vector<std::uint8_t>& interior_;
+    const std::vector<std::uint8_t>& flow_;
+    std::vector<std::int32_t>& labels_;
+    std::vector<std::uint32_t> path_;
+};
 
 // Label of the labelled neighbour with the largest ball, -1 when there is none.
 std::int32_t labelOfLargestNeighbour(const Tetrahedra& tetrahedra, const SegmentLabels& labels,
@@ -150,18 +165,23 @@ class DisjointSets {
 Result<SegmentLabels> stableManifolds(const Tetrahedra& tetrahedra, const std::vector<std::uint8_t>& interior,
                                       const std::vector<std::uint8_t>& flow, const RunContext& context) {
     SegmentLabels labels;
-    labels.ofTetrahedron.assign(tetrahedra.size(), -1);
-    std::vector<std::uint32_t> maxima;
+    labels.ofTetrahedron.assign(tetrahedra.size(), kNoMaximum);
     for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
-        if (interior[t] && flow[t] == 0) maxima.push_back(t);
+        if (!interior[t]) continue;
+        labels.ofTetrahedron[t] = kUnseen;
+        if (flow[t] == 0) labels.peaks.push_back(t);
     }
-    sortByFallingRadius(tetrahedra, maxima);
+    sortByFallingRadius(tetrahedra, labels.peaks);
+    for (std::size_t i = 0; i < labels.peaks.size(); ++i) {
+        labels.ofTetrahedron[labels.peaks[i]] = static_cast<std::int32_t>(i);
+    }
     std::size_t steps = 0;
-    for (const std::uint32_t maximum : maxima) {
-        // Cospherical maxima cannot flow into each other, so none is claimed before its turn.
-        if (auto go = claim(tetrahedra, interior, flow, maximum, steps, context, labels); !go) {
-            return fail(go.error());
+    Downstream downstream(tetrahedra, interior, flow, labels.ofTetrahedron);
+    for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
+        if (++steps % kStepsBetweenCheckpoints == 0) {
+            if (auto go = context.checkpoint(); !go) return fail(go.error());
         }
+        if (labels.ofTetrahedron[t] == kUnseen) downstream.follow(t);
     }
     std::vector<std::uint32_t> leftovers;
     for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {

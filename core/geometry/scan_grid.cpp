@@ -1,0 +1,279 @@
+#include "core/geometry/scan_grid.h"
+
+#include <algorithm>
+#include <array>
+#include <new>
+#include <numeric>
+#include <string>
+#include <utility>
+
+#include "core/geometry/decimate.h"
+
+namespace shapedb {
+
+namespace {
+
+// Coordinates in the unit frame, moved to [0, 2], in steps of 2^-51.
+constexpr double kStepsPerUnit = 0x1p51;
+constexpr int kStepBits = 52;
+// The finest cells: 2^20 along the frame's edge of 2.
+constexpr int kFinestBits = 20;
+// Sums are kept in two parts, so that those of 2^32 points fit.
+constexpr int kLowBits = 26;
+constexpr std::uint64_t kLowMask = (std::uint64_t{1} << kLowBits) - 1;
+
+constexpr std::size_t kCellsPerTarget = 8;
+constexpr std::size_t kPointsBetweenCheckpoints = 1 << 16;
+constexpr std::uint32_t kFree = 0xffffffffu;
+
+using Steps = std::array<std::uint64_t, 3>;
+
+// The sum of the points of a cell, exactly.
+struct Sum {
+    std::array<std::uint64_t, 3> high{};
+    std::array<std::uint64_t, 3> low{};
+    std::uint64_t count = 0;
+
+    void add(const Steps& steps) {
+        for (std::size_t i = 0; i < 3; ++i) {
+            high[i] += steps[i] >> kLowBits;
+            low[i] += steps[i] & kLowMask;
+        }
+        ++count;
+    }
+    void add(const Sum& other) {
+        for (std::size_t i = 0; i < 3; ++i) {
+            high[i] += other.high[i];
+            low[i] += other.low[i];
+        }
+        count += other.count;
+    }
+    // Back in the unit frame.
+    Point3 mean() const {
+        const auto of = [&](std::size_t i) {
+            // Whole steps first: the quotient of the high part carries its remainder into the low one.
+            const std::uint64_t whole = high[i] / count;
+            const std::uint64_t rest = high[i] % count;
+            const double fraction = (static_cast<double>(rest) * static_cast<double>(kLowMask + 1) +
+                                     static_cast<double>(low[i])) /
+                                    static_cast<double>(count);
+            const double middle = static_cast<double>(whole << kLowBits) - kStepsPerUnit;  // exact
+            return (middle + fraction) / kStepsPerUnit;
+        };
+        return {of(0), of(1), of(2)};
+    }
+};
+
+// Of the finest cell along an axis; the far end of the frame belongs to the last.
+std::uint64_t finestIndex(std::uint64_t steps) {
+    return std::min(steps >> (kStepBits - kFinestBits), (std::uint64_t{1} << kFinestBits) - 1);
+}
+
+struct GridCell {
+    std::uint64_t key = 0;
+    Sum sum;
+};
+
+class Grid {
+  public:
+    Grid(std::size_t limit, int bits) : limit_(limit), bits_(bits), slots_(std::size_t{1} << 12) {
+        cells_.reserve(limit + 1);
+    }
+
+    // The number of the point's cell, until the next coarsening.
+    std::uint32_t add(const Steps& steps) {
+        const std::uint32_t cell = find(keyOf(steps));
+        cells_[cell].sum.add(steps);
+        return cell;
+    }
+    bool isFull() const { return cells_.size() > limit_; }
+    const std::vector<GridCell>& cells() const { return cells_; }
+
+    // Eight cells become one. How fine the grid is in the end depends on all points, not on their order:
+    // the finest that stays within the limit. Returns the new number of every cell.
+    std::vector<std::uint32_t> coarsen() {
+        --bits_;
+        std::vector<GridCell> finer;
+        finer.reserve(limit_ + 1);
+        finer.swap(cells_);
+        std::fill(slots_.begin(), slots_.end(), Slot{});
+        constexpr std::uint64_t kOneAxis = (std::uint64_t{1} << 20) - 1;
+        constexpr std::uint64_t kHalves = kOneAxis << 42 | kOneAxis << 21 | kOneAxis;
+        std::vector<std::uint32_t> renumbered;
+        renumbered.reserve(finer.size());
+        for (const GridCell& cell : finer) {
+            renumbered.push_back(find(cell.key >> 1 & kHalves));
+            cells_[renumbered.back()].sum.add(cell.sum);
+        }
+        return renumbered;
+    }
+
+    // Orders the cells by their keys, which no order of points decides. Returns their new numbers.
+    std::vector<std::uint32_t> sort() {
+        std::vector<std::uint32_t> order(cells_.size());
+        std::iota(order.begin(), order.end(), 0u);
+        std::sort(order.begin(), order.end(),
+                  [this](std::uint32_t a, std::uint32_t b) { return cells_[a].key < cells_[b].key; });
+        std::vector<GridCell> ordered;
+        std::vector<std::uint32_t> renumbered(order.size());
+        ordered.reserve(order.size());
+        for (const std::uint32_t cell : order) {
+            renumbered[cell] = static_cast<std::uint32_t>(ordered.size());
+            ordered.push_back(cells_[cell]);
+        }
+        cells_ = std::move(ordered);
+        return renumbered;
+    }
+
+  private:
+    struct Slot {
+        std::uint64_t key = 0;
+        std::uint32_t cell = kFree;
+    };
+
+    std::uint64_t keyOf(const Steps& steps) const {
+        const auto index = [this](std::uint64_t s) { return finestIndex(s) >> (kFinestBits - bits_); };
+        return index(steps[0]) << 42 | index(steps[1]) << 21 | index(steps[2]);
+    }
+
+    // Of the cell with this key, or where it belongs. Keys lie beside the numbers of their cells: most
+    // look-ups touch one cache line.
+    std::size_t slotOf(std::uint64_t key) const {
+        const std::size_t mask = slots_.size() - 1;
+        std::uint64_t mixed = key * 0x9e3779b97f4a7c15ULL;
+        mixed = (mixed ^ mixed >> 32) * 0xd6e8feb86659fd93ULL;
+        std::size_t slot = (mixed >> 32) & mask;
+        while (slots_[slot].cell != kFree && slots_[slot].key != key) slot = (slot + 1) & mask;
+        return slot;
+    }
+
+    // The cell with this key; a new one when there is none.
+    std::uint32_t find(std::uint64_t key) {
+        const std::size_t slot = slotOf(key);
+        if (slots_[slot].cell != kFree) return slots_[slot].cell;
+        const auto cell = static_cast<std::uint32_t>(cells_.size());
+        cells_.push_back({key, {}});
+        slots_[slot] = {key, cell};
+        if (2 * cells_.size() > slots_.size()) {
+            slots_.resize(2 * slots_.size());
+            reindex();
+        }
+        return cell;
+    }
+
+    void reindex() {
+        std::fill(slots_.begin(), slots_.end(), Slot{});
+        for (std::uint32_t c = 0; c < cells_.size(); ++c) slots_[slotOf(cells_[c].key)] = {cells_[c].key, c};
+    }
+
+    std::size_t limit_;
+    int bits_;
+    std::vector<GridCell> cells_;
+    std::vector<Slot> slots_;  // a power of two; at most half full
+};
+
+Steps stepsOf(const Point3& p, const Frame& frame, double inverse) {
+    const auto steps = [](double v) { return static_cast<std::uint64_t>((v + 1.0) * kStepsPerUnit); };
+    const Point3 scaled = inverse * (p - frame.centre);
+    return {steps(scaled.x), steps(scaled.y), steps(scaled.z)};
+}
+
+void renumber(std::vector<std::uint32_t>& cellOfPoint, std::size_t count,
+              const std::vector<std::uint32_t>& renumbered) {
+    for (std::size_t i = 0; i < count; ++i) cellOfPoint[i] = renumbered[cellOfPoint[i]];
+}
+
+// Puts every point into its cell.
+Result<std::vector<std::uint32_t>> fill(Grid& grid, const PointCloud& scan, const Frame& frame,
+                                        const RunContext& context) {
+    const double inverse = 1.0 / frame.unit;  // exact: a power of two
+    std::vector<std::uint32_t> cellOfPoint(scan.size());
+    for (std::size_t i = 0; i < scan.size(); ++i) {
+        if (i % kPointsBetweenCheckpoints == 0) {
+            if (auto go = context.checkpoint(); !go) return fail(go.error());
+        }
+        cellOfPoint[i] = grid.add(stepsOf(scan[i], frame, inverse));
+        while (grid.isFull()) renumber(cellOfPoint, i + 1, grid.coarsen());
+    }
+    return cellOfPoint;
+}
+
+// Every third bit, from the lowest on.
+std::uint64_t spread(std::uint64_t v) {
+    v = (v | v << 32) & 0x001f00000000ffffULL;
+    v = (v | v << 16) & 0x001f0000ff0000ffULL;
+    v = (v | v << 8) & 0x100f00f00f00f00fULL;
+    v = (v | v << 4) & 0x10c30c30c30c30c3ULL;
+    return (v | v << 2) & 0x1249249249249249ULL;
+}
+
+// The finest grid in which a sample stays within the limit. The whole scan occupies no fewer cells, so its
+// own finest is no finer: starting here saves most coarsening and changes nothing.
+int finestOfSample(const PointCloud& scan, const Frame& frame, std::size_t limit) {
+    const double inverse = 1.0 / frame.unit;
+    const std::size_t step = std::max<std::size_t>(1, scan.size() / (limit + limit / 4 + 1));
+    std::vector<std::uint64_t> codes;
+    codes.reserve(scan.size() / step + 1);
+    for (std::size_t i = 0; i < scan.size(); i += step) {
+        const Steps s = stepsOf(scan[i], frame, inverse);
+        codes.push_back(spread(finestIndex(s[0])) << 2 | spread(finestIndex(s[1])) << 1 |
+                        spread(finestIndex(s[2])));
+    }
+    std::sort(codes.begin(), codes.end());
+    // Sorted codes part where their highest different bits are: three bits to a level.
+    std::array<std::size_t, kFinestBits + 1> parted{};
+    for (std::size_t i = 1; i < codes.size(); ++i) {
+        int level = kFinestBits;
+        for (std::uint64_t rest = (codes[i] ^ codes[i - 1]) >> 3; rest != 0; rest >>= 3) --level;
+        if (codes[i] != codes[i - 1]) ++parted[static_cast<std::size_t>(level)];
+    }
+    std::size_t cells = 1 + parted[0];
+    int bits = 0;
+    while (bits < kFinestBits && cells + parted[static_cast<std::size_t>(bits) + 1] <= limit) {
+        cells += parted[static_cast<std::size_t>(++bits)];
+    }
+    return bits;
+}
+
+Result<std::optional<GriddedScan>> gridScanOrThrow(const PointCloud& scan, std::size_t target,
+                                                   const RunContext& context) {
+    const auto frame = frameOf(scan);
+    if (!frame) return fail(frame.error());
+    const std::size_t limit = kCellsPerTarget * target;
+    Grid grid(limit, finestOfSample(scan, *frame, limit));
+    auto siteOfPoint = fill(grid, scan, *frame, context);
+    if (!siteOfPoint) return fail(siteOfPoint.error());
+    if (grid.cells().size() <= target) return std::optional<GriddedScan>();
+    renumber(*siteOfPoint, scan.size(), grid.sort());
+    const std::vector<GridCell>& small = grid.cells();
+    PointCloud means;
+    means.reserve(small.size());
+    for (const GridCell& cell : small) means.push_back(cell.sum.mean());
+    if (auto spans = checkSpansSpace(means); !spans) return fail(spans.error());
+    const auto large = decimate(means, target, context);
+    if (!large) return fail(large.error());
+    std::vector<Sum> sums(large->points.size());
+    for (std::size_t c = 0; c < small.size(); ++c) sums[large->siteOfPoint[c]].add(small[c].sum);
+    PointCloud weighted;
+    weighted.reserve(sums.size());
+    for (const Sum& sum : sums) weighted.push_back(sum.mean());
+    MergedPoints merged = mergeDuplicates(weighted);
+    std::vector<std::uint32_t> siteOfCell(small.size());
+    for (std::size_t c = 0; c < small.size(); ++c) siteOfCell[c] = merged.siteOfPoint[large->siteOfPoint[c]];
+    renumber(*siteOfPoint, scan.size(), siteOfCell);
+    return std::optional<GriddedScan>(GriddedScan{std::move(merged.points), std::move(*siteOfPoint), *frame});
+}
+
+}  // namespace
+
+Result<std::optional<GriddedScan>> gridScan(const PointCloud& scan, std::size_t target,
+                                            const RunContext& context) {
+    try {
+        return gridScanOrThrow(scan, target, context);
+    } catch (const std::bad_alloc&) {
+        return fail(ErrorCode::kOutOfMemory,
+                    "not enough memory to decimate " + std::to_string(scan.size()) + " points");
+    }
+}
+
+}  // namespace shapedb

@@ -1,0 +1,99 @@
+#include "core/segmentation/curve_order.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+
+namespace shapedb {
+
+namespace {
+
+constexpr std::uint32_t kBits = 21;
+constexpr std::uint32_t kDigitBits = 11;
+constexpr std::uint32_t kDigits = 6;  // of 63 bits
+
+// Every third bit, from the lowest on.
+std::uint64_t spread(std::uint64_t v) {
+    v = (v | v << 32) & 0x001f00000000ffffULL;
+    v = (v | v << 16) & 0x001f0000ff0000ffULL;
+    v = (v | v << 8) & 0x100f00f00f00f00fULL;
+    v = (v | v << 4) & 0x10c30c30c30c30c3ULL;
+    return (v | v << 2) & 0x1249249249249249ULL;
+}
+
+// Skilling, "Programming the Hilbert curve" (2004): coordinates to the transposed index, in place,
+// then its bits interleaved.
+std::uint64_t hilbertIndex(std::array<std::uint32_t, 3> x) {
+    for (std::uint32_t q = 1u << (kBits - 1); q > 1; q >>= 1) {
+        const std::uint32_t below = q - 1;
+        for (std::uint32_t& axis : x) {
+            // Without branches: the bits are random. Set: invert the low bits of the first axis; not set:
+            // exchange them with that of this axis.
+            const std::uint32_t set = (axis & q) != 0 ? ~0u : 0u;
+            const std::uint32_t swap = (x[0] ^ axis) & below & ~set;
+            x[0] ^= swap | (below & set);
+            axis ^= swap;
+        }
+    }
+    x[1] ^= x[0];
+    x[2] ^= x[1];
+    std::uint32_t flip = 0;
+    for (std::uint32_t q = 1u << (kBits - 1); q > 1; q >>= 1) {
+        if ((x[2] & q) != 0) flip ^= q - 1;
+    }
+    for (std::uint32_t& axis : x) axis ^= flip;
+    return spread(x[0]) << 2 | spread(x[1]) << 1 | spread(x[2]);
+}
+
+struct Keyed {
+    std::uint64_t key = 0;
+    std::uint32_t point = 0;
+};
+
+std::vector<Keyed> keysOf(const PointCloud& points) {
+    Point3 low = points.front();
+    Point3 high = low;
+    for (const Point3& p : points) {
+        low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+        high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+    }
+    const double extent = std::max({high.x - low.x, high.y - low.y, high.z - low.z});
+    const double last = (1u << kBits) - 1;
+    const double steps = extent > 0.0 && std::isfinite(extent) ? last / extent : 0.0;
+    const auto step = [=](double v) { return static_cast<std::uint32_t>(std::min(last, v * steps)); };
+    std::vector<Keyed> keyed(points.size());
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        const Point3 p = points[i] - low;
+        keyed[i] = {hilbertIndex({step(p.x), step(p.y), step(p.z)}), static_cast<std::uint32_t>(i)};
+    }
+    return keyed;
+}
+
+// Stable, by counting digit after digit from the lowest.
+void sortByKey(std::vector<Keyed>& keyed) {
+    constexpr std::size_t kValues = std::size_t{1} << kDigitBits;
+    std::vector<Keyed> other(keyed.size());
+    for (std::uint32_t digit = 0; digit < kDigits; ++digit) {
+        const std::uint32_t shift = digit * kDigitBits;
+        std::array<std::size_t, kValues + 1> begin{};
+        for (const Keyed& k : keyed) ++begin[((k.key >> shift) & (kValues - 1)) + 1];
+        for (std::size_t v = 0; v < kValues; ++v) begin[v + 1] += begin[v];
+        for (const Keyed& k : keyed) other[begin[(k.key >> shift) & (kValues - 1)]++] = k;
+        keyed.swap(other);
+    }
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> curveOrder(const PointCloud& points) {
+    if (points.empty()) return {};
+    std::vector<Keyed> keyed = keysOf(points);
+    const auto byKey = [](const Keyed& a, const Keyed& b) { return a.key < b.key; };
+    if (!std::is_sorted(keyed.begin(), keyed.end(), byKey)) sortByKey(keyed);
+    std::vector<std::uint32_t> order(points.size());
+    for (std::size_t i = 0; i < order.size(); ++i) order[i] = keyed[i].point;
+    return order;
+}
+
+}  // namespace shapedb

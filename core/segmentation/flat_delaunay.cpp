@@ -1,0 +1,289 @@
+#include "core/segmentation/flat_delaunay.h"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <numeric>
+#include <optional>
+#include <thread>
+#include <utility>
+
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <tbb/parallel_for.h>
+
+namespace shapedb {
+
+namespace {
+
+constexpr std::size_t kInsertsBetweenCheckpoints = 1024;
+
+// Cells to make room for, by points. A scan has six or seven a point; when there are more the store
+// grows.
+constexpr std::size_t kCellsPerPoint = 8;
+constexpr std::size_t kSpareCells = 4096;
+constexpr std::size_t kMostCells = 0xfffffff0u;
+
+// Each round inserts this many times as many points as all before it.
+constexpr int kRoundShift = 2;
+constexpr std::size_t kSmallestRound = 512;
+// A round with fewer points for each thread is not worth dividing.
+constexpr std::size_t kLeastShare = 4096;
+
+// Mixes the bits of an index (the finaliser of MurmurHash3).
+std::uint32_t scrambled(std::uint32_t i) {
+    i ^= i >> 16;
+    i *= 0x85ebca6bu;
+    i ^= i >> 13;
+    i *= 0xc2b2ae35u;
+    return i ^ (i >> 16);
+}
+
+// The insertion order (Amenta, Choi and Rote, "Incremental constructions con BRIO", 2003): rounds of
+// random choice, each in the order of the sites. `ends` are where they end.
+struct Rounds {
+    std::vector<std::uint32_t> order;
+    std::vector<std::size_t> ends;
+};
+
+Rounds makeRounds(std::size_t count) {
+    int rounds = 1;
+    while ((count >> (kRoundShift * rounds)) > kSmallestRound) ++rounds;
+    const auto roundOf = [&](std::uint32_t i) {
+        int round = rounds - 1;
+        for (std::uint32_t bits = scrambled(i); round > 0 && (bits & ((1u << kRoundShift) - 1)) == 0;
+             --round) {
+            bits >>= kRoundShift;
+        }
+        return static_cast<std::size_t>(round);
+    };
+    Rounds made;
+    std::vector<std::size_t> next(static_cast<std::size_t>(rounds) + 1, 0);
+    for (std::uint32_t i = 0; i < count; ++i) ++next[roundOf(i) + 1];
+    std::partial_sum(next.begin(), next.end(), next.begin());
+    made.ends.assign(next.begin() + 1, next.end());
+    made.order.resize(count);
+    for (std::uint32_t i = 0; i < count; ++i) made.order[next[roundOf(i)]++] = i;
+    return made;
+}
+
+bool onOneLine(const Site& a, const Site& b, const Site& c) {
+    using Point = CGAL::Exact_predicates_inexact_constructions_kernel::Point_3;
+    return CGAL::collinear(Point(a.x, a.y, a.z), Point(b.x, b.y, b.z), Point(c.x, c.y, c.z));
+}
+
+// One thread's share of a round, and what came of it.
+struct Share {
+    VertexRange range;
+    std::uint32_t start = kNoCell;
+    const std::uint32_t* begin = nullptr;
+    const std::uint32_t* end = nullptr;
+    std::vector<std::uint32_t> postponed;
+    std::vector<std::uint32_t> freeCells;
+    std::optional<Error> error;
+};
+
+class Builder {
+  public:
+    Builder(std::vector<Site>& sites, CellStore& cells, int threads, const RunContext& context)
+        : sites_(sites),
+          cells_(cells),
+          threads_(static_cast<std::size_t>(std::max(threads, 1))),
+          context_(context) {}
+
+    Result<void> build() {
+        if (auto go = context_.checkpoint(); !go) return go;
+        context_.report("delaunay", 0, sites_.size());
+        cells_.reserve(kCellsPerPoint * sites_.size() + kSpareCells);
+        const Rounds rounds = makeRounds(sites_.size());
+        if (auto begun = beginWithFour(rounds.order); !begun) return begun;
+        std::size_t begin = 0;
+        for (const std::size_t end : rounds.ends) {
+            std::vector<std::uint32_t> left(rounds.order.begin() + static_cast<std::ptrdiff_t>(begin),
+                                            rounds.order.begin() + static_cast<std::ptrdiff_t>(end));
+            leaveOutFirst(left);
+            if (auto done = insertRound(std::move(left)); !done) return done;
+            begin = end;
+        }
+        for (const std::uint32_t cell : free_) cells_[cell].vertices[0] = kFreeCell;
+        return {};
+    }
+
+  private:
+    void leaveOutFirst(std::vector<std::uint32_t>& list) const {
+        const auto taken = [&](std::uint32_t v) {
+            return std::find(first_.begin(), first_.end(), v) != first_.end();
+        };
+        list.erase(std::remove_if(list.begin(), list.end(), taken), list.end());
+    }
+    Result<void> beginWithFour(const std::vector<std::uint32_t>& order);
+    Result<void> insertRound(std::vector<std::uint32_t> left);
+    Result<void> insertAlone(const std::vector<std::uint32_t>& list);
+    Result<void> insertTogether(std::vector<std::uint32_t>& list, bool shifted);
+    void work(Share& share, std::thread::id reporter);
+    std::uint32_t cellWithin(const VertexRange& range) const;
+
+    std::vector<Site>& sites_;
+    CellStore& cells_;
+    std::size_t threads_;
+    const RunContext& context_;
+    std::array<std::uint32_t, 4> first_{};
+    std::vector<std::uint32_t> free_;
+    std::uint32_t last_ = 0;  // a cell to walk from
+    std::atomic<std::size_t> done_{0};
+};
+
+// One cell between the first four points that span space, and the four outside of it.
+Result<void> Builder::beginWithFour(const std::vector<std::uint32_t>& order) {
+    const auto site = [&](std::size_t i) -> const Site& { return sites_[order[i]]; };
+    std::size_t b = 1;
+    while (b < order.size() && samePlace(site(0), site(b))) ++b;
+    if (b == order.size()) return fail(ErrorCode::kTooFewPoints, "fewer than 4 distinct points");
+    std::size_t c = b + 1;
+    while (c < order.size() && onOneLine(site(0), site(b), site(c))) ++c;
+    if (c >= order.size()) return fail(ErrorCode::kCollinear, "all points lie on one line");
+    std::size_t d = c + 1;
+    while (d < order.size() && orientation(site(0), site(b), site(c), site(d)) == 0) ++d;
+    if (d >= order.size()) return fail(ErrorCode::kCoplanar, "all points lie in one plane");
+    first_ = {order[0], order[b], order[c], order[d]};
+    if (orientation(site(0), site(b), site(c), site(d)) < 0) std::swap(first_[0], first_[1]);
+    done_ = 4;
+    const std::uint32_t inner = cells_.take(5);
+    cells_[inner] = {first_, {inner + 1, inner + 2, inner + 3, inner + 4}};
+    for (std::uint32_t i = 0; i < 4; ++i) {
+        // The inner cell reflected in its facet i: with vertex i beyond, the others change their sense.
+        Cell& outer = cells_[inner + 1 + i];
+        outer.vertices = first_;
+        outer.vertices[i] = kInfinite;
+        const std::uint32_t p = (i + 1) % 4;
+        const std::uint32_t q = (i + 2) % 4;
+        std::swap(outer.vertices[p], outer.vertices[q]);
+        // Behind the facet opposite a vertex: the outer cell of the facet opposite it in the inner one.
+        for (std::uint32_t k = 0; k < 4; ++k) {
+            const std::uint32_t facet = k == p ? q : k == q ? p : k;
+            outer.neighbours[k] = k == i ? inner : inner + 1 + facet;
+        }
+    }
+    last_ = inner;
+    return {};
+}
+
+Result<void> Builder::insertRound(std::vector<std::uint32_t> left) {
+    for (const bool shifted : {false, true}) {
+        const bool large = sites_.size() >= kLeastParallelPoints && left.size() >= threads_ * kLeastShare;
+        if (threads_ < 2 || !large) break;
+        if (auto done = insertTogether(left, shifted); !done) return done;
+    }
+    return insertAlone(left);
+}
+
+Result<void> Builder::insertAlone(const std::vector<std::uint32_t>& list) {
+    CavityInserter inserter(sites_, cells_, VertexRange{}, last_);
+    inserter.freeCells().swap(free_);
+    for (std::size_t i = 0; i < list.size(); ++i, ++done_) {
+        if (i % kInsertsBetweenCheckpoints == 0) {
+            if (auto go = context_.checkpoint(); !go) return go;
+            context_.report("delaunay", done_, sites_.size());
+        }
+        Insertion outcome = inserter.insert(list[i]);
+        while (outcome == Insertion::kNoRoom) {
+            if (cells_.capacity() >= kMostCells) {
+                return fail(ErrorCode::kOutOfMemory, "the Delaunay triangulation has over 4e9 tetrahedra");
+            }
+            cells_.reserve(std::min(kMostCells, cells_.capacity() + cells_.capacity() / 2));
+            outcome = inserter.insert(list[i]);
+        }
+        if (outcome != Insertion::kDone) {
+            return fail(ErrorCode::kInternal, "the points to triangulate are not distinct");
+        }
+    }
+    free_.swap(inserter.freeCells());
+    last_ = inserter.lastCell();
+    return {};
+}
+
+// A cell that belongs to the range, to walk from; kNoCell when there is none.
+std::uint32_t Builder::cellWithin(const VertexRange& range) const {
+    for (std::uint32_t cell = 0; cell < cells_.used(); ++cell) {
+        const auto& v = cells_[cell].vertices;
+        if (v[0] == kFreeCell) continue;
+        if (range.holds(v[0]) && range.holds(v[1]) && range.holds(v[2]) && range.holds(v[3])) return cell;
+    }
+    return kNoCell;
+}
+
+// Inserts what the threads can insert without meeting; what is left replaces `list`. `shifted`: with
+// the borders between threads in the middle of where they were.
+Result<void> Builder::insertTogether(std::vector<std::uint32_t>& list, bool shifted) {
+    cells_.reserve(std::min(kMostCells, cells_.used() + kCellsPerPoint * list.size() + kSpareCells));
+    if (shifted) {
+        const auto middle = static_cast<std::ptrdiff_t>(list.size() / threads_ / 2);
+        std::rotate(list.begin(), list.begin() + middle, list.end());
+    }
+    std::vector<Share> shares(threads_);
+    for (const std::uint32_t cell : free_) cells_[cell].vertices[0] = kFreeCell;
+    for (std::size_t k = 0; k < threads_; ++k) {
+        const std::size_t begin = k * list.size() / threads_;
+        const std::size_t end = (k + 1) * list.size() / threads_;
+        Share& share = shares[k];
+        share.begin = list.data() + begin;
+        share.end = list.data() + end;
+        const bool last = k + 1 == threads_;
+        share.range.begin = k == 0 && !shifted ? 0 : list[begin];
+        share.range.end = last ? kInfinite : list[end];
+        share.range.wrapped = last && shifted ? list[0] : 0;
+        share.start = cellWithin(share.range);
+    }
+    shares[0].freeCells.swap(free_);
+    const std::thread::id reporter = std::this_thread::get_id();
+    tbb::this_task_arena::isolate([&] {
+        tbb::parallel_for(
+            std::size_t{0}, threads_, [&](std::size_t k) { work(shares[k], reporter); },
+            tbb::simple_partitioner());
+    });
+    list.clear();
+    for (Share& share : shares) {
+        if (share.error) return fail(*share.error);
+        list.insert(list.end(), share.postponed.begin(), share.postponed.end());
+        free_.insert(free_.end(), share.freeCells.begin(), share.freeCells.end());
+    }
+    std::sort(list.begin(), list.end());
+    last_ = cellWithin(VertexRange{});
+    return {};
+}
+
+void Builder::work(Share& share, std::thread::id reporter) {
+    if (share.start == kNoCell) {
+        share.postponed.assign(share.begin, share.end);
+        return;
+    }
+    CavityInserter inserter(sites_, cells_, share.range, share.start);
+    inserter.freeCells().swap(share.freeCells);
+    std::size_t count = 0;
+    for (const std::uint32_t* v = share.begin; v != share.end; ++v) {
+        if (++count % kInsertsBetweenCheckpoints == 0) {
+            done_ += kInsertsBetweenCheckpoints;
+            if (auto go = context_.checkpoint(); !go) {
+                share.error = go.error();
+                break;
+            }
+            if (std::this_thread::get_id() == reporter) context_.report("delaunay", done_, sites_.size());
+        }
+        switch (inserter.insert(*v)) {
+            case Insertion::kDone: break;
+            case Insertion::kRepeated:
+                share.error = Error{ErrorCode::kInternal, "the points to triangulate are not distinct"};
+                return;
+            case Insertion::kElsewhere:
+            case Insertion::kNoRoom: share.postponed.push_back(*v); break;
+        }
+    }
+    share.freeCells.swap(inserter.freeCells());
+}
+
+}  // namespace
+
+Result<void> insertAll(std::vector<Site>& sites, CellStore& cells, int threads, const RunContext& context) {
+    return Builder(sites, cells, threads, context).build();
+}
+
+}  // namespace shapedb

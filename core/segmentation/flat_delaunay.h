@@ -1,0 +1,25 @@
+// The Delaunay triangulation of points in an order of their own, by one thread or several.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/run_context.h"
+#include "core/segmentation/cavity_inserter.h"
+
+namespace shapedb {
+
+/// Below this many points one thread is as fast as two.
+constexpr std::size_t kLeastParallelPoints = 50000;
+
+/// Triangulates `sites`, which should follow a curve through space (curve_order.h), with up to
+/// `threads` threads of the caller's arena. The set of cells is the same for any number; their places
+/// in the store are not.
+///
+/// Errors: kCoplanar, kCollinear, kTooFewPoints (exactly so); kInternal when two sites are at the same
+/// place; kCancelled, kDeadlineExceeded; kOutOfMemory. May throw std::bad_alloc.
+[[nodiscard]] Result<void> insertAll(std::vector<Site>& sites, CellStore& cells, int threads,
+                                     const RunContext& context);
+
+}  // namespace shapedb
