@@ -4,6 +4,9 @@
 #include <cmath>
 #include <vector>
 
+#include <tbb/parallel_invoke.h>
+#include <tbb/task_arena.h>
+
 #include "core/base/random.h"
 #include "core/signature/footprint.h"
 #include "core/signature/histogram.h"
@@ -163,22 +166,36 @@ void harmonics(const PointCloud& points, const std::vector<double>& weights, std
 
 Result<ShapeStatistics> shapeStatistics(const InteriorView& view, const RunContext& context) {
     ShapeStatistics result{};
-    const auto inner = innerDistances(view, context);
-    if (!inner) return fail(inner.error());
-    thicknessByCentrality(view, *inner, binsOf(result, Statistic::kThicknessByCentrality));
-    thicknessByRadius(view, binsOf(result, Statistic::kThicknessByRadius));
-    bending(*inner, binsOf(result, Statistic::kBending));
-    harmonics(view.centroids, view.volumes, binsOf(result, Statistic::kInteriorHarmonics));
+    const auto bins = [&](Statistic statistic) { return binsOf(result, statistic); };
+    Result<void> insideDone;
+    const auto inside = [&] {
+        const auto inner = innerDistances(view, context);
+        if (!inner) {
+            insideDone = fail(inner.error());
+            return;
+        }
+        thicknessByCentrality(view, *inner, bins(Statistic::kThicknessByCentrality));
+        bending(*inner, bins(Statistic::kBending));
+    };
+    const auto lines = [&] {
+        chords(view, bins(Statistic::kChords));
+        surfaceDistances(view, bins(Statistic::kSurfaceDistances));
+    };
+    const auto rest = [&] {
+        thicknessByRadius(view, bins(Statistic::kThicknessByRadius));
+        harmonics(view.centroids, view.volumes, bins(Statistic::kInteriorHarmonics));
+        harmonics(view.surface, {}, bins(Statistic::kSurfaceHarmonics));
+        if (!context.checkpoint()) return;
+        spread(view, bins(Statistic::kSpread));
+        const std::vector<OutlinePoint> outline = footprint(view.surface);
+        placesInOutline(outline, bins(Statistic::kFootprint));
+        distancesInOutline(outline, bins(Statistic::kFootprintDistances));
+    };
+    // Each writes bins of its own: the same bits on any number of threads. Isolated: a thread that waits
+    // must not begin work of its caller's caller.
+    tbb::this_task_arena::isolate([&] { tbb::parallel_invoke(inside, lines, rest); });
+    if (!insideDone) return fail(insideDone.error());
     if (auto ok = context.checkpoint(); !ok) return fail(ok.error());
-    chords(view, binsOf(result, Statistic::kChords));
-    if (auto ok = context.checkpoint(); !ok) return fail(ok.error());
-    surfaceDistances(view, binsOf(result, Statistic::kSurfaceDistances));
-    harmonics(view.surface, {}, binsOf(result, Statistic::kSurfaceHarmonics));
-    if (auto ok = context.checkpoint(); !ok) return fail(ok.error());
-    spread(view, binsOf(result, Statistic::kSpread));
-    const std::vector<OutlinePoint> outline = footprint(view.surface);
-    placesInOutline(outline, binsOf(result, Statistic::kFootprint));
-    distancesInOutline(outline, binsOf(result, Statistic::kFootprintDistances));
     return result;
 }
 

@@ -66,7 +66,8 @@ constexpr std::size_t kStatisticBins = 432;
 /// (Hellinger).
 using ShapeStatistics = std::array<std::uint8_t, kStatisticBins>;
 
-/// Deterministic. Errors: kCancelled, kDeadlineExceeded.
+/// Deterministic, with the same bits on any number of threads: takes up to three of the calling thread's
+/// oneTBB arena. Errors: kCancelled, kDeadlineExceeded.
 [[nodiscard]] Result<ShapeStatistics> shapeStatistics(const InteriorView& view,
                                                       const RunContext& context = {});
 

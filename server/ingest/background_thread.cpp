@@ -1,5 +1,6 @@
 #include "server/ingest/background_thread.h"
 
+#include <oneapi/tbb/task_arena.h>
 #include <sys/resource.h>
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -21,6 +22,11 @@ void becomeBackgroundThread() noexcept {
     // value.
     const int now = ::getpriority(PRIO_PROCESS, self);
     static_cast<void>(::setpriority(PRIO_PROCESS, self, now + kNicer));
+}
+
+void onThisThreadAlone(const std::function<void()>& work) {
+    oneapi::tbb::task_arena alone(1);
+    alone.execute(work);
 }
 
 }  // namespace shapedb::ingest

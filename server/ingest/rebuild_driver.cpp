@@ -324,8 +324,12 @@ Result<void> RebuildDriver::process(Active& active, const store::Shape& shape) {
     if (!points && points.error().code != ErrorCode::kDataLoss) return fail(points.error());
     RunContext context;
     context.cancel = &active.cancel;
-    const Result<Description> description = points ? describe_(toCloud(*points), active.parameters, context)
-                                                   : Result<Description>(fail(points.error()));
+    Result<Description> description = fail(ErrorCode::kInternal, "not described");
+    if (points) {
+        onThisThreadAlone([&] { description = describe_(toCloud(*points), active.parameters, context); });
+    } else {
+        description = fail(points.error());
+    }
     if (description) {
         return store_.putRebuilt(active.rebuild.id,
                                  {shape.id, shape.pointsVersion, active.rebuild.targetGeneration,

@@ -275,7 +275,8 @@ WorkerPool::Outcome WorkerPool::attempt(Running& running) {
     context.report("start", 0, 0);
     const PointCloud cloud = toCloud(*points);
     std::vector<float>().swap(*points);  // half as much again as the cloud: not kept beside it
-    const Result<Description> description = describe_(cloud, (*collection)->parameters, context);
+    Result<Description> description = fail(ErrorCode::kInternal, "not described");
+    onThisThreadAlone([&] { description = describe_(cloud, (*collection)->parameters, context); });
     if (!description) {
         if (description.error().code == ErrorCode::kCancelled && !running.superseded)
             return Outcome::kPutBack;

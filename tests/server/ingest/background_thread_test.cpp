@@ -1,12 +1,17 @@
 #include "server/ingest/background_thread.h"
 
 #include <algorithm>
+#include <chrono>
+#include <mutex>
+#include <set>
 #include <thread>
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/syscall.h>
 #include <unistd.h>
+
+#include <tbb/parallel_for.h>
 
 namespace shapedb::ingest {
 namespace {
@@ -23,6 +28,19 @@ TEST(BackgroundThread, LowersOnlyTheThreadThatAsks) {
     thread.join();
     EXPECT_EQ(inside, std::min(19, before + 10));
     EXPECT_EQ(niceOfThisThread(), before);
+}
+
+TEST(BackgroundThread, KeepsToItselfWhatWouldSpread) {
+    std::mutex mutex;
+    std::set<std::thread::id> threads;
+    onThisThreadAlone([&] {
+        tbb::parallel_for(0, 64, [&](int) {
+            std::this_thread::sleep_for(std::chrono::milliseconds(1));
+            const std::lock_guard<std::mutex> lock(mutex);
+            threads.insert(std::this_thread::get_id());
+        });
+    });
+    EXPECT_EQ(threads, std::set<std::thread::id>{std::this_thread::get_id()});
 }
 
 }  // namespace
