@@ -260,12 +260,6 @@ json stagesJson(const Stages& stages) {
     return table;
 }
 
-json environmentJson(const Environment& found) {
-    return {{"date", found.date},         {"processor", found.processor},  {"cores", found.cores},
-            {"compiler", found.compiler}, {"build_type", found.buildType}, {"optimised", found.optimised},
-            {"version", found.version}};
-}
-
 json documentOf(const Flags& flags, const std::string& command, const Figures& f) {
     json document = {{"environment", environmentJson(environment())},
                      {"command", command},

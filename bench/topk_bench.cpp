@@ -350,7 +350,8 @@ Result<int> runTopK(const Flags& flags, Bench& bench) {
     if (!mixtures) return fail(mixtures.error());
     announceJson(bench.console, flags.json);
     const Environment here = environment();
-    nlohmann::json document = {{"operation", "topk"}, {"environment", describe(here)}, {"seed", flags.seed}};
+    nlohmann::json document = {
+        {"environment", environmentJson(here)}, {"command", bench.command}, {"seed", flags.seed}};
     bench.console.text(describe(here) + ", seed " + std::to_string(flags.seed) + ", k " +
                        std::to_string(flags.k) + ", " + std::to_string(flags.threads) + " threads\n");
     for (const Mixture mixture : *mixtures) {
