@@ -9,9 +9,8 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/syscall.h>
-#include <unistd.h>
-
 #include <tbb/parallel_for.h>
+#include <unistd.h>
 
 namespace shapedb::ingest {
 namespace {
