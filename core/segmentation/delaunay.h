@@ -27,7 +27,7 @@ struct Tetrahedra {
     std::size_t size() const { return vertices.size(); }
 };
 
-/// Delaunay triangulation of distinct, finite points (CGAL, exact predicates; cospherical
+/// Delaunay triangulation of distinct, finite points (CGAL's exact predicates; cospherical
 /// points are resolved by CGAL's symbolic perturbation, so the result is unique).
 /// Circumcentres are accurate to a few units in the last place of the largest coordinate
 /// unless the tetrahedron is nearly flat; a flat one's may lie far off but is finite.
