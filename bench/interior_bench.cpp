@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <map>
 #include <string>
 #include <vector>
@@ -12,6 +11,7 @@
 
 #include "bench/environment.h"
 #include "bench/operations.h"
+#include "bench/output.h"
 #include "client/cli/exit_code.h"
 #include "client/cli/retrieval_task.h"
 #include "client/io/scan_reader.h"
@@ -173,17 +173,11 @@ Result<Row> measure(const PointCloud& clean, const RunContext& context) {
     return row;
 }
 
-std::string cell(const char* format, double value) {
-    std::array<char, 32> buffer{};
-    std::snprintf(buffer.data(), buffer.size(), format, value);
-    return buffer.data();
-}
-
 std::string line(const std::string& name, const Row& row) {
     std::string text = "| " + name + " |";
     for (const Figures& f : row) {
-        text +=
-            " " + cell("%.1f", 100.0 * f.mean(f.volumeError)) + " / " + cell("%.1f", 100.0 * f.worst) + " |";
+        text += " " + numberText("%.1f", 100.0 * f.mean(f.volumeError)) + " / " +
+                numberText("%.1f", 100.0 * f.worst) + " |";
     }
     return text + "\n";
 }
@@ -191,7 +185,7 @@ std::string line(const std::string& name, const Row& row) {
 template <typename Value>
 std::string summary(const std::string& name, const Row& all, const char* format, Value value) {
     std::string text = "| " + name + " |";
-    for (const Figures& f : all) text += " " + cell(format, value(f)) + " |";
+    for (const Figures& f : all) text += " " + numberText(format, value(f)) + " |";
     return text + "\n";
 }
 

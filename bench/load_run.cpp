@@ -10,6 +10,7 @@
 
 #include <sys/resource.h>
 
+#include "bench/quantiles.h"
 #include "bench/server_process.h"
 #include "bench/stored_shapes.h"
 #include "client/api/client.h"
@@ -27,7 +28,6 @@ constexpr unsigned kClientsPerWorker = 2;
 constexpr std::size_t kDistinctQueries = 64;
 constexpr std::size_t kWarmUpQueries = 3;
 constexpr std::chrono::milliseconds kWarmUp{1'500};
-constexpr double kMedian = 0.5;
 constexpr double kTail = 0.99;
 constexpr std::uint64_t kBytesPerPoint = 12;
 
@@ -153,7 +153,23 @@ Result<double> uploadAll(const client::Client& client, const std::vector<PointCl
 double medianOf(const std::vector<IngestRound>& rounds, double (*value)(const IngestRound&)) {
     std::vector<double> values;
     for (const IngestRound& round : rounds) values.push_back(value(round));
-    return percentile(std::move(values), kMedian);
+    return median(std::move(values));
+}
+
+Result<SignatureGenerator> makeGenerator(const LoadSettings& settings, std::uint64_t shapes,
+                                         const RunContext& context) {
+    return SignatureGenerator::create(
+        {Mixture::kPlain, shapes, settings.seed, settings.sourcePoints, settings.sourceMembers},
+        cancelledBy(context));
+}
+
+Result<void> storeSignatures(const std::string& data, const SignatureGenerator& generator,
+                             std::uint64_t count, const LoadProgress& progress, const RunContext& context) {
+    RunContext reporting = context;
+    reporting.progress = [&](const char*, std::uint64_t done, std::uint64_t total) {
+        progress("storing signatures", done, total);
+    };
+    return fillDataDirectory(data, generator, count, reporting);
 }
 
 /// Some queries that are not among the `stored`.
@@ -181,7 +197,7 @@ Result<void> ask(const client::Client& client, const std::vector<std::string>& q
 }
 
 Latencies latenciesOf(const std::vector<double>& took) {
-    return {took.size(), percentile(took, kMedian), percentile(took, kTail)};
+    return {took.size(), median(took), percentile(took, kTail)};
 }
 
 /// Idle and busy in turn, so that what else the machine does touches both.
@@ -286,13 +302,6 @@ Result<Start> startOnce(const LoadSettings& settings, const std::string& data, c
 
 }  // namespace
 
-double percentile(std::vector<double> values, double share) {
-    if (values.empty()) return 0.0;
-    std::sort(values.begin(), values.end());
-    const double rank = std::ceil(share * static_cast<double>(values.size()));
-    return values[static_cast<std::size_t>(std::max(rank, 1.0)) - 1];
-}
-
 Result<IngestFigures> measureIngest(const LoadSettings& settings, const LoadProgress& progress,
                                     const RunContext& context) {
     const auto directory = WorkDirectory::create(settings.directory);
@@ -344,15 +353,9 @@ Result<LatencyFigures> measureLatency(const LoadSettings& settings, const LoadPr
     const auto directory = WorkDirectory::create(settings.directory);
     if (!directory) return fail(directory.error());
     const std::string data = directory->path() + "/data";
-    const auto generator = SignatureGenerator::create(
-        {Mixture::kPlain, settings.shapes, settings.seed, settings.sourcePoints, settings.sourceMembers},
-        cancelledBy(context));
+    const auto generator = makeGenerator(settings, settings.shapes, context);
     if (!generator) return fail(generator.error());
-    RunContext reporting = context;
-    reporting.progress = [&](const char*, std::uint64_t done, std::uint64_t total) {
-        progress("storing signatures", done, total);
-    };
-    if (const auto filled = fillDataDirectory(data, *generator, settings.shapes, reporting); !filled)
+    if (const auto filled = storeSignatures(data, *generator, settings.shapes, progress, context); !filled)
         return fail(filled.error());
     const std::vector<std::string> queries = makeQueries(*generator, settings.shapes);
     const auto scans =
@@ -372,17 +375,11 @@ Result<StartFigures> measureStart(const LoadSettings& settings, const LoadProgre
     const auto directory = WorkDirectory::create(settings.directory);
     if (!directory) return fail(directory.error());
     const std::string data = settings.startData.empty() ? directory->path() + "/data" : settings.startData;
-    const auto generator = SignatureGenerator::create(
-        {Mixture::kPlain, settings.startShapes, settings.seed, settings.sourcePoints, settings.sourceMembers},
-        cancelledBy(context));
+    const auto generator = makeGenerator(settings, settings.startShapes, context);
     if (!generator) return fail(generator.error());
-    RunContext reporting = context;
-    reporting.progress = [&](const char*, std::uint64_t done, std::uint64_t total) {
-        progress("storing signatures", done, total);
-    };
     if (!std::filesystem::exists(data)) {
-        if (const auto filled = fillDataDirectory(data, *generator, settings.startShapes, reporting); !filled)
-            return fail(filled.error());
+        const auto filled = storeSignatures(data, *generator, settings.startShapes, progress, context);
+        if (!filled) return fail(filled.error());
     }
     const std::string query = encodeSignature(generator->make(settings.startShapes));
 
@@ -403,9 +400,9 @@ Result<StartFigures> measureStart(const LoadSettings& settings, const LoadProgre
         figures.cache = start->stats.cacheBytes;
         figures.databaseBytes = start->stats.databaseBytes;
     }
-    figures.servingSeconds = percentile(serving, kMedian);
-    figures.firstAnswerSeconds = percentile(answered, kMedian);
-    figures.processorSeconds = percentile(processor, kMedian);
+    figures.servingSeconds = median(serving);
+    figures.firstAnswerSeconds = median(answered);
+    figures.processorSeconds = median(processor);
     if (figures.cache > 0)
         figures.residentRatio = static_cast<double>(figures.resident) / static_cast<double>(figures.cache);
     return figures;

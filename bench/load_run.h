@@ -94,7 +94,4 @@ using LoadProgress = std::function<void(const std::string& what, std::uint64_t d
 [[nodiscard]] Result<UploadFigures> measureUpload(const LoadSettings& settings, const LoadProgress& progress,
                                                   const RunContext& context);
 
-/// Value below which `share` of the values lie (the smallest such value); 0 when there are none.
-[[nodiscard]] double percentile(std::vector<double> values, double share);
-
 }  // namespace shapedb::bench

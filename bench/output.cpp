@@ -1,5 +1,8 @@
 #include "bench/output.h"
 
+#include <array>
+#include <cstdio>
+
 #include <nlohmann/json.hpp>
 
 #include "client/io/output_file.h"
@@ -11,6 +14,12 @@ namespace {
 constexpr const char* kStandardOutput = "-";
 
 }  // namespace
+
+std::string numberText(const char* format, double value) {
+    std::array<char, 64> text{};
+    std::snprintf(text.data(), text.size(), format, value);
+    return text.data();
+}
 
 Result<void> writeText(const std::string& path, std::string_view text) {
     auto file = io::OutputFile::create(path);

@@ -15,6 +15,9 @@ namespace shapedb::bench {
 /// Errors: kFileNotWritable.
 [[nodiscard]] Result<void> writeText(const std::string& path, std::string_view text);
 
+/// `value` by a printf format for one double, e.g. "%.2f"; at most 63 characters.
+[[nodiscard]] std::string numberText(const char* format, double value);
+
 /// --json FILE|-: to a file, or to standard output instead of the text for people. Empty: nowhere.
 /// Call `announceJson` before anything is printed. Errors: kFileNotWritable.
 void announceJson(cli::Console& console, const std::string& target);

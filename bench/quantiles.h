@@ -2,16 +2,21 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <utility>
 #include <vector>
 
 namespace shapedb::bench {
 
-/// The value below which a share q in [0, 1] of the values lies (the nearest rank); 0 of none.
-inline double quantile(std::vector<double> values, double q) {
+/// Value below which `share` of the values lie (the smallest such value); 0 when there are none.
+[[nodiscard]] inline double percentile(std::vector<double> values, double share) {
     if (values.empty()) return 0.0;
     std::sort(values.begin(), values.end());
-    return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1) + 0.5)];
+    const double rank = std::ceil(share * static_cast<double>(values.size()));
+    return values[static_cast<std::size_t>(std::max(rank, 1.0)) - 1];
 }
+
+[[nodiscard]] inline double median(std::vector<double> values) { return percentile(std::move(values), 0.5); }
 
 }  // namespace shapedb::bench

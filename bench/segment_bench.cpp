@@ -1,8 +1,6 @@
 // `shapedb-bench segment`: what a segmentation costs beside the bare Delaunay triangulation of its points.
 #include <algorithm>
-#include <array>
 #include <chrono>
-#include <cstdio>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -19,6 +17,7 @@
 #include "bench/operations.h"
 #include "bench/output.h"
 #include "bench/peak_memory.h"
+#include "bench/quantiles.h"
 #include "bench/stopwatch.h"
 #include "client/cli/exit_code.h"
 #include "client/io/scan_reader.h"
@@ -55,12 +54,6 @@ double secondsSince(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-double median(std::vector<double> values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-}
-
 // Times of one stage over all repetitions, in the order the stages ran.
 using Stages = std::vector<std::pair<std::string, std::vector<double>>>;
 
@@ -71,21 +64,12 @@ void note(const std::vector<StageTime>& times, Stages& stages) {
     }
 }
 
-// One profile on all points, one thread.
-struct Undecimated {
+// One profile: on all points, or as users call it.
+struct Lane {
     std::string profile;
     std::vector<double> seconds;
     Stages stages;
-    std::size_t tetrahedra = 0;
-    std::optional<std::size_t> memory;
-};
-
-// One profile as users call it: decimated where it decimates, signature included.
-struct Whole {
-    std::string profile;
-    std::vector<double> seconds;
-    Stages stages;
-    std::size_t sites = 0;
+    std::size_t size = 0;  // tetrahedra of all points, sites of the decimated
     std::optional<std::size_t> memory;
 };
 
@@ -102,9 +86,9 @@ struct Figures {
     std::vector<double> bare;
     std::size_t bareTetrahedra = 0;
     std::optional<std::size_t> bareMemory;
-    std::vector<Undecimated> undecimated;
+    std::vector<Lane> undecimated;  // on all points, one thread
     Parallel parallel;
-    std::vector<Whole> whole;
+    std::vector<Lane> whole;  // decimated where the profile does, signature included
 };
 
 ShapeParameters parametersNamed(const std::string& name) {
@@ -142,11 +126,11 @@ void measureMemory(const Flags& flags, const PointCloud& scan, const PointCloud&
         });
     };
     for (const std::string& profile : flags.profiles) {
-        Whole whole{profile, {}, {}, 0, std::nullopt};
+        Lane whole{profile, {}, {}, 0, std::nullopt};
         whole.memory = limited([&] { return describe(scan, parametersNamed(profile)).has_value(); });
         figures.whole.push_back(std::move(whole));
         if (flags.noUndecimated) continue;
-        Undecimated undecimated{profile, {}, {}, 0, std::nullopt};
+        Lane undecimated{profile, {}, {}, 0, std::nullopt};
         undecimated.memory = limited([&] { return segment(scan, undecimatedOptions(profile)).has_value(); });
         figures.undecimated.push_back(std::move(undecimated));
     }
@@ -161,12 +145,12 @@ Result<void> measureUndecimated(const PointCloud& scan, const PointCloud& distin
     const BareDelaunay bare = bareDelaunay(distinct);
     figures.bare.push_back(bare.seconds);
     figures.bareTetrahedra = bare.tetrahedra;
-    for (Undecimated& lane : figures.undecimated) {
+    for (Lane& lane : figures.undecimated) {
         const ThreadStopwatch stopwatch;
         const auto found = segment(scan, undecimatedOptions(lane.profile), context);
         lane.seconds.push_back(stopwatch.seconds());
         if (!found) return fail(found.error());
-        lane.tetrahedra = found->tetrahedra.size();
+        lane.size = found->tetrahedra.size();
         note(found->stages, lane.stages);
     }
     return {};
@@ -188,24 +172,18 @@ Result<void> measureParallel(const PointCloud& distinct, std::size_t threads, bo
 Result<void> measureWhole(const PointCloud& scan, std::size_t threads, const RunContext& context,
                           Figures& figures) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    for (Whole& lane : figures.whole) {
+    for (Lane& lane : figures.whole) {
         if (parametersNamed(lane.profile).segmentation.decimateTo == 0) continue;
         const auto start = Clock::now();
         const auto found = describe(scan, parametersNamed(lane.profile), context);
         lane.seconds.push_back(secondsSince(start));
         if (!found) return fail(found.error());
-        lane.sites = found->segmentation.sites.size();
+        lane.size = found->segmentation.sites.size();
         std::vector<StageTime> stages = found->segmentation.stages;
         stages.push_back({"signature", lane.seconds.back() - found->segmentation.totalSeconds});
         note(stages, lane.stages);
     }
     return {};
-}
-
-std::string number(const char* format, double value) {
-    std::array<char, 64> buffer{};
-    std::snprintf(buffer.data(), buffer.size(), format, value);
-    return buffer.data();
 }
 
 double megabytes(const std::optional<std::size_t>& bytes) {
@@ -216,7 +194,7 @@ std::string stageTable(const Stages& stages) {
     std::string text;
     for (const auto& [stage, seconds] : stages) {
         text += "  " + stage + std::string(stage.size() < 14 ? 14 - stage.size() : 1, ' ') +
-                number("%8.3f s\n", median(seconds));
+                numberText("%8.3f s\n", median(seconds));
     }
     return text;
 }
@@ -226,29 +204,31 @@ std::string textOf(const Flags& flags, const Figures& f) {
                        " points, " + std::to_string(f.distinct) + " distinct; medians of " +
                        std::to_string(flags.repeat) + "\n";
     if (!flags.noUndecimated) {
-        text += "\nbare CGAL Delaunay, one thread: " + number("%.3f s, ", median(f.bare)) +
+        text += "\nbare CGAL Delaunay, one thread: " + numberText("%.3f s, ", median(f.bare)) +
                 std::to_string(f.bareTetrahedra) + " tetrahedra, peak " +
-                number("%.1f MB\n", megabytes(f.bareMemory));
-        for (const Undecimated& lane : f.undecimated) {
+                numberText("%.1f MB\n", megabytes(f.bareMemory));
+        for (const Lane& lane : f.undecimated) {
             text += "\n" + lane.profile + " profile, all points, one thread: " +
-                    number("%.3f s, ratio_to_delaunay ", median(lane.seconds)) +
-                    number("%.3f; peak ", median(lane.seconds) / median(f.bare)) +
-                    number("%.1f MB, ", megabytes(lane.memory)) +
-                    number("%.3f of the bare one's\n", megabytes(lane.memory) / megabytes(f.bareMemory)) +
+                    numberText("%.3f s, ratio_to_delaunay ", median(lane.seconds)) +
+                    numberText("%.3f; peak ", median(lane.seconds) / median(f.bare)) +
+                    numberText("%.1f MB, ", megabytes(lane.memory)) +
+                    numberText("%.3f of the bare one's\n", megabytes(lane.memory) / megabytes(f.bareMemory)) +
                     stageTable(lane.stages);
         }
-        text += "\nDelaunay with " + std::to_string(flags.threads) +
-                " threads: " + number("%.3f s, ", median(f.parallel.many)) +
-                number("%.2f times as fast as with one (", median(f.parallel.one) / median(f.parallel.many)) +
-                number("%.3f s)\n", median(f.parallel.one));
-        if (flags.cgalParallel) text += number("CGAL's parallel one: %.3f s\n", median(f.parallel.bareMany));
+        text +=
+            "\nDelaunay with " + std::to_string(flags.threads) +
+            " threads: " + numberText("%.3f s, ", median(f.parallel.many)) +
+            numberText("%.2f times as fast as with one (", median(f.parallel.one) / median(f.parallel.many)) +
+            numberText("%.3f s)\n", median(f.parallel.one));
+        if (flags.cgalParallel)
+            text += numberText("CGAL's parallel one: %.3f s\n", median(f.parallel.bareMany));
     }
-    for (const Whole& lane : f.whole) {
+    for (const Lane& lane : f.whole) {
         if (lane.seconds.empty()) continue;
         text += "\n" + lane.profile + " profile, " + std::to_string(flags.threads) +
-                " threads, points to signature: " + number("%.3f s, ", median(lane.seconds)) +
-                std::to_string(lane.sites) + " sites, peak " + number("%.1f MB\n", megabytes(lane.memory)) +
-                stageTable(lane.stages);
+                " threads, points to signature: " + numberText("%.3f s, ", median(lane.seconds)) +
+                std::to_string(lane.size) + " sites, peak " +
+                numberText("%.1f MB\n", megabytes(lane.memory)) + stageTable(lane.stages);
     }
     return text;
 }
@@ -271,11 +251,11 @@ json documentOf(const Flags& flags, const std::string& command, const Figures& f
         document["delaunay"] = {{"seconds", median(f.bare)},
                                 {"tetrahedra", f.bareTetrahedra},
                                 {"peak_megabytes", megabytes(f.bareMemory)}};
-        for (const Undecimated& lane : f.undecimated) {
+        for (const Lane& lane : f.undecimated) {
             document["undecimated"][lane.profile] = {
                 {"seconds", median(lane.seconds)},
                 {"ratio_to_delaunay", median(lane.seconds) / median(f.bare)},
-                {"tetrahedra", lane.tetrahedra},
+                {"tetrahedra", lane.size},
                 {"peak_megabytes", megabytes(lane.memory)},
                 {"memory_ratio_to_delaunay", megabytes(lane.memory) / megabytes(f.bareMemory)},
                 {"stages", stagesJson(lane.stages)}};
@@ -288,25 +268,15 @@ json documentOf(const Flags& flags, const std::string& command, const Figures& f
             document["parallel_delaunay"]["cgal_parallel_seconds"] = median(f.parallel.bareMany);
         }
     }
-    for (const Whole& lane : f.whole) {
+    for (const Lane& lane : f.whole) {
         if (lane.seconds.empty()) continue;
         document["points_to_signature"][lane.profile] = {{"threads", flags.threads},
                                                          {"seconds", median(lane.seconds)},
-                                                         {"sites", lane.sites},
+                                                         {"sites", lane.size},
                                                          {"peak_megabytes", megabytes(lane.memory)},
                                                          {"stages", stagesJson(lane.stages)}};
     }
     return document;
-}
-
-std::string commandOf(const Flags& flags, const Figures& f) {
-    std::string command = "shapedb-bench segment ";
-    command += flags.file.empty() ? "--points " + std::to_string(flags.points) : "--file " + f.source;
-    if (flags.file.empty()) command += " --noise " + json(flags.noise).dump();
-    command += " --profile ";
-    for (std::size_t i = 0; i < flags.profiles.size(); ++i) command += (i ? "," : "") + flags.profiles[i];
-    command += " --repeat " + std::to_string(flags.repeat) + " --threads " + std::to_string(flags.threads);
-    return command + (flags.noUndecimated ? " --no-undecimated" : "");
 }
 
 Result<int> runSegment(const Flags& flags, Bench& bench) {
@@ -335,7 +305,7 @@ Result<int> runSegment(const Flags& flags, Bench& bench) {
         }
         if (auto go = measureWhole(*scan, flags.threads, context, figures); !go) return fail(go.error());
     }
-    const json document = documentOf(flags, commandOf(flags, figures), figures);
+    const json document = documentOf(flags, bench.command, figures);
     if (const auto ok = writeJson(bench.console, flags.json, document); !ok) return fail(ok.error());
     bench.console.text(textOf(flags, figures));
     return cli::kOk;

@@ -1,10 +1,8 @@
 // `shapedb-bench topk`: how long exact search takes among many signatures, beside a flat scan of
 // feature vectors, and whether it is exact.
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <memory>
 #include <optional>
 #include <string>
@@ -135,7 +133,7 @@ class TopKRun {
         const auto quantiles = [](std::vector<double> values) {
             nlohmann::json out;
             for (const double q : {0.01, 0.05, 0.25, 0.5, 0.75, 0.95}) {
-                out[std::to_string(q).substr(0, 4)] = quantile(values, q);
+                out[std::to_string(q).substr(0, 4)] = percentile(values, q);
             }
             return out;
         };
@@ -173,7 +171,7 @@ class TopKRun {
             withThreads(flags_.threads, [&] { done = searchAll(&latencies); });
             if (!done) return done;
             all.insert(all.end(), latencies.begin(), latencies.end());
-            medians.push_back(quantile(latencies, 0.5));
+            medians.push_back(median(latencies));
             if (peer == nullptr) continue;
             std::vector<double> theirs;
             for (std::size_t q = 0; q < kPeerQueries; ++q) {
@@ -182,17 +180,16 @@ class TopKRun {
                     return fail(ErrorCode::kInternal, "the peer found nothing");
                 theirs.push_back(millisecondsSince(start));
             }
-            peerMedians.push_back(quantile(theirs, 0.5));
+            peerMedians.push_back(median(theirs));
             ratios.push_back(medians.back() / peerMedians.back());
         }
         out["threads"] = flags_.threads;
-        out["p50_ms"] = quantile(medians, 0.5);
-        out["p99_ms"] = quantile(all, 0.99);
+        out["p50_ms"] = median(medians);
+        out["p99_ms"] = percentile(all, 0.99);
         if (peer != nullptr) {
-            out["peer"] = {{"name", vectorScanName()},
-                           {"dimension", kPeerDimension},
-                           {"p50_ms", quantile(peerMedians, 0.5)}};
-            out["ratio_to_faiss"] = quantile(ratios, 0.5);
+            out["peer"] = {
+                {"name", vectorScanName()}, {"dimension", kPeerDimension}, {"p50_ms", median(peerMedians)}};
+            out["ratio_to_faiss"] = median(ratios);
         }
         return {};
     }
@@ -246,8 +243,8 @@ class TopKRun {
             inside.push_back(alone / split);
             over.push_back(alone / together);
         }
-        out["speedup_one_by_one"] = quantile(inside, 0.5);
-        out["speedup_batch"] = quantile(over, 0.5);
+        out["speedup_one_by_one"] = median(inside);
+        out["speedup_batch"] = median(over);
         return {};
     }
 
@@ -316,23 +313,18 @@ class TopKRun {
     Queries queries_;
 };
 
-std::string cell(const char* format, double value) {
-    std::array<char, 40> buffer{};
-    std::snprintf(buffer.data(), buffer.size(), format, value);
-    return buffer.data();
-}
-
 std::string line(const nlohmann::json& run) {
     const nlohmann::json& left = run["left"];
-    return "| " + cell("%.0f", run["shapes"].get<double>()) + " | " + cell("%.3g", run["p50_ms"]) + " | " +
-           cell("%.3g", run["p99_ms"]) + " | " +
-           (run.contains("peer") ? cell("%.3g", run["peer"]["p50_ms"]) : "-") + " | " +
-           (run.contains("peer") ? cell("%.3f", run["ratio_to_faiss"]) : "-") + " | " +
-           cell("%.0f", run["bytes_per_shape"]) + " | " +
-           cell("%.3f %%", 100.0 * left["first_half_of_statistics"].get<double>()) + " | " +
-           cell("%.3f %%", 100.0 * left["statistics"].get<double>()) + " | " +
-           cell("%.4f %%", 100.0 * left["parts"].get<double>()) + " | " +
-           cell("%.2f", run["speedup_one_by_one"]) + " | " + cell("%.2f", run["speedup_batch"]) + " |\n";
+    return "| " + numberText("%.0f", run["shapes"].get<double>()) + " | " +
+           numberText("%.3g", run["p50_ms"]) + " | " + numberText("%.3g", run["p99_ms"]) + " | " +
+           (run.contains("peer") ? numberText("%.3g", run["peer"]["p50_ms"]) : "-") + " | " +
+           (run.contains("peer") ? numberText("%.3f", run["ratio_to_faiss"]) : "-") + " | " +
+           numberText("%.0f", run["bytes_per_shape"]) + " | " +
+           numberText("%.3f %%", 100.0 * left["first_half_of_statistics"].get<double>()) + " | " +
+           numberText("%.3f %%", 100.0 * left["statistics"].get<double>()) + " | " +
+           numberText("%.4f %%", 100.0 * left["parts"].get<double>()) + " | " +
+           numberText("%.2f", run["speedup_one_by_one"]) + " | " + numberText("%.2f", run["speedup_batch"]) +
+           " |\n";
 }
 
 Result<std::vector<Mixture>> mixturesOf(const std::string& text) {
@@ -349,6 +341,10 @@ Result<int> runTopK(const Flags& flags, Bench& bench) {
     const auto mixtures = mixturesOf(flags.mixture);
     if (!mixtures) return fail(mixtures.error());
     announceJson(bench.console, flags.json);
+    if (vectorScanName().empty() && !flags.noPeer) {
+        bench.console.note(
+            "no flat scan beside it: build with -DSHAPEDB_BENCH_FAISS=ON (docs/benchmarks.md)");
+    }
     const Environment here = environment();
     nlohmann::json document = {
         {"environment", environmentJson(here)}, {"command", bench.command}, {"seed", flags.seed}};

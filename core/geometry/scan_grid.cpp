@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/geometry/decimate.h"
+#include "core/geometry/interleave.h"
 
 namespace shapedb {
 
@@ -198,15 +199,6 @@ Result<std::vector<std::uint32_t>> fill(Grid& grid, const PointCloud& scan, cons
     return cellOfPoint;
 }
 
-// Every third bit, from the lowest on.
-std::uint64_t spread(std::uint64_t v) {
-    v = (v | v << 32) & 0x001f00000000ffffULL;
-    v = (v | v << 16) & 0x001f0000ff0000ffULL;
-    v = (v | v << 8) & 0x100f00f00f00f00fULL;
-    v = (v | v << 4) & 0x10c30c30c30c30c3ULL;
-    return (v | v << 2) & 0x1249249249249249ULL;
-}
-
 // The finest grid in which a sample stays within the limit. The whole scan occupies no fewer cells, so its
 // own finest is no finer: starting here saves most coarsening and changes nothing.
 int finestOfSample(const PointCloud& scan, const Frame& frame, std::size_t limit) {
@@ -216,8 +208,8 @@ int finestOfSample(const PointCloud& scan, const Frame& frame, std::size_t limit
     codes.reserve(scan.size() / step + 1);
     for (std::size_t i = 0; i < scan.size(); i += step) {
         const Steps s = stepsOf(scan[i], frame, inverse);
-        codes.push_back(spread(finestIndex(s[0])) << 2 | spread(finestIndex(s[1])) << 1 |
-                        spread(finestIndex(s[2])));
+        codes.push_back(everyThirdBit(finestIndex(s[0])) << 2 | everyThirdBit(finestIndex(s[1])) << 1 |
+                        everyThirdBit(finestIndex(s[2])));
     }
     std::sort(codes.begin(), codes.end());
     // Sorted codes part where their highest different bits are: three bits to a level.

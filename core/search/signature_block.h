@@ -24,6 +24,10 @@ struct IndexEntry {
 /// Signatures by rising id. Immutable once shared: const members from any thread.
 class SignatureBlock {
   public:
+    /// Rows a block has room for: the ends of their parts are counted in 16 bits.
+    static constexpr std::size_t kMostRows = 1024;
+    static_assert(kMostRows * kMaxSignaturePoints <= 0xffff, "ends of parts would overflow");
+
     void reserve(std::size_t count);
     /// Ids must rise.
     void append(const IndexEntry& entry);

@@ -42,7 +42,7 @@ class SignatureSet {
     [[nodiscard]] std::size_t memoryBytes() const;
 
     /// Blocks of 1 to kBlockSize entries by rising id; for scans.
-    static constexpr std::size_t kBlockSize = 1024;
+    static constexpr std::size_t kBlockSize = SignatureBlock::kMostRows;
     [[nodiscard]] const std::vector<std::shared_ptr<const SignatureBlock>>& blocks() const { return blocks_; }
 
   private:

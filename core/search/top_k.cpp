@@ -94,12 +94,13 @@ class Searcher {
         order_.reserve(set.blocks().size());
         std::size_t stride = 1;
         while (stride * kFirstSlice < set.blocks().size()) stride *= 2;
-        for (std::size_t step = stride; step >= 1; step /= 2) {
-            for (std::size_t b = step == stride ? 0 : step; b < set.blocks().size();
-                 b += step == stride ? step : 2 * step) {
+        const auto takeEvery = [&](std::size_t step, std::size_t first) {
+            for (std::size_t b = first; b < set.blocks().size(); b += step) {
                 order_.push_back(set.blocks()[b].get());
             }
-        }
+        };
+        takeEvery(stride, 0);
+        for (; stride > 1; stride /= 2) takeEvery(stride, stride / 2);
     }
 
     Result<SearchResult> run() {

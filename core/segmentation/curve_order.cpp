@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "core/geometry/interleave.h"
+
 namespace shapedb {
 
 namespace {
@@ -12,15 +14,6 @@ namespace {
 constexpr std::uint32_t kBits = 21;
 constexpr std::uint32_t kDigitBits = 11;
 constexpr std::uint32_t kDigits = 6;  // of 63 bits
-
-// Every third bit, from the lowest on.
-std::uint64_t spread(std::uint64_t v) {
-    v = (v | v << 32) & 0x001f00000000ffffULL;
-    v = (v | v << 16) & 0x001f0000ff0000ffULL;
-    v = (v | v << 8) & 0x100f00f00f00f00fULL;
-    v = (v | v << 4) & 0x10c30c30c30c30c3ULL;
-    return (v | v << 2) & 0x1249249249249249ULL;
-}
 
 // Skilling, "Programming the Hilbert curve" (2004): coordinates to the transposed index, in place,
 // then its bits interleaved.
@@ -43,7 +36,7 @@ std::uint64_t hilbertIndex(std::array<std::uint32_t, 3> x) {
         if ((x[2] & q) != 0) flip ^= q - 1;
     }
     for (std::uint32_t& axis : x) axis ^= flip;
-    return spread(x[0]) << 2 | spread(x[1]) << 1 | spread(x[2]);
+    return everyThirdBit(x[0]) << 2 | everyThirdBit(x[1]) << 1 | everyThirdBit(x[2]);
 }
 
 struct Keyed {

@@ -3,6 +3,7 @@
 #include <map>
 
 #include "bench/load_run.h"
+#include "bench/quantiles.h"
 #include "bench/stored_shapes.h"
 #include "client/cli/exit_code.h"
 #include "core/signature/signature_codec.h"

@@ -64,6 +64,23 @@ TEST(Parts, FrameIsRightHandedAndCentred) {
     }
 }
 
+TEST(Parts, PackingLosesNothing) {
+    Random random(9);
+    for (int round = 0; round < 3000; ++round) {
+        PackedPart packedOnce;
+        for (std::int16_t& x : packedOnce.position)
+            x = static_cast<std::int16_t>(static_cast<int>(random.below(65535)) - 32767);
+        packedOnce.share = static_cast<std::uint16_t>(1 + random.below(65535));
+        for (std::uint8_t& size : packedOnce.size) size = static_cast<std::uint8_t>(random.below(256));
+        ASSERT_TRUE(packed(unpacked(packedOnce)) == packedOnce);
+    }
+    for (int share = 1; share <= 65535; ++share) {
+        PackedPart part;
+        part.share = static_cast<std::uint16_t>(share);
+        ASSERT_EQ(packed(unpacked(part)).share, share);
+    }
+}
+
 // In the frame the moments of all matter are diagonal and fall.
 TEST(Parts, FrameLiesAlongThePrincipalAxes) {
     Random random(2);
