@@ -4,6 +4,7 @@
 #include <atomic>
 #include <chrono>
 #include <exception>
+#include <memory>
 #include <new>
 #include <string>
 
@@ -88,7 +89,7 @@ class Searcher {
     Searcher(const Signature& query, const SignatureSet& set, const SearchOptions& options,
              const RunContext& context)
         : query_(query), options_(options), context_(context) {
-        if (query.attributes) statistics_.emplace(query, options.score);
+        if (query.attributes) statistics_ = std::make_unique<const StatisticsBound>(query, options.score);
         result_.counts.candidates = set.size();
         // Spread evenly: shapes that came together are often alike.
         order_.reserve(set.blocks().size());
@@ -231,7 +232,7 @@ class Searcher {
     const Signature& query_;
     const SearchOptions& options_;
     const RunContext& context_;
-    std::optional<StatisticsBound> statistics_;
+    std::unique_ptr<const StatisticsBound> statistics_;  // null: the query has points alone
     std::vector<const SignatureBlock*> order_;
     std::size_t blocksDone_ = 0;
     SearchResult result_;
