@@ -1,6 +1,9 @@
 #include "core/segmentation/cavity_inserter.h"
 
 #include <algorithm>
+#include <utility>
+
+#include "core/base/fetch.h"
 
 namespace shapedb {
 
@@ -30,29 +33,10 @@ std::uint32_t indexOf(const std::array<std::uint32_t, 4>& v, std::uint32_t verte
 
 // The search for a cavity waits for memory half of its time: so what it needs next is asked for early.
 void fetchNeighbours(const CellStore& cells, std::uint32_t cell) {
-#if defined(__GNUC__)
-    for (const std::uint32_t next : cells[cell].neighbours) __builtin_prefetch(&cells[next]);
-#else
-    static_cast<void>(cells);
-    static_cast<void>(cell);
-#endif
-}
-
-// The one corner of each neighbour that the cell itself does not have.
-void fetchApexes(const std::vector<Site>& sites, const CellStore& cells, std::uint32_t cell) {
-#if defined(__GNUC__)
-    const auto& v = cells[cell].vertices;
-    const std::uint32_t all = v[0] ^ v[1] ^ v[2] ^ v[3];
-    for (std::size_t i = 0; i < 4; ++i) {
-        const auto& w = cells[cells[cell].neighbours[i]].vertices;
-        const std::uint32_t apex = (all ^ v[i] ^ w[0] ^ w[1] ^ w[2] ^ w[3]) & kVertexBits;
-        __builtin_prefetch(sites.data() + std::min<std::size_t>(apex, sites.size() - 1));
+    for (const std::uint32_t next : cells[cell].neighbours) {
+        fetch(&cells[next]);
+        fetch(&cells.ball(next));
     }
-#else
-    static_cast<void>(sites);
-    static_cast<void>(cells);
-    static_cast<void>(cell);
-#endif
 }
 
 // The facet opposite vertex i, in an order that makes it positive with a point on the side of that
@@ -63,10 +47,12 @@ constexpr std::array<std::array<std::uint32_t, 3>, 4> kFacet = {{{2, 1, 3}, {0, 
 
 void CellStore::reserve(std::size_t capacity) {
     if (capacity <= capacity_) return;
-    // Not make_unique: it would write, and so touch, every page.
-    std::unique_ptr<Cell[]> grown(new Cell[capacity]);
-    std::copy_n(cells_.get(), used(), grown.get());
-    cells_ = std::move(grown);
+    LargeBlock<Cell> cells = allocateLarge<Cell>(capacity);
+    LargeBlock<DelaunayBall> balls = allocateLarge<DelaunayBall>(capacity);
+    std::copy_n(cells_.get(), used(), cells.get());
+    std::copy_n(balls_.get(), used(), balls.get());
+    cells_ = std::move(cells);
+    balls_ = std::move(balls);
     capacity_ = capacity;
 }
 
@@ -83,7 +69,9 @@ CavityInserter::CavityInserter(std::vector<Site>& sites, CellStore& cells, const
       cells_(cells),
       range_(range),
       alone_(range.begin == 0 && range.end == kInfinite),
-      hint_(start) {
+      hint_(start),
+      cavity_(kMostCorners),
+      facets_(kMostCorners) {
     corners_[0] = kInfinite;
 }
 
@@ -93,6 +81,7 @@ bool CavityInserter::owns(std::uint32_t cell) const {
     return range_.holds(v[0] & kVertexBits) && range_.holds(v[1]) && range_.holds(v[2]) && range_.holds(v[3]);
 }
 
+// What the balls leave open.
 bool CavityInserter::conflicts(std::uint32_t cell, const Site& p) const {
     const auto& v = cells_[cell].vertices;
     const std::array<std::uint32_t, 4> w = {v[0] & kVertexBits, v[1], v[2], v[3]};
@@ -146,49 +135,67 @@ bool CavityInserter::isVertexOf(std::uint32_t cell, const Site& p) const {
     return false;
 }
 
-// Collects the cells whose balls hold p, which hang together, and the facets around them.
+// Bit i: the ball of neighbour i holds p. For neighbours in the cavity already it may say anything.
+unsigned CavityInserter::neighboursHolding(std::uint32_t cell, const Site& p) const {
+    const auto& neighbours = cells_[cell].neighbours;
+    unsigned holding = 0;
+    unsigned open = 0;
+    for (std::uint32_t i = 0; i < 4; ++i) {
+        const int holds = ballHolds(cells_.ball(neighbours[i]), p);
+        holding |= static_cast<unsigned>(holds > 0) << i;
+        open |= static_cast<unsigned>(holds == 0) << i;
+    }
+    for (std::uint32_t i = 0; open != 0 && i < 4; ++i) {
+        if ((open >> i & 1u) == 0 || (cells_[neighbours[i]].vertices[0] & kInCavity) != 0) continue;
+        if (conflicts(neighbours[i], p)) holding |= 1u << i;
+    }
+    return holding;
+}
+
+// For what one cell can add.
+void CavityInserter::makeRoom() {
+    if (cavityCount_ + 4 > cavity_.size()) cavity_.resize(2 * cavity_.size());
+    if (facetCount_ + 4 > facets_.size()) facets_.resize(2 * facets_.size());
+}
+
+// Collects the cells whose balls hold p, which hang together, and the facets around them. Whether a ball
+// holds p is as good as random: so the four neighbours of a cell are judged together and almost without
+// branches.
 bool CavityInserter::findCavity(std::uint32_t first, const Site& p) {
-    cavity_.clear();
-    around_.clear();
-    facets_.clear();
-    cavity_.push_back(first);
+    cavity_[0] = first;
+    cavityCount_ = 1;
+    facetCount_ = 0;
     cells_[first].vertices[0] |= kInCavity;
     fetchNeighbours(cells_, first);
-    for (std::size_t k = 0; k < cavity_.size(); ++k) {
+    for (std::size_t k = 0; k < cavityCount_; ++k) {
+        makeRoom();
         const std::uint32_t cell = cavity_[k];
-        fetchApexes(sites_, cells_, cell);
+        const unsigned holding = neighboursHolding(cell, p);
         for (std::uint32_t i = 0; i < 4; ++i) {
             const std::uint32_t next = cells_[cell].neighbours[i];
-            const std::uint32_t marks = cells_[next].vertices[0];
-            if ((marks & kInCavity) != 0) continue;
-            if ((marks & kAroundCavity) == 0) {
-                const bool ours = owns(next);
-                if (conflicts(next, p)) {
-                    if (!ours) return false;
-                    cells_[next].vertices[0] |= kInCavity;
-                    cavity_.push_back(next);
-                    fetchNeighbours(cells_, next);
-                    continue;
-                }
-                if (ours) {
-                    cells_[next].vertices[0] |= kAroundCavity;
-                    around_.push_back(next);
-                }
+            const unsigned fresh = (cells_[next].vertices[0] & kInCavity) == 0 ? 1 : 0;
+            const unsigned joins = fresh & (holding >> i);
+            cavity_[cavityCount_] = next;
+            facets_[facetCount_] = {cell, next, kNoCell, static_cast<std::uint8_t>(i), {}};
+            if (joins != 0) {
+                if (!owns(next)) return false;
+                cells_[next].vertices[0] |= kInCavity;
+                fetchNeighbours(cells_, next);
             }
-            facets_.push_back({cell, next, kNoCell, static_cast<std::uint8_t>(i), {}});
+            cavityCount_ += joins;
+            facetCount_ += fresh & ~joins;
         }
     }
     return true;
 }
 
 void CavityInserter::unmark() {
-    for (const std::uint32_t cell : cavity_) cells_[cell].vertices[0] &= kVertexBits;
-    for (const std::uint32_t cell : around_) cells_[cell].vertices[0] &= kVertexBits;
+    for (std::size_t i = 0; i < cavityCount_; ++i) cells_[cavity_[i]].vertices[0] &= kVertexBits;
 }
 
 // A new cell for every facet.
 bool CavityInserter::takeFresh() {
-    while (free_.size() < facets_.size()) {
+    while (free_.size() < facetCount_) {
         const std::uint32_t batch = cells_.take(kBatch);
         if (batch == kNoCell) return false;
         for (std::uint32_t i = kBatch; i-- > 0;) {
@@ -196,7 +203,8 @@ bool CavityInserter::takeFresh() {
             free_.push_back(batch + i);
         }
     }
-    for (Facet& facet : facets_) {
+    for (std::size_t f = 0; f < facetCount_; ++f) {
+        Facet& facet = facets_[f];
         facet.fresh = free_.back();
         free_.pop_back();
     }
@@ -230,7 +238,8 @@ void CavityInserter::linkAround(const Facet& facet, std::uint32_t j) {
 
 // Writes the new cells and joins them to those beyond the cavity.
 void CavityInserter::placeFresh(std::uint32_t vertex) {
-    for (const Facet& facet : facets_) {
+    for (std::size_t f = 0; f < facetCount_; ++f) {
+        const Facet& facet = facets_[f];
         const auto& old = cells_[facet.cell].vertices;
         Cell& fresh = cells_[facet.fresh];
         fresh.vertices = {old[0] & kVertexBits, old[1], old[2], old[3]};
@@ -250,7 +259,8 @@ void CavityInserter::placeFresh(std::uint32_t vertex) {
 // Gives the corners of the cavity numbers; false when there are too many of them.
 bool CavityInserter::numberCorners() {
     std::uint32_t count = 1;  // 0 is the vertex at infinity
-    for (Facet& facet : facets_) {
+    for (std::size_t f = 0; f < facetCount_; ++f) {
+        Facet& facet = facets_[f];
         const auto& v = cells_[facet.cell].vertices;
         for (std::uint32_t k = 0; k < 3; ++k) {
             const std::uint32_t vertex = v[kFacet[facet.index][k]] & kVertexBits;
@@ -269,19 +279,21 @@ bool CavityInserter::numberCorners() {
             facet.corners[k] = static_cast<std::uint8_t>(number);
         }
     }
+    cornerCount_ = count;
     return true;
 }
 
 // Each edge around the cavity has a facet on its left and, seen backwards, another.
 void CavityInserter::linkByTable() {
-    for (std::size_t f = 0; f < facets_.size(); ++f) {
+    for (std::size_t f = 0; f < facetCount_; ++f) {
         const auto& c = facets_[f].corners;
         const auto at = static_cast<std::uint16_t>(f);
         sides_[c[0]][c[1]] = at;
         sides_[c[1]][c[2]] = at;
         sides_[c[2]][c[0]] = at;
     }
-    for (const Facet& facet : facets_) {
+    for (std::size_t f = 0; f < facetCount_; ++f) {
+        const Facet& facet = facets_[f];
         const auto& c = facet.corners;
         const auto& position = kFacet[facet.index];
         auto& neighbours = cells_[facet.fresh].neighbours;
@@ -291,15 +303,28 @@ void CavityInserter::linkByTable() {
     }
 }
 
+void CavityInserter::measureBalls(const Site& p) {
+    std::array<Way, kMostCorners> ways;
+    for (std::uint32_t i = 1; i < cornerCount_; ++i) ways[i] = wayTo(p, sites_[corners_[i]]);
+    for (std::size_t f = 0; f < facetCount_; ++f) {
+        const auto& c = facets_[f].corners;
+        DelaunayBall& ball = cells_.ball(facets_[f].fresh);
+        ball = ballThrough(p, ways[c[0]], ways[c[1]], ways[c[2]]);
+        if (c[0] == 0 || c[1] == 0 || c[2] == 0) ball.squaredRadius = kNoBall;
+    }
+}
+
 // For a cavity of any size.
 void CavityInserter::linkByTurning() {
-    for (const Facet& facet : facets_) {
+    for (std::size_t f = 0; f < facetCount_; ++f) {
+        const Facet& facet = facets_[f];
         cells_[facet.cell].neighbours[facet.index] = facet.fresh;
         for (std::uint32_t j = 0; j < 4; ++j) {
             if (j != facet.index) cells_[facet.fresh].neighbours[j] = kNoCell;
         }
     }
-    for (const Facet& facet : facets_) {
+    for (std::size_t f = 0; f < facetCount_; ++f) {
+        const Facet& facet = facets_[f];
         for (std::uint32_t j = 0; j < 4; ++j) {
             if (j != facet.index && cells_[facet.fresh].neighbours[j] == kNoCell) linkAround(facet, j);
         }
@@ -310,11 +335,13 @@ void CavityInserter::fillCavity(std::uint32_t vertex) {
     placeFresh(vertex);
     if (numberCorners()) {
         linkByTable();
+        measureBalls(sites_[vertex]);
     } else {
         linkByTurning();
+        for (std::size_t f = 0; f < facetCount_; ++f) cells_.ball(facets_[f].fresh).squaredRadius = kNoBall;
     }
-    for (const std::uint32_t cell : around_) cells_[cell].vertices[0] &= kVertexBits;
-    for (const std::uint32_t cell : cavity_) {
+    for (std::size_t i = 0; i < cavityCount_; ++i) {
+        const std::uint32_t cell = cavity_[i];
         cells_[cell].vertices[0] = kFreeCell;
         free_.push_back(cell);
     }

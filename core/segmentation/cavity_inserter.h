@@ -5,18 +5,18 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <vector>
 
+#include "core/base/large_block.h"
+#include "core/segmentation/delaunay_ball.h"
 #include "core/segmentation/predicates.h"
 
 namespace shapedb {
 
 /// The vertex at infinity, which closes the triangulation outside the hull.
 constexpr std::uint32_t kInfinite = 0x3fffffffu;
-/// Marks on the first vertex of a cell while a point goes in; both are set in a free one.
+/// Mark on the first vertex of a cell while a point goes in; set in a free one.
 constexpr std::uint32_t kInCavity = 0x80000000u;
-constexpr std::uint32_t kAroundCavity = 0x40000000u;
 constexpr std::uint32_t kFreeCell = 0xffffffffu;
 constexpr std::uint32_t kNoCell = 0xffffffffu;
 constexpr std::uint32_t kVertexBits = 0x3fffffffu;
@@ -28,7 +28,8 @@ struct alignas(32) Cell {
     std::array<std::uint32_t, 4> neighbours;
 };
 
-/// The cells in one block of memory, taken from the front. Pages nobody took are never touched.
+/// The cells and their balls in a block of memory each, taken from the front. Pages nobody took are never
+/// touched.
 class CellStore {
   public:
     /// Makes room for as many cells; what is there stays. Not while another thread takes any.
@@ -38,11 +39,16 @@ class CellStore {
 
     Cell& operator[](std::uint32_t i) { return cells_[i]; }
     const Cell& operator[](std::uint32_t i) const { return cells_[i]; }
+    DelaunayBall& ball(std::uint32_t i) { return balls_[i]; }
+    const DelaunayBall& ball(std::uint32_t i) const { return balls_[i]; }
+    /// Frees the balls, when nothing more is inserted.
+    void dropBalls() { balls_.reset(); }
     std::size_t used() const { return used_.load(std::memory_order_relaxed); }
     std::size_t capacity() const { return capacity_; }
 
   private:
-    std::unique_ptr<Cell[]> cells_;
+    LargeBlock<Cell> cells_;
+    LargeBlock<DelaunayBall> balls_;
     std::atomic<std::size_t> used_{0};
     std::size_t capacity_ = 0;
 };
@@ -96,6 +102,8 @@ class CavityInserter {
 
     bool owns(std::uint32_t cell) const;
     bool conflicts(std::uint32_t cell, const Site& p) const;
+    unsigned neighboursHolding(std::uint32_t cell, const Site& p) const;
+    void makeRoom();
     std::uint32_t locate(const Site& p) const;
     bool isVertexOf(std::uint32_t cell, const Site& p) const;
     bool findCavity(std::uint32_t first, const Site& p);
@@ -103,6 +111,7 @@ class CavityInserter {
     bool takeFresh();
     void fillCavity(std::uint32_t vertex);
     void placeFresh(std::uint32_t vertex);
+    void measureBalls(const Site& p);
     bool numberCorners();
     void linkByTable();
     void linkByTurning();
@@ -114,10 +123,13 @@ class CavityInserter {
     bool alone_;  // everything is in range
     std::uint32_t hint_;
     std::vector<std::uint32_t> free_;
+    // Lists with room to spare at the end, where entries are written before it is known whether they count.
     std::vector<std::uint32_t> cavity_;
-    std::vector<std::uint32_t> around_;
+    std::size_t cavityCount_ = 0;
     std::vector<Facet> facets_;
+    std::size_t facetCount_ = 0;
     std::array<std::uint32_t, kMostCorners> corners_{};  // the vertex of each number
+    std::uint32_t cornerCount_ = 0;
     // For an edge from one corner to another: the facet to its left.
     std::array<std::array<std::uint16_t, kMostCorners>, kMostCorners> sides_{};
 };

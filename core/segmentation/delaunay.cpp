@@ -11,6 +11,7 @@
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
+#include "core/base/fetch.h"
 #include "core/geometry/sanitise.h"
 #include "core/segmentation/cavity_inserter.h"
 #include "core/segmentation/curve_order.h"
@@ -70,6 +71,10 @@ void makeCanonical(Cell& cell) {
     }
 }
 
+// How many steps before it is read memory at random is asked for; and what leads to such memory.
+constexpr std::size_t kAhead = 12;
+constexpr std::size_t kFarAhead = 24;
+
 bool isFinite(const Corners& v) {
     return (static_cast<unsigned>(v[0] < kInfinite) & static_cast<unsigned>(v[1] < kInfinite) &
             static_cast<unsigned>(v[2] < kInfinite) & static_cast<unsigned>(v[3] < kInfinite)) != 0;
@@ -94,6 +99,7 @@ std::vector<std::uint32_t> sortedCells(CellStore& cells, std::size_t siteCount) 
     for (std::size_t v = 0; v < siteCount; ++v) {
         group.clear();
         for (std::uint32_t i = begin[v]; i < begin[v + 1]; ++i) {
+            if (i + kFarAhead < sorted.size()) fetch(&cells[sorted[i + kFarAhead]]);
             const Corners& corners = cells[sorted[i]].vertices;
             group.emplace_back(std::uint64_t{corners[1]} << 32 | corners[2], sorted[i]);
         }
@@ -112,6 +118,10 @@ Tetrahedra flatten(CellStore& cells, const std::vector<std::uint32_t>& order) {
     flat.vertices.resize(sorted.size());
     flat.neighbours.resize(sorted.size());
     for (std::size_t t = 0; t < sorted.size(); ++t) {
+        if (t + kFarAhead < sorted.size()) {
+            fetch(&cells[sorted[t + kFarAhead]]);
+            for (const std::uint32_t next : cells[sorted[t + kAhead]].neighbours) fetch(&place[next]);
+        }
         const Cell& cell = cells[sorted[t]];
         for (std::size_t i = 0; i < 4; ++i) {
             flat.vertices[t][i] = order[cell.vertices[i]];

@@ -105,6 +105,7 @@ class Builder {
             begin = end;
         }
         for (const std::uint32_t cell : free_) cells_[cell].vertices[0] = kFreeCell;
+        cells_.dropBalls();
         return {};
     }
 
@@ -148,6 +149,7 @@ Result<void> Builder::beginWithFour(const std::vector<std::uint32_t>& order) {
     if (orientation(site(0), site(b), site(c), site(d)) < 0) std::swap(first_[0], first_[1]);
     done_ = 4;
     const std::uint32_t inner = cells_.take(5);
+    for (std::uint32_t i = 0; i < 5; ++i) cells_.ball(inner + i).squaredRadius = kNoBall;
     cells_[inner] = {first_, {inner + 1, inner + 2, inner + 3, inner + 4}};
     for (std::uint32_t i = 0; i < 4; ++i) {
         // The inner cell reflected in its facet i: with vertex i beyond, the others change their sense.

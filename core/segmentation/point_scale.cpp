@@ -15,7 +15,7 @@ constexpr std::uint32_t kNone = 0xffffffffu;
 
 // How many of its nearest Delaunay neighbours each point keeps: enough that hardly ever another one
 // matters to a point next to it.
-constexpr std::size_t kKept = 4;
+constexpr std::size_t kKept = 5;
 
 // Distances are compared after rounding; so much wider the search is safe.
 constexpr double kSlack = 1.0 + 1e-12;
@@ -48,16 +48,23 @@ struct Nearest {
 
 using Kept = std::vector<Nearest<kKept>>;
 
-// The nearest Delaunay neighbours of every point, in one pass over the tetrahedra.
+// The edges of a tetrahedron, by corners, and the two other corners.
+constexpr std::array<std::array<std::size_t, 4>, 6> kEdges = {
+    {{0, 1, 2, 3}, {0, 2, 1, 3}, {0, 3, 1, 2}, {1, 2, 0, 3}, {1, 3, 0, 2}, {2, 3, 0, 1}}};
+
+// The nearest Delaunay neighbours of every point, in one pass over the tetrahedra. Those around an edge
+// follow one another through the facets that hold it. The first of them has two neighbours after itself
+// there: only such a one looks at the edge.
 Kept nearestNeighbours(const PointCloud& points, const Tetrahedra& tetrahedra) {
     Kept kept(points.size());
-    for (const auto& v : tetrahedra.vertices) {
-        for (std::size_t i = 0; i < 4; ++i) {
-            for (std::size_t j = i + 1; j < 4; ++j) {
-                const double squared = squaredDistance(points[v[i]], points[v[j]]);
-                kept[v[i]].offer(v[j], squared);
-                kept[v[j]].offer(v[i], squared);
-            }
+    for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
+        const auto& v = tetrahedra.vertices[t];
+        const auto& next = tetrahedra.neighbours[t];
+        for (const auto& [i, j, k, l] : kEdges) {
+            if (std::min(next[k], next[l]) < t) continue;
+            const double squared = squaredDistance(points[v[i]], points[v[j]]);
+            kept[v[i]].offer(v[j], squared);
+            kept[v[j]].offer(v[i], squared);
         }
     }
     return kept;
