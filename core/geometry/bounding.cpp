@@ -53,20 +53,71 @@ PointCloud hullVertices(const PointCloud& points) {
     return vertices;
 }
 
-// Squared diagonal of the box with its edges along the rows of `axes`.
-double squaredDiagonal(const PointCloud& points, const Matrix3& axes) {
+// What a box with its edges along the rows of `axes` needs to hold, edge by edge.
+struct Extent {
     std::array<double, 3> low = {INFINITY, INFINITY, INFINITY};
     std::array<double, 3> high = {-INFINITY, -INFINITY, -INFINITY};
+    std::array<Point3, 6> touching;  // the points that touch its faces
+
+    double squaredDiagonal() const {
+        double sum = 0.0;
+        for (std::size_t i = 0; i < 3; ++i) sum += (high[i] - low[i]) * (high[i] - low[i]);
+        return sum;
+    }
+};
+
+template <typename Points>
+Extent extentOf(const Points& points, const Matrix3& axes) {
+    Extent extent;
     for (const Point3& p : points) {
         for (std::size_t i = 0; i < 3; ++i) {
             const double v = axes[i][0] * p.x + axes[i][1] * p.y + axes[i][2] * p.z;
-            low[i] = std::min(low[i], v);
-            high[i] = std::max(high[i], v);
+            if (v < extent.low[i]) {
+                extent.low[i] = v;
+                extent.touching[2 * i] = p;
+            }
+            if (v > extent.high[i]) {
+                extent.high[i] = v;
+                extent.touching[2 * i + 1] = p;
+            }
         }
     }
-    double sum = 0.0;
-    for (std::size_t i = 0; i < 3; ++i) sum += (high[i] - low[i]) * (high[i] - low[i]);
-    return sum;
+    return extent;
+}
+
+// Tells whether boxes around points are smaller than a limit, most often by few of the points: those that
+// touched boxes before.
+class BoxTrial {
+  public:
+    explicit BoxTrial(const PointCloud& points) : points_(points) { known_.fill(points.front()); }
+
+    // Whether the squared diagonal is below the limit, and then what it is. Fewer points never give more,
+    // with rounding neither.
+    bool below(const Matrix3& axes, double limit, double& squaredDiagonal) {
+        if (extentOf(known_, axes).squaredDiagonal() >= limit) return false;
+        const Extent extent = extentOf(points_, axes);
+        for (const Point3& p : extent.touching) remember(p);
+        squaredDiagonal = extent.squaredDiagonal();
+        return squaredDiagonal < limit;
+    }
+
+  private:
+    static constexpr std::size_t kKnown = 24;
+
+    void remember(const Point3& p) {
+        for (const Point3& known : known_) {
+            if (known.x == p.x && known.y == p.y && known.z == p.z) return;
+        }
+        known_[next_++ % kKnown] = p;
+    }
+
+    const PointCloud& points_;
+    std::array<Point3, kKnown> known_;
+    std::size_t next_ = 0;
+};
+
+double squaredDiagonal(const PointCloud& points, const Matrix3& axes) {
+    return extentOf(points, axes).squaredDiagonal();
 }
 
 Point3 randomDirection(Random& random) {
@@ -114,11 +165,12 @@ struct Box {
 };
 
 Box descend(const PointCloud& points, Box box, double firstStep, double lastStep, Random& random) {
+    BoxTrial trial(points);
     for (double step = firstStep; step > lastStep; step *= 0.5) {
         for (int failures = 0; failures < kTriesPerStep;) {
             const Matrix3 candidate = turned(box.axes, randomDirection(random), step * random.uniform());
-            const double value = squaredDiagonal(points, candidate);
-            if (value < box.squaredDiagonal) {
+            double value = 0.0;
+            if (trial.below(candidate, box.squaredDiagonal, value)) {
                 box = {value, candidate};
                 failures = 0;
             } else {
