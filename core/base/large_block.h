@@ -7,6 +7,8 @@
 #include <memory>
 #include <new>
 #include <type_traits>
+#include <utility>
+#include <vector>
 
 #if defined(__linux__)
 #include <sys/mman.h>
@@ -38,5 +40,32 @@ template <typename T>
 #endif
     return LargeBlock<T>(static_cast<T*>(block));
 }
+
+/// Such memory for vectors. What resize() adds is not written: it holds anything until it is assigned.
+template <typename T>
+struct LargeAllocator {
+    using value_type = T;
+
+    LargeAllocator() = default;
+    template <typename U>
+    LargeAllocator(const LargeAllocator<U>&) noexcept {}  // NOLINT: allocators convert
+
+    T* allocate(std::size_t count) { return allocateLarge<T>(count).release(); }
+    void deallocate(T* block, std::size_t) noexcept { FreeLarge()(block); }
+
+    template <typename U>
+    void construct(U* at) noexcept(std::is_nothrow_default_constructible_v<U>) {
+        ::new (static_cast<void*>(at)) U;
+    }
+    template <typename U, typename... Arguments>
+    void construct(U* at, Arguments&&... arguments) {
+        ::new (static_cast<void*>(at)) U(std::forward<Arguments>(arguments)...);
+    }
+    friend bool operator==(const LargeAllocator&, const LargeAllocator&) { return true; }
+    friend bool operator!=(const LargeAllocator&, const LargeAllocator&) { return false; }
+};
+
+template <typename T>
+using LargeVector = std::vector<T, LargeAllocator<T>>;
 
 }  // namespace shapedb

@@ -13,7 +13,7 @@
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
 
-#include "core/geometry/parallel_points.h"
+#include "core/base/parallel.h"
 
 namespace shapedb {
 

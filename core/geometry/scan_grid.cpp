@@ -7,6 +7,11 @@
 #include <string>
 #include <utility>
 
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include "core/base/fetch.h"
+#include "core/base/parallel.h"
 #include "core/geometry/decimate.h"
 #include "core/geometry/interleave.h"
 
@@ -25,6 +30,8 @@ constexpr std::uint64_t kLowMask = (std::uint64_t{1} << kLowBits) - 1;
 
 constexpr std::size_t kCellsPerTarget = 8;
 constexpr std::size_t kPointsBetweenCheckpoints = 1 << 16;
+// Fewer points are not worth a grid of their own.
+constexpr std::size_t kLeastStretch = 1 << 17;
 constexpr std::uint32_t kFree = 0xffffffffu;
 
 using Steps = std::array<std::uint64_t, 3>;
@@ -81,12 +88,27 @@ class Grid {
         cells_.reserve(limit + 1);
     }
 
-    // The number of the point's cell, until the next coarsening.
-    std::uint32_t add(const Steps& steps) {
-        const std::uint32_t cell = find(keyOf(steps));
-        cells_[cell].sum.add(steps);
-        return cell;
+    // Puts points into their cells, whose numbers, until the next coarsening, go to `cellOf`. Memory is asked
+    // for before it is read: in a scan that jumps about every point waits for it otherwise.
+    void add(const Steps* steps, std::size_t count, std::uint32_t* cellOf) {
+        for (std::size_t i = 0; i < count; ++i) fetch(&slots_[firstSlotOf(keyOf(steps[i]))]);
+        for (std::size_t i = 0; i < count; ++i) {
+            cellOf[i] = find(keyOf(steps[i]));
+            fetch(&cells_[cellOf[i]]);
+        }
+        for (std::size_t i = 0; i < count; ++i) cells_[cellOf[i]].sum.add(steps[i]);
     }
+    // Adds the cells of another grid as fine as this one. Returns their numbers here.
+    std::vector<std::uint32_t> add(const Grid& other) {
+        std::vector<std::uint32_t> renumbered;
+        renumbered.reserve(other.cells_.size());
+        for (const GridCell& cell : other.cells_) {
+            renumbered.push_back(find(cell.key));
+            cells_[renumbered.back()].sum.add(cell.sum);
+        }
+        return renumbered;
+    }
+    int bits() const { return bits_; }
     bool isFull() const { return cells_.size() > limit_; }
     const std::vector<GridCell>& cells() const { return cells_; }
 
@@ -139,11 +161,15 @@ class Grid {
 
     // Of the cell with this key, or where it belongs. Keys lie beside the numbers of their cells: most
     // look-ups touch one cache line.
-    std::size_t slotOf(std::uint64_t key) const {
-        const std::size_t mask = slots_.size() - 1;
+    std::size_t firstSlotOf(std::uint64_t key) const {
         std::uint64_t mixed = key * 0x9e3779b97f4a7c15ULL;
         mixed = (mixed ^ mixed >> 32) * 0xd6e8feb86659fd93ULL;
-        std::size_t slot = (mixed >> 32) & mask;
+        return (mixed >> 32) & (slots_.size() - 1);
+    }
+
+    std::size_t slotOf(std::uint64_t key) const {
+        const std::size_t mask = slots_.size() - 1;
+        std::size_t slot = firstSlotOf(key);
         while (slots_[slot].cell != kFree && slots_[slot].key != key) slot = (slot + 1) & mask;
         return slot;
     }
@@ -174,29 +200,75 @@ class Grid {
 };
 
 Steps stepsOf(const Point3& p, const Frame& frame, double inverse) {
-    const auto steps = [](double v) { return static_cast<std::uint64_t>((v + 1.0) * kStepsPerUnit); };
+    // Signed first: that is one instruction.
+    const auto steps = [](double v) {
+        return static_cast<std::uint64_t>(static_cast<std::int64_t>((v + 1.0) * kStepsPerUnit));
+    };
     const Point3 scaled = inverse * (p - frame.centre);
     return {steps(scaled.x), steps(scaled.y), steps(scaled.z)};
 }
 
-void renumber(std::vector<std::uint32_t>& cellOfPoint, std::size_t count,
+void renumber(std::vector<std::uint32_t>& cellOfPoint, std::size_t begin, std::size_t end,
               const std::vector<std::uint32_t>& renumbered) {
-    for (std::size_t i = 0; i < count; ++i) cellOfPoint[i] = renumbered[cellOfPoint[i]];
+    for (std::size_t i = begin; i < end; ++i) cellOfPoint[i] = renumbered[cellOfPoint[i]];
 }
 
-// Puts every point into its cell.
-Result<std::vector<std::uint32_t>> fill(Grid& grid, const PointCloud& scan, const Frame& frame,
-                                        const RunContext& context) {
-    const double inverse = 1.0 / frame.unit;  // exact: a power of two
-    std::vector<std::uint32_t> cellOfPoint(scan.size());
-    for (std::size_t i = 0; i < scan.size(); ++i) {
-        if (i % kPointsBetweenCheckpoints == 0) {
-            if (auto go = context.checkpoint(); !go) return fail(go.error());
-        }
-        cellOfPoint[i] = grid.add(stepsOf(scan[i], frame, inverse));
-        while (grid.isFull()) renumber(cellOfPoint, i + 1, grid.coarsen());
+// A stretch of the scan in a grid of its own. Two of them make that of both stretches together: sums are
+// exact, and how fine it is depends on the points alone.
+struct Stretch {
+    std::size_t begin = 0;
+    std::size_t end = 0;
+    Grid grid;
+
+    void coarsen(std::vector<std::uint32_t>& cellOfPoint, std::size_t filled) {
+        renumber(cellOfPoint, begin, filled, grid.coarsen());
     }
-    return cellOfPoint;
+
+    void add(Stretch& next, std::vector<std::uint32_t>& cellOfPoint) {
+        while (grid.bits() > next.grid.bits()) coarsen(cellOfPoint, end);
+        while (next.grid.bits() > grid.bits()) next.coarsen(cellOfPoint, next.end);
+        renumber(cellOfPoint, next.begin, next.end, grid.add(next.grid));
+        end = next.end;
+        while (grid.isFull()) coarsen(cellOfPoint, end);
+    }
+};
+
+Result<void> fill(Stretch& stretch, const PointCloud& scan, const Frame& frame, const RunContext& context,
+                  std::vector<std::uint32_t>& cellOfPoint) {
+    const double inverse = 1.0 / frame.unit;  // exact: a power of two
+    std::array<Steps, 32> steps;
+    for (std::size_t i = stretch.begin; i < stretch.end;) {
+        if ((i - stretch.begin) % kPointsBetweenCheckpoints == 0) {
+            if (auto go = context.checkpoint(); !go) return go;
+        }
+        const std::size_t count = std::min(steps.size(), stretch.end - i);
+        for (std::size_t k = 0; k < count; ++k) steps[k] = stepsOf(scan[i + k], frame, inverse);
+        stretch.grid.add(steps.data(), count, &cellOfPoint[i]);
+        i += count;
+        while (stretch.grid.isFull()) stretch.coarsen(cellOfPoint, i);
+    }
+    return {};
+}
+
+// Puts every point into its cell, a stretch to each thread.
+Result<Grid> fillAll(const PointCloud& scan, const Frame& frame, std::size_t limit, int bits,
+                     const RunContext& context, std::vector<std::uint32_t>& cellOfPoint) {
+    const std::size_t parts = std::min(threadsOfArena(), scan.size() / kLeastStretch + 1);
+    std::vector<Stretch> stretches;
+    for (std::size_t k = 0; k < parts; ++k) {
+        stretches.push_back({k * scan.size() / parts, (k + 1) * scan.size() / parts, Grid(limit, bits)});
+    }
+    std::vector<Result<void>> done(parts);
+    tbb::this_task_arena::isolate([&] {
+        tbb::parallel_for(std::size_t{0}, parts, [&](std::size_t k) {
+            done[k] = fill(stretches[k], scan, frame, context, cellOfPoint);
+        });
+    });
+    for (const auto& result : done) {
+        if (!result) return fail(result.error());
+    }
+    for (std::size_t k = 1; k < parts; ++k) stretches[0].add(stretches[k], cellOfPoint);
+    return std::move(stretches[0].grid);
 }
 
 // The finest grid in which a sample stays within the limit. The whole scan occupies no fewer cells, so its
@@ -232,12 +304,12 @@ Result<std::optional<GriddedScan>> gridScanOrThrow(const PointCloud& scan, std::
     const auto frame = frameOf(scan);
     if (!frame) return fail(frame.error());
     const std::size_t limit = kCellsPerTarget * target;
-    Grid grid(limit, finestOfSample(scan, *frame, limit));
-    auto siteOfPoint = fill(grid, scan, *frame, context);
-    if (!siteOfPoint) return fail(siteOfPoint.error());
-    if (grid.cells().size() <= target) return std::optional<GriddedScan>();
-    renumber(*siteOfPoint, scan.size(), grid.sort());
-    const std::vector<GridCell>& small = grid.cells();
+    std::vector<std::uint32_t> siteOfPoint(scan.size());
+    auto grid = fillAll(scan, *frame, limit, finestOfSample(scan, *frame, limit), context, siteOfPoint);
+    if (!grid) return fail(grid.error());
+    if (grid->cells().size() <= target) return std::optional<GriddedScan>();
+    const std::vector<std::uint32_t> sorted = grid->sort();
+    const std::vector<GridCell>& small = grid->cells();
     PointCloud means;
     means.reserve(small.size());
     for (const GridCell& cell : small) means.push_back(cell.sum.mean());
@@ -251,9 +323,11 @@ Result<std::optional<GriddedScan>> gridScanOrThrow(const PointCloud& scan, std::
     for (const Sum& sum : sums) weighted.push_back(sum.mean());
     MergedPoints merged = mergeDuplicates(weighted);
     std::vector<std::uint32_t> siteOfCell(small.size());
-    for (std::size_t c = 0; c < small.size(); ++c) siteOfCell[c] = merged.siteOfPoint[large->siteOfPoint[c]];
-    renumber(*siteOfPoint, scan.size(), siteOfCell);
-    return std::optional<GriddedScan>(GriddedScan{std::move(merged.points), std::move(*siteOfPoint), *frame});
+    for (std::size_t c = 0; c < small.size(); ++c) {
+        siteOfCell[c] = merged.siteOfPoint[large->siteOfPoint[sorted[c]]];
+    }
+    renumber(siteOfPoint, 0, scan.size(), siteOfCell);
+    return std::optional<GriddedScan>(GriddedScan{std::move(merged.points), std::move(siteOfPoint), *frame});
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include "core/base/parallel.h"
 #include "core/geometry/interleave.h"
 
 namespace shapedb {
@@ -12,6 +13,7 @@ namespace shapedb {
 namespace {
 
 constexpr std::uint32_t kBits = 21;
+constexpr std::size_t kBlock = 4096;  // points that a thread takes at a time
 constexpr std::uint32_t kDigitBits = 11;
 constexpr std::uint32_t kDigits = 6;  // of 63 bits
 
@@ -56,10 +58,13 @@ std::vector<Keyed> keysOf(const PointCloud& points) {
     const double steps = extent > 0.0 && std::isfinite(extent) ? last / extent : 0.0;
     const auto step = [=](double v) { return static_cast<std::uint32_t>(std::min(last, v * steps)); };
     std::vector<Keyed> keyed(points.size());
-    for (std::size_t i = 0; i < points.size(); ++i) {
-        const Point3 p = points[i] - low;
-        keyed[i] = {hilbertIndex({step(p.x), step(p.y), step(p.z)}), static_cast<std::uint32_t>(i)};
-    }
+    // Nothing can stop it: there is no context.
+    static_cast<void>(forEachRange(points.size(), kBlock, {}, [&](std::size_t from, std::size_t to) {
+        for (std::size_t i = from; i < to; ++i) {
+            const Point3 p = points[i] - low;
+            keyed[i] = {hilbertIndex({step(p.x), step(p.y), step(p.z)}), static_cast<std::uint32_t>(i)};
+        }
+    }));
     return keyed;
 }
 
@@ -82,8 +87,7 @@ void sortByKey(std::vector<Keyed>& keyed) {
 std::vector<std::uint32_t> curveOrder(const PointCloud& points) {
     if (points.empty()) return {};
     std::vector<Keyed> keyed = keysOf(points);
-    const auto byKey = [](const Keyed& a, const Keyed& b) { return a.key < b.key; };
-    if (!std::is_sorted(keyed.begin(), keyed.end(), byKey)) sortByKey(keyed);
+    sortByKey(keyed);
     std::vector<std::uint32_t> order(points.size());
     for (std::size_t i = 0; i < order.size(); ++i) order[i] = keyed[i].point;
     return order;

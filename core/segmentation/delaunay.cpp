@@ -8,10 +8,8 @@
 #include <numeric>
 #include <string>
 
-#include <tbb/global_control.h>
-#include <tbb/task_arena.h>
-
 #include "core/base/fetch.h"
+#include "core/base/parallel.h"
 #include "core/geometry/sanitise.h"
 #include "core/segmentation/cavity_inserter.h"
 #include "core/segmentation/curve_order.h"
@@ -80,14 +78,23 @@ bool isFinite(const Corners& v) {
             static_cast<unsigned>(v[2] < kInfinite) & static_cast<unsigned>(v[3] < kInfinite)) != 0;
 }
 
+// Cells or tetrahedra that a thread takes at a time.
+constexpr std::size_t kBlock = 8192;
+
 // The finite cells, made canonical, by their corners. The places of cells in the store, which depend on
 // the threads, leave no trace.
-std::vector<std::uint32_t> sortedCells(CellStore& cells, std::size_t siteCount) {
+Result<std::vector<std::uint32_t>> sortedCells(CellStore& cells, std::size_t siteCount,
+                                               const RunContext& context) {
+    auto done = forEachRange(cells.used(), kBlock, context, [&](std::size_t from, std::size_t to) {
+        for (std::size_t c = from; c < to; ++c) {
+            Cell& cell = cells[static_cast<std::uint32_t>(c)];
+            if (isFinite(cell.vertices)) makeCanonical(cell);
+        }
+    });
+    if (!done) return fail(done.error());
     std::vector<std::uint32_t> begin(siteCount + 2, 0);
     for (std::uint32_t c = 0; c < cells.used(); ++c) {
-        if (!isFinite(cells[c].vertices)) continue;
-        makeCanonical(cells[c]);
-        ++begin[cells[c].vertices[0] + 2];
+        if (isFinite(cells[c].vertices)) ++begin[cells[c].vertices[0] + 2];
     }
     std::partial_sum(begin.begin(), begin.end(), begin.begin());
     std::vector<std::uint32_t> sorted(begin.back());
@@ -95,52 +102,66 @@ std::vector<std::uint32_t> sortedCells(CellStore& cells, std::size_t siteCount) 
         if (isFinite(cells[c].vertices)) sorted[begin[cells[c].vertices[0] + 1]++] = c;
     }
     // Three corners in their sense belong to one tetrahedron, so the second and third decide.
-    std::vector<std::pair<std::uint64_t, std::uint32_t>> group;
-    for (std::size_t v = 0; v < siteCount; ++v) {
-        group.clear();
-        for (std::uint32_t i = begin[v]; i < begin[v + 1]; ++i) {
-            if (i + kFarAhead < sorted.size()) fetch(&cells[sorted[i + kFarAhead]]);
-            const Corners& corners = cells[sorted[i]].vertices;
-            group.emplace_back(std::uint64_t{corners[1]} << 32 | corners[2], sorted[i]);
+    done = forEachRange(siteCount, kBlock, context, [&](std::size_t from, std::size_t to) {
+        std::vector<std::pair<std::uint64_t, std::uint32_t>> group;
+        for (std::size_t v = from; v < to; ++v) {
+            group.clear();
+            for (std::uint32_t i = begin[v]; i < begin[v + 1]; ++i) {
+                if (i + kFarAhead < begin[to]) fetch(&cells[sorted[i + kFarAhead]]);
+                const Corners& corners = cells[sorted[i]].vertices;
+                group.emplace_back(std::uint64_t{corners[1]} << 32 | corners[2], sorted[i]);
+            }
+            std::sort(group.begin(), group.end());
+            for (std::size_t i = 0; i < group.size(); ++i) sorted[begin[v] + i] = group[i].second;
         }
-        std::sort(group.begin(), group.end());
-        for (std::size_t i = 0; i < group.size(); ++i) sorted[begin[v] + i] = group[i].second;
-    }
+    });
+    if (!done) return fail(done.error());
     return sorted;
 }
 
 // `order`: the point of each site.
-Tetrahedra flatten(CellStore& cells, const std::vector<std::uint32_t>& order) {
-    std::vector<std::uint32_t> sorted = sortedCells(cells, order.size());
+Result<Tetrahedra> flatten(CellStore& cells, const std::vector<std::uint32_t>& order,
+                           const RunContext& context) {
+    const auto sorted = sortedCells(cells, order.size(), context);
+    if (!sorted) return fail(sorted.error());
+    const std::vector<std::uint32_t>& cellOf = *sorted;
     std::vector<std::uint32_t> place(cells.used(), kNoTetrahedron);
-    for (std::uint32_t t = 0; t < sorted.size(); ++t) place[sorted[t]] = t;
+    auto done = forEachRange(cellOf.size(), kBlock, context, [&](std::size_t from, std::size_t to) {
+        for (std::size_t t = from; t < to; ++t) place[cellOf[t]] = static_cast<std::uint32_t>(t);
+    });
+    if (!done) return fail(done.error());
     Tetrahedra flat;
-    flat.vertices.resize(sorted.size());
-    flat.neighbours.resize(sorted.size());
-    for (std::size_t t = 0; t < sorted.size(); ++t) {
-        if (t + kFarAhead < sorted.size()) {
-            fetch(&cells[sorted[t + kFarAhead]]);
-            for (const std::uint32_t next : cells[sorted[t + kAhead]].neighbours) fetch(&place[next]);
+    flat.vertices.resize(cellOf.size());
+    flat.neighbours.resize(cellOf.size());
+    done = forEachRange(cellOf.size(), kBlock, context, [&](std::size_t from, std::size_t to) {
+        for (std::size_t t = from; t < to; ++t) {
+            if (t + kFarAhead < to) {
+                fetch(&cells[cellOf[t + kFarAhead]]);
+                for (const std::uint32_t next : cells[cellOf[t + kAhead]].neighbours) fetch(&place[next]);
+            }
+            const Cell& cell = cells[cellOf[t]];
+            for (std::size_t i = 0; i < 4; ++i) {
+                flat.vertices[t][i] = order[cell.vertices[i]];
+                flat.neighbours[t][i] = place[cell.neighbours[i]];
+            }
         }
-        const Cell& cell = cells[sorted[t]];
-        for (std::size_t i = 0; i < 4; ++i) {
-            flat.vertices[t][i] = order[cell.vertices[i]];
-            flat.neighbours[t][i] = place[cell.neighbours[i]];
-        }
-    }
+    });
+    if (!done) return fail(done.error());
     return flat;
 }
 
-void measureBalls(const PointCloud& points, Tetrahedra& flat) {
+Result<void> measureBalls(const PointCloud& points, Tetrahedra& flat, const RunContext& context) {
     flat.circumcentres.resize(flat.size());
     flat.circumradii.resize(flat.size());
-    for (std::size_t t = 0; t < flat.size(); ++t) {
-        const auto& v = flat.vertices[t];
-        const TetrahedronCorners corners = {points[v[0]], points[v[1]], points[v[2]], points[v[3]]};
-        const Point3 centre = circumcentre(corners);
-        flat.circumcentres[t] = centre;
-        flat.circumradii[t] = distance(centre, corners[0]);
-    }
+    return forEachRange(flat.size(), kBlock, context, [&](std::size_t from, std::size_t to) {
+        for (std::size_t t = from; t < to; ++t) {
+            const auto& v = flat.vertices[t];
+            const TetrahedronCorners corners = {points[v[0]], points[v[1]], points[v[2]], points[v[3]]};
+            const Point3 centre = circumcentre(corners);
+            flat.circumcentres[t] = centre;
+            flat.circumradii[t] = distance(centre, corners[0]);
+        }
+    });
 }
 
 Result<void> checkDistinct(const PointCloud& points) {
@@ -148,14 +169,15 @@ Result<void> checkDistinct(const PointCloud& points) {
     return fail(ErrorCode::kInternal, "the points to triangulate are not distinct");
 }
 
-// As many threads as the caller's arena, and whatever limits it, allow.
-int threadsOfArena() {
-    const auto allowed = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
-    return std::min(tbb::this_task_arena::max_concurrency(), static_cast<int>(allowed));
+std::vector<std::uint32_t> insertionOrder(const PointCloud& points, PointOrder given) {
+    if (given == PointOrder::kAny) return curveOrder(points);
+    std::vector<std::uint32_t> order(points.size());
+    std::iota(order.begin(), order.end(), 0);
+    return order;
 }
 
-Result<Tetrahedra> triangulateOrThrow(const PointCloud& points, const RunContext& context) {
-    const std::vector<std::uint32_t> order = curveOrder(points);
+Result<Tetrahedra> triangulateOrThrow(const PointCloud& points, const RunContext& context, PointOrder given) {
+    const std::vector<std::uint32_t> order = insertionOrder(points, given);
     Tetrahedra flat;
     {
         CellStore cells;
@@ -164,24 +186,26 @@ Result<Tetrahedra> triangulateOrThrow(const PointCloud& points, const RunContext
             const Point3& p = points[order[i]];
             sites[i] = {p.x, p.y, p.z};
         }
-        if (auto done = insertAll(sites, cells, threadsOfArena(), context); !done) {
+        if (auto done = insertAll(sites, cells, static_cast<int>(threadsOfArena()), context); !done) {
             if (done.error().code == ErrorCode::kCollinear || done.error().code == ErrorCode::kCoplanar) {
                 if (auto distinct = checkDistinct(points); !distinct) return fail(distinct.error());
             }
             return fail(done.error());
         }
-        flat = flatten(cells, order);
+        auto flattened = flatten(cells, order, context);
+        if (!flattened) return flattened;
+        flat = std::move(*flattened);
     }
-    measureBalls(points, flat);
+    if (auto done = measureBalls(points, flat, context); !done) return fail(done.error());
     return flat;
 }
 
 }  // namespace
 
-Result<Tetrahedra> triangulate(const PointCloud& points, const RunContext& context) {
+Result<Tetrahedra> triangulate(const PointCloud& points, const RunContext& context, PointOrder order) {
     if (points.size() < 4) return fail(ErrorCode::kTooFewPoints, "fewer than 4 distinct points");
     try {
-        return triangulateOrThrow(points, context);
+        return triangulateOrThrow(points, context, order);
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::kOutOfMemory, "not enough memory for the Delaunay triangulation of " +
                                                  std::to_string(points.size()) + " points");

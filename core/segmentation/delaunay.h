@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/large_block.h"
 #include "core/base/run_context.h"
 #include "core/geometry/point.h"
 
@@ -19,12 +20,17 @@ constexpr std::uint32_t kNoTetrahedron = 0xffffffffu;
 /// opposite its vertex i; `neighbours[t][i]` lies behind it. Vertices are positively oriented:
 /// det(v1 - v0, v2 - v0, v3 - v0) > 0. Immutable once built.
 struct Tetrahedra {
-    std::vector<std::array<std::uint32_t, 4>> vertices;    ///< indices of the points given
-    std::vector<std::array<std::uint32_t, 4>> neighbours;  ///< kNoTetrahedron behind hull facets
-    std::vector<Point3> circumcentres;                     ///< Voronoi vertices
-    std::vector<double> circumradii;                       ///< of the Delaunay balls, not squared
+    LargeVector<std::array<std::uint32_t, 4>> vertices;    ///< indices of the points given
+    LargeVector<std::array<std::uint32_t, 4>> neighbours;  ///< kNoTetrahedron behind hull facets
+    LargeVector<Point3> circumcentres;                     ///< Voronoi vertices
+    LargeVector<double> circumradii;                       ///< of the Delaunay balls, not squared
 
     std::size_t size() const { return vertices.size(); }
+};
+
+enum class PointOrder {
+    kAny,
+    kAlongCurve,  ///< that of curveOrder, which then is not looked for again; the result is the same
 };
 
 /// Delaunay triangulation of distinct, finite points (CGAL's exact predicates; cospherical
@@ -34,6 +40,7 @@ struct Tetrahedra {
 ///
 /// Errors: kTooFewPoints, kCollinear, kCoplanar (exactly so), kCancelled,
 /// kDeadlineExceeded, kOutOfMemory, kInternal.
-[[nodiscard]] Result<Tetrahedra> triangulate(const PointCloud& points, const RunContext& context = {});
+[[nodiscard]] Result<Tetrahedra> triangulate(const PointCloud& points, const RunContext& context = {},
+                                             PointOrder order = PointOrder::kAny);
 
 }  // namespace shapedb

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/fetch.h"
+
 namespace shapedb {
 
 namespace {
@@ -114,6 +116,8 @@ Result<std::vector<std::uint8_t>> interiorTetrahedra(const PointCloud& points, c
             if (!deep.between(tetrahedra.circumcentres[t], tetrahedra.circumcentres[next], shared)) continue;
             inside[next] = 0;
             stack.push_back(next);
+            fetch(&tetrahedra.neighbours[next]);
+            fetch(&tetrahedra.vertices[next]);
         }
     }
     return inside;

@@ -258,7 +258,7 @@ Result<Segmentation> segmentOrThrow(const PointCloud& points, const Segmentation
     if (!prepared) return fail(prepared.error());
     if (auto go = clock.begin("delaunay"); !go) return fail(go.error());
     sortAlongCurve(prepared->sites, result.siteOfPoint);
-    auto tetrahedra = triangulate(prepared->sites, context);
+    auto tetrahedra = triangulate(prepared->sites, context, PointOrder::kAlongCurve);
     if (!tetrahedra) return fail(tetrahedra.error());
     result.tetrahedra = std::move(*tetrahedra);
     clock.end();

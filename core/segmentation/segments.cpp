@@ -6,6 +6,8 @@
 #include <numeric>
 #include <utility>
 
+#include "core/base/fetch.h"
+
 namespace shapedb {
 
 namespace {
@@ -32,9 +34,9 @@ constexpr std::int32_t kNoMaximum = -1;
 // into them, strongest first, is the same; this way each tetrahedron is looked at once.
 class Downstream {
   public:
-    Downstream(const Tetrahedra& tetrahedra, const std::vector<std::uint8_t>& interior,
-               const std::vector<std::uint8_t>& flow, std::vector<std::int32_t>& labels)
-        : tetrahedra_(tetrahedra), interior_(interior), flow_(flow), labels_(labels) {}
+    Downstream(const Tetrahedra& tetrahedra, const std::vector<std::uint8_t>& flow,
+               std::vector<std::int32_t>& labels)
+        : tetrahedra_(tetrahedra), flow_(flow), labels_(labels) {}
 
     void follow(std::uint32_t start) {
         path_.assign(1, start);
@@ -51,8 +53,12 @@ class Downstream {
             for (std::size_t facet = 0; facet < 4; ++facet) {
                 if (!flowsThrough(flow_[t], facet)) continue;
                 const std::uint32_t next = tetrahedra_.neighbours[t][facet];
-                if (next == kNoTetrahedron || !interior_[next]) continue;
-                if (first && labels_[next] == kUnseen) path_.push_back(next);
+                if (next == kNoTetrahedron) continue;
+                if (first && labels_[next] == kUnseen) {
+                    path_.push_back(next);
+                    fetch(&tetrahedra_.neighbours[next]);
+                    fetch(&flow_[next]);
+                }
                 if (labels_[next] >= 0) least = std::min(least, labels_[next]);
             }
             if (path_.size() > depth) continue;
@@ -63,7 +69,6 @@ class Downstream {
 
   private:
     const Tetrahedra& tetrahedra_;
-    const std::vector<std::uint8_t>& interior_;
     const std::vector<std::uint8_t>& flow_;
     std::vector<std::int32_t>& labels_;
     std::vector<std::uint32_t> path_;
@@ -176,7 +181,7 @@ Result<SegmentLabels> stableManifolds(const Tetrahedra& tetrahedra, const std::v
         labels.ofTetrahedron[labels.peaks[i]] = static_cast<std::int32_t>(i);
     }
     std::size_t steps = 0;
-    Downstream downstream(tetrahedra, interior, flow, labels.ofTetrahedron);
+    Downstream downstream(tetrahedra, flow, labels.ofTetrahedron);
     for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
         if (++steps % kStepsBetweenCheckpoints == 0) {
             if (auto go = context.checkpoint(); !go) return fail(go.error());

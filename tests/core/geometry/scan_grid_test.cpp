@@ -6,6 +6,7 @@
 #include <limits>
 
 #include <gtest/gtest.h>
+#include <tbb/task_arena.h>
 
 #include "core/base/random.h"
 #include "core/geometry/decimate.h"
@@ -65,6 +66,25 @@ TEST(ScanGrid, TheOrderOfThePointsLeavesNoTrace) {
     std::sort(turned.begin(), turned.end(),
               [](const Point3& p, const Point3& q) { return length(p) < length(q); });
     EXPECT_TRUE(gridScan(turned, 500).value().value().points == a.points);
+}
+
+// Long enough for three stretches. The last is dense, so that its grid alone is the coarsest.
+TEST(ScanGrid, AnyNumberOfThreadsFindsTheSamePoints) {
+    PointCloud scan = jack(150000);
+    const PointCloud dense = sampleBoundary(makeBox().solid, 300000, 5).value();
+    for (const Point3& p : dense) scan.push_back(0.3 * p);
+    for (const std::size_t target : {std::size_t{500}, std::size_t{20000}}) {
+        const auto in = [&](int threads) {
+            tbb::task_arena arena(threads);
+            return arena.execute([&] { return gridScan(scan, target).value().value(); });
+        };
+        const auto one = in(1);
+        for (const int threads : {2, 3, 7}) {
+            const auto several = in(threads);
+            EXPECT_TRUE(several.points == one.points) << target << " " << threads;
+            EXPECT_TRUE(several.siteOfPoint == one.siteOfPoint) << target << " " << threads;
+        }
+    }
 }
 
 TEST(ScanGrid, FindsAShapeThatIsSmallInItsFrame) {

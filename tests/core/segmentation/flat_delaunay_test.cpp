@@ -49,7 +49,9 @@ std::vector<Corners> byCgal(const PointCloud& points) {
     return tetrahedra;
 }
 
-std::vector<Corners> sorted(std::vector<Corners> tetrahedra) {
+template <typename Vector>
+std::vector<Corners> sorted(const Vector& unsorted) {
+    std::vector<Corners> tetrahedra(unsorted.begin(), unsorted.end());
     for (Corners& corners : tetrahedra) std::sort(corners.begin(), corners.end());
     std::sort(tetrahedra.begin(), tetrahedra.end());
     return tetrahedra;
