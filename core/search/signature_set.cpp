@@ -55,6 +55,16 @@ BlockPtr blockOf(std::vector<Source>::const_iterator begin, std::vector<Source>:
 
 }  // namespace
 
+SignatureSet SignatureSet::ofBlocks(const std::vector<BlockPtr>& blocks) {
+    SignatureSet set;
+    for (const BlockPtr& block : blocks) {
+        if (block->size() == 0) continue;
+        set.size_ += block->size();
+        set.blocks_.push_back(block);
+    }
+    return set;
+}
+
 SignatureSet SignatureSet::with(const std::vector<IndexEntry>& updates,
                                 std::vector<std::int64_t> removedIds) const {
     Updates sorted;

@@ -20,6 +20,10 @@ class SignatureSet {
   public:
     SignatureSet() = default;
 
+    /// Of blocks with rising ids, each block's above those of the one before; empty ones are left out.
+    [[nodiscard]] static SignatureSet ofBlocks(
+        const std::vector<std::shared_ptr<const SignatureBlock>>& blocks);
+
     /// This set with the entries of `updates` inserted or replaced (by id) and those of
     /// `removedIds` left out (unknown ids are ignored). Neither needs an order; an id must
     /// not be in both, nor twice in `updates`.

@@ -23,9 +23,13 @@ static_assert(kSmallestLength == 1.0 / 1024.0, "kSmallestSize is its logarithm")
 
 float logLength(double length) { return static_cast<float>(std::log2(std::max(length, kSmallestLength))); }
 
+// To the nearest integer, halves away from zero, as std::lround, which is a call.
 template <typename Integer>
 Integer nearest(double value, double low, double high) {
-    return static_cast<Integer>(std::lround(std::clamp(value, low, high)));
+    const double clamped = std::clamp(value, low, high);
+    const auto whole = static_cast<std::int32_t>(clamped);
+    const double rest = clamped - whole;  // exact
+    return static_cast<Integer>(whole + static_cast<int>(rest >= 0.5) - static_cast<int>(rest <= -0.5));
 }
 
 Point3 positionOf(const SignaturePoint& point) {
@@ -35,6 +39,7 @@ Point3 positionOf(const SignaturePoint& point) {
 void setFrame(const std::vector<SignaturePoint>& points, Body& body) {
     double total = 0.0;
     for (const SignaturePoint& p : points) total += p.weight;
+    body.centre = {};
     for (const SignaturePoint& p : points) {
         body.centre = body.centre + (p.weight / total) * positionOf(p);
     }
@@ -108,10 +113,15 @@ bool operator==(const Part& a, const Part& b) noexcept {
 
 Body bodyOf(const std::vector<SignaturePoint>& points) {
     Body body;
+    setBody(points, body);
+    return body;
+}
+
+void setBody(const std::vector<SignaturePoint>& points, Body& body) {
     setFrame(points, body);
+    body.parts.clear();
     body.parts.reserve(points.size());
     for (const SignaturePoint& point : points) body.parts.push_back(partOf(point, body));
-    return body;
 }
 
 }  // namespace shapedb

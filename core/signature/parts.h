@@ -59,5 +59,7 @@ struct Body {
 
 /// `points` as in a Signature: at least one, valid. Deterministic.
 [[nodiscard]] Body bodyOf(const std::vector<SignaturePoint>& points);
+/// The same into a body that may hold anything; what it has allocated is used again.
+void setBody(const std::vector<SignaturePoint>& points, Body& body);
 
 }  // namespace shapedb

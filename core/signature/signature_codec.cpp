@@ -136,17 +136,17 @@ Result<void> checkNumbers(const Signature& signature, std::uint16_t version) {
     }
     for (std::size_t i = 0; i < signature.points.size(); ++i) {
         const SignaturePoint& p = signature.points[i];
-        const std::string name = "point " + std::to_string(i);
-        if (!allFinite(p)) return malformed(name + " has a number that is not finite");
-        if (!(p.weight > 0.0f)) return malformed(name + " has no positive weight");
+        const auto name = [i] { return "point " + std::to_string(i); };
+        if (!allFinite(p)) return malformed(name() + " has a number that is not finite");
+        if (!(p.weight > 0.0f)) return malformed(name() + " has no positive weight");
         const double cube = signature.scale * signature.scale * signature.scale;
         if (version != kPointsOnly && p.weight * cube > signature.volume * (1.0 + kShareRounding))
-            return malformed(name + " outweighs the whole volume");
+            return malformed(name() + " outweighs the whole volume");
         if (!(p.volumeShare > 0.0f) || p.volumeShare > 1.0f)
-            return malformed(name + " has a volume share outside (0, 1]");
-        if (!(p.peakRadius > 0.0f)) return malformed(name + " has no positive peak radius");
+            return malformed(name() + " has a volume share outside (0, 1]");
+        if (!(p.peakRadius > 0.0f)) return malformed(name() + " has no positive peak radius");
         if (i > 0 && p.weight > signature.points[i - 1].weight)
-            return malformed(name + " is heavier than the one before");
+            return malformed(name() + " is heavier than the one before");
     }
     if (signature.points.front().position != std::array<float, 3>{}) {
         return malformed("the heaviest point is not at the origin");
@@ -201,6 +201,12 @@ std::string encodeSignature(const Signature& signature) {
 }
 
 Result<Signature> decodeSignature(const std::string& bytes) {
+    Signature signature;
+    if (auto done = decodeSignature(bytes, signature); !done) return fail(done.error());
+    return signature;
+}
+
+Result<void> decodeSignature(const std::string& bytes, Signature& signature) {
     if (bytes.size() < kLeastBytes) {
         return malformed(std::to_string(bytes.size()) + " bytes are too few");
     }
@@ -224,23 +230,27 @@ Result<Signature> decodeSignature(const std::string& bytes) {
     const auto quality = reader.takeUnsigned<std::uint32_t>();
     if (quality > (version == kPointsOnly ? 0u : 255u)) return malformed("reserved bytes are in use");
     try {
-        Signature signature;
         signature.scale = reader.takeDouble();
         signature.origin.x = reader.takeDouble();
         signature.origin.y = reader.takeDouble();
         signature.origin.z = reader.takeDouble();
         signature.volume = reader.takeDouble();
+        signature.points.clear();
+        signature.points.reserve(count);
         for (std::uint16_t i = 0; i < count; ++i) {
             signature.points.push_back(takePoint(reader, version, signature));
         }
         if (auto valid = checkNumbers(signature, version); !valid) return fail(valid.error());
-        if (version != kPointsOnly) {
-            ShapeAttributes& attributes = signature.attributes.emplace();
+        if (version == kPointsOnly) {
+            signature.attributes.reset();
+        } else {
+            if (!signature.attributes) signature.attributes.emplace();
+            ShapeAttributes& attributes = *signature.attributes;
             attributes.quality = static_cast<std::uint8_t>(quality);
             attributes.statistics = takeStatistics(reader, version);
-            attributes.body = bodyOf(signature.points);
+            setBody(signature.points, attributes.body);
         }
-        return signature;
+        return {};
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::kOutOfMemory, "not enough memory to decode a signature");
     }

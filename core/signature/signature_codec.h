@@ -18,5 +18,8 @@ namespace shapedb {
 /// are not stored: they follow from the weights). Errors: kMalformedSignature (too short or long, wrong
 /// magic, unknown version, checksum, a number out of its range: the message says which).
 [[nodiscard]] Result<Signature> decodeSignature(const std::string& bytes);
+/// The same into a signature that may hold anything; what it has allocated is used again. After an error
+/// it holds anything.
+[[nodiscard]] Result<void> decodeSignature(const std::string& bytes, Signature& signature);
 
 }  // namespace shapedb

@@ -15,8 +15,9 @@
 namespace shapedb::index {
 namespace {
 
-/// Rows of one read: large enough to be cheap, small enough to leave the writer its turn.
-constexpr std::size_t kLoadBatch = 2 * SignatureSet::kBlockSize;
+/// Rows of one read, which become a block: large enough to be cheap, small enough to leave the writer its
+/// turn.
+constexpr std::size_t kLoadBatch = SignatureSet::kBlockSize;
 /// One collection is read again while searches go on: they keep the other processors.
 constexpr std::size_t kBatchesWhileServing = 1;
 
@@ -25,18 +26,29 @@ std::size_t batchesOfAllProcessors() {
     return 2 * static_cast<std::size_t>(oneapi::tbb::this_task_arena::max_concurrency());
 }
 
-/// Empty when the signature is damaged; the damage is logged.
-std::optional<IndexEntry> makeEntry(const store::Shape& shape, const std::string& bytes,
-                                    telemetry::Logger& log) {
-    Result<Signature> signature = decodeSignature(bytes);
-    if (!signature) {
-        auto fields = telemetry::fieldsOf(signature.error());
-        fields.push_back({"shape", shape.id});
-        fields.push_back({"key", shape.key});
+/// The entry of a row, into one that may hold anything; false when the signature is damaged, which is
+/// logged.
+bool toEntry(store::IndexRow&& row, IndexEntry& entry, telemetry::Logger& log) {
+    if (const auto decoded = decodeSignature(row.signature.bytes, entry.signature); !decoded) {
+        auto fields = telemetry::fieldsOf(decoded.error());
+        fields.push_back({"shape", row.shapeId});
         log.error("stored signature is damaged: left out of searches until a rebuild", fields);
-        return std::nullopt;
+        return false;
     }
-    return IndexEntry{shape.id, shape.metadata, std::move(*signature)};
+    entry.id = row.shapeId;
+    entry.metadata = std::move(row.metadata);
+    return true;
+}
+
+std::shared_ptr<const SignatureBlock> toBlock(std::vector<store::IndexRow>&& rows, telemetry::Logger& log) {
+    auto block = std::make_shared<SignatureBlock>();
+    block->reserve(rows.size());
+    IndexEntry entry;  // one for all: its memory is used again
+    for (store::IndexRow& row : rows) {
+        if (toEntry(std::move(row), entry, log)) block->append(entry);
+    }
+    block->shrink();
+    return block;
 }
 
 Result<ShapeParameters> parametersOf(const store::Collection& collection) {
@@ -99,8 +111,8 @@ CollectionIndex::~CollectionIndex() = default;
 Result<SignatureSet> CollectionIndex::readSignatures(std::int64_t collectionId, std::size_t batches,
                                                      const RunContext& context) const {
     namespace flow = oneapi::tbb;
-    using Rows = std::shared_ptr<const std::vector<store::IndexRow>>;
-    using Entries = std::shared_ptr<std::vector<IndexEntry>>;
+    using Rows = std::shared_ptr<std::vector<store::IndexRow>>;
+    using Block = std::shared_ptr<const SignatureBlock>;
     std::optional<Error> failure;
     std::int64_t afterId = 0;
     bool last = false;
@@ -118,26 +130,18 @@ Result<SignatureSet> CollectionIndex::readSignatures(std::int64_t collectionId, 
         auto rows = store_.loadIndex(collectionId, afterId, kLoadBatch);
         if (!rows) return stop(rows.error());
         last = rows->size() < kLoadBatch;
-        if (!rows->empty()) afterId = rows->back().shape.id;
-        return std::make_shared<const std::vector<store::IndexRow>>(std::move(*rows));
+        if (!rows->empty()) afterId = rows->back().shapeId;
+        return std::make_shared<std::vector<store::IndexRow>>(std::move(*rows));
     };
-    const auto decodeBatch = [&](const Rows& rows) {
-        auto decoded = std::make_shared<std::vector<IndexEntry>>();
-        decoded->reserve(rows->size());
-        for (const store::IndexRow& row : *rows) {
-            if (auto entry = makeEntry(row.shape, row.signature.bytes, *log_))
-                decoded->push_back(std::move(*entry));
-        }
-        return decoded;
-    };
-    SignatureSet signatures;
-    const auto append = [&](const Entries& decoded) { signatures = signatures.with(*decoded, {}); };
+    const auto decodeBatch = [&](const Rows& rows) { return toBlock(std::move(*rows), *log_); };
+    std::vector<Block> blocks;
+    const auto append = [&](const Block& block) { blocks.push_back(block); };
     flow::parallel_pipeline(batches,
                             flow::make_filter<void, Rows>(flow::filter_mode::serial_in_order, readBatch) &
-                                flow::make_filter<Rows, Entries>(flow::filter_mode::parallel, decodeBatch) &
-                                flow::make_filter<Entries, void>(flow::filter_mode::serial_in_order, append));
+                                flow::make_filter<Rows, Block>(flow::filter_mode::parallel, decodeBatch) &
+                                flow::make_filter<Block, void>(flow::filter_mode::serial_in_order, append));
     if (failure) return fail(*failure);
-    return signatures;
+    return SignatureSet::ofBlocks(blocks);
 }
 
 Result<SnapshotPtr> CollectionIndex::read(const store::Collection& collection, std::size_t batches,
@@ -264,9 +268,9 @@ Result<void> CollectionIndex::applyDirty(Slot& slot) {
         }
         // Of another generation: a switch is being completed, and its reload brings this shape.
         if (row && row->generation != before->collection.generation) continue;
-        auto entry = row ? makeEntry(*shape, row->bytes, *log_) : std::nullopt;
-        if (entry) {
-            updates.push_back(std::move(*entry));
+        IndexEntry entry;
+        if (row && toEntry({id, shape->metadata, std::move(*row)}, entry, *log_)) {
+            updates.push_back(std::move(entry));
         } else {
             removed.push_back(id);
         }

@@ -20,7 +20,7 @@ constexpr char kAllPoints[] =
     "SELECT s.key, s.point_count, s.checksum, p.points, p.point_bytes, p.stored_bytes FROM shape s "
     "LEFT JOIN shape_points p ON p.shape_id = s.id ORDER BY s.id";
 constexpr char kAllSignatures[] =
-    "SELECT s.key, g.points_version, g.generation, g.digest, g.bytes, s.id FROM signature g "
+    "SELECT g.shape_id, g.points_version, g.generation, g.digest, g.bytes FROM signature g "
     "JOIN shape s ON s.id = g.shape_id";
 constexpr char kShapesTotal[] = "SELECT count(*) FROM shape";
 
@@ -140,7 +140,7 @@ class Checker {
         while (query.step()) {
             orRaise(context_.checkpoint());
             try {
-                readSignature(query, 1, query.integer(5), query.text(0));
+                readSignature(connection_, query, 1, query.integer(0));
             } catch (const Failure& failure) {
                 if (failure.fromSqlite) throw;
                 add(failure.error.message);

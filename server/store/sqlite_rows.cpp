@@ -105,7 +105,7 @@ std::int64_t signatureDigest(const std::string& bytes) {
     return static_cast<std::int64_t>(value);
 }
 
-SignatureRow readSignature(const Query& query, int column, std::int64_t shapeId, const std::string& key) {
+SignatureRow readSignature(Connection& connection, const Query& query, int column, std::int64_t shapeId) {
     SignatureRow row;
     row.shapeId = shapeId;
     row.pointsVersion = query.integer(column);
@@ -113,8 +113,9 @@ SignatureRow readSignature(const Query& query, int column, std::int64_t shapeId,
     const BlobView blob = query.blob(column + 3);
     row.bytes.assign(static_cast<const char*>(blob.size > 0 ? blob.data : ""), blob.size);
     if (signatureDigest(row.bytes) != query.integer(column + 2)) {
+        const auto shape = findShapeById(connection, shapeId);
         raise(ErrorCode::kDataLoss,
-              "the stored signature of shape " + quoted(key) +
+              "the stored signature of shape " + (shape ? quoted(shape->key) : std::to_string(shapeId)) +
                   " is damaged; restore a backup, or delete the shape and add it again");
     }
     return row;

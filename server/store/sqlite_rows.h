@@ -13,35 +13,26 @@ namespace shapedb::store {
 // Columns of SHAPEDB_SHAPE_COLUMNS.
 inline constexpr int kColumnMetadataName = 12;
 inline constexpr int kColumnMetadataValue = 13;
-inline constexpr int kColumnAfterShape = 14;
 
 /// Columns 0 to 11 of the current row; metadata stays empty. Throws Failure kDataLoss for
 /// values no writer of ours leaves.
 Shape readShape(const Query& query);
 
-/// Groups the rows of a SHAPEDB_SHAPE_COLUMNS statement into shapes. `readExtra(query)` is
-/// called on the first row of each shape; `visit(shape, extra)` on the complete shape;
-/// returning false ends the walk.
-template <typename ReadExtra, typename Visit>
-void forEachShape(Query& query, ReadExtra readExtra, Visit visit) {
+/// Groups the rows of a SHAPEDB_SHAPE_COLUMNS statement into shapes: `visit(shape)` is called on each
+/// complete shape; returning false ends the walk.
+template <typename Visit>
+void forEachShape(Query& query, Visit visit) {
     bool more = query.step();
     while (more) {
         Shape shape = readShape(query);
-        auto extra = readExtra(query);
         do {
             if (!query.isNull(kColumnMetadataName)) {
                 shape.metadata.emplace(query.text(kColumnMetadataName), query.text(kColumnMetadataValue));
             }
             more = query.step();
         } while (more && query.integer(0) == shape.id);
-        if (!visit(std::move(shape), std::move(extra))) return;
+        if (!visit(std::move(shape))) return;
     }
-}
-
-template <typename Visit>
-void forEachShape(Query& query, Visit visit) {
-    forEachShape(
-        query, [](const Query&) { return 0; }, [&](Shape&& shape, int) { return visit(std::move(shape)); });
 }
 
 std::optional<Shape> findShape(Connection& connection, std::int64_t collectionId, const std::string& key);
@@ -52,8 +43,8 @@ std::optional<Collection> findCollection(Connection& connection, const std::stri
 Collection readCollection(const Query& query);
 
 /// Reads points_version, generation, digest, bytes from `column` on and compares the digest.
-/// Throws Failure kDataLoss; `key` is for its message.
-SignatureRow readSignature(const Query& query, int column, std::int64_t shapeId, const std::string& key);
+/// Throws Failure kDataLoss, which names the shape.
+SignatureRow readSignature(Connection& connection, const Query& query, int column, std::int64_t shapeId);
 
 /// What column signature.digest holds: the first eight bytes of the SHA-256, little-endian.
 /// Persisted.

@@ -1,4 +1,6 @@
 // Shapes, their points and the signatures that serve.
+#include <algorithm>
+
 #include "server/common/sha256.h"
 #include "server/store/point_blob.h"
 #include "server/store/sqlite_rows.h"
@@ -7,6 +9,9 @@
 namespace shapedb::store {
 
 namespace {
+
+// A caller may ask for all there is.
+constexpr std::size_t kMostReserved = 4096;
 
 [[noreturn]] void raiseNoShape(std::int64_t shapeId) {
     raise(ErrorCode::kNotFound, "there is no shape with id " + std::to_string(shapeId));
@@ -242,14 +247,13 @@ Result<SignatureRow> SqliteStore::getSignature(std::int64_t shapeId) {
     return read("read the signature", [&](Connection& connection) {
         Query query(connection, sql::kServingSignature, shapeId);
         if (!query.step()) raiseNoShape(shapeId);
-        const std::string key = query.text(0);
         if (query.isNull(3)) {
             const bool failed = query.integer(1) == static_cast<int>(ShapeState::kFailed);
-            raise(ErrorCode::kNotReady, "shape " + quoted(key) +
+            raise(ErrorCode::kNotReady, "shape " + quoted(query.text(0)) +
                                             (failed ? " could not be segmented: " + query.text(2)
                                                     : " has no signature yet; its job is queued"));
         }
-        return readSignature(query, 3, shapeId, key);
+        return readSignature(connection, query, 3, shapeId);
     });
 }
 
@@ -260,15 +264,16 @@ Result<std::vector<IndexRow>> SqliteStore::loadIndex(std::int64_t collectionId, 
         if (limit == 0) return rows;
         const Collection collection = requireCollection(connection, collectionId);
         Query query(connection, sql::kLoadIndex, collectionId, afterId, collection.generation);
-        forEachShape(
-            query,
-            [](const Query& row) {
-                return readSignature(row, kColumnAfterShape, row.integer(0), row.text(2));
-            },
-            [&](Shape&& shape, SignatureRow&& signature) {
-                rows.push_back({std::move(shape), std::move(signature)});
-                return rows.size() < limit;
-            });
+        rows.reserve(std::min(limit, kMostReserved));
+        for (bool more = query.step(); more && rows.size() < limit;) {
+            IndexRow& row = rows.emplace_back();
+            row.shapeId = query.integer(0);
+            row.signature = readSignature(connection, query, 3, row.shapeId);
+            do {
+                if (!query.isNull(1)) row.metadata.emplace(query.text(1), query.text(2));
+                more = query.step();
+            } while (more && query.integer(0) == row.shapeId);
+        }
         return rows;
     });
 }

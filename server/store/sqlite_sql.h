@@ -72,8 +72,9 @@ inline constexpr char kDeleteSignatures[] = "DELETE FROM signature WHERE shape_i
 inline constexpr char kDeleteSignature[] = "DELETE FROM signature WHERE shape_id = ?1 AND generation = ?2";
 inline constexpr char kDeleteOtherSignatures[] =
     "DELETE FROM signature WHERE shape_id = ?1 AND generation <> ?2";
-inline constexpr char kLoadIndex[] = "SELECT " SHAPEDB_SHAPE_COLUMNS
-                                     ", g.points_version, g.generation, g.digest, g.bytes FROM shape s "
+// Of shape nothing but its id, which the index by collection has: a million look-ups less.
+inline constexpr char kLoadIndex[] = "SELECT s.id, m.name, m.value, g.points_version, g.generation, g.digest, "
+                                     "g.bytes FROM shape s "
                                      "JOIN signature g ON g.shape_id = s.id AND g.generation = ?3 LEFT JOIN "
                                      "shape_metadata m ON m.shape_id = s.id "
                                      "WHERE s.collection_id = ?1 AND s.id > ?2 ORDER BY s.id";

@@ -136,7 +136,8 @@ struct SignatureRow {
 
 /// What the cache needs of one shape.
 struct IndexRow {
-    Shape shape;
+    std::int64_t shapeId = 0;
+    Metadata metadata;
     SignatureRow signature;
 };
 

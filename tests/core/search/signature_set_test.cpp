@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <map>
+#include <memory>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -129,6 +131,32 @@ TEST(SignatureSet, BehavesAsAMapUnderRandomChanges) {
         for (const auto& [snapshot, then] : kept) expectHolds(snapshot, then);
         EXPECT_GT(model.size(), 5000u);
     }
+}
+
+TEST(SignatureSet, OfBlocksIsASetLikeAnyOther) {
+    Model model;
+    std::vector<std::shared_ptr<const SignatureBlock>> blocks;
+    std::int64_t id = 0;
+    for (const std::size_t rows : {1000U, 0U, 1U, 1024U}) {
+        auto block = std::make_shared<SignatureBlock>();
+        for (std::size_t i = 0; i < rows; ++i) {
+            id += 2;
+            block->append(entryOf(id));
+            model[id] = 1;
+        }
+        blocks.push_back(block);
+    }
+    SignatureSet set = SignatureSet::ofBlocks(blocks);
+    expectHolds(set, model);
+    Random random(4);
+    expectFinds(set, model, random, id);
+    set = set.with({entryOf(3, 7), entryOf(id + 1, 8)}, {2, 2002});
+    model[3] = 7;
+    model[id + 1] = 8;
+    model.erase(2);
+    model.erase(2002);
+    expectHolds(set, model);
+    EXPECT_EQ(SignatureSet::ofBlocks({}).size(), 0U);
 }
 
 TEST(SignatureSet, IsEmptyAtFirstAndAgain) {

@@ -82,6 +82,25 @@ TEST(Parts, PackingLosesNothing) {
 }
 
 // In the frame the moments of all matter are diagonal and fall.
+TEST(Parts, PackingRoundsToTheNearestHalvesAwayFromZero) {
+    Part part;
+    part.share = 0.5f;
+    const auto step = [&](float position) {
+        part.position = {position, -position, 0.0f};
+        const PackedPart result = packed(part);
+        EXPECT_EQ(result.position[1], -result.position[0]) << position;
+        return static_cast<long>(result.position[0]);
+    };
+    for (long i = 0; i < 32767; ++i) {
+        // Half a step, and the numbers next to it.
+        const float half = static_cast<float>((static_cast<double>(i) + 0.5) / kPositionSteps);
+        for (const float p : {half, std::nextafter(half, 0.0f), std::nextafter(half, 9.0f)}) {
+            ASSERT_EQ(step(p), std::lround(static_cast<double>(p) * kPositionSteps)) << p;
+        }
+    }
+    EXPECT_EQ(step(100.0f), 32767);
+}
+
 TEST(Parts, FrameLiesAlongThePrincipalAxes) {
     Random random(2);
     for (int round = 0; round < 200; ++round) {

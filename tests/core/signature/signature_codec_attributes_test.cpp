@@ -165,6 +165,29 @@ TEST(SignatureCodecAttributes, DecodeIsTheInverse) {
     }
 }
 
+// A server decodes a million of them into one.
+TEST(SignatureCodecAttributes, WhatASignatureHeldBeforeLeavesNoTrace) {
+    Random random(12);
+    Signature used;
+    for (int i = 0; i < 60; ++i) {
+        Signature signature = randomAttributed(random, 1 + random.below(kMaxSignaturePoints));
+        if (i % 3 == 1) signature.attributes.reset();
+        const std::string bytes = encodeSignature(signature);
+        if (i % 5 == 4) {
+            EXPECT_FALSE(decodeSignature(withChecksum(bytes.substr(0, bytes.size() - 1)), used));
+        }
+        ASSERT_TRUE(decodeSignature(bytes, used));
+        const Signature fresh = decodeSignature(bytes).value();
+        EXPECT_EQ(encodeSignature(used), bytes);
+        EXPECT_EQ(used.attributes.has_value(), fresh.attributes.has_value());
+        if (!fresh.attributes) continue;
+        const Body& body = used.attributes->body;
+        EXPECT_EQ(body.parts, fresh.attributes->body.parts);
+        EXPECT_EQ(body.centre, fresh.attributes->body.centre);
+        EXPECT_EQ(body.axes, fresh.attributes->body.axes);
+    }
+}
+
 TEST(SignatureCodecAttributes, DamageIsNoticed) {
     Random random(2);
     const std::string bytes = encodeSignature(randomAttributed(random, 3));

@@ -42,9 +42,9 @@ class Index : public ::testing::Test {
         const SnapshotPtr now = snapshot();
         EXPECT_EQ(now->signatures.size(), rows.size());
         for (const store::IndexRow& row : rows) {
-            const auto place = now->signatures.find(row.shape.id);
-            ASSERT_TRUE(place) << row.shape.key;
-            EXPECT_EQ(place.block->metadata(place.row), row.shape.metadata);
+            const auto place = now->signatures.find(row.shapeId);
+            ASSERT_TRUE(place) << row.shapeId;
+            EXPECT_EQ(place.block->metadata(place.row), row.metadata);
             Signature cached;
             place.block->scored(place.row, cached);
             EXPECT_TRUE(sameShape(cached, decodeSignature(row.signature.bytes).value()));

@@ -29,9 +29,11 @@ TEST(BulkFill, MakesASoundDatabaseOfReadyShapes) {
     const auto rows = (*store)->loadIndex(collection->id, 0, 100);
     ASSERT_TRUE(rows);
     ASSERT_EQ(rows->size(), 25U);
-    EXPECT_EQ(rows->back().shape.key, "shape-24");
-    EXPECT_EQ(rows->back().shape.state, ShapeState::kReady);
-    EXPECT_EQ(rows->back().shape.metadata, (Metadata{{"family", "mug"}}));
+    const auto last = (*store)->getShapeById(rows->back().shapeId);
+    ASSERT_TRUE(last);
+    EXPECT_EQ(last->key, "shape-24");
+    EXPECT_EQ(last->state, ShapeState::kReady);
+    EXPECT_EQ(rows->back().metadata, (Metadata{{"family", "mug"}}));
     EXPECT_EQ(rows->back().signature.bytes, "signature 24");
     EXPECT_EQ((*store)->queueDepth()->jobs, 0U);
     const auto problems = (*store)->check({});

@@ -277,7 +277,7 @@ class ModelTest : public StoreTest, public ::testing::WithParamInterface<int> {
         std::size_t serving = 0;
         std::map<std::int64_t, SignatureRow> index;
         const auto rows = store_->loadIndex(collection_.id, 0, 1000).value();
-        for (const IndexRow& row : rows) index[row.shape.id] = row.signature;
+        for (const IndexRow& row : rows) index[row.shapeId] = row.signature;
         for (const Shape& shape : listed) {
             const ModelShape& model = model_.at(shape.key);
             EXPECT_TRUE(shape == model.shape) << shape.key;

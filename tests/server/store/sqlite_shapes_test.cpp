@@ -101,7 +101,7 @@ TEST_F(SqliteShapesTest, OtherPointsServeTheOldSignatureUntilTheJobEnds) {
     const auto rows = store_->loadIndex(c.id, 0, 10).value();
     ASSERT_EQ(rows.size(), 1u);
     EXPECT_EQ(rows[0].signature.pointsVersion, 1);
-    EXPECT_EQ(rows[0].shape.pointsVersion, 2);
+    EXPECT_EQ(store_->getShapeById(rows[0].shapeId)->pointsVersion, 2);
     put(c.id, "cup", 3);
     EXPECT_EQ(store_->queueDepth()->jobs, 1u) << "the job of the second points is replaced";
     finishAll();
@@ -260,11 +260,11 @@ TEST_F(SqliteShapesTest, IndexPages) {
     while (true) {
         const auto rows = store_->loadIndex(c.id, after, 3).value();
         for (const IndexRow& row : rows) {
-            EXPECT_EQ(row.signature.bytes, signatureFor(row.shape.id, 1, 1).bytes);
-            EXPECT_EQ(row.signature.shapeId, row.shape.id);
-            EXPECT_EQ("k" + row.shape.metadata.at("n"), row.shape.key);
-            EXPECT_EQ(row.shape.metadata.size(), 2u);
-            after = row.shape.id;
+            EXPECT_EQ(row.signature.bytes, signatureFor(row.shapeId, 1, 1).bytes);
+            EXPECT_EQ(row.signature.shapeId, row.shapeId);
+            EXPECT_EQ("k" + row.metadata.at("n"), store_->getShapeById(row.shapeId)->key);
+            EXPECT_EQ(row.metadata.size(), 2u);
+            after = row.shapeId;
         }
         total += rows.size();
         if (rows.size() < 3) break;

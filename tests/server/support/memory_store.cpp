@@ -300,7 +300,7 @@ Result<std::vector<IndexRow>> MemoryStore::loadIndex(std::int64_t collectionId, 
             const Shape& shape = content_.shapes.at(at->first);
             if (shape.collectionId != collectionId || at->second.generation != collection->second.generation)
                 continue;
-            rows.push_back({shape, at->second});
+            rows.push_back({shape.id, shape.metadata, at->second});
         }
         return rows;
     });
