@@ -24,8 +24,9 @@ struct GriddedScan {
 /// a point that repeats another counts as often as it comes, and points are first gathered in small cells
 /// (at most eight times `target` of them) that go to the cell of the grid their mean lies in.
 ///
-/// The sums are exact, so the order of the points leaves no trace. Memory besides the result: about 100
-/// bytes for each small cell, whatever the size of the scan. Time linear in the scan.
+/// The sums are exact, so the order of the points leaves no trace, nor does the number of threads (those of
+/// the caller's arena). Memory besides the result: about 100 bytes for each small cell, for every thread,
+/// whatever the size of the scan. Time linear in the scan.
 ///
 /// Nothing when the scan occupies so few cells that its distinct points may be fewer than `target`: then
 /// use `sanitise`. Errors: those of `sanitise` (flatness is judged by the small cells' means); kCancelled,

@@ -28,6 +28,7 @@ void sortByFallingRadius(const Tetrahedra& tetrahedra, std::vector<std::uint32_t
 constexpr std::int32_t kUnseen = -2;
 constexpr std::int32_t kOnPath = -3;  // flow has no cycles; if it had, the way would end where it closes
 constexpr std::int32_t kNoMaximum = -1;
+constexpr std::int32_t kInLayer = -4;  // of growing: gets its label with the layer it waits in
 
 // Gives a tetrahedron the label of the strongest maximum that it flows into, directly or not: the least
 // label of the two it may flow into, found before its own. What is left by maxima that claim what flows
@@ -111,12 +112,12 @@ Result<void> growIntoLeftovers(const Tetrahedra& tetrahedra, const std::vector<s
         std::vector<std::uint32_t> following;
         for (const std::uint32_t t : layer) {
             for (const std::uint32_t next : tetrahedra.neighbours[t]) {
-                if (next == kNoTetrahedron || !interior[next] || labels.ofTetrahedron[next] >= 0) continue;
+                if (next == kNoTetrahedron || !interior[next]) continue;
+                if (labels.ofTetrahedron[next] != kNoMaximum) continue;
+                labels.ofTetrahedron[next] = kInLayer;
                 following.push_back(next);
             }
         }
-        std::sort(following.begin(), following.end());
-        following.erase(std::unique(following.begin(), following.end()), following.end());
         layer = std::move(following);
     }
     return {};
@@ -125,6 +126,8 @@ Result<void> growIntoLeftovers(const Tetrahedra& tetrahedra, const std::vector<s
 // Tetrahedra in reach of no maximum: one segment per connected group, around its largest ball.
 void labelIslands(const Tetrahedra& tetrahedra, const std::vector<std::uint8_t>& interior,
                   std::vector<std::uint32_t> leftovers, SegmentLabels& labels) {
+    const auto labelled = [&](std::uint32_t t) { return labels.ofTetrahedron[t] >= 0; };
+    leftovers.erase(std::remove_if(leftovers.begin(), leftovers.end(), labelled), leftovers.end());
     sortByFallingRadius(tetrahedra, leftovers);
     for (const std::uint32_t seed : leftovers) {
         if (labels.ofTetrahedron[seed] >= 0) continue;
