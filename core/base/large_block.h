@@ -3,22 +3,32 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdlib>
 #include <memory>
 #include <new>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
-#if defined(__linux__)
-#include <sys/mman.h>
-#endif
-
 namespace shapedb {
+
+namespace large_block {
+
+/// Blocks from here on come straight from the system and go back to it at once, smaller ones from the heap.
+constexpr std::size_t kLeastMapped = std::size_t{1} << 20;
+/// From here on large pages are asked for; in less memory the rest of the last one would show.
+constexpr std::size_t kLeastOnLargePages = std::size_t{1} << 26;
+
+/// Null when there is no such memory. Aligned to 64 bytes at least. On any thread.
+[[nodiscard]] void* take(std::size_t bytes) noexcept;
+/// What take gave for as many bytes.
+void give(void* block, std::size_t bytes) noexcept;
+
+}  // namespace large_block
 
 /// Releases what allocateLarge gave.
 struct FreeLarge {
-    void operator()(void* block) const noexcept { std::free(block); }
+    std::size_t bytes = 0;
+    void operator()(void* block) const noexcept { large_block::give(block, bytes); }
 };
 
 template <typename T>
@@ -29,16 +39,12 @@ using LargeBlock = std::unique_ptr<T[], FreeLarge>;
 template <typename T>
 [[nodiscard]] LargeBlock<T> allocateLarge(std::size_t count) {
     static_assert(std::is_trivially_copyable_v<T> && std::is_trivially_destructible_v<T>);
-    constexpr std::size_t kLargePage = std::size_t{1} << 21;
-    constexpr std::size_t kSmallPage = std::size_t{1} << 12;
-    const std::size_t page = count * sizeof(T) >= kLargePage ? kLargePage : kSmallPage;
-    const std::size_t bytes = (count * sizeof(T) / page + 1) * page;
-    void* block = std::aligned_alloc(page, bytes);
+    static_assert(alignof(T) <= 64);
+    if (count > static_cast<std::size_t>(-1) / 2 / sizeof(T)) throw std::bad_alloc();
+    const std::size_t bytes = count * sizeof(T);
+    void* block = large_block::take(bytes);
     if (block == nullptr) throw std::bad_alloc();
-#if defined(__linux__)
-    if (page == kLargePage) static_cast<void>(madvise(block, bytes, MADV_HUGEPAGE));  // a wish, no more
-#endif
-    return LargeBlock<T>(static_cast<T*>(block));
+    return LargeBlock<T>(static_cast<T*>(block), FreeLarge{bytes});
 }
 
 /// Such memory for vectors. What resize() adds is not written: it holds anything until it is assigned.
@@ -51,7 +57,7 @@ struct LargeAllocator {
     LargeAllocator(const LargeAllocator<U>&) noexcept {}  // NOLINT: allocators convert
 
     T* allocate(std::size_t count) { return allocateLarge<T>(count).release(); }
-    void deallocate(T* block, std::size_t) noexcept { FreeLarge()(block); }
+    void deallocate(T* block, std::size_t count) noexcept { FreeLarge{count * sizeof(T)}(block); }
 
     template <typename U>
     void construct(U* at) noexcept(std::is_nothrow_default_constructible_v<U>) {

@@ -192,6 +192,7 @@ Result<Tetrahedra> triangulateOrThrow(const PointCloud& points, const RunContext
             }
             return fail(done.error());
         }
+        sites = {};
         auto flattened = flatten(cells, order, context);
         if (!flattened) return flattened;
         flat = std::move(*flattened);
