@@ -73,11 +73,12 @@ inline constexpr char kDeleteSignature[] = "DELETE FROM signature WHERE shape_id
 inline constexpr char kDeleteOtherSignatures[] =
     "DELETE FROM signature WHERE shape_id = ?1 AND generation <> ?2";
 // Of shape nothing but its id, which the index by collection has: a million look-ups less.
-inline constexpr char kLoadIndex[] = "SELECT s.id, m.name, m.value, g.points_version, g.generation, g.digest, "
-                                     "g.bytes FROM shape s "
-                                     "JOIN signature g ON g.shape_id = s.id AND g.generation = ?3 LEFT JOIN "
-                                     "shape_metadata m ON m.shape_id = s.id "
-                                     "WHERE s.collection_id = ?1 AND s.id > ?2 ORDER BY s.id";
+inline constexpr char kLoadIndex[] =
+    "SELECT s.id, m.name, m.value, g.points_version, g.generation, g.digest, "
+    "g.bytes FROM shape s "
+    "JOIN signature g ON g.shape_id = s.id AND g.generation = ?3 LEFT JOIN "
+    "shape_metadata m ON m.shape_id = s.id "
+    "WHERE s.collection_id = ?1 AND s.id > ?2 ORDER BY s.id";
 
 // Jobs.
 inline constexpr char kNextJob[] =
