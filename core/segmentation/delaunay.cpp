@@ -83,7 +83,7 @@ constexpr std::size_t kBlock = 8192;
 
 // The finite cells, made canonical, by their corners. The places of cells in the store, which depend on
 // the threads, leave no trace.
-Result<std::vector<std::uint32_t>> sortedCells(CellStore& cells, std::size_t siteCount,
+Result<LargeVector<std::uint32_t>> sortedCells(CellStore& cells, std::size_t siteCount,
                                                const RunContext& context) {
     auto done = forEachRange(cells.used(), kBlock, context, [&](std::size_t from, std::size_t to) {
         for (std::size_t c = from; c < to; ++c) {
@@ -97,7 +97,7 @@ Result<std::vector<std::uint32_t>> sortedCells(CellStore& cells, std::size_t sit
         if (isFinite(cells[c].vertices)) ++begin[cells[c].vertices[0] + 2];
     }
     std::partial_sum(begin.begin(), begin.end(), begin.begin());
-    std::vector<std::uint32_t> sorted(begin.back());
+    LargeVector<std::uint32_t> sorted(begin.back());
     for (std::uint32_t c = 0; c < cells.used(); ++c) {
         if (isFinite(cells[c].vertices)) sorted[begin[cells[c].vertices[0] + 1]++] = c;
     }
@@ -124,8 +124,8 @@ Result<Tetrahedra> flatten(CellStore& cells, const std::vector<std::uint32_t>& o
                            const RunContext& context) {
     const auto sorted = sortedCells(cells, order.size(), context);
     if (!sorted) return fail(sorted.error());
-    const std::vector<std::uint32_t>& cellOf = *sorted;
-    std::vector<std::uint32_t> place(cells.used(), kNoTetrahedron);
+    const LargeVector<std::uint32_t>& cellOf = *sorted;
+    LargeVector<std::uint32_t> place(cells.used(), kNoTetrahedron);
     auto done = forEachRange(cellOf.size(), kBlock, context, [&](std::size_t from, std::size_t to) {
         for (std::size_t t = from; t < to; ++t) place[cellOf[t]] = static_cast<std::uint32_t>(t);
     });

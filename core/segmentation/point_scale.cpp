@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <limits>
 
+#include "core/base/large_block.h"
+
 namespace shapedb {
 
 namespace {
@@ -46,7 +48,7 @@ struct Nearest {
     }
 };
 
-using Kept = std::vector<Nearest<kKept>>;
+using Kept = LargeVector<Nearest<kKept>>;
 
 // The edges of a tetrahedron, by corners, and the two other corners.
 constexpr std::array<std::array<std::size_t, 4>, 6> kEdges = {

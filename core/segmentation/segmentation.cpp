@@ -112,7 +112,7 @@ void describeContacts(const std::vector<std::int32_t>& rank, const Frame& frame,
 
 // Fills result.segments by falling volume and result.tetrahedronSegment to match. Segments
 // whose tetrahedra are all flat to the last digit have no volume and are left out.
-void describeSegments(const PointCloud& points, const SegmentLabels& labels, const Frame& frame,
+void describeSegments(const PointCloud& points, SegmentLabels labels, const Frame& frame,
                       Segmentation& result) {
     std::vector<Moments> moments(labels.peaks.size());
     for (std::size_t t = 0; t < result.tetrahedra.size(); ++t) {
@@ -138,9 +138,9 @@ void describeSegments(const PointCloud& points, const SegmentLabels& labels, con
         result.segments.push_back(toSegment(moments[s], labels.peaks[s], result.tetrahedra, frame));
         result.volume += result.segments.back().volume;
     }
-    result.tetrahedronSegment.reserve(labels.ofTetrahedron.size());
-    for (const std::int32_t segment : labels.ofTetrahedron) {
-        result.tetrahedronSegment.push_back(segment < 0 ? -1 : rank[static_cast<std::size_t>(segment)]);
+    result.tetrahedronSegment = std::move(labels.ofTetrahedron);
+    for (std::int32_t& segment : result.tetrahedronSegment) {
+        if (segment >= 0) segment = rank[static_cast<std::size_t>(segment)];
     }
     describeContacts(rank, frame, result);
 }
@@ -263,10 +263,10 @@ Result<Segmentation> segmentOrThrow(const PointCloud& points, const Segmentation
     result.tetrahedra = std::move(*tetrahedra);
     clock.end();
     result.delaunaySeconds = clock.lastSeconds();
-    const auto labels = findSegments(prepared->sites, options, context, clock, result);
+    auto labels = findSegments(prepared->sites, options, context, clock, result);
     if (!labels) return fail(labels.error());
     if (auto go = clock.begin("describe"); !go) return fail(go.error());
-    describeSegments(prepared->sites, *labels, prepared->frame, result);
+    describeSegments(prepared->sites, std::move(*labels), prepared->frame, result);
     if (result.segments.empty()) {
         return fail(ErrorCode::kNoInterior,
                     "no closed interior: the surface is open, too noisy or too thin for its sampling (" +
