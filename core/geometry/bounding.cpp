@@ -85,30 +85,27 @@ Extent extentOf(const Points& points, const Matrix3& axes) {
     return extent;
 }
 
-// Tells whether boxes around points are smaller than a limit, most often by few of the points: those that
-// touched boxes before.
+// Boxes around points, of which only those below a limit matter: most others are ruled out by a few of the
+// points, those that touched boxes before.
 class BoxTrial {
   public:
     explicit BoxTrial(const PointCloud& points) : points_(points) { known_.fill(points.front()); }
 
-    // Whether the squared diagonal is below the limit, and then what it is. Fewer points never give more,
-    // with rounding neither.
-    bool below(const Matrix3& axes, double limit, double& squaredDiagonal) {
-        if (extentOf(known_, axes).squaredDiagonal() >= limit) return false;
+    // The squared diagonal, or less but not below the limit. Fewer points never give more, with rounding
+    // neither.
+    double squaredDiagonal(const Matrix3& axes, double limit) {
+        const double least = extentOf(known_, axes).squaredDiagonal();
+        if (least >= limit) return least;
         const Extent extent = extentOf(points_, axes);
         for (const Point3& p : extent.touching) remember(p);
-        squaredDiagonal = extent.squaredDiagonal();
-        return squaredDiagonal < limit;
+        return extent.squaredDiagonal();
     }
 
   private:
     static constexpr std::size_t kKnown = 24;
 
     void remember(const Point3& p) {
-        for (const Point3& known : known_) {
-            if (known.x == p.x && known.y == p.y && known.z == p.z) return;
-        }
-        known_[next_++ % kKnown] = p;
+        if (std::find(known_.begin(), known_.end(), p) == known_.end()) known_[next_++ % kKnown] = p;
     }
 
     const PointCloud& points_;
@@ -169,8 +166,8 @@ Box descend(const PointCloud& points, Box box, double firstStep, double lastStep
     for (double step = firstStep; step > lastStep; step *= 0.5) {
         for (int failures = 0; failures < kTriesPerStep;) {
             const Matrix3 candidate = turned(box.axes, randomDirection(random), step * random.uniform());
-            double value = 0.0;
-            if (trial.below(candidate, box.squaredDiagonal, value)) {
+            const double value = trial.squaredDiagonal(candidate, box.squaredDiagonal);
+            if (value < box.squaredDiagonal) {
                 box = {value, candidate};
                 failures = 0;
             } else {

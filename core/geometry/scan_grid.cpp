@@ -7,9 +7,6 @@
 #include <string>
 #include <utility>
 
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
-
 #include "core/base/fetch.h"
 #include "core/base/parallel.h"
 #include "core/geometry/decimate.h"
@@ -100,13 +97,7 @@ class Grid {
     }
     // Adds the cells of another grid as fine as this one. Returns their numbers here.
     std::vector<std::uint32_t> add(const Grid& other) {
-        std::vector<std::uint32_t> renumbered;
-        renumbered.reserve(other.cells_.size());
-        for (const GridCell& cell : other.cells_) {
-            renumbered.push_back(find(cell.key));
-            cells_[renumbered.back()].sum.add(cell.sum);
-        }
-        return renumbered;
+        return add(other.cells_, [](std::uint64_t key) { return key; });
     }
     int bits() const { return bits_; }
     bool isFull() const { return cells_.size() > limit_; }
@@ -122,13 +113,7 @@ class Grid {
         std::fill(slots_.begin(), slots_.end(), Slot{});
         constexpr std::uint64_t kOneAxis = (std::uint64_t{1} << 20) - 1;
         constexpr std::uint64_t kHalves = kOneAxis << 42 | kOneAxis << 21 | kOneAxis;
-        std::vector<std::uint32_t> renumbered;
-        renumbered.reserve(finer.size());
-        for (const GridCell& cell : finer) {
-            renumbered.push_back(find(cell.key >> 1 & kHalves));
-            cells_[renumbered.back()].sum.add(cell.sum);
-        }
-        return renumbered;
+        return add(finer, [](std::uint64_t key) { return key >> 1 & kHalves; });
     }
 
     // Orders the cells by their keys, which no order of points decides. Returns their new numbers.
@@ -154,19 +139,32 @@ class Grid {
         std::uint32_t cell = kFree;
     };
 
+    // Adds cells whose keys are those of this grid after `keyHere`. Returns their numbers here.
+    template <typename KeyHere>
+    std::vector<std::uint32_t> add(const std::vector<GridCell>& cells, KeyHere keyHere) {
+        std::vector<std::uint32_t> renumbered;
+        renumbered.reserve(cells.size());
+        for (const GridCell& cell : cells) {
+            renumbered.push_back(find(keyHere(cell.key)));
+            cells_[renumbered.back()].sum.add(cell.sum);
+        }
+        return renumbered;
+    }
+
     std::uint64_t keyOf(const Steps& steps) const {
         const auto index = [this](std::uint64_t s) { return finestIndex(s) >> (kFinestBits - bits_); };
         return index(steps[0]) << 42 | index(steps[1]) << 21 | index(steps[2]);
     }
 
-    // Of the cell with this key, or where it belongs. Keys lie beside the numbers of their cells: most
-    // look-ups touch one cache line.
+    // Where the search for a key begins.
     std::size_t firstSlotOf(std::uint64_t key) const {
         std::uint64_t mixed = key * 0x9e3779b97f4a7c15ULL;
         mixed = (mixed ^ mixed >> 32) * 0xd6e8feb86659fd93ULL;
         return (mixed >> 32) & (slots_.size() - 1);
     }
 
+    // Of the cell with this key, or where it belongs. Keys lie beside the numbers of their cells: most
+    // look-ups touch one cache line.
     std::size_t slotOf(std::uint64_t key) const {
         const std::size_t mask = slots_.size() - 1;
         std::size_t slot = firstSlotOf(key);
@@ -259,11 +257,10 @@ Result<Grid> fillAll(const PointCloud& scan, const Frame& frame, std::size_t lim
         stretches.push_back({k * scan.size() / parts, (k + 1) * scan.size() / parts, Grid(limit, bits)});
     }
     std::vector<Result<void>> done(parts);
-    tbb::this_task_arena::isolate([&] {
-        tbb::parallel_for(std::size_t{0}, parts, [&](std::size_t k) {
-            done[k] = fill(stretches[k], scan, frame, context, cellOfPoint);
-        });
+    const auto all = forEachRange(parts, 1, context, [&](std::size_t k, std::size_t) {
+        done[k] = fill(stretches[k], scan, frame, context, cellOfPoint);
     });
+    if (!all) return fail(all.error());
     for (const auto& result : done) {
         if (!result) return fail(result.error());
     }

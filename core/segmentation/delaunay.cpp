@@ -186,7 +186,7 @@ Result<Tetrahedra> triangulateOrThrow(const PointCloud& points, const RunContext
             const Point3& p = points[order[i]];
             sites[i] = {p.x, p.y, p.z};
         }
-        if (auto done = insertAll(sites, cells, static_cast<int>(threadsOfArena()), context); !done) {
+        if (auto done = insertAll(sites, cells, threadsOfArena(), context); !done) {
             if (done.error().code == ErrorCode::kCollinear || done.error().code == ErrorCode::kCoplanar) {
                 if (auto distinct = checkDistinct(points); !distinct) return fail(distinct.error());
             }

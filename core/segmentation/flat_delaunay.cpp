@@ -84,11 +84,8 @@ struct Share {
 
 class Builder {
   public:
-    Builder(std::vector<Site>& sites, CellStore& cells, int threads, const RunContext& context)
-        : sites_(sites),
-          cells_(cells),
-          threads_(static_cast<std::size_t>(std::max(threads, 1))),
-          context_(context) {}
+    Builder(std::vector<Site>& sites, CellStore& cells, std::size_t threads, const RunContext& context)
+        : sites_(sites), cells_(cells), threads_(std::max<std::size_t>(threads, 1)), context_(context) {}
 
     Result<void> build() {
         if (auto go = context_.checkpoint(); !go) return go;
@@ -284,7 +281,8 @@ void Builder::work(Share& share, std::thread::id reporter) {
 
 }  // namespace
 
-Result<void> insertAll(std::vector<Site>& sites, CellStore& cells, int threads, const RunContext& context) {
+Result<void> insertAll(std::vector<Site>& sites, CellStore& cells, std::size_t threads,
+                       const RunContext& context) {
     return Builder(sites, cells, threads, context).build();
 }
 

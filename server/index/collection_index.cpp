@@ -7,8 +7,8 @@
 #include <utility>
 
 #include <oneapi/tbb/parallel_pipeline.h>
-#include <oneapi/tbb/task_arena.h>
 
+#include "core/base/parallel.h"
 #include "core/signature/signature_codec.h"
 #include "server/index/parameters_codec.h"
 
@@ -22,16 +22,15 @@ constexpr std::size_t kLoadBatch = SignatureSet::kBlockSize;
 constexpr std::size_t kBatchesWhileServing = 1;
 
 /// Two for each processor: one is decoded while the next waits.
-std::size_t batchesOfAllProcessors() {
-    return 2 * static_cast<std::size_t>(oneapi::tbb::this_task_arena::max_concurrency());
-}
+std::size_t batchesOfAllProcessors() { return 2 * threadsOfArena(); }
 
 /// The entry of a row, into one that may hold anything; false when the signature is damaged, which is
-/// logged.
-bool toEntry(store::IndexRow&& row, IndexEntry& entry, telemetry::Logger& log) {
+/// logged with the shape's key, which the row has not.
+bool toEntry(store::IndexRow&& row, IndexEntry& entry, store::Store& store, telemetry::Logger& log) {
     if (const auto decoded = decodeSignature(row.signature.bytes, entry.signature); !decoded) {
         auto fields = telemetry::fieldsOf(decoded.error());
         fields.push_back({"shape", row.shapeId});
+        if (const auto shape = store.getShapeById(row.shapeId)) fields.push_back({"key", shape->key});
         log.error("stored signature is damaged: left out of searches until a rebuild", fields);
         return false;
     }
@@ -40,12 +39,13 @@ bool toEntry(store::IndexRow&& row, IndexEntry& entry, telemetry::Logger& log) {
     return true;
 }
 
-std::shared_ptr<const SignatureBlock> toBlock(std::vector<store::IndexRow>&& rows, telemetry::Logger& log) {
+std::shared_ptr<const SignatureBlock> toBlock(std::vector<store::IndexRow>&& rows, store::Store& store,
+                                              telemetry::Logger& log) {
     auto block = std::make_shared<SignatureBlock>();
     block->reserve(rows.size());
     IndexEntry entry;  // one for all: its memory is used again
     for (store::IndexRow& row : rows) {
-        if (toEntry(std::move(row), entry, log)) block->append(entry);
+        if (toEntry(std::move(row), entry, store, log)) block->append(entry);
     }
     block->shrink();
     return block;
@@ -133,7 +133,7 @@ Result<SignatureSet> CollectionIndex::readSignatures(std::int64_t collectionId, 
         if (!rows->empty()) afterId = rows->back().shapeId;
         return std::make_shared<std::vector<store::IndexRow>>(std::move(*rows));
     };
-    const auto decodeBatch = [&](const Rows& rows) { return toBlock(std::move(*rows), *log_); };
+    const auto decodeBatch = [&](const Rows& rows) { return toBlock(std::move(*rows), store_, *log_); };
     std::vector<Block> blocks;
     const auto append = [&](const Block& block) { blocks.push_back(block); };
     flow::parallel_pipeline(batches,
@@ -269,7 +269,7 @@ Result<void> CollectionIndex::applyDirty(Slot& slot) {
         // Of another generation: a switch is being completed, and its reload brings this shape.
         if (row && row->generation != before->collection.generation) continue;
         IndexEntry entry;
-        if (row && toEntry({id, shape->metadata, std::move(*row)}, entry, *log_)) {
+        if (row && toEntry({id, shape->metadata, std::move(*row)}, entry, store_, *log_)) {
             updates.push_back(std::move(entry));
         } else {
             removed.push_back(id);

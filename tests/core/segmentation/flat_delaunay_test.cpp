@@ -58,7 +58,7 @@ std::vector<Corners> sorted(const Vector& unsorted) {
 }
 
 // In the points' own order, straight from the store, so that the number of threads is ours.
-std::vector<Corners> byThreads(const PointCloud& points, int threads) {
+std::vector<Corners> byThreads(const PointCloud& points, std::size_t threads) {
     std::vector<Site> sites;
     for (const Point3& p : points) sites.push_back({p.x, p.y, p.z});
     CellStore cells;
@@ -173,7 +173,7 @@ TEST(FlatDelaunay, AnyNumberOfThreadsFindsTheSameTetrahedra) {
         ASSERT_GE(points.size(), kLeastParallelPoints) << name;
         const auto alone = byThreads(points, 1);
         ASSERT_FALSE(alone.empty()) << name;
-        for (const int threads : {2, 3, 5})
+        for (const std::size_t threads : {2, 3, 5})
             EXPECT_TRUE(byThreads(points, threads) == alone) << name << threads;
     }
 }

@@ -198,6 +198,7 @@ TEST_F(Index, DamagedSignatureIsLeftOutAndLogged) {
     EXPECT_EQ(snapshot()->signatures.size(), 2u);
     EXPECT_TRUE(snapshot()->signatures.find(a.id));
     EXPECT_NE(log->all().find("damaged"), std::string::npos) << log->all();
+    EXPECT_NE(log->all().find("key=c"), std::string::npos) << log->all();
 }
 
 TEST_F(Index, DamagedParametersNameTheCollection) {
