@@ -16,7 +16,7 @@ namespace large_block {
 /// Blocks from here on come straight from the system and go back to it at once, smaller ones from the heap.
 constexpr std::size_t kLeastMapped = std::size_t{1} << 20;
 /// From here on large pages are asked for; in less memory the rest of the last one would show.
-constexpr std::size_t kLeastOnLargePages = std::size_t{1} << 26;
+constexpr std::size_t kLeastOnLargePages = std::size_t{1} << 23;
 
 /// Null when there is no such memory. Aligned to 64 bytes at least. On any thread.
 [[nodiscard]] void* take(std::size_t bytes) noexcept;

@@ -17,6 +17,7 @@
 #include "core/base/random.h"
 #include "core/geometry/motion.h"
 #include "core/geometry/outer_points.h"
+#include "core/geometry/point_pair.h"
 
 namespace shapedb {
 
@@ -57,7 +58,6 @@ PointCloud hullVertices(const PointCloud& points) {
 struct Extent {
     std::array<double, 3> low = {INFINITY, INFINITY, INFINITY};
     std::array<double, 3> high = {-INFINITY, -INFINITY, -INFINITY};
-    std::array<Point3, 6> touching;  // the points that touch its faces
 
     double squaredDiagonal() const {
         double sum = 0.0;
@@ -66,21 +66,34 @@ struct Extent {
     }
 };
 
-template <typename Points>
-Extent extentOf(const Points& points, const Matrix3& axes) {
-    Extent extent;
-    for (const Point3& p : points) {
+// Points two by two; the last alone stands twice.
+std::vector<PointPair> inPairs(const PointCloud& points) {
+    std::vector<PointPair> pairs;
+    for (std::size_t i = 0; i < points.size(); i += 2) {
+        pairs.emplace_back(points[i], points[std::min(i + 1, points.size() - 1)]);
+    }
+    return pairs;
+}
+
+Pair along(const std::array<double, 3>& axis, const PointPair& p) {
+    return axis[0] * p.x + axis[1] * p.y + axis[2] * p.z;
+}
+
+template <typename Pairs>
+Extent extentOf(const Pairs& pairs, const Matrix3& axes) {
+    std::array<Pair, 3> low = {INFINITY, INFINITY, INFINITY};
+    std::array<Pair, 3> high = {-INFINITY, -INFINITY, -INFINITY};
+    for (const PointPair& p : pairs) {
         for (std::size_t i = 0; i < 3; ++i) {
-            const double v = axes[i][0] * p.x + axes[i][1] * p.y + axes[i][2] * p.z;
-            if (v < extent.low[i]) {
-                extent.low[i] = v;
-                extent.touching[2 * i] = p;
-            }
-            if (v > extent.high[i]) {
-                extent.high[i] = v;
-                extent.touching[2 * i + 1] = p;
-            }
+            const Pair v = along(axes[i], p);
+            low[i] = lesser(v, low[i]);
+            high[i] = greater(v, high[i]);
         }
+    }
+    Extent extent;
+    for (std::size_t i = 0; i < 3; ++i) {
+        extent.low[i] = std::min(low[i].low(), low[i].high());
+        extent.high[i] = std::max(high[i].low(), high[i].high());
     }
     return extent;
 }
@@ -89,7 +102,7 @@ Extent extentOf(const Points& points, const Matrix3& axes) {
 // points, those that touched boxes before.
 class BoxTrial {
   public:
-    explicit BoxTrial(const PointCloud& points) : points_(points) { known_.fill(points.front()); }
+    explicit BoxTrial(const std::vector<PointPair>& points) : points_(points) { known_.fill(points.front()); }
 
     // The squared diagonal, or less but not below the limit. Fewer points never give more, with rounding
     // neither.
@@ -97,25 +110,33 @@ class BoxTrial {
         const double least = extentOf(known_, axes).squaredDiagonal();
         if (least >= limit) return least;
         const Extent extent = extentOf(points_, axes);
-        for (const Point3& p : extent.touching) remember(p);
+        rememberTouching(axes, extent);
         return extent.squaredDiagonal();
     }
 
   private:
     static constexpr std::size_t kKnown = 24;
 
-    void remember(const Point3& p) {
-        if (std::find(known_.begin(), known_.end(), p) == known_.end()) known_[next_++ % kKnown] = p;
+    void rememberTouching(const Matrix3& axes, const Extent& extent) {
+        for (const PointPair& p : points_) {
+            unsigned inside = 3;
+            for (std::size_t i = 0; i < 3; ++i) {
+                const Pair v = along(axes[i], p);
+                inside &= less(extent.low[i], v) & less(v, extent.high[i]);
+            }
+            if (inside != 3) remember(p);
+        }
     }
 
-    const PointCloud& points_;
-    std::array<Point3, kKnown> known_;
+    void remember(const PointPair& p) {
+        const auto same = [&](const PointPair& q) { return q.low() == p.low() && q.high() == p.high(); };
+        if (std::none_of(known_.begin(), known_.end(), same)) known_[next_++ % kKnown] = p;
+    }
+
+    const std::vector<PointPair>& points_;
+    std::array<PointPair, kKnown> known_;
     std::size_t next_ = 0;
 };
-
-double squaredDiagonal(const PointCloud& points, const Matrix3& axes) {
-    return extentOf(points, axes).squaredDiagonal();
-}
 
 Point3 randomDirection(Random& random) {
     const double z = random.uniform(-1.0, 1.0);
@@ -161,7 +182,8 @@ struct Box {
     Matrix3 axes;
 };
 
-Box descend(const PointCloud& points, Box box, double firstStep, double lastStep, Random& random) {
+Box descend(const std::vector<PointPair>& points, Box box, double firstStep, double lastStep,
+            Random& random) {
     BoxTrial trial(points);
     for (double step = firstStep; step > lastStep; step *= 0.5) {
         for (int failures = 0; failures < kTriesPerStep;) {
@@ -184,12 +206,13 @@ void sortBySize(std::vector<Box>& boxes) {
 }
 
 double leastSquaredDiagonal(const PointCloud& vertices) {
-    const PointCloud outline = farthestVertices(vertices);
+    const std::vector<PointPair> all = inPairs(vertices);
+    const std::vector<PointPair> outline = inPairs(farthestVertices(vertices));
     Random random(1);
     std::vector<Box> boxes(kStarts);
     for (Box& box : boxes) {
         box.axes = randomRotation(random);
-        box.squaredDiagonal = squaredDiagonal(outline, box.axes);
+        box.squaredDiagonal = extentOf(outline, box.axes).squaredDiagonal();
     }
     sortBySize(boxes);
     boxes.resize(kCoarseDescents);
@@ -198,8 +221,8 @@ double leastSquaredDiagonal(const PointCloud& vertices) {
     boxes.resize(kFineDescents);
     double least = INFINITY;
     for (Box& box : boxes) {
-        box.squaredDiagonal = squaredDiagonal(vertices, box.axes);
-        least = std::min(least, descend(vertices, box, kFirstStep, kLastStep, random).squaredDiagonal);
+        box.squaredDiagonal = extentOf(all, box.axes).squaredDiagonal();
+        least = std::min(least, descend(all, box, kFirstStep, kLastStep, random).squaredDiagonal);
     }
     return least;
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include "core/base/keyed.h"
 #include "core/base/parallel.h"
 #include "core/geometry/interleave.h"
 
@@ -14,8 +15,6 @@ namespace {
 
 constexpr std::uint32_t kBits = 21;
 constexpr std::size_t kBlock = 4096;  // points that a thread takes at a time
-constexpr std::uint32_t kDigitBits = 11;
-constexpr std::uint32_t kDigits = 6;  // of 63 bits
 
 // Skilling, "Programming the Hilbert curve" (2004): coordinates to the transposed index, in place,
 // then its bits interleaved.
@@ -41,11 +40,6 @@ std::uint64_t hilbertIndex(std::array<std::uint32_t, 3> x) {
     return everyThirdBit(x[0]) << 2 | everyThirdBit(x[1]) << 1 | everyThirdBit(x[2]);
 }
 
-struct Keyed {
-    std::uint64_t key = 0;
-    std::uint32_t point = 0;
-};
-
 std::vector<Keyed> keysOf(const PointCloud& points) {
     Point3 low = points.front();
     Point3 high = low;
@@ -68,20 +62,6 @@ std::vector<Keyed> keysOf(const PointCloud& points) {
     return keyed;
 }
 
-// Stable, by counting digit after digit from the lowest.
-void sortByKey(std::vector<Keyed>& keyed) {
-    constexpr std::size_t kValues = std::size_t{1} << kDigitBits;
-    std::vector<Keyed> other(keyed.size());
-    for (std::uint32_t digit = 0; digit < kDigits; ++digit) {
-        const std::uint32_t shift = digit * kDigitBits;
-        std::array<std::size_t, kValues + 1> begin{};
-        for (const Keyed& k : keyed) ++begin[((k.key >> shift) & (kValues - 1)) + 1];
-        for (std::size_t v = 0; v < kValues; ++v) begin[v + 1] += begin[v];
-        for (const Keyed& k : keyed) other[begin[(k.key >> shift) & (kValues - 1)]++] = k;
-        keyed.swap(other);
-    }
-}
-
 }  // namespace
 
 std::vector<std::uint32_t> curveOrder(const PointCloud& points) {
@@ -89,7 +69,7 @@ std::vector<std::uint32_t> curveOrder(const PointCloud& points) {
     std::vector<Keyed> keyed = keysOf(points);
     sortByKey(keyed);
     std::vector<std::uint32_t> order(points.size());
-    for (std::size_t i = 0; i < order.size(); ++i) order[i] = keyed[i].point;
+    for (std::size_t i = 0; i < order.size(); ++i) order[i] = keyed[i].index;
     return order;
 }
 

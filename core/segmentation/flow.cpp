@@ -1,7 +1,9 @@
 #include "core/segmentation/flow.h"
 
-#include <cmath>
+#include <array>
 
+#include "core/base/parallel.h"
+#include "core/geometry/point_pair.h"
 #include "core/segmentation/exact_geometry.h"
 
 namespace shapedb {
@@ -13,35 +15,64 @@ namespace {
 // times that as a margin a wrong sign would need a thousandfold underestimate.
 constexpr double kRounding = 1e-13;
 
-constexpr std::size_t kTetrahedraBetweenCheckpoints = 4096;
+// Flatter tetrahedra are not tried: volume against the edges at a corner.
+constexpr double kLeastShare = 1e-6;
 
-// Signs of the circumcentre's barycentric coordinates, or false when one is too close to call.
-// The centre is computed afresh, relative to a corner: rounded to the frame's origin it would have
-// lost its digits where tetrahedra are small.
-bool approximateFlowMask(const TetrahedronCorners& p, unsigned& mask) {
-    const Point3 a = p[1] - p[0];
-    const Point3 b = p[2] - p[0];
-    const Point3 c = p[3] - p[0];
-    const Point3 bc = cross(b, c);
-    const Point3 ca = cross(c, a);
-    const Point3 ab = cross(a, b);
-    const double sixVolumes = dot(a, bc);
-    const double size = length(a) * length(b) * length(c);
-    if (!(sixVolumes > 1e-6 * size)) return false;
-    const Point3 g =
-        (0.5 / sixVolumes) * (squaredLength(a) * bc + squaredLength(b) * ca + squaredLength(c) * ab);
-    const double second = dot(g, bc);
-    const double third = dot(g, ca);
-    const double fourth = dot(g, ab);
-    const double coordinates[4] = {sixVolumes - second - third - fourth, second, third, fourth};
-    const double reach = length(g) * (length(bc) + length(a) * (length(b) + length(c))) + sixVolumes;
-    const double margin = kRounding * reach * (size / sixVolumes);
-    mask = 0;
+// Tetrahedra that a thread takes at a time.
+constexpr std::size_t kBlock = 4096;
+
+// No less than the length and quicker to have.
+Pair lengthAtMost(const PointPair& a) { return abs(a.x) + abs(a.y) + abs(a.z); }
+
+// Signs of the barycentric coordinates of two circumcentres. The centres are computed afresh, relative to a
+// corner: rounded to the frame's origin they would have lost their digits where tetrahedra are small.
+struct FlowMasks {
+    std::array<unsigned, 2> mask;
+    unsigned sure;  // bit 0 or 1: no coordinate is too close to call
+};
+
+FlowMasks approximateFlowMasks(const PointPair& a, const PointPair& b, const PointPair& c) {
+    const PointPair bc = cross(b, c);
+    const PointPair ca = cross(c, a);
+    const PointPair ab = cross(a, b);
+    const Pair sixVolumes = dot(a, bc);
+    const Pair toA = lengthAtMost(a), toB = lengthAtMost(b), toC = lengthAtMost(c);
+    const Pair size = toA * toB * toC;
+    const PointPair g =
+        (Pair(0.5) / sixVolumes) * (squaredLength(a) * bc + squaredLength(b) * ca + squaredLength(c) * ab);
+    const Pair second = dot(g, bc);
+    const Pair third = dot(g, ca);
+    const Pair fourth = dot(g, ab);
+    const std::array<Pair, 4> coordinates = {sixVolumes - second - third - fourth, second, third, fourth};
+    const Pair reach = lengthAtMost(g) * (lengthAtMost(bc) + toA * (toB + toC)) + sixVolumes;
+    const Pair margin = Pair(kRounding) * reach * (size / sixVolumes);
+    FlowMasks masks{{0, 0}, less(Pair(kLeastShare) * size, sixVolumes)};
     for (unsigned i = 0; i < 4; ++i) {
-        if (std::abs(coordinates[i]) <= margin) return false;
-        if (coordinates[i] < 0.0) mask |= 1u << i;
+        masks.sure &= less(margin, abs(coordinates[i]));
+        const unsigned beyond = less(coordinates[i], 0.0);
+        masks.mask[0] |= (beyond & 1u) << i;
+        masks.mask[1] |= (beyond >> 1) << i;
     }
-    return true;
+    return masks;
+}
+
+// The masks of two tetrahedra, which may be the same.
+void maskTwo(const PointCloud& points, const Tetrahedra& tetrahedra, const std::array<std::uint32_t, 2>& two,
+             std::vector<std::uint8_t>& masks) {
+    const auto& v = tetrahedra.vertices[two[0]];
+    const auto& w = tetrahedra.vertices[two[1]];
+    const PointPair first(points[v[0]], points[w[0]]);
+    const auto wayTo = [&](std::size_t i) { return PointPair(points[v[i]], points[w[i]]) - first; };
+    const FlowMasks found = approximateFlowMasks(wayTo(1), wayTo(2), wayTo(3));
+    for (std::size_t k = 0; k < 2; ++k) {
+        unsigned mask = found.mask[k];
+        if ((found.sure >> k & 1u) == 0) {
+            const auto& corners = tetrahedra.vertices[two[k]];
+            mask = exactFlowMask(
+                {points[corners[0]], points[corners[1]], points[corners[2]], points[corners[3]]});
+        }
+        masks[two[k]] = static_cast<std::uint8_t>(mask);
+    }
 }
 
 }  // namespace
@@ -50,17 +81,19 @@ Result<std::vector<std::uint8_t>> flowMasks(const PointCloud& points, const Tetr
                                             const std::vector<std::uint8_t>& wanted,
                                             const RunContext& context) {
     std::vector<std::uint8_t> masks(tetrahedra.size(), 0);
-    for (std::size_t t = 0; t < tetrahedra.size(); ++t) {
-        if (t % kTetrahedraBetweenCheckpoints == 0) {
-            if (auto go = context.checkpoint(); !go) return fail(go.error());
+    auto done = forEachRange(tetrahedra.size(), kBlock, context, [&](std::size_t from, std::size_t to) {
+        std::array<std::uint32_t, 2> two{};
+        std::size_t waiting = 0;
+        for (std::size_t t = from; t < to; ++t) {
+            if (!wanted[t]) continue;
+            two[waiting++] = static_cast<std::uint32_t>(t);
+            if (waiting < 2) continue;
+            maskTwo(points, tetrahedra, two, masks);
+            waiting = 0;
         }
-        if (!wanted[t]) continue;
-        const auto& v = tetrahedra.vertices[t];
-        const TetrahedronCorners corners = {points[v[0]], points[v[1]], points[v[2]], points[v[3]]};
-        unsigned mask = 0;
-        if (!approximateFlowMask(corners, mask)) mask = exactFlowMask(corners);
-        masks[t] = static_cast<std::uint8_t>(mask);
-    }
+        if (waiting == 1) maskTwo(points, tetrahedra, {two[0], two[0]}, masks);
+    });
+    if (!done) return fail(done.error());
     return masks;
 }
 

@@ -4,14 +4,18 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/run_context.h"
 #include "core/geometry/point.h"
-#include "core/segmentation/delaunay.h"
 
 namespace shapedb {
 
-/// For each point the mean distance to its three nearest other points, in the points' unit.
-/// Read off the triangulation: the k-th nearest neighbour of p is adjacent in Del P to p or to
-/// one of its k - 1 nearer ones. Linear time.
-[[nodiscard]] std::vector<double> pointScales(const PointCloud& points, const Tetrahedra& tetrahedra);
+/// For each point the mean distance to its three nearest other points, in the points' unit; infinite
+/// when there are fewer than three. Points should follow a curve through space (curve_order.h): in any
+/// other order the result is the same, but the time grows with the square of their number. On the
+/// threads of the caller's arena.
+///
+/// Errors: kCancelled, kDeadlineExceeded. May throw std::bad_alloc.
+[[nodiscard]] Result<std::vector<double>> pointScales(const PointCloud& points,
+                                                      const RunContext& context = {});
 
 }  // namespace shapedb

@@ -9,6 +9,7 @@
 #include <tuple>
 #include <utility>
 
+#include "core/base/pair.h"
 #include "core/geometry/bounding.h"
 #include "core/segmentation/curve_order.h"
 #include "core/segmentation/flow.h"
@@ -59,24 +60,34 @@ class StageClock {
 struct Moments {
     double volume = 0.0;
     Point3 first;
-    std::array<double, 6> second{};
+    std::array<Pair, 3> second = {0.0, 0.0, 0.0};  // xx, xy, xz, yy, yz, zz
     std::uint64_t tetrahedra = 0;
 
-    void add(const std::array<Point3, 4>& p) {
-        const double v = std::max(0.0, dot(p[1] - p[0], cross(p[2] - p[0], p[3] - p[0])) / 6.0);
-        const Point3 sum = p[0] + p[1] + p[2] + p[3];
+    void add(const Point3& a, const Point3& b, const Point3& c, const Point3& d) {
+        const double v = std::max(0.0, dot(b - a, cross(c - a, d - a)) / 6.0);
+        const Point3 sum = a + b + c + d;
         volume += v;
         first = first + (0.25 * v) * sum;
         // Integral of x y over a tetrahedron: v / 20 * (sum_i x_i y_i + sum_i x_i * sum_i y_i).
-        std::array<double, 6> products = {sum.x * sum.x, sum.x * sum.y, sum.x * sum.z,
-                                          sum.y * sum.y, sum.y * sum.z, sum.z * sum.z};
-        for (const Point3& c : p) {
-            const std::array<double, 6> own = {c.x * c.x, c.x * c.y, c.x * c.z,
-                                               c.y * c.y, c.y * c.z, c.z * c.z};
-            for (std::size_t i = 0; i < 6; ++i) products[i] += own[i];
+        const std::array<Products, 5> terms = {products(sum), products(a), products(b), products(c),
+                                               products(d)};
+        for (std::size_t i = 0; i < second.size(); ++i) {
+            second[i] = second[i] + Pair(v / 20.0) *
+                                        (terms[0][i] + terms[1][i] + terms[2][i] + terms[3][i] + terms[4][i]);
         }
-        for (std::size_t i = 0; i < 6; ++i) second[i] += v / 20.0 * products[i];
         ++tetrahedra;
+    }
+
+    std::array<double, 6> secondMoments() const {
+        return {second[0].low(),  second[0].high(), second[1].low(),
+                second[1].high(), second[2].low(),  second[2].high()};
+    }
+
+  private:
+    using Products = std::array<Pair, 3>;
+    static Products products(const Point3& p) {
+        return {Pair(p.x, p.x) * Pair(p.x, p.y), Pair(p.x, p.y) * Pair(p.z, p.y),
+                Pair(p.y, p.z) * Pair(p.z, p.z)};
     }
 };
 
@@ -90,7 +101,8 @@ Segment toSegment(const Moments& m, std::uint32_t peak, const Tetrahedra& tetrah
     segment.peak = frame.toScan(tetrahedra.circumcentres[peak]);
     const std::array<double, 6> square = {mean.x * mean.x, mean.x * mean.y, mean.x * mean.z,
                                           mean.y * mean.y, mean.y * mean.z, mean.z * mean.z};
-    for (std::size_t i = 0; i < 6; ++i) segment.covariance[i] = (m.second[i] / m.volume - square[i]) * unit2;
+    const std::array<double, 6> second = m.secondMoments();
+    for (std::size_t i = 0; i < 6; ++i) segment.covariance[i] = (second[i] / m.volume - square[i]) * unit2;
     segment.tetrahedra = m.tetrahedra;
     return segment;
 }
@@ -119,8 +131,8 @@ void describeSegments(const PointCloud& points, SegmentLabels labels, const Fram
         const std::int32_t segment = labels.ofTetrahedron[t];
         if (segment < 0) continue;
         const auto& v = result.tetrahedra.vertices[t];
-        moments[static_cast<std::size_t>(segment)].add(
-            {points[v[0]], points[v[1]], points[v[2]], points[v[3]]});
+        moments[static_cast<std::size_t>(segment)].add(points[v[0]], points[v[1]], points[v[2]],
+                                                       points[v[3]]);
         ++result.interiorTetrahedra;
     }
     std::vector<std::uint32_t> order;
@@ -160,11 +172,29 @@ std::vector<std::int32_t> labelSites(std::size_t siteCount, const Segmentation& 
     return labels;
 }
 
-// Size of what the interior spans, in the unit of the sites.
-Result<double> interiorSize(const PointCloud& sites, const std::vector<std::int32_t>& siteLabels) {
+// Per site 1 when it lies on the convex hull of all.
+std::vector<std::uint8_t> onHull(std::size_t siteCount, const Tetrahedra& tetrahedra) {
+    std::vector<std::uint8_t> on(siteCount, 0);
+    for (std::size_t t = 0; t < tetrahedra.size(); ++t) {
+        for (std::size_t facet = 0; facet < 4; ++facet) {
+            if (tetrahedra.neighbours[t][facet] != kNoTetrahedron) continue;
+            for (std::size_t k = 1; k < 4; ++k) on[tetrahedra.vertices[t][(facet + k) % 4]] = 1;
+        }
+    }
+    return on;
+}
+
+// Size of what the interior spans, in the unit of the sites. When all that lies on the hull belongs to the
+// interior, nothing else is needed for it.
+Result<double> interiorSize(const PointCloud& sites, const std::vector<std::int32_t>& siteLabels,
+                            const Tetrahedra& tetrahedra) {
+    const std::vector<std::uint8_t> on = onHull(sites.size(), tetrahedra);
+    bool hullTouched = true;
+    for (std::size_t i = 0; i < sites.size(); ++i)
+        hullTouched = hullTouched && (!on[i] || siteLabels[i] >= 0);
     PointCloud touched;
     for (std::size_t i = 0; i < sites.size(); ++i) {
-        if (siteLabels[i] >= 0) touched.push_back(sites[i]);
+        if (siteLabels[i] >= 0 && (on[i] || !hullTouched)) touched.push_back(sites[i]);
     }
     return smallestBoxDiagonal(touched);
 }
@@ -224,11 +254,12 @@ Result<SegmentLabels> findSegments(const PointCloud& sites, const SegmentationOp
                                    const RunContext& context, StageClock& clock, Segmentation& result) {
     const Tetrahedra& tetrahedra = result.tetrahedra;
     if (auto go = clock.begin("point_scale"); !go) return fail(go.error());
-    const std::vector<double> scales = pointScales(sites, tetrahedra);
+    const auto scales = pointScales(sites, context);
+    if (!scales) return fail(scales.error());
     if (auto go = clock.begin("interior"); !go) return fail(go.error());
-    const std::vector<std::uint8_t> big = bigBalls(tetrahedra, scales, options.bigBallRatio);
+    const std::vector<std::uint8_t> big = bigBalls(tetrahedra, *scales, options.bigBallRatio);
     result.bigBalls = static_cast<std::uint64_t>(std::count(big.begin(), big.end(), 1));
-    const auto interior = findInterior(sites, big, scales, options, context, result);
+    const auto interior = findInterior(sites, big, *scales, options, context, result);
     if (!interior) return fail(interior.error());
     if (auto go = clock.begin("flow"); !go) return fail(go.error());
     const auto flow = flowMasks(sites, tetrahedra, *interior, context);
@@ -276,7 +307,7 @@ Result<Segmentation> segmentOrThrow(const PointCloud& points, const Segmentation
                         "scan the shape from all sides or raise big_ball_ratio");
     }
     const std::vector<std::int32_t> siteLabels = labelSites(prepared->sites.size(), result);
-    const auto size = interiorSize(prepared->sites, siteLabels);
+    const auto size = interiorSize(prepared->sites, siteLabels, result.tetrahedra);
     if (!size) return fail(size.error());
     result.size = *size * prepared->frame.unit;
     result.pointSegment.reserve(points.size());

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
 #include <limits>
 #include <numeric>
 #include <utility>
 
 #include "core/base/fetch.h"
+#include "core/base/keyed.h"
 
 namespace shapedb {
 
@@ -14,21 +16,35 @@ namespace {
 
 constexpr std::size_t kStepsBetweenCheckpoints = 1 << 16;
 
-bool flowsThrough(std::uint8_t mask, std::size_t facet) { return ((mask >> facet) & 1u) != 0; }
+// Far more than rounding takes from a circumradius.
+constexpr double kMost = 1.001;
 
-// By falling circumradius, equal ones by index.
-void sortByFallingRadius(const Tetrahedra& tetrahedra, std::vector<std::uint32_t>& indices) {
-    std::vector<std::pair<double, std::uint32_t>> keyed;
-    keyed.reserve(indices.size());
-    for (const std::uint32_t t : indices) keyed.emplace_back(-tetrahedra.circumradii[t], t);
-    std::sort(keyed.begin(), keyed.end());
-    for (std::size_t i = 0; i < keyed.size(); ++i) indices[i] = keyed[i].second;
+// Numbers that are not negative have the order of their bits.
+std::uint64_t orderOf(double number) {
+    std::uint64_t bits = 0;
+    std::memcpy(&bits, &number, sizeof bits);
+    return bits;
 }
 
+// By falling circumradius; equal ones stay in order.
+void sortByFallingRadius(const Tetrahedra& tetrahedra, std::vector<std::uint32_t>& indices) {
+    std::vector<Keyed> keyed;
+    keyed.reserve(indices.size());
+    for (const std::uint32_t t : indices) keyed.push_back({~orderOf(tetrahedra.circumradii[t]), t});
+    sortByKey(keyed);
+    for (std::size_t i = 0; i < keyed.size(); ++i) indices[i] = keyed[i].index;
+}
+
+// What is in the place of a label while there is none.
+constexpr std::int32_t kOutside = -1;
 constexpr std::int32_t kUnseen = -2;
-constexpr std::int32_t kOnPath = -3;  // flow has no cycles; if it had, the way would end where it closes
-constexpr std::int32_t kNoMaximum = -1;
-constexpr std::int32_t kInLayer = -4;  // of growing: gets its label with the layer it waits in
+constexpr std::int32_t kOnPath = -3;     // flow has no cycles; if it had, the way would end where it closes
+constexpr std::int32_t kNoMaximum = -4;  // interior, flows into no maximum
+constexpr std::int32_t kInLayer = -5;    // of growing: gets its label with the layer it waits in
+
+// How many steps before it is read memory at random is asked for; and what leads to such memory.
+constexpr std::size_t kAhead = 8;
+constexpr std::size_t kFarAhead = 16;
 
 // Gives a tetrahedron the label of the strongest maximum that it flows into, directly or not: the least
 // label of the two it may flow into, found before its own. What is left by maxima that claim what flows
@@ -39,36 +55,38 @@ class Downstream {
                std::vector<std::int32_t>& labels)
         : tetrahedra_(tetrahedra), flow_(flow), labels_(labels) {}
 
-    void follow(std::uint32_t start) {
-        path_.assign(1, start);
-        while (!path_.empty()) {
-            const std::uint32_t t = path_.back();
-            if (labels_[t] != kUnseen && labels_[t] != kOnPath) {
-                path_.pop_back();
+    void follow(std::uint32_t t) {
+        path_.clear();
+        for (;;) {
+            const auto& neighbours = tetrahedra_.neighbours[t];
+            const unsigned way = flow_[t];
+            const std::uint32_t first = neighbours[lowestBit(way)];
+            const std::uint32_t second = neighbours[lowestBit(way & (way - 1) ? way & (way - 1) : way)];
+            const std::int32_t a = labelOf(first);
+            const std::int32_t b = labelOf(second);
+            if (a == kUnseen || b == kUnseen) {
+                labels_[t] = kOnPath;
+                path_.push_back(t);
+                t = a == kUnseen ? first : second;
                 continue;
             }
-            const bool first = labels_[t] == kUnseen;
-            labels_[t] = kOnPath;
-            std::int32_t least = std::numeric_limits<std::int32_t>::max();
-            const std::size_t depth = path_.size();
-            for (std::size_t facet = 0; facet < 4; ++facet) {
-                if (!flowsThrough(flow_[t], facet)) continue;
-                const std::uint32_t next = tetrahedra_.neighbours[t][facet];
-                if (next == kNoTetrahedron) continue;
-                if (first && labels_[next] == kUnseen) {
-                    path_.push_back(next);
-                    fetch(&tetrahedra_.neighbours[next]);
-                    fetch(&flow_[next]);
-                }
-                if (labels_[next] >= 0) least = std::min(least, labels_[next]);
-            }
-            if (path_.size() > depth) continue;
-            labels_[t] = least == std::numeric_limits<std::int32_t>::max() ? kNoMaximum : least;
+            labels_[t] = stronger(a, b);
+            if (path_.empty()) return;
+            t = path_.back();
             path_.pop_back();
         }
     }
 
   private:
+    static unsigned lowestBit(unsigned mask) { return static_cast<unsigned>(__builtin_ctz(mask)); }
+    std::int32_t labelOf(std::uint32_t t) const { return t == kNoTetrahedron ? kOutside : labels_[t]; }
+    // The least of those that are labels: what is none is negative, so larger without its sign.
+    static std::int32_t stronger(std::int32_t a, std::int32_t b) {
+        const auto least =
+            static_cast<std::int32_t>(std::min(static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b)));
+        return least < 0 ? kNoMaximum : least;
+    }
+
     const Tetrahedra& tetrahedra_;
     const std::vector<std::uint8_t>& flow_;
     std::vector<std::int32_t>& labels_;
@@ -78,54 +96,89 @@ class Downstream {
 // Label of the labelled neighbour with the largest ball, -1 when there is none.
 std::int32_t labelOfLargestNeighbour(const Tetrahedra& tetrahedra, const SegmentLabels& labels,
                                      std::uint32_t t) {
+    // Without branches: which are labelled, and whose ball is largest, is random.
     std::int32_t label = -1;
-    double largest = -1.0;
+    std::int64_t largest = -1;
     for (const std::uint32_t next : tetrahedra.neighbours[t]) {
-        if (next == kNoTetrahedron || labels.ofTetrahedron[next] < 0) continue;
-        if (tetrahedra.circumradii[next] <= largest) continue;
-        largest = tetrahedra.circumradii[next];
-        label = labels.ofTetrahedron[next];
+        const std::uint32_t there = next == kNoTetrahedron ? t : next;  // which has none itself
+        const std::int32_t other = labels.ofTetrahedron[there];
+        const std::int64_t none = other < 0 ? -1 : 0;
+        const std::int64_t radius = static_cast<std::int64_t>(orderOf(tetrahedra.circumradii[there])) | none;
+        label = radius > largest ? other : label;
+        largest = radius > largest ? radius : largest;
     }
     return label;
 }
 
+// A tetrahedron and the label it gets.
+struct Labelling {
+    std::uint32_t tetrahedron;
+    std::int32_t label;
+};
+
 // Gives unlabelled tetrahedra next to labelled ones the label of the neighbour with the largest
 // ball, one layer at a time so that the order of the tetrahedra does not matter. Each layer is
 // found from the one before it: the time is that of one look at every leftover.
-Result<void> growIntoLeftovers(const Tetrahedra& tetrahedra, const std::vector<std::uint8_t>& interior,
-                               const std::vector<std::uint32_t>& leftovers, std::size_t& steps,
-                               const RunContext& context, SegmentLabels& labels) {
-    std::vector<std::uint32_t> layer;
-    for (const std::uint32_t t : leftovers) {
-        if (labelOfLargestNeighbour(tetrahedra, labels, t) >= 0) layer.push_back(t);
-    }
-    while (!layer.empty()) {
-        std::vector<std::int32_t> chosen;
-        chosen.reserve(layer.size());
-        for (const std::uint32_t t : layer) {
-            if (++steps % kStepsBetweenCheckpoints == 0) {
-                if (auto go = context.checkpoint(); !go) return go;
-            }
-            chosen.push_back(labelOfLargestNeighbour(tetrahedra, labels, t));
+class Growth {
+  public:
+    Growth(const Tetrahedra& tetrahedra, SegmentLabels& labels) : tetrahedra_(tetrahedra), labels_(labels) {}
+
+    Result<void> grow(const std::vector<std::uint32_t>& leftovers, const RunContext& context) {
+        choose(leftovers);
+        while (!layer_.empty()) {
+            if (auto go = context.checkpoint(); !go) return go;
+            expand();
+            choose(following_);
         }
-        for (std::size_t i = 0; i < layer.size(); ++i) labels.ofTetrahedron[layer[i]] = chosen[i];
-        std::vector<std::uint32_t> following;
-        for (const std::uint32_t t : layer) {
-            for (const std::uint32_t next : tetrahedra.neighbours[t]) {
-                if (next == kNoTetrahedron || !interior[next]) continue;
-                if (labels.ofTetrahedron[next] != kNoMaximum) continue;
-                labels.ofTetrahedron[next] = kInLayer;
-                following.push_back(next);
+        return {};
+    }
+
+  private:
+    // The layer is what has a labelled neighbour.
+    void choose(const std::vector<std::uint32_t>& candidates) {
+        layer_.clear();
+        for (std::size_t i = 0; i < candidates.size(); ++i) {
+            if (i + kFarAhead < candidates.size()) fetch(&tetrahedra_.neighbours[candidates[i + kFarAhead]]);
+            if (i + kAhead < candidates.size()) fetchNeighbours(candidates[i + kAhead]);
+            const std::uint32_t t = candidates[i];
+            const std::int32_t label = labelOfLargestNeighbour(tetrahedra_, labels_, t);
+            if (label >= 0) layer_.push_back({t, label});
+        }
+    }
+
+    // What is next to the layer, and has no label, follows. Until all of the layer have theirs, nobody looks
+    // at them.
+    void expand() {
+        following_.clear();
+        for (std::size_t i = 0; i < layer_.size(); ++i)
+            labels_.ofTetrahedron[layer_[i].tetrahedron] = layer_[i].label;
+        for (std::size_t i = 0; i < layer_.size(); ++i) {
+            if (i + kFarAhead < layer_.size())
+                fetch(&tetrahedra_.neighbours[layer_[i + kFarAhead].tetrahedron]);
+            if (i + kAhead < layer_.size()) fetchNeighbours(layer_[i + kAhead].tetrahedron);
+            for (const std::uint32_t next : tetrahedra_.neighbours[layer_[i].tetrahedron]) {
+                if (next == kNoTetrahedron || labels_.ofTetrahedron[next] != kNoMaximum) continue;
+                labels_.ofTetrahedron[next] = kInLayer;
+                following_.push_back(next);
             }
         }
-        layer = std::move(following);
     }
-    return {};
-}
+
+    void fetchNeighbours(std::uint32_t t) const {
+        for (const std::uint32_t next : tetrahedra_.neighbours[t]) {
+            fetch(labels_.ofTetrahedron.data() + next);
+            fetch(tetrahedra_.circumradii.data() + next);
+        }
+    }
+
+    const Tetrahedra& tetrahedra_;
+    SegmentLabels& labels_;
+    std::vector<Labelling> layer_;
+    std::vector<std::uint32_t> following_;
+};
 
 // Tetrahedra in reach of no maximum: one segment per connected group, around its largest ball.
-void labelIslands(const Tetrahedra& tetrahedra, const std::vector<std::uint8_t>& interior,
-                  std::vector<std::uint32_t> leftovers, SegmentLabels& labels) {
+void labelIslands(const Tetrahedra& tetrahedra, std::vector<std::uint32_t> leftovers, SegmentLabels& labels) {
     const auto labelled = [&](std::uint32_t t) { return labels.ofTetrahedron[t] >= 0; };
     leftovers.erase(std::remove_if(leftovers.begin(), leftovers.end(), labelled), leftovers.end());
     sortByFallingRadius(tetrahedra, leftovers);
@@ -139,7 +192,7 @@ void labelIslands(const Tetrahedra& tetrahedra, const std::vector<std::uint8_t>&
             const std::uint32_t t = stack.back();
             stack.pop_back();
             for (const std::uint32_t next : tetrahedra.neighbours[t]) {
-                if (next == kNoTetrahedron || !interior[next] || labels.ofTetrahedron[next] >= 0) continue;
+                if (next == kNoTetrahedron || labels.ofTetrahedron[next] != kNoMaximum) continue;
                 labels.ofTetrahedron[next] = segment;
                 stack.push_back(next);
             }
@@ -173,7 +226,7 @@ class DisjointSets {
 Result<SegmentLabels> stableManifolds(const Tetrahedra& tetrahedra, const std::vector<std::uint8_t>& interior,
                                       const std::vector<std::uint8_t>& flow, const RunContext& context) {
     SegmentLabels labels;
-    labels.ofTetrahedron.assign(tetrahedra.size(), kNoMaximum);
+    labels.ofTetrahedron.assign(tetrahedra.size(), kOutside);
     for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
         if (!interior[t]) continue;
         labels.ofTetrahedron[t] = kUnseen;
@@ -193,12 +246,10 @@ Result<SegmentLabels> stableManifolds(const Tetrahedra& tetrahedra, const std::v
     }
     std::vector<std::uint32_t> leftovers;
     for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
-        if (interior[t] && labels.ofTetrahedron[t] < 0) leftovers.push_back(t);
+        if (labels.ofTetrahedron[t] == kNoMaximum) leftovers.push_back(t);
     }
-    if (auto go = growIntoLeftovers(tetrahedra, interior, leftovers, steps, context, labels); !go) {
-        return fail(go.error());
-    }
-    labelIslands(tetrahedra, interior, std::move(leftovers), labels);
+    if (auto go = Growth(tetrahedra, labels).grow(leftovers, context); !go) return fail(go.error());
+    labelIslands(tetrahedra, std::move(leftovers), labels);
     return labels;
 }
 
@@ -217,20 +268,26 @@ double facetCircumradius(const PointCloud& points, const Tetrahedra& tetrahedra,
 SegmentLabels mergeSegments(const PointCloud& points, const Tetrahedra& tetrahedra,
                             const SegmentLabels& labels, double mergeRatio) {
     DisjointSets sets(labels.peaks.size());
-    const auto peakRadius = [&](std::int32_t segment) {
-        return tetrahedra.circumradii[labels.peaks[static_cast<std::size_t>(segment)]];
-    };
+    std::vector<double> peakRadii(labels.peaks.size());
+    for (std::size_t s = 0; s < peakRadii.size(); ++s) peakRadii[s] = tetrahedra.circumradii[labels.peaks[s]];
     for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
         const std::int32_t mine = labels.ofTetrahedron[t];
         if (mine < 0) continue;
+        // No circle through three points of a sphere is larger than the sphere: most tetrahedra and facets
+        // need no look at the circle.
+        const double most = kMost * mergeRatio * tetrahedra.circumradii[t];
+        if (peakRadii[static_cast<std::size_t>(mine)] > most) continue;
         for (std::size_t facet = 0; facet < 4; ++facet) {
             const std::uint32_t next = tetrahedra.neighbours[t][facet];
-            if (next == kNoTetrahedron || next < t) continue;
-            const std::int32_t other = labels.ofTetrahedron[next];
-            if (other < 0 || other == mine || sets.find(other) == sets.find(mine)) continue;
-            const double limit =
-                mergeRatio * facetCircumradius(points, tetrahedra, t, static_cast<int>(facet));
-            if (peakRadius(mine) <= limit && peakRadius(other) <= limit) sets.unite(mine, other);
+            const bool later = next > t && next != kNoTetrahedron;
+            const std::int32_t other = labels.ofTetrahedron[later ? next : t];
+            if (static_cast<unsigned>(other < 0) | static_cast<unsigned>(other == mine)) continue;
+            const double higher = std::max(peakRadii[static_cast<std::size_t>(mine)],
+                                           peakRadii[static_cast<std::size_t>(other)]);
+            if (higher > most || sets.find(other) == sets.find(mine)) continue;
+            if (higher <= mergeRatio * facetCircumradius(points, tetrahedra, t, static_cast<int>(facet))) {
+                sets.unite(mine, other);
+            }
         }
     }
     SegmentLabels merged;
@@ -240,10 +297,13 @@ SegmentLabels mergeSegments(const PointCloud& points, const Tetrahedra& tetrahed
         dense[s] = static_cast<std::int32_t>(merged.peaks.size());
         merged.peaks.push_back(labels.peaks[s]);
     }
-    merged.ofTetrahedron.reserve(tetrahedra.size());
-    for (const std::int32_t segment : labels.ofTetrahedron) {
-        merged.ofTetrahedron.push_back(segment < 0 ? -1
-                                                   : dense[static_cast<std::size_t>(sets.find(segment))]);
+    for (std::size_t s = 0; s < dense.size(); ++s) {
+        dense[s] = dense[static_cast<std::size_t>(sets.find(static_cast<std::int32_t>(s)))];
+    }
+    merged.ofTetrahedron.resize(tetrahedra.size());
+    for (std::size_t t = 0; t < tetrahedra.size(); ++t) {
+        const std::int32_t segment = labels.ofTetrahedron[t];
+        merged.ofTetrahedron[t] = segment < 0 ? -1 : dense[static_cast<std::size_t>(segment)];
     }
     return merged;
 }

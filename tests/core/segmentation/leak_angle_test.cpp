@@ -36,7 +36,7 @@ std::vector<std::uint8_t> reached(const Triangulated& cloud, const std::vector<s
 
 TEST(LeakAngles, AreTheAnglesAtWhichAWalkGetsThrough) {
     for (const Triangulated& cloud : triangulatedClouds()) {
-        const auto big = bigBalls(cloud.tetrahedra, pointScales(cloud.points, cloud.tetrahedra), 0.5);
+        const auto big = bigBalls(cloud.tetrahedra, pointScales(cloud.points).value(), 0.5);
         const auto leaks = leakAngles(cloud.points, cloud.tetrahedra, big);
         ASSERT_TRUE(leaks);
         for (const double degrees : {3.0, 11.0, 22.0, 37.0, 61.0, 95.0, 140.0}) {

@@ -169,8 +169,7 @@ TEST_F(SegmentationOfShape, APointGoesWithTheLargestInnerBallAroundIt) {
     EXPECT_GT(touching, points_->size() * 9 / 10);
 }
 
-TEST_F(SegmentationOfShape, SizeIsTheLeastBoxAroundTheInterior) {
-    const Segmentation& s = *result_;
+PointCloud cornersOfInterior(const Segmentation& s) {
     std::set<std::uint32_t> used;
     for (std::size_t t = 0; t < s.tetrahedra.size(); ++t) {
         if (s.tetrahedronSegment[t] >= 0)
@@ -178,8 +177,27 @@ TEST_F(SegmentationOfShape, SizeIsTheLeastBoxAroundTheInterior) {
     }
     PointCloud inner;
     for (const std::uint32_t v : used) inner.push_back(s.sites[v]);
-    EXPECT_NEAR(s.size, *smallestBoxDiagonal(inner), 1e-3 * s.size);
+    return inner;
+}
+
+TEST_F(SegmentationOfShape, SizeIsTheLeastBoxAroundTheInterior) {
+    const Segmentation& s = *result_;
+    EXPECT_NEAR(s.size, *smallestBoxDiagonal(cornersOfInterior(s)), 1e-3 * s.size);
     EXPECT_NEAR(s.size, std::sqrt(25.0 + 4.0 + 4.0), 0.02 * s.size);
+}
+
+// Then the hull of the interior is not that of all points.
+TEST(Segmentation, SizeLeavesOutWhatSticksOutOfTheInterior) {
+    PointCloud points = sample(makeDumbbell(), 3000, 0.0, 5);
+    for (int i = 0; i < 20; ++i) {
+        for (int k = 0; k < 20; ++k) points.push_back({0.01 * k, 0.02 * k, 2.0 + 0.2 * i});
+    }
+    const auto s = segment(points, {});
+    ASSERT_TRUE(s) << s.error().message;
+    const PointCloud inner = cornersOfInterior(*s);
+    ASSERT_LT(inner.size() + 200, points.size());
+    EXPECT_NEAR(s->size, *smallestBoxDiagonal(inner), 1e-3 * s->size);
+    EXPECT_LT(s->size, 0.9 * *smallestBoxDiagonal(s->sites));
 }
 
 TEST_F(SegmentationOfShape, StagesAreTimedInOrder) {

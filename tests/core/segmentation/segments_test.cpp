@@ -49,7 +49,7 @@ const std::vector<Case>& cases() {
             made.push_back(std::move(c));
         };
         for (const Triangulated& cloud : triangulatedClouds()) {
-            const auto scales = pointScales(cloud.points, cloud.tetrahedra);
+            const auto scales = pointScales(cloud.points).value();
             add(cloud, interiorTetrahedra(cloud.points, cloud.tetrahedra,
                                           bigBalls(cloud.tetrahedra, scales, 0.5), SegmentationOptions{})
                            .value());
