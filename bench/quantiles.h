@@ -19,4 +19,12 @@ namespace shapedb::bench {
 
 [[nodiscard]] inline double median(std::vector<double> values) { return percentile(std::move(values), 0.5); }
 
+/// Median of the ratios of values measured one after the other: a machine that changes its speed from round
+/// to round moves it less than the ratio of medians. Both have as many.
+[[nodiscard]] inline double medianRatio(const std::vector<double>& of, const std::vector<double>& to) {
+    std::vector<double> ratios;
+    for (std::size_t i = 0; i < of.size(); ++i) ratios.push_back(of[i] / to[i]);
+    return median(std::move(ratios));
+}
+
 }  // namespace shapedb::bench

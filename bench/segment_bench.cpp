@@ -201,7 +201,7 @@ std::string stageTable(const Stages& stages) {
 
 std::string textOf(const Flags& flags, const Figures& f) {
     std::string text = describe(environment()) + "\n" + f.source + ": " + std::to_string(f.points) +
-                       " points, " + std::to_string(f.distinct) + " distinct; medians of " +
+                       " points, " + std::to_string(f.distinct) + " distinct; medians, of ratios too, of " +
                        std::to_string(flags.repeat) + "\n";
     if (!flags.noUndecimated) {
         text += "\nbare CGAL Delaunay, one thread: " + numberText("%.3f s, ", median(f.bare)) +
@@ -210,16 +210,15 @@ std::string textOf(const Flags& flags, const Figures& f) {
         for (const Lane& lane : f.undecimated) {
             text += "\n" + lane.profile + " profile, all points, one thread: " +
                     numberText("%.3f s, ratio_to_delaunay ", median(lane.seconds)) +
-                    numberText("%.3f; peak ", median(lane.seconds) / median(f.bare)) +
+                    numberText("%.3f; peak ", medianRatio(lane.seconds, f.bare)) +
                     numberText("%.1f MB, ", megabytes(lane.memory)) +
                     numberText("%.3f of the bare one's\n", megabytes(lane.memory) / megabytes(f.bareMemory)) +
                     stageTable(lane.stages);
         }
-        text +=
-            "\nDelaunay with " + std::to_string(flags.threads) +
-            " threads: " + numberText("%.3f s, ", median(f.parallel.many)) +
-            numberText("%.2f times as fast as with one (", median(f.parallel.one) / median(f.parallel.many)) +
-            numberText("%.3f s)\n", median(f.parallel.one));
+        text += "\nDelaunay with " + std::to_string(flags.threads) +
+                " threads: " + numberText("%.3f s, ", median(f.parallel.many)) +
+                numberText("%.2f times as fast as with one (", medianRatio(f.parallel.one, f.parallel.many)) +
+                numberText("%.3f s)\n", median(f.parallel.one));
         if (flags.cgalParallel)
             text += numberText("CGAL's parallel one: %.3f s\n", median(f.parallel.bareMany));
     }
@@ -254,7 +253,7 @@ json documentOf(const Flags& flags, const std::string& command, const Figures& f
         for (const Lane& lane : f.undecimated) {
             document["undecimated"][lane.profile] = {
                 {"seconds", median(lane.seconds)},
-                {"ratio_to_delaunay", median(lane.seconds) / median(f.bare)},
+                {"ratio_to_delaunay", medianRatio(lane.seconds, f.bare)},
                 {"tetrahedra", lane.size},
                 {"peak_megabytes", megabytes(lane.memory)},
                 {"memory_ratio_to_delaunay", megabytes(lane.memory) / megabytes(f.bareMemory)},
@@ -263,7 +262,7 @@ json documentOf(const Flags& flags, const std::string& command, const Figures& f
         document["parallel_delaunay"] = {{"threads", flags.threads},
                                          {"one_thread_seconds", median(f.parallel.one)},
                                          {"seconds", median(f.parallel.many)},
-                                         {"speed_up", median(f.parallel.one) / median(f.parallel.many)}};
+                                         {"speed_up", medianRatio(f.parallel.one, f.parallel.many)}};
         if (flags.cgalParallel) {
             document["parallel_delaunay"]["cgal_parallel_seconds"] = median(f.parallel.bareMany);
         }

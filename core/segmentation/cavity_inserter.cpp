@@ -140,10 +140,10 @@ unsigned CavityInserter::neighboursHolding(std::uint32_t cell, const Site& p) co
     const auto& neighbours = cells_[cell].neighbours;
     unsigned holding = 0;
     unsigned open = 0;
-    for (std::uint32_t i = 0; i < 4; ++i) {
-        const int holds = ballHolds(cells_.ball(neighbours[i]), p);
-        holding |= static_cast<unsigned>(holds > 0) << i;
-        open |= static_cast<unsigned>(holds == 0) << i;
+    for (std::uint32_t i = 0; i < 4; i += 2) {
+        const Held held = ballsHold(cells_.ball(neighbours[i]), cells_.ball(neighbours[i + 1]), p);
+        holding |= held.surely << i;
+        open |= held.unknown << i;
     }
     for (std::uint32_t i = 0; open != 0 && i < 4; ++i) {
         if ((open >> i & 1u) == 0 || (cells_[neighbours[i]].vertices[0] & kInCavity) != 0) continue;
@@ -256,8 +256,10 @@ void CavityInserter::placeFresh(std::uint32_t vertex) {
     }
 }
 
-// Gives the corners of the cavity numbers; false when there are too many of them.
-bool CavityInserter::numberCorners() {
+// Gives the corners of the cavity numbers; false when there are too many of them. A site's mark tells for
+// which vertex it was numbered last, and how.
+bool CavityInserter::numberCorners(std::uint32_t inserted) {
+    const std::uint64_t mark = (std::uint64_t{inserted} + 1) * kMostCorners;
     std::uint32_t count = 1;  // 0 is the vertex at infinity
     for (std::size_t f = 0; f < facetCount_; ++f) {
         Facet& facet = facets_[f];
@@ -269,12 +271,11 @@ bool CavityInserter::numberCorners() {
                 continue;
             }
             if (count == kMostCorners) return false;
-            // A number counts only if it leads back to the vertex.
-            const std::uint32_t known = sites_[vertex].number;
-            const bool fresh = known >= count || corners_[known] != vertex;
+            const std::uint64_t known = sites_[vertex].mark - mark;
+            const bool fresh = known >= kMostCorners;
+            const std::uint64_t number = fresh ? count : known;
             corners_[count] = vertex;
-            const std::uint32_t number = fresh ? count : known;
-            sites_[vertex].number = number;
+            sites_[vertex].mark = mark + number;
             count += fresh ? 1 : 0;
             facet.corners[k] = static_cast<std::uint8_t>(number);
         }
@@ -306,11 +307,20 @@ void CavityInserter::linkByTable() {
 void CavityInserter::measureBalls(const Site& p) {
     std::array<Way, kMostCorners> ways;
     for (std::uint32_t i = 1; i < cornerCount_; ++i) ways[i] = wayTo(p, sites_[corners_[i]]);
-    for (std::size_t f = 0; f < facetCount_; ++f) {
-        const auto& c = facets_[f].corners;
-        DelaunayBall& ball = cells_.ball(facets_[f].fresh);
-        ball = ballThrough(p, ways[c[0]], ways[c[1]], ways[c[2]]);
-        if (c[0] == 0 || c[1] == 0 || c[2] == 0) ball.squaredRadius = kNoBall;
+    const auto waysOf = [&](const Facet& facet) {
+        const auto& c = facet.corners;
+        return std::array<const Way*, 3>{&ways[c[0]], &ways[c[1]], &ways[c[2]]};
+    };
+    const auto dropInfinite = [&](const Facet& facet) {
+        const auto& c = facet.corners;
+        if (c[0] == 0 || c[1] == 0 || c[2] == 0) cells_.ball(facet.fresh).squaredRadius = kNoBall;
+    };
+    for (std::size_t f = 0; f < facetCount_; f += 2) {
+        const Facet& first = facets_[f];
+        const Facet& second = facets_[std::min(f + 1, facetCount_ - 1)];  // the same when there is none
+        ballsThrough(p, {waysOf(first), waysOf(second)}, cells_.ball(first.fresh), cells_.ball(second.fresh));
+        dropInfinite(first);
+        dropInfinite(second);
     }
 }
 
@@ -333,7 +343,7 @@ void CavityInserter::linkByTurning() {
 
 void CavityInserter::fillCavity(std::uint32_t vertex) {
     placeFresh(vertex);
-    if (numberCorners()) {
+    if (numberCorners(vertex)) {
         linkByTable();
         measureBalls(sites_[vertex]);
     } else {

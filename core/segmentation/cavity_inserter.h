@@ -112,7 +112,7 @@ class CavityInserter {
     void fillCavity(std::uint32_t vertex);
     void placeFresh(std::uint32_t vertex);
     void measureBalls(const Site& p);
-    bool numberCorners();
+    bool numberCorners(std::uint32_t inserted);
     void linkByTable();
     void linkByTurning();
     void linkAround(const Facet& facet, std::uint32_t j);

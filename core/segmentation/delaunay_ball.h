@@ -3,9 +3,13 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
 
+#include "core/base/pair.h"
 #include "core/segmentation/predicates.h"
 
 namespace shapedb {
@@ -33,48 +37,76 @@ struct Way {
     return {x, y, z, x * x + y * y + z * z};
 }
 
-/// The share of the squares in the comparison of ballHolds that their errors may reach. See ballThrough.
+/// The share of the squares in the comparison of ballsHold that their errors may reach. See ballsThrough.
 constexpr double kBallSlack = 1e-8;
 
-/// 1: the ball surely holds p. -1: it surely does not, nor has it p on its sphere. 0: unknown.
-[[nodiscard]] inline int ballHolds(const DelaunayBall& ball, const Site& p) {
-    const double x = ball.x - p.x, y = ball.y - p.y, z = ball.z - p.z;
-    const double squared = x * x + y * y + z * z;
-    const double within = ball.squaredRadius - squared;
-    const double slack = kBallSlack * (ball.squaredRadius + squared);
-    return static_cast<int>(within > slack) - static_cast<int>(-within > slack);
+/// What two balls say about a point; bit 0 or 1 for each.
+struct Held {
+    unsigned surely;   ///< the ball holds the point
+    unsigned unknown;  ///< it may hold it, or have it on its sphere
+};
+
+[[nodiscard]] inline Held ballsHold(const DelaunayBall& a, const DelaunayBall& b, const Site& p) {
+    const Pair x = Pair(a.x, b.x) - p.x, y = Pair(a.y, b.y) - p.y, z = Pair(a.z, b.z) - p.z;
+    const Pair squaredRadius(a.squaredRadius, b.squaredRadius);
+    const Pair squared = x * x + y * y + z * z;
+    const Pair within = squaredRadius - squared;
+    const Pair slack = Pair(kBallSlack) * (squaredRadius + squared);
+    const unsigned surely = less(slack, within);
+    const unsigned surelyNot = less(within, Pair(0.0) - slack);
+    return {surely, ~(surely | surelyNot) & 3u};
 }
 
-/// The ball with p and the ends of three ways from p on its sphere; without a radius when it would not be
-/// accurate enough.
+/// Three ways from a point, and three others from it.
+struct WaysPair {
+    std::array<Pair, 3> x;
+    std::array<Pair, 3> y;
+    std::array<Pair, 3> z;
+    std::array<Pair, 3> squared;
+
+    WaysPair(const std::array<const Way*, 3>& first, const std::array<const Way*, 3>& second) {
+        for (std::size_t i = 0; i < 3; ++i) {
+            x[i] = {first[i]->x, second[i]->x};
+            y[i] = {first[i]->y, second[i]->y};
+            z[i] = {first[i]->z, second[i]->z};
+            squared[i] = {first[i]->squared, second[i]->squared};
+        }
+    }
+};
+
+/// The balls with p and the ends of three ways from p on their spheres, for two times three; without a
+/// radius where they would not be accurate enough.
 ///
 /// With u = 2^-53, R the radius and S = |a| |b| |c|: the cross products are off by 6 u |b| |c|, so the
 /// determinant by 12 u S and the centre seen from p, whose ways are at most 2 R long, by
 /// (40 u S / det + 12 u S / det) R. Flatness is limited so that S / det < 1e5, which makes 6e-10 R. The
 /// centre is rounded at a place that is at most 1e6 R from the origin: 2e-10 R. A centre off by d moves
-/// what ballHolds compares by 2 |p - q| d, less than 2e-9 of the sum of the squares, a fifth of
+/// what ballsHold compares by 2 |p - q| d, less than 2e-9 of the sum of the squares, a fifth of
 /// kBallSlack. The limits on the determinant keep all of it clear of underflow.
-[[nodiscard]] inline DelaunayBall ballThrough(const Site& p, const Way& a, const Way& b, const Way& c) {
+inline void ballsThrough(const Site& p, const WaysPair& w, DelaunayBall& first, DelaunayBall& second) {
     constexpr double kSquaredFlatness = 1e-10;
     constexpr double kLeastSquaredDeterminant = 1e-200;
     constexpr double kSquaredNearness = 1e-12;
-    const double bcx = b.y * c.z - b.z * c.y, bcy = b.z * c.x - b.x * c.z, bcz = b.x * c.y - b.y * c.x;
-    const double cax = c.y * a.z - c.z * a.y, cay = c.z * a.x - c.x * a.z, caz = c.x * a.y - c.y * a.x;
-    const double abx = a.y * b.z - a.z * b.y, aby = a.z * b.x - a.x * b.z, abz = a.x * b.y - a.y * b.x;
-    const double det = a.x * bcx + a.y * bcy + a.z * bcz;
-    const double half = 0.5 / det;
-    DelaunayBall ball;
-    ball.x = p.x + half * (a.squared * bcx + b.squared * cax + c.squared * abx);
-    ball.y = p.y + half * (a.squared * bcy + b.squared * cay + c.squared * aby);
-    ball.z = p.z + half * (a.squared * bcz + b.squared * caz + c.squared * abz);
-    const double x = ball.x - p.x, y = ball.y - p.y, z = ball.z - p.z;
-    const double squaredRadius = x * x + y * y + z * z;
+    const auto& [x, y, z, squared] = w;
+    const Pair bcx = y[1] * z[2] - z[1] * y[2], bcy = z[1] * x[2] - x[1] * z[2],
+               bcz = x[1] * y[2] - y[1] * x[2];
+    const Pair cax = y[2] * z[0] - z[2] * y[0], cay = z[2] * x[0] - x[2] * z[0],
+               caz = x[2] * y[0] - y[2] * x[0];
+    const Pair abx = y[0] * z[1] - z[0] * y[1], aby = z[0] * x[1] - x[0] * z[1],
+               abz = x[0] * y[1] - y[0] * x[1];
+    const Pair det = x[0] * bcx + y[0] * bcy + z[0] * bcz;
+    const Pair half = Pair(0.5) / det;
+    const Pair cx = Pair(p.x) + half * (squared[0] * bcx + squared[1] * cax + squared[2] * abx);
+    const Pair cy = Pair(p.y) + half * (squared[0] * bcy + squared[1] * cay + squared[2] * aby);
+    const Pair cz = Pair(p.z) + half * (squared[0] * bcz + squared[1] * caz + squared[2] * abz);
+    const Pair fromX = cx - p.x, fromY = cy - p.y, fromZ = cz - p.z;
+    const Pair squaredRadius = fromX * fromX + fromY * fromY + fromZ * fromZ;
     const double reach = most(std::abs(p.x), std::abs(p.y), std::abs(p.z));
-    const bool accurate = det * det > kSquaredFlatness * a.squared * b.squared * c.squared &&
-                          det * det > kLeastSquaredDeterminant &&
-                          squaredRadius > kSquaredNearness * reach * reach;
-    ball.squaredRadius = accurate ? squaredRadius : kNoBall;
-    return ball;
+    const unsigned accurate = less(Pair(kSquaredFlatness) * squared[0] * squared[1] * squared[2], det * det) &
+                              less(kLeastSquaredDeterminant, det * det) &
+                              less(kSquaredNearness * reach * reach, squaredRadius);
+    first = {cx.low(), cy.low(), cz.low(), (accurate & 1u) != 0 ? squaredRadius.low() : kNoBall};
+    second = {cx.high(), cy.high(), cz.high(), (accurate & 2u) != 0 ? squaredRadius.high() : kNoBall};
 }
 
 }  // namespace shapedb

@@ -15,7 +15,7 @@ struct alignas(32) Site {
     double x = 0.0;
     double y = 0.0;
     double z = 0.0;
-    std::uint32_t number = 0;  ///< scratch of whoever inserts around this site
+    std::uint64_t mark = 0;  ///< scratch of whoever inserts around this site
 };
 
 inline bool samePlace(const Site& a, const Site& b) { return a.x == b.x && a.y == b.y && a.z == b.z; }

@@ -1,6 +1,8 @@
 #include "core/segmentation/delaunay_ball.h"
 
+#include <array>
 #include <cmath>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -9,6 +11,22 @@
 
 namespace shapedb {
 namespace {
+
+DelaunayBall ballThrough(const Site& p, const Site& a, const Site& b, const Site& c) {
+    const std::array<Way, 3> ways = {wayTo(p, a), wayTo(p, b), wayTo(p, c)};
+    const std::array<const Way*, 3> three = {&ways[0], &ways[1], &ways[2]};
+    DelaunayBall ball;
+    DelaunayBall again;
+    ballsThrough(p, {three, three}, ball, again);
+    return ball;
+}
+
+// 1: surely. -1: surely not. 0: unknown.
+int holds(const DelaunayBall& ball, const Site& p) {
+    const Held held = ballsHold(ball, ball, p);
+    EXPECT_EQ(held.surely & held.unknown, 0U);
+    return held.surely != 0 ? 1 : held.unknown != 0 ? 0 : -1;
+}
 
 struct Tally {
     int judged = 0;
@@ -20,8 +38,8 @@ struct Tally {
 void judge(const Site& p, const Site& a, const Site& b, const Site& c, const Site& query, Tally& tally) {
     const int sense = orientation(p, a, b, c);
     if (sense == 0) return;
-    const DelaunayBall ball = ballThrough(p, wayTo(p, a), wayTo(p, b), wayTo(p, c));
-    const int quick = ballHolds(ball, query);
+    const DelaunayBall ball = ballThrough(p, a, b, c);
+    const int quick = holds(ball, query);
     const int exact = sense > 0 ? exactSideOfSphere(p, a, b, c, query) : exactSideOfSphere(p, b, a, c, query);
     ++tally.judged;
     tally.open += quick == 0 ? 1 : 0;
@@ -84,7 +102,38 @@ TEST(DelaunayBall, SaysNothingWhereDoublesEnd) {
         EXPECT_EQ(tally.wrong, 0) << scale;
     }
     DelaunayBall none{0.0, 0.0, 0.0, kNoBall};
-    EXPECT_EQ(ballHolds(none, {1.0, 2.0, 3.0}), 0);
+    EXPECT_EQ(holds(none, {1.0, 2.0, 3.0}), 0);
+}
+
+// Two together as each with itself, in either place.
+TEST(DelaunayBall, OfTwoAreThoseOfEach) {
+    Random random(3);
+    for (int i = 0; i < 2000; ++i) {
+        const Site p = siteNear(random, {}, 1.0);
+        std::vector<Site> ends;
+        for (int k = 0; k < 6; ++k) ends.push_back(siteNear(random, p, i % 3 == 0 ? 1e-6 : 1.0));
+        if (i % 5 == 0)
+            ends[5] = {2.0 * ends[3].x - p.x, 2.0 * ends[3].y - p.y, 2.0 * ends[3].z - p.z};  // flat
+        std::vector<Way> ways;
+        for (const Site& end : ends) ways.push_back(wayTo(p, end));
+        const std::array<DelaunayBall, 2> each = {ballThrough(p, ends[0], ends[1], ends[2]),
+                                                  ballThrough(p, ends[3], ends[4], ends[5])};
+        std::array<DelaunayBall, 2> both;
+        ballsThrough(p, {{&ways[0], &ways[1], &ways[2]}, {&ways[3], &ways[4], &ways[5]}}, both[0], both[1]);
+        const Site query = siteNear(random, p, 1.0);
+        const Held held = ballsHold(each[0], each[1], query);
+        for (std::size_t k = 0; k < 2; ++k) {
+            ASSERT_EQ(std::isnan(both[k].squaredRadius), std::isnan(each[k].squaredRadius)) << i;
+            const int expected = holds(each[k], query);
+            ASSERT_EQ((held.surely >> k & 1u) != 0, expected > 0) << i;
+            ASSERT_EQ((held.unknown >> k & 1u) != 0, expected == 0) << i;
+            if (std::isnan(each[k].squaredRadius)) continue;
+            ASSERT_EQ(both[k].squaredRadius, each[k].squaredRadius) << i;
+            ASSERT_EQ(both[k].x, each[k].x) << i;
+            ASSERT_EQ(both[k].y, each[k].y) << i;
+            ASSERT_EQ(both[k].z, each[k].z) << i;
+        }
+    }
 }
 
 }  // namespace
