@@ -76,32 +76,48 @@ struct Spreads {
 
 Eigen::Vector3d toEigen(const Point3& p) { return {p.x, p.y, p.z}; }
 
+// The spreads of one neighbourhood, the sample's `place`-th.
+void measureSpread(const PointCloud& points, std::uint32_t centre, const std::vector<Neighbour>& found,
+                   std::size_t place, Spreads& spreads) {
+    Eigen::Vector3d first = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
+    std::size_t next = 0;
+    for (std::size_t s = 0; s < spreads.sizes; ++s) {
+        for (; next < kNeighbourhoods[s]; ++next) {
+            const Eigen::Vector3d d = toEigen(points[found[next].point] - points[centre]);
+            first += d;
+            second += d * d.transpose();
+        }
+        const double n = static_cast<double>(next);
+        Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+        solver.computeDirect(second / n - first * first.transpose() / (n * n), Eigen::EigenvaluesOnly);
+        // Three degrees of freedom went into the plane.
+        spreads.across[s][place] = std::sqrt(std::max(0.0, solver.eigenvalues()[0]) * n / (n - 3.0));
+        spreads.along[s][place] = std::sqrt(std::max(0.0, solver.eigenvalues()[1]));
+    }
+}
+
 Spreads measureSpreads(const PointCloud& points, const NeighbourIndex& index) {
     Spreads spreads;
     while (spreads.sizes < kNeighbourhoods.size() && kNeighbourhoods[spreads.sizes] <= points.size() / 2) {
         ++spreads.sizes;
     }
     if (spreads.sizes == 0) return spreads;
-    std::vector<Neighbour> found;
-    for (const std::uint32_t centre : samplePoints(points)) {
-        index.nearest(points[centre], kNeighbourhoods[spreads.sizes - 1], found);
-        Eigen::Vector3d first = Eigen::Vector3d::Zero();
-        Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
-        std::size_t next = 0;
-        for (std::size_t s = 0; s < spreads.sizes; ++s) {
-            for (; next < kNeighbourhoods[s]; ++next) {
-                const Eigen::Vector3d d = toEigen(points[found[next].point] - points[centre]);
-                first += d;
-                second += d * d.transpose();
-            }
-            const double n = static_cast<double>(next);
-            Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
-            solver.computeDirect(second / n - first * first.transpose() / (n * n), Eigen::EigenvaluesOnly);
-            // Three degrees of freedom went into the plane.
-            spreads.across[s].push_back(std::sqrt(std::max(0.0, solver.eigenvalues()[0]) * n / (n - 3.0)));
-            spreads.along[s].push_back(std::sqrt(std::max(0.0, solver.eigenvalues()[1])));
-        }
+    const std::vector<std::uint32_t> sample = samplePoints(points);
+    for (std::size_t s = 0; s < spreads.sizes; ++s) {
+        spreads.across[s].resize(sample.size());
+        spreads.along[s].resize(sample.size());
     }
+    constexpr std::size_t kSamplesAtOnce = 16;
+    const auto measure = [&](std::size_t from, std::size_t to) {
+        std::vector<Neighbour> found;
+        for (std::size_t i = from; i < to; ++i) {
+            index.nearest(points[sample[i]], kNeighbourhoods[spreads.sizes - 1], found);
+            measureSpread(points, sample[i], found, i, spreads);
+        }
+    };
+    // Nothing can stop it: there is no context.
+    static_cast<void>(forEachRange(sample.size(), kSamplesAtOnce, {}, measure));
     return spreads;
 }
 

@@ -3,11 +3,16 @@
 #include <algorithm>
 #include <numeric>
 
+#include <tbb/parallel_invoke.h>
+#include <tbb/task_arena.h>
+
 namespace shapedb {
 
 namespace {
 
 constexpr std::uint32_t kLeafSize = 10;
+// Two threads are no quicker with fewer points.
+constexpr std::uint32_t kLeastParallel = 4096;
 
 double coordinate(const Point3& p, int axis) { return axis == 0 ? p.x : axis == 1 ? p.y : p.z; }
 
@@ -31,15 +36,37 @@ int widestAxis(const PointCloud& points, const std::uint32_t* begin, const std::
 NeighbourIndex::NeighbourIndex(const PointCloud& points) : indices_(points.size()) {
     std::iota(indices_.begin(), indices_.end(), 0u);
     if (points.empty()) return;
-    build(points, 0, static_cast<std::uint32_t>(points.size()));
+    const auto count = static_cast<std::uint32_t>(points.size());
+    nodes_.resize(nodesFor(count));
+    // Isolated: a thread that waits for the other half must not begin work of its caller's caller.
+    tbb::this_task_arena::isolate([&] { build(points, 0, 0, count); });
     points_.reserve(points.size());
     for (const std::uint32_t i : indices_) points_.push_back(points[i]);
 }
 
-std::uint32_t NeighbourIndex::build(const PointCloud& points, std::uint32_t begin, std::uint32_t end) {
-    const auto at = static_cast<std::uint32_t>(nodes_.size());
-    nodes_.push_back({0.0, begin, end, 0, 0});
-    if (end - begin <= kLeafSize) return at;
+// The nodes of so many points: the tree depends on nothing else.
+std::uint32_t NeighbourIndex::nodesFor(std::uint32_t count) {
+    // On each level nodes have `size` points or one more.
+    std::uint32_t nodes = 0;
+    std::uint32_t size = count, smaller = 1, larger = 0;
+    for (;;) {
+        nodes += smaller + larger;
+        if (size + 1 <= kLeafSize) return nodes;
+        // Nodes of `size` points may be leaves when others are not.
+        if (size <= kLeafSize) return nodes + 2 * larger;
+        const bool even = size % 2 == 0;
+        const std::uint32_t halves = even ? 2 * smaller + larger : smaller;
+        larger = even ? larger : smaller + 2 * larger;
+        smaller = halves;
+        size /= 2;
+    }
+}
+
+// Fills node `at` and those under it, which follow it.
+void NeighbourIndex::build(const PointCloud& points, std::uint32_t at, std::uint32_t begin,
+                           std::uint32_t end) {
+    nodes_[at] = {0.0, begin, end, 0, 0};
+    if (end - begin <= kLeafSize) return;
     const int axis = widestAxis(points, indices_.data() + begin, indices_.data() + end);
     const std::uint32_t middle = begin + (end - begin) / 2;
     std::nth_element(indices_.begin() + begin, indices_.begin() + middle, indices_.begin() + end,
@@ -48,13 +75,18 @@ std::uint32_t NeighbourIndex::build(const PointCloud& points, std::uint32_t begi
                          const double y = coordinate(points[b], axis);
                          return x != y ? x < y : a < b;
                      });
-    const double split = coordinate(points[indices_[middle]], axis);
-    build(points, begin, middle);
-    const std::uint32_t right = build(points, middle, end);
-    nodes_[at].split = split;
+    const std::uint32_t right = at + 1 + nodesFor(middle - begin);
+    nodes_[at].split = coordinate(points[indices_[middle]], axis);
     nodes_[at].right = right;
     nodes_[at].axis = static_cast<std::uint8_t>(axis);
-    return at;
+    const auto left = [&] { build(points, at + 1, begin, middle); };
+    const auto rest = [&] { build(points, right, middle, end); };
+    if (end - begin < kLeastParallel) {
+        left();
+        rest();
+    } else {
+        tbb::parallel_invoke(left, rest);
+    }
 }
 
 // `offset` is the vector from the query to the cell of `node`, `squared` its squared length.

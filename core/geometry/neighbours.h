@@ -23,7 +23,7 @@ struct Neighbour {
 /// once built, so any number of threads may ask at once. Keeps its own copy of the points.
 class NeighbourIndex {
   public:
-    /// O(n log n). Points must be finite and at most 2^32 - 1.
+    /// O(n log n), on the threads of the caller's arena. Points must be finite and at most 2^32 - 1.
     explicit NeighbourIndex(const PointCloud& points);
 
     /// The `count` points nearest to `query` (fewer when there are fewer), nearest first, into
@@ -46,7 +46,8 @@ class NeighbourIndex {
         std::uint8_t axis = 0;
     };
 
-    std::uint32_t build(const PointCloud& points, std::uint32_t begin, std::uint32_t end);
+    static std::uint32_t nodesFor(std::uint32_t count);
+    void build(const PointCloud& points, std::uint32_t at, std::uint32_t begin, std::uint32_t end);
     template <typename Visit, typename Reach>
     void search(std::uint32_t node, const Point3& query, Point3 offset, double squared, Visit& visit,
                 Reach& reach) const;

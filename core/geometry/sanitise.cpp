@@ -7,6 +7,8 @@
 #include <numeric>
 #include <string>
 
+#include "core/base/large_block.h"
+
 namespace shapedb {
 
 namespace {
@@ -115,11 +117,12 @@ struct Placed {
     Point3 at;
     std::uint32_t index = 0;
 };
+using PlacedPoints = LargeVector<Placed>;  // goes back to the system at once
 
 // By coordinates, equal points by index. First into slices along x, as many as points, then each slice
 // by itself: linear time unless most points share a few values of x.
-std::vector<Placed> lexicographicallySorted(const PointCloud& points) {
-    std::vector<Placed> sorted(points.size());
+PlacedPoints lexicographicallySorted(const PointCloud& points) {
+    PlacedPoints sorted(points.size());
     if (points.empty()) return sorted;
     const Box box = axisAlignedBox(points);
     const double extent = box.high.x - box.low.x;
@@ -150,7 +153,7 @@ std::vector<Placed> lexicographicallySorted(const PointCloud& points) {
 }  // namespace
 
 MergedPoints mergeDuplicates(const PointCloud& points) {
-    const std::vector<Placed> sorted = lexicographicallySorted(points);
+    const PlacedPoints sorted = lexicographicallySorted(points);
     MergedPoints merged;
     merged.points.reserve(points.size());
     merged.siteOfPoint.resize(points.size());

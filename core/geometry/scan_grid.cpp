@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <new>
-#include <numeric>
 #include <string>
+#include <type_traits>
 #include <utility>
 
 #include "core/base/fetch.h"
+#include "core/base/keyed.h"
 #include "core/base/parallel.h"
 #include "core/geometry/decimate.h"
 #include "core/geometry/interleave.h"
@@ -27,8 +28,12 @@ constexpr std::uint64_t kLowMask = (std::uint64_t{1} << kLowBits) - 1;
 
 constexpr std::size_t kCellsPerTarget = 8;
 constexpr std::size_t kPointsBetweenCheckpoints = 1 << 16;
-// Fewer points are not worth a grid of their own.
-constexpr std::size_t kLeastStretch = 1 << 17;
+// A stretch with fewer points for each cell it may fill costs more to merge than it saves.
+constexpr std::size_t kPointsPerCell = 4;
+// A sample that tells how fine the grid will be; most often all points when they are as few.
+constexpr std::size_t kSampledPerCell = 3;
+// Of an axis, when a cell is to have a code of 32 bits: enough unless points lie close together.
+constexpr int kShortCodeBits = 10;
 constexpr std::uint32_t kFree = 0xffffffffu;
 
 using Steps = std::array<std::uint64_t, 3>;
@@ -118,16 +123,16 @@ class Grid {
 
     // Orders the cells by their keys, which no order of points decides. Returns their new numbers.
     std::vector<std::uint32_t> sort() {
-        std::vector<std::uint32_t> order(cells_.size());
-        std::iota(order.begin(), order.end(), 0u);
-        std::sort(order.begin(), order.end(),
-                  [this](std::uint32_t a, std::uint32_t b) { return cells_[a].key < cells_[b].key; });
+        LargeVector<Keyed> order;
+        order.reserve(cells_.size());
+        for (std::uint32_t c = 0; c < cells_.size(); ++c) order.push_back({cells_[c].key, c});
+        sortByKey(order);
         std::vector<GridCell> ordered;
         std::vector<std::uint32_t> renumbered(order.size());
         ordered.reserve(order.size());
-        for (const std::uint32_t cell : order) {
-            renumbered[cell] = static_cast<std::uint32_t>(ordered.size());
-            ordered.push_back(cells_[cell]);
+        for (const Keyed& cell : order) {
+            renumbered[cell.index] = static_cast<std::uint32_t>(ordered.size());
+            ordered.push_back(cells_[cell.index]);
         }
         cells_ = std::move(ordered);
         return renumbered;
@@ -248,13 +253,21 @@ Result<void> fill(Stretch& stretch, const PointCloud& scan, const Frame& frame, 
     return {};
 }
 
+// How fine a grid is, and about how many cells it has then.
+struct Fineness {
+    int bits = 0;
+    std::size_t cells = 0;
+};
+
 // Puts every point into its cell, a stretch to each thread.
-Result<Grid> fillAll(const PointCloud& scan, const Frame& frame, std::size_t limit, int bits,
+Result<Grid> fillAll(const PointCloud& scan, const Frame& frame, std::size_t limit, const Fineness& expected,
                      const RunContext& context, std::vector<std::uint32_t>& cellOfPoint) {
-    const std::size_t parts = std::min(threadsOfArena(), scan.size() / kLeastStretch + 1);
+    const std::size_t worthwhile = scan.size() / (kPointsPerCell * expected.cells);
+    const std::size_t parts = std::clamp<std::size_t>(worthwhile, 1, threadsOfArena());
     std::vector<Stretch> stretches;
     for (std::size_t k = 0; k < parts; ++k) {
-        stretches.push_back({k * scan.size() / parts, (k + 1) * scan.size() / parts, Grid(limit, bits)});
+        stretches.push_back(
+            {k * scan.size() / parts, (k + 1) * scan.size() / parts, Grid(limit, expected.bits)});
     }
     std::vector<Result<void>> done(parts);
     const auto all = forEachRange(parts, 1, context, [&](std::size_t k, std::size_t) {
@@ -268,32 +281,57 @@ Result<Grid> fillAll(const PointCloud& scan, const Frame& frame, std::size_t lim
     return std::move(stretches[0].grid);
 }
 
-// The finest grid in which a sample stays within the limit. The whole scan occupies no fewer cells, so its
-// own finest is no finer: starting here saves most coarsening and changes nothing.
-int finestOfSample(const PointCloud& scan, const Frame& frame, std::size_t limit) {
+// The cells of every step-th point in a grid of so many bits, each as one number: three bits to a level, the
+// coarsest first.
+template <typename Code>
+LargeVector<Code> cellCodes(const PointCloud& scan, const Frame& frame, std::size_t step, int bits) {
     const double inverse = 1.0 / frame.unit;
-    const std::size_t step = std::max<std::size_t>(1, scan.size() / (limit + limit / 4 + 1));
-    std::vector<std::uint64_t> codes;
-    codes.reserve(scan.size() / step + 1);
-    for (std::size_t i = 0; i < scan.size(); i += step) {
-        const Steps s = stepsOf(scan[i], frame, inverse);
-        codes.push_back(everyThirdBit(finestIndex(s[0])) << 2 | everyThirdBit(finestIndex(s[1])) << 1 |
-                        everyThirdBit(finestIndex(s[2])));
-    }
-    std::sort(codes.begin(), codes.end());
-    // Sorted codes part where their highest different bits are: three bits to a level.
+    LargeVector<Code> codes((scan.size() + step - 1) / step);
+    constexpr std::size_t kBlock = 1 << 14;
+    // Nothing can stop it: there is no context.
+    static_cast<void>(forEachRange(codes.size(), kBlock, {}, [&](std::size_t from, std::size_t to) {
+        for (std::size_t i = from; i < to; ++i) {
+            const Steps s = stepsOf(scan[i * step], frame, inverse);
+            const auto code = [&](std::size_t axis) {
+                return everyThirdBit(finestIndex(s[axis]) >> (kFinestBits - bits));
+            };
+            codes[i] = static_cast<Code>(code(0) << 2 | code(1) << 1 | code(2));
+        }
+    }));
+    return codes;
+}
+
+// The finest grid, of up to so many bits, in which every step-th point stays within the limit.
+template <typename Code>
+Fineness finestOfSample(const PointCloud& scan, const Frame& frame, std::size_t limit, std::size_t step,
+                        int mostBits) {
+    static_assert(std::is_unsigned_v<Code>);
+    LargeVector<Code> codes = cellCodes<Code>(scan, frame, step, mostBits);
+    sortNumbers(codes);
+    // Sorted codes part where their highest different bits are.
     std::array<std::size_t, kFinestBits + 1> parted{};
     for (std::size_t i = 1; i < codes.size(); ++i) {
-        int level = kFinestBits;
-        for (std::uint64_t rest = (codes[i] ^ codes[i - 1]) >> 3; rest != 0; rest >>= 3) --level;
-        if (codes[i] != codes[i - 1]) ++parted[static_cast<std::size_t>(level)];
+        const Code differing = codes[i] ^ codes[i - 1];
+        int level = mostBits;
+        for (Code rest = differing >> 3; rest != 0; rest >>= 3) --level;
+        if (differing != 0) ++parted[static_cast<std::size_t>(level)];
     }
-    std::size_t cells = 1 + parted[0];
-    int bits = 0;
-    while (bits < kFinestBits && cells + parted[static_cast<std::size_t>(bits) + 1] <= limit) {
-        cells += parted[static_cast<std::size_t>(++bits)];
+    Fineness finest{0, 1};
+    while (finest.bits < mostBits) {
+        const std::size_t finer = finest.cells + parted[static_cast<std::size_t>(finest.bits) + 1];
+        if (finer > limit) break;
+        finest = {finest.bits + 1, finer};
     }
-    return bits;
+    return finest;
+}
+
+// Where to begin: in a grid no coarser than that of all points in the end. All occupy no fewer cells than
+// some of them, so their finest is no finer than that of a sample.
+Fineness finestToTry(const PointCloud& scan, const Frame& frame, std::size_t limit) {
+    const std::size_t step = std::max<std::size_t>(1, scan.size() / (kSampledPerCell * limit));
+    const auto finest = finestOfSample<std::uint32_t>(scan, frame, limit, step, kShortCodeBits);
+    if (finest.bits < kShortCodeBits) return finest;
+    return finestOfSample<std::uint64_t>(scan, frame, limit, step, kFinestBits);
 }
 
 Result<std::optional<GriddedScan>> gridScanOrThrow(const PointCloud& scan, std::size_t target,
@@ -302,7 +340,7 @@ Result<std::optional<GriddedScan>> gridScanOrThrow(const PointCloud& scan, std::
     if (!frame) return fail(frame.error());
     const std::size_t limit = kCellsPerTarget * target;
     std::vector<std::uint32_t> siteOfPoint(scan.size());
-    auto grid = fillAll(scan, *frame, limit, finestOfSample(scan, *frame, limit), context, siteOfPoint);
+    auto grid = fillAll(scan, *frame, limit, finestToTry(scan, *frame, limit), context, siteOfPoint);
     if (!grid) return fail(grid.error());
     if (grid->cells().size() <= target) return std::optional<GriddedScan>();
     const std::vector<std::uint32_t> sorted = grid->sort();

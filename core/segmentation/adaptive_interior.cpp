@@ -3,7 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <utility>
+
+#include <tbb/parallel_invoke.h>
+#include <tbb/task_arena.h>
 
 #include "core/segmentation/inside_potential.h"
 #include "core/segmentation/leak_angle.h"
@@ -229,12 +233,19 @@ const char* interiorSourceName(InteriorSource source) noexcept {
 Result<AdaptiveInterior> adaptiveInterior(const PointCloud& points, const Tetrahedra& tetrahedra,
                                           const std::vector<std::uint8_t>& big,
                                           const std::vector<double>& scales, const RunContext& context) {
-    const Judge judge(points, tetrahedra, scales);
+    std::optional<Judge> made;
+    std::optional<Result<std::vector<double>>> angles;
+    // Isolated: a thread that waits for the other must not begin work of its caller's caller.
+    tbb::this_task_arena::isolate([&] {
+        tbb::parallel_invoke([&] { made.emplace(points, tetrahedra, scales); },
+                             [&] { angles.emplace(leakAngles(points, tetrahedra, big, context)); });
+    });
+    const Judge& judge = *made;
+    const Result<std::vector<double>>& leaks = *angles;
+    if (!leaks) return fail(leaks.error());
     const auto trimmed = [&](Candidate candidate, double leastWidth) {
         return withoutWebs(points, tetrahedra, scales, judge, leastWidth, std::move(candidate));
     };
-    const auto leaks = leakAngles(points, tetrahedra, big, context);
-    if (!leaks) return fail(leaks.error());
     Candidate preferred = judge.judged(leftByWalk(big, *leaks, kAngles[0]));
     // No other interior costs less than nothing, so none can be clearly better than this one.
     if (preferred.parted >= kLeastParted && preferred.cost() <= kTolerance) {

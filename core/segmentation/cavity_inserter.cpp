@@ -63,7 +63,7 @@ std::uint32_t CellStore::take(std::uint32_t count) {
     return kNoCell;
 }
 
-CavityInserter::CavityInserter(std::vector<Site>& sites, CellStore& cells, const VertexRange& range,
+CavityInserter::CavityInserter(LargeVector<Site>& sites, CellStore& cells, const VertexRange& range,
                                std::uint32_t start)
     : sites_(sites),
       cells_(cells),

@@ -78,7 +78,7 @@ enum class Insertion {
 class CavityInserter {
   public:
     /// `start`: a cell of `range`, where the first walk begins.
-    CavityInserter(std::vector<Site>& sites, CellStore& cells, const VertexRange& range, std::uint32_t start);
+    CavityInserter(LargeVector<Site>& sites, CellStore& cells, const VertexRange& range, std::uint32_t start);
 
     /// Inserts the site `vertex`, which must be in range.
     Insertion insert(std::uint32_t vertex);
@@ -117,7 +117,7 @@ class CavityInserter {
     void linkByTurning();
     void linkAround(const Facet& facet, std::uint32_t j);
 
-    std::vector<Site>& sites_;
+    LargeVector<Site>& sites_;
     CellStore& cells_;
     VertexRange range_;
     bool alone_;  // everything is in range

@@ -40,7 +40,7 @@ std::uint64_t hilbertIndex(std::array<std::uint32_t, 3> x) {
     return everyThirdBit(x[0]) << 2 | everyThirdBit(x[1]) << 1 | everyThirdBit(x[2]);
 }
 
-std::vector<Keyed> keysOf(const PointCloud& points) {
+LargeVector<Keyed> keysOf(const PointCloud& points) {
     Point3 low = points.front();
     Point3 high = low;
     for (const Point3& p : points) {
@@ -51,7 +51,7 @@ std::vector<Keyed> keysOf(const PointCloud& points) {
     const double last = (1u << kBits) - 1;
     const double steps = extent > 0.0 && std::isfinite(extent) ? last / extent : 0.0;
     const auto step = [=](double v) { return static_cast<std::uint32_t>(std::min(last, v * steps)); };
-    std::vector<Keyed> keyed(points.size());
+    LargeVector<Keyed> keyed(points.size());
     // Nothing can stop it: there is no context.
     static_cast<void>(forEachRange(points.size(), kBlock, {}, [&](std::size_t from, std::size_t to) {
         for (std::size_t i = from; i < to; ++i) {
@@ -66,7 +66,7 @@ std::vector<Keyed> keysOf(const PointCloud& points) {
 
 std::vector<std::uint32_t> curveOrder(const PointCloud& points) {
     if (points.empty()) return {};
-    std::vector<Keyed> keyed = keysOf(points);
+    LargeVector<Keyed> keyed = keysOf(points);
     sortByKey(keyed);
     std::vector<std::uint32_t> order(points.size());
     for (std::size_t i = 0; i < order.size(); ++i) order[i] = keyed[i].index;

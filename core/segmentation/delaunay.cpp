@@ -198,7 +198,7 @@ Result<Tetrahedra> triangulateOrThrow(const PointCloud& points, const RunContext
     Tetrahedra flat;
     {
         CellStore cells;
-        std::vector<Site> sites(points.size());
+        LargeVector<Site> sites(points.size());
         for (std::size_t i = 0; i < sites.size(); ++i) {
             const Point3& p = points[order[i]];
             sites[i] = {p.x, p.y, p.z};
@@ -209,7 +209,7 @@ Result<Tetrahedra> triangulateOrThrow(const PointCloud& points, const RunContext
             }
             return fail(done.error());
         }
-        sites = {};
+        LargeVector<Site>().swap(sites);  // only so is its memory free
         auto flattened = flatten(cells, order, context);
         if (!flattened) return flattened;
         flat = std::move(*flattened);

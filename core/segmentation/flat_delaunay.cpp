@@ -84,7 +84,7 @@ struct Share {
 
 class Builder {
   public:
-    Builder(std::vector<Site>& sites, CellStore& cells, std::size_t threads, const RunContext& context)
+    Builder(LargeVector<Site>& sites, CellStore& cells, std::size_t threads, const RunContext& context)
         : sites_(sites), cells_(cells), threads_(std::max<std::size_t>(threads, 1)), context_(context) {}
 
     Result<void> build() {
@@ -120,7 +120,7 @@ class Builder {
     void work(Share& share, std::thread::id reporter);
     std::uint32_t cellWithin(const VertexRange& range) const;
 
-    std::vector<Site>& sites_;
+    LargeVector<Site>& sites_;
     CellStore& cells_;
     std::size_t threads_;
     const RunContext& context_;
@@ -281,7 +281,7 @@ void Builder::work(Share& share, std::thread::id reporter) {
 
 }  // namespace
 
-Result<void> insertAll(std::vector<Site>& sites, CellStore& cells, std::size_t threads,
+Result<void> insertAll(LargeVector<Site>& sites, CellStore& cells, std::size_t threads,
                        const RunContext& context) {
     return Builder(sites, cells, threads, context).build();
 }

@@ -20,7 +20,7 @@ constexpr std::size_t kLeastParallelPoints = 50000;
 ///
 /// Errors: kCoplanar, kCollinear, kTooFewPoints (exactly so); kInternal when two sites are at the same
 /// place; kCancelled, kDeadlineExceeded; kOutOfMemory. May throw std::bad_alloc.
-[[nodiscard]] Result<void> insertAll(std::vector<Site>& sites, CellStore& cells, std::size_t threads,
+[[nodiscard]] Result<void> insertAll(LargeVector<Site>& sites, CellStore& cells, std::size_t threads,
                                      const RunContext& context);
 
 }  // namespace shapedb

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/base/fetch.h"
 
@@ -10,7 +11,9 @@ namespace shapedb {
 namespace {
 
 constexpr double kRadiansPerDegree = 3.14159265358979323846 / 180.0;
-constexpr std::size_t kStepsBetweenCheckpoints = 1 << 16;
+// How many steps before it is read memory at random is asked for; and what leads to such memory.
+constexpr std::size_t kAhead = 8;
+constexpr std::size_t kFarAhead = 16;
 
 // The three corners of facet i.
 std::array<Point3, 3> facetCorners(const PointCloud& points, const std::array<std::uint32_t, 4>& vertices,
@@ -83,6 +86,41 @@ class DeepAngle {
     double squaredCosine_;
 };
 
+// What the walk reaches from there is no longer inside. In which order makes no difference: layer by layer,
+// so that memory can be asked for before it is read.
+Result<void> walkFrom(std::vector<std::uint32_t> layer, const PointCloud& points,
+                      const Tetrahedra& tetrahedra, const DeepAngle& deep, const RunContext& context,
+                      std::vector<std::uint8_t>& inside) {
+    while (!layer.empty()) {
+        if (auto go = context.checkpoint(); !go) return go;
+        std::vector<std::uint32_t> following;
+        for (std::size_t i = 0; i < layer.size(); ++i) {
+            if (i + kFarAhead < layer.size()) {
+                fetch(&tetrahedra.neighbours[layer[i + kFarAhead]]);
+                fetch(&tetrahedra.vertices[layer[i + kFarAhead]]);
+            }
+            if (i + kAhead < layer.size()) {
+                for (const std::uint32_t next : tetrahedra.neighbours[layer[i + kAhead]]) {
+                    fetch(inside.data() + next);
+                    fetch(tetrahedra.circumcentres.data() + next);
+                }
+            }
+            const std::uint32_t t = layer[i];
+            for (std::size_t facet = 0; facet < 4; ++facet) {
+                const std::uint32_t next = tetrahedra.neighbours[t][facet];
+                if (next == kNoTetrahedron || !inside[next]) continue;
+                const Point3& shared = points[tetrahedra.vertices[t][(facet + 1) % 4]];
+                if (!deep.between(tetrahedra.circumcentres[t], tetrahedra.circumcentres[next], shared))
+                    continue;
+                inside[next] = 0;
+                following.push_back(next);
+            }
+        }
+        layer = std::move(following);
+    }
+    return {};
+}
+
 }  // namespace
 
 Result<std::vector<std::uint8_t>> interiorTetrahedra(const PointCloud& points, const Tetrahedra& tetrahedra,
@@ -92,33 +130,19 @@ Result<std::vector<std::uint8_t>> interiorTetrahedra(const PointCloud& points, c
     const DeepAngle deep(options.deepAngleDegrees * kRadiansPerDegree);
     const double cosHullAngle = std::cos(options.hullAngleDegrees * kRadiansPerDegree);
     std::vector<std::uint8_t> inside = big;
-    std::vector<std::uint32_t> stack;
+    std::vector<std::uint32_t> layer;
     for (std::size_t t = 0; t < tetrahedra.size(); ++t) {
         if (!big[t]) continue;
         for (int facet = 0; facet < 4; ++facet) {
             if (tetrahedra.neighbours[t][static_cast<std::size_t>(facet)] != kNoTetrahedron) continue;
             if (!opensToOutside(points, tetrahedra, t, facet, cosHullAngle)) continue;
             inside[t] = 0;
-            stack.push_back(static_cast<std::uint32_t>(t));
+            layer.push_back(static_cast<std::uint32_t>(t));
             break;
         }
     }
-    for (std::size_t steps = 1; !stack.empty(); ++steps) {
-        if (steps % kStepsBetweenCheckpoints == 0) {
-            if (auto go = context.checkpoint(); !go) return fail(go.error());
-        }
-        const std::uint32_t t = stack.back();
-        stack.pop_back();
-        for (std::size_t facet = 0; facet < 4; ++facet) {
-            const std::uint32_t next = tetrahedra.neighbours[t][facet];
-            if (next == kNoTetrahedron || !inside[next]) continue;
-            const Point3& shared = points[tetrahedra.vertices[t][(facet + 1) % 4]];
-            if (!deep.between(tetrahedra.circumcentres[t], tetrahedra.circumcentres[next], shared)) continue;
-            inside[next] = 0;
-            stack.push_back(next);
-            fetch(&tetrahedra.neighbours[next]);
-            fetch(&tetrahedra.vertices[next]);
-        }
+    if (auto done = walkFrom(std::move(layer), points, tetrahedra, deep, context, inside); !done) {
+        return fail(done.error());
     }
     return inside;
 }

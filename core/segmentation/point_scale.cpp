@@ -8,6 +8,7 @@
 #include <limits>
 #include <utility>
 
+#include "core/base/large_block.h"
 #include "core/base/pair.h"
 #include "core/base/parallel.h"
 
@@ -93,7 +94,7 @@ class BoxTree {
         }
     }
 
-    const std::vector<Leaf>& leaves() const { return leaves_; }
+    const LargeVector<Leaf>& leaves() const { return leaves_; }
     const Box& boxOfLeaf(std::size_t leaf) const { return levels_.front()[leaf]; }
 
     // The leaves whose boxes come nearer than that to `box`.
@@ -121,7 +122,7 @@ class BoxTree {
         }
     }
 
-    std::vector<Leaf> leaves_;
+    LargeVector<Leaf> leaves_;
     std::vector<std::vector<Box>> levels_;  // of the leaves first
     std::vector<std::vector<BoxPair>> pairs_;
 };

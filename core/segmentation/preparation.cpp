@@ -1,6 +1,7 @@
 #include "core/segmentation/preparation.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "core/geometry/decimate.h"
@@ -30,42 +31,57 @@ void follow(std::vector<std::uint32_t>& siteOfPoint, const std::vector<std::uint
     }
 }
 
-Result<void> leaveOutStrays(PreparedPoints& prepared, double ratio, const RunContext& context) {
-    const NeighbourIndex index(prepared.sites);
-    const auto stray = findStrays(prepared.sites, index, ratio, context);
+// What is prepared so far, and who lies near whom there, looked for once while the sites stay.
+struct Preparation {
+    PreparedPoints prepared;
+    std::optional<NeighbourIndex> index;
+
+    const NeighbourIndex& neighbours() {
+        if (!index) index.emplace(prepared.sites);
+        return *index;
+    }
+
+    // `siteOfSite`: where the sites went.
+    void replaceSites(PointCloud sites, const std::vector<std::uint32_t>& siteOfSite) {
+        follow(prepared.siteOfPoint, siteOfSite);
+        if (sites == prepared.sites) return;
+        index.reset();
+        prepared.sites = std::move(sites);
+    }
+};
+
+Result<void> leaveOutStrays(Preparation& work, double ratio, const RunContext& context) {
+    const PointCloud& sites = work.prepared.sites;
+    const auto stray = findStrays(sites, work.neighbours(), ratio, context);
     if (!stray) return fail(stray.error());
-    std::vector<std::uint32_t> rank(prepared.sites.size(), kNoSite);
+    std::vector<std::uint32_t> rank(sites.size(), kNoSite);
     PointCloud kept;
-    for (std::size_t i = 0; i < prepared.sites.size(); ++i) {
+    for (std::size_t i = 0; i < sites.size(); ++i) {
         if ((*stray)[i]) continue;
         rank[i] = static_cast<std::uint32_t>(kept.size());
-        kept.push_back(prepared.sites[i]);
+        kept.push_back(sites[i]);
     }
-    follow(prepared.siteOfPoint, rank);
-    prepared.sites = std::move(kept);
+    work.replaceSites(std::move(kept), rank);
     return {};
 }
 
-Result<void> smoothNoise(PreparedPoints& prepared, double reach, const RunContext& context) {
-    const NeighbourIndex index(prepared.sites);
-    prepared.noise = estimateNoise(prepared.sites, index);
-    auto moved = smooth(prepared.sites, index, prepared.noise, reach, context);
+Result<void> smoothNoise(Preparation& work, double reach, const RunContext& context) {
+    const PointCloud& sites = work.prepared.sites;
+    work.prepared.noise = estimateNoise(sites, work.neighbours());
+    auto moved = smooth(sites, work.neighbours(), work.prepared.noise, reach, context);
     if (!moved) return fail(moved.error());
     MergedPoints merged = mergeDuplicates(*moved);
-    follow(prepared.siteOfPoint, merged.siteOfPoint);
-    prepared.sites = std::move(merged.points);
+    work.replaceSites(std::move(merged.points), merged.siteOfPoint);
     return {};
 }
 
-Result<void> evenOut(PreparedPoints& prepared, double multiple, const RunContext& context) {
-    const double spacing =
-        multiple * std::max(prepared.noise.spacing, kSpacingPerSigma * prepared.noise.sigma);
-    const NeighbourIndex index(prepared.sites);
-    auto thinned = thin(prepared.sites, index, spacing, context);
+Result<void> evenOut(Preparation& work, double multiple, const RunContext& context) {
+    const NoiseEstimate& noise = work.prepared.noise;
+    const double spacing = multiple * std::max(noise.spacing, kSpacingPerSigma * noise.sigma);
+    auto thinned = thin(work.prepared.sites, work.neighbours(), spacing, context);
     if (!thinned) return fail(thinned.error());
-    follow(prepared.siteOfPoint, thinned->siteOfPoint);
-    prepared.sites = std::move(thinned->points);
-    prepared.spacing = spacing;
+    work.replaceSites(std::move(thinned->points), thinned->siteOfPoint);
+    work.prepared.spacing = spacing;
     return {};
 }
 
@@ -107,31 +123,30 @@ Result<PreparedPoints> preparePoints(const PointCloud& points, const Segmentatio
     if (auto go = begin("sanitise"); !go) return fail(go.error());
     auto begun = fewPoints(points, options.decimateTo, context, begin);
     if (!begun) return begun;
-    PreparedPoints prepared = std::move(*begun);
+    Preparation work{std::move(*begun), std::nullopt};
     if (options.strayRatio > 0.0) {
         if (auto go = begin("strays"); !go) return fail(go.error());
-        if (auto done = leaveOutStrays(prepared, options.strayRatio, context); !done)
-            return fail(done.error());
+        if (auto done = leaveOutStrays(work, options.strayRatio, context); !done) return fail(done.error());
     }
     if (options.smoothingReach > 0.0) {
         if (auto go = begin("smooth"); !go) return fail(go.error());
-        if (auto done = smoothNoise(prepared, options.smoothingReach, context); !done)
-            return fail(done.error());
+        if (auto done = smoothNoise(work, options.smoothingReach, context); !done) return fail(done.error());
         if (options.strayRatio > 0.0) {
             const double ratio = std::min(options.strayRatio, kStragglerRatio);
-            if (auto done = leaveOutStrays(prepared, ratio, context); !done) return fail(done.error());
+            if (auto done = leaveOutStrays(work, ratio, context); !done) return fail(done.error());
         }
     }
     if (options.evenSpacing > 0.0) {
         if (auto go = begin("even_spacing"); !go) return fail(go.error());
-        if (auto done = evenOut(prepared, options.evenSpacing, context); !done) return fail(done.error());
+        if (auto done = evenOut(work, options.evenSpacing, context); !done) return fail(done.error());
     }
+    PreparedPoints& prepared = work.prepared;
     prepared.strays = static_cast<std::uint64_t>(
         std::count(prepared.siteOfPoint.begin(), prepared.siteOfPoint.end(), kNoSite));
     if (prepared.sites.size() < 4) {
         return fail(ErrorCode::kTooFewPoints, "fewer than 4 points are left without strays");
     }
-    return prepared;
+    return std::move(prepared);
 }
 
 }  // namespace shapedb

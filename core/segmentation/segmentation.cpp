@@ -265,15 +265,16 @@ Result<SegmentLabels> findSegments(const PointCloud& sites, const SegmentationOp
     const auto flow = flowMasks(sites, tetrahedra, *interior, context);
     if (!flow) return fail(flow.error());
     if (auto go = clock.begin("segments"); !go) return fail(go.error());
-    const auto fine = stableManifolds(tetrahedra, *interior, *flow, context);
+    auto fine = stableManifolds(tetrahedra, *interior, *flow, context);
     if (!fine) return fail(fine.error());
     result.maxima = fine->peaks.size();
     if (auto go = clock.begin("merge"); !go) return fail(go.error());
-    auto merged = options.mergeContrast == 0.0
-                      ? Result<SegmentLabels>(mergeSegments(sites, tetrahedra, *fine, options.mergeRatio))
-                      : mergeSegmentsByContrast(
-                            sites, tetrahedra, *flow, *fine,
-                            {options.mergeContrast, options.minSegmentShare, options.maxSegments}, context);
+    auto merged =
+        options.mergeContrast == 0.0
+            ? Result<SegmentLabels>(mergeSegments(sites, tetrahedra, std::move(*fine), options.mergeRatio))
+            : mergeSegmentsByContrast(sites, tetrahedra, *flow, *fine,
+                                      {options.mergeContrast, options.minSegmentShare, options.maxSegments},
+                                      context);
     if (!merged) return merged;
     auto contacts = segmentContacts(sites, tetrahedra, *flow, merged->ofTetrahedron, context);
     if (!contacts) return fail(contacts.error());

@@ -28,7 +28,7 @@ std::uint64_t orderOf(double number) {
 
 // By falling circumradius; equal ones stay in order.
 void sortByFallingRadius(const Tetrahedra& tetrahedra, std::vector<std::uint32_t>& indices) {
-    std::vector<Keyed> keyed;
+    LargeVector<Keyed> keyed;
     keyed.reserve(indices.size());
     for (const std::uint32_t t : indices) keyed.push_back({~orderOf(tetrahedra.circumradii[t]), t});
     sortByKey(keyed);
@@ -265,8 +265,8 @@ double facetCircumradius(const PointCloud& points, const Tetrahedra& tetrahedra,
     return length(a) * length(b) * length(a - b) / (2.0 * length(cross(a, b)));
 }
 
-SegmentLabels mergeSegments(const PointCloud& points, const Tetrahedra& tetrahedra,
-                            const SegmentLabels& labels, double mergeRatio) {
+SegmentLabels mergeSegments(const PointCloud& points, const Tetrahedra& tetrahedra, SegmentLabels labels,
+                            double mergeRatio) {
     DisjointSets sets(labels.peaks.size());
     std::vector<double> peakRadii(labels.peaks.size());
     for (std::size_t s = 0; s < peakRadii.size(); ++s) peakRadii[s] = tetrahedra.circumradii[labels.peaks[s]];
@@ -290,22 +290,21 @@ SegmentLabels mergeSegments(const PointCloud& points, const Tetrahedra& tetrahed
             }
         }
     }
-    SegmentLabels merged;
+    std::vector<std::uint32_t> peaks;
     std::vector<std::int32_t> dense(labels.peaks.size(), -1);
     for (std::size_t s = 0; s < labels.peaks.size(); ++s) {
         if (sets.find(static_cast<std::int32_t>(s)) != static_cast<std::int32_t>(s)) continue;
-        dense[s] = static_cast<std::int32_t>(merged.peaks.size());
-        merged.peaks.push_back(labels.peaks[s]);
+        dense[s] = static_cast<std::int32_t>(peaks.size());
+        peaks.push_back(labels.peaks[s]);
     }
     for (std::size_t s = 0; s < dense.size(); ++s) {
         dense[s] = dense[static_cast<std::size_t>(sets.find(static_cast<std::int32_t>(s)))];
     }
-    merged.ofTetrahedron.resize(tetrahedra.size());
-    for (std::size_t t = 0; t < tetrahedra.size(); ++t) {
-        const std::int32_t segment = labels.ofTetrahedron[t];
-        merged.ofTetrahedron[t] = segment < 0 ? -1 : dense[static_cast<std::size_t>(segment)];
+    for (std::int32_t& segment : labels.ofTetrahedron) {
+        if (segment >= 0) segment = dense[static_cast<std::size_t>(segment)];
     }
-    return merged;
+    labels.peaks = std::move(peaks);
+    return labels;
 }
 
 }  // namespace shapedb

@@ -42,6 +42,6 @@ struct SegmentLabels {
 /// mergeRatio * r (the peaks before any merging, literally as published; chains of such pairs
 /// become one segment). Labels of the result are dense, by falling peak.
 [[nodiscard]] SegmentLabels mergeSegments(const PointCloud& points, const Tetrahedra& tetrahedra,
-                                          const SegmentLabels& labels, double mergeRatio);
+                                          SegmentLabels labels, double mergeRatio);
 
 }  // namespace shapedb

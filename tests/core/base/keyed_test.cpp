@@ -10,8 +10,8 @@
 namespace shapedb {
 namespace {
 
-void expectStablySorted(std::vector<Keyed> keyed) {
-    std::vector<Keyed> expected = keyed;
+void expectStablySorted(LargeVector<Keyed> keyed) {
+    LargeVector<Keyed> expected = keyed;
     std::stable_sort(expected.begin(), expected.end(),
                      [](const Keyed& a, const Keyed& b) { return a.key < b.key; });
     sortByKey(keyed);
@@ -22,9 +22,9 @@ void expectStablySorted(std::vector<Keyed> keyed) {
     }
 }
 
-std::vector<Keyed> randomKeys(std::size_t count, std::uint64_t mask, std::uint64_t seed) {
+LargeVector<Keyed> randomKeys(std::size_t count, std::uint64_t mask, std::uint64_t seed) {
     Random random(seed);
-    std::vector<Keyed> keyed;
+    LargeVector<Keyed> keyed;
     for (std::uint32_t i = 0; i < count; ++i) keyed.push_back({random.below(~std::uint64_t{0}) & mask, i});
     return keyed;
 }
@@ -42,6 +42,20 @@ TEST(SortByKey, OfKeysThatAgreeInSomeDigits) {
     for (const std::uint64_t mask : {std::uint64_t{0}, std::uint64_t{0x7ff}, std::uint64_t{3} << 62,
                                      std::uint64_t{0xff0000000000ff}, std::uint64_t{0xff} << 20}) {
         expectStablySorted(randomKeys(3000, mask, mask + 1));
+    }
+}
+
+TEST(SortNumbers, SortsThem) {
+    Random random(4);
+    for (const std::size_t count : {0U, 1U, 2U, 3000U}) {
+        LargeVector<std::uint32_t> numbers;
+        for (std::size_t i = 0; i < count; ++i) {
+            numbers.push_back(static_cast<std::uint32_t>(random.below(std::uint64_t{1} << 32)));
+        }
+        LargeVector<std::uint32_t> expected = numbers;
+        std::sort(expected.begin(), expected.end());
+        sortNumbers(numbers);
+        EXPECT_EQ(numbers, expected);
     }
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include <gtest/gtest.h>
+#include <tbb/task_arena.h>
 
 #include "core/base/random.h"
 
@@ -52,6 +53,49 @@ TEST(NeighbourIndex, NearestAreThoseOfASort) {
             }
         }
     }
+}
+
+PointCloud scattered(std::size_t count, std::uint64_t seed) {
+    Random random(seed);
+    PointCloud points;
+    for (std::size_t i = 0; i < count; ++i) {
+        points.push_back({random.normal(), random.uniform(), random.normal()});
+    }
+    return points;
+}
+
+void expectNearest(const PointCloud& points, const NeighbourIndex& index, const Point3& query) {
+    std::vector<Neighbour> found;
+    index.nearest(query, 3, found);
+    const auto expected = sortedByDistance(points, query);
+    ASSERT_EQ(found.size(), std::min<std::size_t>(3, points.size()));
+    for (std::size_t k = 0; k < found.size(); ++k) {
+        ASSERT_EQ(found[k].point, expected[k].point) << "of " << points.size();
+    }
+}
+
+// Where the nodes lie follows from the number of points.
+TEST(NeighbourIndex, OfAnyNumberOfPoints) {
+    for (std::size_t count = 1; count <= 400; ++count) {
+        const PointCloud points = scattered(count, count);
+        const NeighbourIndex index(points);
+        for (const std::size_t at : {std::size_t{0}, count / 2, count - 1}) {
+            expectNearest(points, index, points[at]);
+        }
+    }
+}
+
+TEST(NeighbourIndex, AnyNumberOfThreadsBuildsTheSame) {
+    const PointCloud points = scattered(30011, 8);
+    std::vector<std::vector<std::uint32_t>> orders;
+    for (const int threads : {1, 2, 5}) {
+        tbb::task_arena arena(threads);
+        const NeighbourIndex index = arena.execute([&] { return NeighbourIndex(points); });
+        orders.push_back(index.order());
+        for (const std::size_t at : {0U, 777U, 30010U}) expectNearest(points, index, points[at]);
+    }
+    EXPECT_EQ(orders[0], orders[1]);
+    EXPECT_EQ(orders[0], orders[2]);
 }
 
 TEST(NeighbourIndex, WithinIsTheWholeBallAndNothingElse) {

@@ -68,7 +68,8 @@ TEST(ScanGrid, TheOrderOfThePointsLeavesNoTrace) {
     EXPECT_TRUE(gridScan(turned, 500).value().value().points == a.points);
 }
 
-// Long enough for three stretches. The last is dense, so that its grid alone is the coarsest.
+// Long enough for a stretch to each thread, for the small target. The last is dense, so that its grid alone
+// is the coarsest.
 TEST(ScanGrid, AnyNumberOfThreadsFindsTheSamePoints) {
     PointCloud scan = jack(150000);
     const PointCloud dense = sampleBoundary(makeBox().solid, 300000, 5).value();

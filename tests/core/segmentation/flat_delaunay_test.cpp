@@ -59,7 +59,7 @@ std::vector<Corners> sorted(const Vector& unsorted) {
 
 // In the points' own order, straight from the store, so that the number of threads is ours.
 std::vector<Corners> byThreads(const PointCloud& points, std::size_t threads) {
-    std::vector<Site> sites;
+    LargeVector<Site> sites;
     for (const Point3& p : points) sites.push_back({p.x, p.y, p.z});
     CellStore cells;
     std::vector<Corners> tetrahedra;
@@ -194,7 +194,7 @@ TEST(FlatDelaunay, ResultsHaveTheSameBitsOnAnyNumberOfThreads) {
 
 TEST(FlatDelaunay, ThreadsStopWhenToldTo) {
     const PointCloud points = alongCurve(inACube(kLeastParallelPoints));
-    std::vector<Site> sites;
+    LargeVector<Site> sites;
     for (const Point3& p : points) sites.push_back({p.x, p.y, p.z});
     std::atomic<bool> cancel{false};
     RunContext context;
@@ -209,7 +209,7 @@ TEST(FlatDelaunay, ThreadsStopWhenToldTo) {
 TEST(FlatDelaunay, ThreadsRefuseRepeatedPoints) {
     PointCloud points = inACube(kLeastParallelPoints);
     points.push_back(points[4321]);
-    std::vector<Site> sites;
+    LargeVector<Site> sites;
     for (const std::uint32_t i : curveOrder(points)) sites.push_back({points[i].x, points[i].y, points[i].z});
     CellStore cells;
     EXPECT_EQ(insertAll(sites, cells, 2, {}).error().code, ErrorCode::kInternal);
