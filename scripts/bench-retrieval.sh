@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Measures retrieval beside the peers on the public data of docs/data.md and writes tables and plot
-# into docs/benchmarks.md and docs/images/. Builds the programs first, with the Point Cloud Library.
+# into docs/benchmarks.md and docs/images/. Builds the programs first, with the peers (install-deps.sh --bench).
 #   SHAPEDB_DATA=/data scripts/bench-retrieval.sh [OPTIONS OF shapedb-bench retrieval, e.g. --seed 2]
 #   BUILD_DIR=...  where to build (build-bench)
 #   BENCH=...      this shapedb-bench instead of building one
@@ -12,8 +12,7 @@ cd "$(dirname "$0")/.."
 bench=${BENCH:-}
 if [ -z "$bench" ]; then
   build_dir=${BUILD_DIR:-build-bench}
-  cmake -S . -B "$build_dir" -G Ninja -DCMAKE_BUILD_TYPE=Release -DSHAPEDB_BENCH_PCL=ON
-  cmake --build "$build_dir" --target shapedb_bench
+  BUILD_DIR=$build_dir scripts/build.sh --bench
   bench=$build_dir/bin/shapedb-bench
 fi
 

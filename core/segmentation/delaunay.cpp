@@ -79,27 +79,68 @@ bool isFinite(const Corners& v) {
 
 // Cells or tetrahedra that a thread takes at a time.
 constexpr std::size_t kBlock = 8192;
+// A part of the store with fewer cells is not worth counts of its own.
+constexpr std::size_t kLeastPart = std::size_t{1} << 18;
+
+// How many finite cells of each part of the store have a vertex as their lowest, and then where in the list
+// of all they begin.
+class LowestVertices {
+  public:
+    LowestVertices(std::size_t parts, std::size_t siteCount)
+        : siteCount_(siteCount), counts_(parts * siteCount) {}
+
+    std::uint32_t& at(std::size_t part, std::uint32_t vertex) { return counts_[part * siteCount_ + vertex]; }
+    void clear(std::size_t part) {
+        const auto begin = counts_.begin() + static_cast<std::ptrdiff_t>(part * siteCount_);
+        std::fill(begin, begin + static_cast<std::ptrdiff_t>(siteCount_), 0);
+    }
+    // Returns where the cells of each vertex begin, and their number.
+    LargeVector<std::uint32_t> toPlaces() {
+        LargeVector<std::uint32_t> begin(siteCount_ + 1);
+        std::uint32_t next = 0;
+        for (std::size_t v = 0; v < siteCount_; ++v) {
+            begin[v] = next;
+            for (std::size_t c = v; c < counts_.size(); c += siteCount_) {
+                next += counts_[c];
+                counts_[c] = next - counts_[c];
+            }
+        }
+        begin[siteCount_] = next;
+        return begin;
+    }
+
+  private:
+    std::size_t siteCount_;
+    LargeVector<std::uint32_t> counts_;
+};
 
 // The finite cells, made canonical, by their corners. The places of cells in the store, which depend on
-// the threads, leave no trace.
+// the threads, leave no trace. `place`: kNoTetrahedron for the others.
 Result<LargeVector<std::uint32_t>> sortedCells(CellStore& cells, std::size_t siteCount,
-                                               const RunContext& context) {
-    auto done = forEachRange(cells.used(), kBlock, context, [&](std::size_t from, std::size_t to) {
-        for (std::size_t c = from; c < to; ++c) {
+                                               LargeVector<std::uint32_t>& place, const RunContext& context) {
+    const std::size_t parts = std::clamp<std::size_t>(cells.used() / kLeastPart, 1, threadsOfArena());
+    const auto beginOf = [&](std::size_t part) { return part * cells.used() / parts; };
+    LowestVertices lowest(parts, siteCount);
+    auto done = forEachRange(parts, 1, context, [&](std::size_t part, std::size_t) {
+        lowest.clear(part);
+        for (std::size_t c = beginOf(part); c < beginOf(part + 1); ++c) {
             Cell& cell = cells[static_cast<std::uint32_t>(c)];
-            if (isFinite(cell.vertices)) makeCanonical(cell);
+            place[c] = kNoTetrahedron;
+            if (!isFinite(cell.vertices)) continue;
+            makeCanonical(cell);
+            ++lowest.at(part, cell.vertices[0]);
         }
     });
     if (!done) return fail(done.error());
-    std::vector<std::uint32_t> begin(siteCount + 2, 0);
-    for (std::uint32_t c = 0; c < cells.used(); ++c) {
-        if (isFinite(cells[c].vertices)) ++begin[cells[c].vertices[0] + 2];
-    }
-    std::partial_sum(begin.begin(), begin.end(), begin.begin());
+    const LargeVector<std::uint32_t> begin = lowest.toPlaces();
     LargeVector<std::uint32_t> sorted(begin.back());
-    for (std::uint32_t c = 0; c < cells.used(); ++c) {
-        if (isFinite(cells[c].vertices)) sorted[begin[cells[c].vertices[0] + 1]++] = c;
-    }
+    done = forEachRange(parts, 1, context, [&](std::size_t part, std::size_t) {
+        for (std::size_t c = beginOf(part); c < beginOf(part + 1); ++c) {
+            const auto cell = static_cast<std::uint32_t>(c);
+            if (isFinite(cells[cell].vertices)) sorted[lowest.at(part, cells[cell].vertices[0])++] = cell;
+        }
+    });
+    if (!done) return fail(done.error());
     // Three corners in their sense belong to one tetrahedron, so the second and third decide.
     done = forEachRange(siteCount, kBlock, context, [&](std::size_t from, std::size_t to) {
         std::vector<std::pair<std::uint64_t, std::uint32_t>> group;
@@ -111,7 +152,10 @@ Result<LargeVector<std::uint32_t>> sortedCells(CellStore& cells, std::size_t sit
                 group.emplace_back(std::uint64_t{corners[1]} << 32 | corners[2], sorted[i]);
             }
             std::sort(group.begin(), group.end());
-            for (std::size_t i = 0; i < group.size(); ++i) sorted[begin[v] + i] = group[i].second;
+            for (std::size_t i = 0; i < group.size(); ++i) {
+                sorted[begin[v] + i] = group[i].second;
+                place[group[i].second] = begin[v] + static_cast<std::uint32_t>(i);
+            }
         }
     });
     if (!done) return fail(done.error());
@@ -121,18 +165,14 @@ Result<LargeVector<std::uint32_t>> sortedCells(CellStore& cells, std::size_t sit
 // `order`: the point of each site.
 Result<Tetrahedra> flatten(CellStore& cells, const std::vector<std::uint32_t>& order,
                            const RunContext& context) {
-    const auto sorted = sortedCells(cells, order.size(), context);
+    LargeVector<std::uint32_t> place(cells.used());  // of a cell among the tetrahedra
+    const auto sorted = sortedCells(cells, order.size(), place, context);
     if (!sorted) return fail(sorted.error());
     const LargeVector<std::uint32_t>& cellOf = *sorted;
-    LargeVector<std::uint32_t> place(cells.used(), kNoTetrahedron);
-    auto done = forEachRange(cellOf.size(), kBlock, context, [&](std::size_t from, std::size_t to) {
-        for (std::size_t t = from; t < to; ++t) place[cellOf[t]] = static_cast<std::uint32_t>(t);
-    });
-    if (!done) return fail(done.error());
     Tetrahedra flat;
     flat.vertices.resize(cellOf.size());
     flat.neighbours.resize(cellOf.size());
-    done = forEachRange(cellOf.size(), kBlock, context, [&](std::size_t from, std::size_t to) {
+    auto done = forEachRange(cellOf.size(), kBlock, context, [&](std::size_t from, std::size_t to) {
         for (std::size_t t = from; t < to; ++t) {
             if (t + kFarAhead < to) {
                 fetch(&cells[cellOf[t + kFarAhead]]);
@@ -199,10 +239,13 @@ Result<Tetrahedra> triangulateOrThrow(const PointCloud& points, const RunContext
     {
         CellStore cells;
         LargeVector<Site> sites(points.size());
-        for (std::size_t i = 0; i < sites.size(); ++i) {
-            const Point3& p = points[order[i]];
-            sites[i] = {p.x, p.y, p.z};
-        }
+        auto placed = forEachRange(sites.size(), kBlock, context, [&](std::size_t from, std::size_t to) {
+            for (std::size_t i = from; i < to; ++i) {
+                const Point3& p = points[order[i]];
+                sites[i] = {p.x, p.y, p.z};
+            }
+        });
+        if (!placed) return fail(placed.error());
         if (auto done = insertAll(sites, cells, threadsOfArena(), context); !done) {
             if (done.error().code == ErrorCode::kCollinear || done.error().code == ErrorCode::kCoplanar) {
                 if (auto distinct = checkDistinct(points); !distinct) return fail(distinct.error());

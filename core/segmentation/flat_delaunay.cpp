@@ -28,6 +28,9 @@ constexpr int kRoundShift = 2;
 constexpr std::size_t kSmallestRound = 512;
 // A round with fewer points for each thread is not worth dividing.
 constexpr std::size_t kLeastShare = 4096;
+// What is left of a round is scattered along the borders: it is divided again only when it is more than this
+// share, which takes many threads.
+constexpr std::size_t kLeastLeft = 8;
 
 // Mixes the bits of an index (the finaliser of MurmurHash3).
 std::uint32_t scrambled(std::uint32_t i) {
@@ -167,9 +170,11 @@ Result<void> Builder::beginWithFour(const std::vector<std::uint32_t>& order) {
 }
 
 Result<void> Builder::insertRound(std::vector<std::uint32_t> left) {
+    const std::size_t all = left.size();
     for (const bool shifted : {false, true}) {
         const bool large = sites_.size() >= kLeastParallelPoints && left.size() >= threads_ * kLeastShare;
-        if (threads_ < 2 || !large) break;
+        const bool many = !shifted || left.size() >= all / kLeastLeft;
+        if (threads_ < 2 || !large || !many) break;
         if (auto done = insertTogether(left, shifted); !done) return done;
     }
     return insertAlone(left);

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <tbb/task_arena.h>
 
 #include "core/base/random.h"
 
@@ -42,6 +43,14 @@ TEST(SortByKey, OfKeysThatAgreeInSomeDigits) {
     for (const std::uint64_t mask : {std::uint64_t{0}, std::uint64_t{0x7ff}, std::uint64_t{3} << 62,
                                      std::uint64_t{0xff0000000000ff}, std::uint64_t{0xff} << 20}) {
         expectStablySorted(randomKeys(3000, mask, mask + 1));
+    }
+}
+
+// Each thread has a part of its own.
+TEST(SortByKey, IsStableOnAnyNumberOfThreads) {
+    for (const int threads : {1, 2, 3, 5}) {
+        tbb::task_arena arena(threads);
+        arena.execute([] { expectStablySorted(randomKeys(400001, std::uint64_t{0xff} << 40 | 0xf, 2)); });
     }
 }
 

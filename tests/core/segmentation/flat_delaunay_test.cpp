@@ -178,6 +178,12 @@ TEST(FlatDelaunay, AnyNumberOfThreadsFindsTheSameTetrahedra) {
     }
 }
 
+// So many borders that what is left along them is divided once more.
+TEST(FlatDelaunay, ManyThreadsFindWhatOneFinds) {
+    const PointCloud points = alongCurve(inACube(3 * kLeastParallelPoints));
+    EXPECT_TRUE(byThreads(points, 7) == byThreads(points, 1));
+}
+
 TEST(FlatDelaunay, ResultsHaveTheSameBitsOnAnyNumberOfThreads) {
     const PointCloud points = scanned(makeDumbbell(), kLeastParallelPoints + 500, 0.001);
     const auto in = [&](int threads) {

@@ -1,0 +1,53 @@
+#!/usr/bin/env bash
+# Takes the figures of speed of docs/benchmarks.md anew: what the program prints, and all figures as JSON,
+# into a folder. Builds the programs first, with the peers (install-deps.sh --bench). On a quiet machine of
+# two cores: segment a quarter of an hour, topk an hour and 24 GiB, load half an hour.
+#   scripts/bench-speed.sh FOLDER [segment] [topk] [load]     all three when none is named
+#   BUILD_DIR=...  where to build (build-bench)
+#   BENCH=...      this shapedb-bench instead of building one; load needs the shapedbd beside it
+set -euo pipefail
+cd "$(dirname "$0")/.."
+: "${1:?name the folder for the figures}"
+mkdir -p "$1"
+folder=$(cd "$1" && pwd)
+shift
+parts=("$@")
+[ ${#parts[@]} -gt 0 ] || parts=(segment topk load)
+for part in "${parts[@]}"; do
+  case "$part" in
+    segment | topk | load) ;;
+    *) echo "bench-speed: unknown part $part; there are segment, topk and load" >&2; exit 2 ;;
+  esac
+done
+
+bench=${BENCH:-}
+if [ -z "$bench" ]; then
+  build_dir=${BUILD_DIR:-build-bench}
+  BUILD_DIR=$build_dir scripts/build.sh --bench
+  bench=$build_dir/bin/shapedb-bench
+fi
+
+# measure NAME OPERATION OPTIONS...: NAME.txt and NAME.json
+measure() {
+  local name=$1
+  shift
+  echo "== $name: shapedb-bench $*" >&2
+  "$bench" "$@" --json "$folder/$name.json" | tee "$folder/$name.txt"
+}
+
+segment() {
+  measure segment-120000 segment --points 120000 --repeat 15 --profile paper
+  measure segment-1000000 segment --points 1000000 --profile paper
+  measure describe-120000 segment --points 120000 --profile default --no-undecimated
+  measure describe-1000000 segment --points 1000000 --profile default --no-undecimated --repeat 9
+  measure describe-10000000 segment --points 10000000 --profile default --no-undecimated
+}
+topk() {
+  measure topk topk --shapes 1000,10000,100000,1000000
+  measure topk-10000000 topk --shapes 10000000 --queries 20
+  measure topk-duplicates topk --shapes 1000000 --mixture duplicates --no-peer
+  measure topk-hard topk --shapes 1000000 --mixture hard --no-peer
+}
+load() { measure load load; }
+
+for part in "${parts[@]}"; do "$part"; done
