@@ -7,6 +7,7 @@
 #include <numeric>
 #include <string>
 
+#include "core/base/fetch.h"
 #include "core/base/large_block.h"
 
 namespace shapedb {
@@ -134,7 +135,14 @@ PlacedPoints lexicographicallySorted(const PointCloud& points) {
     std::vector<std::uint32_t> begin(points.size() + 1, 0);
     for (const Point3& p : points) ++begin[sliceOf(p) + 1];
     std::partial_sum(begin.begin(), begin.end(), begin.begin());
-    for (std::uint32_t i = 0; i < points.size(); ++i) sorted[begin[sliceOf(points[i])]++] = {points[i], i};
+    // Every point goes somewhere else: where is asked for before it is written.
+    constexpr std::size_t kAhead = 8;
+    constexpr std::size_t kFarAhead = 16;
+    for (std::uint32_t i = 0; i < points.size(); ++i) {
+        if (i + kFarAhead < points.size()) fetch(&begin[sliceOf(points[i + kFarAhead])]);
+        if (i + kAhead < points.size()) fetch(sorted.data() + begin[sliceOf(points[i + kAhead])]);
+        sorted[begin[sliceOf(points[i])]++] = {points[i], i};
+    }
     std::size_t from = 0;
     for (std::size_t slice = 0; slice < points.size(); ++slice) {
         const std::size_t to = begin[slice];  // moved to the end of the slice while filling it
