@@ -49,9 +49,11 @@ Result<std::vector<SegmentContact>> segmentContacts(const PointCloud& points, co
         }
         if (labels[t] < 0) continue;
         for (std::size_t facet = 0; facet < 4; ++facet) {
+            // Each facet once. Which of its sides comes first is random, so it is no branch.
             const std::uint32_t next = tetrahedra.neighbours[t][facet];
-            if (next == kNoTetrahedron || next < t || labels[next] < 0 || labels[next] == labels[t]) continue;
-            const auto [low, high] = std::minmax(labels[t], labels[next]);
+            const std::int32_t other = labels[next > t && next != kNoTetrahedron ? next : t];
+            if (other == labels[t] || other < 0) continue;
+            const auto [low, high] = std::minmax(labels[t], other);
             facets.push_back({static_cast<std::uint32_t>(low), static_cast<std::uint32_t>(high),
                               facetPassage(points, tetrahedra, flow, t, facet),
                               facetArea(points, tetrahedra, t, facet)});

@@ -34,7 +34,9 @@ unsigned circumcentres(const PointPair& a, const PointPair& b, const PointPair& 
     const Pair cc = squaredLength(c);
     const Pair sixVolumes = dot(a, bc);
     fromFirst = (Pair(0.5) / sixVolumes) * (aa * bc + bb * cross(c, a) + cc * cross(a, b));
-    return ~less(Pair(kFlatShare) * sqrt(aa * bb * cc), sixVolumes) & 3u;
+    const unsigned solid =
+        less(0.0, sixVolumes) & less(Pair(kFlatShare * kFlatShare) * (aa * bb * cc), sixVolumes * sixVolumes);
+    return ~solid & 3u;
 }
 
 using Corners = std::array<std::uint32_t, 4>;
