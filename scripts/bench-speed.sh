@@ -37,7 +37,7 @@ measure() {
 
 segment() {
   measure segment-120000 segment --points 120000 --repeat 15 --profile paper
-  measure segment-1000000 segment --points 1000000 --profile paper
+  measure segment-1000000 segment --points 1000000 --profile paper --repeat 9
   measure describe-120000 segment --points 120000 --profile default --no-undecimated
   measure describe-1000000 segment --points 1000000 --profile default --no-undecimated --repeat 9
   measure describe-10000000 segment --points 10000000 --profile default --no-undecimated
