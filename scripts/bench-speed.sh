@@ -6,11 +6,11 @@
 #   BUILD_DIR=...  where to build (build-bench)
 #   BENCH=...      this shapedb-bench instead of building one; load needs the shapedbd beside it
 set -euo pipefail
-cd "$(dirname "$0")/.."
 : "${1:?name the folder for the figures}"
 mkdir -p "$1"
 folder=$(cd "$1" && pwd)
 shift
+cd "$(dirname "$0")/.."
 parts=("$@")
 [ ${#parts[@]} -gt 0 ] || parts=(segment topk load)
 for part in "${parts[@]}"; do

@@ -31,17 +31,17 @@ void sortByDigits(LargeVector<T>& elements, Key key) {
     LargeVector<T> other(elements.size());
     const std::size_t parts = std::clamp<std::size_t>(elements.size() / kLeastPart, 1, threadsOfArena());
     std::vector<Places> places(parts);  // where the next of each digit goes, for each part
-    const auto forEachPart = [&](const auto& work) {
+    const auto inParts = [&](const auto& work) {
         // Nothing can stop it: there is no context.
-        static_cast<void>(forEachRange(parts, 1, {}, [&](std::size_t part, std::size_t) {
-            work(places[part], part * elements.size() / parts, (part + 1) * elements.size() / parts);
-        }));
+        static_cast<void>(forEachPart(
+            elements.size(), parts, {},
+            [&](std::size_t part, std::size_t from, std::size_t to) { work(places[part], from, to); }));
     };
     for (std::uint32_t shift = 0; shift < 8 * sizeof(key(elements[0])); shift += kDigitBits) {
         const auto digit = [=](const T& e) {
             return static_cast<std::size_t>(key(e) >> shift) & (kValues - 1);
         };
-        forEachPart([&](Places& counts, std::size_t from, std::size_t to) {
+        inParts([&](Places& counts, std::size_t from, std::size_t to) {
             counts.fill(0);
             for (std::size_t i = from; i < to; ++i) ++counts[digit(elements[i])];
         });
@@ -52,7 +52,7 @@ void sortByDigits(LargeVector<T>& elements, Key key) {
         for (std::size_t v = 0; v < kValues; ++v) {
             for (Places& counts : places) next += std::exchange(counts[v], next);
         }
-        forEachPart([&](Places& place, std::size_t from, std::size_t to) {
+        inParts([&](Places& place, std::size_t from, std::size_t to) {
             for (std::size_t i = from; i < to; ++i) other[place[digit(elements[i])]++] = elements[i];
         });
         elements.swap(other);

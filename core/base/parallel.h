@@ -10,6 +10,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 #include <tbb/task_arena.h>
 
 #include "core/base/error.h"
@@ -49,6 +50,23 @@ template <typename Work>
     if (!stopped) return {};
     // What stopped a block still holds: a cancelled context stays so, and deadlines do not come back.
     return context.checkpoint();
+}
+
+/// Calls `work(part, begin, end)` once for each of so many parts of [0, count), as equal as can be and in
+/// order. Otherwise as forEachRange.
+template <typename Work>
+[[nodiscard]] Result<void> forEachPart(std::size_t count, std::size_t parts, const RunContext& context,
+                                       const Work& work) {
+    return forEachRange(parts, 1, context, [&](std::size_t part, std::size_t) {
+        work(part, part * count / parts, (part + 1) * count / parts);
+    });
+}
+
+/// Does all of it, on any threads, and returns when all is done.
+template <typename... Works>
+void doTogether(const Works&... works) {
+    // Isolated, as above.
+    tbb::this_task_arena::isolate([&] { tbb::parallel_invoke(works...); });
 }
 
 /// Calls a copy of `work` with every point of `order`, once each; each block of points, which follow one

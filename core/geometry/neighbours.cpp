@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <numeric>
 
-#include <tbb/parallel_invoke.h>
-#include <tbb/task_arena.h>
+#include "core/base/parallel.h"
 
 namespace shapedb {
 
@@ -38,8 +37,7 @@ NeighbourIndex::NeighbourIndex(const PointCloud& points) : indices_(points.size(
     if (points.empty()) return;
     const auto count = static_cast<std::uint32_t>(points.size());
     nodes_.resize(nodesFor(count));
-    // Isolated: a thread that waits for the other half must not begin work of its caller's caller.
-    tbb::this_task_arena::isolate([&] { build(points, 0, 0, count); });
+    build(points, 0, 0, count);
     points_.reserve(points.size());
     for (const std::uint32_t i : indices_) points_.push_back(points[i]);
 }
@@ -85,7 +83,7 @@ void NeighbourIndex::build(const PointCloud& points, std::uint32_t at, std::uint
         left();
         rest();
     } else {
-        tbb::parallel_invoke(left, rest);
+        doTogether(left, rest);
     }
 }
 

@@ -136,11 +136,9 @@ PlacedPoints lexicographicallySorted(const PointCloud& points) {
     for (const Point3& p : points) ++begin[sliceOf(p) + 1];
     std::partial_sum(begin.begin(), begin.end(), begin.begin());
     // Every point goes somewhere else: where is asked for before it is written.
-    constexpr std::size_t kAhead = 8;
-    constexpr std::size_t kFarAhead = 16;
     for (std::uint32_t i = 0; i < points.size(); ++i) {
-        if (i + kFarAhead < points.size()) fetch(&begin[sliceOf(points[i + kFarAhead])]);
-        if (i + kAhead < points.size()) fetch(sorted.data() + begin[sliceOf(points[i + kAhead])]);
+        if (i + kFetchFarAhead < points.size()) fetch(&begin[sliceOf(points[i + kFetchFarAhead])]);
+        if (i + kFetchAhead < points.size()) fetch(sorted.data() + begin[sliceOf(points[i + kFetchAhead])]);
         sorted[begin[sliceOf(points[i])]++] = {points[i], i};
     }
     std::size_t from = 0;

@@ -6,9 +6,7 @@
 #include <optional>
 #include <utility>
 
-#include <tbb/parallel_invoke.h>
-#include <tbb/task_arena.h>
-
+#include "core/base/parallel.h"
 #include "core/segmentation/inside_potential.h"
 #include "core/segmentation/leak_angle.h"
 
@@ -235,11 +233,8 @@ Result<AdaptiveInterior> adaptiveInterior(const PointCloud& points, const Tetrah
                                           const std::vector<double>& scales, const RunContext& context) {
     std::optional<Judge> made;
     std::optional<Result<std::vector<double>>> angles;
-    // Isolated: a thread that waits for the other must not begin work of its caller's caller.
-    tbb::this_task_arena::isolate([&] {
-        tbb::parallel_invoke([&] { made.emplace(points, tetrahedra, scales); },
-                             [&] { angles.emplace(leakAngles(points, tetrahedra, big, context)); });
-    });
+    doTogether([&] { made.emplace(points, tetrahedra, scales); },
+               [&] { angles.emplace(leakAngles(points, tetrahedra, big, context)); });
     const Judge& judge = *made;
     const Result<std::vector<double>>& leaks = *angles;
     if (!leaks) return fail(leaks.error());

@@ -121,23 +121,23 @@ class LowestVertices {
 Result<LargeVector<std::uint32_t>> sortedCells(CellStore& cells, std::size_t siteCount,
                                                LargeVector<std::uint32_t>& place, const RunContext& context) {
     const std::size_t parts = std::clamp<std::size_t>(cells.used() / kLeastPart, 1, threadsOfArena());
-    const auto beginOf = [&](std::size_t part) { return part * cells.used() / parts; };
     LowestVertices lowest(parts, siteCount);
-    auto done = forEachRange(parts, 1, context, [&](std::size_t part, std::size_t) {
-        lowest.clear(part);
-        for (std::size_t c = beginOf(part); c < beginOf(part + 1); ++c) {
-            Cell& cell = cells[static_cast<std::uint32_t>(c)];
-            place[c] = kNoTetrahedron;
-            if (!isFinite(cell.vertices)) continue;
-            makeCanonical(cell);
-            ++lowest.at(part, cell.vertices[0]);
-        }
-    });
+    auto done =
+        forEachPart(cells.used(), parts, context, [&](std::size_t part, std::size_t from, std::size_t to) {
+            lowest.clear(part);
+            for (std::size_t c = from; c < to; ++c) {
+                Cell& cell = cells[static_cast<std::uint32_t>(c)];
+                place[c] = kNoTetrahedron;
+                if (!isFinite(cell.vertices)) continue;
+                makeCanonical(cell);
+                ++lowest.at(part, cell.vertices[0]);
+            }
+        });
     if (!done) return fail(done.error());
     const LargeVector<std::uint32_t> begin = lowest.toPlaces();
     LargeVector<std::uint32_t> sorted(begin.back());
-    done = forEachRange(parts, 1, context, [&](std::size_t part, std::size_t) {
-        for (std::size_t c = beginOf(part); c < beginOf(part + 1); ++c) {
+    done = forEachPart(cells.used(), parts, context, [&](std::size_t part, std::size_t from, std::size_t to) {
+        for (std::size_t c = from; c < to; ++c) {
             const auto cell = static_cast<std::uint32_t>(c);
             if (isFinite(cells[cell].vertices)) sorted[lowest.at(part, cells[cell].vertices[0])++] = cell;
         }
@@ -189,10 +189,6 @@ Result<Tetrahedra> flatten(CellStore& cells, const std::vector<std::uint32_t>& o
     });
     if (!done) return fail(done.error());
     return flat;
-}
-
-TetrahedronCorners cornersOf(const PointCloud& points, const Corners& v) {
-    return {points[v[0]], points[v[1]], points[v[2]], points[v[3]]};
 }
 
 // The balls of two tetrahedra, which may be the same.

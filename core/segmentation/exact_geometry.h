@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 
 #include "core/geometry/point.h"
 
@@ -10,6 +11,11 @@ namespace shapedb {
 
 /// Four vertices of a positively oriented, exactly non-flat tetrahedron.
 using TetrahedronCorners = std::array<Point3, 4>;
+
+[[nodiscard]] inline TetrahedronCorners cornersOf(const PointCloud& points,
+                                                  const std::array<std::uint32_t, 4>& vertices) {
+    return {points[vertices[0]], points[vertices[1]], points[vertices[2]], points[vertices[3]]};
+}
 
 /// Circumcentre computed with rational numbers, rounded once.
 [[nodiscard]] Point3 exactCircumcentre(const TetrahedronCorners& corners);

@@ -67,9 +67,7 @@ void maskTwo(const PointCloud& points, const Tetrahedra& tetrahedra, const std::
     for (std::size_t k = 0; k < 2; ++k) {
         unsigned mask = found.mask[k];
         if ((found.sure >> k & 1u) == 0) {
-            const auto& corners = tetrahedra.vertices[two[k]];
-            mask = exactFlowMask(
-                {points[corners[0]], points[corners[1]], points[corners[2]], points[corners[3]]});
+            mask = exactFlowMask(cornersOf(points, tetrahedra.vertices[two[k]]));
         }
         masks[two[k]] = static_cast<std::uint8_t>(mask);
     }

@@ -11,9 +11,6 @@ namespace shapedb {
 namespace {
 
 constexpr double kRadiansPerDegree = 3.14159265358979323846 / 180.0;
-// How many steps before it is read memory at random is asked for; and what leads to such memory.
-constexpr std::size_t kAhead = 8;
-constexpr std::size_t kFarAhead = 16;
 
 // The three corners of facet i.
 std::array<Point3, 3> facetCorners(const PointCloud& points, const std::array<std::uint32_t, 4>& vertices,
@@ -95,12 +92,12 @@ Result<void> walkFrom(std::vector<std::uint32_t> layer, const PointCloud& points
         if (auto go = context.checkpoint(); !go) return go;
         std::vector<std::uint32_t> following;
         for (std::size_t i = 0; i < layer.size(); ++i) {
-            if (i + kFarAhead < layer.size()) {
-                fetch(&tetrahedra.neighbours[layer[i + kFarAhead]]);
-                fetch(&tetrahedra.vertices[layer[i + kFarAhead]]);
+            if (i + kFetchFarAhead < layer.size()) {
+                fetch(&tetrahedra.neighbours[layer[i + kFetchFarAhead]]);
+                fetch(&tetrahedra.vertices[layer[i + kFetchFarAhead]]);
             }
-            if (i + kAhead < layer.size()) {
-                for (const std::uint32_t next : tetrahedra.neighbours[layer[i + kAhead]]) {
+            if (i + kFetchAhead < layer.size()) {
+                for (const std::uint32_t next : tetrahedra.neighbours[layer[i + kFetchAhead]]) {
                     fetch(inside.data() + next);
                     fetch(tetrahedra.circumcentres.data() + next);
                 }

@@ -146,7 +146,7 @@ Result<PreparedPoints> preparePoints(const PointCloud& points, const Segmentatio
     if (prepared.sites.size() < 4) {
         return fail(ErrorCode::kTooFewPoints, "fewer than 4 points are left without strays");
     }
-    return std::move(prepared);
+    return std::move(work.prepared);
 }
 
 }  // namespace shapedb

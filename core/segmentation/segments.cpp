@@ -42,10 +42,6 @@ constexpr std::int32_t kOnPath = -3;     // flow has no cycles; if it had, the w
 constexpr std::int32_t kNoMaximum = -4;  // interior, flows into no maximum
 constexpr std::int32_t kInLayer = -5;    // of growing: gets its label with the layer it waits in
 
-// How many steps before it is read memory at random is asked for; and what leads to such memory.
-constexpr std::size_t kAhead = 8;
-constexpr std::size_t kFarAhead = 16;
-
 // Gives a tetrahedron the label of the strongest maximum that it flows into, directly or not: the least
 // label of the two it may flow into, found before its own. What is left by maxima that claim what flows
 // into them, strongest first, is the same; this way each tetrahedron is looked at once.
@@ -138,8 +134,9 @@ class Growth {
     void choose(const std::vector<std::uint32_t>& candidates) {
         layer_.clear();
         for (std::size_t i = 0; i < candidates.size(); ++i) {
-            if (i + kFarAhead < candidates.size()) fetch(&tetrahedra_.neighbours[candidates[i + kFarAhead]]);
-            if (i + kAhead < candidates.size()) fetchNeighbours(candidates[i + kAhead]);
+            if (i + kFetchFarAhead < candidates.size())
+                fetch(&tetrahedra_.neighbours[candidates[i + kFetchFarAhead]]);
+            if (i + kFetchAhead < candidates.size()) fetchNeighbours(candidates[i + kFetchAhead]);
             const std::uint32_t t = candidates[i];
             const std::int32_t label = labelOfLargestNeighbour(tetrahedra_, labels_, t);
             if (label >= 0) layer_.push_back({t, label});
@@ -153,9 +150,9 @@ class Growth {
         for (std::size_t i = 0; i < layer_.size(); ++i)
             labels_.ofTetrahedron[layer_[i].tetrahedron] = layer_[i].label;
         for (std::size_t i = 0; i < layer_.size(); ++i) {
-            if (i + kFarAhead < layer_.size())
-                fetch(&tetrahedra_.neighbours[layer_[i + kFarAhead].tetrahedron]);
-            if (i + kAhead < layer_.size()) fetchNeighbours(layer_[i + kAhead].tetrahedron);
+            if (i + kFetchFarAhead < layer_.size())
+                fetch(&tetrahedra_.neighbours[layer_[i + kFetchFarAhead].tetrahedron]);
+            if (i + kFetchAhead < layer_.size()) fetchNeighbours(layer_[i + kFetchAhead].tetrahedron);
             for (const std::uint32_t next : tetrahedra_.neighbours[layer_[i].tetrahedron]) {
                 if (next == kNoTetrahedron || labels_.ofTetrahedron[next] != kNoMaximum) continue;
                 labels_.ofTetrahedron[next] = kInLayer;

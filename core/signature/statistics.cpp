@@ -4,9 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include <tbb/parallel_invoke.h>
-#include <tbb/task_arena.h>
-
+#include "core/base/parallel.h"
 #include "core/base/random.h"
 #include "core/signature/footprint.h"
 #include "core/signature/histogram.h"
@@ -191,9 +189,8 @@ Result<ShapeStatistics> shapeStatistics(const InteriorView& view, const RunConte
         placesInOutline(outline, bins(Statistic::kFootprint));
         distancesInOutline(outline, bins(Statistic::kFootprintDistances));
     };
-    // Each writes bins of its own: the same bits on any number of threads. Isolated: a thread that waits
-    // must not begin work of its caller's caller.
-    tbb::this_task_arena::isolate([&] { tbb::parallel_invoke(inside, lines, rest); });
+    // Each writes bins of its own: the same bits on any number of threads.
+    doTogether(inside, lines, rest);
     if (!insideDone) return fail(insideDone.error());
     if (auto ok = context.checkpoint(); !ok) return fail(ok.error());
     return result;
