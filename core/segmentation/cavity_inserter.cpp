@@ -63,22 +63,23 @@ std::uint32_t CellStore::take(std::uint32_t count) {
     return kNoCell;
 }
 
-CavityInserter::CavityInserter(LargeVector<Site>& sites, CellStore& cells, const VertexRange& range,
-                               std::uint32_t start)
-    : sites_(sites),
-      cells_(cells),
-      range_(range),
-      alone_(range.begin == 0 && range.end == kInfinite),
-      hint_(start),
-      cavity_(kMostCorners),
-      facets_(kMostCorners) {
+CavityInserter::CavityInserter(LargeVector<Site>& sites, CellStore& cells, std::uint32_t start)
+    : sites_(sites), cells_(cells), hint_(start), cavity_(kMostCorners), facets_(kMostCorners) {
     corners_[0] = kInfinite;
 }
 
+CavityInserter::CavityInserter(LargeVector<Site>& sites, CellStore& cells, const Share& share,
+                               const StartCells& starts)
+    : CavityInserter(sites, cells, kNoCell) {
+    share_ = share;
+    starts_ = &starts;
+}
+
+template <bool kAlone>
 bool CavityInserter::owns(std::uint32_t cell) const {
-    if (alone_) return true;
+    if (kAlone) return true;
     const auto& v = cells_[cell].vertices;
-    return range_.holds(v[0] & kVertexBits) && range_.holds(v[1]) && range_.holds(v[2]) && range_.holds(v[3]);
+    return share_.holdsThree({v[0] & kVertexBits, v[1], v[2], v[3]});
 }
 
 // What the balls leave open.
@@ -94,18 +95,34 @@ bool CavityInserter::conflicts(std::uint32_t cell, const Site& p) const {
     return side != 0 ? side > 0 : sideOfCircle(a, b, c, p) > 0;
 }
 
+// The cell that holds p, or sees it from outside the hull; kNoCell when it is out of the worker's reach.
+template <bool kAlone>
+std::uint32_t CavityInserter::locate(std::uint32_t vertex, const Site& p) const {
+    if (kAlone) return walk<kAlone>(hint_, p);
+    std::uint32_t found = hint_ != kNoCell ? walk<kAlone>(hint_, p) : kNoCell;
+    if (found != kNoCell) return found;
+    // What a worker can reach may be in several pieces.
+    starts_->visitAround(vertex, [&](std::uint32_t start) {
+        if (cells_[start].vertices[0] == kFreeCell || !owns<kAlone>(start)) return false;
+        found = walk<kAlone>(start, p);
+        return found != kNoCell;
+    });
+    return found;
+}
+
 // Walks towards p through facets that part it from the cell (such a walk ends in a Delaunay
-// triangulation). Returns the cell that holds p, or sees it from outside the hull; kNoCell when the way
-// leaves the worker's reach. Reads neighbours only behind facets with a vertex of its own: no other
-// worker changes those.
-std::uint32_t CavityInserter::locate(const Site& p) const {
-    std::uint32_t cell = hint_;
+// triangulation), to where p is; kNoCell when the way leaves the worker's reach. Reads neighbours only
+// behind facets with two vertices of its own: no other worker changes those.
+template <bool kAlone>
+std::uint32_t CavityInserter::walk(std::uint32_t start, const Site& p) const {
+    std::uint32_t cell = start;
     const std::uint32_t outside = infiniteIndex(cells_[cell].vertices);
     if (outside != 4) cell = cells_[cell].neighbours[outside];
     std::uint32_t from = kNoCell;
     for (;;) {
         const auto& v = cells_[cell].vertices;
         if (isInfinite(v)) return cell;
+        const bool own = owns<kAlone>(cell);  // then so are two vertices of each facet
         std::uint32_t to = kNoCell;
         bool blocked = false;
         for (std::uint32_t i = 0; i < 4 && to == kNoCell; ++i) {
@@ -113,7 +130,7 @@ std::uint32_t CavityInserter::locate(const Site& p) const {
             const std::uint32_t a = v[f[0]];
             const std::uint32_t b = v[f[1]];
             const std::uint32_t c = v[f[2]];
-            const bool open = alone_ || range_.holds(a) || range_.holds(b) || range_.holds(c);
+            const bool open = own || share_.holdsTwo(a, b, c);
             if (open && cells_[cell].neighbours[i] == from) continue;
             if (orientation(sites_[a], sites_[b], sites_[c], p) >= 0) continue;
             if (open) {
@@ -161,6 +178,7 @@ void CavityInserter::makeRoom() {
 // Collects the cells whose balls hold p, which hang together, and the facets around them. Whether a ball
 // holds p is as good as random: so the four neighbours of a cell are judged together and almost without
 // branches.
+template <bool kAlone>
 bool CavityInserter::findCavity(std::uint32_t first, const Site& p) {
     cavity_[0] = first;
     cavityCount_ = 1;
@@ -178,7 +196,7 @@ bool CavityInserter::findCavity(std::uint32_t first, const Site& p) {
             cavity_[cavityCount_] = next;
             facets_[facetCount_] = {cell, next, kNoCell, static_cast<std::uint8_t>(i), {}};
             if (joins != 0) {
-                if (!owns(next)) return false;
+                if (!owns<kAlone>(next)) return false;
                 cells_[next].vertices[0] |= kInCavity;
                 fetchNeighbours(cells_, next);
             }
@@ -256,8 +274,16 @@ void CavityInserter::placeFresh(std::uint32_t vertex) {
     }
 }
 
-// Gives the corners of the cavity numbers; false when there are too many of them. A site's mark tells for
-// which vertex it was numbered last, and how.
+// The number of a corner that has one below `count`; kMostCorners for another.
+std::uint32_t CavityInserter::numberAmong(std::uint32_t vertex, std::uint32_t count) const {
+    const auto* const begin = corners_.begin();
+    const auto* const at = std::find(begin + 1, begin + count, vertex);
+    return at == begin + count ? kMostCorners : static_cast<std::uint32_t>(at - begin);
+}
+
+// Gives the corners of the cavity numbers; false when there are too many of them. The mark of a site tells
+// for which vertex it was numbered last, and how; those of other workers' vertices are theirs to write.
+template <bool kAlone>
 bool CavityInserter::numberCorners(std::uint32_t inserted) {
     const std::uint64_t mark = (std::uint64_t{inserted} + 1) * kMostCorners;
     std::uint32_t count = 1;  // 0 is the vertex at infinity
@@ -271,11 +297,12 @@ bool CavityInserter::numberCorners(std::uint32_t inserted) {
                 continue;
             }
             if (count == kMostCorners) return false;
-            const std::uint64_t known = sites_[vertex].mark - mark;
+            const bool ours = kAlone || share_.holds(vertex);
+            const std::uint64_t known = ours ? sites_[vertex].mark - mark : numberAmong(vertex, count);
             const bool fresh = known >= kMostCorners;
             const std::uint64_t number = fresh ? count : known;
             corners_[count] = vertex;
-            sites_[vertex].mark = mark + number;
+            if (ours) sites_[vertex].mark = mark + number;
             count += fresh ? 1 : 0;
             facet.corners[k] = static_cast<std::uint8_t>(number);
         }
@@ -341,9 +368,10 @@ void CavityInserter::linkByTurning() {
     }
 }
 
+template <bool kAlone>
 void CavityInserter::fillCavity(std::uint32_t vertex) {
     placeFresh(vertex);
-    if (numberCorners(vertex)) {
+    if (numberCorners<kAlone>(vertex)) {
         linkByTable();
         measureBalls(sites_[vertex]);
     } else {
@@ -358,12 +386,13 @@ void CavityInserter::fillCavity(std::uint32_t vertex) {
     hint_ = facets_.front().fresh;
 }
 
-Insertion CavityInserter::insert(std::uint32_t vertex) {
+template <bool kAlone>
+Insertion CavityInserter::insertAs(std::uint32_t vertex) {
     const Site p = sites_[vertex];
-    const std::uint32_t first = locate(p);
-    if (first == kNoCell || !owns(first)) return Insertion::kElsewhere;
+    const std::uint32_t first = locate<kAlone>(vertex, p);
+    if (first == kNoCell || !owns<kAlone>(first)) return Insertion::kElsewhere;
     if (isVertexOf(first, p)) return Insertion::kRepeated;
-    if (!findCavity(first, p)) {
+    if (!findCavity<kAlone>(first, p)) {
         unmark();
         return Insertion::kElsewhere;
     }
@@ -371,8 +400,12 @@ Insertion CavityInserter::insert(std::uint32_t vertex) {
         unmark();
         return Insertion::kNoRoom;
     }
-    fillCavity(vertex);
+    fillCavity<kAlone>(vertex);
     return Insertion::kDone;
+}
+
+Insertion CavityInserter::insert(std::uint32_t vertex) {
+    return starts_ == nullptr ? insertAs<true>(vertex) : insertAs<false>(vertex);
 }
 
 }  // namespace shapedb

@@ -53,18 +53,57 @@ class CellStore {
     std::size_t capacity_ = 0;
 };
 
-/// Which vertices belong to a worker: [begin, end), and those below `wrapped`. The one at infinity
-/// belongs to every worker, a cell to the worker that all its vertices belong to.
+/// Which vertices belong to a worker. The one at infinity belongs to nobody, a cell to the worker that three
+/// of its vertices belong to, or all four.
 ///
-/// Workers with disjoint vertices may insert at the same time without locks: no cell of one is next to
-/// a cell of another (they would share three vertices), what lies between belongs to nobody and keeps its
-/// vertices, and of its four neighbours each worker changes only those behind facets of its own vertices.
-struct VertexRange {
-    std::uint32_t begin = 0;
-    std::uint32_t end = kInfinite;
-    std::uint32_t wrapped = 0;
+/// Workers may insert at the same time without locks. Of the vertices of a facet of its own cells at least
+/// two belong to a worker, so no cell of one is next to a cell of another. What lies between belongs to
+/// nobody and keeps its vertices, and of its four neighbours each worker changes only those behind facets
+/// with two vertices of its own.
+struct Share {
+    const std::uint8_t* workers = nullptr;  ///< by vertex
+    std::uint8_t worker = 0;
 
-    bool holds(std::uint32_t v) const { return v - begin < end - begin || v < wrapped || v == kInfinite; }
+    bool holds(std::uint32_t v) const { return v != kInfinite && workers[v] == worker; }
+    bool holdsTwo(std::uint32_t a, std::uint32_t b, std::uint32_t c) const {
+        return count(a) + count(b) + count(c) >= 2;
+    }
+    bool holdsThree(const std::array<std::uint32_t, 4>& v) const {
+        return count(v[0]) + count(v[1]) + count(v[2]) + count(v[3]) >= 3;
+    }
+
+  private:
+    unsigned count(std::uint32_t v) const { return holds(v) ? 1 : 0; }
+};
+
+/// Some cells of one worker all along the order of the vertices, to walk from when the way from the last
+/// point inserted is barred. They may be free by now.
+class StartCells {
+  public:
+    explicit StartCells(std::size_t siteCount) : siteCount_(siteCount), cells_(kSlots, kNoCell) {}
+
+    /// `vertex`: one of its corners.
+    void add(std::uint32_t vertex, std::uint32_t cell) { cells_[slotOf(vertex)] = cell; }
+    /// Calls `visit(cell)` with those around a vertex, the nearest first, until it returns true.
+    template <typename Visit>
+    void visitAround(std::uint32_t vertex, const Visit& visit) const {
+        const auto see = [&](std::size_t slot) { return cells_[slot] != kNoCell && visit(cells_[slot]); };
+        const std::size_t middle = slotOf(vertex);
+        for (std::size_t away = 0; away <= kReach; ++away) {
+            if (middle + away < kSlots && see(middle + away)) return;
+            if (away != 0 && away <= middle && see(middle - away)) return;
+        }
+    }
+
+    static constexpr std::size_t kSlots = 4096;
+
+  private:
+    static constexpr std::size_t kReach = 3;  // slots to either side
+
+    std::size_t slotOf(std::uint32_t vertex) const { return vertex * kSlots / siteCount_; }
+
+    std::size_t siteCount_;
+    std::vector<std::uint32_t> cells_;
 };
 
 enum class Insertion {
@@ -77,10 +116,12 @@ enum class Insertion {
 /// Inserts points one at a time (Bowyer 1981, Watson 1981). One for each thread.
 class CavityInserter {
   public:
-    /// `start`: a cell of `range`, where the first walk begins.
-    CavityInserter(LargeVector<Site>& sites, CellStore& cells, const VertexRange& range, std::uint32_t start);
+    /// All of them, the first walk beginning at the cell `start`.
+    CavityInserter(LargeVector<Site>& sites, CellStore& cells, std::uint32_t start);
+    /// A worker's. What it is given must live as long as this.
+    CavityInserter(LargeVector<Site>& sites, CellStore& cells, const Share& share, const StartCells& starts);
 
-    /// Inserts the site `vertex`, which must be in range.
+    /// Inserts the site `vertex`, which must be in the share.
     Insertion insert(std::uint32_t vertex);
 
     /// A cell of the last point inserted.
@@ -100,18 +141,29 @@ class CavityInserter {
         std::array<std::uint8_t, 3> corners;  // numbers of its corners, seen from inside
     };
 
+    // kAlone: everything is this one's, which needs no questions.
+    template <bool kAlone>
+    Insertion insertAs(std::uint32_t vertex);
+    template <bool kAlone>
     bool owns(std::uint32_t cell) const;
     bool conflicts(std::uint32_t cell, const Site& p) const;
     unsigned neighboursHolding(std::uint32_t cell, const Site& p) const;
     void makeRoom();
-    std::uint32_t locate(const Site& p) const;
+    template <bool kAlone>
+    std::uint32_t locate(std::uint32_t vertex, const Site& p) const;
+    template <bool kAlone>
+    std::uint32_t walk(std::uint32_t start, const Site& p) const;
     bool isVertexOf(std::uint32_t cell, const Site& p) const;
+    template <bool kAlone>
     bool findCavity(std::uint32_t first, const Site& p);
     void unmark();
     bool takeFresh();
+    template <bool kAlone>
     void fillCavity(std::uint32_t vertex);
     void placeFresh(std::uint32_t vertex);
     void measureBalls(const Site& p);
+    std::uint32_t numberAmong(std::uint32_t vertex, std::uint32_t count) const;
+    template <bool kAlone>
     bool numberCorners(std::uint32_t inserted);
     void linkByTable();
     void linkByTurning();
@@ -119,8 +171,8 @@ class CavityInserter {
 
     LargeVector<Site>& sites_;
     CellStore& cells_;
-    VertexRange range_;
-    bool alone_;  // everything is in range
+    Share share_;
+    const StartCells* starts_ = nullptr;  // none: everything is this one's
     std::uint32_t hint_;
     std::vector<std::uint32_t> free_;
     // Lists with room to spare at the end, where entries are written before it is known whether they count.

@@ -4,12 +4,11 @@
 #include <array>
 #include <cstddef>
 #include <numeric>
-#include <optional>
-#include <thread>
 #include <utility>
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <tbb/parallel_for.h>
+
+#include "core/segmentation/insertion_crew.h"
 
 namespace shapedb {
 
@@ -26,8 +25,6 @@ constexpr std::size_t kMostCells = 0xfffffff0u;
 // Each round inserts this many times as many points as all before it.
 constexpr int kRoundShift = 2;
 constexpr std::size_t kSmallestRound = 512;
-// A round with fewer points for each thread is not worth dividing.
-constexpr std::size_t kLeastShare = 4096;
 // What is left of a round is scattered along the borders: it is divided again only when it is more than this
 // share, which takes many threads.
 constexpr std::size_t kLeastLeft = 8;
@@ -74,21 +71,16 @@ bool onOneLine(const Site& a, const Site& b, const Site& c) {
     return CGAL::collinear(Point(a.x, a.y, a.z), Point(b.x, b.y, b.z), Point(c.x, c.y, c.z));
 }
 
-// One thread's share of a round, and what came of it.
-struct Share {
-    VertexRange range;
-    std::uint32_t start = kNoCell;
-    const std::uint32_t* begin = nullptr;
-    const std::uint32_t* end = nullptr;
-    std::vector<std::uint32_t> postponed;
-    std::vector<std::uint32_t> freeCells;
-    std::optional<Error> error;
-};
-
 class Builder {
   public:
-    Builder(LargeVector<Site>& sites, CellStore& cells, std::size_t threads, const RunContext& context)
-        : sites_(sites), cells_(cells), threads_(std::max<std::size_t>(threads, 1)), context_(context) {}
+    Builder(LargeVector<Site>& sites, CellStore& cells, std::size_t threads, const RunContext& context,
+            const Division& division)
+        : sites_(sites),
+          cells_(cells),
+          threads_(std::min(threads, InsertionCrew::kMostWorkers)),
+          context_(context),
+          division_(division),
+          crew_(sites, cells, threads_, context, done_) {}
 
     Result<void> build() {
         if (auto go = context_.checkpoint(); !go) return go;
@@ -104,7 +96,6 @@ class Builder {
             if (auto done = insertRound(std::move(left)); !done) return done;
             begin = end;
         }
-        for (const std::uint32_t cell : free_) cells_[cell].vertices[0] = kFreeCell;
         cells_.dropBalls();
         return {};
     }
@@ -120,17 +111,18 @@ class Builder {
     Result<void> insertRound(std::vector<std::uint32_t> left);
     Result<void> insertAlone(const std::vector<std::uint32_t>& list);
     Result<void> insertTogether(std::vector<std::uint32_t>& list, bool shifted);
-    void work(Share& share, std::thread::id reporter);
-    std::uint32_t cellWithin(const VertexRange& range) const;
+    std::uint32_t anyCell() const;
 
     LargeVector<Site>& sites_;
     CellStore& cells_;
     std::size_t threads_;
     const RunContext& context_;
+    const Division& division_;
     std::array<std::uint32_t, 4> first_{};
     std::vector<std::uint32_t> free_;
     std::uint32_t last_ = 0;  // a cell to walk from
     std::atomic<std::size_t> done_{0};
+    InsertionCrew crew_;
 };
 
 // One cell between the first four points that span space, and the four outside of it.
@@ -172,7 +164,8 @@ Result<void> Builder::beginWithFour(const std::vector<std::uint32_t>& order) {
 Result<void> Builder::insertRound(std::vector<std::uint32_t> left) {
     const std::size_t all = left.size();
     for (const bool shifted : {false, true}) {
-        const bool large = sites_.size() >= kLeastParallelPoints && left.size() >= threads_ * kLeastShare;
+        const bool large =
+            sites_.size() >= division_.leastPoints && left.size() >= threads_ * division_.leastShare;
         const bool many = !shifted || left.size() >= all / kLeastLeft;
         if (threads_ < 2 || !large || !many) break;
         if (auto done = insertTogether(left, shifted); !done) return done;
@@ -181,7 +174,7 @@ Result<void> Builder::insertRound(std::vector<std::uint32_t> left) {
 }
 
 Result<void> Builder::insertAlone(const std::vector<std::uint32_t>& list) {
-    CavityInserter inserter(sites_, cells_, VertexRange{}, last_);
+    CavityInserter inserter(sites_, cells_, last_);
     inserter.freeCells().swap(free_);
     for (std::size_t i = 0; i < list.size(); ++i, ++done_) {
         if (i % kInsertsBetweenCheckpoints == 0) {
@@ -205,90 +198,27 @@ Result<void> Builder::insertAlone(const std::vector<std::uint32_t>& list) {
     return {};
 }
 
-// A cell that belongs to the range, to walk from; kNoCell when there is none.
-std::uint32_t Builder::cellWithin(const VertexRange& range) const {
-    for (std::uint32_t cell = 0; cell < cells_.used(); ++cell) {
-        const auto& v = cells_[cell].vertices;
-        if (v[0] == kFreeCell) continue;
-        if (range.holds(v[0]) && range.holds(v[1]) && range.holds(v[2]) && range.holds(v[3])) return cell;
-    }
-    return kNoCell;
+// A cell to walk from.
+std::uint32_t Builder::anyCell() const {
+    std::uint32_t cell = 0;
+    while (cells_[cell].vertices[0] == kFreeCell) ++cell;
+    return cell;
 }
 
 // Inserts what the threads can insert without meeting; what is left replaces `list`. `shifted`: with
 // the borders between threads in the middle of where they were.
 Result<void> Builder::insertTogether(std::vector<std::uint32_t>& list, bool shifted) {
     cells_.reserve(std::min(kMostCells, cells_.used() + kCellsPerPoint * list.size() + kSpareCells));
-    if (shifted) {
-        const auto middle = static_cast<std::ptrdiff_t>(list.size() / threads_ / 2);
-        std::rotate(list.begin(), list.begin() + middle, list.end());
-    }
-    std::vector<Share> shares(threads_);
-    for (const std::uint32_t cell : free_) cells_[cell].vertices[0] = kFreeCell;
-    for (std::size_t k = 0; k < threads_; ++k) {
-        const std::size_t begin = k * list.size() / threads_;
-        const std::size_t end = (k + 1) * list.size() / threads_;
-        Share& share = shares[k];
-        share.begin = list.data() + begin;
-        share.end = list.data() + end;
-        const bool last = k + 1 == threads_;
-        share.range.begin = k == 0 && !shifted ? 0 : list[begin];
-        share.range.end = last ? kInfinite : list[end];
-        share.range.wrapped = last && shifted ? list[0] : 0;
-        share.start = cellWithin(share.range);
-    }
-    shares[0].freeCells.swap(free_);
-    const std::thread::id reporter = std::this_thread::get_id();
-    tbb::this_task_arena::isolate([&] {
-        tbb::parallel_for(
-            std::size_t{0}, threads_, [&](std::size_t k) { work(shares[k], reporter); },
-            tbb::simple_partitioner());
-    });
-    list.clear();
-    for (Share& share : shares) {
-        if (share.error) return fail(*share.error);
-        list.insert(list.end(), share.postponed.begin(), share.postponed.end());
-        free_.insert(free_.end(), share.freeCells.begin(), share.freeCells.end());
-    }
-    std::sort(list.begin(), list.end());
-    last_ = cellWithin(VertexRange{});
+    if (auto done = crew_.insert(list, shifted, free_); !done) return done;
+    last_ = anyCell();
     return {};
-}
-
-void Builder::work(Share& share, std::thread::id reporter) {
-    if (share.start == kNoCell) {
-        share.postponed.assign(share.begin, share.end);
-        return;
-    }
-    CavityInserter inserter(sites_, cells_, share.range, share.start);
-    inserter.freeCells().swap(share.freeCells);
-    std::size_t count = 0;
-    for (const std::uint32_t* v = share.begin; v != share.end; ++v) {
-        if (++count % kInsertsBetweenCheckpoints == 0) {
-            done_ += kInsertsBetweenCheckpoints;
-            if (auto go = context_.checkpoint(); !go) {
-                share.error = go.error();
-                break;
-            }
-            if (std::this_thread::get_id() == reporter) context_.report("delaunay", done_, sites_.size());
-        }
-        switch (inserter.insert(*v)) {
-            case Insertion::kDone: break;
-            case Insertion::kRepeated:
-                share.error = Error{ErrorCode::kInternal, "the points to triangulate are not distinct"};
-                return;
-            case Insertion::kElsewhere:
-            case Insertion::kNoRoom: share.postponed.push_back(*v); break;
-        }
-    }
-    share.freeCells.swap(inserter.freeCells());
 }
 
 }  // namespace
 
 Result<void> insertAll(LargeVector<Site>& sites, CellStore& cells, std::size_t threads,
-                       const RunContext& context) {
-    return Builder(sites, cells, threads, context).build();
+                       const RunContext& context, const Division& division) {
+    return Builder(sites, cells, threads, context, division).build();
 }
 
 }  // namespace shapedb

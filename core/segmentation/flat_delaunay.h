@@ -11,8 +11,11 @@
 
 namespace shapedb {
 
-/// Below this many points one thread is as fast as two.
-constexpr std::size_t kLeastParallelPoints = 50000;
+/// What is worth dividing between threads, in points. Results do not depend on it.
+struct Division {
+    std::size_t leastPoints = 50000;  ///< of the whole triangulation
+    std::size_t leastShare = 4096;    ///< of a round, for each thread; at least 1
+};
 
 /// Triangulates `sites`, which should follow a curve through space (curve_order.h), with up to
 /// `threads` threads of the caller's arena. The set of cells is the same for any number; their places
@@ -21,6 +24,6 @@ constexpr std::size_t kLeastParallelPoints = 50000;
 /// Errors: kCoplanar, kCollinear, kTooFewPoints (exactly so); kInternal when two sites are at the same
 /// place; kCancelled, kDeadlineExceeded; kOutOfMemory. May throw std::bad_alloc.
 [[nodiscard]] Result<void> insertAll(LargeVector<Site>& sites, CellStore& cells, std::size_t threads,
-                                     const RunContext& context);
+                                     const RunContext& context, const Division& division = {});
 
 }  // namespace shapedb

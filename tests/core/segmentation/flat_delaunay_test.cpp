@@ -11,6 +11,7 @@
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Triangulation_vertex_base_with_info_3.h>
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
 #include "core/base/random.h"
@@ -57,19 +58,49 @@ std::vector<Corners> sorted(const Vector& unsorted) {
     return tetrahedra;
 }
 
+// So many points are divided between threads.
+const std::size_t kDivided = Division{}.leastPoints;
+
+// Each neighbour has the facet's three corners and this cell behind them.
+bool isJoined(const CellStore& cells, std::uint32_t cell) {
+    for (std::uint32_t i = 0; i < 4; ++i) {
+        const Cell& next = cells[cells[cell].neighbours[i]];
+        std::uint32_t shared = 0;
+        bool back = false;
+        for (std::uint32_t k = 0; k < 4; ++k) {
+            const auto& v = cells[cell].vertices;
+            if (std::find(v.begin(), v.end(), next.vertices[k]) != v.end()) {
+                ++shared;
+            } else {
+                back = next.neighbours[k] == cell;
+            }
+        }
+        if (shared != 3 || !back) return false;
+    }
+    return true;
+}
+
 // In the points' own order, straight from the store, so that the number of threads is ours.
-std::vector<Corners> byThreads(const PointCloud& points, std::size_t threads) {
+std::vector<Corners> byThreads(const PointCloud& points, std::size_t threads, const Division& division = {}) {
     LargeVector<Site> sites;
     for (const Point3& p : points) sites.push_back({p.x, p.y, p.z});
+    const tbb::global_control allowed(tbb::global_control::max_allowed_parallelism, threads);
+    tbb::task_arena arena(static_cast<int>(threads));
     CellStore cells;
     std::vector<Corners> tetrahedra;
-    if (!insertAll(sites, cells, threads, {})) return tetrahedra;
+    const auto done = arena.execute([&] { return insertAll(sites, cells, threads, {}, division); });
+    EXPECT_TRUE(done) << done.error().message;
+    if (!done) return tetrahedra;
+    bool joined = true;
     for (std::uint32_t c = 0; c < cells.used(); ++c) {
         const Corners& v = cells[c].vertices;
+        if (v[0] == kFreeCell) continue;
+        joined = joined && isJoined(cells, c);
         if (std::all_of(v.begin(), v.end(), [](std::uint32_t i) { return i < kInfinite; })) {
             tetrahedra.push_back(v);
         }
     }
+    EXPECT_TRUE(joined);
     return sorted(std::move(tetrahedra));
 }
 
@@ -162,15 +193,15 @@ TEST(FlatDelaunay, FindsTheTetrahedraOfCgalInLargerClouds) {
 
 TEST(FlatDelaunay, AnyNumberOfThreadsFindsTheSameTetrahedra) {
     const std::vector<std::pair<std::string, PointCloud>> clouds = {
-        {"uniform", alongCurve(inACube(kLeastParallelPoints))},
-        {"noisy jack", alongCurve(scanned(makeJack(), kLeastParallelPoints + 500, 0.002))},
-        {"clean box", alongCurve(scanned(makeBox(), kLeastParallelPoints + 500, 0.0))},
+        {"uniform", alongCurve(inACube(kDivided))},
+        {"noisy jack", alongCurve(scanned(makeJack(), kDivided + 500, 0.002))},
+        {"clean box", alongCurve(scanned(makeBox(), kDivided + 500, 0.0))},
         {"grid", alongCurve(grid(37, 0.03125))},
         // Shares of a round that have nothing to do with each other in space.
-        {"not along a curve", inACube(kLeastParallelPoints)},
+        {"not along a curve", inACube(kDivided)},
     };
     for (const auto& [name, points] : clouds) {
-        ASSERT_GE(points.size(), kLeastParallelPoints) << name;
+        ASSERT_GE(points.size(), kDivided) << name;
         const auto alone = byThreads(points, 1);
         ASSERT_FALSE(alone.empty()) << name;
         for (const std::size_t threads : {2, 3, 5})
@@ -180,12 +211,35 @@ TEST(FlatDelaunay, AnyNumberOfThreadsFindsTheSameTetrahedra) {
 
 // So many borders that what is left along them is divided once more.
 TEST(FlatDelaunay, ManyThreadsFindWhatOneFinds) {
-    const PointCloud points = alongCurve(inACube(3 * kLeastParallelPoints));
+    const PointCloud points = alongCurve(inACube(3 * kDivided));
     EXPECT_TRUE(byThreads(points, 7) == byThreads(points, 1));
 }
 
+// Hardly anything belongs to one thread alone.
+TEST(FlatDelaunay, ThreadsFindTheTetrahedraOfCgalHoweverFewPointsTheyShare) {
+    std::vector<std::pair<std::string, PointCloud>> clouds = {
+        {"uniform", alongCurve(inACube(3000))},
+        {"noisy dumbbell", alongCurve(scanned(makeDumbbell(), 4000, 0.003))},
+        {"clean box", alongCurve(scanned(makeBox(), 3000, 0.0))},
+        {"grid", alongCurve(grid(12, 0.0625))},
+        {"nearly repeated", alongCurve(nearlyRepeated())},
+        {"not along a curve", inACube(1000)},
+    };
+    for (const SmallCloud& cloud : smallClouds()) clouds.emplace_back(cloud.name, alongCurve(cloud.points));
+    for (const auto& [name, points] : clouds) {
+        const auto expected = byCgal(points);
+        for (const std::size_t threads : {2, 3, 6}) {
+            for (const std::size_t least : {1, 16, 128}) {
+                const Division fine{0, least};
+                EXPECT_TRUE(byThreads(points, threads, fine) == expected)
+                    << name << " " << threads << " " << least;
+            }
+        }
+    }
+}
+
 TEST(FlatDelaunay, ResultsHaveTheSameBitsOnAnyNumberOfThreads) {
-    const PointCloud points = scanned(makeDumbbell(), kLeastParallelPoints + 500, 0.001);
+    const PointCloud points = scanned(makeDumbbell(), kDivided + 500, 0.001);
     const auto in = [&](int threads) {
         tbb::task_arena arena(threads);
         return arena.execute([&] { return triangulate(points).value(); });
@@ -199,7 +253,7 @@ TEST(FlatDelaunay, ResultsHaveTheSameBitsOnAnyNumberOfThreads) {
 }
 
 TEST(FlatDelaunay, ThreadsStopWhenToldTo) {
-    const PointCloud points = alongCurve(inACube(kLeastParallelPoints));
+    const PointCloud points = alongCurve(inACube(kDivided));
     LargeVector<Site> sites;
     for (const Point3& p : points) sites.push_back({p.x, p.y, p.z});
     std::atomic<bool> cancel{false};
@@ -213,7 +267,7 @@ TEST(FlatDelaunay, ThreadsStopWhenToldTo) {
 }
 
 TEST(FlatDelaunay, ThreadsRefuseRepeatedPoints) {
-    PointCloud points = inACube(kLeastParallelPoints);
+    PointCloud points = inACube(kDivided);
     points.push_back(points[4321]);
     LargeVector<Site> sites;
     for (const std::uint32_t i : curveOrder(points)) sites.push_back({points[i].x, points[i].y, points[i].z});

@@ -1,0 +1,165 @@
+#include "core/segmentation/insertion_crew.h"
+
+#include <algorithm>
+#include <chrono>
+#include <optional>
+#include <thread>
+
+#include "core/base/parallel.h"
+
+namespace shapedb {
+
+namespace {
+
+constexpr std::size_t kInsertsBetweenCheckpoints = 1024;
+// So many sites tell where slabs with as many points as others end.
+constexpr std::size_t kSample = 4096;
+constexpr std::size_t kBlock = 8192;  // sites that a thread takes at a time
+
+double coordinate(const Site& site, std::size_t axis) {
+    return axis == 0 ? site.x : axis == 1 ? site.y : site.z;
+}
+
+}  // namespace
+
+// What one worker needs and leaves.
+struct InsertionCrew::Worker {
+    Share share;
+    StartCells starts;
+    std::vector<std::uint32_t> postponed;
+    std::vector<std::uint32_t> freeCells;
+    std::optional<Error> error;
+    double seconds = 0.0;  // it took
+};
+
+InsertionCrew::InsertionCrew(LargeVector<Site>& sites, CellStore& cells, std::size_t workers,
+                             const RunContext& context, std::atomic<std::size_t>& done)
+    : sites_(sites), cells_(cells), workers_(workers), context_(context), done_(done) {
+    for (std::size_t k = 0; k <= workers; ++k) {
+        borders_.push_back(static_cast<double>(k) / static_cast<double>(workers));
+    }
+}
+
+void InsertionCrew::orderSample() {
+    const std::size_t step = std::max<std::size_t>(1, sites_.size() / kSample);
+    double longest = -1.0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        std::vector<double> along;
+        for (std::size_t i = 0; i < sites_.size(); i += step) along.push_back(coordinate(sites_[i], axis));
+        std::sort(along.begin(), along.end());
+        const double length = along.back() - along.front();
+        if (length <= longest) continue;
+        longest = length;
+        axis_ = axis;
+        sample_.swap(along);
+    }
+}
+
+// Shifted, the borders lie in the middle of the slabs, and what is before the first and beyond the last of
+// them is one worker's.
+Result<void> InsertionCrew::cut(bool shifted) {
+    if (sample_.empty()) orderSample();
+    std::vector<double> at;
+    for (std::size_t k = shifted ? 0 : 1; k < workers_; ++k) {
+        const double share = shifted ? (borders_[k] + borders_[k + 1]) / 2 : borders_[k];
+        const auto last = static_cast<double>(sample_.size() - 1);
+        at.push_back(sample_[static_cast<std::size_t>(share * last)]);
+    }
+    slabOf_.resize(sites_.size());
+    return forEachRange(slabOf_.size(), kBlock, context_, [&](std::size_t from, std::size_t to) {
+        for (std::size_t i = from; i < to; ++i) {
+            const auto slab =
+                std::upper_bound(at.begin(), at.end(), coordinate(sites_[i], axis_)) - at.begin();
+            slabOf_[i] = static_cast<std::uint8_t>(static_cast<std::size_t>(slab) % workers_);
+        }
+    });
+}
+
+// Half of the way to where all would have taken as long, had each needed the same time everywhere in its
+// slab: the other half is taken for chance.
+void InsertionCrew::moveBorders(const std::vector<Worker>& workers) {
+    double all = 0.0;
+    for (const Worker& worker : workers) all += worker.seconds;
+    const std::vector<double> before = borders_;
+    double passed = 0.0;
+    std::size_t next = 1;
+    for (std::size_t k = 0; k < workers_; ++k) {
+        const double seconds = workers[k].seconds;
+        for (; next < workers_; ++next) {
+            const double wanted = all * static_cast<double>(next) / static_cast<double>(workers_) - passed;
+            if (wanted > seconds) break;
+            const double share = seconds > 0.0 ? wanted / seconds : 0.0;
+            borders_[next] = (before[next] + before[k] + share * (before[k + 1] - before[k])) / 2;
+        }
+        passed += seconds;
+    }
+}
+
+Result<void> InsertionCrew::insert(std::vector<std::uint32_t>& list, bool shifted,
+                                   std::vector<std::uint32_t>& freeCells) {
+    if (auto done = cut(shifted); !done) return done;
+    std::vector<Worker> workers;
+    for (std::size_t k = 0; k < workers_; ++k) {
+        const Share share{slabOf_.data(), static_cast<std::uint8_t>(k)};
+        workers.push_back({share, StartCells(sites_.size()), {}, {}, {}, 0.0});
+    }
+    addStarts(workers);
+    workers.front().freeCells.swap(freeCells);
+    const std::thread::id reporter = std::this_thread::get_id();
+    auto done = forEachRange(workers_, 1, context_, [&](std::size_t k, std::size_t) {
+        work(list, workers[k], std::this_thread::get_id() == reporter);
+    });
+    if (!done) return done;
+    if (!shifted) moveBorders(workers);
+    list.clear();
+    for (const Worker& worker : workers) {
+        if (worker.error) return fail(*worker.error);
+        list.insert(list.end(), worker.postponed.begin(), worker.postponed.end());
+        freeCells.insert(freeCells.end(), worker.freeCells.begin(), worker.freeCells.end());
+    }
+    std::sort(list.begin(), list.end());
+    return {};
+}
+
+// A few for each slot.
+void InsertionCrew::addStarts(std::vector<Worker>& workers) const {
+    const std::size_t step = std::max<std::size_t>(1, cells_.used() / (4 * StartCells::kSlots));
+    for (std::size_t c = 0; c < cells_.used(); c += step) {
+        const auto cell = static_cast<std::uint32_t>(c);
+        const auto& v = cells_[cell].vertices;
+        if (v[0] == kFreeCell) continue;
+        for (Worker& worker : workers) {
+            if (worker.share.holdsThree(v)) worker.starts.add(v[0] < kInfinite ? v[0] : v[1], cell);
+        }
+    }
+}
+
+void InsertionCrew::work(const std::vector<std::uint32_t>& list, Worker& worker, bool reports) {
+    const auto begun = std::chrono::steady_clock::now();
+    CavityInserter inserter(sites_, cells_, worker.share, worker.starts);
+    inserter.freeCells().swap(worker.freeCells);
+    std::size_t count = 0;
+    for (const std::uint32_t vertex : list) {
+        if (!worker.share.holds(vertex)) continue;
+        if (++count % kInsertsBetweenCheckpoints == 0) {
+            done_ += kInsertsBetweenCheckpoints;
+            if (auto go = context_.checkpoint(); !go) {
+                worker.error = go.error();
+                return;
+            }
+            if (reports) context_.report("delaunay", done_, sites_.size());
+        }
+        switch (inserter.insert(vertex)) {
+            case Insertion::kDone: break;
+            case Insertion::kRepeated:
+                worker.error = Error{ErrorCode::kInternal, "the points to triangulate are not distinct"};
+                return;
+            case Insertion::kElsewhere:
+            case Insertion::kNoRoom: worker.postponed.push_back(vertex); break;
+        }
+    }
+    worker.freeCells.swap(inserter.freeCells());
+    worker.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+}
+
+}  // namespace shapedb

@@ -1,0 +1,55 @@
+// Workers that insert points into one Delaunay triangulation at the same time.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/run_context.h"
+#include "core/segmentation/cavity_inserter.h"
+
+namespace shapedb {
+
+/// Space is cut into slabs across its longest side, which makes for short borders, so that workers are done
+/// at about the same time. Each inserts the points of its slab, without locks (Share).
+class InsertionCrew {
+  public:
+    static constexpr std::size_t kMostWorkers = 255;
+
+    /// Everything must live as long as this. `workers`: 2 to kMostWorkers, on up to as many threads of the
+    /// caller's arena. `done`: points inserted, for progress.
+    InsertionCrew(LargeVector<Site>& sites, CellStore& cells, std::size_t workers, const RunContext& context,
+                  std::atomic<std::size_t>& done);
+
+    /// Inserts the sites of `list`, which are in rising order; those along the borders stay in it. `shifted`:
+    /// with the borders in the middle of where they are otherwise. `freeCells`: cells of the store that are
+    /// not in use, marked so, and what then is not.
+    ///
+    /// Errors: kInternal when two sites are at the same place; kCancelled, kDeadlineExceeded. May throw
+    /// std::bad_alloc.
+    [[nodiscard]] Result<void> insert(std::vector<std::uint32_t>& list, bool shifted,
+                                      std::vector<std::uint32_t>& freeCells);
+
+  private:
+    struct Worker;
+
+    void orderSample();
+    Result<void> cut(bool shifted);
+    void moveBorders(const std::vector<Worker>& workers);
+    void addStarts(std::vector<Worker>& workers) const;
+    void work(const std::vector<std::uint32_t>& list, Worker& worker, bool reports);
+
+    LargeVector<Site>& sites_;
+    CellStore& cells_;
+    std::size_t workers_;
+    const RunContext& context_;
+    std::atomic<std::size_t>& done_;
+    std::size_t axis_ = 0;              // across which the slabs lie
+    std::vector<double> sample_;        // places of some sites along it, rising
+    std::vector<double> borders_;       // between slabs: shares of the sample, from 0 to 1
+    std::vector<std::uint8_t> slabOf_;  // the worker of each site
+};
+
+}  // namespace shapedb
