@@ -59,4 +59,27 @@ void give(void* block, std::size_t bytes) noexcept {
     std::free(block);
 }
 
+std::size_t movePages(void* from, std::size_t left, void* to, std::size_t bytes) noexcept {
+#if defined(SHAPEDB_LARGE_PAGES)
+    // All but a remainder, which tells the system's own blocks from the heap's in give().
+    const std::size_t most = left < kLeastMapped ? 0 : left - kLeastMapped;
+    const std::size_t length = (bytes < most ? bytes : most) / kLargePage * kLargePage;
+    const bool large =
+        bytes >= kLeastOnLargePages && length > 0 && reinterpret_cast<std::uintptr_t>(from) % kLargePage == 0;
+    if (!large) return 0;
+    if (mremap(from, length, length, MREMAP_MAYMOVE | MREMAP_FIXED, to) != MAP_FAILED) return length;
+    // What was there may be gone already.
+    if (mmap(to, length, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_FIXED, -1, 0) ==
+        MAP_FAILED) {
+        std::abort();
+    }
+#else
+    static_cast<void>(from);
+    static_cast<void>(left);
+    static_cast<void>(to);
+    static_cast<void>(bytes);
+#endif
+    return 0;
+}
+
 }  // namespace shapedb::large_block

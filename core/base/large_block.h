@@ -22,6 +22,10 @@ constexpr std::size_t kLeastOnLargePages = std::size_t{1} << 23;
 [[nodiscard]] void* take(std::size_t bytes) noexcept;
 /// What take gave for as many bytes.
 void give(void* block, std::size_t bytes) noexcept;
+/// Puts the pages at the front of what is left of one block under another, and what was in either is lost.
+/// Returns how many bytes of the first are gone; 0 where that cannot be done. `from` is at the beginning of a
+/// block or where such a call left it, `to` at the beginning of one.
+[[nodiscard]] std::size_t movePages(void* from, std::size_t left, void* to, std::size_t bytes) noexcept;
 
 }  // namespace large_block
 
@@ -59,9 +63,10 @@ struct LargeAllocator {
     T* allocate(std::size_t count) { return allocateLarge<T>(count).release(); }
     void deallocate(T* block, std::size_t count) noexcept { FreeLarge{count * sizeof(T)}(block); }
 
+    // Not even members' default values: those would be written, page after page, to be overwritten.
     template <typename U>
-    void construct(U* at) noexcept(std::is_nothrow_default_constructible_v<U>) {
-        ::new (static_cast<void*>(at)) U;
+    void construct(U*) noexcept {
+        static_assert(std::is_trivially_copyable_v<U> && std::is_trivially_destructible_v<U>);
     }
     template <typename U, typename... Arguments>
     void construct(U* at, Arguments&&... arguments) {
@@ -73,5 +78,32 @@ struct LargeAllocator {
 
 template <typename T>
 using LargeVector = std::vector<T, LargeAllocator<T>>;
+
+/// A block whose content is not needed any more. A new block gets its pages, which the system then need not
+/// clear: that takes as long as writing them.
+class SpentBlock {
+  public:
+    template <typename T>
+    explicit SpentBlock(LargeBlock<T>&& block) : left_(block.get_deleter().bytes), next_(block.release()) {}
+    SpentBlock(const SpentBlock&) = delete;
+    SpentBlock& operator=(const SpentBlock&) = delete;
+    ~SpentBlock() {
+        if (left_ > 0) large_block::give(next_, left_);
+    }
+
+    /// A vector of so many elements, which hold anything until they are assigned.
+    template <typename T>
+    [[nodiscard]] LargeVector<T> makeVector(std::size_t count) {
+        LargeVector<T> vector(count);
+        const std::size_t moved = large_block::movePages(next_, left_, vector.data(), count * sizeof(T));
+        next_ = static_cast<char*>(next_) + moved;
+        left_ -= moved;
+        return vector;
+    }
+
+  private:
+    std::size_t left_;
+    void* next_;
+};
 
 }  // namespace shapedb

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "core/base/large_block.h"
@@ -41,8 +42,10 @@ class CellStore {
     const Cell& operator[](std::uint32_t i) const { return cells_[i]; }
     DelaunayBall& ball(std::uint32_t i) { return balls_[i]; }
     const DelaunayBall& ball(std::uint32_t i) const { return balls_[i]; }
-    /// Frees the balls, when nothing more is inserted.
-    void dropBalls() { balls_.reset(); }
+    /// The memory of the balls, when nothing more is inserted, and that of the cells, when they are not
+    /// needed.
+    SpentBlock giveUpBalls() { return SpentBlock(std::move(balls_)); }
+    SpentBlock giveUpCells() { return SpentBlock(std::move(cells_)); }
     std::size_t used() const { return used_.load(std::memory_order_relaxed); }
     std::size_t capacity() const { return capacity_; }
 

@@ -172,8 +172,11 @@ Result<Tetrahedra> flatten(CellStore& cells, const std::vector<std::uint32_t>& o
     if (!sorted) return fail(sorted.error());
     const LargeVector<std::uint32_t>& cellOf = *sorted;
     Tetrahedra flat;
-    flat.vertices.resize(cellOf.size());
-    flat.neighbours.resize(cellOf.size());
+    {
+        SpentBlock balls = cells.giveUpBalls();
+        flat.vertices = balls.makeVector<Corners>(cellOf.size());
+        flat.neighbours = balls.makeVector<Corners>(cellOf.size());
+    }
     auto done = forEachRange(cellOf.size(), kBlock, context, [&](std::size_t from, std::size_t to) {
         for (std::size_t t = from; t < to; ++t) {
             if (t + kFarAhead < to) {
@@ -211,9 +214,11 @@ void measureTwoBalls(const PointCloud& points, Tetrahedra& flat, std::size_t t, 
     flat.circumradii[u] = radius.high();
 }
 
-Result<void> measureBalls(const PointCloud& points, Tetrahedra& flat, const RunContext& context) {
-    flat.circumcentres.resize(flat.size());
-    flat.circumradii.resize(flat.size());
+// `spent`: memory for them.
+Result<void> measureBalls(const PointCloud& points, Tetrahedra& flat, SpentBlock spent,
+                          const RunContext& context) {
+    flat.circumcentres = spent.makeVector<Point3>(flat.size());
+    flat.circumradii = spent.makeVector<double>(flat.size());
     return forEachRange(flat.size(), kBlock, context, [&](std::size_t from, std::size_t to) {
         for (std::size_t t = from; t < to; t += 2) measureTwoBalls(points, flat, t, std::min(t + 1, to - 1));
     });
@@ -233,29 +238,26 @@ std::vector<std::uint32_t> insertionOrder(const PointCloud& points, PointOrder g
 
 Result<Tetrahedra> triangulateOrThrow(const PointCloud& points, const RunContext& context, PointOrder given) {
     const std::vector<std::uint32_t> order = insertionOrder(points, given);
-    Tetrahedra flat;
-    {
-        CellStore cells;
-        LargeVector<Site> sites(points.size());
-        auto placed = forEachRange(sites.size(), kBlock, context, [&](std::size_t from, std::size_t to) {
-            for (std::size_t i = from; i < to; ++i) {
-                const Point3& p = points[order[i]];
-                sites[i] = {p.x, p.y, p.z};
-            }
-        });
-        if (!placed) return fail(placed.error());
-        if (auto done = insertAll(sites, cells, threadsOfArena(), context); !done) {
-            if (done.error().code == ErrorCode::kCollinear || done.error().code == ErrorCode::kCoplanar) {
-                if (auto distinct = checkDistinct(points); !distinct) return fail(distinct.error());
-            }
-            return fail(done.error());
+    CellStore cells;
+    LargeVector<Site> sites(points.size());
+    auto placed = forEachRange(sites.size(), kBlock, context, [&](std::size_t from, std::size_t to) {
+        for (std::size_t i = from; i < to; ++i) {
+            const Point3& p = points[order[i]];
+            sites[i] = {p.x, p.y, p.z};
         }
-        LargeVector<Site>().swap(sites);  // only so is its memory free
-        auto flattened = flatten(cells, order, context);
-        if (!flattened) return flattened;
-        flat = std::move(*flattened);
+    });
+    if (!placed) return fail(placed.error());
+    if (auto done = insertAll(sites, cells, threadsOfArena(), context); !done) {
+        if (done.error().code == ErrorCode::kCollinear || done.error().code == ErrorCode::kCoplanar) {
+            if (auto distinct = checkDistinct(points); !distinct) return fail(distinct.error());
+        }
+        return fail(done.error());
     }
-    if (auto done = measureBalls(points, flat, context); !done) return fail(done.error());
+    LargeVector<Site>().swap(sites);  // only so is its memory free
+    auto flat = flatten(cells, order, context);
+    if (!flat) return flat;
+    if (auto done = measureBalls(points, *flat, cells.giveUpCells(), context); !done)
+        return fail(done.error());
     return flat;
 }
 

@@ -96,7 +96,6 @@ class Builder {
             if (auto done = insertRound(std::move(left)); !done) return done;
             begin = end;
         }
-        cells_.dropBalls();
         return {};
     }
 

@@ -1,6 +1,8 @@
 #include "core/base/large_block.h"
 
 #include <cstdint>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -15,6 +17,30 @@ TEST(LargeBlock, HoldsWhatIsWritten) {
         EXPECT_EQ(block[count - 1], count - 1);
     }
     EXPECT_THROW(static_cast<void>(allocateLarge<double>(std::size_t{1} << 58)), std::bad_alloc);
+}
+
+// Sizes around those from which blocks are mapped, and on large pages; parts of odd sizes.
+TEST(LargeBlock, WhatIsSpentMakesVectorsOfAnySize) {
+    for (const std::size_t megabytes : {0, 1, 3, 8, 9, 31, 64}) {
+        auto block = allocateLarge<std::uint64_t>(megabytes * 131072 + 11);
+        block[0] = 1;
+        SpentBlock spent(std::move(block));
+        std::vector<LargeVector<std::uint32_t>> vectors;
+        for (const std::size_t count : {5, 300000, 2200000, 4500001, 2500000, 9000000}) {
+            vectors.push_back(spent.makeVector<std::uint32_t>(count));
+            ASSERT_EQ(vectors.back().size(), count);
+            for (std::size_t i = 0; i < count; ++i) vectors.back()[i] = static_cast<std::uint32_t>(i ^ count);
+        }
+        for (const auto& vector : vectors) {
+            std::size_t wrong = 0;
+            for (std::size_t i = 0; i < vector.size(); ++i) {
+                if (vector[i] != static_cast<std::uint32_t>(i ^ vector.size())) ++wrong;
+            }
+            EXPECT_EQ(wrong, 0U) << megabytes << " " << vector.size();
+        }
+        vectors.front().resize(10000000);  // a vector as any other
+        EXPECT_EQ(vectors.front()[4], 4U ^ 5U);
+    }
 }
 
 }  // namespace
