@@ -63,6 +63,8 @@ std::uint32_t CellStore::take(std::uint32_t count) {
     return kNoCell;
 }
 
+Error notDistinct() { return {ErrorCode::kInternal, "the points to triangulate are not distinct"}; }
+
 CavityInserter::CavityInserter(LargeVector<Site>& sites, CellStore& cells, std::uint32_t start)
     : sites_(sites), cells_(cells), hint_(start), cavity_(kMostCorners), facets_(kMostCorners) {
     corners_[0] = kInfinite;

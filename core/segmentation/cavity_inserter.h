@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/error.h"
 #include "core/base/large_block.h"
 #include "core/segmentation/delaunay_ball.h"
 #include "core/segmentation/predicates.h"
@@ -115,6 +116,12 @@ enum class Insertion {
     kElsewhere,  ///< the cavity, or the way to it, leaves the worker's cells: nothing was changed
     kNoRoom,     ///< the store is full: nothing was changed
 };
+
+/// What kRepeated means to a caller: kInternal, since points are made distinct before.
+[[nodiscard]] Error notDistinct();
+
+/// So often who inserts many asks whether to go on.
+constexpr std::size_t kInsertsBetweenCheckpoints = 1024;
 
 /// Inserts points one at a time (Bowyer 1981, Watson 1981). One for each thread.
 class CavityInserter {

@@ -226,7 +226,7 @@ Result<void> measureBalls(const PointCloud& points, Tetrahedra& flat, SpentBlock
 
 Result<void> checkDistinct(const PointCloud& points) {
     if (mergeDuplicates(points).points.size() == points.size()) return {};
-    return fail(ErrorCode::kInternal, "the points to triangulate are not distinct");
+    return fail(notDistinct());
 }
 
 std::vector<std::uint32_t> insertionOrder(const PointCloud& points, PointOrder given) {

@@ -14,8 +14,6 @@ namespace shapedb {
 
 namespace {
 
-constexpr std::size_t kInsertsBetweenCheckpoints = 1024;
-
 // Cells to make room for, by points. A scan has six or seven a point; when there are more the store
 // grows.
 constexpr std::size_t kCellsPerPoint = 8;
@@ -189,7 +187,7 @@ Result<void> Builder::insertAlone(const std::vector<std::uint32_t>& list) {
             outcome = inserter.insert(list[i]);
         }
         if (outcome != Insertion::kDone) {
-            return fail(ErrorCode::kInternal, "the points to triangulate are not distinct");
+            return fail(notDistinct());
         }
     }
     free_.swap(inserter.freeCells());

@@ -11,7 +11,6 @@ namespace shapedb {
 
 namespace {
 
-constexpr std::size_t kInsertsBetweenCheckpoints = 1024;
 // So many sites tell where slabs with as many points as others end.
 constexpr std::size_t kSample = 4096;
 constexpr std::size_t kBlock = 8192;  // sites that a thread takes at a time
@@ -32,14 +31,6 @@ struct InsertionCrew::Worker {
     double seconds = 0.0;  // it took
 };
 
-InsertionCrew::InsertionCrew(LargeVector<Site>& sites, CellStore& cells, std::size_t workers,
-                             const RunContext& context, std::atomic<std::size_t>& done)
-    : sites_(sites), cells_(cells), workers_(workers), context_(context), done_(done) {
-    for (std::size_t k = 0; k <= workers; ++k) {
-        borders_.push_back(static_cast<double>(k) / static_cast<double>(workers));
-    }
-}
-
 void InsertionCrew::orderSample() {
     const std::size_t step = std::max<std::size_t>(1, sites_.size() / kSample);
     double longest = -1.0;
@@ -55,10 +46,19 @@ void InsertionCrew::orderSample() {
     }
 }
 
+void InsertionCrew::placeBorders() {
+    for (std::size_t k = 0; k <= workers_; ++k) {
+        borders_.push_back(static_cast<double>(k) / static_cast<double>(workers_));
+    }
+}
+
 // Shifted, the borders lie in the middle of the slabs, and what is before the first and beyond the last of
 // them is one worker's.
 Result<void> InsertionCrew::cut(bool shifted) {
-    if (sample_.empty()) orderSample();
+    if (sample_.empty()) {
+        orderSample();
+        placeBorders();
+    }
     std::vector<double> at;
     for (std::size_t k = shifted ? 0 : 1; k < workers_; ++k) {
         const double share = shifted ? (borders_[k] + borders_[k + 1]) / 2 : borders_[k];
@@ -151,9 +151,7 @@ void InsertionCrew::work(const std::vector<std::uint32_t>& list, Worker& worker,
         }
         switch (inserter.insert(vertex)) {
             case Insertion::kDone: break;
-            case Insertion::kRepeated:
-                worker.error = Error{ErrorCode::kInternal, "the points to triangulate are not distinct"};
-                return;
+            case Insertion::kRepeated: worker.error = notDistinct(); return;
             case Insertion::kElsewhere:
             case Insertion::kNoRoom: worker.postponed.push_back(vertex); break;
         }

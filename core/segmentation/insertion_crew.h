@@ -18,10 +18,11 @@ class InsertionCrew {
   public:
     static constexpr std::size_t kMostWorkers = 255;
 
-    /// Everything must live as long as this. `workers`: 2 to kMostWorkers, on up to as many threads of the
-    /// caller's arena. `done`: points inserted, for progress.
+    /// Everything must live as long as this. `workers`: at most kMostWorkers, to insert at least 1, on up to
+    /// as many threads of the caller's arena. `done`: points inserted, for progress.
     InsertionCrew(LargeVector<Site>& sites, CellStore& cells, std::size_t workers, const RunContext& context,
-                  std::atomic<std::size_t>& done);
+                  std::atomic<std::size_t>& done)
+        : sites_(sites), cells_(cells), workers_(workers), context_(context), done_(done) {}
 
     /// Inserts the sites of `list`, which are in rising order; those along the borders stay in it. `shifted`:
     /// with the borders in the middle of where they are otherwise. `freeCells`: cells of the store that are
@@ -36,6 +37,7 @@ class InsertionCrew {
     struct Worker;
 
     void orderSample();
+    void placeBorders();
     Result<void> cut(bool shifted);
     void moveBorders(const std::vector<Worker>& workers);
     void addStarts(std::vector<Worker>& workers) const;

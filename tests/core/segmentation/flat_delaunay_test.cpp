@@ -197,7 +197,7 @@ TEST(FlatDelaunay, AnyNumberOfThreadsFindsTheSameTetrahedra) {
         {"noisy jack", alongCurve(scanned(makeJack(), kDivided + 500, 0.002))},
         {"clean box", alongCurve(scanned(makeBox(), kDivided + 500, 0.0))},
         {"grid", alongCurve(grid(37, 0.03125))},
-        // Shares of a round that have nothing to do with each other in space.
+        // Neighbours in space whose numbers have nothing to do with each other.
         {"not along a curve", inACube(kDivided)},
     };
     for (const auto& [name, points] : clouds) {
