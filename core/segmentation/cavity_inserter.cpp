@@ -77,17 +77,19 @@ CavityInserter::CavityInserter(LargeVector<Site>& sites, CellStore& cells, const
     starts_ = &starts;
 }
 
+// Almost all of a worker's cells are inner.
 template <bool kAlone>
 bool CavityInserter::owns(std::uint32_t cell) const {
-    if (kAlone) return true;
-    const auto& v = cells_[cell].vertices;
-    return share_.holdsThree({v[0] & kVertexBits, v[1], v[2], v[3]});
+    return kAlone || (cells_[cell].vertices[0] & kInner) != 0 || ownsAtBorder(cell);
+}
+
+bool CavityInserter::ownsAtBorder(std::uint32_t cell) const {
+    return share_.holdsThree(cells_[cell].corners());
 }
 
 // What the balls leave open.
 bool CavityInserter::conflicts(std::uint32_t cell, const Site& p) const {
-    const auto& v = cells_[cell].vertices;
-    const std::array<std::uint32_t, 4> w = {v[0] & kVertexBits, v[1], v[2], v[3]};
+    const std::array<std::uint32_t, 4> w = cells_[cell].corners();
     if (!isInfinite(w)) return sideOfSphere(sites_[w[0]], sites_[w[1]], sites_[w[2]], sites_[w[3]], p) > 0;
     const auto& f = kFacet[infiniteIndex(w)];
     const Site& a = sites_[w[f[0]]];
@@ -122,7 +124,7 @@ std::uint32_t CavityInserter::walk(std::uint32_t start, const Site& p) const {
     if (outside != 4) cell = cells_[cell].neighbours[outside];
     std::uint32_t from = kNoCell;
     for (;;) {
-        const auto& v = cells_[cell].vertices;
+        const std::array<std::uint32_t, 4> v = cells_[cell].corners();
         if (isInfinite(v)) return cell;
         const bool own = owns<kAlone>(cell);  // then so are two vertices of each facet
         std::uint32_t to = kNoCell;
@@ -148,7 +150,7 @@ std::uint32_t CavityInserter::walk(std::uint32_t start, const Site& p) const {
 }
 
 bool CavityInserter::isVertexOf(std::uint32_t cell, const Site& p) const {
-    for (const std::uint32_t v : cells_[cell].vertices) {
+    for (const std::uint32_t v : cells_[cell].corners()) {
         if (v != kInfinite && samePlace(sites_[v], p)) return true;
     }
     return false;
@@ -185,6 +187,7 @@ bool CavityInserter::findCavity(std::uint32_t first, const Site& p) {
     cavity_[0] = first;
     cavityCount_ = 1;
     facetCount_ = 0;
+    std::uint32_t mark = kAlone ? 0 : cells_[first].vertices[0] & kInner;
     cells_[first].vertices[0] |= kInCavity;
     fetchNeighbours(cells_, first);
     for (std::size_t k = 0; k < cavityCount_; ++k) {
@@ -193,24 +196,29 @@ bool CavityInserter::findCavity(std::uint32_t first, const Site& p) {
         const unsigned holding = neighboursHolding(cell, p);
         for (std::uint32_t i = 0; i < 4; ++i) {
             const std::uint32_t next = cells_[cell].neighbours[i];
-            const unsigned fresh = (cells_[next].vertices[0] & kInCavity) == 0 ? 1 : 0;
+            const std::uint32_t head = cells_[next].vertices[0];
+            const unsigned fresh = (head & kInCavity) == 0 ? 1 : 0;
             const unsigned joins = fresh & (holding >> i);
             cavity_[cavityCount_] = next;
             facets_[facetCount_] = {cell, next, kNoCell, static_cast<std::uint8_t>(i), {}};
             if (joins != 0) {
-                if (!owns<kAlone>(next)) return false;
-                cells_[next].vertices[0] |= kInCavity;
+                if (!kAlone && (head & kInner) == 0) {
+                    if (!ownsAtBorder(next)) return false;
+                    mark = 0;
+                }
+                cells_[next].vertices[0] = head | kInCavity;
                 fetchNeighbours(cells_, next);
             }
             cavityCount_ += joins;
             facetCount_ += fresh & ~joins;
         }
     }
+    cavityMark_ = mark;
     return true;
 }
 
 void CavityInserter::unmark() {
-    for (std::size_t i = 0; i < cavityCount_; ++i) cells_[cavity_[i]].vertices[0] &= kVertexBits;
+    for (std::size_t i = 0; i < cavityCount_; ++i) cells_[cavity_[i]].vertices[0] &= ~kInCavity;
 }
 
 // A new cell for every facet.
@@ -236,10 +244,10 @@ bool CavityInserter::takeFresh() {
 void CavityInserter::linkAround(const Facet& facet, std::uint32_t j) {
     std::uint32_t cell = facet.cell;
     std::uint32_t across = j;
-    const auto& own = cells_[cell].vertices;
-    const std::uint32_t all = (own[0] & kVertexBits) ^ own[1] ^ own[2] ^ own[3];
-    std::uint32_t leaving = facet.index == 0 ? own[0] & kVertexBits : own[facet.index];
-    const std::uint32_t edge = all ^ leaving ^ (j == 0 ? own[0] & kVertexBits : own[j]);
+    const std::array<std::uint32_t, 4> own = cells_[cell].corners();
+    const std::uint32_t all = own[0] ^ own[1] ^ own[2] ^ own[3];
+    std::uint32_t leaving = own[facet.index];
+    const std::uint32_t edge = all ^ leaving ^ own[j];
     for (;;) {
         const std::uint32_t next = cells_[cell].neighbours[across];
         const auto& v = cells_[next].vertices;
@@ -251,28 +259,36 @@ void CavityInserter::linkAround(const Facet& facet, std::uint32_t j) {
             return;
         }
         across = indexOf(v, leaving);
-        leaving = (v[0] & kVertexBits) ^ v[1] ^ v[2] ^ v[3] ^ edge ^ leaving;
+        leaving = cells_[next].firstVertex() ^ v[1] ^ v[2] ^ v[3] ^ edge ^ leaving;
         cell = next;
     }
 }
 
-// Writes the new cells and joins them to those beyond the cavity.
-void CavityInserter::placeFresh(std::uint32_t vertex) {
+// Writes the new cells, their first vertices with a mark, and joins them to those beyond the cavity.
+void CavityInserter::placeFresh(std::uint32_t vertex, std::uint32_t mark) {
     for (std::size_t f = 0; f < facetCount_; ++f) {
         const Facet& facet = facets_[f];
-        const auto& old = cells_[facet.cell].vertices;
         Cell& fresh = cells_[facet.fresh];
-        fresh.vertices = {old[0] & kVertexBits, old[1], old[2], old[3]};
+        fresh.vertices = cells_[facet.cell].corners();
         auto& v = fresh.vertices;
         // Which neighbour of the cell beyond we are shows in its vertices: others may be writing its
         // other neighbours.
         const std::uint32_t shared = v[0] ^ v[1] ^ v[2] ^ v[3] ^ v[facet.index];
         Cell& beyond = cells_[facet.beyond];
         const auto& w = beyond.vertices;
-        const std::uint32_t apex = (w[0] & kVertexBits) ^ w[1] ^ w[2] ^ w[3] ^ shared;
+        const std::uint32_t apex = beyond.firstVertex() ^ w[1] ^ w[2] ^ w[3] ^ shared;
         beyond.neighbours[indexOf(w, apex)] = facet.fresh;
         v[facet.index] = vertex;
+        v[0] |= mark;
         fresh.neighbours[facet.index] = facet.beyond;
+    }
+}
+
+// After a cavity some of whose cells are not inner: there may be others among the new ones.
+void CavityInserter::markInner() {
+    for (std::size_t f = 0; f < facetCount_; ++f) {
+        Cell& fresh = cells_[facets_[f].fresh];
+        if (share_.holdsAll(fresh.vertices)) fresh.vertices[0] |= kInner;
     }
 }
 
@@ -285,7 +301,7 @@ std::uint32_t CavityInserter::numberAmong(std::uint32_t vertex, std::uint32_t co
 
 // Gives the corners of the cavity numbers; false when there are too many of them. The mark of a site tells
 // for which vertex it was numbered last, and how; those of other workers' vertices are theirs to write.
-template <bool kAlone>
+template <bool kOurs>
 bool CavityInserter::numberCorners(std::uint32_t inserted) {
     const std::uint64_t mark = (std::uint64_t{inserted} + 1) * kMostCorners;
     std::uint32_t count = 1;  // 0 is the vertex at infinity
@@ -299,7 +315,7 @@ bool CavityInserter::numberCorners(std::uint32_t inserted) {
                 continue;
             }
             if (count == kMostCorners) return false;
-            const bool ours = kAlone || share_.holds(vertex);
+            const bool ours = kOurs || share_.holds(vertex);
             const std::uint64_t known = ours ? sites_[vertex].mark - mark : numberAmong(vertex, count);
             const bool fresh = known >= kMostCorners;
             const std::uint64_t number = fresh ? count : known;
@@ -370,15 +386,25 @@ void CavityInserter::linkByTurning() {
     }
 }
 
-template <bool kAlone>
-void CavityInserter::fillCavity(std::uint32_t vertex) {
-    placeFresh(vertex);
-    if (numberCorners<kAlone>(vertex)) {
+template <bool kOurs>
+void CavityInserter::joinFresh(std::uint32_t vertex) {
+    if (numberCorners<kOurs>(vertex)) {
         linkByTable();
         measureBalls(sites_[vertex]);
     } else {
         linkByTurning();
         for (std::size_t f = 0; f < facetCount_; ++f) cells_.ball(facets_[f].fresh).squaredRadius = kNoBall;
+    }
+}
+
+template <bool kAlone>
+void CavityInserter::fillCavity(std::uint32_t vertex) {
+    placeFresh(vertex, cavityMark_);
+    if (kAlone || cavityMark_ != 0) {
+        joinFresh<true>(vertex);
+    } else {
+        markInner();
+        joinFresh<false>(vertex);
     }
     for (std::size_t i = 0; i < cavityCount_; ++i) {
         const std::uint32_t cell = cavity_[i];

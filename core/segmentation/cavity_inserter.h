@@ -19,6 +19,9 @@ namespace shapedb {
 constexpr std::uint32_t kInfinite = 0x3fffffffu;
 /// Mark on the first vertex of a cell while a point goes in; set in a free one.
 constexpr std::uint32_t kInCavity = 0x80000000u;
+/// Mark on the first vertex of a cell whose vertices all belong to one worker. No other comes there, so whose
+/// it is needs no question. Means nothing once one thread inserts alone.
+constexpr std::uint32_t kInner = 0x40000000u;
 constexpr std::uint32_t kFreeCell = 0xffffffffu;
 constexpr std::uint32_t kNoCell = 0xffffffffu;
 constexpr std::uint32_t kVertexBits = 0x3fffffffu;
@@ -26,8 +29,14 @@ constexpr std::uint32_t kVertexBits = 0x3fffffffu;
 /// A tetrahedron, half a cache line. Neighbour i is opposite vertex i; vertices are positively
 /// oriented (with the one at infinity: if it were moved to a point beyond the other three).
 struct alignas(32) Cell {
-    std::array<std::uint32_t, 4> vertices;
+    std::array<std::uint32_t, 4> vertices;  // the first with marks
     std::array<std::uint32_t, 4> neighbours;
+
+    std::uint32_t firstVertex() const { return vertices[0] & kVertexBits; }
+    /// The vertices without marks.
+    std::array<std::uint32_t, 4> corners() const {
+        return {firstVertex(), vertices[1], vertices[2], vertices[3]};
+    }
 };
 
 /// The cells and their balls in a block of memory each, taken from the front. Pages nobody took are never
@@ -72,12 +81,14 @@ struct Share {
     bool holdsTwo(std::uint32_t a, std::uint32_t b, std::uint32_t c) const {
         return count(a) + count(b) + count(c) >= 2;
     }
-    bool holdsThree(const std::array<std::uint32_t, 4>& v) const {
-        return count(v[0]) + count(v[1]) + count(v[2]) + count(v[3]) >= 3;
-    }
+    bool holdsThree(const std::array<std::uint32_t, 4>& v) const { return count(v) >= 3; }
+    bool holdsAll(const std::array<std::uint32_t, 4>& v) const { return count(v) == 4; }
 
   private:
     unsigned count(std::uint32_t v) const { return holds(v) ? 1 : 0; }
+    unsigned count(const std::array<std::uint32_t, 4>& v) const {
+        return count(v[0]) + count(v[1]) + count(v[2]) + count(v[3]);
+    }
 };
 
 /// Some cells of one worker all along the order of the vertices, to walk from when the way from the last
@@ -156,6 +167,7 @@ class CavityInserter {
     Insertion insertAs(std::uint32_t vertex);
     template <bool kAlone>
     bool owns(std::uint32_t cell) const;
+    bool ownsAtBorder(std::uint32_t cell) const;
     bool conflicts(std::uint32_t cell, const Site& p) const;
     unsigned neighboursHolding(std::uint32_t cell, const Site& p) const;
     void makeRoom();
@@ -170,10 +182,14 @@ class CavityInserter {
     bool takeFresh();
     template <bool kAlone>
     void fillCavity(std::uint32_t vertex);
-    void placeFresh(std::uint32_t vertex);
+    // kOurs: all corners of the cavity are this one's.
+    template <bool kOurs>
+    void joinFresh(std::uint32_t vertex);
+    void placeFresh(std::uint32_t vertex, std::uint32_t mark);
+    void markInner();
     void measureBalls(const Site& p);
     std::uint32_t numberAmong(std::uint32_t vertex, std::uint32_t count) const;
-    template <bool kAlone>
+    template <bool kOurs>
     bool numberCorners(std::uint32_t inserted);
     void linkByTable();
     void linkByTurning();
@@ -188,6 +204,7 @@ class CavityInserter {
     // Lists with room to spare at the end, where entries are written before it is known whether they count.
     std::vector<std::uint32_t> cavity_;
     std::size_t cavityCount_ = 0;
+    std::uint32_t cavityMark_ = 0;  // kInner when all cells of the cavity have it
     std::vector<Facet> facets_;
     std::size_t facetCount_ = 0;
     std::array<std::uint32_t, kMostCorners> corners_{};  // the vertex of each number

@@ -128,6 +128,7 @@ Result<LargeVector<std::uint32_t>> sortedCells(CellStore& cells, std::size_t sit
             for (std::size_t c = from; c < to; ++c) {
                 Cell& cell = cells[static_cast<std::uint32_t>(c)];
                 place[c] = kNoTetrahedron;
+                cell.vertices[0] = cell.firstVertex();  // no mark from here on
                 if (!isFinite(cell.vertices)) continue;
                 makeCanonical(cell);
                 ++lowest.at(part, cell.vertices[0]);

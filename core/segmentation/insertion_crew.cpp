@@ -13,7 +13,7 @@ namespace {
 
 // So many sites tell where slabs with as many points as others end.
 constexpr std::size_t kSample = 4096;
-constexpr std::size_t kBlock = 8192;  // sites that a thread takes at a time
+constexpr std::size_t kBlock = 8192;  // sites or cells that a thread takes at a time
 
 double coordinate(const Site& site, std::size_t axis) {
     return axis == 0 ? site.x : axis == 1 ? site.y : site.z;
@@ -75,6 +75,18 @@ Result<void> InsertionCrew::cut(bool shifted) {
     });
 }
 
+Result<void> InsertionCrew::markInner() {
+    return forEachRange(cells_.used(), kBlock, context_, [&](std::size_t from, std::size_t to) {
+        for (std::size_t c = from; c < to; ++c) {
+            Cell& cell = cells_[static_cast<std::uint32_t>(c)];
+            if (cell.vertices[0] == kFreeCell) continue;
+            const auto v = cell.corners();
+            const bool inner = v[0] != kInfinite && Share{slabOf_.data(), slabOf_[v[0]]}.holdsAll(v);
+            cell.vertices[0] = v[0] | (inner ? kInner : 0);
+        }
+    });
+}
+
 // Half of the way to where all would have taken as long, had each needed the same time everywhere in its
 // slab: the other half is taken for chance.
 void InsertionCrew::moveBorders(const std::vector<Worker>& workers) {
@@ -98,6 +110,7 @@ void InsertionCrew::moveBorders(const std::vector<Worker>& workers) {
 Result<void> InsertionCrew::insert(std::vector<std::uint32_t>& list, bool shifted,
                                    std::vector<std::uint32_t>& freeCells) {
     if (auto done = cut(shifted); !done) return done;
+    if (auto done = markInner(); !done) return done;
     std::vector<Worker> workers;
     for (std::size_t k = 0; k < workers_; ++k) {
         const Share share{slabOf_.data(), static_cast<std::uint8_t>(k)};
@@ -126,8 +139,8 @@ void InsertionCrew::addStarts(std::vector<Worker>& workers) const {
     const std::size_t step = std::max<std::size_t>(1, cells_.used() / (4 * StartCells::kSlots));
     for (std::size_t c = 0; c < cells_.used(); c += step) {
         const auto cell = static_cast<std::uint32_t>(c);
-        const auto& v = cells_[cell].vertices;
-        if (v[0] == kFreeCell) continue;
+        if (cells_[cell].vertices[0] == kFreeCell) continue;
+        const auto v = cells_[cell].corners();
         for (Worker& worker : workers) {
             if (worker.share.holdsThree(v)) worker.starts.add(v[0] < kInfinite ? v[0] : v[1], cell);
         }

@@ -39,6 +39,7 @@ class InsertionCrew {
     void orderSample();
     void placeBorders();
     Result<void> cut(bool shifted);
+    Result<void> markInner();
     void moveBorders(const std::vector<Worker>& workers);
     void addStarts(std::vector<Worker>& workers) const;
     void work(const std::vector<std::uint32_t>& list, Worker& worker, bool reports);

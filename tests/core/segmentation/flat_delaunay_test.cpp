@@ -65,11 +65,12 @@ const std::size_t kDivided = Division{}.leastPoints;
 bool isJoined(const CellStore& cells, std::uint32_t cell) {
     for (std::uint32_t i = 0; i < 4; ++i) {
         const Cell& next = cells[cells[cell].neighbours[i]];
+        const Corners others = next.corners();
         std::uint32_t shared = 0;
         bool back = false;
         for (std::uint32_t k = 0; k < 4; ++k) {
-            const auto& v = cells[cell].vertices;
-            if (std::find(v.begin(), v.end(), next.vertices[k]) != v.end()) {
+            const Corners v = cells[cell].corners();
+            if (std::find(v.begin(), v.end(), others[k]) != v.end()) {
                 ++shared;
             } else {
                 back = next.neighbours[k] == cell;
@@ -93,8 +94,8 @@ std::vector<Corners> byThreads(const PointCloud& points, std::size_t threads, co
     if (!done) return tetrahedra;
     bool joined = true;
     for (std::uint32_t c = 0; c < cells.used(); ++c) {
-        const Corners& v = cells[c].vertices;
-        if (v[0] == kFreeCell) continue;
+        if (cells[c].vertices[0] == kFreeCell) continue;
+        const Corners v = cells[c].corners();
         joined = joined && isJoined(cells, c);
         if (std::all_of(v.begin(), v.end(), [](std::uint32_t i) { return i < kInfinite; })) {
             tetrahedra.push_back(v);
