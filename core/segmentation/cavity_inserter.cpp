@@ -80,7 +80,7 @@ CavityInserter::CavityInserter(LargeVector<Site>& sites, CellStore& cells, const
 // Almost all of a worker's cells are inner.
 template <bool kAlone>
 bool CavityInserter::owns(std::uint32_t cell) const {
-    return kAlone || (cells_[cell].vertices[0] & kInner) != 0 || ownsAtBorder(cell);
+    return kAlone || (cells_[cell].vertices[0] & share_.innerMark) != 0 || ownsAtBorder(cell);
 }
 
 bool CavityInserter::ownsAtBorder(std::uint32_t cell) const {
@@ -187,7 +187,8 @@ bool CavityInserter::findCavity(std::uint32_t first, const Site& p) {
     cavity_[0] = first;
     cavityCount_ = 1;
     facetCount_ = 0;
-    std::uint32_t mark = kAlone ? 0 : cells_[first].vertices[0] & kInner;
+    const std::uint32_t inner = share_.innerMark;
+    std::uint32_t mark = cells_[first].vertices[0] & inner;
     cells_[first].vertices[0] |= kInCavity;
     fetchNeighbours(cells_, first);
     for (std::size_t k = 0; k < cavityCount_; ++k) {
@@ -202,7 +203,7 @@ bool CavityInserter::findCavity(std::uint32_t first, const Site& p) {
             cavity_[cavityCount_] = next;
             facets_[facetCount_] = {cell, next, kNoCell, static_cast<std::uint8_t>(i), {}};
             if (joins != 0) {
-                if (!kAlone && (head & kInner) == 0) {
+                if (!kAlone && (head & inner) == 0) {
                     if (!ownsAtBorder(next)) return false;
                     mark = 0;
                 }
@@ -288,7 +289,7 @@ void CavityInserter::placeFresh(std::uint32_t vertex, std::uint32_t mark) {
 void CavityInserter::markInner() {
     for (std::size_t f = 0; f < facetCount_; ++f) {
         Cell& fresh = cells_[facets_[f].fresh];
-        if (share_.holdsAll(fresh.vertices)) fresh.vertices[0] |= kInner;
+        if (share_.holdsAll(fresh.vertices)) fresh.vertices[0] |= share_.innerMark;
     }
 }
 

@@ -20,7 +20,7 @@ constexpr std::uint32_t kInfinite = 0x3fffffffu;
 /// Mark on the first vertex of a cell while a point goes in; set in a free one.
 constexpr std::uint32_t kInCavity = 0x80000000u;
 /// Mark on the first vertex of a cell whose vertices all belong to one worker. No other comes there, so whose
-/// it is needs no question. Means nothing once one thread inserts alone.
+/// it is needs no question.
 constexpr std::uint32_t kInner = 0x40000000u;
 constexpr std::uint32_t kFreeCell = 0xffffffffu;
 constexpr std::uint32_t kNoCell = 0xffffffffu;
@@ -76,6 +76,7 @@ class CellStore {
 struct Share {
     const std::uint8_t* workers = nullptr;  ///< by vertex
     std::uint8_t worker = 0;
+    std::uint32_t innerMark = 0;  ///< kInner when cells have that mark now, 0 when it means nothing
 
     bool holds(std::uint32_t v) const { return v != kInfinite && workers[v] == worker; }
     bool holdsTwo(std::uint32_t a, std::uint32_t b, std::uint32_t c) const {

@@ -23,8 +23,8 @@ constexpr std::size_t kMostCells = 0xfffffff0u;
 // Each round inserts this many times as many points as all before it.
 constexpr int kRoundShift = 2;
 constexpr std::size_t kSmallestRound = 512;
-// What is left of a round is scattered along the borders: it is divided again only when it is more than this
-// share, which takes many threads.
+// What a round leaves is divided again when each thread has this part of the least share of a round: its
+// points lie far from each other, which takes more time for each.
 constexpr std::size_t kLeastLeft = 8;
 
 // Mixes the bits of an index (the finaliser of MurmurHash3).
@@ -107,7 +107,7 @@ class Builder {
     Result<void> beginWithFour(const std::vector<std::uint32_t>& order);
     Result<void> insertRound(std::vector<std::uint32_t> left);
     Result<void> insertAlone(const std::vector<std::uint32_t>& list);
-    Result<void> insertTogether(std::vector<std::uint32_t>& list, bool shifted);
+    Result<void> insertTogether(std::vector<std::uint32_t>& list);
     std::uint32_t anyCell() const;
 
     LargeVector<Site>& sites_;
@@ -159,13 +159,9 @@ Result<void> Builder::beginWithFour(const std::vector<std::uint32_t>& order) {
 }
 
 Result<void> Builder::insertRound(std::vector<std::uint32_t> left) {
-    const std::size_t all = left.size();
-    for (const bool shifted : {false, true}) {
-        const bool large =
-            sites_.size() >= division_.leastPoints && left.size() >= threads_ * division_.leastShare;
-        const bool many = !shifted || left.size() >= all / kLeastLeft;
-        if (threads_ < 2 || !large || !many) break;
-        if (auto done = insertTogether(left, shifted); !done) return done;
+    const std::size_t least = threads_ * division_.leastShare;
+    if (threads_ > 1 && sites_.size() >= division_.leastPoints && left.size() >= least) {
+        if (auto done = insertTogether(left); !done) return done;
     }
     return insertAlone(left);
 }
@@ -202,11 +198,13 @@ std::uint32_t Builder::anyCell() const {
     return cell;
 }
 
-// Inserts what the threads can insert without meeting; what is left replaces `list`. `shifted`: with
-// the borders between threads in the middle of where they were.
-Result<void> Builder::insertTogether(std::vector<std::uint32_t>& list, bool shifted) {
+// Inserts what the threads can insert without meeting; what is left replaces `list`.
+Result<void> Builder::insertTogether(std::vector<std::uint32_t>& list) {
     cells_.reserve(std::min(kMostCells, cells_.used() + kCellsPerPoint * list.size() + kSpareCells));
-    if (auto done = crew_.insert(list, shifted, free_); !done) return done;
+    if (auto done = crew_.insert(list, free_); !done) return done;
+    for (int side = 0; side < 2 && list.size() >= threads_ * division_.leastShare / kLeastLeft; ++side) {
+        if (auto done = crew_.insertLeft(list, free_); !done) return done;
+    }
     last_ = anyCell();
     return {};
 }

@@ -31,46 +31,43 @@ struct InsertionCrew::Worker {
     double seconds = 0.0;  // it took
 };
 
-void InsertionCrew::orderSample() {
-    const std::size_t step = std::max<std::size_t>(1, sites_.size() / kSample);
+// As many sites of the list in each, across its longest side that was not cut.
+InsertionCrew::Slabs InsertionCrew::makeSlabs(const std::vector<std::uint32_t>& list) const {
+    const std::size_t step = std::max<std::size_t>(1, list.size() / kSample);
+    Slabs slabs;
     double longest = -1.0;
     for (std::size_t axis = 0; axis < 3; ++axis) {
+        if (isCut_[axis]) continue;
         std::vector<double> along;
-        for (std::size_t i = 0; i < sites_.size(); i += step) along.push_back(coordinate(sites_[i], axis));
+        for (std::size_t i = 0; i < list.size(); i += step) {
+            along.push_back(coordinate(sites_[list[i]], axis));
+        }
         std::sort(along.begin(), along.end());
         const double length = along.back() - along.front();
         if (length <= longest) continue;
         longest = length;
-        axis_ = axis;
-        sample_.swap(along);
+        slabs.axis = axis;
+        slabs.sample.swap(along);
     }
-}
-
-void InsertionCrew::placeBorders() {
     for (std::size_t k = 0; k <= workers_; ++k) {
-        borders_.push_back(static_cast<double>(k) / static_cast<double>(workers_));
+        slabs.borders.push_back(static_cast<double>(k) / static_cast<double>(workers_));
     }
+    return slabs;
 }
 
-// Shifted, the borders lie in the middle of the slabs, and what is before the first and beyond the last of
-// them is one worker's.
-Result<void> InsertionCrew::cut(bool shifted) {
-    if (sample_.empty()) {
-        orderSample();
-        placeBorders();
-    }
+Result<void> InsertionCrew::cut(const Slabs& slabs) {
+    isCut_[slabs.axis] = true;
+    const auto last = static_cast<double>(slabs.sample.size() - 1);
     std::vector<double> at;
-    for (std::size_t k = shifted ? 0 : 1; k < workers_; ++k) {
-        const double share = shifted ? (borders_[k] + borders_[k + 1]) / 2 : borders_[k];
-        const auto last = static_cast<double>(sample_.size() - 1);
-        at.push_back(sample_[static_cast<std::size_t>(share * last)]);
+    for (std::size_t k = 1; k < workers_; ++k) {
+        at.push_back(slabs.sample[static_cast<std::size_t>(slabs.borders[k] * last)]);
     }
     slabOf_.resize(sites_.size());
     return forEachRange(slabOf_.size(), kBlock, context_, [&](std::size_t from, std::size_t to) {
         for (std::size_t i = from; i < to; ++i) {
-            const auto slab =
-                std::upper_bound(at.begin(), at.end(), coordinate(sites_[i], axis_)) - at.begin();
-            slabOf_[i] = static_cast<std::uint8_t>(static_cast<std::size_t>(slab) % workers_);
+            const double place = coordinate(sites_[i], slabs.axis);
+            slabOf_[i] =
+                static_cast<std::uint8_t>(std::upper_bound(at.begin(), at.end(), place) - at.begin());
         }
     });
 }
@@ -81,7 +78,7 @@ Result<void> InsertionCrew::markInner() {
             Cell& cell = cells_[static_cast<std::uint32_t>(c)];
             if (cell.vertices[0] == kFreeCell) continue;
             const auto v = cell.corners();
-            const bool inner = v[0] != kInfinite && Share{slabOf_.data(), slabOf_[v[0]]}.holdsAll(v);
+            const bool inner = v[0] != kInfinite && Share{slabOf_.data(), slabOf_[v[0]], kInner}.holdsAll(v);
             cell.vertices[0] = v[0] | (inner ? kInner : 0);
         }
     });
@@ -92,7 +89,7 @@ Result<void> InsertionCrew::markInner() {
 void InsertionCrew::moveBorders(const std::vector<Worker>& workers) {
     double all = 0.0;
     for (const Worker& worker : workers) all += worker.seconds;
-    const std::vector<double> before = borders_;
+    const std::vector<double> before = slabs_.borders;
     double passed = 0.0;
     std::size_t next = 1;
     for (std::size_t k = 0; k < workers_; ++k) {
@@ -101,19 +98,37 @@ void InsertionCrew::moveBorders(const std::vector<Worker>& workers) {
             const double wanted = all * static_cast<double>(next) / static_cast<double>(workers_) - passed;
             if (wanted > seconds) break;
             const double share = seconds > 0.0 ? wanted / seconds : 0.0;
-            borders_[next] = (before[next] + before[k] + share * (before[k + 1] - before[k])) / 2;
+            slabs_.borders[next] = (before[next] + before[k] + share * (before[k + 1] - before[k])) / 2;
         }
         passed += seconds;
     }
 }
 
-Result<void> InsertionCrew::insert(std::vector<std::uint32_t>& list, bool shifted,
-                                   std::vector<std::uint32_t>& freeCells) {
-    if (auto done = cut(shifted); !done) return done;
+Result<void> InsertionCrew::insert(std::vector<std::uint32_t>& list, std::vector<std::uint32_t>& freeCells) {
+    isCut_ = {};
+    if (slabs_.sample.empty()) slabs_ = makeSlabs(list);
+    if (auto done = cut(slabs_); !done) return done;
     if (auto done = markInner(); !done) return done;
+    const auto workers = insertSideBySide(list, kInner, freeCells);
+    if (!workers) return fail(workers.error());
+    moveBorders(*workers);
+    return {};
+}
+
+// So few points that marks, which take a look at all cells, are not worth it.
+Result<void> InsertionCrew::insertLeft(std::vector<std::uint32_t>& list,
+                                       std::vector<std::uint32_t>& freeCells) {
+    if (list.empty()) return {};
+    if (auto done = cut(makeSlabs(list)); !done) return done;
+    if (auto workers = insertSideBySide(list, 0, freeCells); !workers) return fail(workers.error());
+    return {};
+}
+
+Result<std::vector<InsertionCrew::Worker>> InsertionCrew::insertSideBySide(
+    std::vector<std::uint32_t>& list, std::uint32_t innerMark, std::vector<std::uint32_t>& freeCells) {
     std::vector<Worker> workers;
     for (std::size_t k = 0; k < workers_; ++k) {
-        const Share share{slabOf_.data(), static_cast<std::uint8_t>(k)};
+        const Share share{slabOf_.data(), static_cast<std::uint8_t>(k), innerMark};
         workers.push_back({share, StartCells(sites_.size()), {}, {}, {}, 0.0});
     }
     addStarts(workers);
@@ -122,8 +137,7 @@ Result<void> InsertionCrew::insert(std::vector<std::uint32_t>& list, bool shifte
     auto done = forEachRange(workers_, 1, context_, [&](std::size_t k, std::size_t) {
         work(list, workers[k], std::this_thread::get_id() == reporter);
     });
-    if (!done) return done;
-    if (!shifted) moveBorders(workers);
+    if (!done) return fail(done.error());
     list.clear();
     for (const Worker& worker : workers) {
         if (worker.error) return fail(*worker.error);
@@ -131,7 +145,7 @@ Result<void> InsertionCrew::insert(std::vector<std::uint32_t>& list, bool shifte
         freeCells.insert(freeCells.end(), worker.freeCells.begin(), worker.freeCells.end());
     }
     std::sort(list.begin(), list.end());
-    return {};
+    return workers;
 }
 
 // A few for each slot.

@@ -1,6 +1,7 @@
 // Workers that insert points into one Delaunay triangulation at the same time.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -24,23 +25,32 @@ class InsertionCrew {
                   std::atomic<std::size_t>& done)
         : sites_(sites), cells_(cells), workers_(workers), context_(context), done_(done) {}
 
-    /// Inserts the sites of `list`, which are in rising order; those along the borders stay in it. `shifted`:
-    /// with the borders in the middle of where they are otherwise. `freeCells`: cells of the store that are
-    /// not in use, marked so, and what then is not.
+    /// Inserts the sites of `list`, which are in rising order and not empty; those along the borders stay in
+    /// it. `freeCells`: cells of the store that are not in use, marked so, and what then is not.
     ///
     /// Errors: kInternal when two sites are at the same place; kCancelled, kDeadlineExceeded. May throw
     /// std::bad_alloc.
-    [[nodiscard]] Result<void> insert(std::vector<std::uint32_t>& list, bool shifted,
+    [[nodiscard]] Result<void> insert(std::vector<std::uint32_t>& list,
                                       std::vector<std::uint32_t>& freeCells);
+    /// The same for what that left, if anything, with slabs across the next longest side: once, and again
+    /// across the last.
+    [[nodiscard]] Result<void> insertLeft(std::vector<std::uint32_t>& list,
+                                          std::vector<std::uint32_t>& freeCells);
 
   private:
     struct Worker;
+    struct Slabs {
+        std::size_t axis = 0;         // across which they lie
+        std::vector<double> sample;   // places of some sites along it, rising
+        std::vector<double> borders;  // between slabs: shares of the sample, from 0 to 1
+    };
 
-    void orderSample();
-    void placeBorders();
-    Result<void> cut(bool shifted);
+    Slabs makeSlabs(const std::vector<std::uint32_t>& list) const;
+    Result<void> cut(const Slabs& slabs);
     Result<void> markInner();
     void moveBorders(const std::vector<Worker>& workers);
+    Result<std::vector<Worker>> insertSideBySide(std::vector<std::uint32_t>& list, std::uint32_t innerMark,
+                                                 std::vector<std::uint32_t>& freeCells);
     void addStarts(std::vector<Worker>& workers) const;
     void work(const std::vector<std::uint32_t>& list, Worker& worker, bool reports);
 
@@ -49,9 +59,8 @@ class InsertionCrew {
     std::size_t workers_;
     const RunContext& context_;
     std::atomic<std::size_t>& done_;
-    std::size_t axis_ = 0;              // across which the slabs lie
-    std::vector<double> sample_;        // places of some sites along it, rising
-    std::vector<double> borders_;       // between slabs: shares of the sample, from 0 to 1
+    Slabs slabs_;                       // of whole rounds
+    std::array<bool, 3> isCut_{};       // of this round: whether it was cut across each axis
     std::vector<std::uint8_t> slabOf_;  // the worker of each site
 };
 
