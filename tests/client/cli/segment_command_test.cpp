@@ -2,6 +2,7 @@
 #include <cstring>
 #include <fstream>
 #include <map>
+#include <ostream>
 
 #include "client/io/scan_reader.h"
 #include "core/geometry/noise.h"
@@ -174,6 +175,9 @@ struct BadScan {
     const char* error;
     int exitCode;
 };
+
+// In the test's name; without it there would be addresses.
+void PrintTo(const BadScan& bad, std::ostream* out) { *out << bad.file; }
 
 std::string repeated(const std::string& line, int count) {
     std::string text;
