@@ -38,7 +38,8 @@ Error errorOf(const grpc::Status& status, const TrailingMetadata& trailing, cons
     const Error error{codeOf(status.error_code()), status.error_message()};
     switch (status.error_code()) {
         case grpc::StatusCode::UNAVAILABLE:
-            return {error.code, "cannot reach a server at " + address + " (" + error.message + ")"};
+            return {error.code, "cannot reach a server at " + address + ": is shapedbd running there? (" +
+                                    error.message + ")"};
         case grpc::StatusCode::DEADLINE_EXCEEDED:
             return {error.code, "the server at " + address + " did not answer before the deadline"};
         case grpc::StatusCode::UNIMPLEMENTED:

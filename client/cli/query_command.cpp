@@ -88,7 +88,9 @@ std::string replyText(const QueryFlags& flags, const client::SearchReply& reply)
 
 CommandResult runQuery(Session& session, const QueryFlags& flags) {
     if (flags.path.empty() == flags.key.empty()) {
-        return fail(ErrorCode::kInvalidArgument, "give either a scan file or --key, not both");
+        return fail(ErrorCode::kInvalidArgument, flags.key.empty()
+                                                     ? "name a scan file, or a stored shape by --key"
+                                                     : "give either a scan file or --key, not both");
     }
     client::SearchOptions options = flags.options;
     options.reflection = !flags.score.noReflection;

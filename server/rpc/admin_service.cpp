@@ -1,6 +1,7 @@
 #include "server/rpc/admin_service.h"
 
 #include <algorithm>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -86,6 +87,14 @@ Result<void> follow(const Services& services, Call& call, const std::string& col
     }
 }
 
+// The server's copy of the file that was sent: its name says nothing to the sender.
+Error withoutName(Error error, const std::string& file) {
+    const std::string name = "'" + file + "'";
+    const std::size_t at = error.message.find(name);
+    if (at != std::string::npos) error.message.replace(at, name.size(), "the backup");
+    return error;
+}
+
 Result<void> restoreInto(const Services& services, Call& call, const std::string& file) {
     const auto exclusive = services.restores.exclusive();
     services.rebuilds.pause();
@@ -98,7 +107,7 @@ Result<void> restoreInto(const Services& services, Call& call, const std::string
     // Whatever happened: what the store holds now is worked on.
     const auto workers = services.workers.resume();
     const auto rebuilds = services.rebuilds.resume();
-    if (!restored) return restored;
+    if (!restored) return fail(withoutName(restored.error(), file));
     return workers ? rebuilds : workers;
 }
 

@@ -83,6 +83,8 @@ class AdminRpc : public ::testing::Test {
         const auto reply = restore(chunks);
         EXPECT_EQ(reply.status.error_code(), StatusCode::INVALID_ARGUMENT) << reply;
         EXPECT_EQ(reply.error, error) << reply;
+        EXPECT_EQ(reply.status.error_message().find(directory.path()), std::string::npos)
+            << "names no file of the server: " << reply;
     }
 
     Stream<pb::CheckProgress> check() {

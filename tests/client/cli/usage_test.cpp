@@ -58,6 +58,12 @@ TEST_F(Usage, WrongCommandLinesAreExitCodeTwo) {
     }
 }
 
+TEST_F(Usage, AQueryWithoutAShapeIsToldWhatItNeeds) {
+    EXPECT_NE(runCommand({"query"}).err.find("name a scan file, or a stored shape by --key"),
+              std::string::npos);
+    EXPECT_NE(runCommand({"query", "a.ply", "--key", "b"}).err.find("not both"), std::string::npos);
+}
+
 TEST_F(Usage, WithJsonTheErrorIsADocument) {
     const CommandRun run = runCommand({"segment", "--json", "--no-such-flag"});
     EXPECT_EQ(run.exitCode, 2);
