@@ -301,8 +301,9 @@ Result<int> runSegment(const Flags& flags, Bench& bench) {
         if (auto go = measureWhole(*scan, flags.threads, context, figures); !go) return fail(go.error());
     }
     // On their own: after seconds on one thread a virtual machine is slow to give the other processors back.
-    for (std::size_t i = 0; !flags.noUndecimated && i < flags.repeat; ++i) {
-        bench.console.progress("parallel", i, flags.repeat);
+    const std::size_t turns = flags.noUndecimated ? 0 : flags.repeat;
+    for (std::size_t i = 0; i < turns; ++i) {
+        bench.console.progress("parallel", i, turns);
         if (auto go = measureParallel(distinct, flags.threads, flags.cgalParallel, i % 2 != 0, context,
                                       figures.parallel);
             !go)

@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "core/base/parallel.h"
+#include "core/geometry/axis.h"
 
 namespace shapedb {
 
@@ -12,8 +13,6 @@ namespace {
 constexpr std::uint32_t kLeafSize = 10;
 // Two threads are no quicker with fewer points.
 constexpr std::uint32_t kLeastParallel = 4096;
-
-double coordinate(const Point3& p, int axis) { return axis == 0 ? p.x : axis == 1 ? p.y : p.z; }
 
 void setCoordinate(Point3& p, int axis, double value) { (axis == 0 ? p.x : axis == 1 ? p.y : p.z) = value; }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "core/geometry/axis.h"
 #include "core/matching/alignment.h"
 #include "core/matching/attribute_score.h"
 #include "core/matching/containment.h"
@@ -182,8 +183,8 @@ Motion pieceMotion(const Signature& a, const Signature& b, const ScoreOptions& o
         const Body& body = of.attributes->body;
         Point3 p = body.centre;
         for (std::size_t axis = 0; axis < 3; ++axis) {
-            const double along = axis == 0 ? inFrame.x : (axis == 1 ? inFrame.y : inFrame.z);
-            p = p + along * Point3{body.axes[axis][0], body.axes[axis][1], body.axes[axis][2]};
+            p = p + coordinate(inFrame, axis) *
+                        Point3{body.axes[axis][0], body.axes[axis][1], body.axes[axis][2]};
         }
         return of.origin + of.scale * p;
     };

@@ -14,15 +14,9 @@ constexpr std::uint32_t kBatch = 256;
 
 std::uint32_t infiniteIndex(const std::array<std::uint32_t, 4>& v) {
     for (std::uint32_t i = 0; i < 4; ++i) {
-        if ((v[i] & kVertexBits) == kInfinite) return i;
+        if (v[i] == kInfinite) return i;
     }
     return 4;
-}
-
-bool isInfinite(const std::array<std::uint32_t, 4>& v) {
-    return (static_cast<unsigned>((v[0] & kVertexBits) == kInfinite) |
-            static_cast<unsigned>(v[1] == kInfinite) | static_cast<unsigned>(v[2] == kInfinite) |
-            static_cast<unsigned>(v[3] == kInfinite)) != 0;
 }
 
 // Without branches: which it is, is random.
@@ -90,7 +84,7 @@ bool CavityInserter::ownsAtBorder(std::uint32_t cell) const {
 // What the balls leave open.
 bool CavityInserter::conflicts(std::uint32_t cell, const Site& p) const {
     const std::array<std::uint32_t, 4> w = cells_[cell].corners();
-    if (!isInfinite(w)) return sideOfSphere(sites_[w[0]], sites_[w[1]], sites_[w[2]], sites_[w[3]], p) > 0;
+    if (isFinite(w)) return sideOfSphere(sites_[w[0]], sites_[w[1]], sites_[w[2]], sites_[w[3]], p) > 0;
     const auto& f = kFacet[infiniteIndex(w)];
     const Site& a = sites_[w[f[0]]];
     const Site& b = sites_[w[f[1]]];
@@ -120,12 +114,12 @@ std::uint32_t CavityInserter::locate(std::uint32_t vertex, const Site& p) const 
 template <bool kAlone>
 std::uint32_t CavityInserter::walk(std::uint32_t start, const Site& p) const {
     std::uint32_t cell = start;
-    const std::uint32_t outside = infiniteIndex(cells_[cell].vertices);
+    const std::uint32_t outside = infiniteIndex(cells_[cell].corners());
     if (outside != 4) cell = cells_[cell].neighbours[outside];
     std::uint32_t from = kNoCell;
     for (;;) {
         const std::array<std::uint32_t, 4> v = cells_[cell].corners();
-        if (isInfinite(v)) return cell;
+        if (!isFinite(v)) return cell;
         const bool own = owns<kAlone>(cell);  // then so are two vertices of each facet
         std::uint32_t to = kNoCell;
         bool blocked = false;

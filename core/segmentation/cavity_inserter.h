@@ -39,6 +39,13 @@ struct alignas(32) Cell {
     }
 };
 
+/// Whether none of a cell's corners is the vertex at infinity; false for a free cell. Without branches.
+inline bool isFinite(const std::array<std::uint32_t, 4>& corners) {
+    return (static_cast<unsigned>(corners[0] < kInfinite) & static_cast<unsigned>(corners[1] < kInfinite) &
+            static_cast<unsigned>(corners[2] < kInfinite) & static_cast<unsigned>(corners[3] < kInfinite)) !=
+           0;
+}
+
 /// The cells and their balls in a block of memory each, taken from the front. Pages nobody took are never
 /// touched.
 class CellStore {

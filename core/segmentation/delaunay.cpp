@@ -74,11 +74,6 @@ void makeCanonical(Cell& cell) {
 constexpr std::size_t kAhead = 12;
 constexpr std::size_t kFarAhead = 24;
 
-bool isFinite(const Corners& v) {
-    return (static_cast<unsigned>(v[0] < kInfinite) & static_cast<unsigned>(v[1] < kInfinite) &
-            static_cast<unsigned>(v[2] < kInfinite) & static_cast<unsigned>(v[3] < kInfinite)) != 0;
-}
-
 // Cells or tetrahedra that a thread takes at a time.
 constexpr std::size_t kBlock = 8192;
 // A part of the store with fewer cells is not worth counts of its own.

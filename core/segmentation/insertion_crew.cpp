@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <chrono>
+#include <numeric>
 #include <optional>
 #include <thread>
 
 #include "core/base/parallel.h"
+#include "core/geometry/axis.h"
 
 namespace shapedb {
 
@@ -14,10 +16,6 @@ namespace {
 // So many sites tell where slabs with as many points as others end.
 constexpr std::size_t kSample = 4096;
 constexpr std::size_t kBlock = 8192;  // sites or cells that a thread takes at a time
-
-double coordinate(const Site& site, std::size_t axis) {
-    return axis == 0 ? site.x : axis == 1 ? site.y : site.z;
-}
 
 }  // namespace
 
@@ -86,21 +84,19 @@ Result<void> InsertionCrew::markInner() {
 
 // Half of the way to where all would have taken as long, had each needed the same time everywhere in its
 // slab: the other half is taken for chance.
-void InsertionCrew::moveBorders(const std::vector<Worker>& workers) {
-    double all = 0.0;
-    for (const Worker& worker : workers) all += worker.seconds;
+void InsertionCrew::moveBorders(const std::vector<double>& seconds) {
+    const double all = std::accumulate(seconds.begin(), seconds.end(), 0.0);
     const std::vector<double> before = slabs_.borders;
     double passed = 0.0;
     std::size_t next = 1;
     for (std::size_t k = 0; k < workers_; ++k) {
-        const double seconds = workers[k].seconds;
         for (; next < workers_; ++next) {
             const double wanted = all * static_cast<double>(next) / static_cast<double>(workers_) - passed;
-            if (wanted > seconds) break;
-            const double share = seconds > 0.0 ? wanted / seconds : 0.0;
+            if (wanted > seconds[k]) break;
+            const double share = seconds[k] > 0.0 ? wanted / seconds[k] : 0.0;
             slabs_.borders[next] = (before[next] + before[k] + share * (before[k + 1] - before[k])) / 2;
         }
-        passed += seconds;
+        passed += seconds[k];
     }
 }
 
@@ -109,9 +105,9 @@ Result<void> InsertionCrew::insert(std::vector<std::uint32_t>& list, std::vector
     if (slabs_.sample.empty()) slabs_ = makeSlabs(list);
     if (auto done = cut(slabs_); !done) return done;
     if (auto done = markInner(); !done) return done;
-    const auto workers = insertSideBySide(list, kInner, freeCells);
-    if (!workers) return fail(workers.error());
-    moveBorders(*workers);
+    const auto seconds = insertSideBySide(list, kInner, freeCells);
+    if (!seconds) return fail(seconds.error());
+    moveBorders(*seconds);
     return {};
 }
 
@@ -120,12 +116,14 @@ Result<void> InsertionCrew::insertLeft(std::vector<std::uint32_t>& list,
                                        std::vector<std::uint32_t>& freeCells) {
     if (list.empty()) return {};
     if (auto done = cut(makeSlabs(list)); !done) return done;
-    if (auto workers = insertSideBySide(list, 0, freeCells); !workers) return fail(workers.error());
+    if (auto done = insertSideBySide(list, 0, freeCells); !done) return fail(done.error());
     return {};
 }
 
-Result<std::vector<InsertionCrew::Worker>> InsertionCrew::insertSideBySide(
-    std::vector<std::uint32_t>& list, std::uint32_t innerMark, std::vector<std::uint32_t>& freeCells) {
+// Returns the seconds each worker took.
+Result<std::vector<double>> InsertionCrew::insertSideBySide(std::vector<std::uint32_t>& list,
+                                                            std::uint32_t innerMark,
+                                                            std::vector<std::uint32_t>& freeCells) {
     std::vector<Worker> workers;
     for (std::size_t k = 0; k < workers_; ++k) {
         const Share share{slabOf_.data(), static_cast<std::uint8_t>(k), innerMark};
@@ -139,13 +137,15 @@ Result<std::vector<InsertionCrew::Worker>> InsertionCrew::insertSideBySide(
     });
     if (!done) return fail(done.error());
     list.clear();
+    std::vector<double> seconds;
     for (const Worker& worker : workers) {
         if (worker.error) return fail(*worker.error);
         list.insert(list.end(), worker.postponed.begin(), worker.postponed.end());
         freeCells.insert(freeCells.end(), worker.freeCells.begin(), worker.freeCells.end());
+        seconds.push_back(worker.seconds);
     }
     std::sort(list.begin(), list.end());
-    return workers;
+    return seconds;
 }
 
 // A few for each slot.

@@ -48,8 +48,8 @@ class InsertionCrew {
     Slabs makeSlabs(const std::vector<std::uint32_t>& list) const;
     Result<void> cut(const Slabs& slabs);
     Result<void> markInner();
-    void moveBorders(const std::vector<Worker>& workers);
-    Result<std::vector<Worker>> insertSideBySide(std::vector<std::uint32_t>& list, std::uint32_t innerMark,
+    void moveBorders(const std::vector<double>& seconds);
+    Result<std::vector<double>> insertSideBySide(std::vector<std::uint32_t>& list, std::uint32_t innerMark,
                                                  std::vector<std::uint32_t>& freeCells);
     void addStarts(std::vector<Worker>& workers) const;
     void work(const std::vector<std::uint32_t>& list, Worker& worker, bool reports);
