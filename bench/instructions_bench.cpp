@@ -14,6 +14,7 @@
 #include "bench/server_process.h"
 #include "client/cli/evaluation_run.h"
 #include "client/cli/exit_code.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb::bench {
 
@@ -39,37 +40,37 @@ const Job* findJob(const std::string& name) {
 Result<JobFolder> inputFolder(const WorkDirectory& own, const std::string& folder) {
     JobFolder input{folder.empty() ? own.path() : folder};
     if (!std::filesystem::exists(input.signatures())) {
-        if (const auto made = prepareJobs(input, cli::defaultThreads()); !made) return fail(made.error());
+        RETURN_IF_ERROR(prepareJobs(input, cli::defaultThreads()));
     }
     return input;
 }
 
 Result<int> runJob(const std::string& name, const std::string& folder) {
     const auto own = WorkDirectory::create("");
-    if (!own) return fail(own.error());
+    RETURN_IF_ERROR(own);
     const auto where = inputFolder(*own, folder);
-    if (!where) return fail(where.error());
+    RETURN_IF_ERROR(where);
     const auto work = findJob(name)->prepare(*where);
-    if (!work) return fail(work.error());
-    if (const auto done = runCounted(*work); !done) return fail(done.error());
+    RETURN_IF_ERROR(work);
+    RETURN_IF_ERROR(runCounted(*work));
     return cli::kOk;
 }
 
 Result<Counts> countAll(const InstructionFlags& flags, Bench& bench) {
     Counts counts;
     const auto environment = countingEnvironment(flags.valgrind);
-    if (!environment) return fail(environment.error());
+    RETURN_IF_ERROR(environment);
     counts.environment = *environment;
     const auto own = WorkDirectory::create("");
-    if (!own) return fail(own.error());
+    RETURN_IF_ERROR(own);
     // Here and not under callgrind, where it would take minutes.
     const auto input = inputFolder(*own, flags.folder);
-    if (!input) return fail(input.error());
+    RETURN_IF_ERROR(input);
     for (const Job& job : jobs()) {
         bench.console.progress(job.name, counts.jobs.size(), jobs().size());
-        if (const auto go = bench.context().checkpoint(); !go) return fail(go.error());
+        RETURN_IF_ERROR(bench.context().checkpoint());
         const auto count = countInstructions(flags.valgrind, flags.program, job.name, input->path);
-        if (!count) return fail(count.error());
+        RETURN_IF_ERROR(count);
         counts.jobs[job.name] = *count;
     }
     return counts;
@@ -84,17 +85,16 @@ Result<Counts> readBaseline(const std::string& path) {
 Result<int> runInstructions(const InstructionFlags& flags, Bench& bench) {
     if (flags.update) {
         const auto counts = countAll(flags, bench);
-        if (!counts) return fail(counts.error());
-        if (const auto written = writeText(flags.baseline, countsText(*counts)); !written)
-            return fail(written.error());
+        RETURN_IF_ERROR(counts);
+        RETURN_IF_ERROR(writeText(flags.baseline, countsText(*counts)));
         bench.console.text("wrote " + flags.baseline + "\n");
         return cli::kOk;
     }
     // Before the minute of counting.
     const auto baseline = readBaseline(flags.baseline);
-    if (!baseline) return fail(baseline.error());
+    RETURN_IF_ERROR(baseline);
     const auto counts = countAll(flags, bench);
-    if (!counts) return fail(counts.error());
+    RETURN_IF_ERROR(counts);
     const Verdict verdict = compareCounts(*baseline, *counts, flags.margin);
     bench.console.text(verdictText(verdict, *baseline, *counts, flags.margin));
     return verdict.failed() ? cli::kSomeFailed : cli::kOk;

@@ -16,10 +16,11 @@
 #include "client/cli/retrieval_task.h"
 #include "client/io/scan_reader.h"
 #include "core/base/random.h"
+#include "core/base/return_if_error.h"
 #include "core/geometry/bounding.h"
-#include "core/geometry/noise.h"
+#include "core/pipeline.h"
 #include "core/segmentation/segmentation.h"
-#include "core/signature/profile.h"
+#include "core/synthetic/noise.h"
 
 namespace shapedb::bench {
 
@@ -43,7 +44,7 @@ constexpr std::array<Condition, 7> kConditions = {{
     {"0.5 %", Damage::kNoise, 0.005},
     {"1 %", Damage::kNoise, 0.01},
     {"2 %", Damage::kNoise, 0.02},
-    {"1 % strays", Damage::kOutliers, 0.0},
+    {"1 % outliers", Damage::kOutliers, 0.0},
     {"cap missing", Damage::kCap, 0.0},
 }};
 
@@ -86,8 +87,7 @@ void cutCap(PointCloud& points) {
 Result<PointCloud> damaged(PointCloud points, const Condition& condition) {
     switch (condition.damage) {
         case Damage::kNoise: {
-            if (auto added = addGaussianNoise(points, condition.noise, kSeed); !added)
-                return fail(added.error());
+            RETURN_IF_ERROR(addGaussianNoise(points, condition.noise, kSeed));
             break;
         }
         case Damage::kOutliers: addOutliers(points); break;
@@ -143,13 +143,13 @@ double volumeBelow(const Segmentation& whole, const PointCloud& left) {
 Result<Row> measure(const PointCloud& clean, const RunContext& context) {
     SegmentationOptions published = parametersOf(Profile::kPaper).segmentation;
     const auto truth = segment(clean, published, context);
-    if (!truth) return fail(truth.error());
+    RETURN_IF_ERROR(truth);
     const auto wholeSize = smallestBoxDiagonal(clean);
-    if (!wholeSize) return fail(wholeSize.error());
+    RETURN_IF_ERROR(wholeSize);
     Row row;
     for (std::size_t i = 0; i < kConditions.size(); ++i) {
         const auto points = damaged(clean, kConditions[i]);
-        if (!points) return fail(points.error());
+        RETURN_IF_ERROR(points);
         double volume = truth->volume;
         double size = *wholeSize;
         if (kConditions[i].damage == Damage::kCap) {
@@ -201,7 +201,7 @@ std::string header() {
 
 Result<int> runInterior(const std::string& folder, std::size_t perClass, Bench& bench) {
     const auto scans = cli::listClasses(folder, {});
-    if (!scans) return fail(scans.error());
+    RETURN_IF_ERROR(scans);
     std::map<std::string, Row> classes;
     std::map<std::string, std::size_t> taken;
     Row all;
@@ -209,9 +209,9 @@ Result<int> runInterior(const std::string& folder, std::size_t perClass, Bench& 
         if (perClass != 0 && taken[scan.label] == perClass) continue;
         ++taken[scan.label];
         const auto read = readScan(scan.path);
-        if (!read) return fail(read.error());
+        RETURN_IF_ERROR(read);
         const auto row = measure(read->points, bench.context());
-        if (!row) return fail(row.error());
+        RETURN_IF_ERROR(row);
         for (std::size_t i = 0; i < row->size(); ++i) {
             classes[scan.label][i].add((*row)[i]);
             all[i].add((*row)[i]);
@@ -240,7 +240,7 @@ void addInteriorOperation(CLI::App& app, Bench& bench) {
     };
     auto flags = std::make_shared<Flags>();
     CLI::App* command = app.add_subcommand(
-        "interior", "Error of the interior's volume and of the size under noise, strays and a missing cap");
+        "interior", "Error of the interior's volume and of the size under noise, outliers and a missing cap");
     command->add_option("folder", flags->folder, "Folder of class folders with clean, closed scans")
         ->required();
     command->add_option("--per-class", flags->perClass, "Shapes of each class to take (0: all)");

@@ -10,12 +10,13 @@
 #include "bench/stored_shapes.h"
 #include "client/io/ply_writer.h"
 #include "client/io/scan_reader.h"
+#include "common/sha256.h"
+#include "core/base/return_if_error.h"
 #include "core/matching/score.h"
+#include "core/pipeline.h"
 #include "core/search/top_k.h"
-#include "core/signature/profile.h"
 #include "core/signature/signature_codec.h"
-#include "server/common/sha256.h"
-#include "server/store/sqlite_store.h"
+#include "server/store/sqlite/sqlite_store.h"
 
 // Neither inlined nor cloned nor mangled: callgrind knows it by its name.
 #ifdef __clang__
@@ -45,29 +46,29 @@ constexpr std::size_t kPairStep = 7;
 
 Result<PointCloud> oneScan(std::size_t points) {
     auto scans = makeScans(2, points, kSeed, 1, {});
-    if (!scans) return fail(scans.error());
+    RETURN_IF_ERROR(scans);
     return std::move(scans->back());
 }
 
 Result<Work> segmentJob(const JobFolder&) {
     auto scan = oneScan(kSegmentPoints);
-    if (!scan) return fail(scan.error());
+    RETURN_IF_ERROR(scan);
     return Work([scan = std::move(*scan)]() -> Result<void> {
         const auto segmentation = segment(scan, parametersOf(Profile::kDefault).segmentation);
-        if (!segmentation) return fail(segmentation.error());
+        RETURN_IF_ERROR(segmentation);
         return {};
     });
 }
 
 Result<Work> signatureJob(const JobFolder&) {
     const auto scan = oneScan(kSignaturePoints);
-    if (!scan) return fail(scan.error());
+    RETURN_IF_ERROR(scan);
     auto made = segment(*scan, parametersOf(Profile::kDefault).segmentation);
-    if (!made) return fail(made.error());
+    RETURN_IF_ERROR(made);
     const auto segmentation = std::make_shared<const Segmentation>(std::move(*made));
     return Work([segmentation]() -> Result<void> {
         const auto signature = makeSignature(*segmentation, parametersOf(Profile::kDefault).signature);
-        if (!signature) return fail(signature.error());
+        RETURN_IF_ERROR(signature);
         return {};
     });
 }
@@ -81,7 +82,7 @@ Result<std::vector<Signature>> readSignatures(const JobFolder& folder) {
         std::string bytes(size, '\0');
         file.read(bytes.data(), size);
         auto signature = decodeSignature(bytes);
-        if (!signature) return fail(signature.error());
+        RETURN_IF_ERROR(signature);
         all.push_back(std::move(*signature));
     }
     if (all.size() != kSignatures)
@@ -91,7 +92,7 @@ Result<std::vector<Signature>> readSignatures(const JobFolder& folder) {
 
 Result<Work> scoreJob(const JobFolder& folder) {
     auto signatures = readSignatures(folder);
-    if (!signatures) return fail(signatures.error());
+    RETURN_IF_ERROR(signatures);
     return Work([all = std::move(*signatures)]() -> Result<void> {
         double sum = 0.0;
         for (std::size_t i = 0; i < all.size(); ++i)
@@ -104,7 +105,7 @@ Result<Work> scoreJob(const JobFolder& folder) {
 
 Result<Work> topKJob(const JobFolder& folder) {
     auto signatures = readSignatures(folder);
-    if (!signatures) return fail(signatures.error());
+    RETURN_IF_ERROR(signatures);
     const Signature query = signatures->back();
     signatures->pop_back();
     std::vector<IndexEntry> entries;
@@ -116,7 +117,7 @@ Result<Work> topKJob(const JobFolder& folder) {
         SearchOptions options;
         options.k = kHits;
         const auto found = topK(query, set, options);
-        if (!found) return fail(found.error());
+        RETURN_IF_ERROR(found);
         return {};
     });
 }
@@ -131,21 +132,21 @@ Result<void> storeOne(store::Store& store, std::int64_t collection, const std::s
     put.points = &points;
     put.checksum = sha256(points.data(), points.size() * sizeof(float));
     const auto stored = store.putShape(put);
-    if (!stored) return fail(stored.error());
+    RETURN_IF_ERROR(stored);
     const auto job = store.claimJob();
-    if (!job) return fail(job.error());
+    RETURN_IF_ERROR(job);
     if (!*job) return fail(ErrorCode::kInternal, "a stored shape has no job");
     const auto loaded = store.loadPoints((*job)->shapeId);
-    if (!loaded) return fail(loaded.error());
+    RETURN_IF_ERROR(loaded);
     const auto done =
         store.finishJob(**job, {(*job)->shapeId, (*job)->pointsVersion, (*job)->generation, signature});
-    if (!done) return fail(done.error());
+    RETURN_IF_ERROR(done);
     return {};
 }
 
 Result<Work> storeJob(const JobFolder& folder) {
     const auto scan = oneScan(kStoredPoints);
-    if (!scan) return fail(scan.error());
+    RETURN_IF_ERROR(scan);
     std::vector<float> points;
     for (const Point3& p : *scan) {
         for (const double v : {p.x, p.y, p.z}) points.push_back(static_cast<float>(v));
@@ -154,10 +155,10 @@ Result<Work> storeJob(const JobFolder& folder) {
     options.path = folder.path + "/job.sqlite";
     options.now = [] { return store::TimestampMs{1'700'000'000'000}; };  // the same row each time
     auto opened = store::openSqliteStore(options);
-    if (!opened) return fail(opened.error());
+    RETURN_IF_ERROR(opened);
     const std::shared_ptr<store::Store> store = std::move(*opened);
     const auto collection = store->createCollection("default", "", "");
-    if (!collection) return fail(collection.error());
+    RETURN_IF_ERROR(collection);
     return Work([store, points, id = collection->id]() -> Result<void> {
         const std::string signature(1'000, 's');
         for (std::size_t i = 0; i < kStoredShapes; ++i) {
@@ -165,19 +166,19 @@ Result<Work> storeJob(const JobFolder& folder) {
             if (!stored) return stored;
         }
         const auto rows = store->loadIndex(id, 0, kStoredShapes);
-        if (!rows) return fail(rows.error());
+        RETURN_IF_ERROR(rows);
         return {};
     });
 }
 
 Result<Work> plyJob(const JobFolder& folder) {
     const auto scan = oneScan(kPlyPoints);
-    if (!scan) return fail(scan.error());
+    RETURN_IF_ERROR(scan);
     const std::string path = folder.path + "/job.ply";
-    if (const auto written = writePointsPly(path, *scan); !written) return fail(written.error());
+    RETURN_IF_ERROR(writePointsPly(path, *scan));
     return Work([path]() -> Result<void> {
         const auto read = readScan(path);
-        if (!read) return fail(read.error());
+        RETURN_IF_ERROR(read);
         return {};
     });
 }
@@ -200,7 +201,7 @@ const std::vector<Job>& jobs() {
 Result<void> prepareJobs(const JobFolder& folder, unsigned threads) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
     const auto generator = SignatureGenerator::create({Mixture::kPlain, kSignatures, kSeed, 3000, 2}, {});
-    if (!generator) return fail(generator.error());
+    RETURN_IF_ERROR(generator);
     std::string bytes;
     for (std::size_t i = 0; i < kSignatures; ++i) {
         const std::string signature = encodeSignature(generator->make(i));

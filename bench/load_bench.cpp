@@ -15,6 +15,7 @@
 #include "client/cli/evaluation_run.h"
 #include "client/cli/exit_code.h"
 #include "client/cli/text.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb::bench {
 
@@ -174,7 +175,7 @@ Result<void> add(Measure measure, const LoadSettings& settings, Bench& bench, Re
         bench.console.progress(what, done, total);
     };
     const auto figures = measure(settings, progress, bench.context());
-    if (!figures) return fail(figures.error());
+    RETURN_IF_ERROR(figures);
     report(*figures, settings, all);
     return {};
 }
@@ -191,14 +192,13 @@ Result<int> runLoad(const LoadFlags& flags, Bench& bench) {
     if (done && wanted(kParts[1])) done = add(measureLatency, settings, bench, all);
     if (done && wanted(kParts[2])) done = add(measureStart, settings, bench, all);
     if (done && wanted(kParts[3])) done = add(measureUpload, settings, bench, all);
-    if (!done) return fail(done.error());
+    RETURN_IF_ERROR(done);
     const Environment here = environment();
     json document = {{"environment", environmentJson(here)},
                      {"command", bench.command},
                      {"seed", settings.seed},
                      {"parts", all.parts}};
-    if (const auto written = writeJson(bench.console, flags.json, document); !written)
-        return fail(written.error());
+    RETURN_IF_ERROR(writeJson(bench.console, flags.json, document));
     std::string text = describe(here) + "\n" + bench.command + "\n\n" + table(all.lines);
     if (!here.optimised) text += "This program was built without optimisation: times mean nothing.\n";
     bench.console.text(text);

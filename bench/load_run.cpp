@@ -14,7 +14,8 @@
 #include "bench/server_process.h"
 #include "bench/stored_shapes.h"
 #include "client/api/client.h"
-#include "core/signature/profile.h"
+#include "core/base/return_if_error.h"
+#include "core/pipeline.h"
 #include "core/signature/signature_codec.h"
 
 namespace shapedb::bench {
@@ -116,10 +117,10 @@ Result<double> describeAll(const std::vector<PointCloud>& scans, unsigned thread
     Crew crew(threads, stop, [&](std::size_t i) -> Result<bool> {
         if (i >= scans.size()) return false;
         const auto description = describe(scans[i], parameters, cancelledBy(context));
-        if (!description) return fail(description.error());
+        RETURN_IF_ERROR(description);
         return true;
     });
-    if (const auto done = crew.finish(); !done) return fail(done.error());
+    RETURN_IF_ERROR(crew.finish());
     return since(began);
 }
 
@@ -129,7 +130,7 @@ Result<void> addAndWait(const client::Client& client, const std::string& key, co
     request.shape.key = key;
     request.wait = true;
     const auto added = client.addShape(request, scan, context);
-    if (!added) return fail(added.error());
+    RETURN_IF_ERROR(added);
     if (added->shape.state != client::ShapeState::kReady)
         return fail(ErrorCode::kInternal, "scan " + key + " could not be described");
     return {};
@@ -143,10 +144,10 @@ Result<double> uploadAll(const client::Client& client, const std::vector<PointCl
     Crew crew(kClientsPerWorker * threads, stop, [&](std::size_t i) -> Result<bool> {
         if (i >= scans.size()) return false;
         const auto added = addAndWait(client, prefix + std::to_string(i), scans[i], cancelledBy(context));
-        if (!added) return fail(added.error());
+        RETURN_IF_ERROR(added);
         return true;
     });
-    if (const auto done = crew.finish(); !done) return fail(done.error());
+    RETURN_IF_ERROR(crew.finish());
     return since(began);
 }
 
@@ -190,7 +191,7 @@ Result<void> ask(const client::Client& client, const std::vector<std::string>& q
         const auto began = Clock::now();
         const auto reply =
             client.searchBySignature(options, queries[took.size() % queries.size()], cancelledBy(context));
-        if (!reply) return fail(reply.error());
+        RETURN_IF_ERROR(reply);
         took.push_back(since(began));
     }
     return {};
@@ -222,29 +223,29 @@ Result<LatencyFigures> measureLatencyOf(const LoadSettings& settings, const clie
     }
     for (std::size_t round = 0; round < settings.rounds; ++round) {
         progress("queries", round, settings.rounds);
-        if (const auto asked = askInto(idle); !asked) return fail(asked.error());
+        RETURN_IF_ERROR(askInto(idle));
         std::atomic<bool> stop{false};
         RunContext stopped;
         stopped.cancel = &stop;
         Crew crew(kClientsPerWorker * settings.threads, stop, [&](std::size_t i) -> Result<bool> {
             const std::string key = "busy-" + std::to_string(round) + "-" + std::to_string(i);
             const auto added = addAndWait(uploader, key, scans[i % scans.size()], stopped);
-            if (!added) return fail(added.error());
+            RETURN_IF_ERROR(added);
             return true;
         });
         std::this_thread::sleep_for(kWarmUp);
         const auto before = client.stats();
         const auto began = Clock::now();
-        if (const auto asked = askInto(busy); !asked) return fail(asked.error());
+        RETURN_IF_ERROR(askInto(busy));
         busySeconds += since(began);
         const auto after = client.stats();
         stop = true;
-        if (const auto done = crew.finish(); !done) return fail(done.error());
+        RETURN_IF_ERROR(crew.finish());
         if (!before || !after) return fail((before ? after : before).error());
         described += after->ingested - before->ingested;
         // What was cut off goes on in the workers; the next round is to find them idle.
         for (auto left = client.stats(); left && left->queuedJobs > 0; left = client.stats()) {
-            if (const auto go = context.checkpoint(); !go) return fail(go.error());
+            RETURN_IF_ERROR(context.checkpoint());
             std::this_thread::sleep_for(std::chrono::milliseconds(50));
         }
     }
@@ -258,7 +259,7 @@ Result<LatencyFigures> measureLatencyOf(const LoadSettings& settings, const clie
 Result<PointCloud> makeLargeScan(std::uint64_t count, const LoadSettings& settings,
                                  const RunContext& context) {
     auto scans = makeScans(1, static_cast<std::size_t>(count), settings.seed, 1, context);
-    if (!scans) return fail(scans.error());
+    RETURN_IF_ERROR(scans);
     return std::move(scans->front());
 }
 
@@ -275,27 +276,27 @@ Result<Start> startOnce(const LoadSettings& settings, const std::string& data, c
     Start start;
     const auto began = Clock::now();
     const auto server = startServer(settings, data);
-    if (!server) return fail(server.error());
+    RETURN_IF_ERROR(server);
     const auto client = connect(*server);
-    if (!client) return fail(client.error());
+    RETURN_IF_ERROR(client);
     const auto health = client->health("", cancelledBy(context));
-    if (!health) return fail(health.error());
+    RETURN_IF_ERROR(health);
     if (*health != client::Health::kServing)
         return fail(ErrorCode::kUnavailable, "the server listens but does not say that it serves");
     start.serving = since(began);
     const auto processor = server->processorSeconds();
-    if (!processor) return fail(processor.error());
+    RETURN_IF_ERROR(processor);
     start.processor = *processor;
     client::SearchOptions options;
     options.k = settings.k;
     const auto reply = client->searchBySignature(options, query, cancelledBy(context));
-    if (!reply) return fail(reply.error());
+    RETURN_IF_ERROR(reply);
     start.answered = since(began);
     const auto memory = server->memory();
-    if (!memory) return fail(memory.error());
+    RETURN_IF_ERROR(memory);
     start.memory = *memory;
     const auto stats = client->stats();
-    if (!stats) return fail(stats.error());
+    RETURN_IF_ERROR(stats);
     start.stats = *stats;
     return start;
 }
@@ -305,28 +306,27 @@ Result<Start> startOnce(const LoadSettings& settings, const std::string& data, c
 Result<IngestFigures> measureIngest(const LoadSettings& settings, const LoadProgress& progress,
                                     const RunContext& context) {
     const auto directory = WorkDirectory::create(settings.directory);
-    if (!directory) return fail(directory.error());
+    RETURN_IF_ERROR(directory);
     const auto scans =
         makeScans(settings.scans, settings.scanPoints, settings.seed, settings.threads, context);
-    if (!scans) return fail(scans.error());
+    RETURN_IF_ERROR(scans);
     const auto server = startServer(settings, directory->path() + "/data");
-    if (!server) return fail(server.error());
+    RETURN_IF_ERROR(server);
     const auto client = connect(*server);
-    if (!client) return fail(client.error());
-    if (const auto warm = addAndWait(*client, "warm-up", scans->front(), context); !warm)
-        return fail(warm.error());
+    RETURN_IF_ERROR(client);
+    RETURN_IF_ERROR(addAndWait(*client, "warm-up", scans->front(), context));
 
     IngestFigures figures;
     for (std::size_t round = 0; round < settings.rounds; ++round) {
         progress("ingest", round, settings.rounds);
         const double before = processorSeconds();
         const auto core = describeAll(*scans, settings.threads, context);
-        if (!core) return fail(core.error());
+        RETURN_IF_ERROR(core);
         const double between = processorSeconds();
         const auto serverBefore = server->processorSeconds();
         const auto served =
             uploadAll(*client, *scans, std::to_string(round) + "-", settings.threads, context);
-        if (!served) return fail(served.error());
+        RETURN_IF_ERROR(served);
         const auto serverAfter = server->processorSeconds();
         if (!serverBefore || !serverAfter) return fail((serverBefore ? serverAfter : serverBefore).error());
         figures.rounds.push_back({*core, *served});
@@ -351,35 +351,34 @@ Result<IngestFigures> measureIngest(const LoadSettings& settings, const LoadProg
 Result<LatencyFigures> measureLatency(const LoadSettings& settings, const LoadProgress& progress,
                                       const RunContext& context) {
     const auto directory = WorkDirectory::create(settings.directory);
-    if (!directory) return fail(directory.error());
+    RETURN_IF_ERROR(directory);
     const std::string data = directory->path() + "/data";
     const auto generator = makeGenerator(settings, settings.shapes, context);
-    if (!generator) return fail(generator.error());
-    if (const auto filled = storeSignatures(data, *generator, settings.shapes, progress, context); !filled)
-        return fail(filled.error());
+    RETURN_IF_ERROR(generator);
+    RETURN_IF_ERROR(storeSignatures(data, *generator, settings.shapes, progress, context));
     const std::vector<std::string> queries = makeQueries(*generator, settings.shapes);
     const auto scans =
         makeScans(settings.scans, settings.scanPoints, settings.seed, settings.threads, context);
-    if (!scans) return fail(scans.error());
+    RETURN_IF_ERROR(scans);
     const auto server = startServer(settings, data);
-    if (!server) return fail(server.error());
+    RETURN_IF_ERROR(server);
     const auto client = connect(*server);
-    if (!client) return fail(client.error());
+    RETURN_IF_ERROR(client);
     const auto uploader = connect(*server);
-    if (!uploader) return fail(uploader.error());
+    RETURN_IF_ERROR(uploader);
     return measureLatencyOf(settings, *client, *uploader, queries, *scans, progress, context);
 }
 
 Result<StartFigures> measureStart(const LoadSettings& settings, const LoadProgress& progress,
                                   const RunContext& context) {
     const auto directory = WorkDirectory::create(settings.directory);
-    if (!directory) return fail(directory.error());
+    RETURN_IF_ERROR(directory);
     const std::string data = settings.startData.empty() ? directory->path() + "/data" : settings.startData;
     const auto generator = makeGenerator(settings, settings.startShapes, context);
-    if (!generator) return fail(generator.error());
+    RETURN_IF_ERROR(generator);
     if (!std::filesystem::exists(data)) {
         const auto filled = storeSignatures(data, *generator, settings.startShapes, progress, context);
-        if (!filled) return fail(filled.error());
+        RETURN_IF_ERROR(filled);
     }
     const std::string query = encodeSignature(generator->make(settings.startShapes));
 
@@ -390,7 +389,7 @@ Result<StartFigures> measureStart(const LoadSettings& settings, const LoadProgre
     for (std::size_t round = 0; round < settings.rounds; ++round) {
         progress("starts", round, settings.rounds);
         const auto start = startOnce(settings, data, query, context);
-        if (!start) return fail(start.error());
+        RETURN_IF_ERROR(start);
         serving.push_back(start->serving);
         answered.push_back(start->answered);
         processor.push_back(start->processor);
@@ -411,37 +410,36 @@ Result<StartFigures> measureStart(const LoadSettings& settings, const LoadProgre
 Result<UploadFigures> measureUpload(const LoadSettings& settings, const LoadProgress& progress,
                                     const RunContext& context) {
     const auto directory = WorkDirectory::create(settings.directory);
-    if (!directory) return fail(directory.error());
+    RETURN_IF_ERROR(directory);
     const std::uint64_t count = settings.uploadBytes / kBytesPerPoint;
     progress("large scan", 0, 0);
     const auto scan = makeLargeScan(count, settings, context);
-    if (!scan) return fail(scan.error());
+    RETURN_IF_ERROR(scan);
     const auto small = makeScans(1, settings.scanPoints, settings.seed + 1, 1, context);
-    if (!small) return fail(small.error());
+    RETURN_IF_ERROR(small);
     const auto server =
         startServer(settings, directory->path() + "/data",
                     {"--limits-max-points", std::to_string(std::max<std::uint64_t>(count, 5'000'000))});
-    if (!server) return fail(server.error());
+    RETURN_IF_ERROR(server);
     const auto client = connect(*server);
-    if (!client) return fail(client.error());
+    RETURN_IF_ERROR(client);
     // Threads, connections and arenas that every upload needs are not this one's.
-    if (const auto warm = addAndWait(*client, "warm-up", small->front(), cancelledBy(context)); !warm)
-        return fail(warm.error());
+    RETURN_IF_ERROR(addAndWait(*client, "warm-up", small->front(), cancelledBy(context)));
 
     UploadFigures figures;
     figures.pointBytes = count * kBytesPerPoint;
     figures.exact = server->forgetPeak();
     const auto before = server->memory();
-    if (!before) return fail(before.error());
+    RETURN_IF_ERROR(before);
     client::AddRequest request;
     request.shape.key = "large";
     const auto began = Clock::now();
     const auto added = client->addShape(request, *scan, cancelledBy(context));
-    if (!added) return fail(added.error());
+    RETURN_IF_ERROR(added);
     // At once: a worker begins to read the scan again now.
     const auto uploaded = server->memory();
     figures.seconds = since(began);
-    if (!uploaded) return fail(uploaded.error());
+    RETURN_IF_ERROR(uploaded);
     const auto growthOf = [&](const MemoryUse& use) {
         return static_cast<std::int64_t>(use.peak) - static_cast<std::int64_t>(before->resident) -
                static_cast<std::int64_t>(figures.pointBytes);
@@ -449,9 +447,9 @@ Result<UploadFigures> measureUpload(const LoadSettings& settings, const LoadProg
     figures.growth = growthOf(*uploaded);
     progress("describing the large scan", 0, 0);
     const auto settled = client->watchIngest(request.shape, {}, cancelledBy(context));
-    if (!settled) return fail(settled.error());
+    RETURN_IF_ERROR(settled);
     const auto described = server->memory();
-    if (!described) return fail(described.error());
+    RETURN_IF_ERROR(described);
     figures.describeGrowth = growthOf(*described);
     return figures;
 }

@@ -5,8 +5,9 @@
 
 #include "bench/d2_histogram.h"
 #include "bench/peers.h"
+#include "core/base/return_if_error.h"
 #include "core/matching/score.h"
-#include "core/signature/profile.h"
+#include "core/pipeline.h"
 
 namespace shapedb::bench {
 
@@ -22,7 +23,7 @@ Method profileMethod(Profile profile) {
     method.describe = [parameters](const PointCloud& points, std::uint64_t,
                                    const RunContext& context) -> Result<Features> {
         auto description = describe(points, parameters, context);
-        if (!description) return fail(description.error());
+        RETURN_IF_ERROR(description);
         return Features(std::move(description->signature));
     };
     method.score = [](const Features& a, const Features& b) {
@@ -47,7 +48,7 @@ Method histogramMethod(std::string name, std::string title, std::string comparis
     method.describe = [describe = std::move(describe)](const PointCloud& points, std::uint64_t seed,
                                                        const RunContext&) -> Result<Features> {
         auto histogram = describe(points, seed);
-        if (!histogram) return fail(histogram.error());
+        RETURN_IF_ERROR(histogram);
         return Features(std::move(*histogram));
     };
     method.score = [distance](const Features& a, const Features& b) {

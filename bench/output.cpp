@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/io/output_file.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb::bench {
 
@@ -23,8 +24,8 @@ std::string numberText(const char* format, double value) {
 
 Result<void> writeText(const std::string& path, std::string_view text) {
     auto file = io::OutputFile::create(path);
-    if (!file) return fail(file.error());
-    if (const auto written = file->write(text); !written) return written;
+    RETURN_IF_ERROR(file);
+    RETURN_IF_ERROR(file->write(text));
     return file->commit();
 }
 

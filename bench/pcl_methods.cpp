@@ -15,6 +15,7 @@
 #include <pcl/search/kdtree.h>
 
 #include "bench/peers.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb::bench {
 
@@ -120,7 +121,7 @@ std::function<Result<Histogram>(const PointCloud&, std::uint64_t)> guarded(
     return [describe](const PointCloud& points, std::uint64_t) -> Result<Histogram> {
         try {
             const auto cloud = toCloud(points);
-            if (!cloud) return fail(cloud.error());
+            RETURN_IF_ERROR(cloud);
             return describe(*cloud);
         } catch (const std::bad_alloc&) {
             return fail(ErrorCode::kOutOfMemory, "not enough memory");

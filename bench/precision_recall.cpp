@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/base/return_if_error.h"
+
 namespace shapedb::bench {
 
 namespace {
@@ -23,7 +25,7 @@ std::vector<double> precisions(const ScoreMatrix& scores, const std::vector<std:
 
 Result<std::vector<double>> precisionAtRecall(const ScoreMatrix& scores,
                                               const std::vector<std::string>& labels) {
-    if (const auto valid = checkScoreMatrix(scores, labels.size()); !valid) return fail(valid.error());
+    RETURN_IF_ERROR(checkScoreMatrix(scores, labels.size()));
     std::vector<double> mean(kRecallLevels, 0.0);
     std::size_t queries = 0;
     for (std::size_t query = 0; query < labels.size(); ++query) {

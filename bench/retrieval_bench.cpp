@@ -15,6 +15,7 @@
 #include "client/cli/checks.h"
 #include "client/cli/evaluation_run.h"
 #include "client/cli/exit_code.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb::bench {
 
@@ -47,7 +48,7 @@ Result<RetrievalTask> taskOf(const RetrievalFlags& flags) {
                         "shapes give --gallery");
         }
         auto scans = cli::listClasses(flags.paths.front(), flags.classes);
-        if (!scans) return fail(scans.error());
+        RETURN_IF_ERROR(scans);
         task.queries = std::move(*scans);
         return task;
     }
@@ -56,12 +57,12 @@ Result<RetrievalTask> taskOf(const RetrievalFlags& flags) {
                     "--classes, --except-classes and --plot are for leave-one-out; leave --gallery out");
     }
     const auto match = cli::matchFromName(flags.match);
-    if (!match) return fail(match.error());
+    RETURN_IF_ERROR(match);
     task.match = *match;
     auto queries = cli::listCollection(flags.paths);
-    if (!queries) return fail(queries.error());
+    RETURN_IF_ERROR(queries);
     auto gallery = cli::listCollection(flags.gallery);
-    if (!gallery) return fail(gallery.error());
+    RETURN_IF_ERROR(gallery);
     task.queries = std::move(*queries);
     task.gallery = std::move(*gallery);
     return task;
@@ -98,9 +99,9 @@ int reportFailures(cli::Console& console, const std::vector<LevelResult>& levels
 
 Result<int> runOperation(Bench& bench, const RetrievalFlags& flags) {
     const auto methods = methodsNamed(flags.methods);
-    if (!methods) return fail(methods.error());
+    RETURN_IF_ERROR(methods);
     const auto task = taskOf(flags);
-    if (!task) return fail(task.error());
+    RETURN_IF_ERROR(task);
     const RetrievalSettings settings = settingsOf(flags);
     const auto levels = runRetrieval(
         *task, settings, *methods,
@@ -108,16 +109,15 @@ Result<int> runOperation(Bench& bench, const RetrievalFlags& flags) {
             bench.console.progress(what, done, total);
         },
         bench.context());
-    if (!levels) return fail(levels.error());
+    RETURN_IF_ERROR(levels);
     const RetrievalReportData data{*task, settings, *levels, environment(), peerLibrary()};
     if (!flags.plot.empty()) {
-        if (const auto ok = writeText(flags.plot, retrievalCharts(*levels)); !ok) return fail(ok.error());
+        RETURN_IF_ERROR(writeText(flags.plot, retrievalCharts(*levels)));
     }
     if (!flags.markdown.empty()) {
-        if (const auto ok = writeText(flags.markdown, retrievalMarkdown(data)); !ok) return fail(ok.error());
+        RETURN_IF_ERROR(writeText(flags.markdown, retrievalMarkdown(data)));
     }
-    if (const auto ok = writeJson(bench.console, flags.json, retrievalJson(data)); !ok)
-        return fail(ok.error());
+    RETURN_IF_ERROR(writeJson(bench.console, flags.json, retrievalJson(data)));
     const int exitCode = reportFailures(bench.console, *levels);
     bench.console.text(retrievalText(data));
     return exitCode;

@@ -8,6 +8,7 @@
 #include "bench/stopwatch.h"
 #include "client/cli/evaluation_run.h"
 #include "core/base/random.h"
+#include "core/base/return_if_error.h"
 #include "core/geometry/motion.h"
 
 namespace shapedb::bench {
@@ -93,7 +94,7 @@ Result<Described> describeAll(const std::vector<CollectionScan>& scans, const Re
             progress(what, ++done, scans.size());
             return std::nullopt;
         });
-    if (!run) return fail(run.error());
+    RETURN_IF_ERROR(run);
     return described;
 }
 
@@ -124,7 +125,7 @@ Result<Scored> scoreAll(const Method& method, const std::vector<Item>& rows, con
             seconds[r] = stopwatch.seconds();
             return std::nullopt;
         });
-    if (!run) return fail(run.error());
+    RETURN_IF_ERROR(run);
     double total = 0.0;
     std::size_t count = 0;
     for (std::size_t r = 0; r < rows.size(); ++r) {
@@ -162,9 +163,9 @@ Result<void> leaveOneOut(const RetrievalTask& task, const std::vector<Item>& ite
     }
     scores = cli::withTiesAgainstFailures(std::move(scores), labels, failed, kBelowFailed);
     const auto report = evaluateLeaveOneOut(scores, labels);
-    if (!report) return fail(report.error());
+    RETURN_IF_ERROR(report);
     auto precision = precisionAtRecall(scores, labels);
-    if (!precision) return fail(precision.error());
+    RETURN_IF_ERROR(precision);
     result.metrics = report->mean;
     result.precision = std::move(*precision);
     return {};
@@ -180,7 +181,7 @@ Result<void> againstGallery(const RetrievalTask& task, const std::vector<Item>& 
                              [&](std::size_t g) { return queries[q].features && gallery[g].features; }));
     }
     auto report = evaluateGallery(asked, gallery.size());
-    if (!report) return fail(report.error());
+    RETURN_IF_ERROR(report);
     for (std::size_t q = 0; q < queries.size(); ++q) {
         QueryResult one;
         one.query = task.queries[q].name;
@@ -207,7 +208,7 @@ Result<std::vector<LevelResult>> runRetrieval(const RetrievalTask& task, const R
         RetrievalSettings clean = settings;
         clean.scan.points.reset();
         auto described = describeAll(task.gallery, clean, 0.0, methods, "gallery", progress, context);
-        if (!described) return fail(described.error());
+        RETURN_IF_ERROR(described);
         gallery = std::move(*described);
     }
     std::vector<LevelResult> levels;
@@ -215,14 +216,14 @@ Result<std::vector<LevelResult>> runRetrieval(const RetrievalTask& task, const R
         const std::string what =
             "level " + std::to_string(levels.size() + 1) + " of " + std::to_string(settings.noise.size());
         const auto queries = describeAll(task.queries, settings, noise, methods, what, progress, context);
-        if (!queries) return fail(queries.error());
+        RETURN_IF_ERROR(queries);
         LevelResult level;
         level.noise = noise;
         for (std::size_t m = 0; m < methods.size(); ++m) {
             const std::vector<Item>& rows = (*queries)[m];
             const std::vector<Item>& columns = hasGallery ? gallery[m] : rows;
             auto scored = scoreAll(methods[m], rows, columns, settings.threads, context);
-            if (!scored) return fail(scored.error());
+            RETURN_IF_ERROR(scored);
             MethodResult result;
             result.name = methods[m].name;
             result.title = methods[m].title;
@@ -235,7 +236,7 @@ Result<std::vector<LevelResult>> runRetrieval(const RetrievalTask& task, const R
             }
             const auto measured = hasGallery ? againstGallery(task, rows, columns, scored->scores, result)
                                              : leaveOneOut(task, rows, std::move(scored->scores), result);
-            if (!measured) return fail(measured.error());
+            RETURN_IF_ERROR(measured);
             level.methods.push_back(std::move(result));
         }
         levels.push_back(std::move(level));

@@ -21,10 +21,11 @@
 #include "bench/stopwatch.h"
 #include "client/cli/exit_code.h"
 #include "client/io/scan_reader.h"
-#include "core/geometry/sanitise.h"
-#include "core/segmentation/delaunay.h"
+#include "core/base/return_if_error.h"
+#include "core/delaunay/delaunay.h"
+#include "core/pipeline.h"
+#include "core/preparation/sanitise.h"
 #include "core/segmentation/segmentation.h"
-#include "core/signature/profile.h"
 #include "core/synthetic/families.h"
 
 namespace shapedb::bench {
@@ -97,19 +98,19 @@ ShapeParameters parametersNamed(const std::string& name) {
 
 SegmentationOptions undecimatedOptions(const std::string& profile) {
     SegmentationOptions options = parametersNamed(profile).segmentation;
-    options.decimateTo = 0;
+    options.preparation.decimateTo = 0;
     return options;
 }
 
 Result<PointCloud> loadPoints(const Flags& flags, Figures& figures) {
     if (!flags.file.empty()) {
         auto scan = readScan(flags.file);
-        if (!scan) return fail(scan.error());
+        RETURN_IF_ERROR(scan);
         figures.source = flags.file.substr(flags.file.find_last_of('/') + 1);
         return std::move(scan->points);
     }
     const auto solid = makeMember(kFamily, 0, kSeed);
-    if (!solid) return fail(solid.error());
+    RETURN_IF_ERROR(solid);
     ScanOptions options;
     options.count = flags.points;
     options.noise = flags.noise;
@@ -149,7 +150,7 @@ Result<void> measureUndecimated(const PointCloud& scan, const PointCloud& distin
         const ThreadStopwatch stopwatch;
         const auto found = segment(scan, undecimatedOptions(lane.profile), context);
         lane.seconds.push_back(stopwatch.seconds());
-        if (!found) return fail(found.error());
+        RETURN_IF_ERROR(found);
         lane.size = found->tetrahedra.size();
         note(found->stages, lane.stages);
     }
@@ -163,7 +164,7 @@ Result<void> measureParallel(const PointCloud& distinct, std::size_t threads, bo
         const auto start = Clock::now();
         const auto found = triangulate(distinct, context);
         (many ? parallel.many : parallel.one).push_back(secondsSince(start));
-        if (!found) return fail(found.error());
+        RETURN_IF_ERROR(found);
         if (many && withCgal) parallel.bareMany.push_back(bareParallelDelaunay(distinct).wallSeconds);
     }
     return {};
@@ -173,11 +174,11 @@ Result<void> measureWhole(const PointCloud& scan, std::size_t threads, const Run
                           Figures& figures) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
     for (Lane& lane : figures.whole) {
-        if (parametersNamed(lane.profile).segmentation.decimateTo == 0) continue;
+        if (parametersNamed(lane.profile).segmentation.preparation.decimateTo == 0) continue;
         const auto start = Clock::now();
         const auto found = describe(scan, parametersNamed(lane.profile), context);
         lane.seconds.push_back(secondsSince(start));
-        if (!found) return fail(found.error());
+        RETURN_IF_ERROR(found);
         lane.size = found->segmentation.sites.size();
         std::vector<StageTime> stages = found->segmentation.stages;
         stages.push_back({"signature", lane.seconds.back() - found->segmentation.totalSeconds});
@@ -282,12 +283,12 @@ Result<int> runSegment(const Flags& flags, Bench& bench) {
     Figures figures;
     const RunContext context = bench.context();
     const auto scan = loadPoints(flags, figures);
-    if (!scan) return fail(scan.error());
+    RETURN_IF_ERROR(scan);
     figures.points = scan->size();
     PointCloud distinct;
     if (!flags.noUndecimated) {
         auto clean = sanitise(*scan);
-        if (!clean) return fail(clean.error());
+        RETURN_IF_ERROR(clean);
         distinct = std::move(clean->points);
         distinct.shrink_to_fit();
     }
@@ -296,9 +297,9 @@ Result<int> runSegment(const Flags& flags, Bench& bench) {
     for (std::size_t i = 0; i < flags.repeat; ++i) {
         bench.console.progress("segment", i, flags.repeat);
         if (!flags.noUndecimated) {
-            if (auto go = measureUndecimated(*scan, distinct, context, figures); !go) return fail(go.error());
+            RETURN_IF_ERROR(measureUndecimated(*scan, distinct, context, figures));
         }
-        if (auto go = measureWhole(*scan, flags.threads, context, figures); !go) return fail(go.error());
+        RETURN_IF_ERROR(measureWhole(*scan, flags.threads, context, figures));
     }
     // On their own: after seconds on one thread a virtual machine is slow to give the other processors back.
     const std::size_t turns = flags.noUndecimated ? 0 : flags.repeat;
@@ -310,7 +311,7 @@ Result<int> runSegment(const Flags& flags, Bench& bench) {
             return fail(go.error());
     }
     const json document = documentOf(flags, bench.command, figures);
-    if (const auto ok = writeJson(bench.console, flags.json, document); !ok) return fail(ok.error());
+    RETURN_IF_ERROR(writeJson(bench.console, flags.json, document));
     bench.console.text(textOf(flags, figures));
     return cli::kOk;
 }

@@ -16,6 +16,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "core/base/return_if_error.h"
+
 namespace shapedb::bench {
 
 namespace {
@@ -102,7 +104,7 @@ Result<ServerProcess> ServerProcess::start(const std::string& program, const std
     if (logOutput >= 0) ::close(logOutput);
     if (server.process_ < 0)
         return fail(ErrorCode::kInternal, std::string("no process: ") + std::strerror(errno));
-    if (const auto listening = server.awaitAddress(log); !listening) return fail(listening.error());
+    RETURN_IF_ERROR(server.awaitAddress(log));
     return server;
 }
 

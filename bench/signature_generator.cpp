@@ -8,7 +8,8 @@
 #include <tbb/parallel_for.h>
 
 #include "core/base/random.h"
-#include "core/signature/profile.h"
+#include "core/base/return_if_error.h"
+#include "core/pipeline.h"
 #include "core/synthetic/families.h"
 
 namespace shapedb::bench {
@@ -45,7 +46,7 @@ void blendStatistics(ShapeStatistics& into, const ShapeStatistics& other, double
     }
 }
 
-void disturbPoints(std::vector<SignaturePoint>& points, Random& random, double spread) {
+void disturbPoints(std::vector<WeightedPoint>& points, Random& random, double spread) {
     if (points.size() > 1) {
         // From the lightest: the heaviest, which is the origin, stays.
         for (std::size_t i = points.size() - 1; i > 0; --i) {
@@ -54,7 +55,7 @@ void disturbPoints(std::vector<SignaturePoint>& points, Random& random, double s
         }
     }
     for (std::size_t i = 0; i < points.size(); ++i) {
-        SignaturePoint& p = points[i];
+        WeightedPoint& p = points[i];
         const auto factor = [&](double sigma) {
             return static_cast<float>(std::exp(sigma * random.normal()));
         };
@@ -64,28 +65,28 @@ void disturbPoints(std::vector<SignaturePoint>& points, Random& random, double s
         }
         p.weight *= factor(kPartsGrow * spread);
         const float wider = factor(kPartsGrow * spread / 2.0);
-        p.peakRadius *= wider;
+        p.maximumRadius *= wider;
         for (float& c : p.covariance) c *= wider * wider;
     }
     std::stable_sort(points.begin() + 1, points.end(),
-                     [](const SignaturePoint& a, const SignaturePoint& b) { return a.weight > b.weight; });
+                     [](const WeightedPoint& a, const WeightedPoint& b) { return a.weight > b.weight; });
     // The heaviest point is the origin.
-    for (SignaturePoint& p : points) p.weight = std::min(p.weight, points.front().weight);
+    for (WeightedPoint& p : points) p.weight = std::min(p.weight, points.front().weight);
 }
 
 // Volume and shares that go with the weights, where so much of the interior is in the points.
 void fitVolume(Signature& signature, double share) {
     const double cube = signature.scale * signature.scale * signature.scale;
     double weights = 0.0;
-    for (const SignaturePoint& p : signature.points) weights += p.weight;
+    for (const WeightedPoint& p : signature.points) weights += p.weight;
     signature.volume = weights * cube / share;
-    for (SignaturePoint& p : signature.points)
+    for (WeightedPoint& p : signature.points)
         p.volumeShare = volumeShareOf(p.weight, signature.scale, signature.volume);
 }
 
 double shareInPoints(const Signature& signature) {
     double share = 0.0;
-    for (const SignaturePoint& p : signature.points) share += p.volumeShare;
+    for (const WeightedPoint& p : signature.points) share += p.volumeShare;
     return std::min(share, 0.999);
 }
 
@@ -126,7 +127,7 @@ Result<SignatureGenerator> SignatureGenerator::create(const Options& options, co
         made[i] = std::move(description->signature);
         good[i] = 1;
     });
-    if (auto go = context.checkpoint(); !go) return fail(go.error());
+    RETURN_IF_ERROR(context.checkpoint());
     for (std::size_t i = 0; i < made.size(); ++i) {
         if (good[i] != 0) generator.anchors_.push_back(std::move(made[i]));
     }

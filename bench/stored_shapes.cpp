@@ -7,11 +7,12 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
-#include "core/signature/profile.h"
+#include "bench/bulk_fill.h"
+#include "core/base/return_if_error.h"
+#include "core/pipeline.h"
 #include "core/signature/signature_codec.h"
 #include "core/synthetic/families.h"
-#include "server/index/parameters_codec.h"
-#include "server/store/bulk_fill.h"
+#include "server/store/parameters_codec.h"
 
 namespace shapedb::bench {
 
@@ -44,7 +45,7 @@ Result<void> forEach(std::size_t count, unsigned threads, const RunContext& cont
 Result<PointCloud> makeScan(std::size_t index, std::size_t points, std::uint64_t seed) {
     const auto families = listFamilies();
     const auto solid = makeMember(families[index % families.size()].name, index / families.size(), seed);
-    if (!solid) return fail(solid.error());
+    RETURN_IF_ERROR(solid);
     ScanOptions options;
     options.count = points;
     options.noise = kScanNoise;
@@ -59,11 +60,11 @@ Result<std::vector<PointCloud>> makeScans(std::size_t count, std::size_t points,
     std::vector<PointCloud> scans(count);
     const auto made = forEach(count, threads, context, [&](std::size_t i) -> Result<void> {
         auto scan = makeScan(i, points, seed);
-        if (!scan) return fail(scan.error());
+        RETURN_IF_ERROR(scan);
         scans[i] = std::move(*scan);
         return {};
     });
-    if (!made) return fail(made.error());
+    RETURN_IF_ERROR(made);
     return scans;
 }
 

@@ -23,6 +23,7 @@
 #include "bench/vector_scan.h"
 #include "client/cli/exit_code.h"
 #include "core/base/random.h"
+#include "core/base/return_if_error.h"
 #include "core/search/top_k.h"
 
 namespace shapedb::bench {
@@ -74,10 +75,10 @@ class TopKRun {
 
     Result<nlohmann::json> run() {
         auto generator = SignatureGenerator::create({mixture_, shapes_, flags_.seed}, bench_.context());
-        if (!generator) return fail(generator.error());
+        RETURN_IF_ERROR(generator);
         generator_.emplace(std::move(*generator));
         options_.k = flags_.k;
-        if (auto built = build(); !built) return fail(built.error());
+        RETURN_IF_ERROR(build());
         queries_.signatures.reserve(flags_.queries);
         // Shapes of the same collection that are not in it.
         for (std::size_t q = 0; q < flags_.queries; ++q) {
@@ -91,10 +92,10 @@ class TopKRun {
                               {"bytes_per_shape", static_cast<double>(set_.memoryBytes()) / size()},
                               {"seconds_to_build", buildSeconds_}};
         out["spread"] = spread();
-        if (auto done = measure(out); !done) return fail(done.error());
+        RETURN_IF_ERROR(measure(out));
         addLadder(out);
-        if (auto done = measureBatch(out); !done) return fail(done.error());
-        if (auto done = check(out); !done) return fail(done.error());
+        RETURN_IF_ERROR(measureBatch(out));
+        RETURN_IF_ERROR(check(out));
         return out;
     }
 
@@ -104,7 +105,7 @@ class TopKRun {
     Result<void> build() {
         const auto start = Clock::now();
         for (std::size_t begin = 0; begin < shapes_; begin += kLoadBatch) {
-            if (auto go = bench_.context().checkpoint(); !go) return go;
+            RETURN_IF_ERROR(bench_.context().checkpoint());
             const std::size_t count = std::min(kLoadBatch, shapes_ - begin);
             std::vector<IndexEntry> entries(count);
             tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
@@ -145,7 +146,7 @@ class TopKRun {
         for (std::size_t q = 0; q < queries_.signatures.size(); ++q) {
             const auto start = Clock::now();
             auto result = topK(queries_.signatures[q], set_, options_, bench_.context());
-            if (!result) return fail(result.error());
+            RETURN_IF_ERROR(result);
             if (latencies != nullptr) latencies->push_back(millisecondsSince(start));
             queries_.results[q] = std::move(*result);
         }
@@ -259,8 +260,8 @@ class TopKRun {
                           [&](std::size_t i) { signatures[i] = generator_->make(rows[i]); });
         const std::size_t checked = std::min<std::size_t>(queries_.signatures.size(), full ? 100 : 20);
         for (std::size_t q = 0; q < checked; ++q) {
-            if (auto go = bench_.context().checkpoint(); !go) return go;
-            if (auto same = checkQuery(q, rows, signatures, full); !same) return same;
+            RETURN_IF_ERROR(bench_.context().checkpoint());
+            RETURN_IF_ERROR(checkQuery(q, rows, signatures, full));
         }
         out["checked"] = {{"queries", checked}, {"scores_each", rows.size()}, {"all_shapes", full}};
         return {};
@@ -339,7 +340,7 @@ Result<std::vector<Mixture>> mixturesOf(const std::string& text) {
 
 Result<int> runTopK(const Flags& flags, Bench& bench) {
     const auto mixtures = mixturesOf(flags.mixture);
-    if (!mixtures) return fail(mixtures.error());
+    RETURN_IF_ERROR(mixtures);
     announceJson(bench.console, flags.json);
     if (vectorScanName().empty() && !flags.noPeer) {
         bench.console.note(
@@ -358,12 +359,12 @@ Result<int> runTopK(const Flags& flags, Bench& bench) {
             "|---|---|---|---|---|---|---|---|---|---|---|\n");
         for (const std::size_t shapes : flags.shapes) {
             auto run = TopKRun(flags, shapes, mixture, bench).run();
-            if (!run) return fail(run.error());
+            RETURN_IF_ERROR(run);
             bench.console.text(line(*run));
             document["runs"].push_back(std::move(*run));
         }
     }
-    if (auto written = writeJson(bench.console, flags.json, document); !written) return fail(written.error());
+    RETURN_IF_ERROR(writeJson(bench.console, flags.json, document));
     return cli::kOk;
 }
 

@@ -23,7 +23,7 @@ done
 bench=${BENCH:-}
 if [ -z "$bench" ]; then
   build_dir=${BUILD_DIR:-build-bench}
-  BUILD_DIR=$build_dir scripts/build.sh --bench
+  BUILD_DIR=$build_dir scripts/build.sh --peers
   bench=$build_dir/bin/shapedb-bench
 fi
 

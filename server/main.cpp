@@ -13,7 +13,8 @@
 #include <signal.h>
 #include <unistd.h>
 
-#include "core/signature/profile.h"
+#include "core/base/return_if_error.h"
+#include "core/pipeline.h"
 #include "server/config/load.h"
 #include "server/config/settings.h"
 #include "server/rpc/daemon.h"
@@ -43,7 +44,7 @@ sigset_t endSignals() {
 
 Result<telemetry::LoggerPtr> openLog(const config::ServerConfig::Log& log) {
     const auto level = telemetry::levelFromName(log.level);
-    if (!level) return fail(level.error());
+    RETURN_IF_ERROR(level);
     return telemetry::makeLogger({*level, log.format == "json", log.file});
 }
 

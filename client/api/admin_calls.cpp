@@ -9,7 +9,8 @@
 #include "client/api/call.h"
 #include "client/api/client.h"
 #include "client/api/convert.h"
-#include "server/common/sha256.h"
+#include "common/sha256.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb::client {
 
@@ -22,7 +23,7 @@ std::string asBytes(const Sha256Digest& digest) { return {digest.begin(), digest
 /// Receives one backup stream into `file`.
 template <typename Stream>
 Result<BackupReport> receiveBackup(Stream& stream, BackupFile& file, const RunContext& context) {
-    if (const auto opened = file.open(); !opened) return fail(opened.error());
+    RETURN_IF_ERROR(file.open());
     BackupReport report;
     Sha256 checksum;
     std::uint64_t announced = 0;
@@ -32,7 +33,7 @@ Result<BackupReport> receiveBackup(Stream& stream, BackupFile& file, const RunCo
         if (chunk.total_bytes() != 0) announced = chunk.total_bytes();
         if (!chunk.sha256().empty()) expected = chunk.sha256();
         checksum.update(chunk.data().data(), chunk.data().size());
-        if (const auto written = file.write(chunk.data()); !written) return fail(written.error());
+        RETURN_IF_ERROR(file.write(chunk.data()));
         report.bytes += chunk.data().size();
         context.report("backup", report.bytes, announced);
     }
@@ -131,7 +132,7 @@ Result<std::vector<RebuildProgress>> Client::rebuild(
             }
             return stream->Finish();
         });
-    if (!made) return fail(made.error());
+    RETURN_IF_ERROR(made);
     std::vector<RebuildProgress> results;
     for (auto& [name, progress] : last) results.push_back(std::move(progress));
     return results;
@@ -142,7 +143,7 @@ Result<void> Client::cancelRebuild(const std::string& collection, const RunConte
     request.set_collection(collection);
     const auto response = callUnary(impl_->options, context, kOnce, *impl_->admin,
                                     &v1::AdminService::Stub::CancelRebuild, request);
-    if (!response) return fail(response.error());
+    RETURN_IF_ERROR(response);
     return {};
 }
 
@@ -161,9 +162,9 @@ Result<BackupReport> Client::backupToFile(const std::string& path, const RunCont
                                    }
                                    return stream->Finish();
                                });
-    if (!made) return fail(made.error());
+    RETURN_IF_ERROR(made);
     if (!report) return report;
-    if (const auto committed = file.commit(); !committed) return fail(committed.error());
+    RETURN_IF_ERROR(file.commit());
     return report;
 }
 
@@ -181,7 +182,7 @@ Result<RestoreReport> Client::restoreFromFile(const std::string& path, const Run
             if (!local) rpc.TryCancel();
             return stream->Finish();
         });
-    if (!made) return fail(made.error());
+    RETURN_IF_ERROR(made);
     return RestoreReport{response.collections(), response.shapes()};
 }
 
@@ -203,21 +204,21 @@ Result<std::vector<std::string>> Client::check(const std::function<void(const Ch
             }
             return stream->Finish();
         });
-    if (!made) return fail(made.error());
+    RETURN_IF_ERROR(made);
     return problems;
 }
 
 Result<Stats> Client::stats(const RunContext& context) const {
     const auto response = callUnary(impl_->options, context, kIdempotent, *impl_->admin,
                                     &v1::AdminService::Stub::Stats, v1::StatsRequest());
-    if (!response) return fail(response.error());
+    RETURN_IF_ERROR(response);
     return fromWire(*response);
 }
 
 Result<ServerInfo> Client::serverInfo(const RunContext& context) const {
     const auto response = callUnary(impl_->options, context, kIdempotent, *impl_->admin,
                                     &v1::AdminService::Stub::ServerInfo, v1::ServerInfoRequest());
-    if (!response) return fail(response.error());
+    RETURN_IF_ERROR(response);
     return fromWire(*response);
 }
 
@@ -238,7 +239,7 @@ Result<Health> Client::health(const std::string& service, const RunContext& cont
         if (status.ok()) health = decodeHealthResponse(response);
         return status;
     });
-    if (!made) return fail(made.error());
+    RETURN_IF_ERROR(made);
     return health;
 }
 

@@ -9,6 +9,7 @@
 
 #include "client/api/retry.h"
 #include "client/api/status.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb::client {
 
@@ -79,7 +80,7 @@ bool sleepFor(std::chrono::milliseconds delay, Clock::time_point deadline, const
 
 Result<void> makeCallUnguarded(const ClientOptions& options, const RunContext& context, CallTraits traits,
                                const Attempt& attempt) {
-    if (const auto proceed = context.checkpoint(); !proceed) return fail(proceed.error());
+    RETURN_IF_ERROR(context.checkpoint());
     const Clock::time_point deadline = deadlineOf(options, context, traits);
     // Jitter must differ between clients that failed together.
     Random random(std::random_device{}());
@@ -94,7 +95,7 @@ Result<void> makeCallUnguarded(const ClientOptions& options, const RunContext& c
             const CancelWatch watch(rpc, context.cancel);
             status = attempt(rpc, local);
         }
-        if (!local) return fail(local.error());
+        RETURN_IF_ERROR(local);
         if (status.ok()) return {};
         // Our own cancellation comes back as a failure of the rpc.
         if (const auto proceed = context.checkpoint();

@@ -11,6 +11,7 @@
 
 #include "client/api/client.h"
 #include "core/base/error.h"
+#include "core/base/return_if_error.h"
 #include "core/base/run_context.h"
 #include "shapedb/v1/admin_service.grpc.pb.h"
 #include "shapedb/v1/collection_service.grpc.pb.h"
@@ -58,7 +59,7 @@ template <typename Stub, typename Request, typename Response>
         response.Clear();
         return (stub.*method)(&rpc, request, &response);
     });
-    if (!made) return fail(made.error());
+    RETURN_IF_ERROR(made);
     return response;
 }
 

@@ -5,6 +5,7 @@
 #include "client/api/address.h"
 #include "client/api/call.h"
 #include "client/api/retry.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb::client {
 
@@ -43,7 +44,7 @@ Result<Client> Client::connect(ClientOptions options) {
         return fail(ErrorCode::kInvalidArgument,
                     "deadline is " + std::to_string(options.deadline.count()) + " ms; it must be at least 0");
     }
-    if (const auto valid = validate(options.retry); !valid) return fail(valid.error());
+    RETURN_IF_ERROR(validate(options.retry));
     try {
         auto impl = std::make_unique<Impl>();
         options.address = withDefaultPort(options.address);

@@ -2,6 +2,7 @@
 #include "client/api/call.h"
 #include "client/api/client.h"
 #include "client/api/convert.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb::client {
 
@@ -13,7 +14,7 @@ Result<Collection> Client::createCollection(const std::string& name, const std::
     fillParameters(parameters, &request);
     const auto response = callUnary(impl_->options, context, kOnce, *impl_->collections,
                                     &v1::CollectionService::Stub::CreateCollection, request);
-    if (!response) return fail(response.error());
+    RETURN_IF_ERROR(response);
     return fromWire(*response);
 }
 
@@ -22,7 +23,7 @@ Result<Collection> Client::getCollection(const std::string& name, const RunConte
     request.set_name(name);
     const auto response = callUnary(impl_->options, context, kIdempotent, *impl_->collections,
                                     &v1::CollectionService::Stub::GetCollection, request);
-    if (!response) return fail(response.error());
+    RETURN_IF_ERROR(response);
     return fromWire(*response);
 }
 
@@ -30,7 +31,7 @@ Result<std::vector<Collection>> Client::listCollections(const RunContext& contex
     const auto response =
         callUnary(impl_->options, context, kIdempotent, *impl_->collections,
                   &v1::CollectionService::Stub::ListCollections, v1::ListCollectionsRequest());
-    if (!response) return fail(response.error());
+    RETURN_IF_ERROR(response);
     std::vector<Collection> collections;
     for (const v1::Collection& one : response->collections()) collections.push_back(fromWire(one));
     return collections;
@@ -42,7 +43,7 @@ Result<void> Client::deleteCollection(const std::string& name, bool force, const
     request.set_force(force);
     const auto response = callUnary(impl_->options, context, kOnce, *impl_->collections,
                                     &v1::CollectionService::Stub::DeleteCollection, request);
-    if (!response) return fail(response.error());
+    RETURN_IF_ERROR(response);
     return {};
 }
 

@@ -157,7 +157,7 @@ Signature fromWire(const v1::Signature& from) {
         out.position = fromWire(point.position());
         out.weight = point.weight();
         out.volumeShare = point.volume_share();
-        out.peakRadius = point.peak_radius();
+        out.maximumRadius = point.peak_radius();
         const auto count = std::min(static_cast<std::size_t>(point.extents_size()), out.extents.size());
         std::copy_n(point.extents().begin(), count, out.extents.begin());
         to.points.push_back(out);
@@ -179,7 +179,7 @@ SegmentationReport fromWire(const v1::SegmentationReport& from) {
     to.points = from.points();
     to.pointsUsed = from.points_used();
     to.duplicates = from.duplicates();
-    to.strays = from.strays();
+    to.outliers = from.outliers();
     if (from.has_quality()) to.quality = from.quality();
     to.interiorSource = fromWire(from.interior_source());
     to.angleDegrees = from.angle_degrees();
@@ -245,9 +245,9 @@ Collection fromWire(const v1::Collection& from) {
     to.parameters.mergeContrast = segmentation.merge_contrast();
     to.parameters.minSegmentShare = segmentation.min_segment_share();
     to.parameters.maxSegments = segmentation.max_segments();
-    to.parameters.strayRatio = segmentation.stray_ratio();
+    to.parameters.outlierRatio = segmentation.outlier_ratio();
     to.parameters.smoothingReach = segmentation.smoothing_reach();
-    to.parameters.evenSpacing = segmentation.even_spacing();
+    to.parameters.thinning = segmentation.thinning();
     to.parameters.interiorMethod = segmentation.interior_method() == v1::INTERIOR_METHOD_ADAPTIVE
                                        ? InteriorMethod::kAdaptive
                                        : InteriorMethod::kWalk;

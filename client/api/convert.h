@@ -29,9 +29,9 @@ void fillParameters(const Parameters& from, Message* to) {
     if (from.mergeContrast) to->mutable_segmentation()->set_merge_contrast(*from.mergeContrast);
     if (from.minSegmentShare) to->mutable_segmentation()->set_min_segment_share(*from.minSegmentShare);
     if (from.maxSegments) to->mutable_segmentation()->set_max_segments(*from.maxSegments);
-    if (from.strayRatio) to->mutable_segmentation()->set_stray_ratio(*from.strayRatio);
+    if (from.outlierRatio) to->mutable_segmentation()->set_outlier_ratio(*from.outlierRatio);
     if (from.smoothingReach) to->mutable_segmentation()->set_smoothing_reach(*from.smoothingReach);
-    if (from.evenSpacing) to->mutable_segmentation()->set_even_spacing(*from.evenSpacing);
+    if (from.thinning) to->mutable_segmentation()->set_thinning(*from.thinning);
     if (from.interiorMethod) {
         to->mutable_segmentation()->set_interior_method(*from.interiorMethod == InteriorMethod::kWalk
                                                             ? v1::INTERIOR_METHOD_WALK

@@ -6,7 +6,8 @@
 #include <cstring>
 #include <limits>
 
-#include "server/common/sha256.h"
+#include "common/sha256.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb::client {
 
@@ -80,7 +81,7 @@ Result<PackedPoints> packPoints(const PointCloud& points) {
         return fail(ErrorCode::kTooFewPoints, "the scan holds no points; a shape needs at least 4");
     }
     const auto extent = extentOf(points);
-    if (!extent) return fail(extent.error());
+    RETURN_IF_ERROR(extent);
     const double diagonal = extent->diagonal();
     if (diagonal > 0.0 && diagonal < kSmallestDiagonal) {
         char buffer[160];

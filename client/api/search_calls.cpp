@@ -4,6 +4,7 @@
 #include "client/api/convert.h"
 #include "client/api/packing.h"
 #include "client/api/upload.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb::client {
 
@@ -15,14 +16,14 @@ Result<SearchReply> Client::searchByKey(const SearchOptions& options, const std:
     request.set_include_self(includeSelf);
     const auto response = callUnary(impl_->options, context, kIdempotent, *impl_->search,
                                     &v1::SearchService::Stub::SearchByKey, request);
-    if (!response) return fail(response.error());
+    RETURN_IF_ERROR(response);
     return fromWire(*response);
 }
 
 Result<SearchReply> Client::searchByScan(const SearchOptions& options, const PointCloud& points,
                                          const RunContext& context) const {
     const auto packed = packPoints(points);
-    if (!packed) return fail(packed.error());
+    RETURN_IF_ERROR(packed);
     v1::SearchByScanRequest request;
     v1::SearchByScanHeader* header = request.mutable_header();
     fill(options, header->mutable_options());
@@ -36,7 +37,7 @@ Result<SearchReply> Client::searchByScan(const SearchOptions& options, const Poi
             writeScan(*stream, request, *packed, context);
             return stream->Finish();
         });
-    if (!made) return fail(made.error());
+    RETURN_IF_ERROR(made);
     SearchReply reply = fromWire(response);
     reply.offset = packed->offset;
     return reply;
@@ -50,7 +51,7 @@ Result<SearchReply> Client::searchBySignature(const SearchOptions& options,
     request.set_signature(encodedSignature);
     const auto response = callUnary(impl_->options, context, kIdempotent, *impl_->search,
                                     &v1::SearchService::Stub::SearchBySignature, request);
-    if (!response) return fail(response.error());
+    RETURN_IF_ERROR(response);
     return fromWire(*response);
 }
 
@@ -68,7 +69,7 @@ Result<std::vector<SearchReply>> Client::searchBatch(const SearchOptions& option
     }
     const auto response = callUnary(impl_->options, context, kIdempotent, *impl_->search,
                                     &v1::SearchService::Stub::SearchBatch, request);
-    if (!response) return fail(response.error());
+    RETURN_IF_ERROR(response);
     std::vector<SearchReply> replies;
     for (const v1::SearchResponse& one : response->responses()) replies.push_back(fromWire(one));
     return replies;
@@ -84,7 +85,7 @@ Result<Comparison> Client::compare(const ShapeRef& query, const ShapeRef& other,
     request.set_partial(options.partial);
     const auto response = callUnary(impl_->options, context, kIdempotent, *impl_->search,
                                     &v1::SearchService::Stub::Compare, request);
-    if (!response) return fail(response.error());
+    RETURN_IF_ERROR(response);
     return Comparison{response->score(), fromWire(response->explanation()), fromWire(response->query()),
                       fromWire(response->other())};
 }

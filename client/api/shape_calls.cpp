@@ -4,6 +4,7 @@
 #include "client/api/convert.h"
 #include "client/api/packing.h"
 #include "client/api/upload.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb::client {
 
@@ -34,7 +35,7 @@ Result<void> readSegments(Stream& stream, SegmentedScan& scan, const RunContext&
             scan.signature = fromWire(message.summary().signature());
         } else if (message.has_chunk()) {
             const v1::LabelledChunk& chunk = message.chunk();
-            if (const auto read = unpackPoints(chunk.xyz(), scan.points); !read) return read;
+            RETURN_IF_ERROR(unpackPoints(chunk.xyz(), scan.points));
             scan.segments.insert(scan.segments.end(), chunk.segments().begin(), chunk.segments().end());
             context.report("download", scan.points.size(), scan.report.points);
         }
@@ -52,7 +53,7 @@ Result<void> readSegments(Stream& stream, SegmentedScan& scan, const RunContext&
 Result<AddReply> Client::addShape(const AddRequest& request, const PointCloud& points,
                                   const RunContext& context) const {
     const auto packed = packPoints(points);
-    if (!packed) return fail(packed.error());
+    RETURN_IF_ERROR(packed);
     const v1::AddShapeRequest header = addHeader(request, *packed);
     const CallTraits traits{!request.expectedVersion.has_value(), !request.wait};
     v1::AddShapeResponse response;
@@ -62,7 +63,7 @@ Result<AddReply> Client::addShape(const AddRequest& request, const PointCloud& p
         writeScan(*stream, header, *packed, context);
         return stream->Finish();
     });
-    if (!made) return fail(made.error());
+    RETURN_IF_ERROR(made);
     return AddReply{fromWire(response.outcome()), fromWire(response.shape()), packed->offset};
 }
 
@@ -71,7 +72,7 @@ Result<Shape> Client::getShape(const ShapeRef& shape, const RunContext& context)
     fill(shape, request.mutable_shape());
     const auto response = callUnary(impl_->options, context, kIdempotent, *impl_->shapes,
                                     &v1::ShapeService::Stub::GetShape, request);
-    if (!response) return fail(response.error());
+    RETURN_IF_ERROR(response);
     return fromWire(response->shape());
 }
 
@@ -84,7 +85,7 @@ Result<ListPage> Client::listShapes(const ListRequest& list, const RunContext& c
     request.set_cursor(list.cursor);
     const auto response = callUnary(impl_->options, context, kIdempotent, *impl_->shapes,
                                     &v1::ShapeService::Stub::ListShapes, request);
-    if (!response) return fail(response.error());
+    RETURN_IF_ERROR(response);
     ListPage page;
     for (const v1::Shape& shape : response->shapes()) page.shapes.push_back(fromWire(shape));
     page.nextCursor = response->next_cursor();
@@ -98,7 +99,7 @@ Result<std::uint64_t> Client::countShapes(const ListRequest& list, const RunCont
     request.set_state(toWire(list.state));
     const auto response = callUnary(impl_->options, context, kIdempotent, *impl_->shapes,
                                     &v1::ShapeService::Stub::CountShapes, request);
-    if (!response) return fail(response.error());
+    RETURN_IF_ERROR(response);
     return response->count();
 }
 
@@ -109,7 +110,7 @@ Result<Shape> Client::deleteShape(const ShapeRef& shape, std::optional<std::int6
     if (expectedVersion) request.set_expected_version(*expectedVersion);
     const auto response = callUnary(impl_->options, context, kOnce, *impl_->shapes,
                                     &v1::ShapeService::Stub::DeleteShape, request);
-    if (!response) return fail(response.error());
+    RETURN_IF_ERROR(response);
     return fromWire(response->shape());
 }
 
@@ -129,7 +130,7 @@ Result<IngestEvent> Client::watchIngest(const ShapeRef& shape,
             }
             return stream->Finish();
         });
-    if (!made) return fail(made.error());
+    RETURN_IF_ERROR(made);
     return last;
 }
 
@@ -138,7 +139,7 @@ Result<Signature> Client::getSignature(const ShapeRef& shape, const RunContext& 
     fill(shape, request.mutable_shape());
     const auto response = callUnary(impl_->options, context, kIdempotent, *impl_->shapes,
                                     &v1::ShapeService::Stub::GetSignature, request);
-    if (!response) return fail(response.error());
+    RETURN_IF_ERROR(response);
     return fromWire(response->signature());
 }
 
@@ -154,14 +155,14 @@ Result<SegmentedScan> Client::getSegments(const ShapeRef& shape, const RunContex
             if (!local) rpc.TryCancel();
             return stream->Finish();
         });
-    if (!made) return fail(made.error());
+    RETURN_IF_ERROR(made);
     return scan;
 }
 
 Result<SegmentedScan> Client::segment(const PointCloud& points, const Parameters& parameters,
                                       bool summaryOnly, const RunContext& context) const {
     const auto packed = packPoints(points);
-    if (!packed) return fail(packed.error());
+    RETURN_IF_ERROR(packed);
     v1::SegmentRequest request;
     v1::SegmentHeader* header = request.mutable_header();
     header->set_point_count(packed->count);
@@ -178,7 +179,7 @@ Result<SegmentedScan> Client::segment(const PointCloud& points, const Parameters
             if (!local) rpc.TryCancel();
             return stream->Finish();
         });
-    if (!made) return fail(made.error());
+    RETURN_IF_ERROR(made);
     return scan;
 }
 

@@ -30,7 +30,7 @@ constexpr const char* kOffsetKey = "shapedb.offset";
 
 /// Which published form of the method is used.
 enum class Profile {
-    kDefault,  ///< what we recommend: the method made to stand noise, strays and uneven density
+    kDefault,  ///< what we recommend: the method made to stand noise, outliers and uneven density
     kPaper,    ///< Dey and Goswami 2004 as published: all points, as they are
 };
 
@@ -53,9 +53,9 @@ struct Parameters {
     std::optional<double> mergeContrast;
     std::optional<double> minSegmentShare;         ///< of all volume, [0, 1]; with mergeContrast
     std::optional<std::uint32_t> maxSegments;      ///< with mergeContrast; 0: no limit
-    std::optional<double> strayRatio;              ///< > 1; 0: no point is left out
+    std::optional<double> outlierRatio;            ///< > 1; 0: no point is left out
     std::optional<double> smoothingReach;          ///< in deviations of the noise, [1, 20]; 0: off
-    std::optional<double> evenSpacing;             ///< (0, 10]; 0: no point is thinned away
+    std::optional<double> thinning;                ///< (0, 10]; 0: no point is thinned away
     std::optional<InteriorMethod> interiorMethod;  ///< how the interior is found
     std::optional<std::uint32_t> maxPoints;        ///< heaviest segments kept, 1 to 16
     std::optional<bool> attributes;                ///< false: points and weights alone, as published
@@ -152,10 +152,10 @@ struct IngestEvent {
 
 /// One segment of a shape as its signature keeps it.
 struct WeightedPoint {
-    Point3 position;           ///< volume-weighted centroid, scan units
-    double weight = 0.0;       ///< volume of the segment, scan units cubed
-    double volumeShare = 0.0;  ///< of the whole interior, (0, 1]
-    double peakRadius = 0.0;   ///< of the largest Delaunay ball, scan units
+    Point3 position;             ///< volume-weighted centroid, scan units
+    double weight = 0.0;         ///< volume of the segment, scan units cubed
+    double volumeShare = 0.0;    ///< of the whole interior, (0, 1]
+    double maximumRadius = 0.0;  ///< of the largest Delaunay ball, scan units
     /// Standard deviations of the segment's matter along its principal axes, falling, scan units.
     std::array<double, 3> extents{};
 };
@@ -199,9 +199,9 @@ struct StageTime {
 /// How long and how much each stage of a segmentation took.
 struct SegmentationReport {
     std::uint64_t points = 0;
-    std::uint64_t pointsUsed = 0;  ///< after leaving out strays, merging duplicates and thinning
+    std::uint64_t pointsUsed = 0;  ///< after leaving out outliers, merging duplicates and thinning
     std::uint64_t duplicates = 0;
-    std::uint64_t strays = 0;  ///< points left out
+    std::uint64_t outliers = 0;  ///< points left out
     /// How well the interior could be told from the outside, [0, 1]. Always 1 with kWalk.
     double quality = 1.0;
     InteriorSource interiorSource = InteriorSource::kWalk;

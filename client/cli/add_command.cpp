@@ -13,6 +13,7 @@
 #include "client/cli/session.h"
 #include "client/cli/shape_output.h"
 #include "client/cli/text.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb::cli {
 
@@ -49,7 +50,7 @@ Result<std::vector<Upload>> listUploads(const AddFlags& flags) {
     std::vector<Upload> uploads;
     for (const std::string& path : flags.paths) {
         const auto files = listScanFiles({path});
-        if (!files) return fail(files.error());
+        RETURN_IF_ERROR(files);
         for (const ScanFile& file : *files) {
             Upload upload;
             upload.path = file.path;
@@ -247,11 +248,11 @@ int reportFailures(Session& session, const std::vector<Upload>& uploads) {
 
 CommandResult runAdd(Session& session, const AddFlags& flags) {
     const auto metadata = parseMetadata(flags.metadata);
-    if (!metadata) return fail(metadata.error());
+    RETURN_IF_ERROR(metadata);
     auto uploads = listUploads(flags);
-    if (!uploads) return fail(uploads.error());
+    RETURN_IF_ERROR(uploads);
     const auto client = connectToServer(session, Work::kHeavy);
-    if (!client) return fail(client.error());
+    RETURN_IF_ERROR(client);
     uploadAll(session, *client, flags, *metadata, *uploads);
     if (flags.wait) waitForAll(session, *client, flags, *uploads);
     session.console().document(uploadsJson(*uploads));

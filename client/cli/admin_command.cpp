@@ -10,6 +10,7 @@
 #include "client/cli/session.h"
 #include "client/cli/shape_output.h"
 #include "client/cli/text.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb::cli {
 
@@ -27,7 +28,7 @@ std::string collectionText(const std::string& name) { return name.empty() ? "all
 
 CommandResult runCancelRebuild(Session& session, const client::Client& client, const RebuildFlags& flags) {
     const auto cancelled = client.cancelRebuild(flags.request.collection, session.context());
-    if (!cancelled) return fail(cancelled.error());
+    RETURN_IF_ERROR(cancelled);
     session.console().document({{"cancelled", flags.request.collection}});
     session.console().text(collectionText(flags.request.collection) + ": rebuild cancelled\n");
     return kOk;
@@ -35,7 +36,7 @@ CommandResult runCancelRebuild(Session& session, const client::Client& client, c
 
 CommandResult runRebuild(Session& session, const RebuildFlags& flags) {
     const auto client = connectToServer(session);
-    if (!client) return fail(client.error());
+    RETURN_IF_ERROR(client);
     if (flags.cancel) return runCancelRebuild(session, *client, flags);
     client::RebuildRequest request = flags.request;
     request.parameters = flags.parameters.forServer();
@@ -45,7 +46,7 @@ CommandResult runRebuild(Session& session, const RebuildFlags& flags) {
             session.console().progress("rebuild " + progress.collection, progress.done, progress.total);
         },
         session.context());
-    if (!results) return fail(results.error());
+    RETURN_IF_ERROR(results);
 
     json list = json::array();
     Table table(
@@ -68,9 +69,9 @@ CommandResult runRebuild(Session& session, const RebuildFlags& flags) {
 
 CommandResult runBackup(Session& session, const std::string& file) {
     const auto client = connectToServer(session);
-    if (!client) return fail(client.error());
+    RETURN_IF_ERROR(client);
     const auto report = client->backupToFile(file, session.context());
-    if (!report) return fail(report.error());
+    RETURN_IF_ERROR(report);
     session.console().document(
         {{"file", file}, {"bytes", report->bytes}, {"sha256", hexText(report->sha256)}});
     session.console().text(file + ": " + formatBytes(report->bytes) + "\n");
@@ -79,9 +80,9 @@ CommandResult runBackup(Session& session, const std::string& file) {
 
 CommandResult runRestore(Session& session, const std::string& file) {
     const auto client = connectToServer(session);
-    if (!client) return fail(client.error());
+    RETURN_IF_ERROR(client);
     const auto report = client->restoreFromFile(file, session.context());
-    if (!report) return fail(report.error());
+    RETURN_IF_ERROR(report);
     session.console().document(
         {{"file", file}, {"collections", report->collections}, {"shapes", report->shapes}});
     session.console().text(formatCount(report->shapes, "shape", "shapes") + " in " +
@@ -92,13 +93,13 @@ CommandResult runRestore(Session& session, const std::string& file) {
 
 CommandResult runCheck(Session& session) {
     const auto client = connectToServer(session);
-    if (!client) return fail(client.error());
+    RETURN_IF_ERROR(client);
     const auto problems = client->check(
         [&](const client::CheckProgress& progress) {
             session.console().progress("check", progress.done, progress.total);
         },
         session.context());
-    if (!problems) return fail(problems.error());
+    RETURN_IF_ERROR(problems);
     session.console().document({{"sound", problems->empty()}, {"problems", *problems}});
     for (const std::string& problem : *problems) session.console().text(problem + "\n");
     session.console().text(problems->empty()
@@ -109,9 +110,9 @@ CommandResult runCheck(Session& session) {
 
 CommandResult runStats(Session& session) {
     const auto client = connectToServer(session);
-    if (!client) return fail(client.error());
+    RETURN_IF_ERROR(client);
     const auto stats = client->stats(session.context());
-    if (!stats) return fail(stats.error());
+    RETURN_IF_ERROR(stats);
     session.console().document({{"collections", stats->collections},
                                 {"shapes_pending", stats->shapesPending},
                                 {"shapes_ready", stats->shapesReady},
@@ -149,9 +150,9 @@ CommandResult runStats(Session& session) {
 
 CommandResult runInfo(Session& session) {
     const auto client = connectToServer(session);
-    if (!client) return fail(client.error());
+    RETURN_IF_ERROR(client);
     const auto info = client->serverInfo(session.context());
-    if (!info) return fail(info.error());
+    RETURN_IF_ERROR(info);
     const client::Limits& limits = info->limits;
     session.console().document({{"server", client->address()},
                                 {"version", info->version},

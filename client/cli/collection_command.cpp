@@ -9,6 +9,7 @@
 #include "client/cli/parameters.h"
 #include "client/cli/session.h"
 #include "client/cli/text.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb::cli {
 
@@ -56,7 +57,7 @@ std::string toText(const std::vector<client::Collection>& collections) {
 }
 
 CommandResult show(Session& session, const Result<client::Collection>& collection) {
-    if (!collection) return fail(collection.error());
+    RETURN_IF_ERROR(collection);
     session.console().document(toJson(*collection));
     session.console().text(toText({*collection}));
     return kOk;
@@ -64,22 +65,22 @@ CommandResult show(Session& session, const Result<client::Collection>& collectio
 
 CommandResult runCreate(Session& session, const CollectionFlags& flags) {
     const auto client = connectToServer(session);
-    if (!client) return fail(client.error());
+    RETURN_IF_ERROR(client);
     return show(session, client->createCollection(flags.name, flags.description, flags.parameters.forServer(),
                                                   session.context()));
 }
 
 CommandResult runGet(Session& session, const CollectionFlags& flags) {
     const auto client = connectToServer(session);
-    if (!client) return fail(client.error());
+    RETURN_IF_ERROR(client);
     return show(session, client->getCollection(flags.name, session.context()));
 }
 
 CommandResult runList(Session& session, const CollectionFlags&) {
     const auto client = connectToServer(session);
-    if (!client) return fail(client.error());
+    RETURN_IF_ERROR(client);
     const auto collections = client->listCollections(session.context());
-    if (!collections) return fail(collections.error());
+    RETURN_IF_ERROR(collections);
     json list = json::array();
     for (const client::Collection& one : *collections) list.push_back(toJson(one));
     session.console().document({{"collections", list}});
@@ -89,9 +90,9 @@ CommandResult runList(Session& session, const CollectionFlags&) {
 
 CommandResult runDelete(Session& session, const CollectionFlags& flags) {
     const auto client = connectToServer(session);
-    if (!client) return fail(client.error());
+    RETURN_IF_ERROR(client);
     const auto deleted = client->deleteCollection(flags.name, flags.force, session.context());
-    if (!deleted) return fail(deleted.error());
+    RETURN_IF_ERROR(deleted);
     session.console().document({{"deleted", flags.name}});
     session.console().text(flags.name + ": deleted\n");
     return kOk;

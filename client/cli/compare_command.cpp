@@ -11,6 +11,7 @@
 #include "client/cli/session.h"
 #include "client/cli/shape_output.h"
 #include "client/cli/text.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb::cli {
 
@@ -30,7 +31,7 @@ Result<Signature> describeFile(Session& session, const CompareFlags& flags, cons
                                const std::string& path) {
     const RunContext context = session.context();
     const auto scan = loadScan(path, flags.scan, flags.scan.seed, context);
-    if (!scan) return fail(scan.error());
+    RETURN_IF_ERROR(scan);
     const auto description = describe(scan->points, parameters, context);
     if (!description) return fail(description.error().code, path + ": " + description.error().message);
     return description->signature;
@@ -38,11 +39,11 @@ Result<Signature> describeFile(Session& session, const CompareFlags& flags, cons
 
 Result<client::Comparison> compareFiles(Session& session, const CompareFlags& flags) {
     const auto parameters = flags.parameters.resolve();
-    if (!parameters) return fail(parameters.error());
+    RETURN_IF_ERROR(parameters);
     const auto a = describeFile(session, flags, *parameters, flags.a);
-    if (!a) return fail(a.error());
+    RETURN_IF_ERROR(a);
     const auto b = describeFile(session, flags, *parameters, flags.b);
-    if (!b) return fail(b.error());
+    RETURN_IF_ERROR(b);
     const Explanation explanation = explain(*a, *b, flags.score.resolve());
     return client::Comparison{explanation.score, toClient(explanation), toClient(*a), toClient(*b)};
 }
@@ -54,7 +55,7 @@ Result<client::Comparison> compareStored(Session& session, const CompareFlags& f
             "stored shapes have the parameters of their collection; --profile and the like need --files");
     }
     const auto client = connectToServer(session);
-    if (!client) return fail(client.error());
+    RETURN_IF_ERROR(client);
     return client->compare({flags.collection, flags.a}, {flags.collection, flags.b},
                            {!flags.score.noReflection, flags.score.keepScale, flags.score.partial},
                            session.context());
@@ -62,7 +63,7 @@ Result<client::Comparison> compareStored(Session& session, const CompareFlags& f
 
 CommandResult runCompare(Session& session, const CompareFlags& flags) {
     const auto comparison = flags.files ? compareFiles(session, flags) : compareStored(session, flags);
-    if (!comparison) return fail(comparison.error());
+    RETURN_IF_ERROR(comparison);
     nlohmann::json document = {{"query_name", flags.a},
                                {"other_name", flags.b},
                                {"score", comparison->score},

@@ -12,6 +12,7 @@
 #include "client/cli/retrieval_task.h"
 #include "client/cli/session.h"
 #include "client/cli/text.h"
+#include "core/base/return_if_error.h"
 #include "core/evaluation/similarity_matrix.h"
 
 namespace shapedb::cli {
@@ -211,26 +212,24 @@ CommandResult runLeaveOneOut(Session& session, const EvaluateFlags& flags) {
                     "queries against other shapes give --gallery");
     }
     if (!flags.confusion.empty()) {
-        if (const auto ok = checkFigurePath(flags.confusion); !ok) return fail(ok.error());
+        RETURN_IF_ERROR(checkFigurePath(flags.confusion));
     }
     const auto parameters = flags.parameters.resolve();
-    if (!parameters) return fail(parameters.error());
+    RETURN_IF_ERROR(parameters);
     const auto scans = listClasses(flags.paths.front(), flags.classes);
-    if (!scans) return fail(scans.error());
+    RETURN_IF_ERROR(scans);
     std::vector<EvaluatedShape> shapes = shapesOf(*scans);
 
     Timing timing;
     const Stopwatch segmenting;
-    if (const auto ok = describeAll(session, "segment", shapes, flags.scan, flags, *parameters); !ok) {
-        return fail(ok.error());
-    }
+    RETURN_IF_ERROR(describeAll(session, "segment", shapes, flags.scan, flags, *parameters));
     timing.segment = segmenting.seconds();
     const Stopwatch matching;
     const auto scores = scorePairs(
         shapes, shapes, flags.score.resolve(), flags.threads,
         [&](std::size_t done) { session.console().progress("match", done, shapes.size()); },
         session.context());
-    if (!scores) return fail(scores.error());
+    RETURN_IF_ERROR(scores);
     timing.match = matching.seconds();
 
     std::vector<std::string> labels;
@@ -241,13 +240,11 @@ CommandResult runLeaveOneOut(Session& session, const EvaluateFlags& flags) {
     }
     // Failed pairs score 0, the least there is.
     const auto report = evaluateLeaveOneOut(withTiesAgainstFailures(*scores, labels, failed, -1.0), labels);
-    if (!report) return fail(report.error());
+    RETURN_IF_ERROR(report);
     if (!flags.confusion.empty()) {
         const auto raster = drawSimilarityMatrix(*scores, labels);
-        if (!raster) return fail(raster.error());
-        if (const auto drawn = writeSimilarityFigure(*raster, flags.confusion); !drawn) {
-            return fail(drawn.error());
-        }
+        RETURN_IF_ERROR(raster);
+        RETURN_IF_ERROR(writeSimilarityFigure(*raster, flags.confusion));
     }
     std::vector<const EvaluatedShape*> failures;
     collectFailures(shapes, failures);
@@ -358,13 +355,13 @@ CommandResult runGallery(Session& session, const EvaluateFlags& flags) {
                     "with --gallery name the folders that take part");
     }
     const auto match = matchFromName(flags.match);
-    if (!match) return fail(match.error());
+    RETURN_IF_ERROR(match);
     const auto parameters = flags.parameters.resolve();
-    if (!parameters) return fail(parameters.error());
+    RETURN_IF_ERROR(parameters);
     const auto queryScans = listCollection(flags.paths);
-    if (!queryScans) return fail(queryScans.error());
+    RETURN_IF_ERROR(queryScans);
     const auto galleryScans = listCollection(flags.gallery);
-    if (!galleryScans) return fail(galleryScans.error());
+    RETURN_IF_ERROR(galleryScans);
     std::vector<EvaluatedShape> queries = shapesOf(*queryScans);
     std::vector<EvaluatedShape> gallery = shapesOf(*galleryScans);
 
@@ -374,19 +371,15 @@ CommandResult runGallery(Session& session, const EvaluateFlags& flags) {
     clean.points.reset();
     Timing timing;
     const Stopwatch segmenting;
-    if (const auto ok = describeAll(session, "queries", queries, flags.scan, flags, *parameters); !ok) {
-        return fail(ok.error());
-    }
-    if (const auto ok = describeAll(session, "gallery", gallery, clean, flags, *parameters); !ok) {
-        return fail(ok.error());
-    }
+    RETURN_IF_ERROR(describeAll(session, "queries", queries, flags.scan, flags, *parameters));
+    RETURN_IF_ERROR(describeAll(session, "gallery", gallery, clean, flags, *parameters));
     timing.segment = segmenting.seconds();
     const Stopwatch matching;
     const auto scores = scorePairs(
         queries, gallery, flags.score.resolve(), flags.threads,
         [&](std::size_t done) { session.console().progress("match", done, queries.size()); },
         session.context());
-    if (!scores) return fail(scores.error());
+    RETURN_IF_ERROR(scores);
     timing.match = matching.seconds();
 
     std::vector<GalleryQuery> asked;
@@ -396,7 +389,7 @@ CommandResult runGallery(Session& session, const EvaluateFlags& flags) {
                         [&](std::size_t g) { return queries[q].signature && gallery[g].signature; }));
     }
     const auto report = evaluateGallery(asked, gallery.size());
-    if (!report) return fail(report.error());
+    RETURN_IF_ERROR(report);
     const auto ranked = tellRanks(queries, gallery, *scores, asked, *report);
     std::vector<const EvaluatedShape*> failures;
     collectFailures(queries, failures);

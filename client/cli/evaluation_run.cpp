@@ -9,6 +9,8 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include "core/base/return_if_error.h"
+
 namespace shapedb::cli {
 
 namespace {
@@ -107,7 +109,7 @@ Result<ScoreMatrix> scorePairs(const std::vector<EvaluatedShape>& rows,
             progress(++done);
             return std::nullopt;
         });
-    if (!scored) return fail(scored.error());
+    RETURN_IF_ERROR(scored);
     return scores;
 }
 

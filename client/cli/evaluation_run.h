@@ -14,7 +14,7 @@
 #include "core/base/run_context.h"
 #include "core/evaluation/metrics.h"
 #include "core/matching/score.h"
-#include "core/signature/profile.h"
+#include "core/pipeline.h"
 
 namespace shapedb::cli {
 

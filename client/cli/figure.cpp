@@ -15,6 +15,7 @@
 
 #include "client/cli/bitmap_font.h"
 #include "client/cli/text.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb::cli {
 
@@ -216,7 +217,7 @@ Result<void> checkFigurePath(const std::string& path) {
 }
 
 Result<void> writeSimilarityFigure(const SimilarityRaster& raster, const std::string& path) try {
-    if (const auto valid = checkFigurePath(path); !valid) return fail(valid.error());
+    RETURN_IF_ERROR(checkFigurePath(path));
     if (raster.width == 0 || raster.height == 0 || raster.rgb.size() != 3 * raster.width * raster.height) {
         return fail(ErrorCode::kInvalidArgument, "the picture's bytes do not match its size");
     }

@@ -7,6 +7,7 @@
 #include "client/cli/connection.h"
 #include "client/cli/exit_code.h"
 #include "client/cli/session.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb::cli {
 
@@ -27,9 +28,9 @@ const char* healthName(client::Health health) {
 CommandResult runHealth(Session& session, const std::string& service) {
     if (!session.options().timeoutSeconds) session.options().timeoutSeconds = kPatienceSeconds;
     const auto client = connectToServer(session);
-    if (!client) return fail(client.error());
+    RETURN_IF_ERROR(client);
     const auto health = client->health(service, session.context());
-    if (!health) return fail(health.error());
+    RETURN_IF_ERROR(health);
     session.console().document(
         {{"server", client->address()}, {"service", service}, {"status", healthName(*health)}});
     session.console().text(client->address() + (service.empty() ? "" : " " + service) + ": " +

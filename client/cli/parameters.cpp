@@ -4,13 +4,24 @@
 #include <nlohmann/json.hpp>
 
 #include "client/cli/text.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb::cli {
 
 namespace {
 
-/// Calls visit(flag, name, member of client::Parameters, member of SegmentationOptions, help) for
-/// each parameter that is a number.
+/// The parameter that a member pointer names, in SegmentationOptions or the PreparationOptions within.
+template <typename Options, typename Value>
+auto& parameterIn(Options& options, Value SegmentationOptions::*member) {
+    return options.*member;
+}
+template <typename Options, typename Value>
+auto& parameterIn(Options& options, Value PreparationOptions::*member) {
+    return options.preparation.*member;
+}
+
+/// Calls visit(flag, name, member of client::Parameters, member of SegmentationOptions or
+/// PreparationOptions, help) for each parameter that is a number.
 template <typename Visitor>
 void visitNumbers(Visitor&& visit) {
     using Given = client::Parameters;
@@ -22,21 +33,22 @@ void visitNumbers(Visitor&& visit) {
     visit("--hull-angle", "hull_angle_degrees", &Given::hullAngleDegrees, &Used::hullAngleDegrees,
           "The walk enters through hull facets below this angle, above 0 and below 90 degrees");
     visit("--merge-ratio", "merge_ratio", &Given::mergeRatio, &Used::mergeRatio,
-          "Segments merge when both peaks are within this many radii of their triangle, 1 or more");
+          "Segments merge when both maxima are within this many radii of their triangle, 1 or more");
     visit("--merge-contrast", "merge_contrast", &Given::mergeContrast, &Used::mergeContrast,
-          "Segments merge by contrast instead, up to this ratio of radius to passage, 1 or more; 0: by "
+          "Segments merge by contrast instead, up to this ratio of radius to saddle, 1 or more; 0: by "
           "--merge-ratio");
     visit("--min-segment-share", "min_segment_share", &Given::minSegmentShare, &Used::minSegmentShare,
           "With --merge-contrast: lighter segments join a neighbour, share of the volume, 0 to 1");
     visit("--max-segments", "max_segments", &Given::maxSegments, &Used::maxSegments,
           "With --merge-contrast: merge on while there are more; 0: no limit");
-    visit("--decimate-to", "decimate_to", &Given::decimateTo, &Used::decimateTo,
+    visit("--decimate-to", "decimate_to", &Given::decimateTo, &PreparationOptions::decimateTo,
           "Average denser scans onto a grid of about this many cells, 4 or more; 0: never");
-    visit("--stray-ratio", "stray_ratio", &Given::strayRatio, &Used::strayRatio,
+    visit("--outlier-ratio,--stray-ratio", "outlier_ratio", &Given::outlierRatio,
+          &PreparationOptions::outlierRatio,
           "Leave out points this many times further from others than their neighbours are, above 1; 0: none");
-    visit("--smoothing-reach", "smoothing_reach", &Given::smoothingReach, &Used::smoothingReach,
+    visit("--smoothing-reach", "smoothing_reach", &Given::smoothingReach, &PreparationOptions::smoothingReach,
           "Smooth noise out to this many of its standard deviations, 1 to 20; 0: no smoothing");
-    visit("--even-spacing", "even_spacing", &Given::evenSpacing, &Used::evenSpacing,
+    visit("--thinning,--even-spacing", "thinning", &Given::thinning, &PreparationOptions::thinning,
           "Thin points to this many times the distance that tells them apart, up to 10; 0: keep all");
 }
 
@@ -66,11 +78,11 @@ Result<ShapeParameters> ParameterFlags::resolve() const {
     ShapeParameters parameters = parametersOf(Profile::kDefault);
     if (profile) {
         const auto named = profileFromName(*profile);
-        if (!named) return fail(named.error());
+        RETURN_IF_ERROR(named);
         parameters = parametersOf(*named);
     }
     visitNumbers([&](const char*, const char*, auto given, auto used, const char*) {
-        if (numbers.*given) parameters.segmentation.*used = *(numbers.*given);
+        if (numbers.*given) parameterIn(parameters.segmentation, used) = *(numbers.*given);
     });
     if (interior) {
         parameters.segmentation.interiorMethod =
@@ -78,7 +90,7 @@ Result<ShapeParameters> ParameterFlags::resolve() const {
     }
     if (numbers.maxPoints) parameters.signature.maxPoints = *numbers.maxPoints;
     if (numbers.attributes) parameters.signature.attributes = *numbers.attributes;
-    if (const auto valid = validate(parameters); !valid) return fail(valid.error());
+    RETURN_IF_ERROR(validate(parameters));
     return parameters;
 }
 
@@ -109,8 +121,9 @@ void addParameterFlags(CLI::App& command, ParameterFlags& flags) {
     group->add_option("--profile", flags.profile, "Named set of parameters [default]")
         ->check(CLI::IsMember({"paper", "default"}));
     visitNumbers([&](const char* flag, const char*, auto given, auto used, const char* help) {
-        group->add_option(flag, flags.numbers.*given,
-                          help + defaults(standard.segmentation.*used, paper.segmentation.*used));
+        group->add_option(
+            flag, flags.numbers.*given,
+            help + defaults(parameterIn(standard.segmentation, used), parameterIn(paper.segmentation, used)));
     });
     group
         ->add_option("--interior", flags.interior,
@@ -151,7 +164,7 @@ nlohmann::json toJson(const ShapeParameters& parameters) {
                           {"max_points", parameters.signature.maxPoints},
                           {"attributes", parameters.signature.attributes}};
     visitNumbers([&](const char*, const char* name, auto, auto used, const char*) {
-        out[name] = parameters.segmentation.*used;
+        out[name] = parameterIn(parameters.segmentation, used);
     });
     return out;
 }

@@ -10,7 +10,7 @@
 #include "client/api/types.h"
 #include "core/base/error.h"
 #include "core/matching/score.h"
-#include "core/signature/profile.h"
+#include "core/pipeline.h"
 
 namespace CLI {
 class App;

@@ -11,6 +11,7 @@
 #include "client/cli/session.h"
 #include "client/cli/shape_output.h"
 #include "client/cli/text.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb::cli {
 
@@ -101,11 +102,11 @@ CommandResult runQuery(Session& session, const QueryFlags& flags) {
     Scan scan;
     if (!flags.path.empty()) {
         auto loaded = loadScan(flags.path, flags.scan, flags.scan.seed, context);
-        if (!loaded) return fail(loaded.error());
+        RETURN_IF_ERROR(loaded);
         scan = std::move(*loaded);
     }
     const auto client = connectToServer(session, Work::kHeavy);
-    if (!client) return fail(client.error());
+    RETURN_IF_ERROR(client);
     const auto reply = flags.path.empty()
                            ? client->searchByKey(options, flags.key, flags.includeSelf, context)
                            : client->searchByScan(options, scan.points, context);

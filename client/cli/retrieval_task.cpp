@@ -8,6 +8,7 @@
 
 #include "client/cli/scan_source.h"
 #include "client/io/scan_reader.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb::cli {
 
@@ -49,7 +50,7 @@ Result<void> keepClasses(std::vector<CollectionScan>& scans, const ClassFlags& c
     std::set<std::string> known;
     for (const CollectionScan& scan : scans) known.insert(scan.label);
     for (const auto* asked : {&classes.only, &classes.except}) {
-        if (const auto ok = checkClasses(*asked, known); !ok) return ok;
+        RETURN_IF_ERROR(checkClasses(*asked, known));
     }
     const auto holds = [](const std::vector<std::string>& names, const std::string& name) {
         return std::find(names.begin(), names.end(), name) != names.end();
@@ -82,7 +83,7 @@ Result<std::vector<CollectionScan>> listCollection(const std::vector<std::string
     std::vector<CollectionScan> scans;
     for (const std::string& root : roots) {
         const auto files = listScanFiles({root});
-        if (!files) return fail(files.error());
+        RETURN_IF_ERROR(files);
         for (const ScanFile& file : *files) {
             scans.push_back({file.path, relativeName(file.path, root), file.label});
         }
@@ -102,7 +103,7 @@ Result<std::vector<CollectionScan>> listClasses(const std::string& root, const C
         }
         scan.label = scan.name.substr(0, slash);
     }
-    if (const auto kept = keepClasses(*scans, classes); !kept) return fail(kept.error());
+    RETURN_IF_ERROR(keepClasses(*scans, classes));
     return scans;
 }
 

@@ -13,6 +13,7 @@
 #include "client/cli/session.h"
 #include "client/cli/text.h"
 #include "client/io/ply_writer.h"
+#include "core/base/return_if_error.h"
 #include "core/synthetic/families.h"
 
 namespace shapedb::cli {
@@ -76,7 +77,7 @@ Result<std::vector<std::string>> chosenFamilies(const std::vector<std::string>& 
 
 Result<void> writeSample(const SampleFlags& flags, const SampleFile& file) {
     const auto solid = makeMember(file.family, file.number - 1, flags.seed);
-    if (!solid) return fail(solid.error());
+    RETURN_IF_ERROR(solid);
     ScanOptions options;
     options.count = flags.points;
     options.noise = flags.noise;
@@ -100,7 +101,7 @@ Result<void> writeAll(Session& session, const SampleFlags& flags, const std::vec
         session.console().progress("sample", ++done, files.size());
     });
     for (const Result<void>& result : results) {
-        if (!result) return fail(result.error());
+        RETURN_IF_ERROR(result);
     }
     return {};
 }
@@ -112,7 +113,7 @@ CommandResult runSample(Session& session, const SampleFlags& flags) {
                     "name the folder to write to (or --list to see the families)");
     }
     const auto families = chosenFamilies(flags.families);
-    if (!families) return fail(families.error());
+    RETURN_IF_ERROR(families);
 
     std::vector<SampleFile> files;
     for (const std::string& family : *families) {
@@ -127,7 +128,7 @@ CommandResult runSample(Session& session, const SampleFlags& flags) {
             files.push_back({family, number, (fs::path(flags.folder) / sampleName(family, number)).string()});
         }
     }
-    if (const auto written = writeAll(session, flags, files); !written) return fail(written.error());
+    RETURN_IF_ERROR(writeAll(session, flags, files));
 
     nlohmann::json names = nlohmann::json::array();
     for (const SampleFile& file : files) names.push_back({{"file", file.path}, {"label", file.family}});

@@ -6,7 +6,7 @@
 
 #include "client/cli/checks.h"
 #include "core/base/random.h"
-#include "core/geometry/noise.h"
+#include "core/synthetic/noise.h"
 
 namespace shapedb::cli {
 

@@ -11,6 +11,7 @@
 #include "client/cli/shape_output.h"
 #include "client/cli/text.h"
 #include "client/io/ply_writer.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb::cli {
 
@@ -63,10 +64,10 @@ std::string segmentText(const SegmentFlags& flags, const Scan& scan, const Shape
 
 CommandResult runSegment(Session& session, const SegmentFlags& flags) {
     const auto parameters = flags.parameters.resolve();
-    if (!parameters) return fail(parameters.error());
+    RETURN_IF_ERROR(parameters);
     const RunContext context = session.context();
     const auto scan = loadScan(flags.file, flags.scan, flags.scan.seed, context);
-    if (!scan) return fail(scan.error());
+    RETURN_IF_ERROR(scan);
     const auto description = describe(scan->points, *parameters, context);
     if (!description) {
         return fail(description.error().code, flags.file + ": " + description.error().message);
@@ -74,7 +75,7 @@ CommandResult runSegment(Session& session, const SegmentFlags& flags) {
     if (!flags.out.empty()) {
         const auto written =
             writeLabelledPly(flags.out, scan->points, description->segmentation.pointSegment);
-        if (!written) return fail(written.error());
+        RETURN_IF_ERROR(written);
     }
     const client::SegmentationReport report = reportOf(description->segmentation);
     const client::Signature signature = toClient(description->signature);

@@ -12,6 +12,7 @@
 #include "client/cli/shape_output.h"
 #include "client/cli/text.h"
 #include "client/io/ply_writer.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb::cli {
 
@@ -46,17 +47,17 @@ std::string shapeText(const client::Shape& shape) {
 
 CommandResult runGet(Session& session, const KeyFlags& flags) {
     const auto client = connectToServer(session);
-    if (!client) return fail(client.error());
+    RETURN_IF_ERROR(client);
     const RunContext context = session.context();
     const auto shape = client->getShape(flags.shape, context);
-    if (!shape) return fail(shape.error());
+    RETURN_IF_ERROR(shape);
     json document = toJson(*shape);
     std::string text = shapeText(*shape);
     if (!flags.out.empty()) {
         const auto scan = client->getSegments(flags.shape, context);
-        if (!scan) return fail(scan.error());
+        RETURN_IF_ERROR(scan);
         const auto written = writeLabelledPly(flags.out, scan->points, scan->segments);
-        if (!written) return fail(written.error());
+        RETURN_IF_ERROR(written);
         document["report"] = toJson(scan->report);
         document["signature"] = pointsJson(scan->signature);
         document["out"] = flags.out;
@@ -69,9 +70,9 @@ CommandResult runGet(Session& session, const KeyFlags& flags) {
 
 CommandResult runSignature(Session& session, const KeyFlags& flags) {
     const auto client = connectToServer(session);
-    if (!client) return fail(client.error());
+    RETURN_IF_ERROR(client);
     const auto signature = client->getSignature(flags.shape, session.context());
-    if (!signature) return fail(signature.error());
+    RETURN_IF_ERROR(signature);
     json document = toJson(*signature);
     document["key"] = flags.shape.key;
     std::string text = flags.shape.key + ": volume " + formatNumber(signature->volume) + ", diagonal " +
@@ -99,7 +100,7 @@ json eventJson(const client::IngestEvent& event) {
 
 CommandResult runWatch(Session& session, const KeyFlags& flags) {
     const auto client = connectToServer(session);
-    if (!client) return fail(client.error());
+    RETURN_IF_ERROR(client);
     json events = json::array();
     std::string lastStage;
     const auto last = client->watchIngest(
@@ -112,7 +113,7 @@ CommandResult runWatch(Session& session, const KeyFlags& flags) {
             session.console().progress(event.stage, event.done, event.total);
         },
         session.context());
-    if (!last) return fail(last.error());
+    RETURN_IF_ERROR(last);
     json document = eventJson(*last);
     document["key"] = flags.shape.key;
     document["events"] = events;
@@ -157,9 +158,9 @@ Result<client::ListPage> listAll(const client::Client& client, const ListFlags& 
 
 CommandResult runList(Session& session, const ListFlags& flags) {
     const auto client = connectToServer(session);
-    if (!client) return fail(client.error());
+    RETURN_IF_ERROR(client);
     const auto page = listAll(*client, flags, session.context());
-    if (!page) return fail(page.error());
+    RETURN_IF_ERROR(page);
     json shapes = json::array();
     Table table(
         {{"id", Table::Align::kRight}, {"key"}, {"label"}, {"state"}, {"points", Table::Align::kRight}});
@@ -176,11 +177,11 @@ CommandResult runList(Session& session, const ListFlags& flags) {
 
 CommandResult runCount(Session& session, const ListFlags& flags) {
     const auto client = connectToServer(session);
-    if (!client) return fail(client.error());
+    RETURN_IF_ERROR(client);
     client::ListRequest request = flags.request;
     request.state = stateOf(flags.state);
     const auto count = client->countShapes(request, session.context());
-    if (!count) return fail(count.error());
+    RETURN_IF_ERROR(count);
     session.console().document({{"count", *count}});
     session.console().text(std::to_string(*count) + "\n");
     return kOk;
@@ -197,7 +198,7 @@ CommandResult runDelete(Session& session, const DeleteFlags& flags) {
         return fail(ErrorCode::kInvalidArgument, "--expected-version is of one shape; name one key");
     }
     const auto client = connectToServer(session);
-    if (!client) return fail(client.error());
+    RETURN_IF_ERROR(client);
     const RunContext context = session.context();
     json deleted = json::array();
     json failed = json::array();

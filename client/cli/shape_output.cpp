@@ -107,7 +107,7 @@ client::ShapeAttributes toClient(const ShapeAttributes& attributes) {
     client::ShapeAttributes out;
     out.quality = attributes.quality / 255.0;
     for (const StatisticLayout& layout : kStatistics) {
-        client::ShapeStatistic statistic{layout.name, {}, layout.ground == Ground::kInside};
+        client::ShapeStatistic statistic{layout.name, {}, layout.evidence == Evidence::kInside};
         for (std::size_t i = layout.offset; i < std::size_t{layout.offset} + layout.count; ++i) {
             statistic.shares.push_back(static_cast<float>(shareOfLevel(attributes.statistics[i])));
         }
@@ -138,7 +138,7 @@ client::Signature toClient(const Signature& signature) {
         point.position = pointPosition(signature, i);
         point.weight = pointVolume(signature, i);
         point.volumeShare = signature.points[i].volumeShare;
-        point.peakRadius = static_cast<double>(signature.points[i].peakRadius) * signature.scale;
+        point.maximumRadius = static_cast<double>(signature.points[i].maximumRadius) * signature.scale;
         point.extents = pointExtents(signature, i);
         out.points.push_back(point);
     }
@@ -167,7 +167,7 @@ client::SegmentationReport reportOf(const Segmentation& segmentation) {
     report.points = segmentation.pointSegment.size();
     report.pointsUsed = segmentation.sites.size();
     report.duplicates = segmentation.duplicates;
-    report.strays = segmentation.strays;
+    report.outliers = segmentation.outliers;
     report.quality = segmentation.quality;
     report.interiorSource = toClient(segmentation.interiorSource);
     report.angleDegrees = segmentation.angleDegrees;
@@ -201,7 +201,7 @@ json pointsJson(const client::Signature& signature) {
         points.push_back({{"position", pointJson(point.position)},
                           {"weight", point.weight},
                           {"volume_share", point.volumeShare},
-                          {"peak_radius", point.peakRadius},
+                          {"peak_radius", point.maximumRadius},
                           {"extents", point.extents}});
     }
     return points;
@@ -228,7 +228,7 @@ json toJson(const client::SegmentationReport& report) {
     return {{"points", report.points},
             {"points_used", report.pointsUsed},
             {"duplicates", report.duplicates},
-            {"strays", report.strays},
+            {"outliers", report.outliers},
             {"quality", report.quality},
             {"interior_source", client::sourceName(report.interiorSource)},
             {"angle_degrees", report.angleDegrees},
@@ -246,11 +246,12 @@ json toJson(const client::SegmentationReport& report) {
 std::string preparationText(const client::SegmentationReport& report) {
     if (report.pointsUsed == report.points) return {};
     std::vector<std::string> steps;
-    if (report.strays > 0) steps.push_back("leaving out " + formatCount(report.strays, "stray", "strays"));
+    if (report.outliers > 0)
+        steps.push_back("leaving out " + formatCount(report.outliers, "outlier", "outliers"));
     if (report.duplicates > 0) {
         steps.push_back("merging " + formatCount(report.duplicates, "duplicate", "duplicates"));
     }
-    if (report.pointsUsed + report.duplicates + report.strays < report.points) {
+    if (report.pointsUsed + report.duplicates + report.outliers < report.points) {
         steps.emplace_back("averaging and thinning");
     }
     std::string text = formatCount(report.pointsUsed) + " after ";
@@ -339,7 +340,8 @@ std::string signatureTable(const client::Signature& signature) {
     for (std::size_t i = 0; i < signature.points.size(); ++i) {
         const client::WeightedPoint& point = signature.points[i];
         table.add({std::to_string(i + 1), formatPercent(point.volumeShare), bar(point.volumeShare, 12),
-                   formatNumber(point.weight), formatNumber(point.peakRadius), formatPoint(point.position)});
+                   formatNumber(point.weight), formatNumber(point.maximumRadius),
+                   formatPoint(point.position)});
     }
     return table.render();
 }

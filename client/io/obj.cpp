@@ -11,6 +11,7 @@
 
 #include "client/io/formats.h"
 #include "client/io/text.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb::io {
 
@@ -27,9 +28,9 @@ class ObjReader {
             std::string_view rest = withoutComment(line_);
             const std::string_view keyword = nextWord(rest);
             if (keyword == "v") {
-                if (const auto done = readVertex(rest); !done) return fail(done.error());
+                RETURN_IF_ERROR(readVertex(rest));
             } else if (keyword == "f" || keyword == "fo") {
-                if (const auto done = readFace(rest); !done) return fail(done.error());
+                RETURN_IF_ERROR(readFace(rest));
             }
         }
         if (static_cast<std::uint64_t>(greatestIndex_) > content_.vertices.size()) {

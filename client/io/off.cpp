@@ -7,6 +7,7 @@
 
 #include "client/io/formats.h"
 #include "client/io/text.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb::io {
 
@@ -24,12 +25,12 @@ class OffReader {
 
     Result<ScanContent> read() {
         file_.skipByteOrderMark();
-        if (const auto done = readHeader(); !done) return fail(done.error());
+        RETURN_IF_ERROR(readHeader());
         for (std::uint64_t i = 0; i < counts_.vertices; ++i) {
-            if (const auto done = readVertex(i); !done) return fail(done.error());
+            RETURN_IF_ERROR(readVertex(i));
         }
         for (std::uint64_t i = 0; i < counts_.faces; ++i) {
-            if (const auto done = readFace(i); !done) return fail(done.error());
+            RETURN_IF_ERROR(readFace(i));
         }
         if (nextContentLine()) {
             return fail(file_.malformedLine("data after the last of the announced " +

@@ -10,6 +10,8 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include "core/base/return_if_error.h"
+
 namespace shapedb::io {
 
 namespace fs = std::filesystem;
@@ -89,7 +91,7 @@ Result<void> OutputFile::flush() {
 }
 
 Result<void> OutputFile::commit() {
-    if (const auto done = flush(); !done) return done;
+    RETURN_IF_ERROR(flush());
     // A pipe or a terminal cannot be synchronised, which is no failure.
     if (::fsync(descriptor_) != 0 && errno != EINVAL && errno != ENOTSUP && errno != EROFS) {
         return fail(failed(errno));

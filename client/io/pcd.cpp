@@ -15,6 +15,7 @@
 #include "client/io/formats.h"
 #include "client/io/scalar.h"
 #include "client/io/text.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb::io {
 
@@ -88,9 +89,9 @@ class HeaderParser {
             std::string_view rest = withoutComment(line);
             const std::string_view keyword = nextWord(rest);
             if (keyword.empty()) continue;
-            if (const auto done = parseLine(keyword, rest); !done) return fail(done.error());
+            RETURN_IF_ERROR(parseLine(keyword, rest));
             if (keyword == "DATA") {
-                if (const auto done = check(); !done) return fail(done.error());
+                RETURN_IF_ERROR(check());
                 return header_;
             }
         }
@@ -268,7 +269,7 @@ class PcdBody {
                                             " points, found " + std::to_string(i)));
             }
             if (line.find_first_not_of(" \t") == std::string_view::npos) continue;
-            if (const auto done = readAsciiPoint(line); !done) return done;
+            RETURN_IF_ERROR(readAsciiPoint(line));
             ++i;
         }
         if (file_.onlyPaddingLeft()) return {};
@@ -397,7 +398,7 @@ class PcdBody {
 
 Result<ScanContent> readPcd(InputFile& file, std::size_t maxPoints) {
     const auto header = HeaderParser(file).parse();
-    if (!header) return fail(header.error());
+    RETURN_IF_ERROR(header);
     ScanContent content;
     switch (header->encoding) {
         case PcdEncoding::kAscii: content.format = "PCD ASCII"; break;
@@ -405,7 +406,7 @@ Result<ScanContent> readPcd(InputFile& file, std::size_t maxPoints) {
         case PcdEncoding::kCompressed: content.format = "PCD binary_compressed"; break;
     }
     PcdBody body(file, *header, content, maxPoints);
-    if (const auto done = body.read(); !done) return fail(done.error());
+    RETURN_IF_ERROR(body.read());
     return content;
 }
 

@@ -16,6 +16,7 @@
 #include "client/io/ply_header.h"
 #include "client/io/scalar.h"
 #include "client/io/text.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb::io {
 
@@ -165,11 +166,11 @@ class PlyBody {
         : file_(file), header_(header), content_(content), sink_(file, content.vertices, maxPoints) {}
 
     Result<void> read() {
-        if (const auto checked = findVertexElement(); !checked) return checked;
+        RETURN_IF_ERROR(findVertexElement());
         for (const PlyElement& element : header_.elements) {
             // Such an element has no body, whatever its count says.
             if (element.properties.empty()) continue;
-            if (const auto done = readElement(element); !done) return done;
+            RETURN_IF_ERROR(readElement(element));
         }
         if (!file_.onlyPaddingLeft()) {
             return fail(file_.malformedByte(file_.offset(),
@@ -190,7 +191,7 @@ class PlyBody {
         }
         if (vertex == nullptr) return fail(file_.malformed("header: there is no element vertex"));
         const auto coordinates = findCoordinates(file_, *vertex);
-        if (!coordinates) return fail(coordinates.error());
+        RETURN_IF_ERROR(coordinates);
         coordinates_ = *coordinates;
         vertexCount_ = vertex->count;
         return {};
@@ -266,7 +267,7 @@ class PlyBody {
                                  : readIndices<PolygonFan>(record, element, i, element.properties[j]);
                 if (!done) return done;
             }
-            if (const auto done = endRecord(record, element, i); !done) return done;
+            RETURN_IF_ERROR(endRecord(record, element, i));
         }
         return {};
     }
@@ -289,11 +290,10 @@ class PlyBody {
                     if (!record.real(property.type, *axis)) {
                         return fail(record.error(element, i, "the number " + property.name));
                     }
-                } else if (const auto done = skipProperty(file_, record, element, i, property); !done) {
-                    return done;
-                }
+                } else
+                    RETURN_IF_ERROR(skipProperty(file_, record, element, i, property));
             }
-            if (const auto done = endRecord(record, element, i); !done) return done;
+            RETURN_IF_ERROR(endRecord(record, element, i));
             if (!sink_.add(p)) return fail(sink_.refusal(p, record.where()));
         }
         return {};
@@ -345,7 +345,7 @@ class PlyBody {
 
 Result<ScanContent> readPly(InputFile& file, std::size_t maxPoints) {
     const auto header = readPlyHeader(file);
-    if (!header) return fail(header.error());
+    RETURN_IF_ERROR(header);
     ScanContent content;
     switch (header->encoding) {
         case PlyEncoding::kAscii: content.format = "PLY ASCII"; break;
@@ -353,7 +353,7 @@ Result<ScanContent> readPly(InputFile& file, std::size_t maxPoints) {
         case PlyEncoding::kBigEndian: content.format = "PLY binary big-endian"; break;
     }
     PlyBody body(file, *header, content, maxPoints);
-    if (const auto done = body.read(); !done) return fail(done.error());
+    RETURN_IF_ERROR(body.read());
     return content;
 }
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "client/io/text.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb::io {
 
@@ -125,17 +126,17 @@ Result<PlyHeader> readPlyHeader(InputFile& file) {
         }
         if (keyword == "format") {
             const auto encoding = parseFormat(file, line);
-            if (!encoding) return fail(encoding.error());
+            RETURN_IF_ERROR(encoding);
             header.encoding = *encoding;
             hasFormat = true;
         } else if (keyword == "element") {
             auto element = parseElement(file, line);
-            if (!element) return fail(element.error());
+            RETURN_IF_ERROR(element);
             header.elements.push_back(std::move(*element));
         } else if (keyword == "property") {
             if (header.elements.empty()) return fail(file.malformedLine("'property' before any 'element'"));
             auto property = parseProperty(file, line);
-            if (!property) return fail(property.error());
+            RETURN_IF_ERROR(property);
             header.elements.back().properties.push_back(std::move(*property));
         } else if (!keyword.empty() && keyword != "comment" && keyword != "obj_info") {
             return fail(file.malformedLine(

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "client/io/output_file.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb {
 
@@ -74,7 +75,7 @@ Result<void> appendPoint(std::string& bytes, const PointCloud& points, std::size
 Result<void> writePly(const std::string& path, const PointCloud& points,
                       const std::vector<std::int32_t>* labels) {
     auto file = io::OutputFile::create(path);
-    if (!file) return fail(file.error());
+    RETURN_IF_ERROR(file);
     std::string bytes = "ply\nformat binary_little_endian 1.0\nelement vertex " +
                         std::to_string(points.size()) +
                         "\nproperty float x\nproperty float y\nproperty float z\n";
@@ -91,10 +92,10 @@ Result<void> writePly(const std::string& path, const PointCloud& points,
             for (const std::uint8_t part : {colour.red, colour.green, colour.blue}) append(bytes, part);
             append(bytes, static_cast<std::uint32_t>((*labels)[i]));
         }
-        if (const auto done = file->write(bytes); !done) return done;
+        RETURN_IF_ERROR(file->write(bytes));
         bytes.clear();
     }
-    if (const auto done = file->write(bytes); !done) return done;
+    RETURN_IF_ERROR(file->write(bytes));
     return file->commit();
 }
 

@@ -12,6 +12,7 @@
 #include "client/io/input_file.h"
 #include "client/io/scan_content.h"
 #include "client/io/text.h"
+#include "core/base/return_if_error.h"
 #include "core/geometry/mesh.h"
 
 namespace shapedb {
@@ -136,13 +137,13 @@ Result<Scan> readScanUnguarded(const std::string& path, const ReadOptions& optio
         return fail(ErrorCode::kInvalidArgument, "the number of surface samples must be at least 1");
     }
     auto file = InputFile::open(path, context);
-    if (!file) return fail(file.error());
+    RETURN_IF_ERROR(file);
     const Format* format = formatOf(path);
     if (format == nullptr) return fail(unknownFormat(path));
     auto content = format->read(*file, options.maxPoints);
     // What the parser made of an end that came too early is not the reason.
     if (file->failure()) return fail(*file->failure());
-    if (!content) return fail(content.error());
+    RETURN_IF_ERROR(content);
 
     Scan scan;
     scan.skippedNonFinite = content->skippedNonFinite;
@@ -155,7 +156,7 @@ Result<Scan> readScanUnguarded(const std::string& path, const ReadOptions& optio
         return scan;
     }
     auto points = samplePoints(path, std::move(*content), options);
-    if (!points) return fail(points.error());
+    RETURN_IF_ERROR(points);
     scan.points = std::move(*points);
     return scan;
 }
@@ -204,7 +205,7 @@ Result<std::vector<ScanFile>> listScanFilesUnguarded(const std::vector<std::stri
                 "cannot be read: " + (error ? error.message() : std::string("no such file or folder"))));
         }
         if (fs::is_directory(status)) {
-            if (const auto done = searchFolder(path, found); !done) return fail(done.error());
+            RETURN_IF_ERROR(searchFolder(path, found));
         } else if (formatOf(path) == nullptr) {
             return fail(unknownFormat(path));
         } else {

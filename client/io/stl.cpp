@@ -11,6 +11,7 @@
 #include "client/io/formats.h"
 #include "client/io/scalar.h"
 #include "client/io/text.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb::io {
 
@@ -76,7 +77,7 @@ class StlReader {
     Result<ScanContent> read() {
         const bool ascii = looksAscii();
         const auto done = ascii ? readAscii() : readBinary();
-        if (!done) return fail(done.error());
+        RETURN_IF_ERROR(done);
         content_.format = ascii ? "STL ASCII" : "STL binary";
         return std::move(content_);
     }
@@ -171,7 +172,7 @@ class StlReader {
                 corners = 0;
                 fan_.begin();
             } else if (expected == "vertex") {
-                if (const auto done = readCorner(rest); !done) return done;
+                RETURN_IF_ERROR(readCorner(rest));
                 if (++corners == 3) expected = "endloop";
             } else {
                 expected = "endfacet";

@@ -7,6 +7,7 @@
 
 #include "client/io/formats.h"
 #include "client/io/text.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb::io {
 
@@ -104,7 +105,7 @@ Result<ScanContent> readXyz(InputFile& file, std::size_t maxPoints) {
             if (announced || namesColumns(line)) continue;
         }
         const auto p = parsePoint(file, line);
-        if (!p) return fail(p.error());
+        RETURN_IF_ERROR(p);
         if (!sink.add(*p)) return fail(sink.refusal(*p, "line " + std::to_string(file.lineNumber())));
     }
     if (announced && *announced != content.vertices.size()) {

@@ -30,8 +30,8 @@ namespace shapedb {
 ///
 /// Errors: kCancelled, kDeadlineExceeded.
 template <typename Work>
-[[nodiscard]] Result<void> forEachRange(std::size_t count, std::size_t block, const RunContext& context,
-                                        const Work& work) {
+[[nodiscard]] Result<void> parallelFor(std::size_t count, std::size_t block, const RunContext& context,
+                                       const Work& work) {
     std::atomic<bool> stopped{false};
     const auto runBlock = [&](const tbb::blocked_range<std::size_t>& range) {
         if (stopped.load(std::memory_order_relaxed)) return;
@@ -53,29 +53,29 @@ template <typename Work>
 }
 
 /// Calls `work(part, begin, end)` once for each of so many parts of [0, count), as equal as can be and in
-/// order. Otherwise as forEachRange.
+/// order. Otherwise as parallelFor.
 template <typename Work>
-[[nodiscard]] Result<void> forEachPart(std::size_t count, std::size_t parts, const RunContext& context,
-                                       const Work& work) {
-    return forEachRange(parts, 1, context, [&](std::size_t part, std::size_t) {
+[[nodiscard]] Result<void> parallelForParts(std::size_t count, std::size_t parts, const RunContext& context,
+                                            const Work& work) {
+    return parallelFor(parts, 1, context, [&](std::size_t part, std::size_t) {
         work(part, part * count / parts, (part + 1) * count / parts);
     });
 }
 
 /// Does all of it, on any threads, and returns when all is done.
 template <typename... Works>
-void doTogether(const Works&... works) {
+void parallelInvoke(const Works&... works) {
     // Isolated, as above.
     tbb::this_task_arena::isolate([&] { tbb::parallel_invoke(works...); });
 }
 
 /// Calls a copy of `work` with every point of `order`, once each; each block of points, which follow one
-/// another in `order`, has a copy of its own. Otherwise as forEachRange.
+/// another in `order`, has a copy of its own. Otherwise as parallelFor.
 template <typename Work>
-[[nodiscard]] Result<void> forEachPoint(const std::vector<std::uint32_t>& order, const RunContext& context,
-                                        const Work& work) {
+[[nodiscard]] Result<void> parallelForPoints(const std::vector<std::uint32_t>& order,
+                                             const RunContext& context, const Work& work) {
     constexpr std::size_t kBlock = 512;
-    return forEachRange(order.size(), kBlock, context, [&](std::size_t begin, std::size_t end) {
+    return parallelFor(order.size(), kBlock, context, [&](std::size_t begin, std::size_t end) {
         Work own = work;
         for (std::size_t i = begin; i != end; ++i) own(order[i]);
     });

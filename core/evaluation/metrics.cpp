@@ -5,6 +5,8 @@
 #include <map>
 #include <numeric>
 
+#include "core/base/return_if_error.h"
+
 namespace shapedb {
 
 namespace {
@@ -132,7 +134,7 @@ std::vector<std::size_t> rankOthers(const ScoreMatrix& scores, std::size_t count
 Result<RetrievalReport> evaluateLeaveOneOut(const ScoreMatrix& scores,
                                             const std::vector<std::string>& labels) {
     const std::size_t count = labels.size();
-    if (const auto valid = checkScoreMatrix(scores, count); !valid) return fail(valid.error());
+    RETURN_IF_ERROR(checkScoreMatrix(scores, count));
     std::map<std::string, std::size_t> members;
     for (const std::string& label : labels) ++members[label];
 
@@ -166,9 +168,7 @@ Result<GalleryReport> evaluateGallery(const std::vector<GalleryQuery>& queries, 
     GalleryReport report;
     report.firstRightRank.reserve(queries.size());
     for (std::size_t q = 0; q < queries.size(); ++q) {
-        if (const auto valid = checkGalleryQuery(queries[q], q, gallerySize); !valid) {
-            return fail(valid.error());
-        }
+        RETURN_IF_ERROR(checkGalleryQuery(queries[q], q, gallerySize));
         const std::size_t rank = firstRightRank(queries[q]);
         report.firstRightRank.push_back(rank);
         if (queries[q].right.empty()) {

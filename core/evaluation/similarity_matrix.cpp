@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/base/return_if_error.h"
+
 namespace shapedb {
 
 namespace {
@@ -90,9 +92,9 @@ std::vector<std::size_t> cellStarts(const SimilarityRaster& raster, std::size_t 
 Result<SimilarityRaster> drawSimilarityMatrix(const ScoreMatrix& scores,
                                               const std::vector<std::string>& labels,
                                               const SimilarityMatrixOptions& options) {
-    if (const auto valid = checkOptions(options); !valid) return fail(valid.error());
+    RETURN_IF_ERROR(checkOptions(options));
     const std::size_t count = labels.size();
-    if (const auto valid = checkScoreMatrix(scores, count); !valid) return fail(valid.error());
+    RETURN_IF_ERROR(checkScoreMatrix(scores, count));
 
     SimilarityRaster raster = layOut(labels, options.cellPixels);
     if (raster.width > kMaxRasterPixels) {

@@ -15,9 +15,9 @@
 #include <CGAL/convex_hull_3.h>
 
 #include "core/base/random.h"
+#include "core/geometry/cull_hull_interior.h"
 #include "core/geometry/motion.h"
-#include "core/geometry/outer_points.h"
-#include "core/geometry/point_pair.h"
+#include "core/geometry/vec3x2.h"
 
 namespace shapedb {
 
@@ -43,7 +43,7 @@ constexpr int kCoarseDirections = 1500;
 
 PointCloud hullVertices(const PointCloud& points) {
     std::vector<Kernel::Point_3> copies;
-    for (const Point3& p : withoutDeepInside(points)) copies.emplace_back(p.x, p.y, p.z);
+    for (const Point3& p : cullHullInterior(points)) copies.emplace_back(p.x, p.y, p.z);
     std::vector<Kernel::Point_3> extreme;
     CGAL::extreme_points_3(copies, std::back_inserter(extreme));
     PointCloud vertices;
@@ -67,25 +67,25 @@ struct Extent {
 };
 
 // Points two by two; the last alone stands twice.
-std::vector<PointPair> inPairs(const PointCloud& points) {
-    std::vector<PointPair> pairs;
+std::vector<Vec3x2> inPairs(const PointCloud& points) {
+    std::vector<Vec3x2> pairs;
     for (std::size_t i = 0; i < points.size(); i += 2) {
         pairs.emplace_back(points[i], points[std::min(i + 1, points.size() - 1)]);
     }
     return pairs;
 }
 
-Pair along(const std::array<double, 3>& axis, const PointPair& p) {
+Double2 along(const std::array<double, 3>& axis, const Vec3x2& p) {
     return axis[0] * p.x + axis[1] * p.y + axis[2] * p.z;
 }
 
 template <typename Pairs>
 Extent extentOf(const Pairs& pairs, const Matrix3& axes) {
-    std::array<Pair, 3> low = {INFINITY, INFINITY, INFINITY};
-    std::array<Pair, 3> high = {-INFINITY, -INFINITY, -INFINITY};
-    for (const PointPair& p : pairs) {
+    std::array<Double2, 3> low = {INFINITY, INFINITY, INFINITY};
+    std::array<Double2, 3> high = {-INFINITY, -INFINITY, -INFINITY};
+    for (const Vec3x2& p : pairs) {
         for (std::size_t i = 0; i < 3; ++i) {
-            const Pair v = along(axes[i], p);
+            const Double2 v = along(axes[i], p);
             low[i] = lesser(v, low[i]);
             high[i] = greater(v, high[i]);
         }
@@ -102,7 +102,7 @@ Extent extentOf(const Pairs& pairs, const Matrix3& axes) {
 // points, those that touched boxes before.
 class BoxTrial {
   public:
-    explicit BoxTrial(const std::vector<PointPair>& points) : points_(points) { known_.fill(points.front()); }
+    explicit BoxTrial(const std::vector<Vec3x2>& points) : points_(points) { known_.fill(points.front()); }
 
     // The squared diagonal, or less but not below the limit. Fewer points never give more, with rounding
     // neither.
@@ -118,23 +118,23 @@ class BoxTrial {
     static constexpr std::size_t kKnown = 24;
 
     void rememberTouching(const Matrix3& axes, const Extent& extent) {
-        for (const PointPair& p : points_) {
+        for (const Vec3x2& p : points_) {
             unsigned inside = 3;
             for (std::size_t i = 0; i < 3; ++i) {
-                const Pair v = along(axes[i], p);
+                const Double2 v = along(axes[i], p);
                 inside &= less(extent.low[i], v) & less(v, extent.high[i]);
             }
             if (inside != 3) remember(p);
         }
     }
 
-    void remember(const PointPair& p) {
-        const auto same = [&](const PointPair& q) { return q.low() == p.low() && q.high() == p.high(); };
+    void remember(const Vec3x2& p) {
+        const auto same = [&](const Vec3x2& q) { return q.low() == p.low() && q.high() == p.high(); };
         if (std::none_of(known_.begin(), known_.end(), same)) known_[next_++ % kKnown] = p;
     }
 
-    const std::vector<PointPair>& points_;
-    std::array<PointPair, kKnown> known_;
+    const std::vector<Vec3x2>& points_;
+    std::array<Vec3x2, kKnown> known_;
     std::size_t next_ = 0;
 };
 
@@ -182,8 +182,7 @@ struct Box {
     Matrix3 axes;
 };
 
-Box descend(const std::vector<PointPair>& points, Box box, double firstStep, double lastStep,
-            Random& random) {
+Box descend(const std::vector<Vec3x2>& points, Box box, double firstStep, double lastStep, Random& random) {
     BoxTrial trial(points);
     for (double step = firstStep; step > lastStep; step *= 0.5) {
         for (int failures = 0; failures < kTriesPerStep;) {
@@ -206,8 +205,8 @@ void sortBySize(std::vector<Box>& boxes) {
 }
 
 double leastSquaredDiagonal(const PointCloud& vertices) {
-    const std::vector<PointPair> all = inPairs(vertices);
-    const std::vector<PointPair> outline = inPairs(farthestVertices(vertices));
+    const std::vector<Vec3x2> all = inPairs(vertices);
+    const std::vector<Vec3x2> outline = inPairs(farthestVertices(vertices));
     Random random(1);
     std::vector<Box> boxes(kStarts);
     for (Box& box : boxes) {

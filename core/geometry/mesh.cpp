@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/base/random.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb {
 
@@ -44,7 +45,7 @@ Result<PointCloud> sampleSurface(const TriangleMesh& mesh, std::size_t count, st
     if (count == 0)
         return fail(ErrorCode::kInvalidArgument, "the number of points to sample must be at least 1");
     const auto sums = cumulativeAreas(mesh);
-    if (!sums) return fail(sums.error());
+    RETURN_IF_ERROR(sums);
     if (sums->empty() || !(sums->back() > 0.0) || !std::isfinite(sums->back())) {
         return fail(ErrorCode::kMalformedFile, "the mesh has no triangle with a finite, positive area");
     }

@@ -82,7 +82,7 @@ void NeighbourIndex::build(const PointCloud& points, std::uint32_t at, std::uint
         left();
         rest();
     } else {
-        doTogether(left, rest);
+        parallelInvoke(left, rest);
     }
 }
 

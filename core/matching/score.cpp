@@ -5,20 +5,20 @@
 #include <sstream>
 
 #include "core/geometry/axis.h"
-#include "core/matching/alignment.h"
-#include "core/matching/attribute_score.h"
-#include "core/matching/containment.h"
-#include "core/matching/part_match.h"
+#include "core/matching/attributed/attribute_score.h"
+#include "core/matching/attributed/containment.h"
+#include "core/matching/attributed/segment_match.h"
+#include "core/matching/published/alignment.h"
 
 namespace shapedb {
 
 namespace {
 
-bool comesFirst(const ShapeAttributes& a, const ShapeAttributes& b) {
+bool canonicalLess(const ShapeAttributes& a, const ShapeAttributes& b) {
     if (a.body.parts.size() != b.body.parts.size()) return a.body.parts.size() < b.body.parts.size();
     for (std::size_t i = 0; i < a.body.parts.size(); ++i) {
-        const Part& p = a.body.parts[i];
-        const Part& q = b.body.parts[i];
+        const SegmentDescriptor& p = a.body.parts[i];
+        const SegmentDescriptor& q = b.body.parts[i];
         if (p.share != q.share) return p.share < q.share;
         if (p.position != q.position) return p.position < q.position;
         if (p.size != q.size) return p.size < q.size;
@@ -28,12 +28,12 @@ bool comesFirst(const ShapeAttributes& a, const ShapeAttributes& b) {
 }
 
 // An order on what is scored, so that score(a, b) and score(b, a) are one computation.
-bool comesFirst(const Signature& a, const Signature& b) {
-    if (a.attributes && b.attributes) return comesFirst(*a.attributes, *b.attributes);
+bool canonicalLess(const Signature& a, const Signature& b) {
+    if (a.attributes && b.attributes) return canonicalLess(*a.attributes, *b.attributes);
     if (a.points.size() != b.points.size()) return a.points.size() < b.points.size();
     for (std::size_t i = 0; i < a.points.size(); ++i) {
-        const SignaturePoint& p = a.points[i];
-        const SignaturePoint& q = b.points[i];
+        const WeightedPoint& p = a.points[i];
+        const WeightedPoint& q = b.points[i];
         if (p.weight != q.weight) return p.weight < q.weight;
         if (p.position != q.position) return p.position < q.position;
     }
@@ -129,7 +129,7 @@ Motion scanMotion(const Signature& a, const Signature& b, const ScoreOptions& op
 
 // Scan coordinates of b to scan coordinates of a, from frame of b to frame of a.
 Motion bodyMotion(const Signature& a, const Signature& b, const ScoreOptions& options,
-                  const PartMatch& match) {
+                  const SegmentMatch& match) {
     const Body& from = b.attributes->body;
     const Body& to = a.attributes->body;
     Motion motion;
@@ -165,15 +165,15 @@ double partialScore(const Signature& a, const Signature& b, double agreement, do
 
 // Symmetric bit for bit, as `score` makes it.
 double agreementOf(const Signature& a, const Signature& b, const ScoreOptions& options) {
-    const bool swapped = comesFirst(b, a);
-    return matchParts((swapped ? b : a).attributes->body, (swapped ? a : b).attributes->body, options)
+    const bool swapped = canonicalLess(b, a);
+    return matchSegments((swapped ? b : a).attributes->body, (swapped ? a : b).attributes->body, options)
         .agreement;
 }
 
 // Scan coordinates of b (the whole) to scan coordinates of a (the piece).
 Motion pieceMotion(const Signature& a, const Signature& b, const ScoreOptions& options,
                    const Containment& found) {
-    PartMatch turn;
+    SegmentMatch turn;
     turn.rotation = found.rotation;
     turn.reflected = found.reflected;
     Motion motion = bodyMotion(a, b, options, turn);
@@ -192,10 +192,10 @@ Motion pieceMotion(const Signature& a, const Signature& b, const ScoreOptions& o
     return motion;
 }
 
-void addPairs(const PartPairs& pairs, double total, const Signature& a, const Signature& b,
+void addPairs(const SegmentPairs& pairs, double total, const Signature& a, const Signature& b,
               Explanation& result) {
     for (std::size_t i = 0; i < pairs.count; ++i) {
-        const PartPair& pair = pairs.pairs[i];
+        const SegmentPair& pair = pairs.pairs[i];
         result.matches.push_back({pair.a, pair.b, pair.gain / total, pair.distance});
     }
     std::sort(result.matches.begin(), result.matches.end(), [](const PointMatch& x, const PointMatch& y) {
@@ -225,7 +225,7 @@ Explanation explainPartial(const Signature& a, const Signature& b, const ScoreOp
 Explanation explainAttributed(const Signature& a, const Signature& b, const ScoreOptions& options) {
     const Body& bodyA = a.attributes->body;
     const Body& bodyB = b.attributes->body;
-    const PartMatch match = matchParts(bodyA, bodyB, options);
+    const SegmentMatch match = matchSegments(bodyA, bodyB, options);
     Explanation result;
     result.score = identical(a, b, options) ? 1.0 : attributedScore(a, b, match.agreement, options);
     result.similarity = match.agreement;
@@ -233,7 +233,7 @@ Explanation explainAttributed(const Signature& a, const Signature& b, const Scor
     result.degenerate = isDegenerate(a, b);
     result.motion = bodyMotion(a, b, options, match);
     result.terms = scoreTerms(a, b, options, match.agreement);
-    addPairs(partPairs(bodyA, bodyB, match, options), match.agreement, a, b, result);
+    addPairs(segmentPairs(bodyA, bodyB, match, options), match.agreement, a, b, result);
     return result;
 }
 
@@ -276,9 +276,9 @@ double score(const Signature& a, const Signature& b, const ScoreOptions& options
         const Containment found = containment(a.attributes->body, b.attributes->body, scale, options);
         return partialScore(a, b, agreementOf(a, b, options), found.share, options);
     }
-    if (comesFirst(b, a) && !options.partial) return score(b, a, options);
+    if (canonicalLess(b, a) && !options.partial) return score(b, a, options);
     if (bothAttributed(a, b)) {
-        const PartMatch match = matchParts(a.attributes->body, b.attributes->body, options);
+        const SegmentMatch match = matchSegments(a.attributes->body, b.attributes->body, options);
         return attributedScore(a, b, match.agreement, options);
     }
     const Scaled scaled = inCommonScale(a, b, options);
@@ -288,10 +288,10 @@ double score(const Signature& a, const Signature& b, const ScoreOptions& options
 double scoreUpperBound(const Signature& a, const Signature& b, const ScoreOptions& options) {
     if (identical(a, b, options)) return 1.0;
     if (bothAttributed(a, b)) {
-        const bool swapped = comesFirst(b, a);
+        const bool swapped = canonicalLess(b, a);
         const Body& first = (swapped ? b : a).attributes->body;
         const Body& second = (swapped ? a : b).attributes->body;
-        const double agreement = partAgreementBound(first, second, options);
+        const double agreement = segmentAgreementBound(first, second, options);
         if (!options.partial) return attributedScore(a, b, agreement, options);
         const double share =
             containmentBound(a.attributes->body, b.attributes->body, knownScale(a, b, options));
@@ -309,7 +309,7 @@ double scoreUpperBound(const Signature& a, const Signature& b, const ScoreOption
 
 Explanation explain(const Signature& a, const Signature& b, const ScoreOptions& options) {
     if (options.partial && bothAttributed(a, b)) return explainPartial(a, b, options);
-    if (options.partial || !comesFirst(b, a)) return explainOrdered(a, b, options);
+    if (options.partial || !canonicalLess(b, a)) return explainOrdered(a, b, options);
     Explanation result = explainOrdered(b, a, options);
     result.motion = inverse(result.motion);
     // Distances so far are in units of b's scale; parts are compared each in its own.

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "core/base/return_if_error.h"
+
 namespace shapedb {
 
 namespace {
@@ -30,7 +32,7 @@ class FilterParser {
         if (atEnd()) return filter;
         while (true) {
             auto term = parseTerm();
-            if (!term) return fail(term.error());
+            RETURN_IF_ERROR(term);
             filter.terms_.push_back(std::move(*term));
             skipBlanks();
             if (atEnd()) return filter;

@@ -60,9 +60,9 @@ void SignatureBlock::append(const IndexEntry& entry) {
         HalfRow first, second;
         packStatistics(signature.attributes->statistics, first, second);
         appendStatistics(first, second);
-        for (const Part& part : signature.attributes->body.parts) parts_.push_back(packed(part));
+        for (const SegmentDescriptor& part : signature.attributes->body.parts) parts_.push_back(packed(part));
     } else {
-        for (const SignaturePoint& p : signature.points) points_.push_back({p.position, p.weight});
+        for (const WeightedPoint& p : signature.points) points_.push_back({p.position, p.weight});
         if (!first_.empty()) first_.resize(ids_.size());
         if (!second_.empty()) second_.resize(ids_.size());
     }
@@ -94,7 +94,7 @@ void SignatureBlock::scored(std::size_t row, Signature& signature) const {
         signature.attributes.reset();
         signature.points.clear();
         for (std::size_t i = pointsBegin(row); i < pointsEnd_[row]; ++i) {
-            SignaturePoint point;
+            WeightedPoint point;
             point.position = points_[i].position;
             point.weight = points_[i].weight;
             signature.points.push_back(point);

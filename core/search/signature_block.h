@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "core/matching/packed_statistics.h"
+#include "core/search/packed_statistics.h"
 #include "core/signature/signature.h"
 
 namespace shapedb {
@@ -81,7 +81,7 @@ class SignatureBlock {
     std::vector<std::uint16_t> partsEnd_;   // of the row, in parts_
     std::vector<std::uint16_t> pointsEnd_;  // of the row, in points_
     std::vector<HalfRow> first_, second_;   // empty or one a row
-    std::vector<PackedPart> parts_;
+    std::vector<PackedSegmentDescriptor> parts_;
     std::vector<PackedPoint> points_;
     std::vector<Metadata> metadata_;
     std::size_t attributedCount_ = 0;

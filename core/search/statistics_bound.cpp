@@ -38,7 +38,7 @@ StatisticsBound::StatisticsBound(const Signature& query, const ScoreOptions& opt
 void StatisticsBound::scan(const SignatureBlock& block, const std::vector<std::uint8_t>& wanted,
                            double needed, std::vector<Left>& left, Counts& counts) const {
     if (block.attributedCount() == 0) return;
-    const double farthest = farthestFor(needed);
+    const double farthest = maxDistanceForScore(needed);
     const bool all = block.attributedCount() == block.size();
     std::array<HalfSums, kRowsAtOnce> sums;
     for (std::size_t begin = 0; begin < block.size(); begin += kRowsAtOnce) {

@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/matching/attribute_score.h"
-#include "core/matching/packed_statistics.h"
+#include "core/matching/attributed/attribute_score.h"
+#include "core/search/packed_statistics.h"
 #include "core/search/signature_block.h"
 
 namespace shapedb {

@@ -12,6 +12,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include "core/base/return_if_error.h"
 #include "core/search/statistics_bound.h"
 
 namespace shapedb {
@@ -105,13 +106,13 @@ class Searcher {
     }
 
     Result<SearchResult> run() {
-        if (auto go = context_.checkpoint(); !go) return fail(go.error());
+        RETURN_IF_ERROR(context_.checkpoint());
         std::size_t slice = kFirstSlice;
         for (std::size_t begin = 0; begin < order_.size();) {
             const std::size_t end = std::min(order_.size(), begin + slice);
             auto candidates = boundSlice(begin, end);
-            if (!candidates) return fail(candidates.error());
-            if (auto done = visit(*candidates); !done) return fail(done.error());
+            RETURN_IF_ERROR(candidates);
+            RETURN_IF_ERROR(visit(*candidates));
             begin = end;
             slice *= kSliceGrowth;
             blocksDone_ = end;
@@ -177,7 +178,7 @@ class Searcher {
         auto done = parallelUntilStopped(begin, end, 1, context_, [&](std::size_t b, Signature& scratch) {
             perBlock[b - begin] = boundBlock(*order_[b], least, scratch);
         });
-        if (!done) return fail(done.error());
+        RETURN_IF_ERROR(done);
         std::vector<Candidate> all;
         for (const BlockBounds& block : perBlock) {
             all.insert(all.end(), block.candidates.begin(), block.candidates.end());
@@ -198,7 +199,7 @@ class Searcher {
             std::size_t end = begin;
             while (end < candidates.size() && end - begin < chunk && candidates[end].bound >= least) ++end;
             if (end == begin) break;
-            if (auto done = scoreChunk(candidates, begin, end, least); !done) return done;
+            RETURN_IF_ERROR(scoreChunk(candidates, begin, end, least));
             begin = end;
             chunk = std::min(chunk * 2, kLargestChunk);
             context_.report("search", blocksDone_, order_.size());
@@ -242,7 +243,7 @@ class Searcher {
 
 Result<SearchResult> topK(const Signature& query, const SignatureSet& set, const SearchOptions& options,
                           const RunContext& context) {
-    if (auto valid = check(query, set, options); !valid) return fail(valid.error());
+    RETURN_IF_ERROR(check(query, set, options));
     try {
         const auto began = RunContext::Clock::now();
         auto result = Searcher(query, set, options, context).run();

@@ -7,8 +7,9 @@
 #include <utility>
 
 #include "core/base/parallel.h"
+#include "core/base/return_if_error.h"
+#include "core/segmentation/bottleneck_angle.h"
 #include "core/segmentation/inside_potential.h"
-#include "core/segmentation/leak_angle.h"
 
 namespace shapedb {
 
@@ -133,16 +134,17 @@ std::vector<std::uint8_t> peeled(const PointCloud& points, const Tetrahedra& tet
 
 struct Candidate {
     std::vector<std::uint8_t> inside;
-    double parted = 0.0;   // share of the points
-    double bridged = 0.0;  // area of bridges over the area that the points stand for
-    double covered = 0.0;  // share of the boundary that is no bridge
+    double separatedFraction = 0.0;  // share of the points
+    double bridged = 0.0;            // area of bridges over the area that the points stand for
+    double covered = 0.0;            // share of the boundary that is no bridge
 
-    double cost() const { return kBridgeWeight * bridged + 1.0 - parted; }
+    double cost() const { return kBridgeWeight * bridged + 1.0 - separatedFraction; }
 };
 
-class Judge {
+class InteriorEvaluator {
   public:
-    Judge(const PointCloud& points, const Tetrahedra& tetrahedra, const std::vector<double>& scales)
+    InteriorEvaluator(const PointCloud& points, const Tetrahedra& tetrahedra,
+                      const std::vector<double>& scales)
         : facets_(measureFacets(points, tetrahedra, scales)), poles_(findPoles(points, tetrahedra)) {
         for (const double scale : scales) pointArea_ += scale * scale;
     }
@@ -157,9 +159,10 @@ class Judge {
             boundary += facet.area;
             if (facet.bridge) bridges += facet.area;
         }
-        std::size_t parted = 0;
-        for (const Poles& poles : poles_) parted += within(poles.first) != within(poles.second);
-        candidate.parted = static_cast<double>(parted) / static_cast<double>(poles_.size());
+        std::size_t separatedFraction = 0;
+        for (const Poles& poles : poles_) separatedFraction += within(poles.first) != within(poles.second);
+        candidate.separatedFraction =
+            static_cast<double>(separatedFraction) / static_cast<double>(poles_.size());
         candidate.bridged = bridges / pointArea_;
         candidate.covered = boundary > 0.0 ? 1.0 - bridges / boundary : 0.0;
         return candidate;
@@ -184,7 +187,7 @@ std::vector<std::uint8_t> leftByWalk(const std::vector<std::uint8_t>& big, const
 
 // The candidate, or what is left of it when webs are peeled off, if that costs less.
 Candidate withoutWebs(const PointCloud& points, const Tetrahedra& tetrahedra,
-                      const std::vector<double>& scales, const Judge& judge, double leastWidth,
+                      const std::vector<double>& scales, const InteriorEvaluator& judge, double leastWidth,
                       Candidate candidate) {
     if (candidate.bridged <= kWorthPeeling) return candidate;
     const std::vector<std::uint8_t> whole = candidate.inside;
@@ -192,14 +195,14 @@ Candidate withoutWebs(const PointCloud& points, const Tetrahedra& tetrahedra,
     for (const double width : kPeelWidths) {
         if (width < leastWidth) break;
         Candidate rest = judge.judged(peeled(points, tetrahedra, scales, whole, width));
-        const bool better = rest.parted >= kLeastParted && rest.cost() < candidate.cost();
+        const bool better = rest.separatedFraction >= kLeastParted && rest.cost() < candidate.cost();
         if (better && volumeOf(points, tetrahedra, rest.inside) >= enough) candidate = std::move(rest);
     }
     return candidate;
 }
 
 AdaptiveInterior chosen(Candidate candidate, InteriorSource source, double angleDegrees) {
-    const double quality = candidate.parted * candidate.covered * candidate.covered;
+    const double quality = candidate.separatedFraction * candidate.covered * candidate.covered;
     return {std::move(candidate.inside), source, angleDegrees, quality};
 }
 
@@ -231,19 +234,19 @@ const char* interiorSourceName(InteriorSource source) noexcept {
 Result<AdaptiveInterior> adaptiveInterior(const PointCloud& points, const Tetrahedra& tetrahedra,
                                           const std::vector<std::uint8_t>& big,
                                           const std::vector<double>& scales, const RunContext& context) {
-    std::optional<Judge> made;
+    std::optional<InteriorEvaluator> made;
     std::optional<Result<std::vector<double>>> angles;
-    doTogether([&] { made.emplace(points, tetrahedra, scales); },
-               [&] { angles.emplace(leakAngles(points, tetrahedra, big, context)); });
-    const Judge& judge = *made;
+    parallelInvoke([&] { made.emplace(points, tetrahedra, scales); },
+                   [&] { angles.emplace(bottleneckAngles(points, tetrahedra, big, context)); });
+    const InteriorEvaluator& judge = *made;
     const Result<std::vector<double>>& leaks = *angles;
-    if (!leaks) return fail(leaks.error());
+    RETURN_IF_ERROR(leaks);
     const auto trimmed = [&](Candidate candidate, double leastWidth) {
         return withoutWebs(points, tetrahedra, scales, judge, leastWidth, std::move(candidate));
     };
     Candidate preferred = judge.judged(leftByWalk(big, *leaks, kAngles[0]));
     // No other interior costs less than nothing, so none can be clearly better than this one.
-    if (preferred.parted >= kLeastParted && preferred.cost() <= kTolerance) {
+    if (preferred.separatedFraction >= kLeastParted && preferred.cost() <= kTolerance) {
         return chosen(trimmed(std::move(preferred), kLeastWalkPeel), InteriorSource::kWalk, kAngles[0]);
     }
     std::array<Candidate, kAngles.size()> walks;
@@ -254,16 +257,16 @@ Result<AdaptiveInterior> adaptiveInterior(const PointCloud& points, const Tetrah
         least = std::min(least, walks[i].cost());
     }
     const auto potential = insidePotential(points, tetrahedra, judge.poles(), context);
-    if (!potential) return fail(potential.error());
+    RETURN_IF_ERROR(potential);
     std::vector<std::uint8_t> negative(potential->size());
     for (std::size_t t = 0; t < negative.size(); ++t) negative[t] = (*potential)[t] < 0.0 ? 1 : 0;
     Candidate spread = judge.judged(std::move(negative));
     least = std::min(least, spread.cost());
     for (std::size_t i = 0; i < kAngles.size(); ++i) {
-        if (walks[i].parted < kLeastParted || walks[i].cost() > least + kTolerance) continue;
+        if (walks[i].separatedFraction < kLeastParted || walks[i].cost() > least + kTolerance) continue;
         return chosen(trimmed(std::move(walks[i]), kLeastWalkPeel), InteriorSource::kWalk, kAngles[i]);
     }
-    if (spread.parted >= kLeastParted)
+    if (spread.separatedFraction >= kLeastParted)
         return chosen(trimmed(std::move(spread), 0.0), InteriorSource::kPotential, 0.0);
     return thickened(points, tetrahedra, scales);
 }

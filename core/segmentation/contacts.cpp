@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <tuple>
 
+#include "core/base/return_if_error.h"
 #include "core/segmentation/segments.h"
 
 namespace shapedb {
@@ -45,7 +46,7 @@ Result<std::vector<SegmentContact>> segmentContacts(const PointCloud& points, co
     std::vector<SegmentContact> facets;
     for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
         if (t % kTetrahedraBetweenCheckpoints == 0) {
-            if (auto go = context.checkpoint(); !go) return fail(go.error());
+            RETURN_IF_ERROR(context.checkpoint());
         }
         if (labels[t] < 0) continue;
         for (std::size_t facet = 0; facet < 4; ++facet) {
@@ -70,7 +71,7 @@ Result<std::vector<SegmentContact>> segmentContacts(const PointCloud& points, co
             contacts.push_back(facet);
             continue;
         }
-        contacts.back().passage = std::max(contacts.back().passage, facet.passage);
+        contacts.back().saddleRadius = std::max(contacts.back().saddleRadius, facet.saddleRadius);
         contacts.back().area += facet.area;
     }
     return contacts;

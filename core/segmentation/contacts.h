@@ -6,8 +6,8 @@
 
 #include "core/base/error.h"
 #include "core/base/run_context.h"
+#include "core/delaunay/delaunay.h"
 #include "core/geometry/point.h"
-#include "core/segmentation/delaunay.h"
 
 namespace shapedb {
 
@@ -17,7 +17,7 @@ struct SegmentContact {
     std::uint32_t second = 0;  ///< index of another, above `first`
     /// Radius of the largest ball, empty of points, that passes from one into the other
     /// along the Voronoi edges between them (the saddle), unit of the points, > 0.
-    double passage = 0.0;
+    double saddleRadius = 0.0;
     double area = 0.0;  ///< of the triangles they share, unit of the points squared, >= 0
 };
 

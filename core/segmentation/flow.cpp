@@ -3,8 +3,9 @@
 #include <array>
 
 #include "core/base/parallel.h"
-#include "core/geometry/point_pair.h"
-#include "core/segmentation/exact_geometry.h"
+#include "core/base/return_if_error.h"
+#include "core/geometry/tetrahedron.h"
+#include "core/geometry/vec3x2.h"
 
 namespace shapedb {
 
@@ -22,7 +23,7 @@ constexpr double kLeastShare = 1e-6;
 constexpr std::size_t kBlock = 4096;
 
 // No less than the length and quicker to have.
-Pair lengthAtMost(const PointPair& a) { return abs(a.x) + abs(a.y) + abs(a.z); }
+Double2 lengthAtMost(const Vec3x2& a) { return abs(a.x) + abs(a.y) + abs(a.z); }
 
 // Signs of the barycentric coordinates of two circumcentres. The centres are computed afresh, relative to a
 // corner: rounded to the frame's origin they would have lost their digits where tetrahedra are small.
@@ -31,22 +32,22 @@ struct FlowMasks {
     unsigned sure;  // bit 0 or 1: no coordinate is too close to call
 };
 
-FlowMasks approximateFlowMasks(const PointPair& a, const PointPair& b, const PointPair& c) {
-    const PointPair bc = cross(b, c);
-    const PointPair ca = cross(c, a);
-    const PointPair ab = cross(a, b);
-    const Pair sixVolumes = dot(a, bc);
-    const Pair toA = lengthAtMost(a), toB = lengthAtMost(b), toC = lengthAtMost(c);
-    const Pair size = toA * toB * toC;
-    const PointPair g =
-        (Pair(0.5) / sixVolumes) * (squaredLength(a) * bc + squaredLength(b) * ca + squaredLength(c) * ab);
-    const Pair second = dot(g, bc);
-    const Pair third = dot(g, ca);
-    const Pair fourth = dot(g, ab);
-    const std::array<Pair, 4> coordinates = {sixVolumes - second - third - fourth, second, third, fourth};
-    const Pair reach = lengthAtMost(g) * (lengthAtMost(bc) + toA * (toB + toC)) + sixVolumes;
-    const Pair margin = Pair(kRounding) * reach * (size / sixVolumes);
-    FlowMasks masks{{0, 0}, less(Pair(kLeastShare) * size, sixVolumes)};
+FlowMasks approximateFlowMasks(const Vec3x2& a, const Vec3x2& b, const Vec3x2& c) {
+    const Vec3x2 bc = cross(b, c);
+    const Vec3x2 ca = cross(c, a);
+    const Vec3x2 ab = cross(a, b);
+    const Double2 sixVolumes = dot(a, bc);
+    const Double2 toA = lengthAtMost(a), toB = lengthAtMost(b), toC = lengthAtMost(c);
+    const Double2 size = toA * toB * toC;
+    const Vec3x2 g =
+        (Double2(0.5) / sixVolumes) * (squaredLength(a) * bc + squaredLength(b) * ca + squaredLength(c) * ab);
+    const Double2 second = dot(g, bc);
+    const Double2 third = dot(g, ca);
+    const Double2 fourth = dot(g, ab);
+    const std::array<Double2, 4> coordinates = {sixVolumes - second - third - fourth, second, third, fourth};
+    const Double2 reach = lengthAtMost(g) * (lengthAtMost(bc) + toA * (toB + toC)) + sixVolumes;
+    const Double2 margin = Double2(kRounding) * reach * (size / sixVolumes);
+    FlowMasks masks{{0, 0}, less(Double2(kLeastShare) * size, sixVolumes)};
     for (unsigned i = 0; i < 4; ++i) {
         masks.sure &= less(margin, abs(coordinates[i]));
         const unsigned beyond = less(coordinates[i], 0.0);
@@ -61,8 +62,8 @@ void maskTwo(const PointCloud& points, const Tetrahedra& tetrahedra, const std::
              std::vector<std::uint8_t>& masks) {
     const auto& v = tetrahedra.vertices[two[0]];
     const auto& w = tetrahedra.vertices[two[1]];
-    const PointPair first(points[v[0]], points[w[0]]);
-    const auto wayTo = [&](std::size_t i) { return PointPair(points[v[i]], points[w[i]]) - first; };
+    const Vec3x2 first(points[v[0]], points[w[0]]);
+    const auto wayTo = [&](std::size_t i) { return Vec3x2(points[v[i]], points[w[i]]) - first; };
     const FlowMasks found = approximateFlowMasks(wayTo(1), wayTo(2), wayTo(3));
     for (std::size_t k = 0; k < 2; ++k) {
         unsigned mask = found.mask[k];
@@ -79,7 +80,7 @@ Result<std::vector<std::uint8_t>> flowMasks(const PointCloud& points, const Tetr
                                             const std::vector<std::uint8_t>& wanted,
                                             const RunContext& context) {
     std::vector<std::uint8_t> masks(tetrahedra.size(), 0);
-    auto done = forEachRange(tetrahedra.size(), kBlock, context, [&](std::size_t from, std::size_t to) {
+    auto done = parallelFor(tetrahedra.size(), kBlock, context, [&](std::size_t from, std::size_t to) {
         std::array<std::uint32_t, 2> two{};
         std::size_t waiting = 0;
         for (std::size_t t = from; t < to; ++t) {
@@ -91,7 +92,7 @@ Result<std::vector<std::uint8_t>> flowMasks(const PointCloud& points, const Tetr
         }
         if (waiting == 1) maskTwo(points, tetrahedra, {two[0], two[0]}, masks);
     });
-    if (!done) return fail(done.error());
+    RETURN_IF_ERROR(done);
     return masks;
 }
 

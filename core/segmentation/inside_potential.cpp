@@ -2,7 +2,8 @@
 
 #include <cmath>
 
-#include "core/segmentation/leak_angle.h"
+#include "core/base/return_if_error.h"
+#include "core/segmentation/bottleneck_angle.h"
 
 namespace shapedb {
 
@@ -108,7 +109,7 @@ Result<std::vector<double>> solve(const System& system, const RunContext& contex
     const double enough = kResidual * kResidual * size;
     for (int iteration = 0; iteration < kMaxIterations && size > enough; ++iteration) {
         if (iteration % kIterationsBetweenCheckpoints == 0) {
-            if (auto go = context.checkpoint(); !go) return fail(go.error());
+            RETURN_IF_ERROR(context.checkpoint());
         }
         multiply(system, direction, product);
         double curvature = 0.0;

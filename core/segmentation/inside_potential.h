@@ -6,8 +6,8 @@
 
 #include "core/base/error.h"
 #include "core/base/run_context.h"
+#include "core/delaunay/delaunay.h"
 #include "core/geometry/point.h"
-#include "core/segmentation/delaunay.h"
 
 namespace shapedb {
 

@@ -4,7 +4,8 @@
 #include <cmath>
 #include <utility>
 
-#include "core/base/fetch.h"
+#include "core/base/prefetch.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb {
 
@@ -89,17 +90,17 @@ Result<void> walkFrom(std::vector<std::uint32_t> layer, const PointCloud& points
                       const Tetrahedra& tetrahedra, const DeepAngle& deep, const RunContext& context,
                       std::vector<std::uint8_t>& inside) {
     while (!layer.empty()) {
-        if (auto go = context.checkpoint(); !go) return go;
+        RETURN_IF_ERROR(context.checkpoint());
         std::vector<std::uint32_t> following;
         for (std::size_t i = 0; i < layer.size(); ++i) {
-            if (i + kFetchFarAhead < layer.size()) {
-                fetch(&tetrahedra.neighbours[layer[i + kFetchFarAhead]]);
-                fetch(&tetrahedra.vertices[layer[i + kFetchFarAhead]]);
+            if (i + kPrefetchFarDistance < layer.size()) {
+                prefetch(&tetrahedra.neighbours[layer[i + kPrefetchFarDistance]]);
+                prefetch(&tetrahedra.vertices[layer[i + kPrefetchFarDistance]]);
             }
-            if (i + kFetchAhead < layer.size()) {
-                for (const std::uint32_t next : tetrahedra.neighbours[layer[i + kFetchAhead]]) {
-                    fetch(inside.data() + next);
-                    fetch(tetrahedra.circumcentres.data() + next);
+            if (i + kPrefetchDistance < layer.size()) {
+                for (const std::uint32_t next : tetrahedra.neighbours[layer[i + kPrefetchDistance]]) {
+                    prefetch(inside.data() + next);
+                    prefetch(tetrahedra.circumcentres.data() + next);
                 }
             }
             const std::uint32_t t = layer[i];
@@ -138,9 +139,7 @@ Result<std::vector<std::uint8_t>> interiorTetrahedra(const PointCloud& points, c
             break;
         }
     }
-    if (auto done = walkFrom(std::move(layer), points, tetrahedra, deep, context, inside); !done) {
-        return fail(done.error());
-    }
+    RETURN_IF_ERROR(walkFrom(std::move(layer), points, tetrahedra, deep, context, inside));
     return inside;
 }
 

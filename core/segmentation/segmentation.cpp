@@ -9,14 +9,15 @@
 #include <tuple>
 #include <utility>
 
-#include "core/base/pair.h"
+#include "core/base/double2.h"
+#include "core/base/return_if_error.h"
+#include "core/delaunay/hilbert_order.h"
 #include "core/geometry/bounding.h"
-#include "core/segmentation/curve_order.h"
+#include "core/preparation/prepare_points.h"
+#include "core/segmentation/contrast_merging.h"
 #include "core/segmentation/flow.h"
-#include "core/segmentation/hierarchy.h"
 #include "core/segmentation/interior.h"
-#include "core/segmentation/point_scale.h"
-#include "core/segmentation/preparation.h"
+#include "core/segmentation/local_spacing.h"
 #include "core/segmentation/segments.h"
 
 namespace shapedb {
@@ -60,7 +61,7 @@ class StageClock {
 struct Moments {
     double volume = 0.0;
     Point3 first;
-    std::array<Pair, 3> second = {0.0, 0.0, 0.0};  // xx, xy, xz, yy, yz, zz
+    std::array<Double2, 3> second = {0.0, 0.0, 0.0};  // xx, xy, xz, yy, yz, zz
     std::uint64_t tetrahedra = 0;
 
     void add(const Point3& a, const Point3& b, const Point3& c, const Point3& d) {
@@ -72,7 +73,7 @@ struct Moments {
         const std::array<Products, 5> terms = {products(sum), products(a), products(b), products(c),
                                                products(d)};
         for (std::size_t i = 0; i < second.size(); ++i) {
-            second[i] = second[i] + Pair(v / 20.0) *
+            second[i] = second[i] + Double2(v / 20.0) *
                                         (terms[0][i] + terms[1][i] + terms[2][i] + terms[3][i] + terms[4][i]);
         }
         ++tetrahedra;
@@ -84,21 +85,21 @@ struct Moments {
     }
 
   private:
-    using Products = std::array<Pair, 3>;
+    using Products = std::array<Double2, 3>;
     static Products products(const Point3& p) {
-        return {Pair(p.x, p.x) * Pair(p.x, p.y), Pair(p.x, p.y) * Pair(p.z, p.y),
-                Pair(p.y, p.z) * Pair(p.z, p.z)};
+        return {Double2(p.x, p.x) * Double2(p.x, p.y), Double2(p.x, p.y) * Double2(p.z, p.y),
+                Double2(p.y, p.z) * Double2(p.z, p.z)};
     }
 };
 
-Segment toSegment(const Moments& m, std::uint32_t peak, const Tetrahedra& tetrahedra, const Frame& frame) {
+Segment toSegment(const Moments& m, std::uint32_t maximum, const Tetrahedra& tetrahedra, const Frame& frame) {
     Segment segment;
     const double unit2 = frame.unit * frame.unit;
     const Point3 mean = (1.0 / m.volume) * m.first;
     segment.volume = m.volume * unit2 * frame.unit;
     segment.centroid = frame.toScan(mean);
-    segment.peakRadius = tetrahedra.circumradii[peak] * frame.unit;
-    segment.peak = frame.toScan(tetrahedra.circumcentres[peak]);
+    segment.maximumRadius = tetrahedra.circumradii[maximum] * frame.unit;
+    segment.maximum = frame.toScan(tetrahedra.circumcentres[maximum]);
     const std::array<double, 6> square = {mean.x * mean.x, mean.x * mean.y, mean.x * mean.z,
                                           mean.y * mean.y, mean.y * mean.z, mean.z * mean.z};
     const std::array<double, 6> second = m.secondMoments();
@@ -114,7 +115,7 @@ void describeContacts(const std::vector<std::int32_t>& rank, const Frame& frame,
         const auto [low, high] = std::minmax(rank[contact.first], rank[contact.second]);
         if (low < 0) continue;
         described.push_back({static_cast<std::uint32_t>(low), static_cast<std::uint32_t>(high),
-                             contact.passage * frame.unit, contact.area * frame.unit * frame.unit});
+                             contact.saddleRadius * frame.unit, contact.area * frame.unit * frame.unit});
     }
     std::sort(described.begin(), described.end(), [](const SegmentContact& a, const SegmentContact& b) {
         return std::tie(a.first, a.second) < std::tie(b.first, b.second);
@@ -126,7 +127,7 @@ void describeContacts(const std::vector<std::int32_t>& rank, const Frame& frame,
 // whose tetrahedra are all flat to the last digit have no volume and are left out.
 void describeSegments(const PointCloud& points, SegmentLabels labels, const Frame& frame,
                       Segmentation& result) {
-    std::vector<Moments> moments(labels.peaks.size());
+    std::vector<Moments> moments(labels.maxima.size());
     for (std::size_t t = 0; t < result.tetrahedra.size(); ++t) {
         const std::int32_t segment = labels.ofTetrahedron[t];
         if (segment < 0) continue;
@@ -147,7 +148,7 @@ void describeSegments(const PointCloud& points, SegmentLabels labels, const Fram
     for (std::size_t i = 0; i < order.size(); ++i) {
         const std::uint32_t s = order[i];
         rank[s] = static_cast<std::int32_t>(i);
-        result.segments.push_back(toSegment(moments[s], labels.peaks[s], result.tetrahedra, frame));
+        result.segments.push_back(toSegment(moments[s], labels.maxima[s], result.tetrahedra, frame));
         result.volume += result.segments.back().volume;
     }
     result.tetrahedronSegment = std::move(labels.ofTetrahedron);
@@ -208,11 +209,11 @@ void toScanUnits(const Frame& frame, PointCloud sites, Segmentation& result) {
 
 Result<PreparedPoints> prepare(const PointCloud& points, const SegmentationOptions& options,
                                const RunContext& context, StageClock& clock, Segmentation& result) {
-    auto prepared =
-        preparePoints(points, options, context, [&](const char* stage) { return clock.begin(stage); });
+    auto prepared = preparePoints(points, options.preparation, context,
+                                  [&](const char* stage) { return clock.begin(stage); });
     if (!prepared) return prepared;
     result.duplicates = prepared->duplicates;
-    result.strays = prepared->strays;
+    result.outliers = prepared->outliers;
     result.noise = prepared->noise.sigma * prepared->frame.unit;
     result.siteOfPoint = std::move(prepared->siteOfPoint);
     return prepared;
@@ -220,7 +221,7 @@ Result<PreparedPoints> prepare(const PointCloud& points, const SegmentationOptio
 
 // Sites that are neighbours in space become neighbours in memory: every later stage runs along them.
 void sortAlongCurve(PointCloud& sites, std::vector<std::uint32_t>& siteOfPoint) {
-    const std::vector<std::uint32_t> order = curveOrder(sites);
+    const std::vector<std::uint32_t> order = hilbertOrder(sites);
     PointCloud sorted(sites.size());
     std::vector<std::uint32_t> rank(sites.size());
     for (std::uint32_t i = 0; i < order.size(); ++i) {
@@ -243,7 +244,7 @@ Result<std::vector<std::uint8_t>> findInterior(const PointCloud& sites, const st
         return interiorTetrahedra(sites, result.tetrahedra, big, options, context);
     }
     auto interior = adaptiveInterior(sites, result.tetrahedra, big, scales, context);
-    if (!interior) return fail(interior.error());
+    RETURN_IF_ERROR(interior);
     result.interiorSource = interior->source;
     result.angleDegrees = interior->angleDegrees;
     result.quality = interior->quality;
@@ -253,22 +254,22 @@ Result<std::vector<std::uint8_t>> findInterior(const PointCloud& sites, const st
 Result<SegmentLabels> findSegments(const PointCloud& sites, const SegmentationOptions& options,
                                    const RunContext& context, StageClock& clock, Segmentation& result) {
     const Tetrahedra& tetrahedra = result.tetrahedra;
-    if (auto go = clock.begin("point_scale"); !go) return fail(go.error());
-    const auto scales = pointScales(sites, context);
-    if (!scales) return fail(scales.error());
-    if (auto go = clock.begin("interior"); !go) return fail(go.error());
+    RETURN_IF_ERROR(clock.begin("point_scale"));
+    const auto scales = localSpacings(sites, context);
+    RETURN_IF_ERROR(scales);
+    RETURN_IF_ERROR(clock.begin("interior"));
     const std::vector<std::uint8_t> big = bigBalls(tetrahedra, *scales, options.bigBallRatio);
     result.bigBalls = static_cast<std::uint64_t>(std::count(big.begin(), big.end(), 1));
     const auto interior = findInterior(sites, big, *scales, options, context, result);
-    if (!interior) return fail(interior.error());
-    if (auto go = clock.begin("flow"); !go) return fail(go.error());
+    RETURN_IF_ERROR(interior);
+    RETURN_IF_ERROR(clock.begin("flow"));
     const auto flow = flowMasks(sites, tetrahedra, *interior, context);
-    if (!flow) return fail(flow.error());
-    if (auto go = clock.begin("segments"); !go) return fail(go.error());
+    RETURN_IF_ERROR(flow);
+    RETURN_IF_ERROR(clock.begin("segments"));
     auto fine = stableManifolds(tetrahedra, *interior, *flow, context);
-    if (!fine) return fail(fine.error());
-    result.maxima = fine->peaks.size();
-    if (auto go = clock.begin("merge"); !go) return fail(go.error());
+    RETURN_IF_ERROR(fine);
+    result.maxima = fine->maxima.size();
+    RETURN_IF_ERROR(clock.begin("merge"));
     auto merged =
         options.mergeContrast == 0.0
             ? Result<SegmentLabels>(mergeSegments(sites, tetrahedra, std::move(*fine), options.mergeRatio))
@@ -277,7 +278,7 @@ Result<SegmentLabels> findSegments(const PointCloud& sites, const SegmentationOp
                                       context);
     if (!merged) return merged;
     auto contacts = segmentContacts(sites, tetrahedra, *flow, merged->ofTetrahedron, context);
-    if (!contacts) return fail(contacts.error());
+    RETURN_IF_ERROR(contacts);
     result.contacts = std::move(*contacts);
     return merged;
 }
@@ -287,17 +288,17 @@ Result<Segmentation> segmentOrThrow(const PointCloud& points, const Segmentation
     Segmentation result;
     StageClock clock(context, result.stages);
     auto prepared = prepare(points, options, context, clock, result);
-    if (!prepared) return fail(prepared.error());
-    if (auto go = clock.begin("delaunay"); !go) return fail(go.error());
+    RETURN_IF_ERROR(prepared);
+    RETURN_IF_ERROR(clock.begin("delaunay"));
     sortAlongCurve(prepared->sites, result.siteOfPoint);
-    auto tetrahedra = triangulate(prepared->sites, context, PointOrder::kAlongCurve);
-    if (!tetrahedra) return fail(tetrahedra.error());
+    auto tetrahedra = triangulate(prepared->sites, context, PointOrder::kHilbert);
+    RETURN_IF_ERROR(tetrahedra);
     result.tetrahedra = std::move(*tetrahedra);
     clock.end();
     result.delaunaySeconds = clock.lastSeconds();
     auto labels = findSegments(prepared->sites, options, context, clock, result);
-    if (!labels) return fail(labels.error());
-    if (auto go = clock.begin("describe"); !go) return fail(go.error());
+    RETURN_IF_ERROR(labels);
+    RETURN_IF_ERROR(clock.begin("describe"));
     describeSegments(prepared->sites, std::move(*labels), prepared->frame, result);
     if (result.segments.empty()) {
         return fail(ErrorCode::kNoInterior,
@@ -309,7 +310,7 @@ Result<Segmentation> segmentOrThrow(const PointCloud& points, const Segmentation
     }
     const std::vector<std::int32_t> siteLabels = labelSites(prepared->sites.size(), result);
     const auto size = interiorSize(prepared->sites, siteLabels, result.tetrahedra);
-    if (!size) return fail(size.error());
+    RETURN_IF_ERROR(size);
     result.size = *size * prepared->frame.unit;
     result.pointSegment.reserve(points.size());
     for (const std::uint32_t site : result.siteOfPoint) {
@@ -325,7 +326,7 @@ Result<Segmentation> segmentOrThrow(const PointCloud& points, const Segmentation
 
 Result<Segmentation> segment(const PointCloud& points, const SegmentationOptions& options,
                              const RunContext& context) {
-    if (auto valid = validate(options); !valid) return fail(valid.error());
+    RETURN_IF_ERROR(validate(options));
     try {
         return segmentOrThrow(points, options, context);
     } catch (const std::bad_alloc&) {

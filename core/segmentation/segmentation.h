@@ -1,6 +1,6 @@
 // From a noisy point cloud to the segments of the shape's interior: Sections 2 and 3 of
 // Dey and Goswami, "Shape Segmentation and Matching from Noisy Point Clouds" (2004).
-// The stages have a header each: core/geometry/sanitise.h, delaunay.h, point_scale.h,
+// The stages have a header each: core/preparation/sanitise.h, delaunay.h, point_scale.h,
 // interior.h, flow.h, segments.h; this one runs them in order.
 #pragma once
 
@@ -10,21 +10,21 @@
 
 #include "core/base/error.h"
 #include "core/base/run_context.h"
+#include "core/delaunay/delaunay.h"
 #include "core/geometry/point.h"
+#include "core/preparation/prepare_points.h"
 #include "core/segmentation/adaptive_interior.h"
 #include "core/segmentation/contacts.h"
-#include "core/segmentation/delaunay.h"
 #include "core/segmentation/options.h"
-#include "core/segmentation/preparation.h"
 
 namespace shapedb {
 
 /// One segment: the stable manifold of a maximum of the distance function, after merging.
 struct Segment {
-    double volume = 0.0;      ///< of its tetrahedra, scan units cubed, > 0
-    Point3 centroid;          ///< volume-weighted mean of the tetrahedra's centroids (Section 4.1)
-    double peakRadius = 0.0;  ///< circumradius of the largest Delaunay ball, scan units
-    Point3 peak;              ///< centre of that ball
+    double volume = 0.0;         ///< of its tetrahedra, scan units cubed, > 0
+    Point3 centroid;             ///< volume-weighted mean of the tetrahedra's centroids (Section 4.1)
+    double maximumRadius = 0.0;  ///< circumradius of the largest Delaunay ball, scan units
+    Point3 maximum;              ///< centre of that ball
     /// Second central moments of its matter per volume: xx, xy, xz, yy, yz, zz, scan units squared.
     std::array<double, 6> covariance{};
     std::uint64_t tetrahedra = 0;
@@ -53,13 +53,13 @@ struct Segmentation {
     Tetrahedra tetrahedra;
 
     /// The points that were triangulated, scan units: distinct, prepared as the options ask.
-    /// `siteOfPoint` maps each input point to its site, kNoSite when it was left out as a stray.
+    /// `siteOfPoint` maps each input point to its site, kNoSite when it was left out as an outlier.
     PointCloud sites;
     std::vector<std::uint32_t> siteOfPoint;
 
     double volume = 0.0;  ///< of all segments together, scan units cubed
     /// Smallest diagonal of an oriented box around the interior's tetrahedra, scan units.
-    /// A stray point counts only where an interior tetrahedron reaches it; with a fixed deep angle
+    /// An outlier counts only where an interior tetrahedron reaches it; with a fixed deep angle
     /// several of them can make that happen (docs/algorithm.md).
     double size = 0.0;
     /// How the interior was found and how much it deserves trust, in [0, 1]: see
@@ -70,7 +70,7 @@ struct Segmentation {
     double noise = 0.0;  ///< estimated standard deviation before smoothing, scan units; 0: not measured
 
     std::uint64_t duplicates = 0;  ///< input points that repeated an earlier one; see PreparedPoints
-    std::uint64_t strays = 0;      ///< input points left out
+    std::uint64_t outliers = 0;    ///< input points left out
     std::uint64_t bigBalls = 0;
     std::uint64_t interiorTetrahedra = 0;
     std::uint64_t maxima = 0;  ///< segments before merging

@@ -7,8 +7,9 @@
 #include <numeric>
 #include <utility>
 
-#include "core/base/fetch.h"
-#include "core/base/keyed.h"
+#include "core/base/prefetch.h"
+#include "core/base/radix_sort.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb {
 
@@ -28,10 +29,10 @@ std::uint64_t orderOf(double number) {
 
 // By falling circumradius; equal ones stay in order.
 void sortByFallingRadius(const Tetrahedra& tetrahedra, std::vector<std::uint32_t>& indices) {
-    LargeVector<Keyed> keyed;
+    LargeVector<KeyedIndex> keyed;
     keyed.reserve(indices.size());
     for (const std::uint32_t t : indices) keyed.push_back({~orderOf(tetrahedra.circumradii[t]), t});
-    sortByKey(keyed);
+    radixSortByKey(keyed);
     for (std::size_t i = 0; i < keyed.size(); ++i) indices[i] = keyed[i].index;
 }
 
@@ -122,7 +123,7 @@ class Growth {
     Result<void> grow(const std::vector<std::uint32_t>& leftovers, const RunContext& context) {
         choose(leftovers);
         while (!layer_.empty()) {
-            if (auto go = context.checkpoint(); !go) return go;
+            RETURN_IF_ERROR(context.checkpoint());
             expand();
             choose(following_);
         }
@@ -134,9 +135,9 @@ class Growth {
     void choose(const std::vector<std::uint32_t>& candidates) {
         layer_.clear();
         for (std::size_t i = 0; i < candidates.size(); ++i) {
-            if (i + kFetchFarAhead < candidates.size())
-                fetch(&tetrahedra_.neighbours[candidates[i + kFetchFarAhead]]);
-            if (i + kFetchAhead < candidates.size()) fetchNeighbours(candidates[i + kFetchAhead]);
+            if (i + kPrefetchFarDistance < candidates.size())
+                prefetch(&tetrahedra_.neighbours[candidates[i + kPrefetchFarDistance]]);
+            if (i + kPrefetchDistance < candidates.size()) fetchNeighbours(candidates[i + kPrefetchDistance]);
             const std::uint32_t t = candidates[i];
             const std::int32_t label = labelOfLargestNeighbour(tetrahedra_, labels_, t);
             if (label >= 0) layer_.push_back({t, label});
@@ -150,9 +151,10 @@ class Growth {
         for (std::size_t i = 0; i < layer_.size(); ++i)
             labels_.ofTetrahedron[layer_[i].tetrahedron] = layer_[i].label;
         for (std::size_t i = 0; i < layer_.size(); ++i) {
-            if (i + kFetchFarAhead < layer_.size())
-                fetch(&tetrahedra_.neighbours[layer_[i + kFetchFarAhead].tetrahedron]);
-            if (i + kFetchAhead < layer_.size()) fetchNeighbours(layer_[i + kFetchAhead].tetrahedron);
+            if (i + kPrefetchFarDistance < layer_.size())
+                prefetch(&tetrahedra_.neighbours[layer_[i + kPrefetchFarDistance].tetrahedron]);
+            if (i + kPrefetchDistance < layer_.size())
+                fetchNeighbours(layer_[i + kPrefetchDistance].tetrahedron);
             for (const std::uint32_t next : tetrahedra_.neighbours[layer_[i].tetrahedron]) {
                 if (next == kNoTetrahedron || labels_.ofTetrahedron[next] != kNoMaximum) continue;
                 labels_.ofTetrahedron[next] = kInLayer;
@@ -163,8 +165,8 @@ class Growth {
 
     void fetchNeighbours(std::uint32_t t) const {
         for (const std::uint32_t next : tetrahedra_.neighbours[t]) {
-            fetch(labels_.ofTetrahedron.data() + next);
-            fetch(tetrahedra_.circumradii.data() + next);
+            prefetch(labels_.ofTetrahedron.data() + next);
+            prefetch(tetrahedra_.circumradii.data() + next);
         }
     }
 
@@ -181,8 +183,8 @@ void labelIslands(const Tetrahedra& tetrahedra, std::vector<std::uint32_t> lefto
     sortByFallingRadius(tetrahedra, leftovers);
     for (const std::uint32_t seed : leftovers) {
         if (labels.ofTetrahedron[seed] >= 0) continue;
-        const auto segment = static_cast<std::int32_t>(labels.peaks.size());
-        labels.peaks.push_back(seed);
+        const auto segment = static_cast<std::int32_t>(labels.maxima.size());
+        labels.maxima.push_back(seed);
         labels.ofTetrahedron[seed] = segment;
         std::vector<std::uint32_t> stack = {seed};
         while (!stack.empty()) {
@@ -197,7 +199,7 @@ void labelIslands(const Tetrahedra& tetrahedra, std::vector<std::uint32_t> lefto
     }
 }
 
-// Union by smaller index: the representative is the segment with the largest peak.
+// Union by smaller index: the representative is the segment with the largest maximum.
 class DisjointSets {
   public:
     explicit DisjointSets(std::size_t count) : parent_(count) {
@@ -227,17 +229,17 @@ Result<SegmentLabels> stableManifolds(const Tetrahedra& tetrahedra, const std::v
     for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
         if (!interior[t]) continue;
         labels.ofTetrahedron[t] = kUnseen;
-        if (flow[t] == 0) labels.peaks.push_back(t);
+        if (flow[t] == 0) labels.maxima.push_back(t);
     }
-    sortByFallingRadius(tetrahedra, labels.peaks);
-    for (std::size_t i = 0; i < labels.peaks.size(); ++i) {
-        labels.ofTetrahedron[labels.peaks[i]] = static_cast<std::int32_t>(i);
+    sortByFallingRadius(tetrahedra, labels.maxima);
+    for (std::size_t i = 0; i < labels.maxima.size(); ++i) {
+        labels.ofTetrahedron[labels.maxima[i]] = static_cast<std::int32_t>(i);
     }
     std::size_t steps = 0;
     Downstream downstream(tetrahedra, flow, labels.ofTetrahedron);
     for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
         if (++steps % kStepsBetweenCheckpoints == 0) {
-            if (auto go = context.checkpoint(); !go) return fail(go.error());
+            RETURN_IF_ERROR(context.checkpoint());
         }
         if (labels.ofTetrahedron[t] == kUnseen) downstream.follow(t);
     }
@@ -245,7 +247,7 @@ Result<SegmentLabels> stableManifolds(const Tetrahedra& tetrahedra, const std::v
     for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
         if (labels.ofTetrahedron[t] == kNoMaximum) leftovers.push_back(t);
     }
-    if (auto go = Growth(tetrahedra, labels).grow(leftovers, context); !go) return fail(go.error());
+    RETURN_IF_ERROR(Growth(tetrahedra, labels).grow(leftovers, context));
     labelIslands(tetrahedra, std::move(leftovers), labels);
     return labels;
 }
@@ -264,35 +266,36 @@ double facetCircumradius(const PointCloud& points, const Tetrahedra& tetrahedra,
 
 SegmentLabels mergeSegments(const PointCloud& points, const Tetrahedra& tetrahedra, SegmentLabels labels,
                             double mergeRatio) {
-    DisjointSets sets(labels.peaks.size());
-    std::vector<double> peakRadii(labels.peaks.size());
-    for (std::size_t s = 0; s < peakRadii.size(); ++s) peakRadii[s] = tetrahedra.circumradii[labels.peaks[s]];
+    DisjointSets sets(labels.maxima.size());
+    std::vector<double> maximumRadii(labels.maxima.size());
+    for (std::size_t s = 0; s < maximumRadii.size(); ++s)
+        maximumRadii[s] = tetrahedra.circumradii[labels.maxima[s]];
     for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
         const std::int32_t mine = labels.ofTetrahedron[t];
         if (mine < 0) continue;
         // No circle through three points of a sphere is larger than the sphere: most tetrahedra and facets
         // need no look at the circle.
         const double most = kMost * mergeRatio * tetrahedra.circumradii[t];
-        if (peakRadii[static_cast<std::size_t>(mine)] > most) continue;
+        if (maximumRadii[static_cast<std::size_t>(mine)] > most) continue;
         for (std::size_t facet = 0; facet < 4; ++facet) {
             const std::uint32_t next = tetrahedra.neighbours[t][facet];
             const bool later = next > t && next != kNoTetrahedron;
             const std::int32_t other = labels.ofTetrahedron[later ? next : t];
             if (static_cast<unsigned>(other < 0) | static_cast<unsigned>(other == mine)) continue;
-            const double higher = std::max(peakRadii[static_cast<std::size_t>(mine)],
-                                           peakRadii[static_cast<std::size_t>(other)]);
+            const double higher = std::max(maximumRadii[static_cast<std::size_t>(mine)],
+                                           maximumRadii[static_cast<std::size_t>(other)]);
             if (higher > most || sets.find(other) == sets.find(mine)) continue;
             if (higher <= mergeRatio * facetCircumradius(points, tetrahedra, t, static_cast<int>(facet))) {
                 sets.unite(mine, other);
             }
         }
     }
-    std::vector<std::uint32_t> peaks;
-    std::vector<std::int32_t> dense(labels.peaks.size(), -1);
-    for (std::size_t s = 0; s < labels.peaks.size(); ++s) {
+    std::vector<std::uint32_t> maxima;
+    std::vector<std::int32_t> dense(labels.maxima.size(), -1);
+    for (std::size_t s = 0; s < labels.maxima.size(); ++s) {
         if (sets.find(static_cast<std::int32_t>(s)) != static_cast<std::int32_t>(s)) continue;
-        dense[s] = static_cast<std::int32_t>(peaks.size());
-        peaks.push_back(labels.peaks[s]);
+        dense[s] = static_cast<std::int32_t>(maxima.size());
+        maxima.push_back(labels.maxima[s]);
     }
     for (std::size_t s = 0; s < dense.size(); ++s) {
         dense[s] = dense[static_cast<std::size_t>(sets.find(static_cast<std::int32_t>(s)))];
@@ -300,7 +303,7 @@ SegmentLabels mergeSegments(const PointCloud& points, const Tetrahedra& tetrahed
     for (std::int32_t& segment : labels.ofTetrahedron) {
         if (segment >= 0) segment = dense[static_cast<std::size_t>(segment)];
     }
-    labels.peaks = std::move(peaks);
+    labels.maxima = std::move(maxima);
     return labels;
 }
 

@@ -7,16 +7,16 @@
 
 #include "core/base/error.h"
 #include "core/base/run_context.h"
+#include "core/delaunay/delaunay.h"
 #include "core/geometry/point.h"
-#include "core/segmentation/delaunay.h"
 
 namespace shapedb {
 
 /// A partition of the interior: per tetrahedron the segment's index, -1 outside; per segment
-/// the tetrahedron that holds its peak (its largest Delaunay ball by the order of claiming).
+/// the tetrahedron that holds its maximum (its largest Delaunay ball by the order of claiming).
 struct SegmentLabels {
     std::vector<std::int32_t> ofTetrahedron;
-    std::vector<std::uint32_t> peaks;
+    std::vector<std::uint32_t> maxima;
 };
 
 /// Stable manifolds of the maxima. Maxima are taken by falling circumradius; each claims, depth
@@ -38,9 +38,9 @@ struct SegmentLabels {
 [[nodiscard]] double facetCircumradius(const PointCloud& points, const Tetrahedra& tetrahedra, std::size_t t,
                                        int facet);
 
-/// Merges every two segments that share a triangle of circumradius r with both peaks at most
-/// mergeRatio * r (the peaks before any merging, literally as published; chains of such pairs
-/// become one segment). Labels of the result are dense, by falling peak.
+/// Merges every two segments that share a triangle of circumradius r with both maxima at most
+/// mergeRatio * r (the maxima before any merging, literally as published; chains of such pairs
+/// become one segment). Labels of the result are dense, by falling maximum.
 [[nodiscard]] SegmentLabels mergeSegments(const PointCloud& points, const Tetrahedra& tetrahedra,
                                           SegmentLabels labels, double mergeRatio);
 

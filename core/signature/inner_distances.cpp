@@ -7,7 +7,8 @@
 #include <utility>
 
 #include "core/base/parallel.h"
-#include "core/segmentation/delaunay.h"
+#include "core/base/return_if_error.h"
+#include "core/delaunay/delaunay.h"
 
 namespace shapedb {
 
@@ -190,11 +191,11 @@ Result<InnerDistances> innerDistances(const InteriorView& view, const RunContext
     }
     result.distance.resize(result.sources.size());
     const auto done =
-        forEachRange(result.sources.size(), kBlock, context, [&](std::size_t from, std::size_t to) {
+        parallelFor(result.sources.size(), kBlock, context, [&](std::size_t from, std::size_t to) {
             ShortestWays ways(graph);
             for (std::size_t s = from; s < to; ++s) result.distance[s] = ways.from(result.sources[s]);
         });
-    if (!done) return fail(done.error());
+    RETURN_IF_ERROR(done);
     result.mean = meanReached(result);
     return result;
 }

@@ -9,6 +9,8 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "core/base/return_if_error.h"
+
 namespace shapedb {
 
 Result<void> validate(const SignatureOptions& options) {
@@ -31,8 +33,8 @@ bool sameShape(const Signature& a, const Signature& b) noexcept {
     }
     if (a.points.size() != b.points.size()) return false;
     for (std::size_t i = 0; i < a.points.size(); ++i) {
-        const SignaturePoint& p = a.points[i];
-        const SignaturePoint& q = b.points[i];
+        const WeightedPoint& p = a.points[i];
+        const WeightedPoint& q = b.points[i];
         if (p.position != q.position || p.weight != q.weight) return false;
     }
     return true;
@@ -78,14 +80,14 @@ Result<Signature> makeSignatureOrThrow(const Segmentation& segmentation, const S
     for (std::size_t i = 0; i < count; ++i) {
         const Segment& segment = segmentation.segments[i];
         const Point3 position = inverse * (segment.centroid - signature.origin);
-        SignaturePoint point;
+        WeightedPoint point;
         point.position = {static_cast<float>(position.x), static_cast<float>(position.y),
                           static_cast<float>(position.z)};
         point.weight = static_cast<float>(segment.volume * inverse * inverse * inverse);
         point.volumeShare = volumeShareOf(point.weight, signature.scale, signature.volume);
-        // A segment without a maximum may peak in a flat tetrahedron, of any circumradius.
-        point.peakRadius = static_cast<float>(
-            std::min<double>(segment.peakRadius * inverse, std::numeric_limits<float>::max()));
+        // A segment without a maximum may have its largest ball in a flat tetrahedron, of any circumradius.
+        point.maximumRadius = static_cast<float>(
+            std::min<double>(segment.maximumRadius * inverse, std::numeric_limits<float>::max()));
         for (std::size_t m = 0; m < 6; ++m) {
             point.covariance[m] = static_cast<float>(segment.covariance[m] * inverse * inverse);
         }
@@ -103,7 +105,7 @@ Result<Signature> makeSignatureOrThrow(const Segmentation& segmentation, const S
 Result<ShapeAttributes> attributesOf(const Segmentation& segmentation, const Signature& signature,
                                      const RunContext& context) {
     auto statistics = shapeStatistics(interiorView(segmentation), context);
-    if (!statistics) return fail(statistics.error());
+    RETURN_IF_ERROR(statistics);
     ShapeAttributes attributes;
     attributes.statistics = *statistics;
     attributes.quality =
@@ -116,12 +118,12 @@ Result<ShapeAttributes> attributesOf(const Segmentation& segmentation, const Sig
 
 Result<Signature> makeSignature(const Segmentation& segmentation, const SignatureOptions& options,
                                 const RunContext& context) {
-    if (auto valid = validate(options); !valid) return fail(valid.error());
+    RETURN_IF_ERROR(validate(options));
     try {
         auto signature = makeSignatureOrThrow(segmentation, options);
         if (!signature || !options.attributes) return signature;
         auto attributes = attributesOf(segmentation, *signature, context);
-        if (!attributes) return fail(attributes.error());
+        RETURN_IF_ERROR(attributes);
         signature->attributes = std::move(*attributes);
         return signature;
     } catch (const std::bad_alloc&) {

@@ -11,7 +11,7 @@
 #include "core/base/run_context.h"
 #include "core/geometry/point.h"
 #include "core/segmentation/segmentation.h"
-#include "core/signature/parts.h"
+#include "core/signature/segment_descriptor.h"
 #include "core/signature/statistics.h"
 
 namespace shapedb {
@@ -33,12 +33,12 @@ constexpr std::uint32_t kMaxSignaturePoints = 16;
 
 /// One weighted point with what its segment knows besides. Lengths are divided by
 /// Signature::scale. Single precision: what is scored is exactly what is stored.
-struct SignaturePoint {
+struct WeightedPoint {
     /// Representative point g* minus the heaviest one's: the first point's is (0, 0, 0).
     std::array<float, 3> position{};
-    float weight = 0.0f;       ///< volume of the segment / scale^3, > 0
-    float volumeShare = 0.0f;  ///< of the whole interior, (0, 1]
-    float peakRadius = 0.0f;   ///< circumradius of its largest Delaunay ball / scale
+    float weight = 0.0f;         ///< volume of the segment / scale^3, > 0
+    float volumeShare = 0.0f;    ///< of the whole interior, (0, 1]
+    float maximumRadius = 0.0f;  ///< circumradius of its largest Delaunay ball / scale
     /// Second central moments / scale^2: xx, xy, xz, yy, yz, zz.
     std::array<float, 6> covariance{};
 };
@@ -51,10 +51,10 @@ struct ShapeAttributes {
 };
 
 struct Signature {
-    std::vector<SignaturePoint> points;  ///< by falling weight; 1 to kMaxSignaturePoints
-    double scale = 1.0;                  ///< smallest diagonal of a box around the interior, scan units, > 0
-    Point3 origin;                       ///< heaviest representative point, scan units
-    double volume = 0.0;                 ///< of the whole interior, scan units cubed
+    std::vector<WeightedPoint> points;  ///< by falling weight; 1 to kMaxSignaturePoints
+    double scale = 1.0;                 ///< smallest diagonal of a box around the interior, scan units, > 0
+    Point3 origin;                      ///< heaviest representative point, scan units
+    double volume = 0.0;                ///< of the whole interior, scan units cubed
     std::optional<ShapeAttributes> attributes;  ///< with SignatureOptions::attributes
 };
 

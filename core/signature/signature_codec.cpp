@@ -7,6 +7,8 @@
 
 #include <zlib.h>
 
+#include "core/base/return_if_error.h"
+
 namespace shapedb {
 
 namespace {
@@ -102,20 +104,20 @@ class Reader {
     const char* at_;
 };
 
-SignaturePoint takePoint(Reader& reader, std::uint16_t version, const Signature& of) {
-    SignaturePoint point;
+WeightedPoint takePoint(Reader& reader, std::uint16_t version, const Signature& of) {
+    WeightedPoint point;
     for (float& v : point.position) v = reader.takeFloat();
     point.weight = reader.takeFloat();
     point.volumeShare =
         version == kPointsOnly ? reader.takeFloat() : volumeShareOf(point.weight, of.scale, of.volume);
-    point.peakRadius = reader.takeFloat();
+    point.maximumRadius = reader.takeFloat();
     for (float& v : point.covariance) v = reader.takeFloat();
     return point;
 }
 
-bool allFinite(const SignaturePoint& point) {
+bool allFinite(const WeightedPoint& point) {
     bool finite =
-        std::isfinite(point.weight) && std::isfinite(point.volumeShare) && std::isfinite(point.peakRadius);
+        std::isfinite(point.weight) && std::isfinite(point.volumeShare) && std::isfinite(point.maximumRadius);
     for (const float v : point.position) finite = finite && std::isfinite(v);
     for (const float v : point.covariance) finite = finite && std::isfinite(v);
     return finite;
@@ -135,7 +137,7 @@ Result<void> checkNumbers(const Signature& signature, std::uint16_t version) {
         return malformed("the origin is not finite");
     }
     for (std::size_t i = 0; i < signature.points.size(); ++i) {
-        const SignaturePoint& p = signature.points[i];
+        const WeightedPoint& p = signature.points[i];
         const auto name = [i] { return "point " + std::to_string(i); };
         if (!allFinite(p)) return malformed(name() + " has a number that is not finite");
         if (!(p.weight > 0.0f)) return malformed(name() + " has no positive weight");
@@ -144,7 +146,7 @@ Result<void> checkNumbers(const Signature& signature, std::uint16_t version) {
             return malformed(name() + " outweighs the whole volume");
         if (!(p.volumeShare > 0.0f) || p.volumeShare > 1.0f)
             return malformed(name() + " has a volume share outside (0, 1]");
-        if (!(p.peakRadius > 0.0f)) return malformed(name() + " has no positive peak radius");
+        if (!(p.maximumRadius > 0.0f)) return malformed(name() + " has no positive maximum radius");
         if (i > 0 && p.weight > signature.points[i - 1].weight)
             return malformed(name() + " is heavier than the one before");
     }
@@ -188,11 +190,11 @@ std::string encodeSignature(const Signature& signature) {
     putDouble(out, signature.origin.y);
     putDouble(out, signature.origin.z);
     putDouble(out, signature.volume);
-    for (const SignaturePoint& point : signature.points) {
+    for (const WeightedPoint& point : signature.points) {
         for (const float v : point.position) putFloat(out, v);
         putFloat(out, point.weight);
         if (version == kPointsOnly) putFloat(out, point.volumeShare);
-        putFloat(out, point.peakRadius);
+        putFloat(out, point.maximumRadius);
         for (const float v : point.covariance) putFloat(out, v);
     }
     if (signature.attributes) putStatistics(out, signature.attributes->statistics);
@@ -202,7 +204,7 @@ std::string encodeSignature(const Signature& signature) {
 
 Result<Signature> decodeSignature(const std::string& bytes) {
     Signature signature;
-    if (auto done = decodeSignature(bytes, signature); !done) return fail(done.error());
+    RETURN_IF_ERROR(decodeSignature(bytes, signature));
     return signature;
 }
 
@@ -240,7 +242,7 @@ Result<void> decodeSignature(const std::string& bytes, Signature& signature) {
         for (std::uint16_t i = 0; i < count; ++i) {
             signature.points.push_back(takePoint(reader, version, signature));
         }
-        if (auto valid = checkNumbers(signature, version); !valid) return fail(valid.error());
+        RETURN_IF_ERROR(checkNumbers(signature, version));
         if (version == kPointsOnly) {
             signature.attributes.reset();
         } else {

@@ -6,6 +6,7 @@
 
 #include "core/base/parallel.h"
 #include "core/base/random.h"
+#include "core/base/return_if_error.h"
 #include "core/signature/footprint.h"
 #include "core/signature/histogram.h"
 #include "core/signature/inner_distances.h"
@@ -190,9 +191,9 @@ Result<ShapeStatistics> shapeStatistics(const InteriorView& view, const RunConte
         distancesInOutline(outline, bins(Statistic::kFootprintDistances));
     };
     // Each writes bins of its own: the same bits on any number of threads.
-    doTogether(inside, lines, rest);
-    if (!insideDone) return fail(insideDone.error());
-    if (auto ok = context.checkpoint(); !ok) return fail(ok.error());
+    parallelInvoke(inside, lines, rest);
+    RETURN_IF_ERROR(insideDone);
+    RETURN_IF_ERROR(context.checkpoint());
     return result;
 }
 

@@ -30,7 +30,7 @@ enum class Statistic : std::uint8_t {
 constexpr std::size_t kStatisticKinds = 10;
 
 /// What a scan must show for a statistic of it to hold.
-enum class Ground : std::uint8_t {
+enum class Evidence : std::uint8_t {
     kInside,   ///< all of the surface, so that the inside can be told
     kSurface,  ///< the surface; of one side most of it holds (a chord's share inside hardly depends
                ///< on how thick a thin shape is taken to be)
@@ -41,23 +41,23 @@ struct StatisticLayout {
     const char* name;      ///< for people: "chords"; static storage
     std::uint16_t offset;  ///< of its first bin
     std::uint16_t count;   ///< bins
-    Ground ground;
+    Evidence evidence;
     /// Above 0: which end comes first is chance, so two shapes are also compared with one's rows in
     /// reverse; as many rows as this.
     std::uint16_t reversibleRows;
 };
 
 constexpr std::array<StatisticLayout, kStatisticKinds> kStatistics{{
-    {"chords", 0, 48, Ground::kSurface, 0},
-    {"thickness by centrality", 48, 60, Ground::kInside, 0},
-    {"thickness by radius", 108, 60, Ground::kInside, 0},
-    {"bending", 168, 24, Ground::kInside, 0},
-    {"interior harmonics", 192, 64, Ground::kInside, 0},
-    {"surface distances", 256, 32, Ground::kSurface, 0},
-    {"surface harmonics", 288, 64, Ground::kSurface, 0},
-    {"spread", 352, 20, Ground::kInside, 0},
-    {"footprint", 372, 40, Ground::kOutline, 10},
-    {"footprint distances", 412, 20, Ground::kOutline, 0},
+    {"chords", 0, 48, Evidence::kSurface, 0},
+    {"thickness by centrality", 48, 60, Evidence::kInside, 0},
+    {"thickness by radius", 108, 60, Evidence::kInside, 0},
+    {"bending", 168, 24, Evidence::kInside, 0},
+    {"interior harmonics", 192, 64, Evidence::kInside, 0},
+    {"surface distances", 256, 32, Evidence::kSurface, 0},
+    {"surface harmonics", 288, 64, Evidence::kSurface, 0},
+    {"spread", 352, 20, Evidence::kInside, 0},
+    {"footprint", 372, 40, Evidence::kOutline, 10},
+    {"footprint distances", 412, 20, Evidence::kOutline, 0},
 }};
 constexpr std::size_t kStatisticBins = 432;
 

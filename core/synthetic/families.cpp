@@ -4,8 +4,9 @@
 #include <cmath>
 
 #include "core/base/random.h"
+#include "core/base/return_if_error.h"
 #include "core/geometry/motion.h"
-#include "core/geometry/noise.h"
+#include "core/synthetic/noise.h"
 #include "core/synthetic/parts.h"
 
 namespace shapedb {
@@ -461,9 +462,8 @@ Result<PointCloud> scanOf(const Solid& solid, const ScanOptions& options) {
     Random poseRandom(seeds.next());
 
     auto points = sampleBoundary(solid, options.count, pointSeed);
-    if (!points) return fail(points.error());
-    if (const auto noisy = addGaussianNoise(*points, options.noise, noiseSeed); !noisy)
-        return fail(noisy.error());
+    RETURN_IF_ERROR(points);
+    RETURN_IF_ERROR(addGaussianNoise(*points, options.noise, noiseSeed));
     if (!options.randomPose) return points;
     return applyToCloud(randomPose(poseRandom, boundsOf(solid).diagonal()), *points);
 }

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/base/random.h"
+#include "core/base/return_if_error.h"
 
 namespace shapedb {
 
@@ -311,7 +312,7 @@ Solid movedSolid(const Motion& motion, const Solid& solid) {
 }
 
 Result<PointCloud> sampleBoundary(const Solid& solid, std::size_t count, std::uint64_t seed) {
-    if (const auto valid = checkSolid(solid); !valid) return fail(valid.error());
+    RETURN_IF_ERROR(checkSolid(solid));
     if (count == 0) {
         return fail(ErrorCode::kInvalidArgument, "the number of points to sample must be at least 1");
     }

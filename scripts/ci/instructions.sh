@@ -11,9 +11,7 @@ cd "$(dirname "$0")/../.."
 
 build_dir=${BUILD_DIR:-build}
 scripts/install-deps.sh
-if [ ! -f "$build_dir/CMakeCache.txt" ]; then
-  cmake -S . -B "$build_dir" -G Ninja -DCMAKE_BUILD_TYPE=Release
-fi
+cmake -S . -B "$build_dir" -G Ninja -DCMAKE_BUILD_TYPE=Release -DSHAPEDB_BUILD_BENCH=ON
 export CCACHE_BASEDIR="$PWD"
 cmake --build "$build_dir" --target shapedb_bench
 exec "$build_dir/bin/shapedb-bench" instructions bench/instructions.json "$@"

@@ -12,6 +12,7 @@
 #include <toml++/toml.h>
 #include <unistd.h>
 
+#include "core/base/return_if_error.h"
 #include "server/config/settings.h"
 
 namespace shapedb::config {
@@ -55,7 +56,7 @@ class FileReader {
 
     Result<void> read() {
         const Result<std::string> text = content();
-        if (!text) return fail(text.error());
+        RETURN_IF_ERROR(text);
         try {
             return readTable(toml::parse(*text, path_), "");
         } catch (const toml::parse_error& error) {
@@ -93,9 +94,9 @@ class FileReader {
                             (setting->kind == SettingKind::kText ? "text in quotes" : "a whole number") +
                             " (" + setting->range + ")");
                 }
-                if (const auto assigned = assign(loaded_, *setting, *text, where); !assigned) return assigned;
+                RETURN_IF_ERROR(assign(loaded_, *setting, *text, where));
             } else if (isTable(key) && node.is_table()) {
-                if (const auto read = readTable(*node.as_table(), key + "."); !read) return read;
+                RETURN_IF_ERROR(readTable(*node.as_table(), key + "."));
             } else {
                 return fail(ErrorCode::kInvalidArgument,
                             where + ": unknown key " + key + "; shapedbd --help lists the settings");
@@ -196,24 +197,24 @@ Result<Loaded> load(const CommandLine& commandLine, const std::vector<std::strin
     for (const Setting& setting : settings()) loaded.origins[setting.key] = "default";
 
     const Result<Variables> variables = readEnvironment(environment);
-    if (!variables) return fail(variables.error());
+    RETURN_IF_ERROR(variables);
 
     const std::string& file = commandLine.configFile.empty() ? variables->configFile : commandLine.configFile;
     if (!file.empty()) {
-        if (const auto read = FileReader(loaded, file).read(); !read) return fail(read.error());
+        RETURN_IF_ERROR(FileReader(loaded, file).read());
     }
     for (const auto& [key, text] : variables->settings) {
         const Setting& setting = *findByKey(key);
         const auto assigned = assign(loaded, setting, text, "environment " + setting.environment);
-        if (!assigned) return fail(assigned.error());
+        RETURN_IF_ERROR(assigned);
     }
     for (const auto& [key, text] : commandLine.flags) {
         const Setting* setting = findByKey(key);
         if (setting == nullptr) return fail(ErrorCode::kInternal, "no setting for flag of " + key);
         const auto assigned = assign(loaded, *setting, text, "flag " + setting->flag);
-        if (!assigned) return fail(assigned.error());
+        RETURN_IF_ERROR(assigned);
     }
-    if (const auto valid = validateTogether(loaded.config); !valid) return fail(valid.error());
+    RETURN_IF_ERROR(validateTogether(loaded.config));
     return loaded;
 }
 

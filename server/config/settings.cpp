@@ -9,6 +9,8 @@
 
 #include <arpa/inet.h>
 
+#include "core/base/return_if_error.h"
+
 namespace shapedb::config {
 namespace {
 
@@ -94,7 +96,7 @@ Setting number(const std::string& key, SettingKind kind, std::uint64_t low, std:
     Setting setting = named(key, kind, show(low) + " to " + show(high), std::move(help));
     setting.assign = [=](ServerConfig& config, const std::string& text) -> Result<void> {
         const auto value = kind == SettingKind::kBytes ? parseBytes(text) : parseUnsigned(text);
-        if (!value) return fail(value.error());
+        RETURN_IF_ERROR(value);
         if (*value < low || *value > high) {
             return fail(ErrorCode::kInvalidArgument,
                         quoted(text) + " is outside " + show(low) + " to " + show(high));
@@ -136,7 +138,7 @@ Setting listenSetting() {
                             "Address to serve on. Port 0 picks a free one; IPv6 hosts in brackets.");
     setting.assign = [](ServerConfig& config, const std::string& text) -> Result<void> {
         const Result<Endpoint> endpoint = parseEndpoint(text);
-        if (!endpoint) return fail(endpoint.error());
+        RETURN_IF_ERROR(endpoint);
         config.listen = text;
         return {};
     };

@@ -9,8 +9,9 @@
 #include <oneapi/tbb/parallel_pipeline.h>
 
 #include "core/base/parallel.h"
+#include "core/base/return_if_error.h"
 #include "core/signature/signature_codec.h"
-#include "server/index/parameters_codec.h"
+#include "server/store/parameters_codec.h"
 
 namespace shapedb::index {
 namespace {
@@ -149,11 +150,11 @@ Result<SnapshotPtr> CollectionIndex::read(const store::Collection& collection, s
     auto snapshot = std::make_shared<Snapshot>();
     snapshot->collection = collection;
     Result<ShapeParameters> parameters = parametersOf(collection);
-    if (!parameters) return fail(parameters.error());
+    RETURN_IF_ERROR(parameters);
     snapshot->parameters = *parameters;
 
     auto signatures = readSignatures(collection.id, batches, context);
-    if (!signatures) return fail(signatures.error());
+    RETURN_IF_ERROR(signatures);
     snapshot->signatures = std::move(*signatures);
     return SnapshotPtr(std::move(snapshot));
 }
@@ -170,11 +171,11 @@ Result<void> CollectionIndex::loadAll(const RunContext& context) {
 
 Result<void> CollectionIndex::loadAllUnguarded(const RunContext& context) {
     const auto collections = store_.listCollections();
-    if (!collections) return fail(collections.error());
+    RETURN_IF_ERROR(collections);
     Directory next;
     for (const store::Collection& collection : *collections) {
         Result<SnapshotPtr> snapshot = read(collection, batchesOfAllProcessors(), context);
-        if (!snapshot) return fail(snapshot.error());
+        RETURN_IF_ERROR(snapshot);
         auto slot = std::make_shared<Slot>();
         slot->publish(*snapshot);
         insert(next, std::move(slot));
@@ -218,7 +219,7 @@ Result<SnapshotPtr> CollectionIndex::add(const store::Collection& collection) {
     auto snapshot = std::make_shared<Snapshot>();
     snapshot->collection = collection;
     Result<ShapeParameters> parameters = parametersOf(collection);
-    if (!parameters) return fail(parameters.error());
+    RETURN_IF_ERROR(parameters);
     snapshot->parameters = *parameters;
     auto slot = std::make_shared<Slot>();
     slot->publish(snapshot);
@@ -287,9 +288,9 @@ Result<void> CollectionIndex::reloadLocked(Slot& slot) {
     // What is marked by now will be read. Later marks may or may not be, and are applied after.
     slot.takeDirty();
     const auto collection = store_.getCollection(slot.current()->collection.name);
-    if (!collection) return fail(collection.error());
+    RETURN_IF_ERROR(collection);
     Result<SnapshotPtr> snapshot = read(*collection, kBatchesWhileServing, {});
-    if (!snapshot) return fail(snapshot.error());
+    RETURN_IF_ERROR(snapshot);
     slot.publish(*snapshot);
     slot.stale = false;
     return applyDirty(slot);
@@ -327,7 +328,7 @@ Result<bool> CollectionIndex::switchGeneration(std::int64_t collectionId,
     if (!changed || !*changed) return changed;
     const std::lock_guard<std::mutex> lock(slot->apply);
     const Result<void> reloaded = guarded([&] { return reloadLocked(*slot); });
-    if (!reloaded) return fail(reloaded.error());
+    RETURN_IF_ERROR(reloaded);
     return true;
 }
 

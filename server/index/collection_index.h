@@ -17,8 +17,8 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/pipeline.h"
 #include "core/search/signature_set.h"
-#include "core/signature/profile.h"
 #include "server/store/store.h"
 #include "server/telemetry/logger.h"
 

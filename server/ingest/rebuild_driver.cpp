@@ -6,9 +6,10 @@
 #include <string>
 #include <utility>
 
+#include "core/base/return_if_error.h"
 #include "core/signature/signature_codec.h"
-#include "server/index/parameters_codec.h"
 #include "server/ingest/background_thread.h"
+#include "server/store/parameters_codec.h"
 
 namespace shapedb::ingest {
 namespace {
@@ -32,7 +33,7 @@ std::vector<telemetry::Field> fieldsOf(const store::Rebuild& rebuild, const Erro
 }  // namespace
 
 RebuildDriver::RebuildDriver(store::Store& store, index::CollectionIndex& index, WorkerPool& pool,
-                             SuspectGate& suspects, Describer describe, telemetry::LoggerPtr log,
+                             CrashIsolation& suspects, SignaturePipeline describe, telemetry::LoggerPtr log,
                              RebuildOptions options)
     : store_(store),
       index_(index),
@@ -47,14 +48,14 @@ RebuildDriver::~RebuildDriver() { stop(); }
 
 Result<void> RebuildDriver::enqueueRunning() {
     const auto running = store_.runningRebuilds();
-    if (!running) return fail(running.error());
+    RETURN_IF_ERROR(running);
     const std::lock_guard<std::mutex> lock(mutex_);
     queue_.assign(running->begin(), running->end());
     return {};
 }
 
 Result<void> RebuildDriver::start() {
-    if (const auto queued = enqueueRunning(); !queued) return queued;
+    RETURN_IF_ERROR(enqueueRunning());
     for (int i = 0; i < std::max(1, options_.threads); ++i) {
         threads_.emplace_back([this] {
             becomeBackgroundThread();
@@ -69,7 +70,7 @@ Result<store::Rebuild> RebuildDriver::begin(const store::Collection& collection,
     const std::lock_guard<std::mutex> one(beginMutex_);
     const std::string text = index::encodeParameters(parameters);
     const auto running = store_.runningRebuilds();
-    if (!running) return fail(running.error());
+    RETURN_IF_ERROR(running);
     for (const store::Rebuild& rebuild : *running) {
         if (rebuild.collectionId != collection.id) continue;
         if (rebuild.parameters == text) return rebuild;
@@ -90,7 +91,7 @@ Result<store::Rebuild> RebuildDriver::begin(const store::Collection& collection,
 
 Result<store::Rebuild> RebuildDriver::waitForChange(const store::Rebuild& seen, const RunContext& context) {
     for (auto nextCount = RunContext::Clock::now();;) {
-        if (const auto go = context.checkpoint(); !go) return fail(go.error());
+        RETURN_IF_ERROR(context.checkpoint());
         if (RunContext::Clock::now() >= nextCount) {
             auto now = store_.getRebuild(seen.id);
             if (!now || !sameProgress(*now, seen)) return now;
@@ -118,7 +119,7 @@ Result<void> RebuildDriver::cancel(const store::Collection& collection) {
         }
     }
     const auto running = store_.runningRebuilds();
-    if (!running) return fail(running.error());
+    RETURN_IF_ERROR(running);
     for (const store::Rebuild& rebuild : *running) {
         if (rebuild.collectionId != collection.id) continue;
         const auto abandoned = store_.abandonRebuild(rebuild.id, store::RebuildState::kCancelled);
@@ -310,7 +311,7 @@ Result<void> RebuildDriver::guarded(Active& active, const store::Shape& shape) {
         if (stored) entry.acquit();
         return stored;
     }
-    const SuspectGate::Pass pass(suspects_, deaths > 0);
+    const CrashIsolation::Pass pass(suspects_, deaths > 0);
     CrashJournal::Entry entry(journal_, shape);
     const Result<void> stored = process(active, shape);
     if (stored && !active.cancel) entry.acquit();

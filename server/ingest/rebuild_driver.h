@@ -20,9 +20,9 @@
 #include "core/base/error.h"
 #include "core/base/run_context.h"
 #include "server/index/collection_index.h"
+#include "server/ingest/crash_isolation.h"
 #include "server/ingest/crash_journal.h"
-#include "server/ingest/describer.h"
-#include "server/ingest/suspect_gate.h"
+#include "server/ingest/signature_pipeline.h"
 #include "server/ingest/worker_pool.h"
 #include "server/store/store.h"
 #include "server/telemetry/logger.h"
@@ -45,8 +45,9 @@ struct RebuildOptions {
 class RebuildDriver {
   public:
     /// The references are not owned and must outlive the driver.
-    RebuildDriver(store::Store& store, index::CollectionIndex& index, WorkerPool& pool, SuspectGate& suspects,
-                  Describer describe, telemetry::LoggerPtr log, RebuildOptions options);
+    RebuildDriver(store::Store& store, index::CollectionIndex& index, WorkerPool& pool,
+                  CrashIsolation& suspects, SignaturePipeline describe, telemetry::LoggerPtr log,
+                  RebuildOptions options);
     /// As `stop`.
     ~RebuildDriver();
 
@@ -100,8 +101,8 @@ class RebuildDriver {
     store::Store& store_;
     index::CollectionIndex& index_;
     WorkerPool& pool_;
-    SuspectGate& suspects_;
-    Describer describe_;
+    CrashIsolation& suspects_;
+    SignaturePipeline describe_;
     telemetry::LoggerPtr log_;
     RebuildOptions options_;
     CrashJournal journal_;

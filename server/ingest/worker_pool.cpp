@@ -6,6 +6,7 @@
 #include <new>
 #include <utility>
 
+#include "core/base/return_if_error.h"
 #include "core/signature/signature_codec.h"
 #include "server/ingest/background_thread.h"
 
@@ -32,7 +33,7 @@ std::vector<telemetry::Field> fieldsOf(const store::Job& job, const Error& error
 }  // namespace
 
 WorkerPool::WorkerPool(store::Store& store, index::CollectionIndex& index, ProgressBoard& board,
-                       SuspectGate& suspects, Describer describe, telemetry::LoggerPtr log,
+                       CrashIsolation& suspects, SignaturePipeline describe, telemetry::LoggerPtr log,
                        WorkerOptions options)
     : store_(store),
       index_(index),
@@ -46,7 +47,7 @@ WorkerPool::~WorkerPool() { stop(); }
 
 Result<void> WorkerPool::recover() {
     const auto quarantined = store_.recoverJobs(options_.maxAttempts);
-    if (!quarantined) return fail(quarantined.error());
+    RETURN_IF_ERROR(quarantined);
     for (const store::Shape& shape : *quarantined) {
         log_->error(
             "scan set aside: the server died each time it was segmented",
@@ -57,7 +58,7 @@ Result<void> WorkerPool::recover() {
 }
 
 Result<void> WorkerPool::start() {
-    if (const auto recovered = recover(); !recovered) return recovered;
+    RETURN_IF_ERROR(recover());
     for (int i = 0; i < std::max(1, options_.threads); ++i) {
         threads_.emplace_back([this] {
             becomeBackgroundThread();
@@ -145,7 +146,7 @@ std::chrono::milliseconds WorkerPool::retryAfter(std::uint64_t jobs) const {
 
 void WorkerPool::run() {
     for (;;) {
-        std::optional<SuspectGate::Pass> pass;
+        std::optional<CrashIsolation::Pass> pass;
         const std::shared_ptr<Running> running = next(pass);
         if (!running) return;
         work(running);
@@ -188,7 +189,7 @@ Result<std::optional<store::Job>> WorkerPool::claim(std::unique_lock<std::mutex>
 }
 
 /// Blocks until there is a job and this worker may have it; null when the pool stops.
-std::shared_ptr<WorkerPool::Running> WorkerPool::next(std::optional<SuspectGate::Pass>& pass) {
+std::shared_ptr<WorkerPool::Running> WorkerPool::next(std::optional<CrashIsolation::Pass>& pass) {
     std::unique_lock<std::mutex> lock(mutex_);
     for (;;) {
         const auto mayClaim = [this] {

@@ -19,9 +19,9 @@
 
 #include "core/base/error.h"
 #include "server/index/collection_index.h"
-#include "server/ingest/describer.h"
+#include "server/ingest/crash_isolation.h"
 #include "server/ingest/progress_board.h"
-#include "server/ingest/suspect_gate.h"
+#include "server/ingest/signature_pipeline.h"
 #include "server/store/store.h"
 #include "server/telemetry/logger.h"
 
@@ -39,7 +39,8 @@ class WorkerPool {
   public:
     /// The references are not owned and must outlive the pool.
     WorkerPool(store::Store& store, index::CollectionIndex& index, ProgressBoard& board,
-               SuspectGate& suspects, Describer describe, telemetry::LoggerPtr log, WorkerOptions options);
+               CrashIsolation& suspects, SignaturePipeline describe, telemetry::LoggerPtr log,
+               WorkerOptions options);
     /// As `stop`.
     ~WorkerPool();
 
@@ -82,7 +83,7 @@ class WorkerPool {
 
     static void markSuperseded(Running& running);
     void run();
-    std::shared_ptr<Running> next(std::optional<SuspectGate::Pass>& pass);
+    std::shared_ptr<Running> next(std::optional<CrashIsolation::Pass>& pass);
     Result<std::optional<store::Job>> claim(std::unique_lock<std::mutex>& lock);
     void retryReleases(std::unique_lock<std::mutex>& lock);
     void work(const std::shared_ptr<Running>& running);
@@ -96,8 +97,8 @@ class WorkerPool {
     store::Store& store_;
     index::CollectionIndex& index_;
     ProgressBoard& board_;
-    SuspectGate& suspects_;
-    Describer describe_;
+    CrashIsolation& suspects_;
+    SignaturePipeline describe_;
     telemetry::LoggerPtr log_;
     WorkerOptions options_;
 

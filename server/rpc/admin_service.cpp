@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/return_if_error.h"
 #include "server/config/load.h"
 #include "server/rpc/backup_stream.h"
 #include "server/rpc/call.h"
@@ -28,7 +29,7 @@ Result<void> reloadCache(const Services& services, Call& call,
                          const std::vector<index::SnapshotPtr>& collections, RebuildWriter& writer) {
     for (const index::SnapshotPtr& snapshot : collections) {
         const auto began = std::chrono::steady_clock::now();
-        if (const auto reloaded = services.index.reload(snapshot->collection.id); !reloaded) return reloaded;
+        RETURN_IF_ERROR(services.index.reload(snapshot->collection.id));
         const auto now = services.index.byId(snapshot->collection.id);
         const std::uint64_t count = now ? (*now)->signatures.size() : 0;
         v1::RebuildProgress progress;
@@ -37,7 +38,7 @@ Result<void> reloadCache(const Services& services, Call& call,
         progress.set_total(count);
         progress.set_finished(true);
         progress.set_seconds(std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count());
-        if (const auto sent = call.write(writer, progress); !sent) return sent;
+        RETURN_IF_ERROR(call.write(writer, progress));
     }
     return {};
 }
@@ -64,7 +65,7 @@ Result<void> follow(const Services& services, Call& call, const std::string& col
                     store::Rebuild rebuild, bool detach, RebuildWriter& writer) {
     RunContext oneSecond = call.run();
     for (;;) {
-        if (const auto sent = sendProgress(call, collection, rebuild, writer); !sent) return sent;
+        RETURN_IF_ERROR(sendProgress(call, collection, rebuild, writer));
         if (detach || rebuild.state == store::RebuildState::kDone) return {};
         if (rebuild.state == store::RebuildState::kCancelled) {
             return fail(ErrorCode::kCancelled,
@@ -75,7 +76,7 @@ Result<void> follow(const Services& services, Call& call, const std::string& col
                         "the rebuild of collection '" + collection + "' failed: see the log");
         }
         for (;;) {
-            if (const auto go = call.checkpointWhileFollowing(); !go) return go;
+            RETURN_IF_ERROR(call.checkpointWhileFollowing());
             oneSecond.deadline = std::min(call.run().deadline, RunContext::Clock::now() + kProgressInterval);
             const auto changed = services.rebuilds.waitForChange(rebuild, oneSecond);
             if (changed) {
@@ -124,21 +125,21 @@ grpc::Status AdminServiceHandler::Rebuild(grpc::ServerContext* context, const v1
         std::vector<index::SnapshotPtr> collections = services_.index.all();
         if (!request->collection().empty()) {
             const auto found = call.collection(request->collection());
-            if (!found) return fail(found.error());
+            RETURN_IF_ERROR(found);
             collections = {*found};
         }
         if (request->cache_only()) return reloadCache(services_, call, collections, *writer);
 
-        if (const auto place = call.becomeFollower(); !place) return place;
+        RETURN_IF_ERROR(call.becomeFollower());
         // All are started first: they go on should this call be lost while it follows one.
         std::vector<store::Rebuild> started;
         for (const index::SnapshotPtr& snapshot : collections) {
             const auto parameters = parametersFrom(request->profile(), request->segmentation(),
                                                    request->signature(), snapshot->parameters);
-            if (!parameters) return fail(parameters.error());
+            RETURN_IF_ERROR(parameters);
             const RestoreGate::Write write(services_.restores);
             const auto rebuild = services_.rebuilds.begin(snapshot->collection, *parameters);
-            if (!rebuild) return fail(rebuild.error());
+            RETURN_IF_ERROR(rebuild);
             started.push_back(*rebuild);
         }
         for (std::size_t i = 0; i < started.size(); ++i) {
@@ -156,7 +157,7 @@ grpc::Status AdminServiceHandler::CancelRebuild(grpc::ServerContext* context,
     return handle(services_, context, "CancelRebuild", [&](Call& call) -> Result<void> {
         const RestoreGate::Write write(services_.restores);
         const auto found = call.collection(request->collection());
-        if (!found) return fail(found.error());
+        RETURN_IF_ERROR(found);
         return services_.rebuilds.cancel((*found)->collection);
     });
 }
@@ -165,8 +166,8 @@ grpc::Status AdminServiceHandler::Backup(grpc::ServerContext* context, const v1:
                                          grpc::ServerWriter<v1::BackupChunk>* writer) {
     return handle(services_, context, "Backup", [&](Call& call) -> Result<void> {
         const auto file = TemporaryFile::create(services_.temporaryDirectory);
-        if (!file) return fail(file.error());
-        if (const auto copied = services_.store.backup(file->path(), call.run()); !copied) return copied;
+        RETURN_IF_ERROR(file);
+        RETURN_IF_ERROR(services_.store.backup(file->path(), call.run()));
         return sendFile(file->path(), call.run(),
                         [&](const v1::BackupChunk& chunk) { return call.write(*writer, chunk); });
     });
@@ -178,24 +179,24 @@ grpc::Status AdminServiceHandler::Restore(grpc::ServerContext* context,
     return handle(services_, context, "Restore", [&](Call& call) -> Result<void> {
         call.expectRestore();
         const auto file = TemporaryFile::create(services_.temporaryDirectory);
-        if (!file) return fail(file.error());
+        RETURN_IF_ERROR(file);
         auto receiver = FileReceiver::create(file->path());
-        if (!receiver) return fail(receiver.error());
+        RETURN_IF_ERROR(receiver);
         v1::BackupChunk chunk;
         while (call.read(*reader, &chunk)) {
-            if (const auto go = call.run().checkpoint(); !go) return go;
-            if (const auto added = receiver->add(chunk); !added) return added;
+            RETURN_IF_ERROR(call.run().checkpoint());
+            RETURN_IF_ERROR(receiver->add(chunk));
         }
         if (call.clientGone()) return fail(ErrorCode::kCancelled, "the client cancelled the restore");
-        if (const auto complete = receiver->finish(); !complete) return complete;
+        RETURN_IF_ERROR(receiver->finish());
         call.note({"bytes", receiver->bytes()});
 
-        if (const auto begun = services_.restores.beginRestore(); !begun) return begun;
+        RETURN_IF_ERROR(services_.restores.beginRestore());
         const Result<void> restored = restoreInto(services_, call, file->path());
         services_.restores.endRestore();
         if (!restored) return restored;
         const auto stats = services_.store.stats();
-        if (!stats) return fail(stats.error());
+        RETURN_IF_ERROR(stats);
         response->set_collections(stats->collections);
         response->set_shapes(stats->shapesPending + stats->shapesReady + stats->shapesFailed);
         services_.log->info("database replaced by a backup", {{"shapes", response->shapes()}});
@@ -217,13 +218,13 @@ grpc::Status AdminServiceHandler::Check(grpc::ServerContext* context, const v1::
             (void)call.write(*writer, progress);  // a client that has gone is seen by the checkpoint
         };
         const auto problems = services_.store.check(run);
-        if (!problems) return fail(problems.error());
+        RETURN_IF_ERROR(problems);
         call.note({"problems", static_cast<std::uint64_t>(problems->size())});
         progress.set_done(progress.total());
         for (const std::string& problem : *problems) {
             progress.add_problems(problem);
             if (progress.ByteSizeLong() < kMaxChunkBytes) continue;
-            if (const auto sent = call.write(*writer, progress); !sent) return sent;
+            RETURN_IF_ERROR(call.write(*writer, progress));
             progress.clear_problems();
         }
         progress.set_finished(true);
@@ -235,9 +236,9 @@ grpc::Status AdminServiceHandler::Stats(grpc::ServerContext* context, const v1::
                                         v1::StatsResponse* response) {
     return handle(services_, context, "Stats", [&](Call&) -> Result<void> {
         const auto stats = services_.store.stats();
-        if (!stats) return fail(stats.error());
+        RETURN_IF_ERROR(stats);
         const auto depth = services_.store.queueDepth();
-        if (!depth) return fail(depth.error());
+        RETURN_IF_ERROR(depth);
         const index::CollectionIndex::Totals cache = services_.index.totals();
         const std::uint64_t running = services_.workers.running();
         const std::chrono::duration<double> uptime = std::chrono::system_clock::now() - services_.started;
@@ -265,7 +266,7 @@ grpc::Status AdminServiceHandler::ServerInfo(grpc::ServerContext* context, const
                                              v1::ServerInfoResponse* response) {
     return handle(services_, context, "ServerInfo", [&](Call&) -> Result<void> {
         const auto stats = services_.store.stats();
-        if (!stats) return fail(stats.error());
+        RETURN_IF_ERROR(stats);
         response->set_version(config::version());
         response->set_schema_version(stats->schemaVersion);
         const auto started = services_.started.time_since_epoch();

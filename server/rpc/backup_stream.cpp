@@ -4,6 +4,7 @@
 #include <cstring>
 #include <system_error>
 
+#include "core/base/return_if_error.h"
 #include "server/rpc/limits.h"
 
 namespace shapedb::rpc {
@@ -32,14 +33,14 @@ Result<void> sendFile(const std::string& path, const RunContext& context,
     v1::BackupChunk chunk;
     chunk.set_total_bytes(static_cast<std::uint64_t>(size));
     for (std::uint64_t sent = 0; sent < static_cast<std::uint64_t>(size);) {
-        if (const auto go = context.checkpoint(); !go) return go;
+        RETURN_IF_ERROR(context.checkpoint());
         std::string* data = chunk.mutable_data();
         data->resize(kMaxChunkBytes);
         data->resize(std::fread(data->data(), 1, data->size(), file.get()));
         if (data->empty()) return unreadable();
         hash.update(data->data(), data->size());
         sent += data->size();
-        if (const auto passed = send(chunk); !passed) return passed;
+        RETURN_IF_ERROR(send(chunk));
         chunk.Clear();
     }
     const Sha256Digest digest = hash.finish();

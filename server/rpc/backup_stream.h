@@ -7,9 +7,9 @@
 #include <memory>
 #include <string>
 
+#include "common/sha256.h"
 #include "core/base/error.h"
 #include "core/base/run_context.h"
-#include "server/common/sha256.h"
 #include "shapedb/v1/admin_service.pb.h"
 
 namespace shapedb::rpc {

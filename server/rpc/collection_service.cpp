@@ -1,9 +1,10 @@
 #include "server/rpc/collection_service.h"
 
-#include "server/index/parameters_codec.h"
+#include "core/base/return_if_error.h"
 #include "server/rpc/call.h"
 #include "server/rpc/convert.h"
 #include "server/rpc/request_checks.h"
+#include "server/store/parameters_codec.h"
 
 namespace shapedb::rpc {
 namespace {
@@ -18,7 +19,7 @@ Result<void> fill(const Services& services, const index::Snapshot& snapshot, v1:
     const auto ready = count(store::ShapeState::kReady);
     const auto failed = count(store::ShapeState::kFailed);
     for (const auto& result : {all, ready, failed}) {
-        if (!result) return fail(result.error());
+        RETURN_IF_ERROR(result);
     }
     toProto(snapshot.collection, snapshot.parameters, out);
     out->set_shapes(*all);
@@ -34,17 +35,17 @@ grpc::Status CollectionServiceHandler::CreateCollection(grpc::ServerContext* con
                                                         v1::Collection* response) {
     return handle(services_, context, "CreateCollection", [&](Call& call) -> Result<void> {
         call.note({"collection", request->name()});
-        if (const auto valid = checkCollectionName(request->name()); !valid) return valid;
-        if (const auto valid = checkDescription(request->description()); !valid) return valid;
+        RETURN_IF_ERROR(checkCollectionName(request->name()));
+        RETURN_IF_ERROR(checkDescription(request->description()));
         const auto parameters = parametersFrom(request->profile(), request->segmentation(),
                                                request->signature(), parametersOf(Profile::kDefault));
-        if (!parameters) return fail(parameters.error());
+        RETURN_IF_ERROR(parameters);
         const RestoreGate::Write write(services_.restores);
         const auto created = services_.store.createCollection(request->name(), request->description(),
                                                               index::encodeParameters(*parameters));
-        if (!created) return fail(created.error());
+        RETURN_IF_ERROR(created);
         const auto added = services_.index.add(*created);
-        if (!added) return fail(added.error());
+        RETURN_IF_ERROR(added);
         return fill(services_, **added, response);
     });
 }
@@ -54,7 +55,7 @@ grpc::Status CollectionServiceHandler::GetCollection(grpc::ServerContext* contex
                                                      v1::Collection* response) {
     return handle(services_, context, "GetCollection", [&](Call& call) -> Result<void> {
         const auto found = call.collection(request->name());
-        if (!found) return fail(found.error());
+        RETURN_IF_ERROR(found);
         return fill(services_, **found, response);
     });
 }
@@ -64,8 +65,7 @@ grpc::Status CollectionServiceHandler::ListCollections(grpc::ServerContext* cont
                                                        v1::ListCollectionsResponse* response) {
     return handle(services_, context, "ListCollections", [&](Call&) -> Result<void> {
         for (const index::SnapshotPtr& snapshot : services_.index.all()) {
-            if (const auto filled = fill(services_, *snapshot, response->add_collections()); !filled)
-                return filled;
+            RETURN_IF_ERROR(fill(services_, *snapshot, response->add_collections()));
         }
         return {};
     });
@@ -76,14 +76,14 @@ grpc::Status CollectionServiceHandler::DeleteCollection(grpc::ServerContext* con
                                                         v1::DeleteCollectionResponse*) {
     return handle(services_, context, "DeleteCollection", [&](Call& call) -> Result<void> {
         // No default here: nobody deletes a collection by forgetting its name.
-        if (const auto valid = checkCollectionName(request->name()); !valid) return valid;
+        RETURN_IF_ERROR(checkCollectionName(request->name()));
         const RestoreGate::Write write(services_.restores);
         const auto found = call.collection(request->name());
-        if (!found) return fail(found.error());
+        RETURN_IF_ERROR(found);
         const store::Collection& collection = (*found)->collection;
         if (!request->force()) {
             const auto shapes = services_.store.countShapes(collection.id, {});
-            if (!shapes) return fail(shapes.error());
+            RETURN_IF_ERROR(shapes);
             if (*shapes > 0) {
                 return fail(ErrorCode::kRejected, "collection '" + collection.name + "' holds " +
                                                       std::to_string(*shapes) +
@@ -92,7 +92,7 @@ grpc::Status CollectionServiceHandler::DeleteCollection(grpc::ServerContext* con
         }
         const auto cancelled = services_.rebuilds.cancel(collection);
         if (!cancelled && cancelled.error().code != ErrorCode::kNotFound) return cancelled;
-        if (const auto deleted = services_.store.deleteCollection(collection.id); !deleted) return deleted;
+        RETURN_IF_ERROR(services_.store.deleteCollection(collection.id));
         services_.index.remove(collection.id);
         services_.workers.supersedeCollection(collection.id);
         return {};

@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "core/base/return_if_error.h"
 #include "core/signature/signature_codec.h"
 
 namespace shapedb::rpc {
@@ -93,13 +94,13 @@ void toProto(const store::Collection& collection, const ShapeParameters& paramet
     segmentation->set_deep_angle_degrees(parameters.segmentation.deepAngleDegrees);
     segmentation->set_hull_angle_degrees(parameters.segmentation.hullAngleDegrees);
     segmentation->set_merge_ratio(parameters.segmentation.mergeRatio);
-    segmentation->set_decimate_to(parameters.segmentation.decimateTo);
+    segmentation->set_decimate_to(parameters.segmentation.preparation.decimateTo);
     segmentation->set_merge_contrast(parameters.segmentation.mergeContrast);
     segmentation->set_min_segment_share(parameters.segmentation.minSegmentShare);
     segmentation->set_max_segments(parameters.segmentation.maxSegments);
-    segmentation->set_stray_ratio(parameters.segmentation.strayRatio);
-    segmentation->set_smoothing_reach(parameters.segmentation.smoothingReach);
-    segmentation->set_even_spacing(parameters.segmentation.evenSpacing);
+    segmentation->set_outlier_ratio(parameters.segmentation.preparation.outlierRatio);
+    segmentation->set_smoothing_reach(parameters.segmentation.preparation.smoothingReach);
+    segmentation->set_thinning(parameters.segmentation.preparation.thinning);
     segmentation->set_interior_method(toProto(parameters.segmentation.interiorMethod));
     out->mutable_signature()->set_max_points(parameters.signature.maxPoints);
     out->mutable_signature()->set_attributes(parameters.signature.attributes);
@@ -112,7 +113,7 @@ void toProto(const ShapeAttributes& attributes, pb::ShapeAttributes* out) {
     for (const StatisticLayout& layout : kStatistics) {
         pb::ShapeStatistic* statistic = out->add_statistics();
         statistic->set_name(layout.name);
-        statistic->set_of_interior(layout.ground == Ground::kInside);
+        statistic->set_of_interior(layout.evidence == Evidence::kInside);
         for (std::size_t i = layout.offset; i < std::size_t{layout.offset} + layout.count; ++i) {
             statistic->add_shares(static_cast<float>(shareOfLevel(attributes.statistics[i])));
         }
@@ -121,12 +122,12 @@ void toProto(const ShapeAttributes& attributes, pb::ShapeAttributes* out) {
 
 void toProto(const Signature& signature, pb::Signature* out) {
     for (std::size_t i = 0; i < signature.points.size(); ++i) {
-        const SignaturePoint& point = signature.points[i];
+        const WeightedPoint& point = signature.points[i];
         pb::WeightedPoint* weighted = out->add_points();
         toProto(pointPosition(signature, i), weighted->mutable_position());
         weighted->set_weight(pointVolume(signature, i));
         weighted->set_volume_share(point.volumeShare);
-        weighted->set_peak_radius(static_cast<double>(point.peakRadius) * signature.scale);
+        weighted->set_peak_radius(static_cast<double>(point.maximumRadius) * signature.scale);
         for (const double extent : pointExtents(signature, i)) weighted->add_extents(extent);
     }
     out->set_scale(signature.scale);
@@ -139,7 +140,7 @@ void toProto(const Segmentation& segmentation, pb::SegmentationReport* out) {
     out->set_points(segmentation.siteOfPoint.size());
     out->set_points_used(segmentation.sites.size());
     out->set_duplicates(segmentation.duplicates);
-    out->set_strays(segmentation.strays);
+    out->set_outliers(segmentation.outliers);
     out->set_quality(segmentation.quality);
     out->set_interior_source(toProto(segmentation.interiorSource));
     out->set_angle_degrees(segmentation.angleDegrees);
@@ -222,13 +223,14 @@ Result<ShapeParameters> parametersFrom(pb::Profile profile, const pb::Segmentati
     if (segmentation.has_deep_angle_degrees()) options.deepAngleDegrees = segmentation.deep_angle_degrees();
     if (segmentation.has_hull_angle_degrees()) options.hullAngleDegrees = segmentation.hull_angle_degrees();
     if (segmentation.has_merge_ratio()) options.mergeRatio = segmentation.merge_ratio();
-    if (segmentation.has_decimate_to()) options.decimateTo = segmentation.decimate_to();
+    if (segmentation.has_decimate_to()) options.preparation.decimateTo = segmentation.decimate_to();
     if (segmentation.has_merge_contrast()) options.mergeContrast = segmentation.merge_contrast();
     if (segmentation.has_min_segment_share()) options.minSegmentShare = segmentation.min_segment_share();
     if (segmentation.has_max_segments()) options.maxSegments = segmentation.max_segments();
-    if (segmentation.has_stray_ratio()) options.strayRatio = segmentation.stray_ratio();
-    if (segmentation.has_smoothing_reach()) options.smoothingReach = segmentation.smoothing_reach();
-    if (segmentation.has_even_spacing()) options.evenSpacing = segmentation.even_spacing();
+    if (segmentation.has_outlier_ratio()) options.preparation.outlierRatio = segmentation.outlier_ratio();
+    if (segmentation.has_smoothing_reach())
+        options.preparation.smoothingReach = segmentation.smoothing_reach();
+    if (segmentation.has_thinning()) options.preparation.thinning = segmentation.thinning();
     switch (static_cast<int>(segmentation.interior_method())) {
         case pb::INTERIOR_METHOD_UNSPECIFIED: break;
         case pb::INTERIOR_METHOD_WALK: options.interiorMethod = InteriorMethod::kWalk; break;
@@ -237,7 +239,7 @@ Result<ShapeParameters> parametersFrom(pb::Profile profile, const pb::Segmentati
     }
     if (signature.has_max_points()) parameters.signature.maxPoints = signature.max_points();
     if (signature.has_attributes()) parameters.signature.attributes = signature.attributes();
-    if (const auto valid = validate(parameters); !valid) return fail(valid.error());
+    RETURN_IF_ERROR(validate(parameters));
     return parameters;
 }
 

@@ -5,8 +5,8 @@
 
 #include "core/base/error.h"
 #include "core/matching/score.h"
+#include "core/pipeline.h"
 #include "core/segmentation/segmentation.h"
-#include "core/signature/profile.h"
 #include "core/signature/signature.h"
 #include "server/index/collection_index.h"
 #include "server/store/store.h"

@@ -2,7 +2,7 @@
 
 #include <charconv>
 
-#include "server/common/sha256.h"
+#include "common/sha256.h"
 
 namespace shapedb::rpc {
 namespace {

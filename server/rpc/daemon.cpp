@@ -9,8 +9,8 @@
 #include <grpcpp/grpcpp.h>
 #include <grpcpp/health_check_service_interface.h>
 
+#include "core/base/return_if_error.h"
 #include "server/config/settings.h"
-#include "server/index/parameters_codec.h"
 #include "server/rpc/admin_service.h"
 #include "server/rpc/collection_service.h"
 #include "server/rpc/limits.h"
@@ -19,7 +19,8 @@
 #include "server/rpc/services.h"
 #include "server/rpc/shape_service.h"
 #include "server/rpc/temporary_file.h"
-#include "server/store/sqlite_store.h"
+#include "server/store/parameters_codec.h"
+#include "server/store/sqlite/sqlite_store.h"
 
 namespace shapedb::rpc {
 namespace {
@@ -66,8 +67,8 @@ constexpr const char* kServiceNames[] = {"shapedb.v1.ShapeService", "shapedb.v1.
 
 /// In order of construction; destroyed in reverse.
 struct Daemon::Parts {
-    Parts(const config::ServerConfig& configuration, telemetry::LoggerPtr logger, ingest::Describer describe,
-          std::unique_ptr<store::Store> opened)
+    Parts(const config::ServerConfig& configuration, telemetry::LoggerPtr logger,
+          ingest::SignaturePipeline describe, std::unique_ptr<store::Store> opened)
         : config(configuration),
           log(std::move(logger)),
           store(std::move(opened)),
@@ -119,7 +120,7 @@ struct Daemon::Parts {
     std::unique_ptr<store::Store> store;
     index::CollectionIndex index;
     ingest::ProgressBoard board;
-    ingest::SuspectGate suspects;
+    ingest::CrashIsolation suspects;
     ingest::WorkerPool workers;
     ingest::RebuildDriver rebuilds;
     CancelWatcher cancellations;
@@ -140,22 +141,22 @@ struct Daemon::Parts {
 };
 
 Result<void> Daemon::Parts::prepare() {
-    if (const auto ready = prepareTemporaryDirectory(services.temporaryDirectory); !ready) return ready;
-    if (const auto ready = ensureDefaultCollection(*store); !ready) return ready;
+    RETURN_IF_ERROR(prepareTemporaryDirectory(services.temporaryDirectory));
+    RETURN_IF_ERROR(ensureDefaultCollection(*store));
     const auto began = std::chrono::steady_clock::now();
-    if (const auto loaded = index.loadAll(); !loaded) return loaded;
+    RETURN_IF_ERROR(index.loadAll());
     const auto totals = index.totals();
     log->info("index loaded",
               {{"signatures", totals.signatures},
                {"bytes", totals.bytes},
                {"seconds", std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count()}});
-    if (const auto started = workers.start(); !started) return started;
+    RETURN_IF_ERROR(workers.start());
     return rebuilds.start();
 }
 
 Result<void> Daemon::Parts::listen() {
     const auto wanted = config::parseEndpoint(config.listen);
-    if (!wanted) return fail(wanted.error());
+    RETURN_IF_ERROR(wanted);
     endpoint = *wanted;
 
     grpc::EnableDefaultHealthCheckService(true);
@@ -217,13 +218,13 @@ Daemon::~Daemon() {
 }
 
 Result<std::unique_ptr<Daemon>> Daemon::start(const config::ServerConfig& config, telemetry::LoggerPtr log,
-                                              ingest::Describer describe) {
+                                              ingest::SignaturePipeline describe) {
     auto opened = openStore(config);
-    if (!opened) return fail(opened.error());
+    RETURN_IF_ERROR(opened);
     auto parts = std::make_unique<Parts>(config, std::move(log), std::move(describe), std::move(*opened));
     std::unique_ptr<Daemon> daemon(new Daemon(std::move(parts)));
-    if (const auto prepared = daemon->parts_->prepare(); !prepared) return fail(prepared.error());
-    if (const auto listening = daemon->parts_->listen(); !listening) return fail(listening.error());
+    RETURN_IF_ERROR(daemon->parts_->prepare());
+    RETURN_IF_ERROR(daemon->parts_->listen());
     return daemon;
 }
 

@@ -6,7 +6,7 @@
 
 #include "core/base/error.h"
 #include "server/config/server_config.h"
-#include "server/ingest/describer.h"
+#include "server/ingest/signature_pipeline.h"
 #include "server/telemetry/logger.h"
 
 namespace shapedb::rpc {
@@ -18,7 +18,7 @@ class Daemon {
     /// store::openSqliteStore, kUnavailable (the address cannot be listened on).
     [[nodiscard]] static Result<std::unique_ptr<Daemon>> start(const config::ServerConfig& config,
                                                                telemetry::LoggerPtr log,
-                                                               ingest::Describer describe);
+                                                               ingest::SignaturePipeline describe);
     /// As `drain`.
     ~Daemon();
 

@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "core/base/return_if_error.h"
 #include "server/rpc/limits.h"
 
 namespace shapedb::rpc {
@@ -45,7 +46,7 @@ SegmentationSlots::Slot::~Slot() {
 Result<void> SegmentationSlots::Slot::acquire(const RunContext& context) {
     std::unique_lock<std::mutex> lock(slots_.mutex_);
     while (slots_.free_ == 0) {
-        if (const auto go = context.checkpoint(); !go) return go;
+        RETURN_IF_ERROR(context.checkpoint());
         slots_.changed_.wait_for(lock, kLookForCancellation);
     }
     --slots_.free_;

@@ -5,6 +5,7 @@
 #include <new>
 #include <utility>
 
+#include "core/base/return_if_error.h"
 #include "server/rpc/limits.h"
 
 // What travels is little-endian and is used as it is.
@@ -70,8 +71,8 @@ Result<void> PointReceiver::checkChunk(const std::string& xyz) const {
 }
 
 Result<void> PointReceiver::add(const std::string& xyz) {
-    if (const auto valid = checkChunk(xyz); !valid) return valid;
-    if (const auto room = share_.take(xyz.size()); !room) return room;
+    RETURN_IF_ERROR(checkChunk(xyz));
+    RETURN_IF_ERROR(share_.take(xyz.size()));
     const std::size_t before = scan_.xyz.size();
     scan_.xyz.resize(before + xyz.size() / sizeof(float));
     std::memcpy(scan_.xyz.data() + before, xyz.data(), xyz.size());

@@ -6,8 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "common/sha256.h"
 #include "core/base/error.h"
-#include "server/common/sha256.h"
+#include "core/base/return_if_error.h"
 #include "server/rpc/call.h"
 #include "server/rpc/gates.h"
 
@@ -61,7 +62,7 @@ template <typename Request, typename Reader, typename OnHeader>
 Result<ReceivedScan> receiveScan(Reader& reader, PointReceiver& receiver, Call& call, OnHeader&& onHeader) {
     Request request;
     while (call.read(reader, &request)) {
-        if (const auto go = call.run().checkpoint(); !go) return fail(go.error());
+        RETURN_IF_ERROR(call.run().checkpoint());
         Result<void> taken;
         if (request.has_header()) {
             taken = receiver.begin(request.header().point_count(), request.header().sha256());
@@ -72,7 +73,7 @@ Result<ReceivedScan> receiveScan(Reader& reader, PointReceiver& receiver, Call& 
         } else {
             taken = fail(ErrorCode::kMalformedStream, "message with neither header nor chunk");
         }
-        if (!taken) return fail(taken.error());
+        RETURN_IF_ERROR(taken);
     }
     // `Read` also ends when the client has gone: then nothing was completed.
     if (call.clientGone()) return fail(ErrorCode::kCancelled, "the client cancelled the upload");

@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <array>
 
-#include "core/geometry/sanitise.h"
-#include "server/ingest/describer.h"
+#include "core/base/return_if_error.h"
+#include "core/preparation/sanitise.h"
+#include "server/ingest/signature_pipeline.h"
 
 namespace shapedb::rpc {
 namespace {
@@ -40,7 +41,7 @@ Result<void> checkUsable(const std::vector<float>& xyz) {
     // Points that span space go on doing so when others join them.
     if (xyz.size() >= 3 && sanitise(ingest::toCloud(sampleOf(xyz)))) return {};
     const auto sanitised = sanitise(ingest::toCloud(xyz));
-    if (!sanitised) return fail(sanitised.error());
+    RETURN_IF_ERROR(sanitised);
     return {};
 }
 

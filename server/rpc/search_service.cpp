@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "core/base/return_if_error.h"
 #include "core/signature/signature_codec.h"
 #include "server/rpc/call.h"
 #include "server/rpc/convert.h"
@@ -23,12 +24,12 @@ struct Prepared {
 Result<Prepared> prepare(const Services& services, Call& call, const pb::SearchOptions& options) {
     call.note({"k", std::uint64_t{options.k()}});
     const auto collection = call.collection(options.collection());
-    if (!collection) return fail(collection.error());
-    if (const auto valid = checkK(options.k(), services.config); !valid) return fail(valid.error());
-    if (const auto valid = checkThreshold(options.threshold()); !valid) return fail(valid.error());
-    if (const auto valid = checkFilterLength(options.filter()); !valid) return fail(valid.error());
+    RETURN_IF_ERROR(collection);
+    RETURN_IF_ERROR(checkK(options.k(), services.config));
+    RETURN_IF_ERROR(checkThreshold(options.threshold()));
+    RETURN_IF_ERROR(checkFilterLength(options.filter()));
     Result<Filter> filter = Filter::parse(options.filter());
-    if (!filter) return fail(filter.error());
+    RETURN_IF_ERROR(filter);
     Prepared prepared;
     prepared.collection = *collection;
     prepared.options.k = options.k();
@@ -66,7 +67,7 @@ Result<void> answer(const Services& services, const Prepared& prepared, const Si
     for (const SearchHit& hit : found.hits) {
         const auto shape = services.store.getShapeById(hit.id);
         if (!shape && shape.error().code == ErrorCode::kNotFound) continue;  // deleted meanwhile
-        if (!shape) return fail(shape.error());
+        RETURN_IF_ERROR(shape);
         pb::Hit* out = response->add_hits();
         toProto(*shape, prepared.collection->collection.name,
                 qualityIn(prepared.collection->signatures, hit.id), out->mutable_shape());
@@ -90,7 +91,7 @@ Result<void> search(const Services& services, const Call& call, const Prepared& 
                     const Signature& query, std::size_t& room, pb::SearchResponse* response) {
     const auto found =
         services.searches.run(query, prepared.collection->signatures, prepared.options, call.run());
-    if (!found) return fail(found.error());
+    RETURN_IF_ERROR(found);
     return answer(services, prepared, query, *found, room, response);
 }
 
@@ -101,15 +102,15 @@ struct StoredQuery {
 };
 
 Result<StoredQuery> storedQuery(const Services& services, const Prepared& prepared, const std::string& key) {
-    if (const auto valid = checkKey(key); !valid) return fail(valid.error());
+    RETURN_IF_ERROR(checkKey(key));
     auto shape = services.store.getShape(prepared.collection->collection.id, key);
     if (!shape && shape.error().code == ErrorCode::kNotFound) {
         return fail(ErrorCode::kNotFound, "there is no shape '" + key + "' in collection '" +
                                               prepared.collection->collection.name + "'");
     }
-    if (!shape) return fail(shape.error());
+    RETURN_IF_ERROR(shape);
     auto signature = findSignature(services, {prepared.collection, *shape});
-    if (!signature) return fail(signature.error());
+    RETURN_IF_ERROR(signature);
     return StoredQuery{std::move(*signature), shape->id};
 }
 
@@ -118,12 +119,12 @@ Result<BatchQuery> batchQuery(const Services& services, const Prepared& prepared
     switch (query.by_case()) {
         case v1::SearchBatchRequest::Query::kKey: {
             auto stored = storedQuery(services, prepared, query.key());
-            if (!stored) return fail(stored.error());
+            RETURN_IF_ERROR(stored);
             return BatchQuery{std::move(stored->signature), stored->id};
         }
         case v1::SearchBatchRequest::Query::kSignature: {
             auto signature = decodeSignature(query.signature());
-            if (!signature) return fail(signature.error());
+            RETURN_IF_ERROR(signature);
             return BatchQuery{std::move(*signature), std::nullopt};
         }
         case v1::SearchBatchRequest::Query::BY_NOT_SET: break;
@@ -146,7 +147,7 @@ Result<void> searchBatch(const Services& services, const Call& call, const Prepa
     }
     const auto found =
         services.searches.runBatch(queries, prepared.collection->signatures, prepared.options, call.run());
-    if (!found) return fail(found.error());
+    RETURN_IF_ERROR(found);
     std::size_t room = kMaxAnswerBytes;
     for (int i = 0; i < request.queries_size(); ++i) {
         const auto at = static_cast<std::size_t>(i);
@@ -165,9 +166,9 @@ grpc::Status SearchServiceHandler::SearchByKey(grpc::ServerContext* context,
     return handle(services_, context, "SearchByKey", [&](Call& call) -> Result<void> {
         call.noteKey(request->key());
         auto prepared = prepare(services_, call, request->options());
-        if (!prepared) return fail(prepared.error());
+        RETURN_IF_ERROR(prepared);
         const auto stored = storedQuery(services_, *prepared, request->key());
-        if (!stored) return fail(stored.error());
+        RETURN_IF_ERROR(stored);
         if (!request->include_self()) prepared->options.excludeId = stored->id;
         std::size_t room = kMaxAnswerBytes;
         return search(services_, call, *prepared, stored->signature, room, response);
@@ -182,22 +183,22 @@ grpc::Status SearchServiceHandler::SearchByScan(grpc::ServerContext* context,
         PointReceiver receiver(services_.config.limits.maxPoints, services_.uploads);
         const auto checkSearchHeader = [&](const v1::SearchByScanHeader& header) -> Result<void> {
             auto checked = prepare(services_, call, header.options());
-            if (!checked) return fail(checked.error());
+            RETURN_IF_ERROR(checked);
             prepared = std::move(*checked);
             return {};
         };
         const auto scan = receiveScan<v1::SearchByScanRequest>(*reader, receiver, call, checkSearchHeader);
         if (!scan && scan.error().code == ErrorCode::kQueueFull) call.retryAfter(kBudgetRetry);
-        if (!scan) return fail(scan.error());
+        RETURN_IF_ERROR(scan);
 
         Result<Description> description = fail(ErrorCode::kInternal, "not segmented");
         {
             SegmentationSlots::Slot slot(services_.slots);
-            if (const auto acquired = slot.acquire(call.run()); !acquired) return acquired;
+            RETURN_IF_ERROR(slot.acquire(call.run()));
             description =
                 services_.describe(ingest::toCloud(scan->xyz), prepared.collection->parameters, call.run());
         }
-        if (!description) return fail(description.error());
+        RETURN_IF_ERROR(description);
         toProto(description->segmentation, response->mutable_report());
         response->set_seconds_segment(description->segmentation.totalSeconds);
         std::size_t room = kMaxAnswerBytes;
@@ -210,9 +211,9 @@ grpc::Status SearchServiceHandler::SearchBySignature(grpc::ServerContext* contex
                                                      v1::SearchResponse* response) {
     return handle(services_, context, "SearchBySignature", [&](Call& call) -> Result<void> {
         const auto prepared = prepare(services_, call, request->options());
-        if (!prepared) return fail(prepared.error());
+        RETURN_IF_ERROR(prepared);
         const auto signature = decodeSignature(request->signature());
-        if (!signature) return fail(signature.error());
+        RETURN_IF_ERROR(signature);
         std::size_t room = kMaxAnswerBytes;
         return search(services_, call, *prepared, *signature, room, response);
     });
@@ -230,7 +231,7 @@ grpc::Status SearchServiceHandler::SearchBatch(grpc::ServerContext* context,
                                                          std::to_string(services_.config.limits.maxBatch));
         }
         const auto prepared = prepare(services_, call, request->options());
-        if (!prepared) return fail(prepared.error());
+        RETURN_IF_ERROR(prepared);
         return searchBatch(services_, call, *prepared, *request, response);
     });
 }

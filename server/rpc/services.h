@@ -8,9 +8,9 @@
 
 #include "server/config/server_config.h"
 #include "server/index/collection_index.h"
-#include "server/ingest/describer.h"
 #include "server/ingest/progress_board.h"
 #include "server/ingest/rebuild_driver.h"
+#include "server/ingest/signature_pipeline.h"
 #include "server/ingest/worker_pool.h"
 #include "server/rpc/cancel_watcher.h"
 #include "server/rpc/gates.h"
@@ -29,7 +29,7 @@ struct Services {
     ingest::WorkerPool& workers;
     ingest::RebuildDriver& rebuilds;
     ingest::ProgressBoard& board;
-    ingest::Describer describe;
+    ingest::SignaturePipeline describe;
     telemetry::LoggerPtr log;
     CancelWatcher& cancellations;
     CallGate& calls;

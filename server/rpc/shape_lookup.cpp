@@ -1,5 +1,6 @@
 #include "server/rpc/shape_lookup.h"
 
+#include "core/base/return_if_error.h"
 #include "core/signature/signature_codec.h"
 #include "server/rpc/limits.h"
 #include "server/rpc/request_checks.h"
@@ -9,14 +10,14 @@ namespace shapedb::rpc {
 Result<FoundShape> findShape(const Services& services, Call& call, const pb::ShapeRef& ref) {
     call.noteKey(ref.key());
     const auto collection = call.collection(ref.collection());
-    if (!collection) return fail(collection.error());
-    if (const auto valid = checkKey(ref.key()); !valid) return fail(valid.error());
+    RETURN_IF_ERROR(collection);
+    RETURN_IF_ERROR(checkKey(ref.key()));
     const auto shape = services.store.getShape((*collection)->collection.id, ref.key());
     if (!shape && shape.error().code == ErrorCode::kNotFound) {
         return fail(ErrorCode::kNotFound, "there is no shape '" + ref.key() + "' in collection '" +
                                               (*collection)->collection.name + "'");
     }
-    if (!shape) return fail(shape.error());
+    RETURN_IF_ERROR(shape);
     return FoundShape{*collection, *shape};
 }
 
@@ -34,7 +35,7 @@ Result<Signature> findSignature(const Services& services, const FoundShape& foun
 Result<Signature> storedSignature(const Services& services, const index::Snapshot& searched,
                                   std::int64_t shapeId) {
     const auto row = services.store.getSignature(shapeId);
-    if (!row) return fail(row.error());
+    RETURN_IF_ERROR(row);
     if (row->generation != searched.collection.generation) {
         return fail(ErrorCode::kNotReady, "a rebuild of collection '" + searched.collection.name +
                                               "' is being put in place: try again");
@@ -69,16 +70,14 @@ Result<store::Shape> followIngest(
         if (!shape) return shape;
         if (shape->state == store::ShapeState::kReady) {
             // Stored a moment before it is searched: who hears READY must find it.
-            if (const auto refreshed = services.index.refresh(shape->collectionId, shapeId); !refreshed) {
-                return fail(refreshed.error());
-            }
+            RETURN_IF_ERROR(services.index.refresh(shape->collectionId, shapeId));
         }
-        if (const auto told = onChange(*shape, status); !told) return fail(told.error());
+        RETURN_IF_ERROR(onChange(*shape, status));
         if (shape->state != store::ShapeState::kPending) return shape;
         const auto lookAgain = ingest::ProgressBoard::Clock::now() + kReadStateAgain;
         while (watch->status().sequence == status.sequence &&
                ingest::ProgressBoard::Clock::now() < lookAgain) {
-            if (const auto go = checkpoint(); !go) return fail(go.error());
+            RETURN_IF_ERROR(checkpoint());
             watch->waitForChange(status.sequence, ingest::ProgressBoard::Clock::now() + kLookForCancellation);
         }
     }

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <utility>
 
+#include "core/base/return_if_error.h"
 #include "core/search/filter.h"
 #include "server/rpc/call.h"
 #include "server/rpc/convert.h"
@@ -29,16 +30,15 @@ pb::AddShapeResponse::Outcome outcomeOf(store::PutOutcome outcome) {
 
 Result<void> checkHeader(const Services& services, Call& call, const pb::AddShapeHeader& header) {
     call.noteKey(header.key());
-    if (const auto valid = checkKey(header.key()); !valid) return valid;
-    if (const auto mode = fromProto(header.mode()); !mode) return fail(mode.error());
-    if (const auto valid = checkMetadata(toMetadata(header.metadata())); !valid) return valid;
+    RETURN_IF_ERROR(checkKey(header.key()));
+    RETURN_IF_ERROR(fromProto(header.mode()));
+    RETURN_IF_ERROR(checkMetadata(toMetadata(header.metadata())));
     if (header.has_expected_version() && header.expected_version() < 0) {
         return fail(ErrorCode::kInvalidArgument, "expected_version: must be 0 (the key is free) or more");
     }
-    if (const auto collection = call.collection(header.collection()); !collection)
-        return fail(collection.error());
+    RETURN_IF_ERROR(call.collection(header.collection()));
     if (header.wait()) {
-        if (const auto place = call.becomeFollower(); !place) return place;
+        RETURN_IF_ERROR(call.becomeFollower());
     }
     if (services.restores.restoring()) {
         return fail(ErrorCode::kUnavailable, "the database is being replaced by a backup: try again later");
@@ -48,11 +48,11 @@ Result<void> checkHeader(const Services& services, Call& call, const pb::AddShap
 
 /// The parts of a request ListShapes and CountShapes share.
 Result<store::ShapeFilter> makeFilter(const Call& call, const std::string& text, pb::ShapeState state) {
-    if (const auto valid = checkFilterLength(text); !valid) return fail(valid.error());
+    RETURN_IF_ERROR(checkFilterLength(text));
     Result<Filter> filter = Filter::parse(text);
-    if (!filter) return fail(filter.error());
+    RETURN_IF_ERROR(filter);
     const auto wanted = fromProto(state);
-    if (!wanted) return fail(wanted.error());
+    RETURN_IF_ERROR(wanted);
     store::ShapeFilter result;
     result.state = *wanted;
     const RunContext* run = &call.run();
@@ -82,7 +82,7 @@ Result<void> sendSegments(Call& call, Writer& writer, const Description& descrip
         std::memcpy(chunk->mutable_xyz()->data(), xyz.data() + 3 * first, count * kPointBytes);
         chunk->mutable_segments()->Add(labels.begin() + static_cast<std::ptrdiff_t>(first),
                                        labels.begin() + static_cast<std::ptrdiff_t>(first + count));
-        if (const auto sent = call.write(writer, message); !sent) return sent;
+        RETURN_IF_ERROR(call.write(writer, message));
     }
     return {};
 }
@@ -110,14 +110,14 @@ Result<void> ShapeServiceHandler::addShape(Call& call, grpc::ServerReader<v1::Ad
             return checkHeader(services_, call, received);
         });
         if (!scan && scan.error().code == ErrorCode::kQueueFull) call.retryAfter(kBudgetRetry);
-        if (!scan) return fail(scan.error());
-        if (const auto usable = checkUsable(scan->xyz); !usable) return usable;
-        if (const auto go = call.run().checkpoint(); !go) return go;
+        RETURN_IF_ERROR(scan);
+        RETURN_IF_ERROR(checkUsable(scan->xyz));
+        RETURN_IF_ERROR(call.run().checkpoint());
 
         const RestoreGate::Write write(services_.restores);
         // Again: it may have been deleted, or replaced by a restore, while the points came.
         const auto collection = call.collection(header.collection());
-        if (!collection) return fail(collection.error());
+        RETURN_IF_ERROR(collection);
         store::PutRequest request;
         request.collectionId = (*collection)->collection.id;
         request.key = header.key();
@@ -133,7 +133,7 @@ Result<void> ShapeServiceHandler::addShape(Call& call, grpc::ServerReader<v1::Ad
             const auto depth = services_.store.queueDepth();
             call.retryAfter(services_.workers.retryAfter(depth ? depth->jobs : 0));
         }
-        if (!stored) return fail(stored.error());
+        RETURN_IF_ERROR(stored);
         put = *stored;
         collectionName = (*collection)->collection.name;
         wait = header.wait();
@@ -168,7 +168,7 @@ grpc::Status ShapeServiceHandler::GetShape(grpc::ServerContext* context, const v
                                            v1::GetShapeResponse* response) {
     return handle(services_, context, "GetShape", [&](Call& call) -> Result<void> {
         const auto found = findShape(services_, call, request->shape());
-        if (!found) return fail(found.error());
+        RETURN_IF_ERROR(found);
         toProto(found->shape, found->collection->collection.name,
                 qualityIn(found->collection->signatures, found->shape.id), response->mutable_shape());
         return {};
@@ -180,19 +180,19 @@ grpc::Status ShapeServiceHandler::ListShapes(grpc::ServerContext* context,
                                              v1::ListShapesResponse* response) {
     return handle(services_, context, "ListShapes", [&](Call& call) -> Result<void> {
         const auto collection = call.collection(request->collection());
-        if (!collection) return fail(collection.error());
-        if (const auto valid = checkPageSize(request->page_size()); !valid) return valid;
+        RETURN_IF_ERROR(collection);
+        RETURN_IF_ERROR(checkPageSize(request->page_size()));
         const auto filter = makeFilter(call, request->filter(), request->state());
-        if (!filter) return fail(filter.error());
+        RETURN_IF_ERROR(filter);
         const Listing listing{(*collection)->collection.id, request->filter(), request->state()};
         const auto afterId = decodeCursor(listing, request->cursor());
-        if (!afterId) return fail(afterId.error());
+        RETURN_IF_ERROR(afterId);
 
         const std::size_t pageSize = request->page_size() == 0 ? kDefaultPageSize : request->page_size();
         // One more than asked for tells whether there is a next page.
         const auto shapes = services_.store.listShapes(listing.collectionId, *afterId, pageSize + 1, *filter);
-        if (!shapes) return fail(shapes.error());
-        if (const auto go = call.run().checkpoint(); !go) return go;
+        RETURN_IF_ERROR(shapes);
+        RETURN_IF_ERROR(call.run().checkpoint());
         std::size_t bytes = 0;
         std::size_t sent = 0;
         for (; sent < std::min(pageSize, shapes->size()) && bytes < kMaxPageBytes; ++sent) {
@@ -211,13 +211,13 @@ grpc::Status ShapeServiceHandler::CountShapes(grpc::ServerContext* context,
                                               v1::CountShapesResponse* response) {
     return handle(services_, context, "CountShapes", [&](Call& call) -> Result<void> {
         const auto collection = call.collection(request->collection());
-        if (!collection) return fail(collection.error());
+        RETURN_IF_ERROR(collection);
         auto filter = makeFilter(call, request->filter(), request->state());
-        if (!filter) return fail(filter.error());
+        RETURN_IF_ERROR(filter);
         if (request->filter().empty()) filter->accept = nullptr;  // the store counts without reading
         const auto count = services_.store.countShapes((*collection)->collection.id, *filter);
-        if (!count) return fail(count.error());
-        if (const auto go = call.run().checkpoint(); !go) return go;
+        RETURN_IF_ERROR(count);
+        RETURN_IF_ERROR(call.run().checkpoint());
         response->set_count(*count);
         return {};
     });
@@ -231,12 +231,12 @@ grpc::Status ShapeServiceHandler::DeleteShape(grpc::ServerContext* context,
         const pb::ShapeRef& ref = request->shape();
         call.noteKey(ref.key());
         const auto collection = call.collection(ref.collection());
-        if (!collection) return fail(collection.error());
-        if (const auto valid = checkKey(ref.key()); !valid) return valid;
+        RETURN_IF_ERROR(collection);
+        RETURN_IF_ERROR(checkKey(ref.key()));
         std::optional<std::int64_t> expected;
         if (request->has_expected_version()) expected = request->expected_version();
         const auto shape = services_.store.deleteShape((*collection)->collection.id, ref.key(), expected);
-        if (!shape) return fail(shape.error());
+        RETURN_IF_ERROR(shape);
         services_.workers.supersede(shape->id);
         services_.board.settled(shape->id);
         if (const auto refreshed = services_.index.refresh(shape->collectionId, shape->id); !refreshed) {
@@ -253,8 +253,8 @@ grpc::Status ShapeServiceHandler::WatchIngest(grpc::ServerContext* context,
                                               grpc::ServerWriter<v1::IngestEvent>* writer) {
     return handle(services_, context, "WatchIngest", [&](Call& call) -> Result<void> {
         const auto found = findShape(services_, call, request->shape());
-        if (!found) return fail(found.error());
-        if (const auto place = call.becomeFollower(); !place) return place;
+        RETURN_IF_ERROR(found);
+        RETURN_IF_ERROR(call.becomeFollower());
         std::string last;
         const auto tell = [&](const store::Shape& shape,
                               const ingest::ProgressBoard::Status& status) -> Result<void> {
@@ -276,7 +276,7 @@ grpc::Status ShapeServiceHandler::WatchIngest(grpc::ServerContext* context,
         };
         const auto settled = followIngest(
             services_, found->shape.id, [&] { return call.checkpointWhileFollowing(); }, tell);
-        if (!settled) return fail(settled.error());
+        RETURN_IF_ERROR(settled);
         return {};
     });
 }
@@ -286,9 +286,9 @@ grpc::Status ShapeServiceHandler::GetSignature(grpc::ServerContext* context,
                                                v1::GetSignatureResponse* response) {
     return handle(services_, context, "GetSignature", [&](Call& call) -> Result<void> {
         const auto found = findShape(services_, call, request->shape());
-        if (!found) return fail(found.error());
+        RETURN_IF_ERROR(found);
         const auto signature = findSignature(services_, *found);
-        if (!signature) return fail(signature.error());
+        RETURN_IF_ERROR(signature);
         toProto(*signature, response->mutable_signature());
         return {};
     });
@@ -299,15 +299,15 @@ grpc::Status ShapeServiceHandler::GetSegments(grpc::ServerContext* context,
                                               grpc::ServerWriter<v1::SegmentedPoints>* writer) {
     return handle(services_, context, "GetSegments", [&](Call& call) -> Result<void> {
         const auto found = findShape(services_, call, request->shape());
-        if (!found) return fail(found.error());
+        RETURN_IF_ERROR(found);
         SegmentationSlots::Slot slot(services_.slots);
-        if (const auto acquired = slot.acquire(call.run()); !acquired) return acquired;
+        RETURN_IF_ERROR(slot.acquire(call.run()));
         const auto points = services_.store.loadPoints(found->shape.id);
-        if (!points) return fail(points.error());
+        RETURN_IF_ERROR(points);
         call.addPoints(points->size() / 3, points->size() * sizeof(float));
         const auto description =
             services_.describe(ingest::toCloud(*points), found->collection->parameters, call.run());
-        if (!description) return fail(description.error());
+        RETURN_IF_ERROR(description);
         return sendSegments(call, *writer, *description, *points, false);
     });
 }
@@ -321,18 +321,18 @@ grpc::Status ShapeServiceHandler::Segment(
         const auto checkSegmentHeader = [&](const v1::SegmentHeader& header) -> Result<void> {
             const auto wanted = parametersFrom(header.profile(), header.segmentation(), header.signature(),
                                                parametersOf(Profile::kDefault));
-            if (!wanted) return fail(wanted.error());
+            RETURN_IF_ERROR(wanted);
             parameters = *wanted;
             summaryOnly = header.summary_only();
             return {};
         };
         const auto scan = receiveScan<v1::SegmentRequest>(*stream, receiver, call, checkSegmentHeader);
         if (!scan && scan.error().code == ErrorCode::kQueueFull) call.retryAfter(kBudgetRetry);
-        if (!scan) return fail(scan.error());
+        RETURN_IF_ERROR(scan);
         SegmentationSlots::Slot slot(services_.slots);
-        if (const auto acquired = slot.acquire(call.run()); !acquired) return acquired;
+        RETURN_IF_ERROR(slot.acquire(call.run()));
         const auto description = services_.describe(ingest::toCloud(scan->xyz), parameters, call.run());
-        if (!description) return fail(description.error());
+        RETURN_IF_ERROR(description);
         return sendSegments(call, *stream, *description, scan->xyz, summaryOnly);
     });
 }

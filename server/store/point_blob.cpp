@@ -7,7 +7,8 @@
 
 #include <zstd.h>
 
-#include "server/store/sqlite_connection.h"
+#include "core/base/return_if_error.h"
+#include "server/store/sqlite/connection.h"
 
 namespace shapedb::store {
 
@@ -112,7 +113,7 @@ Result<PointEncoding> PointEncoding::plan(const std::vector<float>& points, int 
     const std::size_t bytes = points.size() * kFloatBytes;
     if (bytes <= kHeldBytes) {
         auto blob = encodePoints(points, level);
-        if (!blob) return fail(blob.error());
+        RETURN_IF_ERROR(blob);
         encoding.blob_ = std::move(*blob);
         encoding.held_ = true;
         encoding.size_ = encoding.blob_.size();

@@ -6,9 +6,9 @@
 #include <set>
 #include <thread>
 
-#include "core/signature/profile.h"
+#include "common/sha256.h"
+#include "core/pipeline.h"
 #include "core/signature/signature_codec.h"
-#include "server/common/sha256.h"
 #include "tests/integration/support/live_test.h"
 
 namespace shapedb::testing {

@@ -1,6 +1,6 @@
 // The default profile on a live server: quality of the interior, attributes, terms of a score.
 #include "core/matching/score.h"
-#include "core/signature/profile.h"
+#include "core/pipeline.h"
 #include "core/signature/signature_codec.h"
 #include "tests/integration/support/live_test.h"
 
@@ -102,7 +102,7 @@ TEST_F(AttributesRpc, SignatureIsTheOneOfTheLibrary) {
     const pb::SegmentationSummary& summary = stateless.messages[0].summary();
     EXPECT_EQ(summary.signature().encoded(), reply.value.signature().encoded());
     EXPECT_EQ(summary.report().quality(), expected->segmentation.quality);
-    EXPECT_EQ(summary.report().strays(), expected->segmentation.strays);
+    EXPECT_EQ(summary.report().outliers(), expected->segmentation.outliers);
     EXPECT_EQ(summary.report().noise(), expected->segmentation.noise);
     EXPECT_EQ(summary.report().angle_degrees(), expected->segmentation.angleDegrees);
     EXPECT_NE(summary.report().interior_source(), pb::INTERIOR_SOURCE_UNSPECIFIED);

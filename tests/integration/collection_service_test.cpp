@@ -1,5 +1,5 @@
 // CollectionService on a live server.
-#include "core/signature/profile.h"
+#include "core/pipeline.h"
 #include "tests/integration/support/live_test.h"
 
 namespace shapedb::testing {
@@ -51,19 +51,19 @@ TEST_F(CollectionRpc, ParametersThatAreNotSetAreTheProfiles) {
     const SegmentationOptions profile = parametersOf(Profile::kDefault).segmentation;
     pb::CreateCollectionRequest request;
     request.set_name(collection + "-partly");
-    request.mutable_segmentation()->set_stray_ratio(0.0);
+    request.mutable_segmentation()->set_outlier_ratio(0.0);
     request.mutable_segmentation()->set_merge_contrast(1.75);
     const auto created = unary(*client.collections, &Stub::CreateCollection, request);
     ASSERT_TRUE(created.ok()) << created;
     const pb::SegmentationParameters& got = created.value.segmentation();
-    EXPECT_EQ(got.stray_ratio(), 0.0);
+    EXPECT_EQ(got.outlier_ratio(), 0.0);
     EXPECT_EQ(got.merge_contrast(), 1.75);
-    EXPECT_EQ(got.decimate_to(), profile.decimateTo);
+    EXPECT_EQ(got.decimate_to(), profile.preparation.decimateTo);
     EXPECT_EQ(got.deep_angle_degrees(), profile.deepAngleDegrees);
     EXPECT_EQ(got.min_segment_share(), profile.minSegmentShare);
     EXPECT_EQ(got.max_segments(), profile.maxSegments);
-    EXPECT_EQ(got.smoothing_reach(), profile.smoothingReach);
-    EXPECT_EQ(got.even_spacing(), profile.evenSpacing);
+    EXPECT_EQ(got.smoothing_reach(), profile.preparation.smoothingReach);
+    EXPECT_EQ(got.thinning(), profile.preparation.thinning);
     EXPECT_EQ(got.interior_method() == pb::INTERIOR_METHOD_ADAPTIVE,
               profile.interiorMethod == InteriorMethod::kAdaptive);
 }

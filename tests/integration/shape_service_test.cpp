@@ -3,7 +3,7 @@
 #include <set>
 #include <thread>
 
-#include "core/signature/profile.h"
+#include "core/pipeline.h"
 #include "core/signature/signature_codec.h"
 #include "tests/integration/support/live_test.h"
 

@@ -11,7 +11,7 @@
 #include <unistd.h>
 
 #include "client/api/packing.h"
-#include "server/common/sha256.h"
+#include "common/sha256.h"
 #include "tests/client/api/fake_server.h"
 
 namespace shapedb::client {

@@ -7,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
+#include "common/sha256.h"
 #include "core/base/random.h"
-#include "server/common/sha256.h"
 
 namespace shapedb::client {
 namespace {

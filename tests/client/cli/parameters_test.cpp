@@ -27,9 +27,9 @@ TEST(Parameters, EachFlagOverridesItsFieldOnly) {
     flags.numbers.mergeContrast = 1.75;
     flags.numbers.minSegmentShare = 0.03125;
     flags.numbers.maxSegments = 12;
-    flags.numbers.strayRatio = 4.0;
+    flags.numbers.outlierRatio = 4.0;
     flags.numbers.smoothingReach = 6.0;
-    flags.numbers.evenSpacing = 1.5;
+    flags.numbers.thinning = 1.5;
     flags.numbers.maxPoints = 9;
     flags.numbers.attributes = true;
     const auto resolved = flags.resolve();
@@ -43,9 +43,9 @@ TEST(Parameters, EachFlagOverridesItsFieldOnly) {
                                                  {"merge_contrast", 1.75},
                                                  {"min_segment_share", 0.03125},
                                                  {"max_segments", 12},
-                                                 {"stray_ratio", 4.0},
+                                                 {"outlier_ratio", 4.0},
                                                  {"smoothing_reach", 6.0},
-                                                 {"even_spacing", 1.5},
+                                                 {"thinning", 1.5},
                                                  {"interior_method", "adaptive"},
                                                  {"max_points", 9},
                                                  {"attributes", true}}));
@@ -72,9 +72,9 @@ TEST(Parameters, ZeroTurnsOffWhatTheProfileTurnsOn) {
     ParameterFlags flags;
     flags.numbers.decimateTo = 0;
     flags.numbers.mergeContrast = 0.0;
-    flags.numbers.strayRatio = 0.0;
+    flags.numbers.outlierRatio = 0.0;
     flags.numbers.smoothingReach = 0.0;
-    flags.numbers.evenSpacing = 0.0;
+    flags.numbers.thinning = 0.0;
     flags.interior = "walk";
     flags.numbers.attributes = false;
     flags.numbers.deepAngleDegrees = 20.0;

@@ -2,7 +2,7 @@
 
 #include <set>
 
-#include "core/geometry/noise.h"
+#include "core/synthetic/noise.h"
 #include "tests/client/cli/run_command.h"
 
 namespace shapedb::cli {

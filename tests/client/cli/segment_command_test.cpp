@@ -5,8 +5,8 @@
 #include <ostream>
 
 #include "client/io/scan_reader.h"
-#include "core/geometry/noise.h"
-#include "core/signature/profile.h"
+#include "core/pipeline.h"
+#include "core/synthetic/noise.h"
 #include "tests/client/cli/run_command.h"
 
 namespace shapedb::cli {
@@ -94,16 +94,16 @@ TEST_F(SegmentCommand, FlagsBeyondThePaperReachTheMethod) {
     EXPECT_FALSE(plain.contains("statistics"));
     EXPECT_EQ(plain["quality"], 1.0);
     const auto all = with({"--interior", "adaptive", "--merge-contrast", "1.25", "--max-segments", "2",
-                           "--min-segment-share", "0.01", "--stray-ratio", "3", "--smoothing-reach", "5",
+                           "--min-segment-share", "0.01", "--outlier-ratio", "3", "--smoothing-reach", "5",
                            "--even-spacing", "1", "--attributes"});
     ShapeParameters parameters = parametersOf(Profile::kPaper);
     parameters.segmentation.interiorMethod = InteriorMethod::kAdaptive;
     parameters.segmentation.mergeContrast = 1.25;
     parameters.segmentation.maxSegments = 2;
     parameters.segmentation.minSegmentShare = 0.01;
-    parameters.segmentation.strayRatio = 3.0;
-    parameters.segmentation.smoothingReach = 5.0;
-    parameters.segmentation.evenSpacing = 1.0;
+    parameters.segmentation.preparation.outlierRatio = 3.0;
+    parameters.segmentation.preparation.smoothingReach = 5.0;
+    parameters.segmentation.preparation.thinning = 1.0;
     parameters.signature.attributes = true;
     const auto expected = describe(readScan(path("dumbbell.xyz"))->points, parameters);
     ASSERT_TRUE(expected) << expected.error().message;

@@ -117,13 +117,13 @@ TEST(ShapeOutput, PointsThatWereNotUsedAreAccountedFor) {
     report.points = report.pointsUsed = 1000;
     EXPECT_EQ(preparationText(report), "");
     report.pointsUsed = 990;
-    report.strays = 10;
-    EXPECT_EQ(preparationText(report), "990 after leaving out 10 strays\n");
+    report.outliers = 10;
+    EXPECT_EQ(preparationText(report), "990 after leaving out 10 outliers\n");
     report.duplicates = 1;
     report.pointsUsed = 500;
     EXPECT_EQ(preparationText(report),
-              "500 after leaving out 10 strays, merging 1 duplicate and averaging and thinning\n");
-    report.strays = report.duplicates = 0;
+              "500 after leaving out 10 outliers, merging 1 duplicate and averaging and thinning\n");
+    report.outliers = report.duplicates = 0;
     EXPECT_EQ(preparationText(report), "500 after averaging and thinning\n");
     report.duplicates = 500;
     EXPECT_EQ(preparationText(report), "500 after merging 500 duplicates\n");
@@ -136,12 +136,12 @@ TEST(ShapeOutput, LowQualityIsExplained) {
 
 TEST(ShapeOutput, ReportInJson) {
     client::SegmentationReport report;
-    report.strays = 3;
+    report.outliers = 3;
     report.quality = 0.25;
     report.interiorSource = client::InteriorSource::kThickened;
     report.noise = 0.5;
     const nlohmann::json document = toJson(report);
-    EXPECT_EQ(document["strays"], 3);
+    EXPECT_EQ(document["outliers"], 3);
     EXPECT_EQ(document["quality"], 0.25);
     EXPECT_EQ(document["interior_source"], "thickened");
     EXPECT_EQ(document["angle_degrees"], 0.0);

@@ -26,7 +26,7 @@ TEST_F(Usage, WrongCommandLinesAreExitCodeTwo) {
         {"segment", "a.ply", "--interior", "guess"},
         {"segment", "a.ply", "--merge-contrast", "0.5"},
         {"segment", "a.ply", "--min-segment-share", "1.5"},
-        {"segment", "a.ply", "--stray-ratio", "1"},
+        {"segment", "a.ply", "--outlier-ratio", "1"},
         {"segment", "a.ply", "--smoothing-reach", "21"},
         {"segment", "a.ply", "--even-spacing", "-1"},
         {"segment", "a.ply", "--max-segments", "-1"},
@@ -86,7 +86,7 @@ TEST_F(Usage, HelpAndVersionAreOnStandardOutput) {
     }
     EXPECT_EQ(runCommand({"--version"}).out.rfind("shapedb ", 0), 0u);
     const std::string help = runCommand({"segment", "--help"}).out;
-    for (const char* flag : {"--deep-angle", "--merge-contrast", "--stray-ratio", "--interior"}) {
+    for (const char* flag : {"--deep-angle", "--merge-contrast", "--outlier-ratio", "--interior"}) {
         EXPECT_NE(help.find(flag), std::string::npos) << flag;
     }
 }

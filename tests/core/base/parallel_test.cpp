@@ -18,7 +18,7 @@ TEST(Parallel, RangesCoverEveryIndexOnce) {
             std::vector<int> seen(count, 0);
             std::atomic<std::size_t> widest{0};
             const auto done = arena.execute([&] {
-                return forEachRange(count, 100, {}, [&](std::size_t begin, std::size_t end) {
+                return parallelFor(count, 100, {}, [&](std::size_t begin, std::size_t end) {
                     std::size_t known = widest;
                     while (known < end - begin && !widest.compare_exchange_weak(known, end - begin)) {
                     }
@@ -37,7 +37,7 @@ TEST(Parallel, StopsWhenToldTo) {
     RunContext context;
     context.cancel = &cancel;
     std::atomic<std::size_t> done{0};
-    const auto result = forEachRange(1000000, 10, context, [&](std::size_t begin, std::size_t end) {
+    const auto result = parallelFor(1000000, 10, context, [&](std::size_t begin, std::size_t end) {
         done += end - begin;
         if (done > 1000) cancel = true;
     });

@@ -5,7 +5,7 @@
 #include <map>
 #include <utility>
 
-#include "core/signature/profile.h"
+#include "core/pipeline.h"
 #include "core/synthetic/families.h"
 #include "tests/core/matching/random_signatures.h"
 
@@ -36,13 +36,13 @@ void updateBody(Signature& signature) { signature.attributes->body = bodyOf(sign
 Signature randomAttributed(Random& random, std::size_t maxPoints) {
     Signature signature = randomSignature(random, maxPoints);
     const bool alike = random.below(3) == 0;  // parts of one size: any may meet any
-    for (SignaturePoint& p : signature.points) {
+    for (WeightedPoint& p : signature.points) {
         const auto extent = [&] {
             return alike ? 0.05f : static_cast<float>(0.1 * std::exp(random.normal()));
         };
         const float x = extent(), y = extent(), z = extent();
         p.covariance = turnedCovariance({x * x, 0, 0, y * y, 0, z * z}, randomRotation(random));
-        p.peakRadius = alike ? 0.1f : static_cast<float>(0.1 * std::exp(random.normal()));
+        p.maximumRadius = alike ? 0.1f : static_cast<float>(0.1 * std::exp(random.normal()));
     }
     ShapeAttributes& attributes = signature.attributes.emplace();
     attributes.quality = static_cast<std::uint8_t>(random.below(4) == 0 ? 255 : random.below(256));
@@ -56,9 +56,9 @@ Signature randomAttributed(Random& random, std::size_t maxPoints) {
 Signature disturbedAttributed(Signature signature, Random& random, double noise) {
     double sharesBefore = 0.0;
     double sharesAfter = 0.0;
-    for (const SignaturePoint& p : signature.points) sharesBefore += p.volumeShare;
+    for (const WeightedPoint& p : signature.points) sharesBefore += p.volumeShare;
     for (std::size_t i = 0; i < signature.points.size(); ++i) {
-        SignaturePoint& p = signature.points[i];
+        WeightedPoint& p = signature.points[i];
         const auto nearly = [&](float x) {
             return x * static_cast<float>(std::exp(noise * random.normal()));
         };
@@ -67,11 +67,11 @@ Signature disturbedAttributed(Signature signature, Random& random, double noise)
         p.weight = i == 0 ? weight : std::min(weight, signature.points[i - 1].weight);
         p.volumeShare = nearly(p.volumeShare);
         sharesAfter += p.volumeShare;
-        p.peakRadius = nearly(p.peakRadius);
+        p.maximumRadius = nearly(p.maximumRadius);
         const float wider = nearly(1.0f);
         for (float& c : p.covariance) c *= wider;
     }
-    for (SignaturePoint& p : signature.points) {
+    for (WeightedPoint& p : signature.points) {
         p.volumeShare *= static_cast<float>(sharesBefore / sharesAfter);
     }
     for (std::uint8_t& bin : signature.attributes->statistics) {
@@ -84,7 +84,7 @@ Signature disturbedAttributed(Signature signature, Random& random, double noise)
 
 Signature turnedAttributed(Signature signature, const Matrix3& rotation) {
     Signature result = turned(std::move(signature), rotation);
-    for (SignaturePoint& p : result.points) p.covariance = turnedCovariance(p.covariance, rotation);
+    for (WeightedPoint& p : result.points) p.covariance = turnedCovariance(p.covariance, rotation);
     updateBody(result);
     return result;
 }

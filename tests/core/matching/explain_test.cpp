@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "core/matching/score.h"
-#include "core/signature/profile.h"
+#include "core/pipeline.h"
 #include "core/synthetic/families.h"
 #include "core/synthetic/named_shapes.h"
 #include "tests/core/matching/random_signatures.h"

@@ -16,7 +16,7 @@ struct Weighted {
 
 Weighted scaledBy(const Signature& signature, double factor) {
     Weighted result;
-    for (const SignaturePoint& p : signature.points) {
+    for (const WeightedPoint& p : signature.points) {
         result.at.push_back({factor * p.position[0], factor * p.position[1], factor * p.position[2]});
         result.weight.push_back(factor * factor * factor * p.weight);
     }

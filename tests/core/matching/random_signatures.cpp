@@ -68,12 +68,12 @@ float weightOf(Random& random, Kind kind) {
 
 void finish(Signature& signature) {
     std::sort(signature.points.begin(), signature.points.end(),
-              [](const SignaturePoint& p, const SignaturePoint& q) { return p.weight > q.weight; });
+              [](const WeightedPoint& p, const WeightedPoint& q) { return p.weight > q.weight; });
     double whole = 0.0;
-    for (const SignaturePoint& p : signature.points) whole += p.weight;
-    for (SignaturePoint& p : signature.points) {
+    for (const WeightedPoint& p : signature.points) whole += p.weight;
+    for (WeightedPoint& p : signature.points) {
         p.volumeShare = std::max(1e-30f, static_cast<float>(p.weight / whole));
-        p.peakRadius = 0.1f;
+        p.maximumRadius = 0.1f;
         p.covariance = {1e-3f, 0, 0, 1e-3f, 0, 1e-3f};
     }
     signature.volume = whole * signature.scale * signature.scale * signature.scale;
@@ -93,7 +93,7 @@ Signature randomSignature(Random& random, Kind kind, std::size_t maxPoints) {
     std::vector<Point3> positions = {Point3{}};
     while (positions.size() < count) positions.push_back(positionOf(random, kind, frame, positions));
     for (std::size_t i = 0; i < count; ++i) {
-        SignaturePoint point;
+        WeightedPoint point;
         point.position = {static_cast<float>(positions[i].x), static_cast<float>(positions[i].y),
                           static_cast<float>(positions[i].z)};
         point.weight = weights[i];
@@ -109,20 +109,20 @@ Signature randomSignature(Random& random, std::size_t maxPoints) {
 
 Signature disturbed(Signature signature, Random& random, double noise) {
     for (std::size_t i = 0; i < signature.points.size(); ++i) {
-        SignaturePoint& p = signature.points[i];
+        WeightedPoint& p = signature.points[i];
         for (float& x : p.position) x = i == 0 ? 0.0f : x + static_cast<float>(noise * random.normal());
         // The heaviest stays the heaviest: it is the anchor.
         const float weight = p.weight * static_cast<float>(std::exp(noise * random.normal()));
         p.weight = i == 0 ? weight : std::min(weight, signature.points.front().weight);
     }
     std::sort(signature.points.begin() + 1, signature.points.end(),
-              [](const SignaturePoint& p, const SignaturePoint& q) { return p.weight > q.weight; });
+              [](const WeightedPoint& p, const WeightedPoint& q) { return p.weight > q.weight; });
     finish(signature);
     return signature;
 }
 
 Signature turned(Signature signature, const Matrix3& rotation) {
-    for (SignaturePoint& p : signature.points) {
+    for (WeightedPoint& p : signature.points) {
         const Point3 r = rotate(rotation, {p.position[0], p.position[1], p.position[2]});
         p.position = {static_cast<float>(r.x), static_cast<float>(r.y), static_cast<float>(r.z)};
     }
@@ -146,7 +146,7 @@ Matrix3 randomReflection(Random& random) {
 Signature signatureOf(const std::vector<std::array<double, 4>>& rows) {
     Signature signature;
     for (const auto& row : rows) {
-        SignaturePoint point;
+        WeightedPoint point;
         point.position = {static_cast<float>(row[0]), static_cast<float>(row[1]), static_cast<float>(row[2])};
         point.weight = static_cast<float>(row[3]);
         signature.points.push_back(point);
@@ -159,7 +159,7 @@ std::string describeSignature(const Signature& signature) {
     std::ostringstream out;
     out.precision(9);
     out << "scale " << signature.scale << ":";
-    for (const SignaturePoint& p : signature.points) {
+    for (const WeightedPoint& p : signature.points) {
         out << " {" << p.position[0] << ", " << p.position[1] << ", " << p.position[2] << ", " << p.weight
             << "}";
     }

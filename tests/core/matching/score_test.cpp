@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "core/matching/alignment.h"
+#include "core/matching/published/alignment.h"
 #include "tests/core/matching/plain_score.h"
 #include "tests/core/matching/random_signatures.h"
 
@@ -65,11 +65,11 @@ Pair randomPair(Random& random, std::size_t maxPoints = 8) {
 // taken moves points by that much.
 bool onALine(const Signature& signature) {
     Point3 farthest;
-    for (const SignaturePoint& p : signature.points) {
+    for (const WeightedPoint& p : signature.points) {
         const Point3 at{p.position[0], p.position[1], p.position[2]};
         if (length(at) > length(farthest)) farthest = at;
     }
-    for (const SignaturePoint& p : signature.points) {
+    for (const WeightedPoint& p : signature.points) {
         const Point3 at{p.position[0], p.position[1], p.position[2]};
         if (length(cross(at, farthest)) > 1e-6 * length(farthest)) return false;
     }
@@ -286,7 +286,7 @@ TEST(Score, StaysANumberForExtremeNumbers) {
             Signature s = randomSignature(random, 5);
             const float length = static_cast<float>(lengths[random.below(lengths.size())]);
             const float weight = static_cast<float>(std::pow(10.0, random.uniform(-30, 30)));
-            for (SignaturePoint& p : s.points) {
+            for (WeightedPoint& p : s.points) {
                 for (float& x : p.position) x *= length;
                 p.weight *= weight;
             }

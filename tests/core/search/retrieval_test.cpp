@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include "core/pipeline.h"
 #include "core/search/top_k.h"
-#include "core/signature/profile.h"
 #include "core/synthetic/families.h"
 #include "tests/core/matching/attributed_signatures.h"
 

@@ -257,7 +257,7 @@ TEST(SignatureSet, KeepsAShapeInFewBytes) {
     }
     const SignatureSet set = SignatureSet().with(entries, {});
     EXPECT_LE(set.memoryBytes() / entries.size(), 512u);
-    EXPECT_GT(set.memoryBytes() / entries.size(), 256u + sizeof(PackedPart));
+    EXPECT_GT(set.memoryBytes() / entries.size(), 256u + sizeof(PackedSegmentDescriptor));
 }
 
 TEST(SignatureSet, CountsTheMemoryOfWhatItHolds) {

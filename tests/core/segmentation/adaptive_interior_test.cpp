@@ -9,19 +9,19 @@
 #include "core/base/random.h"
 #include "core/geometry/bounding.h"
 #include "core/geometry/motion.h"
-#include "core/geometry/noise.h"
 #include "core/segmentation/segmentation.h"
 #include "core/synthetic/named_shapes.h"
+#include "core/synthetic/noise.h"
 
 namespace shapedb {
 namespace {
 
 SegmentationOptions adaptive() {
     SegmentationOptions options;
-    options.decimateTo = 20000;
-    options.strayRatio = 3.0;
-    options.smoothingReach = 5.0;
-    options.evenSpacing = 1.0;
+    options.preparation.decimateTo = 20000;
+    options.preparation.outlierRatio = 3.0;
+    options.preparation.smoothingReach = 5.0;
+    options.preparation.thinning = 1.0;
     options.interiorMethod = InteriorMethod::kAdaptive;
     return options;
 }
@@ -66,7 +66,7 @@ TEST(AdaptiveInterior, NoiseMovesVolumeAndSizeLittle) {
     }
 }
 
-TEST(AdaptiveInterior, StraysChangeNothingThatMatters) {
+TEST(AdaptiveInterior, OutliersChangeNothingThatMatters) {
     for (const NamedShape& shape : namedShapes()) {
         const PointCloud clean = sampled(shape);
         PointCloud points = clean;
@@ -79,7 +79,7 @@ TEST(AdaptiveInterior, StraysChangeNothingThatMatters) {
         const Segmentation s = found(points);
         EXPECT_NEAR(s.volume / shape.volume, 1.0, 0.03) << shape.name;
         EXPECT_NEAR(s.size / sizeOf(clean), 1.0, 0.03) << shape.name;
-        EXPECT_GT(s.strays, 40u) << shape.name;
+        EXPECT_GT(s.outliers, 40u) << shape.name;
         EXPECT_EQ(s.siteOfPoint.back(), kNoSite);
         EXPECT_EQ(s.pointSegment.back(), -1);
     }

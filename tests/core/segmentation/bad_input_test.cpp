@@ -203,7 +203,7 @@ TEST(BadInput, NoBigBallsNoInterior) {
 TEST(RunControl, CancellingInEachStageStops) {
     const PointCloud points = dumbbell(20000);
     SegmentationOptions options;
-    options.decimateTo = 15000;
+    options.preparation.decimateTo = 15000;
     for (const std::string stop : {"sanitise", "decimate", "delaunay", "point_scale", "interior", "flow",
                                    "segments", "merge", "describe"}) {
         std::atomic<bool> cancel{false};

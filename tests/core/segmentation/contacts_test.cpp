@@ -13,7 +13,7 @@
 #include "core/segmentation/flow.h"
 #include "core/segmentation/segmentation.h"
 #include "core/synthetic/named_shapes.h"
-#include "small_clouds.h"
+#include "tests/core/segmentation/small_clouds.h"
 
 namespace shapedb {
 namespace {
@@ -61,7 +61,7 @@ TEST(SegmentContacts, ArePairsWithTheWidestWayAndAllSharedArea) {
         for (const SegmentContact& contact : contacts) {
             EXPECT_EQ(contact.first, static_cast<std::uint32_t>(at->first.first)) << cloud.name;
             EXPECT_EQ(contact.second, static_cast<std::uint32_t>(at->first.second)) << cloud.name;
-            EXPECT_NEAR(contact.passage, at->second.first, 1e-6 * at->second.first) << cloud.name;
+            EXPECT_NEAR(contact.saddleRadius, at->second.first, 1e-6 * at->second.first) << cloud.name;
             EXPECT_NEAR(contact.area, at->second.second, 1e-12 * at->second.second) << cloud.name;
             ++at;
             ++pairs;
@@ -94,7 +94,7 @@ TEST(SegmentContacts, OfADumbbellAreTheEndsOfItsRodInScanUnits) {
     for (std::uint32_t ball = 0; ball < 2; ++ball) {
         EXPECT_EQ(s.contacts[ball].first, ball);
         EXPECT_EQ(s.contacts[ball].second, 2U);
-        EXPECT_NEAR(s.contacts[ball].passage, 40.0 * 0.3, 0.15 * 40.0 * 0.3);
+        EXPECT_NEAR(s.contacts[ball].saddleRadius, 40.0 * 0.3, 0.15 * 40.0 * 0.3);
         const double section = std::acos(-1.0) * 144.0;
         EXPECT_GT(s.contacts[ball].area, 0.7 * section);
         EXPECT_LT(s.contacts[ball].area, 4.0 * section);

@@ -6,8 +6,8 @@
 
 #include <gtest/gtest.h>
 
-#include "core/segmentation/exact_geometry.h"
-#include "small_clouds.h"
+#include "core/geometry/tetrahedron.h"
+#include "tests/core/segmentation/small_clouds.h"
 
 namespace shapedb {
 namespace {

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "core/base/random.h"
-#include "small_clouds.h"
+#include "tests/core/segmentation/small_clouds.h"
 
 namespace shapedb {
 namespace {

@@ -8,8 +8,8 @@
 #include <gtest/gtest.h>
 
 #include "core/base/random.h"
-#include "core/segmentation/point_scale.h"
-#include "small_clouds.h"
+#include "core/segmentation/local_spacing.h"
+#include "tests/core/segmentation/small_clouds.h"
 
 namespace shapedb {
 namespace {
@@ -80,7 +80,7 @@ std::vector<std::uint8_t> referenceInterior(const Triangulated& cloud, const Bal
 }
 
 std::vector<std::uint8_t> bigOf(const Triangulated& cloud, double ratio) {
-    return bigBalls(cloud.tetrahedra, pointScales(cloud.points).value(), ratio);
+    return bigBalls(cloud.tetrahedra, localSpacings(cloud.points).value(), ratio);
 }
 
 std::size_t countOf(const std::vector<std::uint8_t>& flags) {
@@ -89,7 +89,7 @@ std::size_t countOf(const std::vector<std::uint8_t>& flags) {
 
 TEST(BigBalls, AreThoseAboveTheScaleOfAnyCorner) {
     for (const Triangulated& cloud : triangulatedClouds()) {
-        const auto scales = pointScales(cloud.points).value();
+        const auto scales = localSpacings(cloud.points).value();
         for (const double ratio : {0.3, 0.5, 1.0, 2.0}) {
             const auto big = bigBalls(cloud.tetrahedra, scales, ratio);
             for (std::size_t t = 0; t < big.size(); ++t) {

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <type_traits>
 
 #include <gtest/gtest.h>
 
@@ -16,20 +17,23 @@ TEST(SegmentationOptions, DefaultsAreThePapers) {
     EXPECT_EQ(options.deepAngleDegrees, 20.0);
     EXPECT_EQ(options.hullAngleDegrees, 5.0);
     EXPECT_EQ(options.mergeRatio, 1.5);
-    EXPECT_EQ(options.decimateTo, 0U);
-    EXPECT_EQ(options.strayRatio, 0.0);
-    EXPECT_EQ(options.smoothingReach, 0.0);
-    EXPECT_EQ(options.evenSpacing, 0.0);
+    EXPECT_EQ(options.preparation.decimateTo, 0U);
+    EXPECT_EQ(options.preparation.outlierRatio, 0.0);
+    EXPECT_EQ(options.preparation.smoothingReach, 0.0);
+    EXPECT_EQ(options.preparation.thinning, 0.0);
     EXPECT_EQ(options.interiorMethod, InteriorMethod::kWalk);
 }
 
 // Sets one field to each value; the error must name the field.
-template <typename Field>
-void expectRefused(Field SegmentationOptions::*field, const std::string& name,
-                   std::initializer_list<double> values) {
+template <typename Options, typename Field>
+void expectRefused(Field Options::*field, const std::string& name, std::initializer_list<double> values) {
     for (const double value : values) {
         SegmentationOptions options;
-        options.*field = static_cast<Field>(value);
+        if constexpr (std::is_same_v<Options, PreparationOptions>) {
+            options.preparation.*field = static_cast<Field>(value);
+        } else {
+            options.*field = static_cast<Field>(value);
+        }
         const auto valid = validate(options);
         ASSERT_FALSE(valid) << name << " " << value;
         EXPECT_EQ(valid.error().code, ErrorCode::kInvalidArgument);
@@ -44,10 +48,10 @@ TEST(SegmentationOptions, EachFieldHasItsRange) {
     expectRefused(&SegmentationOptions::deepAngleDegrees, "deep_angle_degrees", {0.0, 90.0, -5.0, nan, inf});
     expectRefused(&SegmentationOptions::hullAngleDegrees, "hull_angle_degrees", {0.0, 90.0, -5.0, nan, inf});
     expectRefused(&SegmentationOptions::mergeRatio, "merge_ratio", {0.999, 0.0, -2.0, nan, inf});
-    expectRefused(&SegmentationOptions::decimateTo, "decimate_to", {1, 2, 3});
-    expectRefused(&SegmentationOptions::strayRatio, "stray_ratio", {1.0, 0.5, -3.0, nan, inf});
-    expectRefused(&SegmentationOptions::smoothingReach, "smoothing_reach", {0.5, 20.1, -1.0, nan, inf});
-    expectRefused(&SegmentationOptions::evenSpacing, "even_spacing", {10.1, -1.0, nan, inf});
+    expectRefused(&PreparationOptions::decimateTo, "decimate_to", {1, 2, 3});
+    expectRefused(&PreparationOptions::outlierRatio, "outlier_ratio", {1.0, 0.5, -3.0, nan, inf});
+    expectRefused(&PreparationOptions::smoothingReach, "smoothing_reach", {0.5, 20.1, -1.0, nan, inf});
+    expectRefused(&PreparationOptions::thinning, "thinning", {10.1, -1.0, nan, inf});
 }
 
 TEST(SegmentationOptions, EndsOfTheRangesAreAllowed) {
@@ -56,9 +60,9 @@ TEST(SegmentationOptions, EndsOfTheRangesAreAllowed) {
     options.deepAngleDegrees = 89.999;
     options.hullAngleDegrees = 1e-9;
     options.mergeRatio = 1.0;
-    options.decimateTo = 4;
+    options.preparation.decimateTo = 4;
     EXPECT_TRUE(validate(options));
-    options.decimateTo = 4294967295U;
+    options.preparation.decimateTo = 4294967295U;
     EXPECT_TRUE(validate(options));
 }
 

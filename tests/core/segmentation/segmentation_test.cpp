@@ -11,10 +11,10 @@
 
 #include "core/base/random.h"
 #include "core/geometry/bounding.h"
-#include "core/geometry/noise.h"
 #include "core/segmentation/interior.h"
-#include "core/segmentation/point_scale.h"
+#include "core/segmentation/local_spacing.h"
 #include "core/synthetic/named_shapes.h"
+#include "core/synthetic/noise.h"
 
 namespace shapedb {
 namespace {
@@ -104,7 +104,7 @@ TEST_F(SegmentationOfShape, MomentsAgreeWithDirectSummation) {
         if (segment.volume > 1e-9) {
             EXPECT_LT(distance(segment.centroid, (1.0 / volume[i]) * first[i]), 1e-9);
         }
-        EXPECT_LE(segment.peakRadius, largest[i] * (1 + 1e-12));
+        EXPECT_LE(segment.maximumRadius, largest[i] * (1 + 1e-12));
         EXPECT_LE(segment.volume, last);
         EXPECT_GT(segment.volume, 0.0);
         last = segment.volume;
@@ -223,7 +223,7 @@ TEST(Segmentation, OfTheCornersOfATetrahedronIsThatTetrahedron) {
     ASSERT_EQ(s->segments.size(), 1U);
     EXPECT_NEAR(s->volume, 8.0 / (6.0 * std::sqrt(2.0)), 1e-12);
     EXPECT_LT(length(s->segments[0].centroid), 1e-12);
-    EXPECT_NEAR(s->segments[0].peakRadius, std::sqrt(1.5), 1e-12);
+    EXPECT_NEAR(s->segments[0].maximumRadius, std::sqrt(1.5), 1e-12);
     // Second moments of a regular tetrahedron with edge a: a^2 / 40 about every axis.
     EXPECT_NEAR(s->segments[0].covariance[0], 4.0 / 40.0, 1e-12);
     EXPECT_NEAR(s->segments[0].covariance[3], 4.0 / 40.0, 1e-12);
@@ -260,7 +260,8 @@ void expectBallsFirst(const NamedShape& shape, std::uint64_t seed) {
             if (distance(segment.centroid, ball.centre) > 0.02 * s->size) continue;
             found.insert(b);
             EXPECT_NEAR(segment.volume, ball.volume(), 0.1 * ball.volume()) << shape.name << " ball " << b;
-            EXPECT_NEAR(segment.peakRadius, ball.radius, 0.02 * ball.radius) << shape.name << " ball " << b;
+            EXPECT_NEAR(segment.maximumRadius, ball.radius, 0.02 * ball.radius)
+                << shape.name << " ball " << b;
         }
     }
     EXPECT_EQ(found.size(), shape.balls.size()) << shape.name << ": each of the heaviest is another ball";
@@ -282,13 +283,13 @@ TEST(Segmentation, OfASphereIsOneHeavySegment) {
     ASSERT_TRUE(s);
     EXPECT_GT(s->segments[0].volume, 0.95 * s->volume);
     EXPECT_LT(length(s->segments[0].centroid), 0.01);
-    EXPECT_NEAR(s->segments[0].peakRadius, 1.0, 0.01);
+    EXPECT_NEAR(s->segments[0].maximumRadius, 1.0, 0.01);
 }
 
 TEST(Segmentation, DecimatesWhenAsked) {
     const PointCloud points = sample(makeDumbbell(), 20000, 0.0, 6);
     SegmentationOptions options;
-    options.decimateTo = 5000;
+    options.preparation.decimateTo = 5000;
     const auto s = segment(points, options);
     ASSERT_TRUE(s);
     EXPECT_LE(s->sites.size(), 5000U);
@@ -300,7 +301,7 @@ TEST(Segmentation, DecimatesWhenAsked) {
     }
     EXPECT_EQ(s->stages[1].stage, std::string("decimate"));
     EXPECT_NEAR(s->volume, makeDumbbell().volume, 0.03 * makeDumbbell().volume);
-    options.decimateTo = 20000;
+    options.preparation.decimateTo = 20000;
     EXPECT_EQ(segment(points, options)->sites.size(), 20000U) << "no more than asked: left alone";
 }
 

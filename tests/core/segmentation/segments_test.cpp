@@ -14,8 +14,8 @@
 #include "core/base/random.h"
 #include "core/segmentation/flow.h"
 #include "core/segmentation/interior.h"
-#include "core/segmentation/point_scale.h"
-#include "small_clouds.h"
+#include "core/segmentation/local_spacing.h"
+#include "tests/core/segmentation/small_clouds.h"
 
 namespace shapedb {
 namespace {
@@ -49,7 +49,7 @@ const std::vector<Case>& cases() {
             made.push_back(std::move(c));
         };
         for (const Triangulated& cloud : triangulatedClouds()) {
-            const auto scales = pointScales(cloud.points).value();
+            const auto scales = localSpacings(cloud.points).value();
             add(cloud, interiorTetrahedra(cloud.points, cloud.tetrahedra,
                                           bigBalls(cloud.tetrahedra, scales, 0.5), SegmentationOptions{})
                            .value());
@@ -80,8 +80,8 @@ std::vector<double> strengths(const Case& c) {
     return known;
 }
 
-double peakRadius(const Case& c, std::int32_t segment) {
-    return c.flat().circumradii[c.fine.peaks[static_cast<std::size_t>(segment)]];
+double maximumRadius(const Case& c, std::int32_t segment) {
+    return c.flat().circumradii[c.fine.maxima[static_cast<std::size_t>(segment)]];
 }
 
 TEST(StableManifolds, PartitionTheInterior) {
@@ -91,12 +91,12 @@ TEST(StableManifolds, PartitionTheInterior) {
         for (std::size_t t = 0; t < c.flat().size(); ++t) {
             const std::int32_t segment = c.fine.ofTetrahedron[t];
             ASSERT_EQ(segment >= 0, c.interior[t] != 0) << c.cloud->name;
-            ASSERT_LT(segment, static_cast<std::int32_t>(c.fine.peaks.size()));
+            ASSERT_LT(segment, static_cast<std::int32_t>(c.fine.maxima.size()));
             if (segment >= 0) used.insert(segment);
         }
-        EXPECT_EQ(used.size(), c.fine.peaks.size()) << "no segment is empty";
-        for (std::size_t s = 0; s < c.fine.peaks.size(); ++s) {
-            ASSERT_EQ(c.fine.ofTetrahedron[c.fine.peaks[s]], static_cast<std::int32_t>(s));
+        EXPECT_EQ(used.size(), c.fine.maxima.size()) << "no segment is empty";
+        for (std::size_t s = 0; s < c.fine.maxima.size(); ++s) {
+            ASSERT_EQ(c.fine.ofTetrahedron[c.fine.maxima[s]], static_cast<std::int32_t>(s));
         }
     }
 }
@@ -108,9 +108,10 @@ TEST(StableManifolds, FollowTheStrengthOfThePaper) {
         for (std::uint32_t t = 0; t < c.flat().size(); ++t) {
             if (!c.interior[t] || strength[t] < 0.0) continue;
             const std::int32_t segment = c.fine.ofTetrahedron[t];
-            ASSERT_EQ(peakRadius(c, segment), strength[t]) << c.cloud->name;
+            ASSERT_EQ(maximumRadius(c, segment), strength[t]) << c.cloud->name;
             if (c.flow[t] == 0) {
-                ASSERT_EQ(c.fine.peaks[static_cast<std::size_t>(segment)], t) << "a maximum is its own peak";
+                ASSERT_EQ(c.fine.maxima[static_cast<std::size_t>(segment)], t)
+                    << "a maximum is its own maximum";
                 continue;
             }
             // t goes where its strongest successor goes (one of them, when several are as strong).
@@ -158,10 +159,10 @@ TEST(StableManifolds, LeftoversJoinLayerByLayer) {
             if (expected[t] >= 0) {
                 ASSERT_EQ(c.fine.ofTetrahedron[t], expected[t]) << c.cloud->name;
             } else if (c.interior[t]) {
-                // An island: its peak flows into no maximum and is its largest ball.
+                // An island: its maximum flows into no maximum and is its largest ball.
                 const std::int32_t segment = c.fine.ofTetrahedron[t];
-                ASSERT_LT(strength[c.fine.peaks[static_cast<std::size_t>(segment)]], 0.0);
-                ASSERT_LE(c.flat().circumradii[t], peakRadius(c, segment));
+                ASSERT_LT(strength[c.fine.maxima[static_cast<std::size_t>(segment)]], 0.0);
+                ASSERT_LE(c.flat().circumradii[t], maximumRadius(c, segment));
                 ++islands;
             }
         }
@@ -174,8 +175,8 @@ TEST(StableManifolds, EachIsConnected) {
     for (const Case& c : cases()) {
         std::vector<std::uint8_t> seen(c.flat().size(), 0);
         std::size_t reached = 0;
-        for (std::size_t s = 0; s < c.fine.peaks.size(); ++s) {
-            std::vector<std::uint32_t> stack = {c.fine.peaks[s]};
+        for (std::size_t s = 0; s < c.fine.maxima.size(); ++s) {
+            std::vector<std::uint32_t> stack = {c.fine.maxima[s]};
             seen[stack.back()] = 1;
             while (!stack.empty()) {
                 const std::uint32_t t = stack.back();
@@ -234,7 +235,7 @@ TEST(MergeSegments, IsTheClosureOfMergeablePairs) {
     std::size_t mergedAway = 0;
     for (const Case& c : cases()) {
         for (const double ratio : {1.0, 1.5, 2.5}) {
-            const std::size_t n = c.fine.peaks.size();
+            const std::size_t n = c.fine.maxima.size();
             std::map<std::pair<std::int32_t, std::int32_t>, double> widest;  // largest shared triangle
             for (std::size_t t = 0; t < c.flat().size(); ++t) {
                 for (std::size_t i = 0; i < 4; ++i) {
@@ -255,8 +256,8 @@ TEST(MergeSegments, IsTheClosureOfMergeablePairs) {
                 for (const auto& [pair, radius] : widest) {
                     const auto a = static_cast<std::size_t>(pair.first);
                     const auto b = static_cast<std::size_t>(pair.second);
-                    if (peakRadius(c, pair.first) > ratio * radius ||
-                        peakRadius(c, pair.second) > ratio * radius)
+                    if (maximumRadius(c, pair.first) > ratio * radius ||
+                        maximumRadius(c, pair.second) > ratio * radius)
                         continue;
                     const std::size_t least = std::min(group[a], group[b]);
                     changed = changed || group[a] != least || group[b] != least;
@@ -276,11 +277,11 @@ TEST(MergeSegments, IsTheClosureOfMergeablePairs) {
                 ASSERT_EQ(known.first->second, after) << c.cloud->name << ": one group, one label";
             }
             EXPECT_EQ(labels.size(), labelOfGroup.size()) << c.cloud->name << ": one label, one group";
-            EXPECT_EQ(merged.peaks.size(), labels.size());
-            mergedAway += n - merged.peaks.size();
-            // The peak of a merged segment is the first, that is the largest, of its group.
+            EXPECT_EQ(merged.maxima.size(), labels.size());
+            mergedAway += n - merged.maxima.size();
+            // The maximum of a merged segment is the first, that is the largest, of its group.
             for (const auto& [first, label] : labelOfGroup) {
-                EXPECT_EQ(merged.peaks[static_cast<std::size_t>(label)], c.fine.peaks[first]);
+                EXPECT_EQ(merged.maxima[static_cast<std::size_t>(label)], c.fine.maxima[first]);
             }
             EXPECT_TRUE(std::is_sorted(labels.begin(), labels.end()));
             EXPECT_EQ(labels.empty() ? -1 : *labels.rbegin(), static_cast<std::int32_t>(labels.size()) - 1);
@@ -293,10 +294,10 @@ TEST(MergeSegments, PeaksOfMaximaFall) {
     for (const Case& c : cases()) {
         const auto strength = strengths(c);
         double last = std::numeric_limits<double>::infinity();
-        for (const std::uint32_t peak : c.fine.peaks) {
-            if (strength[peak] < 0.0) break;  // islands come after all maxima
-            EXPECT_LE(c.flat().circumradii[peak], last);
-            last = c.flat().circumradii[peak];
+        for (const std::uint32_t maximum : c.fine.maxima) {
+            if (strength[maximum] < 0.0) break;  // islands come after all maxima
+            EXPECT_LE(c.flat().circumradii[maximum], last);
+            last = c.flat().circumradii[maximum];
         }
     }
 }

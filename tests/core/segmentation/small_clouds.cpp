@@ -1,12 +1,12 @@
-#include "small_clouds.h"
+#include "tests/core/segmentation/small_clouds.h"
 
 #include <stdexcept>
 #include <utility>
 
 #include "core/base/random.h"
-#include "core/geometry/noise.h"
-#include "core/geometry/sanitise.h"
+#include "core/preparation/sanitise.h"
 #include "core/synthetic/named_shapes.h"
+#include "core/synthetic/noise.h"
 
 namespace shapedb {
 

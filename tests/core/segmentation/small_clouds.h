@@ -9,8 +9,8 @@
 #include <CGAL/Exact_rational.h>
 #include <CGAL/Simple_cartesian.h>
 
+#include "core/delaunay/delaunay.h"
 #include "core/geometry/point.h"
-#include "core/segmentation/delaunay.h"
 
 namespace shapedb {
 

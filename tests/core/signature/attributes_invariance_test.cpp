@@ -12,7 +12,7 @@
 
 #include "core/base/random.h"
 #include "core/geometry/motion.h"
-#include "core/signature/profile.h"
+#include "core/pipeline.h"
 #include "core/signature/signature_codec.h"
 #include "core/synthetic/families.h"
 #include "core/synthetic/named_shapes.h"

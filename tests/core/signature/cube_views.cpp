@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "core/base/random.h"
+#include "core/delaunay/delaunay.h"
 #include "core/geometry/motion.h"
-#include "core/segmentation/delaunay.h"
 
 namespace shapedb::testing_support {
 

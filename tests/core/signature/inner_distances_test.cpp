@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "core/segmentation/delaunay.h"
+#include "core/delaunay/delaunay.h"
 #include "tests/core/signature/cube_views.h"
 
 namespace shapedb {

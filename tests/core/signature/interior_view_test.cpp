@@ -7,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include "core/segmentation/delaunay.h"
-#include "core/signature/profile.h"
+#include "core/delaunay/delaunay.h"
+#include "core/pipeline.h"
 #include "core/synthetic/named_shapes.h"
 #include "tests/core/signature/cube_views.h"
 

@@ -11,7 +11,7 @@
 
 #include "core/base/random.h"
 #include "core/geometry/motion.h"
-#include "core/signature/profile.h"
+#include "core/pipeline.h"
 #include "core/signature/signature_codec.h"
 #include "core/synthetic/named_shapes.h"
 
@@ -63,7 +63,7 @@ void expectMovesLittle(const Signature& still, const Signature& moved, const Mot
             EXPECT_NEAR(moved.points[i].weight / still.points[i].weight, 1.0, 1e-3) << what << " point " << i;
         }
         EXPECT_NEAR(moved.points[i].volumeShare, still.points[i].volumeShare, 1e-5) << what;
-        EXPECT_NEAR(moved.points[i].peakRadius / still.points[i].peakRadius, 1.0, 1e-3) << what;
+        EXPECT_NEAR(moved.points[i].maximumRadius / still.points[i].maximumRadius, 1.0, 1e-3) << what;
     }
 }
 
@@ -136,7 +136,7 @@ TEST(SignatureInvariance, PointOrderChangesNoBit) {
         const PointCloud points = sample(shape, 3000);
         for (const Profile profile : {Profile::kPaper, Profile::kDefault}) {
             ShapeParameters parameters = parametersOf(profile);
-            if (profile == Profile::kDefault) parameters.segmentation.decimateTo = 2000;
+            if (profile == Profile::kDefault) parameters.segmentation.preparation.decimateTo = 2000;
             const auto reference = describe(points, parameters).value();
             const std::string bytes = encodeSignature(reference.signature);
             for (std::uint64_t seed = 1; seed <= 3; ++seed) {

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "core/base/random.h"
-#include "core/signature/profile.h"
+#include "core/pipeline.h"
 #include "core/signature/signature_codec.h"
 #include "core/synthetic/families.h"
 
@@ -36,13 +36,13 @@ Signature randomAttributed(Random& random, std::size_t count) {
     signature.volume = signature.scale * signature.scale * signature.scale * random.uniform(1, 100);
     signature.origin = {random.normal() * 1e30, random.normal(), random.normal() * 1e-30};
     for (std::size_t i = 0; i < count; ++i) {
-        SignaturePoint point;
+        WeightedPoint point;
         if (i > 0) {
             for (float& v : point.position) v = static_cast<float>(random.normal());
         }
         point.weight = 1.0f / static_cast<float>(i + 1);
         point.volumeShare = volumeShareOf(point.weight, signature.scale, signature.volume);
-        point.peakRadius = static_cast<float>(random.uniform(0.1, 1));
+        point.maximumRadius = static_cast<float>(random.uniform(0.1, 1));
         for (float& v : point.covariance) v = static_cast<float>(random.normal());
         signature.points.push_back(point);
     }
@@ -98,7 +98,7 @@ std::string goldenHead(const std::string& version) {
                              "000000000000c03f"          // origin 1, -2, 0.125
                              "0000000000000e40"          // volume 3.75
                              "000000000000000000000000"  // position
-                             "0000003e0000803e"  // weight, peak radius; the share follows from the weight
+                             "0000003e0000803e"  // weight, maximum radius; the share follows from the weight
                              "0ad7233c00000000000000000ad7a33c000000008fc2f53c";
     std::string bytes;
     for (std::size_t i = 0; i < head.size(); i += 2) {

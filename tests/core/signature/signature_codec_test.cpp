@@ -73,7 +73,7 @@ TEST(SignatureCodec, GoldenBytes) {
         "00000000"  // position
         "0000003e"
         "0000403f"
-        "0000803e"  // weight, share, peak radius
+        "0000803e"  // weight, share, maximum radius
         "0ad7233c"
         "00000000"
         "00000000"
@@ -105,7 +105,7 @@ void expectSame(const Signature& a, const Signature& b) {
     EXPECT_EQ(a.volume, b.volume);
     for (std::size_t i = 0; i < a.points.size(); ++i) {
         EXPECT_EQ(a.points[i].volumeShare, b.points[i].volumeShare);
-        EXPECT_EQ(a.points[i].peakRadius, b.points[i].peakRadius);
+        EXPECT_EQ(a.points[i].maximumRadius, b.points[i].maximumRadius);
         EXPECT_EQ(a.points[i].covariance, b.points[i].covariance);
     }
 }
@@ -118,13 +118,13 @@ TEST(SignatureCodec, DecodeIsTheInverse) {
         signature.volume = std::exp(random.uniform(-80, 80));
         signature.origin = {random.normal() * 1e30, random.normal(), random.normal() * 1e-30};
         for (std::uint32_t i = 0; i < count; ++i) {
-            SignaturePoint point;
+            WeightedPoint point;
             if (i > 0) {
                 for (float& v : point.position) v = static_cast<float>(random.normal());
             }
             point.weight = 1.0f / static_cast<float>(i + 1);
             point.volumeShare = static_cast<float>(1.0 - random.uniform());
-            point.peakRadius = static_cast<float>(random.uniform(0.1, 1));
+            point.maximumRadius = static_cast<float>(random.uniform(0.1, 1));
             for (float& v : point.covariance) v = static_cast<float>(random.normal());
             signature.points.push_back(point);
         }
@@ -200,7 +200,7 @@ TEST(SignatureCodec, BadNumbersAreRefused) {
     refused("heavier", [&](Signature& s) { s.points[1].weight = 0.126f; });
     refused("share", [&](Signature& s) { s.points[0].volumeShare = 1.5f; });
     refused("share", [&](Signature& s) { s.points[1].volumeShare = 0.0f; });
-    refused("peak radius", [&](Signature& s) { s.points[1].peakRadius = 0.0f; });
+    refused("maximum radius", [&](Signature& s) { s.points[1].maximumRadius = 0.0f; });
     refused("origin", [&](Signature& s) { s.points[0].position[0] = 0.001f; });
     refused("too few", [&](Signature& s) { s.points.clear(); });
     refused("17 points", [&](Signature& s) { s.points.resize(17, s.points[1]); });

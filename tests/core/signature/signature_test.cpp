@@ -17,7 +17,7 @@ Segmentation tenSegments() {
         Segment segment;
         segment.volume = 10.0 - i;
         segment.centroid = {5.0 + i, -1.0, 0.5 * i};
-        segment.peakRadius = 1.0 + i;
+        segment.maximumRadius = 1.0 + i;
         segment.covariance = {4.0, 0.0, 0.0, 9.0, 0.0, 1.0};
         s.segments.push_back(segment);
         s.volume += segment.volume;
@@ -33,12 +33,12 @@ TEST(Signature, FieldsAreScaledAndAnchored) {
     EXPECT_EQ(signature->origin, (Point3{5.0, -1.0, 0.0}));
     ASSERT_EQ(signature->points.size(), 7U) << "the paper: less than ten";
     for (std::size_t i = 0; i < 7; ++i) {
-        const SignaturePoint& p = signature->points[i];
+        const WeightedPoint& p = signature->points[i];
         const float at = static_cast<float>(i);
         EXPECT_EQ(p.position, (std::array<float, 3>{at / 4.0f, 0.0f, at / 8.0f}));
         EXPECT_EQ(p.weight, (10.0f - at) / 64.0f);
         EXPECT_FLOAT_EQ(p.volumeShare, (10.0f - at) / 55.0f);
-        EXPECT_EQ(p.peakRadius, (1.0f + at) / 4.0f);
+        EXPECT_EQ(p.maximumRadius, (1.0f + at) / 4.0f);
         EXPECT_EQ(p.covariance, (std::array<float, 6>{0.25f, 0.0f, 0.0f, 0.5625f, 0.0f, 0.0625f}));
         EXPECT_LT(distance(pointPosition(*signature, i), tenSegments().segments[i].centroid), 1e-6);
         EXPECT_NEAR(pointVolume(*signature, i), 10.0 - static_cast<double>(i), 1e-6);
@@ -80,8 +80,8 @@ TEST(Signature, LeavesOutWhatSinglePrecisionCannotHold) {
     s.segments[3].volume = 1e-60;
     s.segments.resize(4);
     EXPECT_EQ(makeSignature(s, {})->points.size(), 3U);
-    s.segments[0].peakRadius = 1e300;
-    EXPECT_TRUE(std::isfinite(makeSignature(s, {})->points[0].peakRadius));
+    s.segments[0].maximumRadius = 1e300;
+    EXPECT_TRUE(std::isfinite(makeSignature(s, {})->points[0].maximumRadius));
     s.segments = {s.segments[3]};
     EXPECT_EQ(makeSignature(s, {}).error().code, ErrorCode::kNoInterior);
     EXPECT_EQ(makeSignature(Segmentation{}, {}).error().code, ErrorCode::kNoInterior);
@@ -125,7 +125,7 @@ TEST(Signature, OfRealShapesIsWellFormed) {
         const auto signature = makeSignature(*s, {}).value();
         double share = 0.0;
         for (std::size_t i = 0; i < signature.points.size(); ++i) {
-            const SignaturePoint& p = signature.points[i];
+            const WeightedPoint& p = signature.points[i];
             EXPECT_GT(p.weight, 0.0f);
             EXPECT_LE(p.weight, signature.points[i == 0 ? 0 : i - 1].weight);
             share += p.volumeShare;

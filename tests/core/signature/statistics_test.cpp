@@ -10,10 +10,10 @@
 
 #include <gtest/gtest.h>
 
+#include "core/pipeline.h"
 #include "core/signature/footprint.h"
 #include "core/signature/inner_distances.h"
 #include "core/signature/local_spread.h"
-#include "core/signature/profile.h"
 #include "core/signature/shell_harmonics.h"
 #include "core/synthetic/named_shapes.h"
 #include "tests/core/signature/cube_views.h"

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/common/sha256.h"
+#include "common/sha256.h"
 
 namespace shapedb::testing {
 namespace {

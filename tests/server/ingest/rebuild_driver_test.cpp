@@ -41,7 +41,7 @@ class Driver : public ::testing::Test {
         ASSERT_TRUE(store.putShape(putRequest(parts.id, key, points)));
     }
 
-    RebuildDriver& start(Describer describe = quickDescribe, int threads = 3) {
+    RebuildDriver& start(SignaturePipeline describe = quickDescribe, int threads = 3) {
         RebuildOptions options;
         options.threads = threads;
         options.batch = 4;
@@ -55,7 +55,7 @@ class Driver : public ::testing::Test {
     }
 
     /// Counts what it describes; waits at each scan while closed.
-    Describer counting() {
+    SignaturePipeline counting() {
         return
             [this](const PointCloud& points, const ShapeParameters& parameters, const RunContext& context) {
                 ++described;
@@ -111,7 +111,7 @@ class Driver : public ::testing::Test {
     std::shared_ptr<RecordingLogger> log;
     index::CollectionIndex index;
     ProgressBoard board;
-    SuspectGate suspects;
+    CrashIsolation suspects;
     store::Collection parts;
     std::unique_ptr<WorkerPool> pool;
     std::unique_ptr<RebuildDriver> driver;

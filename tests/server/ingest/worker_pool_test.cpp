@@ -43,7 +43,7 @@ class Pool : public ::testing::Test {
         EXPECT_TRUE(index.loadAll());
     }
 
-    WorkerPool& start(Describer describe = quickDescribe, int threads = 2) {
+    WorkerPool& start(SignaturePipeline describe = quickDescribe, int threads = 2) {
         WorkerOptions options;
         options.threads = threads;
         options.backOff = 5ms;
@@ -52,7 +52,7 @@ class Pool : public ::testing::Test {
         return *pool;
     }
 
-    Describer through(Gate& gate) {
+    SignaturePipeline through(Gate& gate) {
         return [&gate](const PointCloud& points, const ShapeParameters& parameters,
                        const RunContext& context) { return gate.describe(points, parameters, context); };
     }
@@ -73,7 +73,7 @@ class Pool : public ::testing::Test {
     std::shared_ptr<RecordingLogger> log;
     index::CollectionIndex index;
     ProgressBoard board;
-    SuspectGate suspects;
+    CrashIsolation suspects;
     store::Collection parts;
     std::unique_ptr<WorkerPool> pool;
 };

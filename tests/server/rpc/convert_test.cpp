@@ -23,7 +23,7 @@ TEST(ParametersFrom, SetFieldsWinOverTheBase) {
     ASSERT_TRUE(fresh);
     EXPECT_EQ(fresh->profile, Profile::kDefault);
     EXPECT_EQ(fresh->segmentation.mergeRatio, 1.5) << "a profile starts from its defaults";
-    EXPECT_EQ(fresh->segmentation.decimateTo, 0u) << "set to 0 is not unset";
+    EXPECT_EQ(fresh->segmentation.preparation.decimateTo, 0u) << "set to 0 is not unset";
 }
 
 TEST(ParametersFrom, EveryFieldArrives) {
@@ -36,9 +36,9 @@ TEST(ParametersFrom, EveryFieldArrives) {
     segmentation.set_merge_contrast(1.25);
     segmentation.set_min_segment_share(0.01);
     segmentation.set_max_segments(12);
-    segmentation.set_stray_ratio(3.0);
+    segmentation.set_outlier_ratio(3.0);
     segmentation.set_smoothing_reach(5.0);
-    segmentation.set_even_spacing(1.0);
+    segmentation.set_thinning(1.0);
     segmentation.set_interior_method(pb::INTERIOR_METHOD_ADAPTIVE);
     // A field added to the message and forgotten here would show.
     const auto* fields = pb::SegmentationParameters::descriptor();
@@ -160,7 +160,7 @@ TEST(Reports, SayWhatWasLeftOutAndHowSureTheInteriorIs) {
     segmentation.siteOfPoint.resize(10);
     segmentation.sites.resize(6);
     segmentation.duplicates = 1;
-    segmentation.strays = 3;
+    segmentation.outliers = 3;
     segmentation.quality = 0.25;
     segmentation.interiorSource = InteriorSource::kPotential;
     segmentation.angleDegrees = 17.5;
@@ -170,7 +170,7 @@ TEST(Reports, SayWhatWasLeftOutAndHowSureTheInteriorIs) {
     EXPECT_EQ(report.points(), 10u);
     EXPECT_EQ(report.points_used(), 6u);
     EXPECT_EQ(report.duplicates(), 1u);
-    EXPECT_EQ(report.strays(), 3u);
+    EXPECT_EQ(report.outliers(), 3u);
     EXPECT_EQ(report.quality(), 0.25);
     EXPECT_EQ(report.interior_source(), pb::INTERIOR_SOURCE_POTENTIAL);
     EXPECT_EQ(report.angle_degrees(), 17.5);
@@ -185,7 +185,7 @@ TEST(Signatures, AreInScanUnits) {
     signature.points.resize(2);
     signature.points[0].weight = 0.4f;
     signature.points[0].volumeShare = 0.75f;
-    signature.points[0].peakRadius = 0.5f;
+    signature.points[0].maximumRadius = 0.5f;
     signature.points[1].weight = 0.125f;
     signature.points[1].position = {0.5f, 0.0f, -1.0f};
     pb::Signature message;
@@ -219,7 +219,7 @@ TEST(Signatures, AttributesAreSharesByName) {
     for (std::size_t s = 0; s < kStatistics.size(); ++s) {
         const pb::ShapeStatistic& statistic = message.attributes().statistics(static_cast<int>(s));
         EXPECT_EQ(statistic.name(), kStatistics[s].name);
-        EXPECT_EQ(statistic.of_interior(), kStatistics[s].ground == Ground::kInside);
+        EXPECT_EQ(statistic.of_interior(), kStatistics[s].evidence == Evidence::kInside);
         for (const float share : statistic.shares()) {
             const double root = static_cast<double>(bin++ % 16) / 15.0;
             EXPECT_NEAR(share, root * root / 2.0, 1e-6);

@@ -5,8 +5,8 @@
 #include <gtest/gtest.h>
 
 #include "core/base/random.h"
-#include "core/geometry/sanitise.h"
-#include "server/ingest/describer.h"
+#include "core/preparation/sanitise.h"
+#include "server/ingest/signature_pipeline.h"
 
 namespace shapedb::rpc {
 namespace {

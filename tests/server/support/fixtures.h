@@ -10,10 +10,10 @@
 #include <utility>
 #include <vector>
 
+#include "core/pipeline.h"
 #include "core/search/signature_set.h"
-#include "core/signature/profile.h"
 #include "core/signature/signature_codec.h"
-#include "server/index/parameters_codec.h"
+#include "server/store/parameters_codec.h"
 #include "server/store/store.h"
 #include "server/telemetry/logger.h"
 
@@ -25,7 +25,7 @@ inline Signature signatureOf(double volume) {
     signature.points.resize(1);
     signature.points[0].weight = static_cast<float>(volume / 1024.0);
     signature.points[0].volumeShare = 1.0f;
-    signature.points[0].peakRadius = 0.25f;
+    signature.points[0].maximumRadius = 0.25f;
     signature.points[0].covariance = {0.01f, 0.0f, 0.0f, 0.01f, 0.0f, 0.01f};
     signature.volume = volume;
     return signature;

@@ -1,0 +1,32 @@
+// Fills a database with shapes that are already described, for measurements at sizes that would
+// take days to upload. The server never calls it.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+
+#include "core/base/run_context.h"
+#include "server/store/sqlite/sqlite_store.h"
+
+namespace shapedb::store {
+
+struct FillShape {
+    std::string key;  ///< unique
+    Metadata metadata;
+    std::string signature;  ///< core/signature/signature_codec.h; not looked at
+};
+
+/// Creates the database at `options.path`, or opens it as openSqliteStore does, makes the collection and
+/// puts `count` READY shapes into it, `make(0)`, `make(1)`, ... Each has the same four points, so that
+/// the database passes `check` (but a rebuild would replace all signatures by that of a tetrahedron).
+/// Commits now and then: after an error part of it is there.
+///
+/// Errors: those of openSqliteStore; kAlreadyExists (collection, or a key); kCancelled,
+/// kDeadlineExceeded. Not thread-safe.
+[[nodiscard]] Result<void> fillDatabase(const SqliteOptions& options, const std::string& collection,
+                                        const std::string& parameters, std::uint64_t count,
+                                        const std::function<FillShape(std::uint64_t)>& make,
+                                        const RunContext& context = {});
+
+}  // namespace shapedb::store

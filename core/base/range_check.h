@@ -1,0 +1,18 @@
+// Checking that a parameter is in range.
+#pragma once
+
+#include <string>
+
+#include "core/base/error.h"
+
+namespace shapedb {
+
+/// Errors: kInvalidArgument unless `holds`: "FIELD is VALUE; it must be RANGE".
+[[nodiscard]] inline Result<void> requireInRange(bool holds, const char* field, double value,
+                                                 const char* range) {
+    if (holds) return {};
+    return fail(ErrorCode::kInvalidArgument,
+                std::string(field) + " is " + std::to_string(value) + "; it must be " + range);
+}
+
+}  // namespace shapedb

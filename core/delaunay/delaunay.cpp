@@ -1,0 +1,276 @@
+#include "core/delaunay/delaunay.h"
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <limits>
+#include <new>
+#include <numeric>
+#include <string>
+
+#include "core/base/parallel.h"
+#include "core/base/prefetch.h"
+#include "core/base/return_if_error.h"
+#include "core/delaunay/bowyer_watson.h"
+#include "core/delaunay/flat_delaunay.h"
+#include "core/delaunay/hilbert_order.h"
+#include "core/geometry/tetrahedron.h"
+#include "core/geometry/vec3x2.h"
+#include "core/preparation/sanitise.h"
+
+namespace shapedb {
+
+namespace {
+
+// A tetrahedron is computed exactly when its volume, as a share of the box spanned by its three
+// edges at a corner, leaves fewer than about six correct digits in double precision.
+constexpr double kFlatShare = 1e-10;
+
+// Where they lie seen from their first corners, as two tetrahedra have it side by side. Bit 0 or 1 of the
+// result: in double precision it would be good for nothing.
+unsigned circumcentres(const Vec3x2& a, const Vec3x2& b, const Vec3x2& c, Vec3x2& fromFirst) {
+    const Vec3x2 bc = cross(b, c);
+    const Double2 aa = squaredLength(a);
+    const Double2 bb = squaredLength(b);
+    const Double2 cc = squaredLength(c);
+    const Double2 sixVolumes = dot(a, bc);
+    fromFirst = (Double2(0.5) / sixVolumes) * (aa * bc + bb * cross(c, a) + cc * cross(a, b));
+    const unsigned solid = less(0.0, sixVolumes) &
+                           less(Double2(kFlatShare * kFlatShare) * (aa * bb * cc), sixVolumes * sixVolumes);
+    return ~solid & 3u;
+}
+
+using Corners = std::array<std::uint32_t, 4>;
+
+// The even permutation of the corners that has the lowest first and the lowest of the others second,
+// applied to corners and neighbours. So a tetrahedron looks the same whatever made it. Two exchanges
+// keep the sense; comparing without branches, because which corner is lowest is random.
+void makeCanonical(Cell& cell) {
+    Corners& v = cell.vertices;
+    Corners& n = cell.neighbours;
+    const auto exchange = [&](std::uint32_t i, std::uint32_t j) {
+        std::swap(v[i], v[j]);
+        std::swap(n[i], n[j]);
+    };
+    const std::uint32_t low01 = v[1] < v[0] ? 1 : 0;
+    const std::uint32_t low23 = v[3] < v[2] ? 3 : 2;
+    const std::uint32_t first = v[low23] < v[low01] ? low23 : low01;
+    // The lowest to the front by exchanging both pairs: (0 1)(2 3), (0 2)(1 3) or (0 3)(1 2).
+    const Corners w = v;
+    const Corners m = n;
+    for (std::uint32_t i = 0; i < 4; ++i) {
+        v[i] = w[i ^ first];
+        n[i] = m[i ^ first];
+    }
+    if (v[2] < v[1] && v[2] < v[3]) {
+        exchange(1, 2);
+        exchange(2, 3);
+    } else if (v[3] < v[1]) {
+        exchange(1, 3);
+        exchange(2, 3);
+    }
+}
+
+// How many steps before it is read memory at random is asked for; and what leads to such memory.
+constexpr std::size_t kAhead = 12;
+constexpr std::size_t kFarAhead = 24;
+
+// Cells or tetrahedra that a thread takes at a time.
+constexpr std::size_t kBlock = 8192;
+// A part of the store with fewer cells is not worth counts of its own.
+constexpr std::size_t kLeastPart = std::size_t{1} << 18;
+
+// How many finite cells of each part of the store have a vertex as their lowest, and then where in the list
+// of all they begin.
+class LowestVertices {
+  public:
+    LowestVertices(std::size_t parts, std::size_t siteCount)
+        : siteCount_(siteCount), counts_(parts * siteCount) {}
+
+    std::uint32_t& at(std::size_t part, std::uint32_t vertex) { return counts_[part * siteCount_ + vertex]; }
+    void clear(std::size_t part) {
+        const auto begin = counts_.begin() + static_cast<std::ptrdiff_t>(part * siteCount_);
+        std::fill(begin, begin + static_cast<std::ptrdiff_t>(siteCount_), 0);
+    }
+    // Returns where the cells of each vertex begin, and their number.
+    LargeVector<std::uint32_t> toPlaces() {
+        LargeVector<std::uint32_t> begin(siteCount_ + 1);
+        std::uint32_t next = 0;
+        for (std::size_t v = 0; v < siteCount_; ++v) {
+            begin[v] = next;
+            for (std::size_t c = v; c < counts_.size(); c += siteCount_) {
+                next += counts_[c];
+                counts_[c] = next - counts_[c];
+            }
+        }
+        begin[siteCount_] = next;
+        return begin;
+    }
+
+  private:
+    std::size_t siteCount_;
+    LargeVector<std::uint32_t> counts_;
+};
+
+// The finite cells, made canonical, by their corners. The places of cells in the store, which depend on
+// the threads, leave no trace. `place`: kNoTetrahedron for the others.
+Result<LargeVector<std::uint32_t>> sortedCells(CellStore& cells, std::size_t siteCount,
+                                               LargeVector<std::uint32_t>& place, const RunContext& context) {
+    const std::size_t parts = std::clamp<std::size_t>(cells.used() / kLeastPart, 1, threadsOfArena());
+    LowestVertices lowest(parts, siteCount);
+    auto done = parallelForParts(cells.used(), parts, context,
+                                 [&](std::size_t part, std::size_t from, std::size_t to) {
+                                     lowest.clear(part);
+                                     for (std::size_t c = from; c < to; ++c) {
+                                         Cell& cell = cells[static_cast<std::uint32_t>(c)];
+                                         place[c] = kNoTetrahedron;
+                                         cell.vertices[0] = cell.firstVertex();  // no mark from here on
+                                         if (!isFinite(cell.vertices)) continue;
+                                         makeCanonical(cell);
+                                         ++lowest.at(part, cell.vertices[0]);
+                                     }
+                                 });
+    RETURN_IF_ERROR(done);
+    const LargeVector<std::uint32_t> begin = lowest.toPlaces();
+    LargeVector<std::uint32_t> sorted(begin.back());
+    done = parallelForParts(cells.used(), parts, context,
+                            [&](std::size_t part, std::size_t from, std::size_t to) {
+                                for (std::size_t c = from; c < to; ++c) {
+                                    const auto cell = static_cast<std::uint32_t>(c);
+                                    if (isFinite(cells[cell].vertices))
+                                        sorted[lowest.at(part, cells[cell].vertices[0])++] = cell;
+                                }
+                            });
+    RETURN_IF_ERROR(done);
+    // Three corners in their sense belong to one tetrahedron, so the second and third decide.
+    done = parallelFor(siteCount, kBlock, context, [&](std::size_t from, std::size_t to) {
+        std::vector<std::pair<std::uint64_t, std::uint32_t>> group;
+        for (std::size_t v = from; v < to; ++v) {
+            group.clear();
+            for (std::uint32_t i = begin[v]; i < begin[v + 1]; ++i) {
+                if (i + kFarAhead < begin[to]) prefetch(&cells[sorted[i + kFarAhead]]);
+                const Corners& corners = cells[sorted[i]].vertices;
+                group.emplace_back(std::uint64_t{corners[1]} << 32 | corners[2], sorted[i]);
+            }
+            std::sort(group.begin(), group.end());
+            for (std::size_t i = 0; i < group.size(); ++i) {
+                sorted[begin[v] + i] = group[i].second;
+                place[group[i].second] = begin[v] + static_cast<std::uint32_t>(i);
+            }
+        }
+    });
+    RETURN_IF_ERROR(done);
+    return sorted;
+}
+
+// `order`: the point of each site.
+Result<Tetrahedra> flatten(CellStore& cells, const std::vector<std::uint32_t>& order,
+                           const RunContext& context) {
+    LargeVector<std::uint32_t> place(cells.used());  // of a cell among the tetrahedra
+    const auto sorted = sortedCells(cells, order.size(), place, context);
+    RETURN_IF_ERROR(sorted);
+    const LargeVector<std::uint32_t>& cellOf = *sorted;
+    Tetrahedra flat;
+    {
+        SpentBlock balls = cells.giveUpBalls();
+        flat.vertices = balls.makeVector<Corners>(cellOf.size());
+        flat.neighbours = balls.makeVector<Corners>(cellOf.size());
+    }
+    auto done = parallelFor(cellOf.size(), kBlock, context, [&](std::size_t from, std::size_t to) {
+        for (std::size_t t = from; t < to; ++t) {
+            if (t + kFarAhead < to) {
+                prefetch(&cells[cellOf[t + kFarAhead]]);
+                for (const std::uint32_t next : cells[cellOf[t + kAhead]].neighbours) prefetch(&place[next]);
+            }
+            const Cell& cell = cells[cellOf[t]];
+            for (std::size_t i = 0; i < 4; ++i) {
+                flat.vertices[t][i] = order[cell.vertices[i]];
+                flat.neighbours[t][i] = place[cell.neighbours[i]];
+            }
+        }
+    });
+    RETURN_IF_ERROR(done);
+    return flat;
+}
+
+// The balls of two tetrahedra, which may be the same.
+void measureTwoBalls(const PointCloud& points, Tetrahedra& flat, std::size_t t, std::size_t u) {
+    const Corners& v = flat.vertices[t];
+    const Corners& w = flat.vertices[u];
+    const Vec3x2 first(points[v[0]], points[w[0]]);
+    const auto wayTo = [&](std::size_t i) { return Vec3x2(points[v[i]], points[w[i]]) - first; };
+    Vec3x2 fromFirst;
+    const unsigned flatOnes = circumcentres(wayTo(1), wayTo(2), wayTo(3), fromFirst);
+    Vec3x2 centre = first + fromFirst;
+    if (flatOnes != 0) {
+        centre = Vec3x2((flatOnes & 1u) != 0 ? exactCircumcentre(cornersOf(points, v)) : centre.low(),
+                        (flatOnes & 2u) != 0 ? exactCircumcentre(cornersOf(points, w)) : centre.high());
+    }
+    const Double2 radius = length(centre - first);
+    flat.circumcentres[t] = centre.low();
+    flat.circumcentres[u] = centre.high();
+    flat.circumradii[t] = radius.low();
+    flat.circumradii[u] = radius.high();
+}
+
+// `spent`: memory for them.
+Result<void> measureBalls(const PointCloud& points, Tetrahedra& flat, SpentBlock spent,
+                          const RunContext& context) {
+    flat.circumcentres = spent.makeVector<Point3>(flat.size());
+    flat.circumradii = spent.makeVector<double>(flat.size());
+    return parallelFor(flat.size(), kBlock, context, [&](std::size_t from, std::size_t to) {
+        for (std::size_t t = from; t < to; t += 2) measureTwoBalls(points, flat, t, std::min(t + 1, to - 1));
+    });
+}
+
+Result<void> checkDistinct(const PointCloud& points) {
+    if (mergeDuplicates(points).points.size() == points.size()) return {};
+    return fail(notDistinct());
+}
+
+std::vector<std::uint32_t> insertionOrder(const PointCloud& points, PointOrder given) {
+    if (given == PointOrder::kAny) return hilbertOrder(points);
+    std::vector<std::uint32_t> order(points.size());
+    std::iota(order.begin(), order.end(), 0);
+    return order;
+}
+
+Result<Tetrahedra> triangulateOrThrow(const PointCloud& points, const RunContext& context, PointOrder given) {
+    const std::vector<std::uint32_t> order = insertionOrder(points, given);
+    CellStore cells;
+    LargeVector<Site> sites(points.size());
+    auto placed = parallelFor(sites.size(), kBlock, context, [&](std::size_t from, std::size_t to) {
+        for (std::size_t i = from; i < to; ++i) {
+            const Point3& p = points[order[i]];
+            sites[i] = {p.x, p.y, p.z};
+        }
+    });
+    RETURN_IF_ERROR(placed);
+    if (auto done = insertAll(sites, cells, threadsOfArena(), context); !done) {
+        if (done.error().code == ErrorCode::kCollinear || done.error().code == ErrorCode::kCoplanar) {
+            RETURN_IF_ERROR(checkDistinct(points));
+        }
+        return fail(done.error());
+    }
+    LargeVector<Site>().swap(sites);  // only so is its memory free
+    auto flat = flatten(cells, order, context);
+    if (!flat) return flat;
+    RETURN_IF_ERROR(measureBalls(points, *flat, cells.giveUpCells(), context));
+    return flat;
+}
+
+}  // namespace
+
+Result<Tetrahedra> triangulate(const PointCloud& points, const RunContext& context, PointOrder order) {
+    if (points.size() < 4) return fail(ErrorCode::kTooFewPoints, "fewer than 4 distinct points");
+    try {
+        return triangulateOrThrow(points, context, order);
+    } catch (const std::bad_alloc&) {
+        return fail(ErrorCode::kOutOfMemory, "not enough memory for the Delaunay triangulation of " +
+                                                 std::to_string(points.size()) + " points");
+    } catch (const std::exception& e) {
+        return fail(ErrorCode::kInternal, std::string("Delaunay triangulation: ") + e.what());
+    }
+}
+
+}  // namespace shapedb

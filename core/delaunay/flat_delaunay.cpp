@@ -1,0 +1,220 @@
+#include "core/delaunay/flat_delaunay.h"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <numeric>
+#include <utility>
+
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+
+#include "core/base/return_if_error.h"
+#include "core/delaunay/parallel_insertion.h"
+
+namespace shapedb {
+
+namespace {
+
+// Cells to make room for, by points. A scan has six or seven a point; when there are more the store
+// grows.
+constexpr std::size_t kCellsPerPoint = 8;
+constexpr std::size_t kSpareCells = 4096;
+constexpr std::size_t kMostCells = 0xfffffff0u;
+
+// Each round inserts this many times as many points as all before it.
+constexpr int kRoundShift = 2;
+constexpr std::size_t kSmallestRound = 512;
+// What a round leaves is divided again when each thread has this part of the least share of a round: its
+// points lie far from each other, which takes more time for each.
+constexpr std::size_t kLeastLeft = 8;
+
+// Mixes the bits of an index (the finaliser of MurmurHash3).
+std::uint32_t scrambled(std::uint32_t i) {
+    i ^= i >> 16;
+    i *= 0x85ebca6bu;
+    i ^= i >> 13;
+    i *= 0xc2b2ae35u;
+    return i ^ (i >> 16);
+}
+
+// The insertion order (Amenta, Choi and Rote, "Incremental constructions con BRIO", 2003): rounds of
+// random choice, each in the order of the sites. `ends` are where they end.
+struct Rounds {
+    std::vector<std::uint32_t> order;
+    std::vector<std::size_t> ends;
+};
+
+Rounds makeRounds(std::size_t count) {
+    int rounds = 1;
+    while ((count >> (kRoundShift * rounds)) > kSmallestRound) ++rounds;
+    const auto roundOf = [&](std::uint32_t i) {
+        int round = rounds - 1;
+        for (std::uint32_t bits = scrambled(i); round > 0 && (bits & ((1u << kRoundShift) - 1)) == 0;
+             --round) {
+            bits >>= kRoundShift;
+        }
+        return static_cast<std::size_t>(round);
+    };
+    Rounds made;
+    std::vector<std::size_t> next(static_cast<std::size_t>(rounds) + 1, 0);
+    for (std::uint32_t i = 0; i < count; ++i) ++next[roundOf(i) + 1];
+    std::partial_sum(next.begin(), next.end(), next.begin());
+    made.ends.assign(next.begin() + 1, next.end());
+    made.order.resize(count);
+    for (std::uint32_t i = 0; i < count; ++i) made.order[next[roundOf(i)]++] = i;
+    return made;
+}
+
+bool onOneLine(const Site& a, const Site& b, const Site& c) {
+    using Point = CGAL::Exact_predicates_inexact_constructions_kernel::Point_3;
+    return CGAL::collinear(Point(a.x, a.y, a.z), Point(b.x, b.y, b.z), Point(c.x, c.y, c.z));
+}
+
+class Builder {
+  public:
+    Builder(LargeVector<Site>& sites, CellStore& cells, std::size_t threads, const RunContext& context,
+            const Division& division)
+        : sites_(sites),
+          cells_(cells),
+          threads_(std::min(threads, ParallelInsertion::kMostWorkers)),
+          context_(context),
+          division_(division),
+          crew_(sites, cells, threads_, context, done_) {}
+
+    Result<void> build() {
+        RETURN_IF_ERROR(context_.checkpoint());
+        context_.report("delaunay", 0, sites_.size());
+        cells_.reserve(kCellsPerPoint * sites_.size() + kSpareCells);
+        const Rounds rounds = makeRounds(sites_.size());
+        RETURN_IF_ERROR(beginWithFour(rounds.order));
+        std::size_t begin = 0;
+        for (const std::size_t end : rounds.ends) {
+            std::vector<std::uint32_t> left(rounds.order.begin() + static_cast<std::ptrdiff_t>(begin),
+                                            rounds.order.begin() + static_cast<std::ptrdiff_t>(end));
+            leaveOutFirst(left);
+            RETURN_IF_ERROR(insertRound(std::move(left)));
+            begin = end;
+        }
+        return {};
+    }
+
+  private:
+    void leaveOutFirst(std::vector<std::uint32_t>& list) const {
+        const auto taken = [&](std::uint32_t v) {
+            return std::find(first_.begin(), first_.end(), v) != first_.end();
+        };
+        list.erase(std::remove_if(list.begin(), list.end(), taken), list.end());
+    }
+    Result<void> beginWithFour(const std::vector<std::uint32_t>& order);
+    Result<void> insertRound(std::vector<std::uint32_t> left);
+    Result<void> insertAlone(const std::vector<std::uint32_t>& list);
+    Result<void> insertTogether(std::vector<std::uint32_t>& list);
+    std::uint32_t anyCell() const;
+
+    LargeVector<Site>& sites_;
+    CellStore& cells_;
+    std::size_t threads_;
+    const RunContext& context_;
+    const Division& division_;
+    std::array<std::uint32_t, 4> first_{};
+    std::vector<std::uint32_t> free_;
+    std::uint32_t last_ = 0;  // a cell to walk from
+    std::atomic<std::size_t> done_{0};
+    ParallelInsertion crew_;
+};
+
+// One cell between the first four points that span space, and the four outside of it.
+Result<void> Builder::beginWithFour(const std::vector<std::uint32_t>& order) {
+    const auto site = [&](std::size_t i) -> const Site& { return sites_[order[i]]; };
+    std::size_t b = 1;
+    while (b < order.size() && samePlace(site(0), site(b))) ++b;
+    if (b == order.size()) return fail(ErrorCode::kTooFewPoints, "fewer than 4 distinct points");
+    std::size_t c = b + 1;
+    while (c < order.size() && onOneLine(site(0), site(b), site(c))) ++c;
+    if (c >= order.size()) return fail(ErrorCode::kCollinear, "all points lie on one line");
+    std::size_t d = c + 1;
+    while (d < order.size() && orientation(site(0), site(b), site(c), site(d)) == 0) ++d;
+    if (d >= order.size()) return fail(ErrorCode::kCoplanar, "all points lie in one plane");
+    first_ = {order[0], order[b], order[c], order[d]};
+    if (orientation(site(0), site(b), site(c), site(d)) < 0) std::swap(first_[0], first_[1]);
+    done_ = 4;
+    const std::uint32_t inner = cells_.take(5);
+    for (std::uint32_t i = 0; i < 5; ++i) cells_.ball(inner + i).squaredRadius = kNoBall;
+    cells_[inner] = {first_, {inner + 1, inner + 2, inner + 3, inner + 4}};
+    for (std::uint32_t i = 0; i < 4; ++i) {
+        // The inner cell reflected in its facet i: with vertex i beyond, the others change their sense.
+        Cell& outer = cells_[inner + 1 + i];
+        outer.vertices = first_;
+        outer.vertices[i] = kInfinite;
+        const std::uint32_t p = (i + 1) % 4;
+        const std::uint32_t q = (i + 2) % 4;
+        std::swap(outer.vertices[p], outer.vertices[q]);
+        // Behind the facet opposite a vertex: the outer cell of the facet opposite it in the inner one.
+        for (std::uint32_t k = 0; k < 4; ++k) {
+            const std::uint32_t facet = k == p ? q : k == q ? p : k;
+            outer.neighbours[k] = k == i ? inner : inner + 1 + facet;
+        }
+    }
+    last_ = inner;
+    return {};
+}
+
+Result<void> Builder::insertRound(std::vector<std::uint32_t> left) {
+    const std::size_t least = threads_ * division_.leastShare;
+    if (threads_ > 1 && sites_.size() >= division_.leastPoints && left.size() >= least) {
+        RETURN_IF_ERROR(insertTogether(left));
+    }
+    return insertAlone(left);
+}
+
+Result<void> Builder::insertAlone(const std::vector<std::uint32_t>& list) {
+    BowyerWatson inserter(sites_, cells_, last_);
+    inserter.freeCells().swap(free_);
+    for (std::size_t i = 0; i < list.size(); ++i, ++done_) {
+        if (i % kInsertsBetweenCheckpoints == 0) {
+            RETURN_IF_ERROR(context_.checkpoint());
+            context_.report("delaunay", done_, sites_.size());
+        }
+        Insertion outcome = inserter.insert(list[i]);
+        while (outcome == Insertion::kNoRoom) {
+            if (cells_.capacity() >= kMostCells) {
+                return fail(ErrorCode::kOutOfMemory, "the Delaunay triangulation has over 4e9 tetrahedra");
+            }
+            cells_.reserve(std::min(kMostCells, cells_.capacity() + cells_.capacity() / 2));
+            outcome = inserter.insert(list[i]);
+        }
+        if (outcome != Insertion::kDone) {
+            return fail(notDistinct());
+        }
+    }
+    free_.swap(inserter.freeCells());
+    last_ = inserter.lastCell();
+    return {};
+}
+
+// A cell to walk from.
+std::uint32_t Builder::anyCell() const {
+    std::uint32_t cell = 0;
+    while (cells_[cell].vertices[0] == kFreeCell) ++cell;
+    return cell;
+}
+
+// Inserts what the threads can insert without meeting; what is left replaces `list`.
+Result<void> Builder::insertTogether(std::vector<std::uint32_t>& list) {
+    cells_.reserve(std::min(kMostCells, cells_.used() + kCellsPerPoint * list.size() + kSpareCells));
+    RETURN_IF_ERROR(crew_.insert(list, free_));
+    for (int side = 0; side < 2 && list.size() >= threads_ * division_.leastShare / kLeastLeft; ++side) {
+        RETURN_IF_ERROR(crew_.insertLeft(list, free_));
+    }
+    last_ = anyCell();
+    return {};
+}
+
+}  // namespace
+
+Result<void> insertAll(LargeVector<Site>& sites, CellStore& cells, std::size_t threads,
+                       const RunContext& context, const Division& division) {
+    return Builder(sites, cells, threads, context, division).build();
+}
+
+}  // namespace shapedb

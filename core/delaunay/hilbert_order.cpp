@@ -1,0 +1,76 @@
+#include "core/delaunay/hilbert_order.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+
+#include "core/base/parallel.h"
+#include "core/base/radix_sort.h"
+#include "core/geometry/morton.h"
+
+namespace shapedb {
+
+namespace {
+
+constexpr std::uint32_t kBits = 21;
+constexpr std::size_t kBlock = 4096;  // points that a thread takes at a time
+
+// Skilling, "Programming the Hilbert curve" (2004): coordinates to the transposed index, in place,
+// then its bits interleaved.
+std::uint64_t hilbertIndex(std::array<std::uint32_t, 3> x) {
+    for (std::uint32_t q = 1u << (kBits - 1); q > 1; q >>= 1) {
+        const std::uint32_t below = q - 1;
+        for (std::uint32_t& axis : x) {
+            // Without branches: the bits are random. Set: invert the low bits of the first axis; not set:
+            // exchange them with that of this axis.
+            const std::uint32_t set = (axis & q) != 0 ? ~0u : 0u;
+            const std::uint32_t swap = (x[0] ^ axis) & below & ~set;
+            x[0] ^= swap | (below & set);
+            axis ^= swap;
+        }
+    }
+    x[1] ^= x[0];
+    x[2] ^= x[1];
+    std::uint32_t flip = 0;
+    for (std::uint32_t q = 1u << (kBits - 1); q > 1; q >>= 1) {
+        if ((x[2] & q) != 0) flip ^= q - 1;
+    }
+    for (std::uint32_t& axis : x) axis ^= flip;
+    return spreadBits3(x[0]) << 2 | spreadBits3(x[1]) << 1 | spreadBits3(x[2]);
+}
+
+LargeVector<KeyedIndex> keysOf(const PointCloud& points) {
+    Point3 low = points.front();
+    Point3 high = low;
+    for (const Point3& p : points) {
+        low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+        high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+    }
+    const double extent = std::max({high.x - low.x, high.y - low.y, high.z - low.z});
+    const double last = (1u << kBits) - 1;
+    const double steps = extent > 0.0 && std::isfinite(extent) ? last / extent : 0.0;
+    const auto step = [=](double v) { return static_cast<std::uint32_t>(std::min(last, v * steps)); };
+    LargeVector<KeyedIndex> keyed(points.size());
+    // Nothing can stop it: there is no context.
+    static_cast<void>(parallelFor(points.size(), kBlock, {}, [&](std::size_t from, std::size_t to) {
+        for (std::size_t i = from; i < to; ++i) {
+            const Point3 p = points[i] - low;
+            keyed[i] = {hilbertIndex({step(p.x), step(p.y), step(p.z)}), static_cast<std::uint32_t>(i)};
+        }
+    }));
+    return keyed;
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> hilbertOrder(const PointCloud& points) {
+    if (points.empty()) return {};
+    LargeVector<KeyedIndex> keyed = keysOf(points);
+    radixSortByKey(keyed);
+    std::vector<std::uint32_t> order(points.size());
+    for (std::size_t i = 0; i < order.size(); ++i) order[i] = keyed[i].index;
+    return order;
+}
+
+}  // namespace shapedb

@@ -1,0 +1,178 @@
+#include "core/geometry/cull_hull_interior.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Surface_mesh.h>
+#include <CGAL/convex_hull_3.h>
+
+namespace shapedb {
+
+namespace {
+
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+
+// With fewer points the hull itself costs no more.
+constexpr std::size_t kWorthwhile = 2000;
+
+// A body is spanned by the extreme points of every n-th point and of as many directions.
+constexpr int kDirections = 128;
+
+// Directions are grouped by squares on the faces of a cube.
+constexpr std::size_t kSquares = 24;
+
+// A point counts as inside only if it is by this share of the body's reach: far above rounding.
+constexpr double kMargin = 1e-6;
+
+// Evenly spread (a Fibonacci spiral), the same every time.
+Point3 direction(int i) {
+    const double z = 1.0 - (2.0 * i + 1.0) / kDirections;
+    const double angle = 2.399963229728653 * i;
+    const double across = std::sqrt(std::max(0.0, 1.0 - z * z));
+    return {across * std::cos(angle), across * std::sin(angle), z};
+}
+
+std::vector<Kernel::Point_3> extremePoints(const PointCloud& points) {
+    std::array<double, kDirections> farthest;
+    std::array<std::size_t, kDirections> at{};
+    std::array<Point3, kDirections> directions;
+    farthest.fill(-std::numeric_limits<double>::infinity());
+    for (int i = 0; i < kDirections; ++i) directions[static_cast<std::size_t>(i)] = direction(i);
+    // A sample is enough to span a body; every point of it is in the hull of all.
+    const std::size_t step = std::max<std::size_t>(1, points.size() / 20000);
+    for (std::size_t p = 0; p < points.size(); p += step) {
+        for (std::size_t i = 0; i < directions.size(); ++i) {
+            const double reach = dot(points[p], directions[i]);
+            if (reach <= farthest[i]) continue;
+            farthest[i] = reach;
+            at[i] = p;
+        }
+    }
+    std::vector<Kernel::Point_3> extreme;
+    for (const std::size_t p : at) extreme.emplace_back(points[p].x, points[p].y, points[p].z);
+    return extreme;
+}
+
+// A convex body around its centre: normals over distances, so that a point p is inside when
+// dot(face, inside(p)) < 1 for every face.
+// In coordinates stretched to the points' box, because the grid of directions suits round bodies.
+struct Body {
+    Point3 centre;
+    Point3 stretch;
+    std::vector<Point3> faces;
+
+    Point3 inside(const Point3& p) const {
+        const Point3 d = p - centre;
+        return {stretch.x * d.x, stretch.y * d.y, stretch.z * d.z};
+    }
+};
+
+// Without faces when the points span no body.
+Body spannedBy(const std::vector<Kernel::Point_3>& extreme) {
+    Body body;
+    const CGAL::Bbox_3 box = CGAL::bbox_3(extreme.begin(), extreme.end());
+    body.stretch = {1.0 / (box.xmax() - box.xmin()), 1.0 / (box.ymax() - box.ymin()),
+                    1.0 / (box.zmax() - box.zmin())};
+    if (!std::isfinite(squaredLength(body.stretch))) return body;
+    for (const auto& p : extreme) body.centre = body.centre + Point3{p.x(), p.y(), p.z()};
+    body.centre = (1.0 / static_cast<double>(extreme.size())) * body.centre;
+    CGAL::Surface_mesh<Kernel::Point_3> hull;
+    CGAL::convex_hull_3(extreme.begin(), extreme.end(), hull);
+    for (const auto face : hull.faces()) {
+        std::vector<Point3> corners;
+        for (const auto v : CGAL::vertices_around_face(hull.halfedge(face), hull)) {
+            const auto& p = hull.point(v);
+            corners.push_back(body.inside({p.x(), p.y(), p.z()}));
+        }
+        const Point3 normal = cross(corners[1] - corners[0], corners[2] - corners[0]);
+        const double height = dot(normal, corners[0]);
+        // A face this close to the centre belongs to a body too flat to use.
+        if (!(height > 1e-9 * length(normal) * length(corners[0]))) return {body.centre, body.stretch, {}};
+        body.faces.push_back((1.0 / height) * normal);
+    }
+    return body;
+}
+
+// How far the body reaches in every direction, as its inverse: the largest dot(face, u) for u on the
+// cube, which is convex in u, so over a square of the cube its maximum is at a corner.
+class Reach {
+  public:
+    explicit Reach(const Body& body) : body_(body) {
+        std::array<double, (kSquares + 1) * (kSquares + 1)> corners{};
+        for (int face = 0; face < 6; ++face) {
+            for (std::size_t i = 0; i <= kSquares; ++i) {
+                for (std::size_t j = 0; j <= kSquares; ++j) {
+                    corners[i * (kSquares + 1) + j] = inverseReach(face, coordinate(i), coordinate(j));
+                }
+            }
+            for (std::size_t i = 0; i < kSquares; ++i) {
+                for (std::size_t j = 0; j < kSquares; ++j) {
+                    const std::size_t c = i * (kSquares + 1) + j;
+                    const double near = std::max(corners[c], corners[c + 1]);
+                    const double far = std::max(corners[c + kSquares + 1], corners[c + kSquares + 2]);
+                    inverse_.push_back(std::max(near, far));
+                }
+            }
+        }
+    }
+
+    bool isDeepInside(const Point3& p) const {
+        const Point3 d = body_.inside(p);
+        const std::array<double, 3> v = {d.x, d.y, d.z};
+        const std::size_t axis = std::abs(d.x) >= std::abs(d.y) ? (std::abs(d.x) >= std::abs(d.z) ? 0 : 2)
+                                                                : (std::abs(d.y) >= std::abs(d.z) ? 1 : 2);
+        const double size = std::abs(v[axis]);
+        if (size == 0.0) return true;
+        const std::size_t face = 2 * axis + (v[axis] < 0.0 ? 1 : 0);
+        const std::size_t i = square(v[(axis + 1) % 3] / size);
+        const std::size_t j = square(v[(axis + 2) % 3] / size);
+        return size * inverse_[(face * kSquares + i) * kSquares + j] < 1.0 - kMargin;
+    }
+
+  private:
+    static double coordinate(std::size_t i) {
+        return 2.0 * static_cast<double>(i) / static_cast<double>(kSquares) - 1.0;
+    }
+    static std::size_t square(double v) {
+        const double at = 0.5 * (v + 1.0) * static_cast<double>(kSquares);
+        return std::min(kSquares - 1, static_cast<std::size_t>(std::max(0.0, at)));
+    }
+
+    double inverseReach(int face, double second, double third) const {
+        std::array<double, 3> u{};
+        const auto axis = static_cast<std::size_t>(face / 2);
+        u[axis] = face % 2 == 0 ? 1.0 : -1.0;
+        u[(axis + 1) % 3] = second;
+        u[(axis + 2) % 3] = third;
+        double largest = 0.0;
+        for (const Point3& f : body_.faces) {
+            largest = std::max(largest, f.x * u[0] + f.y * u[1] + f.z * u[2]);
+        }
+        return largest;
+    }
+
+    const Body& body_;
+    std::vector<double> inverse_;
+};
+
+}  // namespace
+
+PointCloud cullHullInterior(const PointCloud& points) {
+    if (points.size() < kWorthwhile) return points;
+    const Body body = spannedBy(extremePoints(points));
+    if (body.faces.size() < 4) return points;
+    const Reach reach(body);
+    PointCloud outer;
+    for (const Point3& p : points) {
+        if (!reach.isDeepInside(p)) outer.push_back(p);
+    }
+    return outer;
+}
+
+}  // namespace shapedb

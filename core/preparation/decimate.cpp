@@ -1,0 +1,130 @@
+#include "core/preparation/decimate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <new>
+#include <string>
+#include <utility>
+
+#include "core/base/return_if_error.h"
+#include "core/preparation/sanitise.h"
+
+namespace shapedb {
+
+namespace {
+
+// Finest grid: 2^20 cells along the unit cube's edge of 2, three indices in one 64-bit key.
+constexpr double kMinCell = 2.0 / (1 << 20);
+// Coarsest: one cell holds everything, the far corner (1, 1, 1) too.
+constexpr double kMaxCell = 2.5;
+constexpr int kMaxSteps = 32;
+constexpr int kSecantSteps = 4;
+constexpr double kAcceptedShare = 0.9;
+
+using KeyedIndex = std::pair<std::uint64_t, std::uint32_t>;  // cell, point
+
+std::uint64_t cellKey(const Point3& p, double cell) {
+    const auto index = [cell](double v) { return static_cast<std::uint64_t>((v + 1.0) / cell); };
+    return (index(p.x) << 42) | (index(p.y) << 21) | index(p.z);
+}
+
+std::vector<KeyedIndex> sortedByCell(const PointCloud& points, double cell) {
+    std::vector<KeyedIndex> keyed(points.size());
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        keyed[i] = {cellKey(points[i], cell), static_cast<std::uint32_t>(i)};
+    }
+    std::sort(keyed.begin(), keyed.end());
+    return keyed;
+}
+
+// How many cells are occupied, without sorting: a table of keys with linear probing.
+std::size_t countCells(const PointCloud& points, double cell) {
+    constexpr std::uint64_t kFree = ~std::uint64_t{0};
+    std::vector<std::uint64_t> table(1 << 12, kFree);
+    std::size_t cells = 0;
+    const auto slotOf = [&](std::uint64_t key) {
+        std::size_t slot = (key * 0x9e3779b97f4a7c15ULL) >> 20;
+        for (slot &= table.size() - 1; table[slot] != kFree && table[slot] != key;) {
+            slot = (slot + 1) & (table.size() - 1);
+        }
+        return slot;
+    };
+    for (const Point3& p : points) {
+        const std::uint64_t key = cellKey(p, cell);
+        const std::size_t slot = slotOf(key);
+        if (table[slot] == key) continue;
+        table[slot] = key;
+        if (2 * ++cells <= table.size()) continue;
+        std::vector<std::uint64_t> old(2 * table.size(), kFree);
+        old.swap(table);
+        for (const std::uint64_t known : old) {
+            if (known != kFree) table[slotOf(known)] = known;
+        }
+    }
+    return cells;
+}
+
+DecimatedPoints averageCells(const PointCloud& points, const std::vector<KeyedIndex>& keyed, double cell) {
+    PointCloud means;
+    std::vector<std::uint32_t> cellOfPoint(points.size());
+    for (std::size_t begin = 0; begin < keyed.size();) {
+        std::size_t end = begin;
+        Point3 sum;
+        for (; end < keyed.size() && keyed[end].first == keyed[begin].first; ++end) {
+            sum = sum + points[keyed[end].second];
+            cellOfPoint[keyed[end].second] = static_cast<std::uint32_t>(means.size());
+        }
+        means.push_back((1.0 / static_cast<double>(end - begin)) * sum);
+        begin = end;
+    }
+    MergedPoints merged = mergeDuplicates(means);
+    for (std::uint32_t& site : cellOfPoint) site = merged.siteOfPoint[site];
+    return {std::move(merged.points), std::move(cellOfPoint), cell};
+}
+
+Result<DecimatedPoints> decimateOrThrow(const PointCloud& points, std::size_t target,
+                                        const RunContext& context) {
+    if (points.size() <= target) {
+        MergedPoints merged = mergeDuplicates(points);
+        return DecimatedPoints{std::move(merged.points), std::move(merged.siteOfPoint), 0.0};
+    }
+    // `fine` gives too many cells, `coarse` few enough.
+    double fine = kMinCell;
+    double coarse = kMaxCell;
+    double cell = std::clamp(2.0 / std::sqrt(static_cast<double>(target)), fine, coarse);
+    double bestCell = coarse;
+    for (int step = 0; step < kMaxSteps; ++step) {
+        RETURN_IF_ERROR(context.checkpoint());
+        const std::size_t cells = countCells(points, cell);
+        const double share = static_cast<double>(cells) / static_cast<double>(target);
+        if (cells <= target) {
+            coarse = cell;
+            bestCell = cell;
+            if (share >= kAcceptedShare || cell <= kMinCell) break;
+        } else {
+            fine = cell;
+        }
+        // Aim a little below the target. Where nearly every point has a cell of its own the count
+        // hardly answers to the size and such steps creep: then every other one bisects.
+        const double guess = cell * std::sqrt(share / 0.96);
+        const bool bisect = step >= kSecantSteps && step % 2 == 0;
+        cell = !bisect && guess > fine && guess < coarse ? guess : std::sqrt(fine * coarse);
+    }
+    return averageCells(points, sortedByCell(points, bestCell), bestCell);
+}
+
+}  // namespace
+
+Result<DecimatedPoints> decimate(const PointCloud& points, std::size_t target, const RunContext& context) {
+    if (target < 4) {
+        return fail(ErrorCode::kInvalidArgument, "the target of the decimation must be at least 4 points");
+    }
+    try {
+        return decimateOrThrow(points, target, context);
+    } catch (const std::bad_alloc&) {
+        return fail(ErrorCode::kOutOfMemory,
+                    "not enough memory to decimate " + std::to_string(points.size()) + " points");
+    }
+}
+
+}  // namespace shapedb

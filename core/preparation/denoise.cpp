@@ -1,0 +1,244 @@
+#include "core/preparation/denoise.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <new>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <Eigen/Eigenvalues>
+
+#include "core/base/parallel.h"
+#include "core/base/return_if_error.h"
+
+namespace shapedb {
+
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr std::size_t kSamples = 500;
+constexpr std::array<std::size_t, 10> kNeighbourhoods = {12, 16, 24, 32, 48, 64, 96, 128, 192, 256};
+
+// A surface whose spread across the plane is below this share of the spread along it, in the
+// smallest neighbourhood, is as smooth as its sampling can tell.
+constexpr double kSmoothRatio = 0.2;
+
+// Noise below this share of the spacing does not disturb the Delaunay balls.
+constexpr double kHarmlessRatio = 0.1;
+
+// Along a plateau the spread grows with less than this power of the neighbourhood's width.
+constexpr double kPlateauSlope = 0.85;
+// Slopes that differ by no more than this are one plateau; one this much steeper ends it: there the
+// neighbourhoods have reached the far side of the part.
+constexpr double kPlateauTolerance = 0.05;
+constexpr double kPlateauEnds = 0.15;
+
+constexpr double kReachInSpacings = 4.0;  // pi * 4^2: about fifty neighbours
+// A point with fewer than this share of the neighbours that its reach should hold lies off the
+// surface and looks for it farther away.
+constexpr double kEnoughShare = 0.5;
+constexpr double kWiderReach = 1.6;
+constexpr std::size_t kQuadricMinimum = 12;
+constexpr double kMaxMoveInSigmas = 3.0;
+
+double median(std::vector<double> values) {
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+}
+
+// Every n-th point by distance from the centroid: the same choice however the cloud is turned.
+std::vector<std::uint32_t> samplePoints(const PointCloud& points) {
+    Point3 centroid;
+    for (const Point3& p : points) centroid = centroid + p;
+    centroid = (1.0 / static_cast<double>(points.size())) * centroid;
+    std::vector<Neighbour> byDistance(points.size());
+    for (std::uint32_t i = 0; i < points.size(); ++i) {
+        byDistance[i] = {squaredDistance(points[i], centroid), i};
+    }
+    std::sort(byDistance.begin(), byDistance.end());
+    const std::size_t count = std::min(points.size(), kSamples);
+    std::vector<std::uint32_t> chosen(count);
+    for (std::size_t i = 0; i < count; ++i) chosen[i] = byDistance[i * points.size() / count].point;
+    return chosen;
+}
+
+// Spread of each sampled neighbourhood across and along its plane, by neighbourhood size.
+struct Spreads {
+    std::array<std::vector<double>, kNeighbourhoods.size()> across;
+    std::array<std::vector<double>, kNeighbourhoods.size()> along;
+    std::size_t sizes = 0;  // how many of kNeighbourhoods the cloud is large enough for
+};
+
+Eigen::Vector3d toEigen(const Point3& p) { return {p.x, p.y, p.z}; }
+
+// The spreads of one neighbourhood, the sample's `place`-th.
+void measureSpread(const PointCloud& points, std::uint32_t centre, const std::vector<Neighbour>& found,
+                   std::size_t place, Spreads& spreads) {
+    Eigen::Vector3d first = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
+    std::size_t next = 0;
+    for (std::size_t s = 0; s < spreads.sizes; ++s) {
+        for (; next < kNeighbourhoods[s]; ++next) {
+            const Eigen::Vector3d d = toEigen(points[found[next].point] - points[centre]);
+            first += d;
+            second += d * d.transpose();
+        }
+        const double n = static_cast<double>(next);
+        Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+        solver.computeDirect(second / n - first * first.transpose() / (n * n), Eigen::EigenvaluesOnly);
+        // Three degrees of freedom went into the plane.
+        spreads.across[s][place] = std::sqrt(std::max(0.0, solver.eigenvalues()[0]) * n / (n - 3.0));
+        spreads.along[s][place] = std::sqrt(std::max(0.0, solver.eigenvalues()[1]));
+    }
+}
+
+Spreads measureSpreads(const PointCloud& points, const NeighbourIndex& index) {
+    Spreads spreads;
+    while (spreads.sizes < kNeighbourhoods.size() && kNeighbourhoods[spreads.sizes] <= points.size() / 2) {
+        ++spreads.sizes;
+    }
+    if (spreads.sizes == 0) return spreads;
+    const std::vector<std::uint32_t> sample = samplePoints(points);
+    for (std::size_t s = 0; s < spreads.sizes; ++s) {
+        spreads.across[s].resize(sample.size());
+        spreads.along[s].resize(sample.size());
+    }
+    constexpr std::size_t kSamplesAtOnce = 16;
+    const auto measure = [&](std::size_t from, std::size_t to) {
+        std::vector<Neighbour> found;
+        for (std::size_t i = from; i < to; ++i) {
+            index.nearest(points[sample[i]], kNeighbourhoods[spreads.sizes - 1], found);
+            measureSpread(points, sample[i], found, i, spreads);
+        }
+    };
+    // Nothing can stop it: there is no context.
+    static_cast<void>(parallelFor(sample.size(), kSamplesAtOnce, {}, measure));
+    return spreads;
+}
+
+// A disc of radius r spreads by r / 2 along either axis.
+double spacingFrom(double along, std::size_t neighbours) {
+    return 2.0 * along * std::sqrt(kPi / static_cast<double>(neighbours));
+}
+
+// The local frame of a neighbourhood: two directions along the surface and one across.
+struct LocalFrame {
+    Eigen::Vector3d mean;
+    Eigen::Matrix3d axes;  // columns by rising spread: the first is the normal
+};
+
+// How far along the normal the fitted quadric lies from the origin (the point to be moved), or
+// the plane where there are too few neighbours for a quadric.
+double heightOfFit(const std::vector<Eigen::Vector3d>& offsets, const std::vector<double>& weights,
+                   const LocalFrame& frame, double reach) {
+    const Eigen::Vector3d normal = frame.axes.col(0);
+    const double planeHeight = frame.mean.dot(normal);
+    if (offsets.size() < kQuadricMinimum) return planeHeight;
+    Eigen::Matrix<double, 6, 6> normalMatrix = Eigen::Matrix<double, 6, 6>::Zero();
+    Eigen::Matrix<double, 6, 1> right = Eigen::Matrix<double, 6, 1>::Zero();
+    for (std::size_t i = 0; i < offsets.size(); ++i) {
+        const double u = offsets[i].dot(frame.axes.col(1)) / reach;
+        const double v = offsets[i].dot(frame.axes.col(2)) / reach;
+        Eigen::Matrix<double, 6, 1> row;
+        row << 1.0, u, v, u * u, u * v, v * v;
+        normalMatrix += weights[i] * row * row.transpose();
+        right += (weights[i] * offsets[i].dot(normal)) * row;
+    }
+    const Eigen::LDLT<Eigen::Matrix<double, 6, 6>> factors(normalMatrix);
+    const auto pivots = factors.vectorD();
+    if (!(pivots.minCoeff() > 1e-4 * pivots.maxCoeff())) return planeHeight;
+    return factors.solve(right)[0];
+}
+
+Point3 projected(const PointCloud& points, std::uint32_t at, const std::vector<Neighbour>& found,
+                 double reach, double limit, std::vector<Eigen::Vector3d>& offsets,
+                 std::vector<double>& weights) {
+    offsets.clear();
+    weights.clear();
+    double sum = 0.0;
+    LocalFrame frame{Eigen::Vector3d::Zero(), Eigen::Matrix3d::Zero()};
+    Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
+    for (const Neighbour& n : found) {
+        const Eigen::Vector3d d = toEigen(points[n.point] - points[at]);
+        const double share = 1.0 - n.squaredDistance / (reach * reach);
+        const double w = share * share;
+        offsets.push_back(d);
+        weights.push_back(w);
+        sum += w;
+        frame.mean += w * d;
+        second += w * d * d.transpose();
+    }
+    if (found.size() < 4 || sum <= 0.0) return points[at];
+    frame.mean /= sum;
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+    solver.computeDirect(second / sum - frame.mean * frame.mean.transpose());
+    frame.axes = solver.eigenvectors();
+    const double height = std::clamp(heightOfFit(offsets, weights, frame, reach), -limit, limit);
+    const Eigen::Vector3d move = height * frame.axes.col(0);
+    return points[at] + Point3{move.x(), move.y(), move.z()};
+}
+
+// With fewer than `enough` neighbours in its reach a point looks farther.
+Result<PointCloud> smoothOnce(const PointCloud& points, const NeighbourIndex& index, double reach,
+                              double enough, double limit, const RunContext& context) {
+    PointCloud moved(points.size());
+    const auto moveOne = [&, found = std::vector<Neighbour>(), offsets = std::vector<Eigen::Vector3d>(),
+                          weights = std::vector<double>()](std::uint32_t i) mutable {
+        double own = reach;
+        index.within(points[i], own, found);
+        if (static_cast<double>(found.size()) < enough) {
+            own *= kWiderReach;
+            index.within(points[i], own, found);
+        }
+        moved[i] = projected(points, i, found, own, limit, offsets, weights);
+    };
+    RETURN_IF_ERROR(parallelForPoints(index.order(), context, moveOne));
+    return moved;
+}
+
+}  // namespace
+
+NoiseEstimate estimateNoise(const PointCloud& points, const NeighbourIndex& index) {
+    const Spreads spreads = measureSpreads(points, index);
+    if (spreads.sizes == 0) return {};
+    std::vector<double> across;
+    std::vector<double> along;
+    for (std::size_t s = 0; s < spreads.sizes; ++s) {
+        across.push_back(median(spreads.across[s]));
+        along.push_back(median(spreads.along[s]));
+    }
+    NoiseEstimate estimate{across[0], spacingFrom(along[0], kNeighbourhoods[0])};
+    if (across[0] <= kSmoothRatio * along[0]) return estimate;
+    double flattest = kPlateauSlope;
+    for (std::size_t s = 1; s < spreads.sizes; ++s) {
+        const double slope = std::log(across[s] / across[s - 1]) / std::log(along[s] / along[s - 1]);
+        const bool found = flattest < kPlateauSlope;
+        if (found && slope > flattest + kPlateauEnds) break;
+        if (slope > flattest + (found ? kPlateauTolerance : 0.0)) continue;
+        flattest = std::min(flattest, slope);
+        estimate = {across[s], spacingFrom(along[s], kNeighbourhoods[s])};
+    }
+    return estimate;
+}
+
+Result<PointCloud> smooth(const PointCloud& points, const NeighbourIndex& index, const NoiseEstimate& noise,
+                          double reachInSigmas, const RunContext& context) {
+    try {
+        if (!(noise.sigma > kHarmlessRatio * noise.spacing)) return points;
+        const double reach = std::max(reachInSigmas * noise.sigma, kReachInSpacings * noise.spacing);
+        const double expected = kPi * (reach / noise.spacing) * (reach / noise.spacing);
+        return smoothOnce(points, index, reach, kEnoughShare * expected, kMaxMoveInSigmas * noise.sigma,
+                          context);
+    } catch (const std::bad_alloc&) {
+        return fail(ErrorCode::kOutOfMemory,
+                    "not enough memory to smooth " + std::to_string(points.size()) + " points");
+    }
+}
+
+}  // namespace shapedb

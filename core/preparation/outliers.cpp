@@ -1,0 +1,149 @@
+#include "core/preparation/outliers.h"
+
+#include <algorithm>
+#include <cmath>
+#include <new>
+#include <numeric>
+#include <string>
+
+#include <Eigen/Core>
+#include <Eigen/Eigenvalues>
+
+#include "core/base/parallel.h"
+#include "core/base/return_if_error.h"
+
+namespace shapedb {
+
+namespace {
+
+constexpr std::size_t kNeighbours = 8;
+constexpr std::size_t kSurroundings = 12;  // enough to tell a surface from a haze
+constexpr double kCommonShare = 0.9;
+constexpr double kHazeReach = 2.5;
+// Spread across the plane over spread along it: a surface's is below this, unless it is as curved
+// as its sampling is coarse.
+constexpr double kHazeFlatness = 0.25;
+constexpr double kLinkInReaches = 3.0;     // of the common reach
+constexpr double kOwnLinkInReaches = 1.5;  // of the mean reach of the two ends
+constexpr double kSmallGroupShare = 0.01;
+
+// Each point's nearest neighbours, without itself.
+struct Surroundings {
+    std::vector<std::uint32_t> near;  // kNeighbours per point, nearest first
+    std::vector<double> reach;
+    double common = 0.0;  // the reach that kCommonShare of the points do not exceed
+
+    std::uint32_t neighbour(std::size_t point, std::size_t rank) const {
+        return near[point * kNeighbours + rank];
+    }
+};
+
+Result<Surroundings> measureReaches(const PointCloud& points, const NeighbourIndex& index,
+                                    const RunContext& context) {
+    Surroundings around;
+    around.near.resize(points.size() * kNeighbours);
+    around.reach.resize(points.size());
+    const auto measureOne = [&, found = std::vector<Neighbour>()](std::uint32_t i) mutable {
+        index.nearest(points[i], kNeighbours + 1, found);  // the first is the point itself
+        for (std::size_t k = 0; k < kNeighbours; ++k) around.near[i * kNeighbours + k] = found[k + 1].point;
+        around.reach[i] = std::sqrt(found.back().squaredDistance);
+    };
+    RETURN_IF_ERROR(parallelForPoints(index.order(), context, measureOne));
+    std::vector<double> sorted = around.reach;
+    const auto common =
+        sorted.begin() + static_cast<std::ptrdiff_t>(kCommonShare * static_cast<double>(sorted.size() - 1));
+    std::nth_element(sorted.begin(), common, sorted.end());
+    around.common = *common;
+    return around;
+}
+
+bool standsOff(const Surroundings& around, std::size_t i, double ratio) {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < kNeighbours; ++k) sum += around.reach[around.neighbour(i, k)];
+    return around.reach[i] * static_cast<double>(kNeighbours) > ratio * sum;
+}
+
+bool liesInHaze(const PointCloud& points, const NeighbourIndex& index, const Point3& p,
+                std::vector<Neighbour>& found) {
+    index.nearest(p, kSurroundings, found);
+    Eigen::Vector3d first = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
+    for (const Neighbour& n : found) {
+        const Point3 d = points[n.point] - p;
+        const Eigen::Vector3d e(d.x, d.y, d.z);
+        first += e;
+        second += e * e.transpose();
+    }
+    const double count = static_cast<double>(found.size());
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+    solver.computeDirect(second / count - first * first.transpose() / (count * count),
+                         Eigen::EigenvaluesOnly);
+    const double across = std::sqrt(std::max(0.0, solver.eigenvalues()[0]));
+    return across > kHazeFlatness * std::sqrt(std::max(0.0, solver.eigenvalues()[1]));
+}
+
+// Groups of points that short links between neighbours hold together.
+class Groups {
+  public:
+    explicit Groups(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0u); }
+
+    std::uint32_t find(std::uint32_t i) {
+        while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+        return i;
+    }
+    void join(std::uint32_t a, std::uint32_t b) { parent_[find(a)] = find(b); }
+
+  private:
+    std::vector<std::uint32_t> parent_;
+};
+
+void markSmallGroups(const PointCloud& points, const Surroundings& around,
+                     std::vector<std::uint8_t>& outlier) {
+    Groups groups(points.size());
+    for (std::uint32_t i = 0; i < points.size(); ++i) {
+        for (std::size_t k = 0; !outlier[i] && k < kNeighbours; ++k) {
+            const std::uint32_t j = around.neighbour(i, k);
+            if (outlier[j]) continue;
+            const double link = std::max(kLinkInReaches * around.common,
+                                         kOwnLinkInReaches * 0.5 * (around.reach[i] + around.reach[j]));
+            if (squaredDistance(points[i], points[j]) <= link * link) groups.join(i, j);
+        }
+    }
+    std::vector<std::uint32_t> size(points.size(), 0);
+    for (std::uint32_t i = 0; i < points.size(); ++i) ++size[groups.find(i)];
+    const double small = kSmallGroupShare * static_cast<double>(points.size());
+    for (std::uint32_t i = 0; i < points.size(); ++i) {
+        if (static_cast<double>(size[groups.find(i)]) < small) outlier[i] = 1;
+    }
+}
+
+Result<std::vector<std::uint8_t>> findOutliersOrThrow(const PointCloud& points, const NeighbourIndex& index,
+                                                      double ratio, const RunContext& context) {
+    std::vector<std::uint8_t> outlier(points.size(), 0);
+    if (points.size() <= kSurroundings) return outlier;
+    const auto around = measureReaches(points, index, context);
+    RETURN_IF_ERROR(around);
+    std::vector<Neighbour> found;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        const bool farFromAll = around->reach[i] > kHazeReach * around->common;
+        outlier[i] =
+            standsOff(*around, i, ratio) || (farFromAll && liesInHaze(points, index, points[i], found)) ? 1
+                                                                                                        : 0;
+    }
+    markSmallGroups(points, *around, outlier);
+    return outlier;
+}
+
+}  // namespace
+
+Result<std::vector<std::uint8_t>> findOutliers(const PointCloud& points, const NeighbourIndex& index,
+                                               double ratio, const RunContext& context) {
+    try {
+        return findOutliersOrThrow(points, index, ratio, context);
+    } catch (const std::bad_alloc&) {
+        return fail(ErrorCode::kOutOfMemory, "not enough memory to look for outliers among " +
+                                                 std::to_string(points.size()) + " points");
+    }
+}
+
+}  // namespace shapedb

@@ -1,0 +1,153 @@
+#include "core/preparation/prepare_points.h"
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+#include "core/base/return_if_error.h"
+#include "core/geometry/neighbours.h"
+#include "core/preparation/decimate.h"
+#include "core/preparation/outliers.h"
+#include "core/preparation/scan_grid.h"
+#include "core/preparation/thin.h"
+
+namespace shapedb {
+
+namespace {
+
+// Points closer together than the noise say nothing new about the surface.
+constexpr double kSpacingPerSigma = 1.0;
+
+// What smoothing leaves behind away from the surface is sparser than its surroundings by less
+// than an outlier of the raw scan.
+constexpr double kStragglerRatio = 1.7;
+
+// Scans of more than this many times the target are not sorted before they are decimated.
+constexpr std::size_t kStreamingRatio = 4;
+
+// Composes siteOfPoint with a further step.
+void follow(std::vector<std::uint32_t>& siteOfPoint, const std::vector<std::uint32_t>& step) {
+    for (std::uint32_t& site : siteOfPoint) {
+        if (site != kNoSite) site = step[site];
+    }
+}
+
+// What is prepared so far, and who lies near whom there, looked for once while the sites stay.
+struct Preparation {
+    PreparedPoints prepared;
+    std::optional<NeighbourIndex> index;
+
+    const NeighbourIndex& neighbours() {
+        if (!index) index.emplace(prepared.sites);
+        return *index;
+    }
+
+    // `siteOfSite`: where the sites went.
+    void replaceSites(PointCloud sites, const std::vector<std::uint32_t>& siteOfSite) {
+        follow(prepared.siteOfPoint, siteOfSite);
+        if (sites == prepared.sites) return;
+        index.reset();
+        prepared.sites = std::move(sites);
+    }
+};
+
+Result<void> leaveOutOutliers(Preparation& work, double ratio, const RunContext& context) {
+    const PointCloud& sites = work.prepared.sites;
+    const auto outlier = findOutliers(sites, work.neighbours(), ratio, context);
+    RETURN_IF_ERROR(outlier);
+    std::vector<std::uint32_t> rank(sites.size(), kNoSite);
+    PointCloud kept;
+    for (std::size_t i = 0; i < sites.size(); ++i) {
+        if ((*outlier)[i]) continue;
+        rank[i] = static_cast<std::uint32_t>(kept.size());
+        kept.push_back(sites[i]);
+    }
+    work.replaceSites(std::move(kept), rank);
+    return {};
+}
+
+Result<void> smoothNoise(Preparation& work, double reach, const RunContext& context) {
+    const PointCloud& sites = work.prepared.sites;
+    work.prepared.noise = estimateNoise(sites, work.neighbours());
+    auto moved = smooth(sites, work.neighbours(), work.prepared.noise, reach, context);
+    RETURN_IF_ERROR(moved);
+    MergedPoints merged = mergeDuplicates(*moved);
+    work.replaceSites(std::move(merged.points), merged.siteOfPoint);
+    return {};
+}
+
+Result<void> thinOut(Preparation& work, double multiple, const RunContext& context) {
+    const NoiseEstimate& noise = work.prepared.noise;
+    const double spacing = multiple * std::max(noise.spacing, kSpacingPerSigma * noise.sigma);
+    auto thinned = thin(work.prepared.sites, work.neighbours(), spacing, context);
+    RETURN_IF_ERROR(thinned);
+    work.replaceSites(std::move(thinned->points), thinned->siteOfPoint);
+    work.prepared.spacing = spacing;
+    return {};
+}
+
+// Sanitised and decimated. Large scans go through a grid instead of being sorted first.
+Result<PreparedPoints> fewPoints(const PointCloud& points, std::size_t target, const RunContext& context,
+                                 const std::function<Result<void>(const char*)>& begin) {
+    PreparedPoints prepared;
+    if (target != 0 && points.size() > kStreamingRatio * target) {
+        RETURN_IF_ERROR(begin("decimate"));
+        auto gridded = gridScan(points, target, context);
+        RETURN_IF_ERROR(gridded);
+        if (*gridded) {
+            prepared.sites = std::move((*gridded)->points);
+            prepared.frame = (*gridded)->frame;
+            prepared.siteOfPoint = std::move((*gridded)->siteOfPoint);
+            return prepared;
+        }
+    }
+    auto clean = sanitise(points);
+    RETURN_IF_ERROR(clean);
+    prepared.sites = std::move(clean->points);
+    prepared.frame = clean->frame;
+    prepared.siteOfPoint = std::move(clean->siteOfPoint);
+    prepared.duplicates = clean->duplicates;
+    if (target == 0 || prepared.sites.size() <= target) return prepared;
+    RETURN_IF_ERROR(begin("decimate"));
+    auto thinned = decimate(prepared.sites, target, context);
+    RETURN_IF_ERROR(thinned);
+    follow(prepared.siteOfPoint, thinned->siteOfPoint);
+    prepared.sites = std::move(thinned->points);
+    return prepared;
+}
+
+}  // namespace
+
+Result<PreparedPoints> preparePoints(const PointCloud& points, const PreparationOptions& options,
+                                     const RunContext& context,
+                                     const std::function<Result<void>(const char*)>& begin) {
+    RETURN_IF_ERROR(begin("sanitise"));
+    auto begun = fewPoints(points, options.decimateTo, context, begin);
+    if (!begun) return begun;
+    Preparation work{std::move(*begun), std::nullopt};
+    if (options.outlierRatio > 0.0) {
+        RETURN_IF_ERROR(begin("outliers"));
+        RETURN_IF_ERROR(leaveOutOutliers(work, options.outlierRatio, context));
+    }
+    if (options.smoothingReach > 0.0) {
+        RETURN_IF_ERROR(begin("smooth"));
+        RETURN_IF_ERROR(smoothNoise(work, options.smoothingReach, context));
+        if (options.outlierRatio > 0.0) {
+            const double ratio = std::min(options.outlierRatio, kStragglerRatio);
+            RETURN_IF_ERROR(leaveOutOutliers(work, ratio, context));
+        }
+    }
+    if (options.thinning > 0.0) {
+        RETURN_IF_ERROR(begin("thin"));
+        RETURN_IF_ERROR(thinOut(work, options.thinning, context));
+    }
+    PreparedPoints& prepared = work.prepared;
+    prepared.outliers = static_cast<std::uint64_t>(
+        std::count(prepared.siteOfPoint.begin(), prepared.siteOfPoint.end(), kNoSite));
+    if (prepared.sites.size() < 4) {
+        return fail(ErrorCode::kTooFewPoints, "fewer than 4 points are left without outliers");
+    }
+    return std::move(work.prepared);
+}
+
+}  // namespace shapedb

@@ -1,0 +1,40 @@
+// From a scan to the points that are triangulated: outliers left out, noise smoothed, density evened.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/run_context.h"
+#include "core/geometry/point.h"
+#include "core/preparation/denoise.h"
+#include "core/preparation/options.h"
+#include "core/preparation/sanitise.h"
+
+namespace shapedb {
+
+/// Stands for no site: the point was left out.
+constexpr std::uint32_t kNoSite = 0xffffffffu;
+
+struct PreparedPoints {
+    PointCloud sites;  ///< distinct, in the unit frame, in lexicographic order
+    Frame frame;
+    std::vector<std::uint32_t> siteOfPoint;  ///< input point -> index into `sites`, or kNoSite
+    std::uint64_t duplicates = 0;  ///< input points that repeated another; not counted (0) in scans large
+                                   ///< enough to be decimated as they stream by
+    std::uint64_t outliers = 0;    ///< input points left out
+    NoiseEstimate noise;           ///< before smoothing, unit frame; zero when not measured
+    double spacing = 0.0;          ///< the sites' own, unit frame; zero when not measured
+};
+
+/// Runs the steps that `options` ask for, in this order: sanitise, decimate, outliers, smooth, even
+/// spacing. `begin` is called with the name of each as it starts and may stop the work.
+///
+/// Errors: those of the steps and of `begin`.
+[[nodiscard]] Result<PreparedPoints> preparePoints(const PointCloud& points,
+                                                   const PreparationOptions& options,
+                                                   const RunContext& context,
+                                                   const std::function<Result<void>(const char*)>& begin);
+
+}  // namespace shapedb

@@ -1,0 +1,83 @@
+#include "core/segmentation/bottleneck_angle.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <queue>
+#include <utility>
+
+#include "core/base/return_if_error.h"
+
+namespace shapedb {
+
+namespace {
+
+constexpr std::size_t kStepsBetweenCheckpoints = 1 << 16;
+
+// Outward unit normal of facet i.
+Point3 outwardNormal(const PointCloud& points, const std::array<std::uint32_t, 4>& vertices, std::size_t i) {
+    const Point3& a = points[vertices[(i + 1) % 4]];
+    const Point3& b = points[vertices[(i + 2) % 4]];
+    const Point3& c = points[vertices[(i + 3) % 4]];
+    const Point3 normal = cross(b - a, c - a);
+    const double size = length(normal);
+    const double sign = dot(normal, points[vertices[i]] - a) > 0.0 ? -1.0 : 1.0;
+    return size > 0.0 ? (sign / size) * normal : Point3{};
+}
+
+}  // namespace
+
+double facetCosine(const PointCloud& points, const Tetrahedra& tetrahedra, std::size_t tetrahedron,
+                   std::size_t facet) {
+    const auto& vertices = tetrahedra.vertices[tetrahedron];
+    const Point3& shared = points[vertices[(facet + 1) % 4]];
+    const Point3 here = tetrahedra.circumcentres[tetrahedron] - shared;
+    const std::uint32_t next = tetrahedra.neighbours[tetrahedron][facet];
+    const double cosine =
+        next == kNoTetrahedron
+            ? dot(outwardNormal(points, vertices, facet), here) / tetrahedra.circumradii[tetrahedron]
+            : dot(here, tetrahedra.circumcentres[next] - shared) /
+                  (tetrahedra.circumradii[tetrahedron] * tetrahedra.circumradii[next]);
+    return std::clamp(cosine, -1.0, 1.0);
+}
+
+Result<std::vector<double>> bottleneckAngles(const PointCloud& points, const Tetrahedra& tetrahedra,
+                                             const std::vector<std::uint8_t>& big,
+                                             const RunContext& context) {
+    // Dijkstra on -cosine, which grows with the angle.
+    using Reached = std::pair<double, std::uint32_t>;
+    constexpr double kUnreached = std::numeric_limits<double>::infinity();
+    std::vector<double> best(tetrahedra.size(), kUnreached);
+    std::priority_queue<Reached, std::vector<Reached>, std::greater<Reached>> queue;
+    const auto offer = [&](std::uint32_t t, double value) {
+        if (value >= best[t]) return;
+        best[t] = value;
+        queue.push({value, t});
+    };
+    for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
+        for (std::size_t facet = 0; big[t] && facet < 4; ++facet) {
+            if (tetrahedra.neighbours[t][facet] == kNoTetrahedron) {
+                offer(t, -facetCosine(points, tetrahedra, t, facet));
+            }
+        }
+    }
+    for (std::size_t steps = 1; !queue.empty(); ++steps) {
+        if (steps % kStepsBetweenCheckpoints == 0) {
+            RETURN_IF_ERROR(context.checkpoint());
+        }
+        const auto [value, t] = queue.top();
+        queue.pop();
+        if (value > best[t]) continue;
+        for (std::size_t facet = 0; facet < 4; ++facet) {
+            const std::uint32_t next = tetrahedra.neighbours[t][facet];
+            if (next == kNoTetrahedron || !big[next] || best[next] <= value) continue;
+            offer(next, std::max(value, -facetCosine(points, tetrahedra, t, facet)));
+        }
+    }
+    for (double& value : best) {
+        if (value < kUnreached) value = std::acos(-value);
+    }
+    return best;
+}
+
+}  // namespace shapedb

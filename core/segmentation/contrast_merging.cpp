@@ -1,0 +1,242 @@
+#include "core/segmentation/contrast_merging.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <queue>
+#include <tuple>
+#include <unordered_map>
+#include <utility>
+
+#include "core/base/return_if_error.h"
+
+namespace shapedb {
+
+namespace {
+
+constexpr std::size_t kStepsBetweenCheckpoints = 4096;
+
+// A group's pairs are looked at again when its radius has moved by this share of itself.
+constexpr double kRadiusDrift = 1e-3;
+
+// Weight of a flat segment, as a share of all volume: it must not weigh nothing.
+constexpr double kLeastWeight = 1e-12;
+
+// The groups while they grow: radii, weights, and passages to neighbours.
+class Groups {
+  public:
+    using Passages = std::vector<std::pair<std::uint32_t, double>>;
+
+    explicit Groups(const SegmentGraph& graph)
+        : parent_(graph.volumes.size()),
+          weight_(graph.volumes),
+          logRadius_(graph.volumes.size()),
+          radius_(graph.volumes.size()),
+          passages_(graph.volumes.size()) {
+        for (const double volume : graph.volumes) total_ += volume;
+        const double least = std::max(kLeastWeight * total_, std::numeric_limits<double>::min());
+        for (std::uint32_t i = 0; i < parent_.size(); ++i) {
+            parent_[i] = i;
+            weight_[i] = std::max(weight_[i], least);
+            logRadius_[i] = std::log(graph.radii[i]);
+            radius_[i] = graph.radii[i];
+        }
+        for (const SegmentContact& c : graph.contacts) {
+            passages_[c.first][c.second] = c.saddleRadius;
+            passages_[c.second][c.first] = c.saddleRadius;
+        }
+    }
+
+    std::uint32_t size() const { return static_cast<std::uint32_t>(parent_.size()); }
+    double totalVolume() const { return total_; }
+    bool isGroup(std::uint32_t i) const { return parent_[i] == i; }
+    double weight(std::uint32_t group) const { return weight_[group]; }
+    double logRadius(std::uint32_t group) const { return logRadius_[group]; }
+    const std::unordered_map<std::uint32_t, double>& neighbours(std::uint32_t group) const {
+        return passages_[group];
+    }
+
+    double contrast(std::uint32_t a, std::uint32_t b, double saddleRadius) const {
+        const auto [least, most] = std::minmax(radius_[a], radius_[b]);
+        return most / std::min(least, saddleRadius);
+    }
+
+    std::uint32_t groupOf(std::uint32_t i) {
+        while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+        return i;
+    }
+
+    // Joins two groups that touch. The one with fewer neighbours, or else less weight, goes into the
+    // other: returns the one that remains, and the neighbours it got by this, with their passages.
+    std::pair<std::uint32_t, Passages> join(std::uint32_t a, std::uint32_t b) {
+        if (std::make_tuple(passages_[a].size(), weight_[a], b) <
+            std::make_tuple(passages_[b].size(), weight_[b], a)) {
+            std::swap(a, b);
+        }
+        const double weight = weight_[a] + weight_[b];
+        logRadius_[a] = (weight_[a] * logRadius_[a] + weight_[b] * logRadius_[b]) / weight;
+        radius_[a] = std::exp(logRadius_[a]);
+        weight_[a] = weight;
+        parent_[b] = a;
+        Passages moved;
+        passages_[a].erase(b);
+        for (const auto& [next, saddleRadius] : passages_[b]) {
+            if (next == a) continue;
+            passages_[next].erase(b);
+            double& widest = passages_[a][next];
+            widest = std::max(widest, saddleRadius);
+            passages_[next][a] = widest;
+            moved.emplace_back(next, widest);
+        }
+        passages_[b] = {};
+        return {a, std::move(moved)};
+    }
+
+  private:
+    std::vector<std::uint32_t> parent_;
+    std::vector<double> weight_;
+    std::vector<double> logRadius_;
+    std::vector<double> radius_;
+    std::vector<std::unordered_map<std::uint32_t, double>> passages_;
+    double total_ = 0.0;
+};
+
+// A pair of groups waiting to merge; equal contrasts by index, so that the order of pushing
+// does not matter.
+struct Candidate {
+    double contrast;
+    std::uint32_t a;
+    std::uint32_t b;
+    bool operator<(const Candidate& o) const {
+        return std::tie(contrast, a, b) > std::tie(o.contrast, o.a, o.b);  // least first
+    }
+};
+
+Result<void> mergeAlike(Groups& groups, double limit, const RunContext& context) {
+    std::priority_queue<Candidate> queue;
+    const auto consider = [&](std::uint32_t a, std::uint32_t b, double saddleRadius) {
+        const double contrast = groups.contrast(a, b, saddleRadius);
+        if (contrast <= limit) queue.push({contrast, std::min(a, b), std::max(a, b)});
+    };
+    std::vector<double> seenRadius(groups.size());
+    for (std::uint32_t a = 0; a < groups.size(); ++a) {
+        seenRadius[a] = groups.logRadius(a);
+        for (const auto& [b, saddleRadius] : groups.neighbours(a)) {
+            if (a < b) consider(a, b, saddleRadius);
+        }
+    }
+    for (std::size_t step = 1; !queue.empty(); ++step) {
+        if (step % kStepsBetweenCheckpoints == 0) {
+            RETURN_IF_ERROR(context.checkpoint());
+        }
+        const Candidate best = queue.top();
+        queue.pop();
+        if (!groups.isGroup(best.a) || !groups.isGroup(best.b)) continue;
+        const double saddleRadius = groups.neighbours(best.a).at(best.b);
+        if (groups.contrast(best.a, best.b, saddleRadius) > best.contrast) {
+            consider(best.a, best.b, saddleRadius);
+            continue;
+        }
+        const auto [joined, moved] = groups.join(best.a, best.b);
+        if (std::abs(groups.logRadius(joined) - seenRadius[joined]) > kRadiusDrift) {
+            seenRadius[joined] = groups.logRadius(joined);
+            for (const auto& [next, width] : groups.neighbours(joined)) consider(joined, next, width);
+        } else {
+            for (const auto& [next, width] : moved) consider(joined, next, width);
+        }
+    }
+    return {};
+}
+
+std::uint32_t widestNeighbour(const Groups& groups, std::uint32_t group) {
+    std::uint32_t best = group;
+    double widest = -1.0;
+    for (const auto& [next, saddleRadius] : groups.neighbours(group)) {
+        if (saddleRadius > widest || (saddleRadius == widest && next < best)) {
+            widest = saddleRadius;
+            best = next;
+        }
+    }
+    return best;
+}
+
+Result<void> absorbLight(Groups& groups, const ContrastMerging& options, const RunContext& context) {
+    // Only groups that touch another: a lump apart can join none, nor take a place from the others.
+    std::priority_queue<Candidate> lightest;
+    for (std::uint32_t i = 0; i < groups.size(); ++i) {
+        if (!groups.neighbours(i).empty()) lightest.push({groups.weight(i), i, 0});
+    }
+    std::size_t left = lightest.size();
+    const double least = options.minShare * groups.totalVolume();
+    for (std::size_t step = 1; !lightest.empty(); ++step) {
+        if (step % kStepsBetweenCheckpoints == 0) {
+            RETURN_IF_ERROR(context.checkpoint());
+        }
+        const Candidate light = lightest.top();
+        lightest.pop();
+        if (!groups.isGroup(light.a) || groups.weight(light.a) != light.contrast) continue;
+        const bool tooMany = options.maxSegments > 0 && left > options.maxSegments;
+        if (light.contrast >= least && !tooMany) break;
+        const std::uint32_t joined = groups.join(light.a, widestNeighbour(groups, light.a)).first;
+        --left;
+        if (groups.neighbours(joined).empty()) {
+            --left;
+        } else {
+            lightest.push({groups.weight(joined), joined, 0});
+        }
+    }
+    return {};
+}
+
+}  // namespace
+
+Result<std::vector<std::uint32_t>> mergeByContrast(const SegmentGraph& graph, const ContrastMerging& options,
+                                                   const RunContext& context) {
+    Groups groups(graph);
+    RETURN_IF_ERROR(mergeAlike(groups, options.contrast, context));
+    RETURN_IF_ERROR(absorbLight(groups, options, context));
+    std::vector<std::uint32_t> dense(groups.size(), groups.size());
+    std::vector<std::uint32_t> result(groups.size());
+    std::uint32_t count = 0;
+    for (std::uint32_t i = 0; i < groups.size(); ++i) {
+        std::uint32_t& index = dense[groups.groupOf(i)];
+        if (index == groups.size()) index = count++;
+        result[i] = index;
+    }
+    return result;
+}
+
+Result<SegmentLabels> mergeSegmentsByContrast(const PointCloud& points, const Tetrahedra& tetrahedra,
+                                              const std::vector<std::uint8_t>& flow,
+                                              const SegmentLabels& fine, const ContrastMerging& options,
+                                              const RunContext& context) {
+    SegmentGraph graph;
+    auto contacts = segmentContacts(points, tetrahedra, flow, fine.ofTetrahedron, context);
+    RETURN_IF_ERROR(contacts);
+    graph.contacts = std::move(*contacts);
+    graph.volumes.assign(fine.maxima.size(), 0.0);
+    for (std::size_t t = 0; t < tetrahedra.size(); ++t) {
+        const std::int32_t segment = fine.ofTetrahedron[t];
+        if (segment < 0) continue;
+        const auto& v = tetrahedra.vertices[t];
+        const Point3 a = points[v[0]];
+        const double six = dot(points[v[1]] - a, cross(points[v[2]] - a, points[v[3]] - a));
+        graph.volumes[static_cast<std::size_t>(segment)] += std::max(0.0, six / 6.0);
+    }
+    for (const std::uint32_t maximum : fine.maxima) graph.radii.push_back(tetrahedra.circumradii[maximum]);
+    const auto groups = mergeByContrast(graph, options, context);
+    RETURN_IF_ERROR(groups);
+    // Fine segments come by falling maximum (islands last), so the first of a group has its maximum.
+    SegmentLabels merged;
+    for (std::size_t s = 0; s < groups->size(); ++s) {
+        if ((*groups)[s] == merged.maxima.size()) merged.maxima.push_back(fine.maxima[s]);
+    }
+    merged.ofTetrahedron.reserve(tetrahedra.size());
+    for (const std::int32_t segment : fine.ofTetrahedron) {
+        merged.ofTetrahedron.push_back(
+            segment < 0 ? -1 : static_cast<std::int32_t>((*groups)[static_cast<std::size_t>(segment)]));
+    }
+    return merged;
+}
+
+}  // namespace shapedb

@@ -1,0 +1,21 @@
+// How densely the shape is sampled around each point (Section 2).
+#pragma once
+
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/run_context.h"
+#include "core/geometry/point.h"
+
+namespace shapedb {
+
+/// For each point the mean distance to its three nearest other points, in the points' unit; infinite
+/// when there are fewer than three. Points should follow a curve through space (curve_order.h): in any
+/// other order the result is the same, but the time grows with the square of their number. On the
+/// threads of the caller's arena.
+///
+/// Errors: kCancelled, kDeadlineExceeded. May throw std::bad_alloc.
+[[nodiscard]] Result<std::vector<double>> localSpacings(const PointCloud& points,
+                                                        const RunContext& context = {});
+
+}  // namespace shapedb

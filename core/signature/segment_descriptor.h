@@ -1,0 +1,65 @@
+// The weighted points of a signature as the attributed score compares them: in the frame of the
+// whole body, with the attributes of their segments in logarithms.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "core/geometry/motion.h"
+#include "core/geometry/point.h"
+
+namespace shapedb {
+
+struct WeightedPoint;
+
+/// One segment as it is kept: 12 bytes, and all that is scored of it.
+struct PackedSegmentDescriptor {
+    std::array<std::int16_t, 3> position{};  ///< in steps of 1/kPositionSteps
+    std::uint16_t share = 1;                 ///< in steps of 1/kShareSteps, at least 1
+    std::array<std::uint8_t, 4> size{};      ///< in steps of 1/kSizeSteps octave above kSmallestLength
+};
+
+/// Finer than the noise of any scan by far.
+constexpr double kPositionSteps = 16384.0;
+constexpr double kShareSteps = 65535.0;
+constexpr double kSizeSteps = 24.0;  // up to 10.6 octaves: sizes are below 1
+
+/// One segment as it is compared. Lengths in units of Signature::scale. All numbers are multiples of
+/// the steps of a PackedSegmentDescriptor, so that packing loses nothing.
+struct SegmentDescriptor {
+    std::array<float, 3> position{};  ///< centroid, in the body's frame
+    float radius = 0.0f;              ///< distance from the body's centre: length of `position`
+    float share = 0.0f;               ///< of the interior's volume, (0, 1]
+    /// Base-2 logarithms: the standard deviations of its matter along its principal axes, falling,
+    /// and its maximum radius. No less than kSmallestLength each.
+    std::array<float, 4> size{};
+};
+
+/// Smaller lengths are below the noise of any scanner and count as this.
+constexpr double kSmallestLength = 1.0 / 1024.0;
+
+/// The nearest that can be kept; numbers out of range count as the nearest in range.
+[[nodiscard]] PackedSegmentDescriptor packed(const SegmentDescriptor& part) noexcept;
+/// packed(unpacked(p)) is p again, for a share of at least 1.
+[[nodiscard]] SegmentDescriptor unpacked(const PackedSegmentDescriptor& part) noexcept;
+
+[[nodiscard]] bool operator==(const PackedSegmentDescriptor& a, const PackedSegmentDescriptor& b) noexcept;
+[[nodiscard]] bool operator==(const SegmentDescriptor& a, const SegmentDescriptor& b) noexcept;
+
+/// The parts of a body and its frame: origin at the centroid of all parts, axes along the principal
+/// axes of their matter together, by falling spread, right-handed. The signs of the axes, and axes
+/// of equal spread, are chance: who compares two bodies must try all.
+struct Body {
+    std::vector<SegmentDescriptor> parts;  ///< in the order of the points
+    Point3 centre;                         ///< in the coordinates of WeightedPoint::position
+    Matrix3 axes{};                        ///< rows: the frame's axes in those coordinates
+};
+
+/// `points` as in a Signature: at least one, valid. Deterministic.
+[[nodiscard]] Body bodyOf(const std::vector<WeightedPoint>& points);
+/// The same into a body that may hold anything; what it has allocated is used again.
+void setBody(const std::vector<WeightedPoint>& points, Body& body);
+
+}  // namespace shapedb

@@ -1,0 +1,162 @@
+#include "server/store/sqlite/check.h"
+
+#include "server/store/sqlite/rows.h"
+
+namespace shapedb::store {
+
+namespace {
+
+constexpr std::size_t kMaxProblems = 200;
+
+constexpr char kIntegrity[] = "PRAGMA integrity_check(100)";
+constexpr char kForeignKeys[] = "PRAGMA foreign_key_check";
+constexpr char kTallyProblems[] =
+    "SELECT 1 FROM (SELECT 1) LEFT JOIN tally t ON t.id = 1 WHERE t.id IS NULL "
+    "OR t.jobs <> (SELECT count(*) FROM job) OR t.job_bytes <> (SELECT coalesce(sum(point_bytes), 0) FROM "
+    "job) "
+    "OR t.point_bytes <> (SELECT coalesce(sum(point_bytes), 0) FROM shape_points) "
+    "OR t.stored_point_bytes <> (SELECT coalesce(sum(stored_bytes), 0) FROM shape_points)";
+constexpr char kAllPoints[] =
+    "SELECT s.key, s.point_count, s.checksum, p.points, p.point_bytes, p.stored_bytes FROM shape s "
+    "LEFT JOIN shape_points p ON p.shape_id = s.id ORDER BY s.id";
+constexpr char kAllSignatures[] =
+    "SELECT g.shape_id, g.points_version, g.generation, g.digest, g.bytes FROM signature g "
+    "JOIN shape s ON s.id = g.shape_id";
+constexpr char kShapesTotal[] = "SELECT count(*) FROM shape";
+
+/// Each names a rule the writers keep, and lists the keys that break it.
+struct Rule {
+    const char* sql;
+    const char* problem;
+};
+constexpr Rule kRules[] = {
+    {"SELECT s.key FROM shape s JOIN collection c ON c.id = s.collection_id WHERE s.state = 1 AND NOT EXISTS "
+     "(SELECT 1 FROM signature g WHERE g.shape_id = s.id AND g.generation = c.generation "
+     "AND g.points_version = s.points_version)",
+     "is ready but has no signature of its current points"},
+    {"SELECT s.key FROM shape s WHERE s.state = 0 AND NOT EXISTS (SELECT 1 FROM job j WHERE j.shape_id = "
+     "s.id)",
+     "is pending but has no job"},
+    {"SELECT s.key FROM shape s JOIN job j ON j.shape_id = s.id WHERE s.state <> 0",
+     "has a job but is not pending"},
+    {"SELECT s.key FROM shape s JOIN job j ON j.shape_id = s.id WHERE j.points_version <> s.points_version",
+     "has a job for points it no longer has"},
+    {"SELECT s.key FROM shape s JOIN collection c ON c.id = s.collection_id JOIN signature g ON g.shape_id = "
+     "s.id "
+     "WHERE g.points_version > s.points_version OR (g.generation <> c.generation AND NOT EXISTS "
+     "(SELECT 1 FROM rebuild r WHERE r.collection_id = c.id AND r.state = 0 "
+     "AND r.target_generation = g.generation AND g.points_version = s.points_version))",
+     "has a signature that belongs to no generation"},
+    {"SELECT s.key FROM shape s JOIN collection c ON c.id = s.collection_id JOIN signature g ON g.shape_id = "
+     "s.id "
+     "WHERE s.state = 2 AND g.generation = c.generation",
+     "has failed but still serves a signature"},
+};
+
+class Checker {
+  public:
+    Checker(Connection& connection, const RunContext& context) : connection_(connection), context_(context) {}
+
+    std::vector<std::string> run() {
+        const Interruptible interruptible(connection_, context_);
+        const Transaction snapshot(connection_, Transaction::Kind::kRead);
+        context_.report("integrity", 0, 0);
+        section([&] { integrity(); });
+        section([&] { foreignKeys(); });
+        section([&] { points(); });
+        section([&] { signatures(); });
+        for (const Rule& rule : kRules) {
+            section([&] {
+                Query query(connection_, rule.sql);
+                while (query.step()) add("shape " + quoted(query.text(0)) + " " + rule.problem);
+            });
+        }
+        section([&] {
+            if (Query(connection_, kTallyProblems).step()) add("the sums in table tally are wrong");
+        });
+        return std::move(problems_);
+    }
+
+  private:
+    void add(std::string problem) {
+        if (problems_.size() < kMaxProblems) problems_.push_back(std::move(problem));
+        if (problems_.size() == kMaxProblems) problems_.push_back("... and more");
+    }
+
+    /// Damage ends a section, not the check.
+    template <typename Body>
+    void section(Body body) {
+        orRaise(context_.checkpoint());
+        try {
+            body();
+        } catch (const Failure& failure) {
+            orRaise(context_.checkpoint());  // SQLite's "interrupted" becomes the caller's reason
+            if (failure.error.code != ErrorCode::kDataLoss) throw;
+            add(failure.error.message);
+        }
+    }
+
+    void integrity() {
+        Query query(connection_, kIntegrity);
+        while (query.step()) {
+            const std::string line = query.text(0);
+            if (line != "ok") add("database integrity: " + line);
+        }
+    }
+
+    void foreignKeys() {
+        Query query(connection_, kForeignKeys);
+        while (query.step())
+            add("a row of " + query.text(0) + " refers to a missing row of " + query.text(2));
+    }
+
+    void points() {
+        std::uint64_t total = 0;
+        {
+            Query query(connection_, kShapesTotal);
+            if (query.step()) total = static_cast<std::uint64_t>(query.integer(0));
+        }
+        Query query(connection_, kAllPoints);
+        for (std::uint64_t done = 0; query.step(); ++done) {
+            orRaise(context_.checkpoint());
+            context_.report("points", done, total);
+            try {
+                const std::vector<float> loaded = readPoints(query);
+                const auto bytes = static_cast<std::int64_t>(loaded.size() * sizeof(float));
+                if (query.integer(4) != bytes ||
+                    query.integer(5) != static_cast<std::int64_t>(query.blob(3).size)) {
+                    add("shape " + quoted(query.text(0)) + " has wrong byte counts beside its points");
+                }
+            } catch (const Failure& failure) {
+                if (failure.fromSqlite) throw;
+                add(failure.error.message);
+            }
+        }
+        context_.report("points", total, total);
+    }
+
+    void signatures() {
+        Query query(connection_, kAllSignatures);
+        while (query.step()) {
+            orRaise(context_.checkpoint());
+            try {
+                readSignature(connection_, query, 1, query.integer(0));
+            } catch (const Failure& failure) {
+                if (failure.fromSqlite) throw;
+                add(failure.error.message);
+            }
+        }
+    }
+
+    Connection& connection_;
+    const RunContext& context_;
+    std::vector<std::string> problems_;
+};
+
+}  // namespace
+
+std::vector<std::string> checkDatabase(Connection& connection, const RunContext& context) {
+    return Checker(connection, context).run();
+}
+
+}  // namespace shapedb::store

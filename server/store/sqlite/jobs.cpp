@@ -1,0 +1,116 @@
+// The job queue.
+#include "server/store/sqlite/rows.h"
+#include "server/store/sqlite/sqlite_store_impl.h"
+
+namespace shapedb::store {
+
+bool SqliteStore::jobIsCurrent(Connection& connection, const Job& job, std::int64_t generation) {
+    std::int64_t serving = 0;
+    {
+        Query query(connection, sql::kCurrentJob, job.id, job.shapeId, job.pointsVersion);
+        if (!query.step()) return false;
+        serving = query.integer(0);
+    }
+    if (generation > serving) {
+        raise(ErrorCode::kInvalidArgument, "a result of generation " + std::to_string(generation) +
+                                               " for a collection of generation " + std::to_string(serving));
+    }
+    if (generation == serving) return true;
+    // Made with the parameters of before a rebuild: it could never serve. Once more, then.
+    Query(connection, sql::kReleaseJob, job.id, job.attempts).run();
+    return false;
+}
+
+std::optional<Shape> SqliteStore::markFailed(Connection& connection, std::int64_t shapeId, const Error& why) {
+    Query(connection, sql::kSetFailed, shapeId, now(), std::string(errorCodeName(why.code)), why.message)
+        .run();
+    Query(connection, sql::kDeleteSignatures, shapeId).run();
+    Query(connection, sql::kDeleteJob, shapeId).run();
+    return findShapeById(connection, shapeId);
+}
+
+Result<std::optional<Job>> SqliteStore::claimJob() {
+    return write("claim a job", [&](Connection& connection) {
+        std::optional<Job> job;
+        {
+            Query query(connection, sql::kNextJob);
+            if (!query.step()) return job;
+            job.emplace();
+            job->id = query.integer(0);
+            job->shapeId = query.integer(1);
+            job->collectionId = query.integer(2);
+            job->pointsVersion = query.integer(3);
+            job->attempts = static_cast<int>(query.integer(4)) + 1;
+            job->pointBytes = static_cast<std::uint64_t>(query.integer(5));
+            job->generation = query.integer(6);
+        }
+        Query(connection, sql::kStartJob, job->id).run();
+        return job;
+    });
+}
+
+Result<std::optional<Shape>> SqliteStore::finishJob(const Job& job, const SignatureRow& signature) {
+    return write("store the signature", [&](Connection& connection) -> std::optional<Shape> {
+        if (signature.shapeId != job.shapeId || signature.pointsVersion != job.pointsVersion) {
+            raise(ErrorCode::kInvalidArgument, "the signature is not of the job's shape and points");
+        }
+        if (!jobIsCurrent(connection, job, signature.generation)) return std::nullopt;
+        Query(connection, sql::kPutSignature, signature.shapeId, signature.generation,
+              signature.pointsVersion, signatureDigest(signature.bytes),
+              BlobView{signature.bytes.data(), signature.bytes.size()})
+            .run();
+        Query(connection, sql::kSetReady, job.shapeId, now()).run();
+        Query(connection, sql::kDeleteJob, job.shapeId).run();
+        return findShapeById(connection, job.shapeId);
+    });
+}
+
+Result<std::optional<Shape>> SqliteStore::failJob(const Job& job, const Error& why) {
+    return write("store the failure", [&](Connection& connection) -> std::optional<Shape> {
+        if (!jobIsCurrent(connection, job, job.generation)) return std::nullopt;
+        return markFailed(connection, job.shapeId, why);
+    });
+}
+
+Result<void> SqliteStore::releaseJob(const Job& job) {
+    return write("put the job back", [&](Connection& connection) {
+        Query(connection, sql::kReleaseJob, job.id, job.attempts).run();
+    });
+}
+
+Result<std::vector<Shape>> SqliteStore::recoverJobs(int maxAttempts) {
+    return write("recover the jobs", [&](Connection& connection) {
+        struct Lost {
+            std::int64_t shapeId;
+            std::int64_t attempts;
+        };
+        std::vector<Lost> lost;
+        {
+            Query query(connection, sql::kRunningJobs, maxAttempts);
+            while (query.step()) lost.push_back({query.integer(0), query.integer(1)});
+        }
+        std::vector<Shape> quarantined;
+        for (const Lost& job : lost) {
+            const Error why{
+                ErrorCode::kInternal,
+                "the server stopped " + std::to_string(job.attempts) +
+                    " times while it segmented this scan; it is set aside. Replace its points, or "
+                    "rebuild the collection, to try again"};
+            if (auto shape = markFailed(connection, job.shapeId, why))
+                quarantined.push_back(std::move(*shape));
+        }
+        Query(connection, sql::kRequeueRunning).run();
+        return quarantined;
+    });
+}
+
+Result<QueueDepth> SqliteStore::queueDepth() {
+    return read("read the queue depth", [&](Connection& connection) {
+        Query tally(connection, sql::kTally);
+        if (!tally.step()) raise(ErrorCode::kDataLoss, "the row of table tally is missing");
+        return QueueDepth{static_cast<std::uint64_t>(tally.integer(0)),
+                          static_cast<std::uint64_t>(tally.integer(1))};
+    });
+}
+
+}  // namespace shapedb::store

@@ -1,0 +1,270 @@
+// Backup, restore and check.
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "server/store/sqlite/check.h"
+#include "server/store/sqlite/migrator.h"
+#include "server/store/sqlite/sqlite_store_impl.h"
+
+namespace shapedb::store {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// 1 MB between two looks at the caller's wish to stop.
+constexpr int kStepPages = 256;
+constexpr std::size_t kCopyBytes = 1u << 20;
+
+/// Removes a temporary database and what SQLite may put beside it.
+class TemporaryFile {
+  public:
+    explicit TemporaryFile(std::string path) : path_(std::move(path)) { remove(); }
+    ~TemporaryFile() { remove(); }
+    TemporaryFile(const TemporaryFile&) = delete;
+    TemporaryFile& operator=(const TemporaryFile&) = delete;
+    const std::string& path() const { return path_; }
+
+  private:
+    void remove() const noexcept {
+        for (const char* ending : {"", "-journal", "-wal", "-shm"}) {
+            std::error_code ignored;
+            fs::remove(path_ + ending, ignored);
+        }
+    }
+
+    std::string path_;
+};
+
+class File {
+  public:
+    File(const std::string& path, int flags) : descriptor_(::open(path.c_str(), flags | O_CLOEXEC, 0600)) {}
+    ~File() {
+        if (descriptor_ >= 0) ::close(descriptor_);
+    }
+    File(const File&) = delete;
+    File& operator=(const File&) = delete;
+    int get() const { return descriptor_; }
+
+  private:
+    int descriptor_;
+};
+
+class Counted {
+  public:
+    explicit Counted(std::atomic<int>& counter) : counter_(counter) { ++counter_; }
+    ~Counted() { --counter_; }
+    Counted(const Counted&) = delete;
+    Counted& operator=(const Counted&) = delete;
+
+  private:
+    std::atomic<int>& counter_;
+};
+
+[[noreturn]] void raiseUnwritable(const std::string& path, int why) {
+    const ErrorCode code = why == ENOSPC || why == EFBIG || why == EDQUOT ? ErrorCode::kStorageFull
+                                                                          : ErrorCode::kFileNotWritable;
+    raise(code, "cannot write '" + path + "': " + std::strerror(why));
+}
+
+void createPrivate(const std::string& path) {
+    const File file(path, O_RDWR | O_CREAT | O_EXCL);
+    if (file.get() < 0) raiseUnwritable(path, errno);
+}
+
+/// Gives the finished file its name, never over another file.
+void publish(const std::string& temporary, const std::string& path) {
+    {
+        const File file(temporary, O_RDONLY);
+        if (file.get() < 0 || ::fsync(file.get()) != 0) raiseUnwritable(path, errno);
+    }
+    if (::renameat2(AT_FDCWD, temporary.c_str(), AT_FDCWD, path.c_str(), RENAME_NOREPLACE) != 0) {
+        if (errno == EEXIST)
+            raise(ErrorCode::kAlreadyExists, "'" + path + "' already exists; choose a new name");
+        // EINVAL: a file system without that flag.
+        if (errno != EINVAL) raiseUnwritable(path, errno);
+        if (fs::exists(path))
+            raise(ErrorCode::kAlreadyExists, "'" + path + "' already exists; choose a new name");
+        if (::rename(temporary.c_str(), path.c_str()) != 0) raiseUnwritable(path, errno);
+    }
+    fs::path folder = fs::path(path).parent_path();
+    if (folder.empty()) folder = ".";
+    const File directory(folder.string(), O_RDONLY | O_DIRECTORY);
+    if (directory.get() < 0 || ::fsync(directory.get()) != 0) raiseUnwritable(path, errno);
+}
+
+void copyBytes(const std::string& from, const std::string& to, const RunContext& context) {
+    const File source(from, O_RDONLY);
+    struct stat status {};
+    if (source.get() < 0 || ::fstat(source.get(), &status) != 0) {
+        raise(ErrorCode::kFileNotReadable, "cannot read '" + from + "': " + std::strerror(errno));
+    }
+    if (!S_ISREG(status.st_mode)) raise(ErrorCode::kFileNotReadable, "'" + from + "' is not a file");
+    const File target(to, O_WRONLY | O_CREAT | O_EXCL);
+    if (target.get() < 0) raiseUnwritable(to, errno);
+    std::vector<char> buffer(kCopyBytes);
+    std::uint64_t done = 0;
+    while (true) {
+        orRaise(context.checkpoint());
+        context.report("copy", done, static_cast<std::uint64_t>(status.st_size));
+        const ssize_t got = ::read(source.get(), buffer.data(), buffer.size());
+        if (got < 0)
+            raise(ErrorCode::kFileNotReadable, "cannot read '" + from + "': " + std::strerror(errno));
+        if (got == 0) return;
+        for (ssize_t written = 0; written < got;) {
+            const ssize_t n =
+                ::write(target.get(), buffer.data() + written, static_cast<std::size_t>(got - written));
+            if (n < 0) raiseUnwritable(to, errno);
+            written += n;
+        }
+        done += static_cast<std::uint64_t>(got);
+    }
+}
+
+/// A file that is part of a running database is not a backup.
+void requireBackupFile(const std::string& path, const std::string& livePath) {
+    std::error_code error;
+    if (!fs::exists(path, error)) {
+        raise(ErrorCode::kFileNotReadable, "there is no file '" + path + "'");
+    }
+    if (fs::equivalent(path, livePath, error)) {
+        raise(ErrorCode::kMalformedFile, "'" + path + "' is the database in use, not a backup of it");
+    }
+    const std::uintmax_t wal = fs::file_size(path + "-wal", error);
+    if (!error && wal > 0) {
+        raise(ErrorCode::kMalformedFile, "'" + path +
+                                             "' is a database in use (its log lies beside it), not a "
+                                             "backup; make one with the backup command");
+    }
+}
+
+/// What is wrong with the copy is wrong with the file the user named.
+template <typename Body>
+void blaming(const std::string& path, Body body) {
+    try {
+        body();
+    } catch (const Failure& failure) {
+        switch (failure.error.code) {
+            case ErrorCode::kDataLoss:
+            case ErrorCode::kInternal:  // a constraint broken by the file's content
+                raise(ErrorCode::kMalformedFile,
+                      "'" + path + "' cannot be restored: " + failure.error.message);
+            case ErrorCode::kSchemaTooNew:
+                raise(ErrorCode::kSchemaTooNew,
+                      "'" + path + "' cannot be restored: " + failure.error.message);
+            default: throw;
+        }
+    }
+}
+
+/// Checks the private copy of a backup and brings it to this program's schema.
+void prepareCopy(Connection& copy, const RunContext& context, std::int64_t nowMs) {
+    if (identify(copy) != FileKind::kOurs) raise(ErrorCode::kDataLoss, "it is not a ShapeDB database");
+    if (copy.integer("PRAGMA page_size") != kPageSize) {
+        raise(ErrorCode::kDataLoss, "its page size is not " + std::to_string(kPageSize));
+    }
+    copy.execute("PRAGMA synchronous=OFF");  // a crash only loses the copy
+    const std::string mode = copy.text("PRAGMA journal_mode=DELETE");
+    if (mode != "delete") raise(ErrorCode::kStorage, "cannot change the journal mode of the copy");
+    migrate(copy, embeddedMigrations(), nowMs);
+    const std::vector<std::string> problems = checkDatabase(copy, context);
+    if (!problems.empty()) {
+        raise(ErrorCode::kDataLoss,
+              problems.front() +
+                  (problems.size() > 1 ? " (and " + std::to_string(problems.size() - 1) + " more)" : ""));
+    }
+}
+
+std::int64_t lastId(Connection& connection, const std::string& table) {
+    return connection.integer("SELECT seq FROM sqlite_sequence WHERE name = '" + table + "'");
+}
+
+void setLastId(Connection& connection, const std::string& table, std::int64_t id) {
+    connection.execute("DELETE FROM sqlite_sequence WHERE name = '" + table +
+                       "'; INSERT INTO sqlite_sequence (name, seq) VALUES ('" + table + "', " +
+                       std::to_string(id) + ")");
+}
+
+/// Ids are never reused, across a restore neither: new rows continue past both histories,
+/// and jobs and rebuilds of the file get ids the running server has never handed out, so
+/// that a result still in flight cannot meet a row it was not made for.
+void separateIds(Connection& copy, Connection& live) {
+    Transaction transaction(copy, Transaction::Kind::kWrite);
+    for (const char* table : {"collection", "shape"}) {
+        setLastId(copy, table, std::max(lastId(copy, table), lastId(live, table)));
+    }
+    for (const std::string table : {"job", "rebuild"}) {
+        const std::int64_t offset = std::max(lastId(copy, table), lastId(live, table));
+        copy.execute("UPDATE " + table + " SET id = id + " + std::to_string(offset));
+        setLastId(copy, table, offset + lastId(copy, table));
+    }
+    // Whoever ran these jobs when the backup was made did not die of them.
+    copy.execute("UPDATE job SET state = 0, attempts = attempts - 1 WHERE state = 1");
+    transaction.commit();
+}
+
+}  // namespace
+
+Result<void> SqliteStore::backup(const std::string& path, const RunContext& context) {
+    return guarded("write the backup", [&] {
+        if (fs::exists(path))
+            raise(ErrorCode::kAlreadyExists, "'" + path + "' already exists; choose a new name");
+        const TemporaryFile temporary(path + ".partial-" + std::to_string(::getpid()));
+        createPrivate(temporary.path());
+        const Counted longRead(longReads_);
+        {
+            Connection source(options_.path, OpenMode::kReadOnly, options_.busyTimeoutMs);
+            // The open snapshot keeps writers from making SQLite start the copy over.
+            const Transaction snapshot(source, Transaction::Kind::kRead);
+            static_cast<void>(source.integer("SELECT count(*) FROM sqlite_schema"));
+            Connection target(temporary.path(), OpenMode::kReadWrite, options_.busyTimeoutMs);
+            target.execute("PRAGMA synchronous=OFF");  // made durable as a whole by `publish`
+            copyDatabase(source, target, kStepPages, [&](std::uint64_t done, std::uint64_t total) {
+                context.report("backup", done, total);
+                orRaise(context.checkpoint());
+            });
+            // A file alone, that can be read from a folder one may not write to.
+            if (target.text("PRAGMA journal_mode=DELETE") != "delete") {
+                raise(ErrorCode::kStorage, "cannot turn the backup into a single file");
+            }
+        }
+        publish(temporary.path(), path);
+    });
+}
+
+Result<void> SqliteStore::restore(const std::string& path, const RunContext& context) {
+    return guarded("restore the backup", [&] {
+        requireBackupFile(path, options_.path);
+        const TemporaryFile temporary(options_.path + ".restore");
+        copyBytes(path, temporary.path(), context);
+        std::unique_ptr<Connection> copy;
+        blaming(path, [&] {
+            copy =
+                std::make_unique<Connection>(temporary.path(), OpenMode::kReadWrite, options_.busyTimeoutMs);
+            prepareCopy(*copy, context, now());
+        });
+        const std::lock_guard<std::mutex> lock(writerMutex_);
+        separateIds(*copy, *writer_);
+        copyDatabase(*copy, *writer_, kStepPages, [&](std::uint64_t done, std::uint64_t total) {
+            context.report("restore", done, total);
+            orRaise(context.checkpoint());
+        });
+        boundWal();
+    });
+}
+
+Result<std::vector<std::string>> SqliteStore::check(const RunContext& context) {
+    return guarded("check the database", [&] {
+        const Counted longRead(longReads_);
+        Connection connection(options_.path, OpenMode::kReadOnly, options_.busyTimeoutMs);
+        return checkDatabase(connection, context);
+    });
+}
+
+}  // namespace shapedb::store

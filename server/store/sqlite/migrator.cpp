@@ -1,0 +1,129 @@
+#include "server/store/sqlite/migrator.h"
+
+#include <map>
+#include <string_view>
+
+#include "common/sha256.h"
+
+namespace shapedb::store {
+
+namespace {
+
+constexpr char kCreateRecord[] =
+    "CREATE TABLE IF NOT EXISTS schema_migration ("
+    "number INTEGER PRIMARY KEY, name TEXT NOT NULL, sha256 TEXT NOT NULL, applied_at INTEGER NOT NULL) "
+    "STRICT";
+constexpr char kReadRecord[] = "SELECT number, name, sha256 FROM schema_migration ORDER BY number";
+constexpr char kWriteRecord[] = "INSERT INTO schema_migration VALUES (?1, ?2, ?3, ?4)";
+constexpr char kReadSchema[] = "SELECT type || ' ' || name, coalesce(sql, '') FROM sqlite_schema";
+
+std::string fingerprint(const Migration& migration) {
+    const std::string_view text(migration.sql);
+    return toHex(sha256(text.data(), text.size()));
+}
+
+/// Compares the record with what this program carries; returns how many are applied.
+std::size_t verifyRecord(Connection& connection, const std::vector<Migration>& migrations) {
+    std::size_t applied = 0;
+    Query record(connection, kReadRecord);
+    while (record.step()) {
+        const std::int64_t number = record.integer(0);
+        const std::string name = record.text(1);
+        if (applied == migrations.size()) {
+            raise(ErrorCode::kSchemaTooNew, "the database has migration " + std::to_string(number) + " (" +
+                                                name + "), this program knows " +
+                                                std::to_string(migrations.size()) +
+                                                "; use the newer program");
+        }
+        const Migration& known = migrations[applied];
+        if (number != known.number) {
+            raise(ErrorCode::kDataLoss, "the record of applied migrations is damaged: expected number " +
+                                            std::to_string(known.number) + ", found " +
+                                            std::to_string(number));
+        }
+        if (record.text(2) != fingerprint(known)) {
+            raise(ErrorCode::kDataLoss,
+                  "migration " + std::to_string(number) + " (" + name +
+                      ") was applied with another text than this program has; migrations "
+                      "are never edited, use the program that wrote the database");
+        }
+        ++applied;
+    }
+    return applied;
+}
+
+void apply(Connection& connection, const Migration& migration, std::int64_t nowMs) {
+    Transaction transaction(connection, Transaction::Kind::kWrite);
+    if (migration.number == 1) {
+        connection.execute("PRAGMA application_id=" + std::to_string(kApplicationId));
+        connection.execute(kCreateRecord);
+    }
+    connection.execute(migration.sql);
+    Query(connection, kWriteRecord, migration.number, std::string(migration.name), fingerprint(migration),
+          nowMs)
+        .run();
+    connection.execute("PRAGMA user_version=" + std::to_string(migration.number));
+    transaction.commit();
+}
+
+std::map<std::string, std::string> schemaOf(Connection& connection) {
+    std::map<std::string, std::string> schema;
+    Query rows(connection, kReadSchema);
+    while (rows.step()) {
+        std::string name = rows.text(0);
+        // sqlite_sequence, automatic indices, statistics: SQLite's own.
+        if (name.find(" sqlite_") == std::string::npos) schema.emplace(std::move(name), rows.text(1));
+    }
+    return schema;
+}
+
+/// A file can carry our marks and other tables, or triggers of its own: refuse it before a
+/// statement meets it.
+void verifySchema(Connection& connection, const std::vector<Migration>& migrations) {
+    Connection reference(":memory:", OpenMode::kReadWriteCreate, 0);
+    for (const Migration& migration : migrations) apply(reference, migration, 0);
+    const auto expected = schemaOf(reference);
+    const auto actual = schemaOf(connection);
+    for (const auto& [name, sql] : expected) {
+        const auto found = actual.find(name);
+        if (found == actual.end()) raise(ErrorCode::kDataLoss, "the database lacks the " + name);
+        if (found->second != sql) raise(ErrorCode::kDataLoss, "the database has a different " + name);
+    }
+    for (const auto& entry : actual) {
+        if (expected.count(entry.first) == 0) {
+            raise(ErrorCode::kDataLoss, "the database has a " + entry.first + " that is not ours; drop it");
+        }
+    }
+}
+
+}  // namespace
+
+FileKind identify(Connection& connection) {
+    const std::int64_t id = connection.integer("PRAGMA application_id");
+    const std::int64_t version = connection.integer("PRAGMA user_version");
+    const std::int64_t objects = connection.integer("SELECT count(*) FROM sqlite_schema");
+    if (id == 0 && version == 0 && objects == 0) return FileKind::kEmpty;
+    return id == kApplicationId && version > 0 ? FileKind::kOurs : FileKind::kForeign;
+}
+
+int schemaVersion(Connection& connection) {
+    return static_cast<int>(connection.integer("PRAGMA user_version"));
+}
+
+void migrate(Connection& connection, const std::vector<Migration>& migrations, std::int64_t nowMs) {
+    const int version = schemaVersion(connection);
+    if (version < 0 || static_cast<std::size_t>(version) > migrations.size()) {
+        raise(ErrorCode::kSchemaTooNew, "the database has schema version " + std::to_string(version) +
+                                            ", this program knows " + std::to_string(migrations.size()) +
+                                            "; use the newer program");
+    }
+    const std::size_t applied = version == 0 ? 0 : verifyRecord(connection, migrations);
+    if (applied != static_cast<std::size_t>(version)) {
+        raise(ErrorCode::kDataLoss, "the database says schema version " + std::to_string(version) +
+                                        " but records " + std::to_string(applied) + " migrations");
+    }
+    for (std::size_t i = applied; i < migrations.size(); ++i) apply(connection, migrations[i], nowMs);
+    verifySchema(connection, migrations);
+}
+
+}  // namespace shapedb::store

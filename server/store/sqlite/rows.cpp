@@ -1,0 +1,142 @@
+#include "server/store/sqlite/rows.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include "common/sha256.h"
+#include "server/store/point_blob.h"
+
+namespace shapedb::store {
+
+namespace {
+
+Checksum readChecksum(const Query& query, int column, const std::string& key) {
+    const BlobView blob = query.blob(column);
+    Checksum checksum{};
+    if (blob.size != checksum.size()) {
+        raise(ErrorCode::kDataLoss, "the stored checksum of shape " + quoted(key) + " is damaged");
+    }
+    std::memcpy(checksum.data(), blob.data, blob.size);
+    return checksum;
+}
+
+ShapeState readState(const Query& query, int column, const std::string& key) {
+    const std::int64_t value = query.integer(column);
+    if (value < static_cast<int>(ShapeState::kPending) || value > static_cast<int>(ShapeState::kFailed)) {
+        raise(ErrorCode::kDataLoss,
+              "shape " + quoted(key) + " has the unknown state " + std::to_string(value));
+    }
+    return static_cast<ShapeState>(value);
+}
+
+}  // namespace
+
+std::string quoted(const std::string& key) { return "'" + key + "'"; }
+
+Shape readShape(const Query& query) {
+    Shape shape;
+    shape.id = query.integer(0);
+    shape.collectionId = query.integer(1);
+    shape.key = query.text(2);
+    shape.version = query.integer(3);
+    shape.pointsVersion = query.integer(4);
+    shape.state = readState(query, 5, shape.key);
+    shape.pointCount = static_cast<std::uint64_t>(query.integer(6));
+    shape.checksum = readChecksum(query, 7, shape.key);
+    shape.createdAt = query.integer(8);
+    shape.updatedAt = query.integer(9);
+    if (shape.state == ShapeState::kFailed) {
+        shape.failure = Error{errorCodeFromName(query.text(10)), query.text(11)};
+    }
+    return shape;
+}
+
+namespace {
+
+std::optional<Shape> onlyShape(Query& query) {
+    std::optional<Shape> found;
+    forEachShape(query, [&](Shape&& shape) {
+        found = std::move(shape);
+        return false;
+    });
+    return found;
+}
+
+}  // namespace
+
+std::optional<Shape> findShape(Connection& connection, std::int64_t collectionId, const std::string& key) {
+    Query query(connection, sql::kShapeByKey, collectionId, key);
+    return onlyShape(query);
+}
+
+std::optional<Shape> findShapeById(Connection& connection, std::int64_t shapeId) {
+    Query query(connection, sql::kShapeById, shapeId);
+    return onlyShape(query);
+}
+
+Collection readCollection(const Query& query) {
+    Collection collection;
+    collection.id = query.integer(0);
+    collection.name = query.text(1);
+    collection.description = query.text(2);
+    collection.parameters = query.text(3);
+    collection.generation = query.integer(4);
+    collection.createdAt = query.integer(5);
+    return collection;
+}
+
+Collection requireCollection(Connection& connection, std::int64_t collectionId) {
+    Query query(connection, sql::kCollectionById, collectionId);
+    if (!query.step())
+        raise(ErrorCode::kNotFound, "there is no collection with id " + std::to_string(collectionId));
+    return readCollection(query);
+}
+
+std::optional<Collection> findCollection(Connection& connection, const std::string& name) {
+    Query query(connection, sql::kCollectionByName, name);
+    if (!query.step()) return std::nullopt;
+    return readCollection(query);
+}
+
+std::int64_t signatureDigest(const std::string& bytes) {
+    const Sha256Digest digest = sha256(bytes.data(), bytes.size());
+    std::uint64_t value = 0;
+    for (int i = 7; i >= 0; --i) value = value << 8 | digest[static_cast<std::size_t>(i)];
+    return static_cast<std::int64_t>(value);
+}
+
+SignatureRow readSignature(Connection& connection, const Query& query, int column, std::int64_t shapeId) {
+    SignatureRow row;
+    row.shapeId = shapeId;
+    row.pointsVersion = query.integer(column);
+    row.generation = query.integer(column + 1);
+    const BlobView blob = query.blob(column + 3);
+    row.bytes.assign(static_cast<const char*>(blob.size > 0 ? blob.data : ""), blob.size);
+    if (signatureDigest(row.bytes) != query.integer(column + 2)) {
+        const auto shape = findShapeById(connection, shapeId);
+        raise(ErrorCode::kDataLoss,
+              "the stored signature of shape " + (shape ? quoted(shape->key) : std::to_string(shapeId)) +
+                  " is damaged; restore a backup, or delete the shape and add it again");
+    }
+    return row;
+}
+
+std::vector<float> readPoints(const Query& query) {
+    const std::string key = query.text(0);
+    if (query.isNull(3)) raise(ErrorCode::kDataLoss, "shape " + quoted(key) + " has lost its points");
+    const BlobView blob = query.blob(3);
+    const auto pointCount = static_cast<std::uint64_t>(query.integer(1));
+    // A damaged count must not wrap around when multiplied.
+    Result<std::vector<float>> points = pointCount > (std::uint64_t{1} << 40)
+                                            ? fail(ErrorCode::kDataLoss, "the stored point count is damaged")
+                                            : decodePoints(blob.data, blob.size, 3 * pointCount);
+    if (!points) raise(points.error().code, "shape " + quoted(key) + ": " + points.error().message);
+    if (sha256(points->data(), points->size() * sizeof(float)) != readChecksum(query, 2, key)) {
+        raise(ErrorCode::kDataLoss,
+              "the stored points of shape " + quoted(key) +
+                  " do not have their checksum; restore a backup or add the shape again");
+    }
+    return std::move(*points);
+}
+
+}  // namespace shapedb::store

@@ -1,0 +1,59 @@
+// From rows to the structs of store.h, and the small reads several parts share.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "server/store/sqlite/connection.h"
+#include "server/store/sqlite/sql.h"
+#include "server/store/store.h"
+
+namespace shapedb::store {
+
+// Columns of SHAPEDB_SHAPE_COLUMNS.
+inline constexpr int kColumnMetadataName = 12;
+inline constexpr int kColumnMetadataValue = 13;
+
+/// Columns 0 to 11 of the current row; metadata stays empty. Throws Failure kDataLoss for
+/// values no writer of ours leaves.
+Shape readShape(const Query& query);
+
+/// Groups the rows of a SHAPEDB_SHAPE_COLUMNS statement into shapes: `visit(shape)` is called on each
+/// complete shape; returning false ends the walk.
+template <typename Visit>
+void forEachShape(Query& query, Visit visit) {
+    bool more = query.step();
+    while (more) {
+        Shape shape = readShape(query);
+        do {
+            if (!query.isNull(kColumnMetadataName)) {
+                shape.metadata.emplace(query.text(kColumnMetadataName), query.text(kColumnMetadataValue));
+            }
+            more = query.step();
+        } while (more && query.integer(0) == shape.id);
+        if (!visit(std::move(shape))) return;
+    }
+}
+
+std::optional<Shape> findShape(Connection& connection, std::int64_t collectionId, const std::string& key);
+std::optional<Shape> findShapeById(Connection& connection, std::int64_t shapeId);
+/// Throws Failure kNotFound.
+Collection requireCollection(Connection& connection, std::int64_t collectionId);
+std::optional<Collection> findCollection(Connection& connection, const std::string& name);
+Collection readCollection(const Query& query);
+
+/// Reads points_version, generation, digest, bytes from `column` on and compares the digest.
+/// Throws Failure kDataLoss, which names the shape.
+SignatureRow readSignature(Connection& connection, const Query& query, int column, std::int64_t shapeId);
+
+/// What column signature.digest holds: the first eight bytes of the SHA-256, little-endian.
+/// Persisted.
+std::int64_t signatureDigest(const std::string& bytes);
+
+/// The row of a kLoadPoints query, decoded and compared with its checksum. Throws Failure.
+std::vector<float> readPoints(const Query& query);
+
+/// How messages name a shape.
+std::string quoted(const std::string& key);
+
+}  // namespace shapedb::store

@@ -1,0 +1,282 @@
+// Shapes, their points and the signatures that serve.
+#include <algorithm>
+
+#include "common/sha256.h"
+#include "core/base/return_if_error.h"
+#include "server/store/point_blob.h"
+#include "server/store/sqlite/rows.h"
+#include "server/store/sqlite/sqlite_store_impl.h"
+
+namespace shapedb::store {
+
+namespace {
+
+// A caller may ask for all there is.
+constexpr std::size_t kMostReserved = 4096;
+
+[[noreturn]] void raiseNoShape(std::int64_t shapeId) {
+    raise(ErrorCode::kNotFound, "there is no shape with id " + std::to_string(shapeId));
+}
+
+[[noreturn]] void raiseNoShape(const Collection& collection, const std::string& key) {
+    raise(ErrorCode::kNotFound,
+          "there is no shape " + quoted(key) + " in collection " + quoted(collection.name));
+}
+
+void requireVersion(const std::string& key, std::int64_t actual, std::optional<std::int64_t> expected) {
+    if (!expected || *expected == actual) return;
+    const std::string is =
+        actual == 0 ? "does not exist (version 0)" : "has version " + std::to_string(actual);
+    raise(ErrorCode::kVersionConflict,
+          "shape " + quoted(key) + " " + is + ", not the expected version " + std::to_string(*expected));
+}
+
+void writeMetadata(Connection& connection, std::int64_t shapeId, const Metadata& metadata) {
+    for (const auto& [name, value] : metadata) {
+        Query(connection, sql::kInsertMetadata, shapeId, name, value).run();
+    }
+}
+
+void writePoints(Connection& connection, std::int64_t shapeId, const PutRequest& request,
+                 const PointEncoding& encoding) {
+    const std::size_t bytes = request.points->size() * sizeof(float);
+    if (const std::string* blob = encoding.held()) {
+        Query(connection, sql::kInsertPoints, shapeId, bytes, blob->size(),
+              BlobView{blob->data(), blob->size()})
+            .run();
+        return;
+    }
+    Query(connection, sql::kInsertPoints, shapeId, bytes, encoding.size(), ZeroBlob{encoding.size()}).run();
+    BlobWriter writer(connection, "shape_points", "points", shapeId);
+    encoding.write([&](const void* data, std::size_t size) { writer.append(data, size); });
+}
+
+BlobView view(const Checksum& checksum) { return {checksum.data(), checksum.size()}; }
+
+void requireValid(const PutRequest& request) {
+    if (request.points == nullptr || request.points->size() % 3 != 0) {
+        raise(ErrorCode::kInvalidArgument,
+              "the points of shape " + quoted(request.key) + " are not packed x y z");
+    }
+    if (sha256(request.points->data(), request.points->size() * sizeof(float)) != request.checksum) {
+        raise(ErrorCode::kChecksumMismatch, "the points of shape " + quoted(request.key) +
+                                                " do not have the announced checksum; send them again");
+    }
+}
+
+/// The rules of PutMode and expectedVersion for the key as it is now.
+void requireAllowed(const PutRequest& request, const Collection& collection,
+                    const std::optional<Shape>& existing, bool identical) {
+    if (!existing && request.mode == PutMode::kUpdateOnly) raiseNoShape(collection, request.key);
+    if (existing && request.mode == PutMode::kInsertOnly && !identical) {
+        raise(ErrorCode::kAlreadyExists, "shape " + quoted(request.key) + " already exists in collection " +
+                                             quoted(collection.name) + " with other points or metadata");
+    }
+    requireVersion(request.key, existing ? existing->version : 0, request.expectedVersion);
+}
+
+}  // namespace
+
+void SqliteStore::queueJob(Connection& connection, const PutRequest& request, std::int64_t shapeId,
+                           std::int64_t pointsVersion) {
+    const std::uint64_t bytes = request.points->size() * sizeof(float);
+    Query tally(connection, sql::kTally);
+    if (!tally.step()) raise(ErrorCode::kDataLoss, "the row of table tally is missing");
+    const auto jobs = static_cast<std::uint64_t>(tally.integer(0));
+    const auto queued = static_cast<std::uint64_t>(tally.integer(1));
+    if (request.maxQueuedJobs > 0 && jobs >= request.maxQueuedJobs) {
+        raise(ErrorCode::kQueueFull, "the ingest queue holds " + std::to_string(jobs) + " scans of at most " +
+                                         std::to_string(request.maxQueuedJobs) + "; retry later");
+    }
+    if (request.maxQueuedBytes > 0 && queued + bytes > request.maxQueuedBytes) {
+        raise(ErrorCode::kQueueFull, "the ingest queue holds " + std::to_string(queued) +
+                                         " bytes of at most " + std::to_string(request.maxQueuedBytes) +
+                                         ", no room for " + std::to_string(bytes) + " more; retry later");
+    }
+    Query(connection, sql::kInsertJob, shapeId, pointsVersion, bytes, now()).run();
+}
+
+PutResult SqliteStore::insertShape(Connection& connection, const PutRequest& request,
+                                   const PointEncoding& encoding) {
+    Query(connection, sql::kInsertShape, request.collectionId, request.key, request.points->size() / 3,
+          view(request.checksum), now())
+        .run();
+    const std::int64_t shapeId = connection.lastInsertId();
+    writeMetadata(connection, shapeId, request.metadata);
+    writePoints(connection, shapeId, request, encoding);
+    queueJob(connection, request, shapeId, 1);
+    return {PutOutcome::kCreated, *findShapeById(connection, shapeId)};
+}
+
+PutResult SqliteStore::changeShape(Connection& connection, const PutRequest& request,
+                                   const PointEncoding& encoding, const Shape& existing) {
+    const std::int64_t shapeId = existing.id;
+    const bool samePoints = existing.checksum == request.checksum;
+    if (existing.metadata != request.metadata) {
+        Query(connection, sql::kDeleteMetadata, shapeId).run();
+        writeMetadata(connection, shapeId, request.metadata);
+    }
+    if (samePoints) {
+        Query(connection, sql::kRaiseVersion, shapeId, now()).run();
+        return {PutOutcome::kMetadataChanged, *findShapeById(connection, shapeId)};
+    }
+    Query(connection, sql::kReplacePointsOfShape, shapeId, request.points->size() / 3, view(request.checksum),
+          now())
+        .run();
+    Query(connection, sql::kDeletePoints, shapeId).run();
+    writePoints(connection, shapeId, request, encoding);
+    // The serving signature stays until the new result arrives; what a running rebuild has
+    // made of the old points is worth nothing.
+    const Collection collection = requireCollection(connection, existing.collectionId);
+    Query(connection, sql::kDeleteOtherSignatures, shapeId, collection.generation).run();
+    Query(connection, sql::kDeleteRebuildFailuresOfShape, shapeId).run();
+    Query(connection, sql::kDeleteJob, shapeId).run();
+    queueJob(connection, request, shapeId, existing.version + 1);
+    return {PutOutcome::kReplaced, *findShapeById(connection, shapeId)};
+}
+
+Result<PutResult> SqliteStore::putShape(const PutRequest& request) {
+    // Hashing and compressing take the longest and need no lock (a large scan is compressed a second
+    // time under it).
+    const auto encoding = guarded("store the scan", [&] {
+        requireValid(request);
+        return orRaise(PointEncoding::plan(*request.points, options_.pointCompressionLevel));
+    });
+    RETURN_IF_ERROR(encoding);
+    return write("store the scan", [&](Connection& connection) -> PutResult {
+        const Collection collection = requireCollection(connection, request.collectionId);
+        const std::optional<Shape> existing = findShape(connection, request.collectionId, request.key);
+        const bool identical =
+            existing && existing->checksum == request.checksum && existing->metadata == request.metadata;
+        requireAllowed(request, collection, existing, identical);
+        if (!existing) return insertShape(connection, request, *encoding);
+        if (identical) return {PutOutcome::kUnchanged, *existing};
+        return changeShape(connection, request, *encoding, *existing);
+    });
+}
+
+Result<Shape> SqliteStore::getShape(std::int64_t collectionId, const std::string& key) {
+    return read("read the shape", [&](Connection& connection) {
+        auto found = findShape(connection, collectionId, key);
+        if (!found) raiseNoShape(requireCollection(connection, collectionId), key);
+        return std::move(*found);
+    });
+}
+
+Result<Shape> SqliteStore::getShapeById(std::int64_t shapeId) {
+    return read("read the shape", [&](Connection& connection) {
+        auto found = findShapeById(connection, shapeId);
+        if (!found) raiseNoShape(shapeId);
+        return std::move(*found);
+    });
+}
+
+namespace {
+
+/// Calls `visit` for accepted shapes by rising id until it returns false.
+template <typename Visit>
+void forEachAccepted(Connection& connection, std::int64_t collectionId, std::int64_t afterId,
+                     const ShapeFilter& filter, Visit visit) {
+    Query query(connection, filter.state ? sql::kListShapesInState : sql::kListShapes);
+    if (filter.state) {
+        query.bindAll(collectionId, afterId, static_cast<int>(*filter.state));
+    } else {
+        query.bindAll(collectionId, afterId);
+    }
+    forEachShape(query, [&](Shape&& shape) {
+        if (filter.accept && !filter.accept(shape)) return true;
+        return visit(std::move(shape));
+    });
+}
+
+}  // namespace
+
+Result<std::vector<Shape>> SqliteStore::listShapes(std::int64_t collectionId, std::int64_t afterId,
+                                                   std::size_t limit, const ShapeFilter& filter) {
+    return read("list the shapes", [&](Connection& connection) {
+        std::vector<Shape> page;
+        if (limit == 0) return page;
+        forEachAccepted(connection, collectionId, afterId, filter, [&](Shape&& shape) {
+            page.push_back(std::move(shape));
+            return page.size() < limit;
+        });
+        return page;
+    });
+}
+
+Result<std::uint64_t> SqliteStore::countShapes(std::int64_t collectionId, const ShapeFilter& filter) {
+    return read("count the shapes", [&](Connection& connection) {
+        std::uint64_t count = 0;
+        if (filter.accept) {
+            forEachAccepted(connection, collectionId, 0, filter, [&](Shape&&) {
+                ++count;
+                return true;
+            });
+            return count;
+        }
+        Query query(connection, filter.state ? sql::kCountShapesInState : sql::kCountShapes);
+        if (filter.state) {
+            query.bindAll(collectionId, static_cast<int>(*filter.state));
+        } else {
+            query.bindAll(collectionId);
+        }
+        if (query.step()) count = static_cast<std::uint64_t>(query.integer(0));
+        return count;
+    });
+}
+
+Result<Shape> SqliteStore::deleteShape(std::int64_t collectionId, const std::string& key,
+                                       std::optional<std::int64_t> expectedVersion) {
+    return write("delete the shape", [&](Connection& connection) {
+        auto found = findShape(connection, collectionId, key);
+        if (!found) raiseNoShape(requireCollection(connection, collectionId), key);
+        requireVersion(key, found->version, expectedVersion);
+        Query(connection, sql::kDeleteShape, found->id).run();
+        return std::move(*found);
+    });
+}
+
+Result<std::vector<float>> SqliteStore::loadPoints(std::int64_t shapeId) {
+    return read("read the points", [&](Connection& connection) {
+        Query query(connection, sql::kLoadPoints, shapeId);
+        if (!query.step()) raiseNoShape(shapeId);
+        return readPoints(query);
+    });
+}
+
+Result<SignatureRow> SqliteStore::getSignature(std::int64_t shapeId) {
+    return read("read the signature", [&](Connection& connection) {
+        Query query(connection, sql::kServingSignature, shapeId);
+        if (!query.step()) raiseNoShape(shapeId);
+        if (query.isNull(3)) {
+            const bool failed = query.integer(1) == static_cast<int>(ShapeState::kFailed);
+            raise(ErrorCode::kNotReady, "shape " + quoted(query.text(0)) +
+                                            (failed ? " could not be segmented: " + query.text(2)
+                                                    : " has no signature yet; its job is queued"));
+        }
+        return readSignature(connection, query, 3, shapeId);
+    });
+}
+
+Result<std::vector<IndexRow>> SqliteStore::loadIndex(std::int64_t collectionId, std::int64_t afterId,
+                                                     std::size_t limit) {
+    return read("load the index", [&](Connection& connection) {
+        std::vector<IndexRow> rows;
+        if (limit == 0) return rows;
+        const Collection collection = requireCollection(connection, collectionId);
+        Query query(connection, sql::kLoadIndex, collectionId, afterId, collection.generation);
+        rows.reserve(std::min(limit, kMostReserved));
+        for (bool more = query.step(); more && rows.size() < limit;) {
+            IndexRow& row = rows.emplace_back();
+            row.shapeId = query.integer(0);
+            row.signature = readSignature(connection, query, 3, row.shapeId);
+            do {
+                if (!query.isNull(1)) row.metadata.emplace(query.text(1), query.text(2));
+                more = query.step();
+            } while (more && query.integer(0) == row.shapeId);
+        }
+        return rows;
+    });
+}
+
+}  // namespace shapedb::store

@@ -1,0 +1,232 @@
+#include "server/store/sqlite/sqlite_store.h"
+
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <filesystem>
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include "server/store/sqlite/migrator.h"
+#include "server/store/sqlite/rows.h"
+#include "server/store/sqlite/sqlite_store_impl.h"
+
+namespace shapedb::store {
+
+namespace {
+
+constexpr int kWalAutoCheckpointPages = 1000;
+/// Past this size a commit waits for readers to let the log start anew.
+constexpr std::uint64_t kWalBoundBytes = 64u << 20;
+/// Growth between two such attempts, and how long each waits at most.
+constexpr std::uint64_t kWalRetryBytes = 16u << 20;
+constexpr int kWalWaitMs = 500;
+/// The log file is cut to this size after each write-back, so a burst does not stay on disk.
+constexpr std::uint64_t kWalKeepBytes = 16u << 20;
+
+std::uint64_t fileSize(const std::string& path) {
+    std::error_code error;
+    const std::uintmax_t size = std::filesystem::file_size(path, error);
+    return error ? 0 : static_cast<std::uint64_t>(size);
+}
+
+TimestampMs systemNow() {
+    using std::chrono::duration_cast;
+    return duration_cast<std::chrono::milliseconds>(std::chrono::system_clock::now().time_since_epoch())
+        .count();
+}
+
+SqliteOptions completed(SqliteOptions options) {
+    if (options.path.empty()) raise(ErrorCode::kInvalidArgument, "the database path is empty");
+    if (options.readers < 1 || options.readers > 64) {
+        raise(ErrorCode::kInvalidArgument, "readers must be 1 to 64, not " + std::to_string(options.readers));
+    }
+    if (options.busyTimeoutMs < 0) {
+        raise(ErrorCode::kInvalidArgument, "the busy timeout must not be negative");
+    }
+    if (options.pointCompressionLevel < 1 || options.pointCompressionLevel > 19) {
+        raise(ErrorCode::kInvalidArgument,
+              "the compression level must be 1 to 19, not " + std::to_string(options.pointCompressionLevel));
+    }
+    if (!options.now) options.now = systemNow;
+    options.path = std::filesystem::absolute(options.path).lexically_normal().string();
+    return options;
+}
+
+void syncPath(const std::string& path, int flags) {
+    const int descriptor = open(path.c_str(), flags | O_CLOEXEC);
+    const bool ok = descriptor >= 0 && fsync(descriptor) == 0;
+    const int why = errno;
+    if (descriptor >= 0) close(descriptor);
+    if (!ok) raise(ErrorCode::kStorage, "cannot make '" + path + "' durable: " + std::strerror(why));
+}
+
+/// A new database appears under its name only when complete, so that an empty file there is
+/// always damage and never taken for a fresh start.
+void createDatabase(const SqliteOptions& options) {
+    const std::string fresh = options.path + ".new";
+    std::filesystem::remove(fresh);
+    const int descriptor = open(fresh.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+    if (descriptor < 0) {
+        const ErrorCode code = errno == ENOSPC ? ErrorCode::kStorageFull : ErrorCode::kStorage;
+        raise(code, "cannot create database '" + options.path + "': " + std::strerror(errno));
+    }
+    close(descriptor);
+    {
+        Connection connection(fresh, OpenMode::kReadWrite, options.busyTimeoutMs);
+        connection.execute("PRAGMA page_size=" + std::to_string(kPageSize));
+        migrate(connection, embeddedMigrations(), options.now());
+    }
+    syncPath(fresh, O_RDONLY);
+    std::filesystem::rename(fresh, options.path);
+    syncPath(std::filesystem::path(options.path).parent_path().string(), O_RDONLY | O_DIRECTORY);
+}
+
+void requireUsableFile(const SqliteOptions& options) {
+    if (std::filesystem::is_directory(options.path)) {
+        raise(ErrorCode::kStorage, "the database path '" + options.path + "' is a folder");
+    }
+    const std::string wal = options.path + "-wal";
+    if (!std::filesystem::exists(options.path)) {
+        if (fileSize(wal) > 0) {
+            raise(ErrorCode::kDataLoss, "'" + wal + "' is there but its database '" + options.path +
+                                            "' is not; put the database back or move the log away");
+        }
+        createDatabase(options);
+    } else if (fileSize(options.path) == 0) {
+        raise(ErrorCode::kDataLoss, "the database '" + options.path +
+                                        "' is empty; put a backup in its place, or remove it to start anew");
+    }
+}
+
+/// Opens, checks that it is ours before a byte is written, migrates.
+std::unique_ptr<Connection> openWriter(const SqliteOptions& options) {
+    requireUsableFile(options);
+    auto writer = std::make_unique<Connection>(options.path, OpenMode::kReadWrite, options.busyTimeoutMs);
+    if (identify(*writer) != FileKind::kOurs) {
+        raise(ErrorCode::kDataLoss, "'" + options.path + "' is not a ShapeDB database");
+    }
+    if (schemaVersion(*writer) > static_cast<int>(embeddedMigrations().size())) {
+        migrate(*writer, embeddedMigrations(), options.now());  // refuses, with the reason
+    }
+    const std::string mode = writer->text("PRAGMA journal_mode=WAL");
+    if (mode != "wal") {
+        raise(ErrorCode::kStorage, "'" + options.path + "' cannot use a write-ahead log (journal mode " +
+                                       mode + "): it needs a local file system");
+    }
+    writer->execute("PRAGMA wal_autocheckpoint=" + std::to_string(kWalAutoCheckpointPages) +
+                    "; PRAGMA journal_size_limit=" + std::to_string(kWalKeepBytes) +
+                    "; PRAGMA secure_delete=FAST");
+    migrate(*writer, embeddedMigrations(), options.now());
+    return writer;
+}
+
+}  // namespace
+
+SqliteStore::SqliteStore(const SqliteOptions& options)
+    : options_(completed(options)),
+      lock_(options_.path),
+      writer_(openWriter(options_)),
+      readers_(std::make_unique<ReaderPool>(options_.path, options_.readers, options_.busyTimeoutMs)),
+      walAttemptAt_(kWalBoundBytes) {}
+
+void SqliteStore::boundWal() noexcept {
+    const std::uint64_t size = fileSize(options_.path + "-wal");
+    if (size < walAttemptAt_) {
+        if (size < kWalBoundBytes) walAttemptAt_ = kWalBoundBytes;
+        return;
+    }
+    walAttemptAt_ = size + kWalRetryBytes;
+    // The commit is done; a failed write-back changes nothing about it and is tried again.
+    static_cast<void>(guarded("write back the log", [&] {
+        if (writer_->truncateWal(longReads_ > 0 ? 0 : kWalWaitMs)) walAttemptAt_ = kWalBoundBytes;
+    }));
+}
+
+// Collections ----------------------------------------------------------------------------
+
+Result<Collection> SqliteStore::createCollection(const std::string& name, const std::string& description,
+                                                 const std::string& parameters) {
+    return write("create the collection", [&](Connection& connection) {
+        if (findCollection(connection, name)) {
+            raise(ErrorCode::kAlreadyExists, "collection '" + name + "' already exists");
+        }
+        Query(connection, sql::kInsertCollection, name, description, parameters, now()).run();
+        return requireCollection(connection, connection.lastInsertId());
+    });
+}
+
+Result<Collection> SqliteStore::getCollection(const std::string& name) {
+    return read("read the collection", [&](Connection& connection) {
+        auto found = findCollection(connection, name);
+        if (!found) raise(ErrorCode::kNotFound, "there is no collection '" + name + "'");
+        return std::move(*found);
+    });
+}
+
+Result<std::vector<Collection>> SqliteStore::listCollections() {
+    return read("list the collections", [&](Connection& connection) {
+        std::vector<Collection> all;
+        Query query(connection, sql::kListCollections);
+        while (query.step()) all.push_back(readCollection(query));
+        return all;
+    });
+}
+
+Result<void> SqliteStore::deleteCollection(std::int64_t collectionId) {
+    return write("delete the collection", [&](Connection& connection) {
+        requireCollection(connection, collectionId);
+        Query(connection, sql::kDeleteCollection, collectionId).run();
+    });
+}
+
+// Statistics -----------------------------------------------------------------------------
+
+Result<StoreStats> SqliteStore::stats() {
+    return read("read the statistics", [&](Connection& connection) {
+        StoreStats stats;
+        const auto count = [&](const char* statement) {
+            Query query(connection, statement);
+            return query.step() ? static_cast<std::uint64_t>(query.integer(0)) : 0;
+        };
+        stats.collections = count(sql::kCountCollections);
+        stats.signatures = count(sql::kCountSignatures);
+        Query states(connection, sql::kCountStates);
+        while (states.step()) {
+            const auto shapes = static_cast<std::uint64_t>(states.integer(1));
+            switch (static_cast<ShapeState>(states.integer(0))) {
+                case ShapeState::kPending: stats.shapesPending = shapes; break;
+                case ShapeState::kReady: stats.shapesReady = shapes; break;
+                case ShapeState::kFailed: stats.shapesFailed = shapes; break;
+            }
+        }
+        Query tally(connection, sql::kTally);
+        if (tally.step()) {
+            stats.pointBytes = static_cast<std::uint64_t>(tally.integer(2));
+            stats.storedPointBytes = static_cast<std::uint64_t>(tally.integer(3));
+        }
+        stats.databaseBytes = fileSize(options_.path);
+        stats.walBytes = fileSize(options_.path + "-wal");
+        stats.schemaVersion = schemaVersion(connection);
+        return stats;
+    });
+}
+
+Result<void> SqliteStore::checkpoint() {
+    return guarded("write back the log", [&] {
+        const std::lock_guard<std::mutex> lock(writerMutex_);
+        if (!writer_->truncateWal(options_.busyTimeoutMs)) {
+            raise(ErrorCode::kStorage,
+                  "cannot write back the log: a read is still going on; try again later");
+        }
+        walAttemptAt_ = kWalBoundBytes;
+    });
+}
+
+Result<std::unique_ptr<Store>> openSqliteStore(const SqliteOptions& options) {
+    return guarded("open the database",
+                   [&]() -> std::unique_ptr<Store> { return std::make_unique<SqliteStore>(options); });
+}
+
+}  // namespace shapedb::store

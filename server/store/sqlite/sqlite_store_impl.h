@@ -1,0 +1,130 @@
+// The class behind openSqliteStore; its functions are spread over sqlite_*.cpp by subject.
+//
+// Lock order: writerMutex_ before the pool's own mutex. A reader is never held while waiting
+// for the writer, so writers never wait for readers nor the other way round.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "server/store/point_blob.h"
+#include "server/store/sqlite/pool.h"
+#include "server/store/sqlite/process_lock.h"
+#include "server/store/sqlite/sqlite_store.h"
+
+namespace shapedb::store {
+
+class SqliteStore final : public Store {
+  public:
+    /// Throws Failure.
+    explicit SqliteStore(const SqliteOptions& options);
+    ~SqliteStore() override = default;
+
+    Result<Collection> createCollection(const std::string& name, const std::string& description,
+                                        const std::string& parameters) override;
+    Result<Collection> getCollection(const std::string& name) override;
+    Result<std::vector<Collection>> listCollections() override;
+    Result<void> deleteCollection(std::int64_t collectionId) override;
+
+    Result<PutResult> putShape(const PutRequest& request) override;
+    Result<Shape> getShape(std::int64_t collectionId, const std::string& key) override;
+    Result<Shape> getShapeById(std::int64_t shapeId) override;
+    Result<std::vector<Shape>> listShapes(std::int64_t collectionId, std::int64_t afterId, std::size_t limit,
+                                          const ShapeFilter& filter) override;
+    Result<std::uint64_t> countShapes(std::int64_t collectionId, const ShapeFilter& filter) override;
+    Result<Shape> deleteShape(std::int64_t collectionId, const std::string& key,
+                              std::optional<std::int64_t> expectedVersion) override;
+    Result<std::vector<float>> loadPoints(std::int64_t shapeId) override;
+    Result<SignatureRow> getSignature(std::int64_t shapeId) override;
+
+    Result<std::optional<Job>> claimJob() override;
+    Result<std::optional<Shape>> finishJob(const Job& job, const SignatureRow& signature) override;
+    Result<std::optional<Shape>> failJob(const Job& job, const Error& why) override;
+    Result<void> releaseJob(const Job& job) override;
+    Result<std::vector<Shape>> recoverJobs(int maxAttempts) override;
+    Result<QueueDepth> queueDepth() override;
+
+    Result<std::vector<IndexRow>> loadIndex(std::int64_t collectionId, std::int64_t afterId,
+                                            std::size_t limit) override;
+
+    Result<Rebuild> startRebuild(std::int64_t collectionId, const std::string& parameters) override;
+    Result<Rebuild> getRebuild(std::int64_t rebuildId) override;
+    Result<std::vector<Rebuild>> runningRebuilds() override;
+    Result<std::vector<Shape>> rebuildBatch(std::int64_t rebuildId, std::int64_t afterId,
+                                            std::size_t limit) override;
+    Result<void> putRebuilt(std::int64_t rebuildId, const SignatureRow& signature) override;
+    Result<void> putRebuildFailure(std::int64_t rebuildId, std::int64_t shapeId, std::int64_t pointsVersion,
+                                   const Error& why) override;
+    Result<bool> finishRebuild(std::int64_t rebuildId) override;
+    Result<void> abandonRebuild(std::int64_t rebuildId, RebuildState state) override;
+
+    Result<void> backup(const std::string& path, const RunContext& context) override;
+    Result<void> restore(const std::string& path, const RunContext& context) override;
+    Result<std::vector<std::string>> check(const RunContext& context) override;
+    Result<StoreStats> stats() override;
+    Result<void> checkpoint() override;
+
+  private:
+    /// Runs `body(connection)` in a write transaction and commits it, unless it throws.
+    template <typename Body>
+    auto write(const char* operation, Body&& body) noexcept
+        -> Result<std::invoke_result_t<Body, Connection&>> {
+        using Value = std::invoke_result_t<Body, Connection&>;
+        return guarded(operation, [&]() -> Value {
+            const std::lock_guard<std::mutex> lock(writerMutex_);
+            Transaction transaction(*writer_, Transaction::Kind::kWrite);
+            if constexpr (std::is_void_v<Value>) {
+                body(*writer_);
+                transaction.commit();
+                boundWal();
+            } else {
+                Value value = body(*writer_);
+                transaction.commit();
+                boundWal();
+                return value;
+            }
+        });
+    }
+
+    /// Runs `body(connection)` in a read transaction on a pooled connection.
+    template <typename Body>
+    auto read(const char* operation, Body&& body) noexcept
+        -> Result<std::invoke_result_t<Body, Connection&>> {
+        using Value = std::invoke_result_t<Body, Connection&>;
+        return guarded(operation, [&]() -> Value {
+            const ReaderPool::Lease lease = readers_->acquire();
+            const Transaction snapshot(*lease, Transaction::Kind::kRead);
+            return body(*lease);
+        });
+    }
+
+    TimestampMs now() const { return options_.now(); }
+
+    /// After a commit: SQLite writes the log back every thousand pages, but cannot start it
+    /// anew while overlapping reads go on without a gap. Past a bound this waits for one.
+    void boundWal() noexcept;
+
+    PutResult insertShape(Connection& connection, const PutRequest& request, const PointEncoding& encoding);
+    PutResult changeShape(Connection& connection, const PutRequest& request, const PointEncoding& encoding,
+                          const Shape& existing);
+    void queueJob(Connection& connection, const PutRequest& request, std::int64_t shapeId,
+                  std::int64_t pointsVersion);
+    std::optional<Shape> markFailed(Connection& connection, std::int64_t shapeId, const Error& why);
+    bool jobIsCurrent(Connection& connection, const Job& job, std::int64_t generation);
+
+    SqliteOptions options_;
+    ProcessLock lock_;
+    std::mutex writerMutex_;
+    std::unique_ptr<Connection> writer_;
+    std::unique_ptr<ReaderPool> readers_;
+    std::uint64_t walAttemptAt_;  ///< size of the log at which to wait for readers; writerMutex_
+    /// Backups and checks hold a snapshot for long: waiting for them would be in vain.
+    std::atomic<int> longReads_{0};
+};
+
+}  // namespace shapedb::store

@@ -1,0 +1,317 @@
+#include "core/delaunay/flat_delaunay.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <CGAL/Delaunay_triangulation_3.h>
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Triangulation_vertex_base_with_info_3.h>
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
+
+#include "core/base/random.h"
+#include "core/delaunay/delaunay.h"
+#include "core/delaunay/hilbert_order.h"
+#include "core/preparation/sanitise.h"
+#include "core/synthetic/named_shapes.h"
+#include "core/synthetic/noise.h"
+#include "tests/core/segmentation/small_clouds.h"
+
+namespace shapedb {
+namespace {
+
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using Corners = std::array<std::uint32_t, 4>;
+
+// The reference: CGAL's triangulation, as its tetrahedra with sorted corners, sorted.
+std::vector<Corners> byCgal(const PointCloud& points) {
+    using Structure = CGAL::Triangulation_data_structure_3<
+        CGAL::Triangulation_vertex_base_with_info_3<std::uint32_t, Kernel>,
+        CGAL::Delaunay_triangulation_cell_base_3<Kernel>>;
+    std::vector<std::pair<Kernel::Point_3, std::uint32_t>> numbered;
+    for (std::uint32_t i = 0; i < points.size(); ++i) {
+        numbered.emplace_back(Kernel::Point_3(points[i].x, points[i].y, points[i].z), i);
+    }
+    CGAL::Delaunay_triangulation_3<Kernel, Structure> triangulation;
+    triangulation.insert(numbered.begin(), numbered.end());
+    std::vector<Corners> tetrahedra;
+    for (const auto cell : triangulation.finite_cell_handles()) {
+        Corners corners;
+        for (int i = 0; i < 4; ++i) corners[static_cast<std::size_t>(i)] = cell->vertex(i)->info();
+        std::sort(corners.begin(), corners.end());
+        tetrahedra.push_back(corners);
+    }
+    std::sort(tetrahedra.begin(), tetrahedra.end());
+    return tetrahedra;
+}
+
+template <typename Vector>
+std::vector<Corners> sorted(const Vector& unsorted) {
+    std::vector<Corners> tetrahedra(unsorted.begin(), unsorted.end());
+    for (Corners& corners : tetrahedra) std::sort(corners.begin(), corners.end());
+    std::sort(tetrahedra.begin(), tetrahedra.end());
+    return tetrahedra;
+}
+
+// So many points are divided between threads.
+const std::size_t kDivided = Division{}.leastPoints;
+
+// Each neighbour has the facet's three corners and this cell behind them.
+bool isJoined(const CellStore& cells, std::uint32_t cell) {
+    for (std::uint32_t i = 0; i < 4; ++i) {
+        const Cell& next = cells[cells[cell].neighbours[i]];
+        const Corners others = next.corners();
+        std::uint32_t shared = 0;
+        bool back = false;
+        for (std::uint32_t k = 0; k < 4; ++k) {
+            const Corners v = cells[cell].corners();
+            if (std::find(v.begin(), v.end(), others[k]) != v.end()) {
+                ++shared;
+            } else {
+                back = next.neighbours[k] == cell;
+            }
+        }
+        if (shared != 3 || !back) return false;
+    }
+    return true;
+}
+
+// In the points' own order, straight from the store, so that the number of threads is ours.
+std::vector<Corners> byThreads(const PointCloud& points, std::size_t threads, const Division& division = {}) {
+    LargeVector<Site> sites;
+    for (const Point3& p : points) sites.push_back({p.x, p.y, p.z});
+    const tbb::global_control allowed(tbb::global_control::max_allowed_parallelism, threads);
+    tbb::task_arena arena(static_cast<int>(threads));
+    CellStore cells;
+    std::vector<Corners> tetrahedra;
+    const auto done = arena.execute([&] { return insertAll(sites, cells, threads, {}, division); });
+    EXPECT_TRUE(done) << done.error().message;
+    if (!done) return tetrahedra;
+    bool joined = true;
+    for (std::uint32_t c = 0; c < cells.used(); ++c) {
+        if (cells[c].vertices[0] == kFreeCell) continue;
+        const Corners v = cells[c].corners();
+        joined = joined && isJoined(cells, c);
+        if (std::all_of(v.begin(), v.end(), [](std::uint32_t i) { return i < kInfinite; })) {
+            tetrahedra.push_back(v);
+        }
+    }
+    EXPECT_TRUE(joined);
+    return sorted(std::move(tetrahedra));
+}
+
+PointCloud alongCurve(const PointCloud& points) {
+    PointCloud along;
+    for (const std::uint32_t i : hilbertOrder(points)) along.push_back(points[i]);
+    return along;
+}
+
+PointCloud scanned(const NamedShape& shape, std::size_t count, double noise) {
+    PointCloud points = sampleBoundary(shape.solid, count, 3).value();
+    EXPECT_TRUE(addGaussianNoise(points, noise, 3));
+    return sanitise(points).value().points;
+}
+
+// A cubic grid: every cell's corners on one sphere, every layer in one plane.
+PointCloud grid(int side, double step) {
+    PointCloud points;
+    for (int i = 0; i < side; ++i) {
+        for (int j = 0; j < side; ++j) {
+            for (int k = 0; k < side; ++k) points.push_back({i * step, j * step, k * step});
+        }
+    }
+    return points;
+}
+
+// Pairs of points that differ by the last digit of a coordinate, and lines of points.
+PointCloud nearlyRepeated() {
+    Random random(5);
+    PointCloud points;
+    for (int i = 0; i < 1500; ++i) {
+        const Point3 p{random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)};
+        points.push_back(p);
+        points.push_back(p + Point3{kGrid, 0, 0});
+        points.push_back(p + Point3{0, kGrid, kGrid});
+        points.push_back({i * 0x1p-12, 0.25, 0.5});
+    }
+    return sanitise(points).value().points;
+}
+
+// The points of an integer grid on one sphere: cospherical, many of them in common planes.
+PointCloud integerSphere(int squaredRadius) {
+    PointCloud points;
+    for (int x = -80; x <= 80; ++x) {
+        for (int y = -80; y <= 80; ++y) {
+            for (int z = -80; z <= 80; ++z) {
+                if (x * x + y * y + z * z == squaredRadius) {
+                    points.push_back({x / 128.0, y / 128.0, z / 128.0});
+                }
+            }
+        }
+    }
+    return points;
+}
+
+PointCloud inACube(std::size_t count) {
+    Random random(7);
+    PointCloud points;
+    for (std::size_t i = 0; i < count; ++i) {
+        points.push_back({random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)});
+    }
+    return points;
+}
+
+TEST(FlatDelaunay, FindsTheTetrahedraOfCgalInSmallClouds) {
+    for (const SmallCloud& cloud : smallClouds()) {
+        const auto flat = triangulate(cloud.points);
+        ASSERT_TRUE(flat) << cloud.name;
+        EXPECT_TRUE(sorted(flat->vertices) == byCgal(cloud.points)) << cloud.name;
+    }
+}
+
+TEST(FlatDelaunay, FindsTheTetrahedraOfCgalInLargerClouds) {
+    const std::vector<std::pair<std::string, PointCloud>> clouds = {
+        {"uniform", inACube(8000)},
+        {"noisy dumbbell", scanned(makeDumbbell(), 12000, 0.003)},
+        {"clean box", scanned(makeBox(), 8000, 0.0)},
+        {"clean jack", scanned(makeJack(), 12000, 0.0)},
+        {"grid", grid(16, 0.0625)},
+        {"grid of tenths", grid(14, 0.1)},
+        {"nearly repeated", nearlyRepeated()},
+        {"integer sphere", integerSphere(3509)},
+    };
+    for (const auto& [name, points] : clouds) {
+        const auto flat = triangulate(points);
+        ASSERT_TRUE(flat) << name;
+        EXPECT_TRUE(sorted(flat->vertices) == byCgal(points)) << name;
+    }
+}
+
+TEST(FlatDelaunay, AnyNumberOfThreadsFindsTheSameTetrahedra) {
+    const std::vector<std::pair<std::string, PointCloud>> clouds = {
+        {"uniform", alongCurve(inACube(kDivided))},
+        {"noisy jack", alongCurve(scanned(makeJack(), kDivided + 500, 0.002))},
+        {"clean box", alongCurve(scanned(makeBox(), kDivided + 500, 0.0))},
+        {"grid", alongCurve(grid(37, 0.03125))},
+        // Neighbours in space whose numbers have nothing to do with each other.
+        {"not along a curve", inACube(kDivided)},
+    };
+    for (const auto& [name, points] : clouds) {
+        ASSERT_GE(points.size(), kDivided) << name;
+        const auto alone = byThreads(points, 1);
+        ASSERT_FALSE(alone.empty()) << name;
+        for (const std::size_t threads : {2, 3, 5})
+            EXPECT_TRUE(byThreads(points, threads) == alone) << name << threads;
+    }
+}
+
+// So many borders that what is left along them is divided once more.
+TEST(FlatDelaunay, ManyThreadsFindWhatOneFinds) {
+    const PointCloud points = alongCurve(inACube(3 * kDivided));
+    EXPECT_TRUE(byThreads(points, 7) == byThreads(points, 1));
+}
+
+// Hardly anything belongs to one thread alone.
+TEST(FlatDelaunay, ThreadsFindTheTetrahedraOfCgalHoweverFewPointsTheyShare) {
+    std::vector<std::pair<std::string, PointCloud>> clouds = {
+        {"uniform", alongCurve(inACube(3000))},
+        {"noisy dumbbell", alongCurve(scanned(makeDumbbell(), 4000, 0.003))},
+        {"clean box", alongCurve(scanned(makeBox(), 3000, 0.0))},
+        {"grid", alongCurve(grid(12, 0.0625))},
+        {"nearly repeated", alongCurve(nearlyRepeated())},
+        {"not along a curve", inACube(1000)},
+    };
+    for (const SmallCloud& cloud : smallClouds()) clouds.emplace_back(cloud.name, alongCurve(cloud.points));
+    for (const auto& [name, points] : clouds) {
+        const auto expected = byCgal(points);
+        for (const std::size_t threads : {2, 3, 6}) {
+            for (const std::size_t least : {1, 16, 128}) {
+                const Division fine{0, least};
+                EXPECT_TRUE(byThreads(points, threads, fine) == expected)
+                    << name << " " << threads << " " << least;
+            }
+        }
+    }
+}
+
+TEST(FlatDelaunay, ResultsHaveTheSameBitsOnAnyNumberOfThreads) {
+    const PointCloud points = scanned(makeDumbbell(), kDivided + 500, 0.001);
+    const auto in = [&](int threads) {
+        tbb::task_arena arena(threads);
+        return arena.execute([&] { return triangulate(points).value(); });
+    };
+    const Tetrahedra one = in(1);
+    const Tetrahedra three = in(3);
+    EXPECT_TRUE(one.vertices == three.vertices);
+    EXPECT_TRUE(one.neighbours == three.neighbours);
+    EXPECT_TRUE(one.circumcentres == three.circumcentres);
+    EXPECT_TRUE(one.circumradii == three.circumradii);
+}
+
+TEST(FlatDelaunay, ThreadsStopWhenToldTo) {
+    const PointCloud points = alongCurve(inACube(kDivided));
+    LargeVector<Site> sites;
+    for (const Point3& p : points) sites.push_back({p.x, p.y, p.z});
+    std::atomic<bool> cancel{false};
+    RunContext context;
+    context.cancel = &cancel;
+    context.progress = [&](const char*, std::uint64_t done, std::uint64_t) {
+        if (done > points.size() / 2) cancel = true;
+    };
+    CellStore cells;
+    EXPECT_EQ(insertAll(sites, cells, 2, context).error().code, ErrorCode::kCancelled);
+}
+
+TEST(FlatDelaunay, ThreadsRefuseRepeatedPoints) {
+    PointCloud points = inACube(kDivided);
+    points.push_back(points[4321]);
+    LargeVector<Site> sites;
+    for (const std::uint32_t i : hilbertOrder(points))
+        sites.push_back({points[i].x, points[i].y, points[i].z});
+    CellStore cells;
+    EXPECT_EQ(insertAll(sites, cells, 2, {}).error().code, ErrorCode::kInternal);
+}
+
+// Two skew lines: every point of one makes a tetrahedron with every two neighbours of the other.
+TEST(FlatDelaunay, GrowsWherePointsHaveManyTetrahedra) {
+    PointCloud points;
+    for (int i = 0; i < 120; ++i) {
+        points.push_back({i * 0.0078125, 0.0, 0.0});
+        points.push_back({0.0, i * 0.0078125 + 0.001, 1.0});
+    }
+    const auto flat = triangulate(points);
+    ASSERT_TRUE(flat);
+    EXPECT_GT(flat->size(), 10000U);
+    EXPECT_TRUE(sorted(flat->vertices) == byCgal(points));
+}
+
+TEST(CurveOrder, IsAPermutationOfStepsToNeighbours) {
+    const PointCloud points = grid(16, 0.0625);
+    auto order = hilbertOrder(points);
+    double longest = 0.0;
+    double sum = 0.0;
+    for (std::size_t i = 1; i < order.size(); ++i) {
+        const double step = distance(points[order[i - 1]], points[order[i]]);
+        longest = std::max(longest, step);
+        sum += step;
+    }
+    // A Hilbert curve visits a grid of 2^k along each axis from neighbour to neighbour.
+    EXPECT_LE(longest, 2 * 0.0625 + 1e-12);
+    EXPECT_LT(sum, 1.1 * 0.0625 * static_cast<double>(points.size()));
+    std::sort(order.begin(), order.end());
+    for (std::uint32_t i = 0; i < order.size(); ++i) ASSERT_EQ(order[i], i);
+}
+
+TEST(CurveOrder, OfNoneOneAndEqualPoints) {
+    EXPECT_TRUE(hilbertOrder({}).empty());
+    EXPECT_EQ(hilbertOrder({{1, 2, 3}}).size(), 1U);
+    EXPECT_EQ(hilbertOrder({{1, 2, 3}, {1, 2, 3}, {1, 2, 3}}), (std::vector<std::uint32_t>{0, 1, 2}));
+}
+
+}  // namespace
+}  // namespace shapedb

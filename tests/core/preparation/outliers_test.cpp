@@ -1,0 +1,116 @@
+#include "core/preparation/outliers.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "core/base/random.h"
+#include "core/geometry/motion.h"
+
+namespace shapedb {
+namespace {
+
+constexpr double kRatio = 3.0;
+
+PointCloud sphere(std::size_t count, Random& random) {
+    PointCloud points;
+    while (points.size() < count) {
+        const Point3 d{random.normal(), random.normal(), random.normal()};
+        points.push_back((1.0 / length(d)) * d);
+    }
+    return points;
+}
+
+std::vector<std::uint8_t> outliersOf(const PointCloud& points) {
+    const auto outliers = findOutliers(points, NeighbourIndex(points), kRatio);
+    return outliers ? *outliers : std::vector<std::uint8_t>{};
+}
+
+std::size_t count(const std::vector<std::uint8_t>& outliers, std::size_t begin, std::size_t end) {
+    return static_cast<std::size_t>(std::count(outliers.begin() + static_cast<std::ptrdiff_t>(begin),
+                                               outliers.begin() + static_cast<std::ptrdiff_t>(end), 1));
+}
+
+TEST(FindOutliers, ACleanSurfaceHasNearlyNone) {
+    Random random(1);
+    const PointCloud points = sphere(5000, random);
+    EXPECT_LE(count(outliersOf(points), 0, points.size()), 3u);
+}
+
+TEST(FindOutliers, FindsAHazeInTheWholeBox) {
+    Random random(2);
+    PointCloud points = sphere(10000, random);
+    const std::size_t clean = points.size();
+    for (int i = 0; i < 100; ++i) {
+        points.push_back({random.uniform(-1.0, 1.0), random.uniform(-1.0, 1.0), random.uniform(-1.0, 1.0)});
+    }
+    const auto outliers = outliersOf(points);
+    ASSERT_EQ(outliers.size(), points.size());
+    // Those that happen to lie near the surface are part of it for all anyone can tell.
+    std::size_t far = 0;
+    for (std::size_t i = clean; i < points.size(); ++i) {
+        if (std::abs(length(points[i]) - 1.0) < 0.25) continue;
+        ++far;
+        EXPECT_EQ(outliers[i], 1) << i;
+    }
+    EXPECT_GT(far, 30u);
+    EXPECT_LE(count(outliers, 0, clean), 10u);
+}
+
+TEST(FindOutliers, FindsAClusterFarOff) {
+    Random random(3);
+    PointCloud points = sphere(5000, random);
+    for (int i = 0; i < 30; ++i) {
+        points.push_back({5.0 + 0.01 * random.normal(), 0.01 * random.normal(), 0.01 * random.normal()});
+    }
+    const auto outliers = outliersOf(points);
+    EXPECT_EQ(count(outliers, 5000, 5030), 30u);
+    EXPECT_LE(count(outliers, 0, 5000), 3u);
+}
+
+TEST(FindOutliers, KeepsASparseRegionAndAThinPart) {
+    Random random(4);
+    PointCloud points = sphere(6000, random);
+    const std::size_t dense = points.size();
+    // The far half of another sphere at a ninth of the density, and a rod as thin as the spacing.
+    const PointCloud sparse = sphere(1400, random);
+    for (const Point3& p : sparse) {
+        if (p.x > 0.0) points.push_back({p.x * 2.0 - 0.2, p.y * 2.0, p.z * 2.0});
+    }
+    const std::size_t rod = points.size();
+    for (int i = 0; i < 400; ++i) {
+        const double angle = random.uniform(0.0, 6.283185307179586);
+        points.push_back({-1.0 - random.uniform(0.0, 2.0), 0.03 * std::cos(angle), 0.03 * std::sin(angle)});
+    }
+    const auto outliers = outliersOf(points);
+    EXPECT_LE(count(outliers, dense, rod), 3u);
+    EXPECT_LE(count(outliers, rod, points.size()), 3u);
+}
+
+TEST(FindOutliers, KeepsAPartApart) {
+    Random random(5);
+    PointCloud points = sphere(5000, random);
+    for (const Point3& p : sphere(300, random)) points.push_back({5.0 + 0.2 * p.x, 0.2 * p.y, 0.2 * p.z});
+    EXPECT_LE(count(outliersOf(points), 5000, points.size()), 2u);
+}
+
+TEST(FindOutliers, SaysTheSameInAnyPose) {
+    Random random(6);
+    PointCloud points = sphere(3000, random);
+    for (int i = 0; i < 40; ++i) {
+        points.push_back({random.uniform(-1.0, 1.0), random.uniform(-1.0, 1.0), random.uniform(-1.0, 1.0)});
+    }
+    Motion motion;
+    motion.rotation = randomRotation(random);
+    motion.scale = 3.0;
+    EXPECT_EQ(outliersOf(points), outliersOf(applyToCloud(motion, points)));
+}
+
+TEST(FindOutliers, AHandfulOfPointsHasNone) {
+    EXPECT_TRUE(outliersOf({}).empty());
+    EXPECT_EQ(outliersOf({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 100}}), (std::vector<std::uint8_t>(4, 0)));
+}
+
+}  // namespace
+}  // namespace shapedb

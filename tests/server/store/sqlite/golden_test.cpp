@@ -1,0 +1,95 @@
+// One small database per schema version, opened and queried by every later version.
+// SHAPEDB_WRITE_GOLDEN=FILE writes the one of the present schema (docs/storage.md).
+#include <cstdlib>
+
+#include <zstd.h>
+
+#include "server/store/sqlite/migrator.h"
+#include "tests/server/store/sqlite/store_fixture.h"
+
+namespace shapedb::store {
+namespace {
+
+using GoldenTest = StoreTest;
+
+const std::vector<float> kTetrahedron = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
+
+std::vector<float> ball() { return cloud(42, 300); }
+
+/// A ready, a replaced (pending, old signature serving), a failed and a running shape, beside
+/// a rebuild in progress and an empty collection.
+void fill(Store& store) {
+    const Collection c = store.createCollection("golden", "one of each", "theta=20").value();
+    ASSERT_TRUE(store.createCollection("empty", "", ""));
+    const std::vector<float> round = ball();
+    const auto finish = [&] {
+        const Job job = **store.claimJob();
+        ASSERT_TRUE(store.finishJob(job, signatureFor(job)));
+    };
+    ASSERT_TRUE(store.putShape(request(c.id, "ready", kTetrahedron, {{"label", "tetrahedron"}, {"n", "4"}})));
+    finish();
+    ASSERT_TRUE(store.putShape(request(c.id, "replaced", kTetrahedron)));
+    finish();
+    ASSERT_TRUE(store.putShape(request(c.id, "failed", kTetrahedron)));
+    ASSERT_TRUE(store.failJob(**store.claimJob(), {ErrorCode::kNoInterior, "no closed interior"}));
+    ASSERT_TRUE(store.putShape(request(c.id, "replaced", round, {{"label", "ball"}})));
+    const Rebuild rebuild = store.startRebuild(c.id, "theta=25").value();
+    ASSERT_TRUE(store.putRebuilt(rebuild.id, signatureFor(1, 1, 2)));
+    ASSERT_TRUE(store.claimJob().value());
+}
+
+TEST_F(GoldenTest, Version1OpensAndAnswers) {
+    if (const char* target = std::getenv("SHAPEDB_WRITE_GOLDEN")) {
+        fill(*store_);
+        store_.reset();
+        const std::string bytes = slurp(options().path);
+        std::string packed(ZSTD_compressBound(bytes.size()), ' ');
+        packed.resize(ZSTD_compress(packed.data(), packed.size(), bytes.data(), bytes.size(), 19));
+        spill(target, packed);
+        return;
+    }
+    const std::string packed = slurp(std::string(SHAPEDB_GOLDEN_DIR) + "/database_v1.db.zst");
+    ASSERT_FALSE(packed.empty()) << "the golden database is missing";
+    std::string bytes(ZSTD_getFrameContentSize(packed.data(), packed.size()), ' ');
+    ASSERT_EQ(ZSTD_decompress(bytes.data(), bytes.size(), packed.data(), packed.size()), bytes.size());
+    store_.reset();
+    spill(options().path, bytes);
+    open();
+    EXPECT_EQ(store_->stats()->schemaVersion, static_cast<int>(embeddedMigrations().size()));
+    expectSound();
+
+    const Collection c = store_->getCollection("golden").value();
+    EXPECT_EQ(c.parameters, "theta=20");
+    EXPECT_EQ(c.generation, 1);
+    const Shape ready = store_->getShape(c.id, "ready").value();
+    EXPECT_EQ(ready.state, ShapeState::kReady);
+    EXPECT_EQ(ready.metadata, (Metadata{{"label", "tetrahedron"}, {"n", "4"}}));
+    EXPECT_EQ(store_->loadPoints(ready.id).value(), kTetrahedron);
+    EXPECT_EQ(store_->getSignature(ready.id)->bytes, "signature of 1/1/1");
+    const Shape replaced = store_->getShape(c.id, "replaced").value();
+    EXPECT_EQ(replaced.state, ShapeState::kPending);
+    EXPECT_EQ(replaced.version, 2);
+    EXPECT_EQ(store_->loadPoints(replaced.id).value(), ball());
+    EXPECT_EQ(store_->getSignature(replaced.id)->pointsVersion, 1);
+    const Shape failed = store_->getShape(c.id, "failed").value();
+    EXPECT_EQ(failed.failure->code, ErrorCode::kNoInterior);
+    EXPECT_EQ(failed.failure->message, "no closed interior");
+    EXPECT_EQ(store_->loadIndex(c.id, 0, 10)->size(), 2u);
+
+    // And it goes on: the interrupted job and the rebuild end.
+    ASSERT_TRUE(store_->recoverJobs(2)->empty());
+    EXPECT_EQ(store_->queueDepth()->jobs, 1u);
+    finishAll();
+    const Rebuild rebuild = store_->runningRebuilds()->front();
+    EXPECT_EQ(rebuild.done, 1u);
+    const auto missing = store_->rebuildBatch(rebuild.id, 0, 10).value();
+    EXPECT_EQ(missing.size(), 2u);
+    for (const Shape& shape : missing) {
+        ASSERT_TRUE(store_->putRebuilt(rebuild.id, signatureFor(shape.id, shape.pointsVersion, 2)));
+    }
+    EXPECT_TRUE(store_->finishRebuild(rebuild.id).value());
+    expectSound();
+}
+
+}  // namespace
+}  // namespace shapedb::store

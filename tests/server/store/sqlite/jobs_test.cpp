@@ -1,0 +1,118 @@
+#include "tests/server/store/sqlite/store_fixture.h"
+
+namespace shapedb::store {
+namespace {
+
+using SqliteJobsTest = StoreTest;
+
+TEST_F(SqliteJobsTest, OldestFirstAndReleaseKeepsAge) {
+    const Collection c = collection();
+    EXPECT_FALSE(store_->claimJob().value());
+    const Shape a = put(c.id, "a", 1);
+    const Shape b = put(c.id, "b", 2);
+    const Job first = claim();
+    EXPECT_EQ(first.shapeId, a.id);
+    EXPECT_EQ(first.collectionId, c.id);
+    EXPECT_EQ(first.pointsVersion, 1);
+    EXPECT_EQ(first.generation, 1);
+    EXPECT_EQ(first.attempts, 1);
+    EXPECT_EQ(first.pointBytes, 96u);
+    const Job second = claim();
+    EXPECT_EQ(second.shapeId, b.id);
+    EXPECT_FALSE(store_->claimJob().value());
+    ASSERT_TRUE(store_->releaseJob(second));
+    ASSERT_TRUE(store_->releaseJob(first));
+    ASSERT_TRUE(store_->releaseJob(first)) << "a second release is nothing";
+    const Job again = claim();
+    EXPECT_EQ(again.id, first.id);
+    EXPECT_EQ(again.attempts, 1);
+    EXPECT_EQ(store_->queueDepth()->jobs, 2u);
+}
+
+TEST_F(SqliteJobsTest, FinishMakesReady) {
+    const Collection c = collection();
+    const Shape shape = put(c.id, "a", 1, {{"label", "cup"}});
+    const Job job = claim();
+    const auto done = store_->finishJob(job, signatureFor(job)).value();
+    ASSERT_TRUE(done);
+    EXPECT_EQ(done->state, ShapeState::kReady);
+    EXPECT_EQ(done->version, 1);
+    EXPECT_EQ(done->metadata, shape.metadata);
+    EXPECT_EQ(store_->getSignature(shape.id)->bytes, signatureFor(job).bytes);
+    EXPECT_EQ(store_->queueDepth()->jobs, 0u);
+    EXPECT_EQ(store_->queueDepth()->bytes, 0u);
+    EXPECT_FALSE(store_->finishJob(job, signatureFor(job)).value()) << "the job is gone";
+    EXPECT_FALSE(store_->failJob(job, {ErrorCode::kInternal, "late"}).value());
+    expectSound();
+}
+
+TEST_F(SqliteJobsTest, SignaturesAreBytes) {
+    const Collection c = collection();
+    for (const std::string& bytes : {std::string(), std::string("a\0\xff", 3), std::string(100000, 'x')}) {
+        put(c.id, "a", bytes.size() + 50);
+        const Job job = claim();
+        SignatureRow row = signatureFor(job);
+        row.bytes = bytes;
+        ASSERT_TRUE(store_->finishJob(job, row));
+        EXPECT_EQ(store_->getSignature(job.shapeId)->bytes, bytes);
+    }
+}
+
+TEST_F(SqliteJobsTest, ResultsOfGoneOrReplacedPointsAreDropped) {
+    const Collection c = collection();
+    put(c.id, "a", 1);
+    const Job old = claim();
+    put(c.id, "a", 2);
+    EXPECT_FALSE(store_->finishJob(old, signatureFor(old)).value());
+    EXPECT_FALSE(store_->failJob(old, {ErrorCode::kCoplanar, ""}).value());
+    ASSERT_TRUE(store_->releaseJob(old));
+    EXPECT_EQ(store_->getShape(c.id, "a")->state, ShapeState::kPending);
+    const Job job = claim();
+    EXPECT_EQ(job.pointsVersion, 2);
+    ASSERT_TRUE(store_->deleteShape(c.id, "a", {}));
+    EXPECT_FALSE(store_->finishJob(job, signatureFor(job)).value());
+    EXPECT_EQ(store_->queueDepth()->jobs, 0u);
+    EXPECT_EQ(store_->stats()->signatures, 0u);
+}
+
+TEST_F(SqliteJobsTest, WrongSignaturesAreRefused) {
+    const Collection c = collection();
+    const Shape other = put(c.id, "b", 2);
+    finishAll();
+    put(c.id, "a", 1);
+    const Job job = claim();
+    EXPECT_FAILS(store_->finishJob(job, signatureFor(other.id, 1, 1)), ErrorCode::kInvalidArgument);
+    EXPECT_FAILS(store_->finishJob(job, signatureFor(job.shapeId, 2, 1)), ErrorCode::kInvalidArgument);
+    EXPECT_FAILS(store_->finishJob(job, signatureFor(job.shapeId, 1, 2)), ErrorCode::kInvalidArgument);
+    EXPECT_TRUE(store_->finishJob(job, signatureFor(job)).value());
+}
+
+TEST_F(SqliteJobsTest, JobsThatKillTheServerAreQuarantined) {
+    const Collection c = collection();
+    const Shape bad = put(c.id, "bad", 1);
+    finishAll();
+    put(c.id, "bad", 2);  // its old signature serves until the quarantine
+    const Shape good = put(c.id, "good", 3);
+    for (int life = 1; life <= 2; ++life) {
+        const Job job = claim();
+        EXPECT_EQ(job.shapeId, bad.id);
+        EXPECT_EQ(job.attempts, life);
+        open();  // the process dies with the job
+        const auto quarantined = store_->recoverJobs(2).value();
+        ASSERT_EQ(quarantined.size(), life == 2 ? 1u : 0u);
+        if (life == 2) {
+            EXPECT_EQ(quarantined[0].id, bad.id);
+            EXPECT_EQ(quarantined[0].state, ShapeState::kFailed);
+            EXPECT_NE(quarantined[0].failure->message.find("2 times"), std::string::npos);
+        }
+    }
+    EXPECT_FAILS(store_->getSignature(bad.id), ErrorCode::kNotReady);
+    const Job job = claim();
+    EXPECT_EQ(job.shapeId, good.id);
+    EXPECT_TRUE(store_->finishJob(job, signatureFor(job)).value());
+    EXPECT_FALSE(store_->claimJob().value());
+    expectSound();
+}
+
+}  // namespace
+}  // namespace shapedb::store

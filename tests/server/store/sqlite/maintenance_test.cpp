@@ -1,0 +1,282 @@
+#include <atomic>
+#include <thread>
+
+#include "server/store/sqlite/migrator.h"
+#include "tests/server/store/sqlite/store_fixture.h"
+
+namespace shapedb::store {
+namespace {
+
+class SqliteCareTest : public StoreTest {
+  protected:
+    void SetUp() override {
+        StoreTest::SetUp();
+        collection_ = collection();
+        for (int i = 0; i < 6; ++i) put(collection_.id, "k" + std::to_string(i), 10 + i, {{"label", "cup"}});
+        for (int i = 0; i < 4; ++i) {
+            const Job job = claim();
+            ASSERT_TRUE(store_->finishJob(job, signatureFor(job)));
+        }
+        ASSERT_TRUE(store_->backup(backup_, {}));
+    }
+
+    void expectRefused(const std::string& path, ErrorCode code) {
+        const Shape before = put(collection_.id, "live", 99);
+        const auto refused = store_->restore(path, {});
+        ASSERT_FALSE(refused);
+        EXPECT_EQ(refused.error().code, code) << refused.error().message;
+        EXPECT_TRUE(store_->getShape(collection_.id, "live").value() == before);
+        EXPECT_FALSE(std::filesystem::exists(folder_.file("shapes.db.restore")));
+        expectSound();
+    }
+
+    /// A copy of the backup, changed by SQL.
+    std::string changed(const std::string& sql) {
+        const std::string path = folder_.file("changed.db");
+        spill(path, slurp(backup_));
+        Connection(path, OpenMode::kReadWrite, 0).execute(sql);
+        return path;
+    }
+
+    Collection collection_;
+    std::string backup_ = folder_.file("backup.db");
+};
+
+TEST_F(SqliteCareTest, RestoreBringsBackWhatWasThere) {
+    const auto before = store_->listShapes(collection_.id, 0, 100, {}).value();
+    const auto index = store_->loadIndex(collection_.id, 0, 100).value();
+    const std::string file = slurp(backup_);
+    put(collection_.id, "k0", 77);
+    put(collection_.id, "later", 78);
+    ASSERT_TRUE(store_->deleteShape(collection_.id, "k1", {}));
+    collection("later");
+    std::string stages;
+    RunContext context;
+    context.progress = [&](const char* stage, std::uint64_t, std::uint64_t) {
+        if (stages.find(stage) == std::string::npos) stages += std::string(stage) + " ";
+    };
+    const auto restored = store_->restore(backup_, context);
+    ASSERT_TRUE(restored) << restored.error().message;
+    EXPECT_NE(stages.find("copy integrity points"), std::string::npos) << stages;
+    EXPECT_TRUE(slurp(backup_) == file) << "the backup is left as it is";
+    for (int round = 0; round < 2; ++round) {
+        const auto after = store_->listShapes(collection_.id, 0, 100, {}).value();
+        ASSERT_EQ(after.size(), before.size());
+        for (std::size_t i = 0; i < after.size(); ++i) EXPECT_TRUE(after[i] == before[i]);
+        EXPECT_EQ(store_->loadIndex(collection_.id, 0, 100)->size(), index.size());
+        EXPECT_EQ(store_->listCollections()->size(), 1u);
+        EXPECT_EQ(store_->loadPoints(before[0].id).value(), cloud(10));
+        EXPECT_EQ(store_->queueDepth()->jobs, 2u);
+        open();
+    }
+    finishAll();
+    expectSound();
+}
+
+TEST_F(SqliteCareTest, ResultsInFlightMeetNoRestoredRow) {
+    // Same lineage: after the restore the ids of "later" would come again.
+    const Shape later = put(collection_.id, "later", 50);
+    finishAll();
+    put(collection_.id, "later", 51);
+    const Job inFlight = claim();
+    const Rebuild rebuild = store_->startRebuild(collection_.id, "finer").value();
+    ASSERT_TRUE(store_->restore(backup_, {}));
+    const Shape fresh = put(collection_.id, "fresh", 52);
+    EXPECT_GT(fresh.id, later.id);
+    EXPECT_FALSE(store_->finishJob(inFlight, signatureFor(inFlight)).value());
+    EXPECT_FAILS(store_->putRebuilt(rebuild.id, signatureFor(fresh.id, 1, 2)), ErrorCode::kNotFound);
+    EXPECT_GT(store_->startRebuild(collection_.id, "finer")->id, rebuild.id);
+    std::int64_t last = inFlight.id;
+    for (int i = 0; i < 3; ++i) {
+        const Job job = claim();
+        EXPECT_GT(job.id, last);
+        last = job.id;
+    }
+    expectSound();
+}
+
+TEST_F(SqliteCareTest, RunningJobsComeBackQueuedAndUntried) {
+    claim();
+    const std::string path = folder_.file("second.db");
+    ASSERT_TRUE(store_->backup(path, {}));
+    ASSERT_TRUE(store_->restore(path, {}));
+    EXPECT_EQ(claim().attempts, 1);
+    EXPECT_EQ(claim().attempts, 1);
+}
+
+TEST_F(SqliteCareTest, BackupIsOneOrdinaryFile) {
+    EXPECT_FAILS(store_->backup(backup_, {}), ErrorCode::kAlreadyExists);
+    EXPECT_FAILS(store_->backup(folder_.file("none/x.db"), {}), ErrorCode::kFileNotWritable);
+    std::size_t files = 0;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_.file(""))) {
+        files += entry.path().filename().string().rfind("backup", 0) == 0 ? 1 : 0;
+    }
+    EXPECT_EQ(files, 1u);
+    SqliteOptions other = options();
+    other.path = folder_.file("opened.db");
+    spill(other.path, slurp(backup_));
+    auto opened = openSqliteStore(other);
+    ASSERT_TRUE(opened) << opened.error().message;
+    EXPECT_EQ((*opened)->countShapes(collection_.id, {}).value(), 6u);
+    EXPECT_TRUE((*opened)->check({})->empty());
+}
+
+TEST_F(SqliteCareTest, RefusesWhatIsNoGoodBackup) {
+    expectRefused(folder_.file("missing.db"), ErrorCode::kFileNotReadable);
+    expectRefused(folder_.file("."), ErrorCode::kFileNotReadable);
+    const std::string path = folder_.file("bad.db");
+    spill(path, "");
+    expectRefused(path, ErrorCode::kMalformedFile);
+    spill(path, std::string(10000, 'x'));
+    expectRefused(path, ErrorCode::kMalformedFile);
+    spill(path, slurp(backup_).substr(0, 40000));
+    expectRefused(path, ErrorCode::kMalformedFile);
+    spill(path, slurp(backup_));
+    spill(path + "-wal", "in use");
+    expectRefused(path, ErrorCode::kMalformedFile);
+    expectRefused(folder_.file("shapes.db"), ErrorCode::kMalformedFile);
+    expectRefused(changed("PRAGMA application_id=1"), ErrorCode::kMalformedFile);
+    expectRefused(changed("PRAGMA user_version=2"), ErrorCode::kSchemaTooNew);
+    expectRefused(
+        changed("INSERT INTO schema_migration VALUES (2, '0002_future', '', 0); PRAGMA user_version=2"),
+        ErrorCode::kSchemaTooNew);
+    expectRefused(changed("UPDATE schema_migration SET sha256 = 'x'"), ErrorCode::kMalformedFile);
+    expectRefused(changed("DROP INDEX job_by_state"), ErrorCode::kMalformedFile);
+    expectRefused(changed("CREATE TABLE more (x)"), ErrorCode::kMalformedFile);
+    expectRefused(changed("UPDATE shape_points SET points = zeroblob(97) WHERE shape_id = 3"),
+                  ErrorCode::kMalformedFile);
+    expectRefused(changed("DELETE FROM signature"), ErrorCode::kMalformedFile);
+}
+
+TEST_F(SqliteCareTest, RefusesAnotherPageSize) {
+    expectRefused(changed("PRAGMA page_size=8192; VACUUM"), ErrorCode::kMalformedFile);
+}
+
+TEST_F(SqliteCareTest, CancelledLeavesNothing) {
+    // Enough pages for several steps.
+    for (int i = 0; i < 8; ++i) {
+        const auto big = cloud(200 + i, 20000);
+        ASSERT_TRUE(store_->putShape(request(collection_.id, "big" + std::to_string(i), big)));
+    }
+    const std::string large = folder_.file("large.db");
+    ASSERT_TRUE(store_->backup(large, {}));
+    std::atomic<bool> cancel{false};
+    RunContext context;
+    context.cancel = &cancel;
+    for (const std::string stop : {"copy", "integrity", "points", "restore", "backup"}) {
+        cancel = false;
+        context.progress = [&](const char* stage, std::uint64_t, std::uint64_t) {
+            if (stage == stop) cancel = true;
+        };
+        const std::string path = folder_.file("cancelled.db");
+        if (stop == "backup") {
+            EXPECT_FAILS(store_->backup(path, context), ErrorCode::kCancelled);
+            EXPECT_FALSE(std::filesystem::exists(path));
+        } else {
+            put(collection_.id, "live", 98);
+            EXPECT_FAILS(store_->restore(large, context), ErrorCode::kCancelled);
+            EXPECT_TRUE(store_->getShape(collection_.id, "live")) << stop;
+        }
+    }
+    cancel = true;
+    context.progress = nullptr;
+    EXPECT_FAILS(store_->check(context), ErrorCode::kCancelled);
+    RunContext late;
+    late.deadline = RunContext::Clock::now() - std::chrono::seconds(1);
+    EXPECT_FAILS(store_->check(late), ErrorCode::kDeadlineExceeded);
+    expectSound();
+}
+
+TEST_F(SqliteCareTest, ReadersSeeTheOldOrTheNew) {
+    // Two contents, told apart by the label of all their shapes, restored in turn.
+    const std::string other = folder_.file("other.db");
+    for (int i = 0; i < 6; ++i) put(collection_.id, "k" + std::to_string(i), 10 + i, {{"label", "jug"}});
+    ASSERT_TRUE(store_->backup(other, {}));
+    std::atomic<bool> stop{false};
+    std::atomic<int> mixed{0};
+    std::atomic<int> reads{0};
+    std::vector<std::thread> readers;
+    for (int t = 0; t < 2; ++t) {
+        readers.emplace_back([&] {
+            while (!stop) {
+                const auto shapes = store_->listShapes(collection_.id, 0, 100, {});
+                bool good = shapes && shapes->size() == 6;
+                if (good) {
+                    for (const Shape& shape : *shapes)
+                        good = good && shape.metadata == shapes->front().metadata;
+                }
+                if (!good) ++mixed;
+                ++reads;
+            }
+        });
+    }
+    for (int i = 0; i < 10; ++i) {
+        const auto restored = store_->restore(i % 2 ? other : backup_, {});
+        EXPECT_TRUE(restored) << restored.error().message;
+    }
+    stop = true;
+    for (auto& reader : readers) reader.join();
+    EXPECT_EQ(mixed, 0);
+    EXPECT_GT(reads, 10);
+    EXPECT_EQ(store_->getShape(collection_.id, "k0")->metadata.at("label"), "jug");
+    expectSound();
+}
+
+TEST_F(SqliteCareTest, BackupBesideWritesIsOneMoment) {
+    // The writer adds pairs; a backup never holds half of what it acknowledged before.
+    std::atomic<bool> stop{false};
+    std::atomic<int> acknowledged{0};
+    std::thread writer([&] {
+        for (int i = 0; !stop; ++i) {
+            const auto points = cloud(1000 + i, 2000);
+            if (store_->putShape(request(collection_.id, "w" + std::to_string(i), points)))
+                acknowledged = i + 1;
+        }
+    });
+    for (int round = 0; round < 5; ++round) {
+        const int least = acknowledged;
+        SqliteOptions copied = options();
+        copied.path = folder_.file("moment" + std::to_string(round) + ".db");
+        const auto made = store_->backup(copied.path, {});
+        EXPECT_TRUE(made) << made.error().message;
+        auto opened = openSqliteStore(copied);
+        ASSERT_TRUE(opened) << opened.error().message;
+        EXPECT_TRUE((*opened)->check({})->empty());
+        EXPECT_GE((*opened)->countShapes(collection_.id, {}).value(), static_cast<std::uint64_t>(6 + least));
+    }
+    stop = true;
+    writer.join();
+    expectSound();
+}
+
+// Each rule of the check, broken on purpose.
+TEST_F(SqliteCareTest, CheckFindsWhatIsBroken) {
+    const std::pair<const char*, const char*> breaks[] = {
+        {"UPDATE shape_points SET points = zeroblob(97) WHERE shape_id = 1", "checksum"},
+        {"UPDATE shape_points SET points = x'01' WHERE shape_id = 1", "damaged"},
+        {"UPDATE shape SET point_count = 9 WHERE id = 1", "damaged"},
+        {"UPDATE shape SET point_count = 4611686018427387904 WHERE id = 1", "point count"},
+        {"DELETE FROM shape_points WHERE shape_id = 1", "lost its points"},
+        {"UPDATE shape_points SET stored_bytes = 1 WHERE shape_id = 1", "byte counts"},
+        {"DELETE FROM signature WHERE shape_id = 1", "is ready but"},
+        {"UPDATE signature SET bytes = x'00' WHERE shape_id = 1", "signature of shape 'k0'"},
+        {"UPDATE signature SET generation = 5 WHERE shape_id = 1", "no generation"},
+        {"UPDATE shape SET state = 2, failure_code = 'x', failure_message = '' WHERE id = 1", "still serves"},
+        {"DELETE FROM job WHERE shape_id = 5", "has no job"},
+        {"UPDATE shape SET state = 1 WHERE id = 5", "not pending"},
+        {"UPDATE job SET points_version = 2 WHERE shape_id = 5", "no longer has"},
+        {"UPDATE tally SET jobs = jobs + 1", "tally"},
+        {"PRAGMA foreign_keys=OFF; DELETE FROM shape WHERE id = 1", "missing row"},
+    };
+    for (const auto& [sql, expected] : breaks) {
+        SqliteOptions broken = options();
+        broken.path = changed(sql);
+        const auto problems = openSqliteStore(broken).value()->check({}).value();
+        std::string all;
+        for (const auto& line : problems) all += line + "\n";
+        EXPECT_NE(all.find(expected), std::string::npos) << sql << "\n" << all;
+    }
+}
+
+}  // namespace
+}  // namespace shapedb::store

@@ -1,0 +1,340 @@
+// The store equals a map: seeded random operations on both, compared as they go, with
+// restarts in between (after leveldb's ModelDB).
+#include <map>
+#include <set>
+
+#include "tests/server/store/sqlite/store_fixture.h"
+
+namespace shapedb::store {
+namespace {
+
+struct ModelShape {
+    Shape shape;
+    std::uint64_t seed = 0;               ///< of its points
+    std::optional<SignatureRow> serving;  ///< of the collection's generation
+    std::optional<SignatureRow> rebuilt;  ///< of the running rebuild
+    std::optional<Error> rebuildFailure;
+    bool hasJob = false;
+    bool running = false;
+    int attempts = 0;
+};
+
+class ModelTest : public StoreTest, public ::testing::WithParamInterface<int> {
+  protected:
+    static constexpr int kKeys = 12;
+
+    std::string randomKey() { return "k" + std::to_string(random_.below(kKeys)); }
+    Metadata randomMetadata() {
+        Metadata metadata;
+        for (std::uint64_t i = random_.below(3); i > 0; --i) {
+            metadata["m" + std::to_string(random_.below(3))] = std::to_string(random_.below(2));
+        }
+        return metadata;
+    }
+
+    void doPut() {
+        const std::string key = randomKey();
+        const std::uint64_t seed = random_.below(3);
+        const auto points = cloud(seed);
+        const Metadata metadata = randomMetadata();
+        const auto result = store_->putShape(request(collection_.id, key, points, metadata));
+        ASSERT_TRUE(result) << result.error().message;
+        const auto found = model_.find(key);
+        if (found == model_.end()) {
+            EXPECT_EQ(result->outcome, PutOutcome::kCreated);
+            ModelShape fresh;
+            fresh.shape = result->shape;
+            EXPECT_GT(fresh.shape.id, lastId_);
+            lastId_ = fresh.shape.id;
+            fresh.shape.key = key;
+            fresh.shape.version = fresh.shape.pointsVersion = 1;
+            fresh.shape.state = ShapeState::kPending;
+            fresh.shape.pointCount = 8;
+            fresh.shape.checksum = checksumOf(points);
+            fresh.shape.metadata = metadata;
+            fresh.seed = seed;
+            fresh.hasJob = true;
+            queue_.push_back(key);
+            model_[key] = fresh;
+            return;
+        }
+        ModelShape& model = found->second;
+        if (model.seed == seed && model.shape.metadata == metadata) {
+            EXPECT_EQ(result->outcome, PutOutcome::kUnchanged);
+            return;
+        }
+        ++model.shape.version;
+        model.shape.metadata = metadata;
+        if (model.seed == seed) {
+            EXPECT_EQ(result->outcome, PutOutcome::kMetadataChanged);
+            return;
+        }
+        EXPECT_EQ(result->outcome, PutOutcome::kReplaced);
+        model.seed = seed;
+        model.shape.pointsVersion = model.shape.version;
+        model.shape.checksum = checksumOf(points);
+        model.shape.state = ShapeState::kPending;
+        model.shape.failure.reset();
+        model.rebuilt.reset();
+        model.rebuildFailure.reset();
+        unqueue(key);
+        model.hasJob = true;
+        model.running = false;
+        model.attempts = 0;
+        queue_.push_back(key);
+    }
+
+    void unqueue(const std::string& key) {
+        for (auto it = queue_.begin(); it != queue_.end(); ++it) {
+            if (*it == key) {
+                queue_.erase(it);
+                return;
+            }
+        }
+    }
+
+    void doDelete() {
+        const std::string key = randomKey();
+        const auto result = store_->deleteShape(collection_.id, key, {});
+        const auto found = model_.find(key);
+        ASSERT_EQ(result.has_value(), found != model_.end());
+        if (!result) return;
+        EXPECT_TRUE(*result == found->second.shape);
+        unqueue(key);
+        model_.erase(found);
+    }
+
+    void doClaim() {
+        const auto job = store_->claimJob();
+        ASSERT_TRUE(job) << job.error().message;
+        const std::string* oldest = nullptr;
+        for (const auto& key : queue_) {
+            if (!model_[key].running) {
+                oldest = &key;
+                break;
+            }
+        }
+        ASSERT_EQ(job->has_value(), oldest != nullptr);
+        if (oldest == nullptr) return;
+        ModelShape& model = model_[*oldest];
+        EXPECT_EQ((*job)->shapeId, model.shape.id);
+        EXPECT_EQ((*job)->pointsVersion, model.shape.pointsVersion);
+        EXPECT_EQ((*job)->generation, generation_);
+        model.running = true;
+        EXPECT_EQ((*job)->attempts, ++model.attempts);
+        claimed_.push_back(**job);
+    }
+
+    /// The model of the job's shape while the job is still its own.
+    ModelShape* holder(const Job& job) {
+        for (auto& entry : model_) {
+            ModelShape& model = entry.second;
+            if (model.shape.id == job.shapeId && model.shape.pointsVersion == job.pointsVersion &&
+                model.hasJob) {
+                return &model;
+            }
+        }
+        return nullptr;
+    }
+
+    void doEndJob() {
+        if (claimed_.empty()) return;
+        const std::size_t at = random_.below(claimed_.size());
+        const Job job = claimed_[at];
+        claimed_.erase(claimed_.begin() + static_cast<std::ptrdiff_t>(at));
+        ModelShape* model = holder(job);
+        const std::uint64_t how = random_.below(4);
+        if (how == 0) {
+            ASSERT_TRUE(store_->releaseJob(job));
+            if (model != nullptr) putBack(*model);
+            return;
+        }
+        const bool counts = model != nullptr && job.generation == generation_;
+        const Error why{ErrorCode::kNoInterior, "model"};
+        const auto result = how == 1 ? store_->failJob(job, why) : store_->finishJob(job, signatureFor(job));
+        ASSERT_TRUE(result) << result.error().message;
+        ASSERT_EQ(result->has_value(), counts);
+        if (!counts) {
+            if (model != nullptr) putBack(*model);
+            return;
+        }
+        model->hasJob = model->running = false;
+        unqueue(model->shape.key);
+        if (how == 1) {
+            model->shape.state = ShapeState::kFailed;
+            model->shape.failure = why;
+            model->serving.reset();
+            model->rebuilt.reset();
+        } else {
+            model->shape.state = ShapeState::kReady;
+            model->serving = signatureFor(job);
+        }
+        EXPECT_TRUE(**result == model->shape);
+    }
+
+    static void putBack(ModelShape& model) {
+        model.running = false;
+        --model.attempts;
+    }
+
+    void doRebuild() {
+        if (!rebuild_) {
+            const auto started = store_->startRebuild(collection_.id, "p" + std::to_string(generation_));
+            ASSERT_TRUE(started) << started.error().message;
+            rebuild_ = *started;
+            EXPECT_EQ(rebuild_->targetGeneration, generation_ + 1);
+            return;
+        }
+        const std::uint64_t how = random_.below(12);
+        if (how == 0) {
+            ASSERT_TRUE(store_->abandonRebuild(rebuild_->id, RebuildState::kCancelled));
+            endRebuild();
+            return;
+        }
+        if (how == 1) return finishRebuild();
+        const auto batch = store_->rebuildBatch(rebuild_->id, 0, 1000);
+        ASSERT_TRUE(batch) << batch.error().message;
+        std::set<std::int64_t> expected;
+        for (const auto& entry : model_) {
+            const ModelShape& model = entry.second;
+            if (!model.hasJob && !model.rebuilt && !model.rebuildFailure) expected.insert(model.shape.id);
+        }
+        std::set<std::int64_t> listed;
+        for (const Shape& shape : *batch) listed.insert(shape.id);
+        EXPECT_EQ(listed, expected);
+        if (batch->empty()) return;
+        const Shape& shape = (*batch)[random_.below(batch->size())];
+        ModelShape& model = model_[shape.key];
+        if (how == 2) {
+            const Error why{ErrorCode::kCoplanar, "rebuilt model"};
+            ASSERT_TRUE(store_->putRebuildFailure(rebuild_->id, shape.id, shape.pointsVersion, why));
+            model.rebuildFailure = why;
+        } else {
+            model.rebuilt = signatureFor(shape.id, shape.pointsVersion, generation_ + 1);
+            ASSERT_TRUE(store_->putRebuilt(rebuild_->id, *model.rebuilt));
+        }
+    }
+
+    void finishRebuild() {
+        bool complete = true;
+        for (const auto& entry : model_) {
+            const ModelShape& model = entry.second;
+            complete = complete && (model.hasJob || model.rebuilt || model.rebuildFailure);
+        }
+        const auto finished = store_->finishRebuild(rebuild_->id);
+        ASSERT_TRUE(finished) << finished.error().message;
+        ASSERT_EQ(*finished, complete);
+        if (!complete) return;
+        ++flips_;
+        ++generation_;
+        for (auto& entry : model_) {
+            ModelShape& model = entry.second;
+            model.serving = model.rebuilt;
+            if (model.hasJob) continue;
+            model.shape.state = model.rebuilt ? ShapeState::kReady : ShapeState::kFailed;
+            model.shape.failure = model.rebuildFailure;
+        }
+        endRebuild();
+    }
+
+    void endRebuild() {
+        rebuild_.reset();
+        for (auto& entry : model_) {
+            entry.second.rebuilt.reset();
+            entry.second.rebuildFailure.reset();
+        }
+    }
+
+    void doReopen() {
+        open();
+        const auto quarantined = store_->recoverJobs(3);
+        ASSERT_TRUE(quarantined);
+        std::set<std::string> expected;
+        for (auto& entry : model_) {
+            ModelShape& model = entry.second;
+            if (!model.running) continue;
+            model.running = false;
+            if (model.attempts < 3) continue;
+            model.hasJob = false;
+            model.serving.reset();
+            model.rebuilt.reset();
+            model.shape.state = ShapeState::kFailed;
+            expected.insert(entry.first);
+            unqueue(entry.first);
+        }
+        for (const Shape& shape : *quarantined) {
+            EXPECT_EQ(expected.erase(shape.key), 1u);
+            model_[shape.key].shape.failure = shape.failure;
+        }
+        EXPECT_TRUE(expected.empty());
+        claimed_.clear();
+        quarantines_ += static_cast<int>(quarantined->size());
+    }
+
+    void compare() {
+        const auto listed = store_->listShapes(collection_.id, 0, 1000, {}).value();
+        ASSERT_EQ(listed.size(), model_.size());
+        std::size_t serving = 0;
+        std::map<std::int64_t, SignatureRow> index;
+        const auto rows = store_->loadIndex(collection_.id, 0, 1000).value();
+        for (const IndexRow& row : rows) index[row.shapeId] = row.signature;
+        for (const Shape& shape : listed) {
+            const ModelShape& model = model_.at(shape.key);
+            EXPECT_TRUE(shape == model.shape) << shape.key;
+            EXPECT_EQ(store_->loadPoints(shape.id).value(), cloud(model.seed));
+            const auto signature = store_->getSignature(shape.id);
+            ASSERT_EQ(signature.has_value(), model.serving.has_value()) << shape.key;
+            if (!signature) continue;
+            ++serving;
+            EXPECT_EQ(signature->bytes, model.serving->bytes);
+            EXPECT_EQ(index.at(shape.id).bytes, model.serving->bytes);
+        }
+        EXPECT_EQ(index.size(), serving);
+        EXPECT_EQ(store_->queueDepth()->jobs, queue_.size());
+        EXPECT_EQ(store_->queueDepth()->bytes, 96 * queue_.size());
+        EXPECT_EQ(store_->getCollection("parts")->generation, generation_);
+    }
+
+    Random random_{0};
+    Collection collection_;
+    std::int64_t generation_ = 1;
+    std::int64_t lastId_ = 0;
+    int flips_ = 0;
+    int quarantines_ = 0;
+    std::map<std::string, ModelShape> model_;
+    std::vector<std::string> queue_;  ///< keys with a job, oldest first
+    std::vector<Job> claimed_;
+    std::optional<Rebuild> rebuild_;
+};
+
+TEST_P(ModelTest, EqualsAMap) {
+    random_ = Random(static_cast<std::uint64_t>(GetParam()));
+    collection_ = collection();
+    for (int step = 0; step < 500 && !HasFatalFailure(); ++step) {
+        const std::uint64_t dice = random_.below(100);
+        SCOPED_TRACE("step " + std::to_string(step));
+        if (dice < 22) {
+            doPut();
+        } else if (dice < 27) {
+            doDelete();
+        } else if (dice < 50) {
+            doClaim();
+        } else if (dice < 70) {
+            doEndJob();
+        } else if (dice < 98) {
+            doRebuild();
+        } else {
+            doReopen();
+        }
+        if (step % 20 == 0) compare();
+        if (step % 300 == 0) expectSound();
+    }
+    compare();
+    expectSound();
+    EXPECT_GT(flips_, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, ModelTest, ::testing::Range(1, 5));
+
+}  // namespace
+}  // namespace shapedb::store

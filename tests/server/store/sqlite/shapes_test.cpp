@@ -1,0 +1,276 @@
+#include <set>
+
+#include "tests/server/store/sqlite/store_fixture.h"
+
+namespace shapedb::store {
+namespace {
+
+using SqliteShapesTest = StoreTest;
+
+TEST_F(SqliteShapesTest, PutStoresAllAndQueuesAJob) {
+    const Collection c = collection();
+    const auto points = cloud(1, 500);
+    const PutResult put =
+        store_->putShape(request(c.id, "cup", points, {{"label", "cup"}, {"b", "2"}})).value();
+    EXPECT_EQ(put.outcome, PutOutcome::kCreated);
+    EXPECT_EQ(put.shape.version, 1);
+    EXPECT_EQ(put.shape.pointsVersion, 1);
+    EXPECT_EQ(put.shape.state, ShapeState::kPending);
+    EXPECT_EQ(put.shape.pointCount, 500u);
+    EXPECT_EQ(put.shape.checksum, checksumOf(points));
+    EXPECT_EQ(put.shape.metadata, (Metadata{{"b", "2"}, {"label", "cup"}}));
+    EXPECT_FALSE(put.shape.failure);
+    EXPECT_TRUE(store_->getShape(c.id, "cup").value() == put.shape);
+    EXPECT_TRUE(store_->getShapeById(put.shape.id).value() == put.shape);
+    EXPECT_EQ(store_->loadPoints(put.shape.id).value(), points);
+    EXPECT_EQ(store_->queueDepth()->jobs, 1u);
+    EXPECT_EQ(store_->queueDepth()->bytes, 6000u);
+    open();
+    EXPECT_TRUE(store_->getShape(c.id, "cup").value() == put.shape);
+    EXPECT_EQ(store_->loadPoints(put.shape.id).value(), points);
+}
+
+// Above PointEncoding::kHeldBytes: written into the row in pieces.
+TEST_F(SqliteShapesTest, LargeScansComeBackAndAreReplaced) {
+    const Collection c = collection();
+    for (const std::size_t count : {800'000, 900'000}) {
+        const auto points = cloud(count, count);
+        const auto put = store_->putShape(request(c.id, "large", points));
+        ASSERT_TRUE(put) << put.error().message;
+        EXPECT_EQ(store_->loadPoints(put->shape.id).value(), points);
+        EXPECT_EQ(store_->stats()->pointBytes, 12 * count);
+        EXPECT_LT(store_->stats()->storedPointBytes, 12 * count);
+        EXPECT_EQ(store_->putShape(request(c.id, "large", points))->outcome, PutOutcome::kUnchanged);
+        open();
+        EXPECT_EQ(store_->loadPoints(put->shape.id).value(), points);
+    }
+    finishAll();
+    expectSound();
+}
+
+TEST_F(SqliteShapesTest, RepeatedRequestChangesNothing) {
+    const Collection c = collection();
+    const auto points = cloud(1);
+    for (const bool failed : {false, true}) {
+        const Shape first = put(c.id, failed ? "f" : "r", 1, {{"a", "1"}});
+        if (failed) {
+            ASSERT_TRUE(store_->failJob(claim(), {ErrorCode::kCoplanar, "flat"}));
+        } else {
+            finishAll();
+        }
+        const Shape before = store_->getShapeById(first.id).value();
+        for (const PutMode mode : {PutMode::kUpsert, PutMode::kInsertOnly, PutMode::kUpdateOnly}) {
+            PutRequest again = request(c.id, first.key, points, {{"a", "1"}});
+            again.mode = mode;
+            const PutResult result = store_->putShape(again).value();
+            EXPECT_EQ(result.outcome, PutOutcome::kUnchanged);
+            EXPECT_TRUE(result.shape == before);
+            EXPECT_EQ(result.shape.updatedAt, before.updatedAt);
+        }
+        EXPECT_EQ(store_->queueDepth()->jobs, 0u);
+    }
+}
+
+TEST_F(SqliteShapesTest, OtherMetadataNeedsNoJob) {
+    const Collection c = collection();
+    put(c.id, "cup", 1, {{"a", "1"}, {"b", "2"}});
+    finishAll();
+    const auto points = cloud(1);
+    const PutResult result = store_->putShape(request(c.id, "cup", points, {{"b", "3"}})).value();
+    EXPECT_EQ(result.outcome, PutOutcome::kMetadataChanged);
+    EXPECT_EQ(result.shape.version, 2);
+    EXPECT_EQ(result.shape.pointsVersion, 1);
+    EXPECT_EQ(result.shape.state, ShapeState::kReady);
+    EXPECT_EQ(result.shape.metadata, (Metadata{{"b", "3"}}));
+    EXPECT_EQ(store_->queueDepth()->jobs, 0u);
+    EXPECT_EQ(store_->getSignature(result.shape.id)->pointsVersion, 1);
+    expectSound();
+}
+
+TEST_F(SqliteShapesTest, OtherPointsServeTheOldSignatureUntilTheJobEnds) {
+    const Collection c = collection();
+    const Shape first = put(c.id, "cup", 1);
+    finishAll();
+    const Shape second = put(c.id, "cup", 2);
+    EXPECT_EQ(second.id, first.id);
+    EXPECT_EQ(second.version, 2);
+    EXPECT_EQ(second.pointsVersion, 2);
+    EXPECT_EQ(second.state, ShapeState::kPending);
+    EXPECT_EQ(store_->getSignature(first.id)->pointsVersion, 1);
+    EXPECT_EQ(store_->loadPoints(first.id).value(), cloud(2));
+    const auto rows = store_->loadIndex(c.id, 0, 10).value();
+    ASSERT_EQ(rows.size(), 1u);
+    EXPECT_EQ(rows[0].signature.pointsVersion, 1);
+    EXPECT_EQ(store_->getShapeById(rows[0].shapeId)->pointsVersion, 2);
+    put(c.id, "cup", 3);
+    EXPECT_EQ(store_->queueDepth()->jobs, 1u) << "the job of the second points is replaced";
+    finishAll();
+    EXPECT_EQ(store_->getSignature(first.id)->bytes, signatureFor(first.id, 3, 1).bytes);
+    put(c.id, "cup", 4);
+    ASSERT_TRUE(store_->failJob(claim(), {ErrorCode::kTooFewPoints, "three"}));
+    EXPECT_FAILS(store_->getSignature(first.id), ErrorCode::kNotReady);
+    EXPECT_EQ(store_->getShapeById(first.id)->failure->message, "three");
+    put(c.id, "cup", 5);
+    EXPECT_FALSE(store_->getShapeById(first.id)->failure);
+    EXPECT_EQ(store_->stats()->signatures, 0u);
+    expectSound();
+}
+
+TEST_F(SqliteShapesTest, ModesAndExpectedVersions) {
+    const Collection c = collection();
+    const auto one = cloud(1);
+    const auto two = cloud(2);
+    PutRequest update = request(c.id, "cup", one);
+    update.mode = PutMode::kUpdateOnly;
+    EXPECT_FAILS(store_->putShape(update), ErrorCode::kNotFound);
+    PutRequest expected = request(c.id, "cup", one);
+    expected.expectedVersion = 3;
+    EXPECT_FAILS(store_->putShape(expected), ErrorCode::kVersionConflict);
+    expected.expectedVersion = 0;
+    EXPECT_EQ(store_->putShape(expected)->outcome, PutOutcome::kCreated);
+    EXPECT_FAILS(store_->putShape(expected), ErrorCode::kVersionConflict);
+
+    PutRequest insert = request(c.id, "cup", two);
+    insert.mode = PutMode::kInsertOnly;
+    EXPECT_FAILS(store_->putShape(insert), ErrorCode::kAlreadyExists);
+    insert = request(c.id, "cup", one, {{"a", "1"}});
+    insert.mode = PutMode::kInsertOnly;
+    EXPECT_FAILS(store_->putShape(insert), ErrorCode::kAlreadyExists);
+
+    PutRequest replace = request(c.id, "cup", two);
+    replace.expectedVersion = 2;
+    const auto conflict = store_->putShape(replace);
+    ASSERT_FALSE(conflict);
+    EXPECT_EQ(conflict.error().message, "shape 'cup' has version 1, not the expected version 2");
+    replace.expectedVersion = 1;
+    EXPECT_EQ(store_->putShape(replace)->shape.version, 2);
+
+    EXPECT_FAILS(store_->deleteShape(c.id, "cup", 1), ErrorCode::kVersionConflict);
+    EXPECT_EQ(store_->deleteShape(c.id, "cup", 2)->version, 2);
+    EXPECT_FAILS(store_->deleteShape(c.id, "cup", 2), ErrorCode::kNotFound);
+}
+
+TEST_F(SqliteShapesTest, NotFoundAndBadRequests) {
+    const Collection c = collection();
+    const auto points = cloud(1);
+    EXPECT_FAILS(store_->putShape(request(99, "cup", points)), ErrorCode::kNotFound);
+    PutRequest bad = request(c.id, "cup", points);
+    bad.points = nullptr;
+    EXPECT_FAILS(store_->putShape(bad), ErrorCode::kInvalidArgument);
+    const std::vector<float> four(4);
+    EXPECT_FAILS(store_->putShape(request(c.id, "cup", four)), ErrorCode::kInvalidArgument);
+    bad = request(c.id, "cup", points);
+    bad.checksum[0] ^= 1;
+    EXPECT_FAILS(store_->putShape(bad), ErrorCode::kChecksumMismatch);
+    EXPECT_FAILS(store_->getShape(c.id, "cup"), ErrorCode::kNotFound);
+    EXPECT_FAILS(store_->getShape(99, "cup"), ErrorCode::kNotFound);
+    EXPECT_FAILS(store_->getShapeById(1), ErrorCode::kNotFound);
+    EXPECT_FAILS(store_->loadPoints(1), ErrorCode::kNotFound);
+    EXPECT_FAILS(store_->getSignature(1), ErrorCode::kNotFound);
+    EXPECT_FAILS(store_->loadIndex(99, 0, 1), ErrorCode::kNotFound);
+    const Shape shape = put(c.id, "cup", 1);
+    EXPECT_FAILS(store_->getSignature(shape.id), ErrorCode::kNotReady);
+}
+
+TEST_F(SqliteShapesTest, QueueBoundsHoldAndStoreNothing) {
+    const Collection c = collection();
+    const auto a = cloud(1);
+    const auto b = cloud(2);
+    const auto bounded = [&](const std::string& key, const std::vector<float>& points, std::uint64_t jobs,
+                             std::uint64_t bytes) {
+        PutRequest put = request(c.id, key, points);
+        put.maxQueuedJobs = jobs;
+        put.maxQueuedBytes = bytes;
+        return store_->putShape(put);
+    };
+    EXPECT_FAILS(bounded("a", a, 0, 95), ErrorCode::kQueueFull);
+    EXPECT_TRUE(bounded("a", a, 1, 96));
+    EXPECT_FAILS(bounded("b", b, 1, 0), ErrorCode::kQueueFull);
+    EXPECT_FAILS(bounded("b", b, 0, 191), ErrorCode::kQueueFull);
+    EXPECT_FAILS(store_->getShape(c.id, "b"), ErrorCode::kNotFound);
+    EXPECT_EQ(bounded("a", a, 1, 96)->outcome, PutOutcome::kUnchanged) << "no job, no bound";
+    EXPECT_EQ(bounded("a", b, 1, 96)->outcome, PutOutcome::kReplaced) << "its own job leaves the queue first";
+    const Job job = claim();
+    EXPECT_FAILS(bounded("b", b, 1, 0), ErrorCode::kQueueFull);  // running jobs count
+    ASSERT_TRUE(store_->finishJob(job, signatureFor(job)));
+    EXPECT_TRUE(bounded("b", b, 1, 96));
+    EXPECT_FAILS(bounded("a", a, 1, 0), ErrorCode::kQueueFull);
+    EXPECT_EQ(store_->getShape(c.id, "a")->version, 2) << "a refused replacement changes nothing";
+    EXPECT_EQ(store_->loadPoints(store_->getShape(c.id, "a")->id).value(), b);
+    expectSound();
+}
+
+TEST_F(SqliteShapesTest, PagesAreStableAndFiltered) {
+    const Collection c = collection();
+    const Collection other = collection("other");
+    for (int i = 0; i < 40; ++i) {
+        put(c.id, "k" + std::to_string(i), 100 + i, {{"parity", i % 2 ? "odd" : "even"}, {"x", "y"}});
+        put(other.id, "k" + std::to_string(i), 100 + i);
+    }
+    for (int i = 0; i < 10; ++i) {
+        const Job job = claim();
+        ASSERT_TRUE(store_->finishJob(job, signatureFor(job)));
+    }
+    const auto pages = [&](const ShapeFilter& filter, std::size_t limit) {
+        std::vector<std::string> keys;
+        std::int64_t after = 0;
+        while (true) {
+            const auto page = store_->listShapes(c.id, after, limit, filter).value();
+            EXPECT_LE(page.size(), limit);
+            for (const Shape& shape : page) {
+                EXPECT_GT(shape.id, after);
+                EXPECT_EQ(shape.metadata.size(), 2u);
+                after = shape.id;
+                keys.push_back(shape.key);
+            }
+            if (page.size() < limit) return keys;
+        }
+    };
+    EXPECT_EQ(pages({}, 7).size(), 40u);
+    EXPECT_EQ(pages({ShapeState::kReady, nullptr}, 2).size(), 5u);
+    ShapeFilter odd;
+    odd.accept = [](const Shape& shape) { return shape.metadata.at("parity") == "odd"; };
+    const auto keys = pages(odd, 3);
+    EXPECT_EQ(keys.size(), 20u);
+    for (const auto& key : keys) EXPECT_EQ((key.back() - '0') % 2, 1) << key;
+    EXPECT_EQ(store_->countShapes(c.id, odd).value(), 20u);
+    EXPECT_EQ(store_->countShapes(c.id, {}).value(), 40u);
+    EXPECT_EQ(store_->countShapes(c.id, {ShapeState::kPending, nullptr}).value(), 35u);
+    odd.state = ShapeState::kReady;
+    EXPECT_EQ(store_->countShapes(c.id, odd).value(), 2u);
+    EXPECT_TRUE(store_->listShapes(c.id, 0, 0, {})->empty());
+
+    // A filter that throws is a defect, but not the end of the server.
+    ShapeFilter bad;
+    bad.accept = [](const Shape&) -> bool { throw std::runtime_error("broken filter"); };
+    EXPECT_FAILS(store_->listShapes(c.id, 0, 5, bad), ErrorCode::kInternal);
+    EXPECT_EQ(store_->listShapes(c.id, 0, 5, {})->size(), 5u);
+}
+
+TEST_F(SqliteShapesTest, IndexPages) {
+    const Collection c = collection();
+    for (int i = 0; i < 9; ++i)
+        put(c.id, "k" + std::to_string(i), 100 + i, {{"n", std::to_string(i)}, {"m", ""}});
+    for (int i = 0; i < 7; ++i) {
+        const Job job = claim();
+        ASSERT_TRUE(store_->finishJob(job, signatureFor(job)));
+    }
+    std::int64_t after = 0;
+    std::size_t total = 0;
+    while (true) {
+        const auto rows = store_->loadIndex(c.id, after, 3).value();
+        for (const IndexRow& row : rows) {
+            EXPECT_EQ(row.signature.bytes, signatureFor(row.shapeId, 1, 1).bytes);
+            EXPECT_EQ(row.signature.shapeId, row.shapeId);
+            EXPECT_EQ("k" + row.metadata.at("n"), store_->getShapeById(row.shapeId)->key);
+            EXPECT_EQ(row.metadata.size(), 2u);
+            after = row.shapeId;
+        }
+        total += rows.size();
+        if (rows.size() < 3) break;
+    }
+    EXPECT_EQ(total, 7u);
+}
+
+}  // namespace
+}  // namespace shapedb::store

@@ -1,0 +1,151 @@
+// What the store tests share: a private folder, a database in it, small clouds.
+#pragma once
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "common/sha256.h"
+#include "core/base/random.h"
+#include "server/store/sqlite/sqlite_store.h"
+
+namespace shapedb::store {
+
+inline std::vector<float> cloud(std::uint64_t seed, std::size_t points = 8) {
+    Random random(seed);
+    std::vector<float> xyz(3 * points);
+    for (float& value : xyz) value = static_cast<float>(random.uniform(-1.0, 1.0));
+    return xyz;
+}
+
+inline Checksum checksumOf(const std::vector<float>& points) {
+    return sha256(points.data(), points.size() * sizeof(float));
+}
+
+/// The request keeps a pointer to `points`.
+inline PutRequest request(std::int64_t collectionId, const std::string& key, const std::vector<float>& points,
+                          Metadata metadata = {}) {
+    PutRequest put;
+    put.collectionId = collectionId;
+    put.key = key;
+    put.points = &points;
+    put.checksum = checksumOf(points);
+    put.metadata = std::move(metadata);
+    return put;
+}
+
+/// A signature that names what it was made of, so that a mix-up shows.
+inline SignatureRow signatureFor(std::int64_t shapeId, std::int64_t pointsVersion, std::int64_t generation) {
+    return {shapeId, pointsVersion, generation,
+            "signature of " + std::to_string(shapeId) + "/" + std::to_string(pointsVersion) + "/" +
+                std::to_string(generation)};
+}
+inline SignatureRow signatureFor(const Job& job) {
+    return signatureFor(job.shapeId, job.pointsVersion, job.generation);
+}
+
+inline bool operator==(const Shape& a, const Shape& b) {
+    const auto failureOf = [](const Shape& shape) {
+        return shape.failure ? std::string(errorCodeName(shape.failure->code)) + shape.failure->message : "";
+    };
+    return a.id == b.id && a.collectionId == b.collectionId && a.key == b.key && a.version == b.version &&
+           a.pointsVersion == b.pointsVersion && a.state == b.state && a.pointCount == b.pointCount &&
+           a.checksum == b.checksum && a.metadata == b.metadata && failureOf(a) == failureOf(b);
+}
+
+inline std::string slurp(const std::string& path) {
+    std::ifstream in(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+inline void spill(const std::string& path, const std::string& bytes) {
+    std::ofstream(path, std::ios::binary | std::ios::trunc) << bytes;
+}
+
+class Folder {
+  public:
+    Folder() {
+        std::string pattern = (std::filesystem::temp_directory_path() / "shapedb-store-XXXXXX").string();
+        path_ = mkdtemp(pattern.data());
+    }
+    ~Folder() {
+        std::error_code ignored;
+        std::filesystem::remove_all(path_, ignored);
+    }
+    Folder(const Folder&) = delete;
+    Folder& operator=(const Folder&) = delete;
+    std::string file(const std::string& name) const { return path_ + "/" + name; }
+
+  private:
+    std::string path_;
+};
+
+class StoreTest : public ::testing::Test {
+  protected:
+    void SetUp() override { open(); }
+
+    void open() {
+        store_.reset();
+        auto opened = openSqliteStore(options());
+        ASSERT_TRUE(opened) << opened.error().message;
+        store_ = std::move(*opened);
+    }
+
+    SqliteOptions options() const {
+        SqliteOptions options;
+        options.path = folder_.file("shapes.db");
+        options.readers = 2;
+        options.now = [this] { return ++*clock_; };
+        return options;
+    }
+
+    Collection collection(const std::string& name = "parts") {
+        return store_->createCollection(name, "", "parameters of " + name).value();
+    }
+    Shape put(std::int64_t collectionId, const std::string& key, std::uint64_t seed, Metadata metadata = {}) {
+        const auto points = cloud(seed);
+        auto result = store_->putShape(request(collectionId, key, points, std::move(metadata)));
+        EXPECT_TRUE(result) << result.error().message;
+        return result ? result->shape : Shape{};
+    }
+    Job claim() {
+        auto job = store_->claimJob();
+        EXPECT_TRUE(job && *job);
+        return job && *job ? **job : Job{};
+    }
+    /// Ends all queued jobs well.
+    void finishAll() {
+        while (true) {
+            auto job = store_->claimJob();
+            ASSERT_TRUE(job) << job.error().message;
+            if (!*job) return;
+            auto done = store_->finishJob(**job, signatureFor(**job));
+            ASSERT_TRUE(done) << done.error().message;
+        }
+    }
+    void expectSound() {
+        const auto problems = store_->check({});
+        ASSERT_TRUE(problems) << problems.error().message;
+        for (const auto& problem : *problems) ADD_FAILURE() << problem;
+    }
+
+    Folder folder_;
+    std::unique_ptr<TimestampMs> clock_ = std::make_unique<TimestampMs>(1000);
+    std::unique_ptr<Store> store_;
+};
+
+#define EXPECT_FAILS(expression, expectedCode)                                         \
+    do {                                                                               \
+        const auto failed_ = (expression);                                             \
+        ASSERT_FALSE(failed_) << "no error";                                           \
+        EXPECT_EQ(failed_.error().code, expectedCode)                                  \
+            << errorCodeName(failed_.error().code) << ": " << failed_.error().message; \
+    } while (false)
+
+}  // namespace shapedb::store
