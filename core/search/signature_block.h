@@ -8,12 +8,11 @@
 #include <string>
 #include <vector>
 
+#include "core/base/metadata.h"
 #include "core/search/packed_statistics.h"
 #include "core/signature/signature.h"
 
 namespace shapedb {
-
-using Metadata = std::map<std::string, std::string>;
 
 struct IndexEntry {
     std::int64_t id = 0;  ///< > 0, unique in the set; breaks ties

@@ -1,11 +1,11 @@
-// Every statement the store runs again and again. Each constant's address is its key in a
-// connection's statement cache; a test reads the plan of each one that has to be cheap.
+// The statements of the store. The address of a constant is its key in a connection's statement
+// cache; a test checks the query plans of those that must be cheap.
 #pragma once
 
 namespace shapedb::store::sql {
 
-// Columns 0 to 13 as `readShape` and `forEachShape` (sqlite_rows.h) expect them: one row per
-// metadata entry, so that a listing needs one statement and not one per shape.
+// Columns 0 to 13 as `readShape` and `forEachShape` (rows.h) expect them: one row per metadata entry,
+// so that a listing needs a single statement.
 #define SHAPEDB_SHAPE_COLUMNS                                                             \
     "s.id, s.collection_id, s.key, s.version, s.points_version, s.state, s.point_count, " \
     "s.checksum, s.created_at, s.updated_at, s.failure_code, s.failure_message, m.name, m.value"
@@ -72,7 +72,7 @@ inline constexpr char kDeleteSignatures[] = "DELETE FROM signature WHERE shape_i
 inline constexpr char kDeleteSignature[] = "DELETE FROM signature WHERE shape_id = ?1 AND generation = ?2";
 inline constexpr char kDeleteOtherSignatures[] =
     "DELETE FROM signature WHERE shape_id = ?1 AND generation <> ?2";
-// Of shape nothing but its id, which the index by collection has: a million look-ups less.
+// Of table shape only the id, which the index by collection has: saves a look-up per shape.
 inline constexpr char kLoadIndex[] =
     "SELECT s.id, m.name, m.value, g.points_version, g.generation, g.digest, "
     "g.bytes FROM shape s "

@@ -28,9 +28,9 @@ std::ostream& operator<<(std::ostream& out, const Outcome& outcome) {
 Client::Client(const std::string& address) {
     grpc::ChannelArguments arguments;
     arguments.SetMaxReceiveMessageSize(-1);
-    // Channels of one process share connections otherwise, also with a server that was killed.
+    // Otherwise the channels of a process share connections, even to a server that was killed.
     arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-    // A refused call must be seen, not repeated behind our back.
+    // A refused call must be seen, not silently repeated.
     arguments.SetInt(GRPC_ARG_ENABLE_RETRIES, 0);
     channel = grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
     shapes = pb::ShapeService::NewStub(channel);

@@ -1,4 +1,4 @@
-// A client that only knows the generated stubs, and says what came back in full.
+// A client on the generated stubs that returns everything a call gave back.
 #pragma once
 
 #include <chrono>

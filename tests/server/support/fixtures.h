@@ -1,4 +1,4 @@
-// Small things several server tests need.
+// Fixtures of the server tests.
 #pragma once
 
 #include <chrono>
@@ -19,7 +19,7 @@
 
 namespace shapedb::testing {
 
-/// A valid signature whose volume, and weight, says which one it is; up to 1000.
+/// A valid signature that is recognised by its volume (at most 1000) and weight.
 inline Signature signatureOf(double volume) {
     Signature signature;
     signature.points.resize(1);
@@ -31,7 +31,7 @@ inline Signature signatureOf(double volume) {
     return signature;
 }
 
-/// What searches find of a shape made by `signatureOf`: its volume; 0 when it is not there.
+/// The volume of a signature made by `signatureOf`, as searches see it; 0 when it is not there.
 inline double cachedVolume(const SignatureSet& signatures, std::int64_t id) {
     const SignatureSet::Place place = signatures.find(id);
     if (!place) return 0.0;
@@ -40,11 +40,11 @@ inline double cachedVolume(const SignatureSet& signatures, std::int64_t id) {
     return cached.points.at(0).weight * 1024.0;
 }
 
-/// Points whose first coordinate is `tag`.
-inline std::vector<float> taggedPoints(float tag) { return {tag, 0, 0, 0, 1, 0, 0, 0, 1, 1, 1, 1}; }
+/// Points in space whose first coordinate is `tag` (flat only for -0.5).
+inline std::vector<float> taggedPoints(float tag) { return {tag, 0, 0, 0, 1, 0, 0, 0, 1, 1, 1, 2}; }
 
-/// A describer that needs no geometry: the signature's volume is the first coordinate, its
-/// scale the parameters' maximum of points. Negative coordinates have no interior.
+/// Describes without geometry: the signature's volume is the first coordinate, its scale the
+/// parameters' maxPoints. A negative first coordinate has no interior.
 inline Result<Description> quickDescribe(const PointCloud& points, const ShapeParameters& parameters,
                                          const RunContext& context) {
     context.report("quick", 0, 0);
@@ -57,12 +57,10 @@ inline Result<Description> quickDescribe(const PointCloud& points, const ShapePa
 }
 
 inline store::PutRequest putRequest(std::int64_t collectionId, const std::string& key,
-                                    const std::vector<float>& points, store::Metadata metadata = {}) {
-    store::PutRequest request;
+                                    const std::vector<float>& points, Metadata metadata = {}) {
+    store::PutRequest request(store::VerifiedScan::verify(points).value());
     request.collectionId = collectionId;
     request.key = key;
-    request.points = &points;
-    request.checksum[0] = static_cast<std::uint8_t>(static_cast<int>(points[0]));
     request.metadata = std::move(metadata);
     return request;
 }
@@ -70,7 +68,7 @@ inline store::PutRequest putRequest(std::int64_t collectionId, const std::string
 inline std::string paperParameters(std::uint32_t maxPoints = 7) {
     ShapeParameters parameters = parametersOf(Profile::kPaper);
     parameters.signature.maxPoints = maxPoints;
-    return index::encodeParameters(parameters);
+    return store::encodeParameters(parameters);
 }
 
 inline bool eventually(const std::function<bool()>& condition,
@@ -83,7 +81,7 @@ inline bool eventually(const std::function<bool()>& condition,
     return true;
 }
 
-/// Keeps the lines.
+/// Keeps all lines.
 class RecordingLogger : public telemetry::Logger {
   public:
     void log(telemetry::Level, const std::string& message,

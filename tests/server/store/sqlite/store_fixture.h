@@ -1,4 +1,4 @@
-// What the store tests share: a private folder, a database in it, small clouds.
+// Fixtures of the store tests: a private folder with a database, small clouds.
 #pragma once
 
 #include <cstdlib>
@@ -29,19 +29,16 @@ inline Checksum checksumOf(const std::vector<float>& points) {
     return sha256(points.data(), points.size() * sizeof(float));
 }
 
-/// The request keeps a pointer to `points`.
 inline PutRequest request(std::int64_t collectionId, const std::string& key, const std::vector<float>& points,
                           Metadata metadata = {}) {
-    PutRequest put;
+    PutRequest put(VerifiedScan::verify(points).value());
     put.collectionId = collectionId;
     put.key = key;
-    put.points = &points;
-    put.checksum = checksumOf(points);
     put.metadata = std::move(metadata);
     return put;
 }
 
-/// A signature that names what it was made of, so that a mix-up shows.
+/// Names what it was made of, so that a mix-up shows.
 inline SignatureRow signatureFor(std::int64_t shapeId, std::int64_t pointsVersion, std::int64_t generation) {
     return {shapeId, pointsVersion, generation,
             "signature of " + std::to_string(shapeId) + "/" + std::to_string(pointsVersion) + "/" +
@@ -119,7 +116,7 @@ class StoreTest : public ::testing::Test {
         EXPECT_TRUE(job && *job);
         return job && *job ? **job : Job{};
     }
-    /// Ends all queued jobs well.
+    /// Finishes all queued jobs with a signature.
     void finishAll() {
         while (true) {
             auto job = store_->claimJob();
