@@ -1,13 +1,11 @@
 #include "tests/integration/support/server_process.h"
 
 #include <cstdio>
-#include <filesystem>
 #include <fstream>
 #include <iterator>
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
-#include <stdlib.h>
 #include <unistd.h>
 
 namespace shapedb::testing {
@@ -15,16 +13,6 @@ namespace shapedb::testing {
 std::string readFile(const std::string& path) {
     std::ifstream stream(path, std::ios::binary);
     return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-}
-
-TemporaryDirectory::TemporaryDirectory() {
-    path_ = ::testing::TempDir() + "shapedb-XXXXXX";
-    if (::mkdtemp(path_.data()) == nullptr) ADD_FAILURE() << "no temporary directory at " << path_;
-}
-
-TemporaryDirectory::~TemporaryDirectory() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
 }
 
 Finished runServer(const std::vector<std::string>& arguments,

@@ -8,21 +8,9 @@
 #include <vector>
 
 #include "common/child_process.h"
+#include "tests/support/temporary_directory.h"
 
 namespace shapedb::testing {
-
-/// A directory that is removed with this object.
-class TemporaryDirectory {
-  public:
-    TemporaryDirectory();
-    ~TemporaryDirectory();
-    TemporaryDirectory(const TemporaryDirectory&) = delete;
-    TemporaryDirectory& operator=(const TemporaryDirectory&) = delete;
-    [[nodiscard]] const std::string& path() const { return path_; }
-
-  private:
-    std::string path_;
-};
 
 /// A program that ended by itself.
 struct Finished {

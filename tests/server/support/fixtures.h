@@ -1,12 +1,9 @@
 // Fixtures of the server tests.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
-#include <functional>
 #include <mutex>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -16,6 +13,7 @@
 #include "server/store/parameters_codec.h"
 #include "server/store/store.h"
 #include "server/telemetry/logger.h"
+#include "tests/support/eventually.h"
 
 namespace shapedb::testing {
 
@@ -69,16 +67,6 @@ inline std::string paperParameters(std::uint32_t maxPoints = 7) {
     ShapeParameters parameters = parametersOf(Profile::kPaper);
     parameters.signature.maxPoints = maxPoints;
     return store::encodeParameters(parameters);
-}
-
-inline bool eventually(const std::function<bool()>& condition,
-                       std::chrono::milliseconds atMost = std::chrono::seconds(10)) {
-    const auto until = std::chrono::steady_clock::now() + atMost;
-    while (!condition()) {
-        if (std::chrono::steady_clock::now() >= until) return false;
-        std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    }
-    return true;
 }
 
 /// Keeps all lines.

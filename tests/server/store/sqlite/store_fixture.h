@@ -1,7 +1,6 @@
 // Fixtures of the store tests: a private folder with a database, small clouds.
 #pragma once
 
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -10,11 +9,11 @@
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "common/sha256.h"
 #include "core/base/random.h"
 #include "server/store/sqlite/sqlite_store.h"
+#include "tests/support/temporary_directory.h"
 
 namespace shapedb::store {
 
@@ -65,23 +64,7 @@ inline void spill(const std::string& path, const std::string& bytes) {
     std::ofstream(path, std::ios::binary | std::ios::trunc) << bytes;
 }
 
-class Folder {
-  public:
-    Folder() {
-        std::string pattern = (std::filesystem::temp_directory_path() / "shapedb-store-XXXXXX").string();
-        path_ = mkdtemp(pattern.data());
-    }
-    ~Folder() {
-        std::error_code ignored;
-        std::filesystem::remove_all(path_, ignored);
-    }
-    Folder(const Folder&) = delete;
-    Folder& operator=(const Folder&) = delete;
-    std::string file(const std::string& name) const { return path_ + "/" + name; }
-
-  private:
-    std::string path_;
-};
+using Folder = testing::TemporaryDirectory;
 
 class StoreTest : public ::testing::Test {
   protected:
