@@ -48,19 +48,20 @@ Result<void> ScanVerifier::append(const void* bytes, std::size_t size) {
     return take(first);
 }
 
-/// Checks and hashes the numbers from `first` on.
+/// Checks and hashes the points from number `first` on.
 Result<void> ScanVerifier::take(std::size_t first) {
-    for (std::size_t i = first; i < xyz_.size(); ++i) {
-        const float value = xyz_[i];
-        const std::size_t axis = i % 3;
-        if (!std::isfinite(value)) {
-            return fail(ErrorCode::kNonFiniteCoordinate,
-                        "point " + std::to_string(i / 3) + ": " + "xyz"[axis] +
-                            (std::isnan(value) ? " is NaN" : " is infinite or beyond single precision") +
-                            ": drop such points before sending");
+    for (std::size_t point = first / 3; point < xyz_.size() / 3; ++point) {
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            const float value = xyz_[3 * point + axis];
+            if (!std::isfinite(value)) {
+                return fail(ErrorCode::kNonFiniteCoordinate,
+                            "point " + std::to_string(point) + ": " + "xyz"[axis] +
+                                (std::isnan(value) ? " is NaN" : " is infinite or beyond single precision") +
+                                ": drop such points before sending");
+            }
+            if (value < xyz_[3 * extremes_[axis] + axis]) extremes_[axis] = point;
+            if (value > xyz_[3 * extremes_[3 + axis] + axis]) extremes_[3 + axis] = point;
         }
-        if (value < xyz_[3 * extremes_[axis] + axis]) extremes_[axis] = i / 3;
-        if (value > xyz_[3 * extremes_[3 + axis] + axis]) extremes_[3 + axis] = i / 3;
     }
     hash_.update(xyz_.data() + first, (xyz_.size() - first) * sizeof(float));
     return {};
