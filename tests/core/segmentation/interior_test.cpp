@@ -10,7 +10,7 @@
 #include "core/base/math.h"
 #include "core/base/random.h"
 #include "core/segmentation/local_spacing.h"
-#include "tests/core/segmentation/small_clouds.h"
+#include "tests/core/segmentation/exact_balls.h"
 
 namespace shapedb {
 namespace {
