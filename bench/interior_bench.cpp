@@ -15,6 +15,7 @@
 #include "client/cli/exit_code.h"
 #include "client/cli/retrieval_task.h"
 #include "client/io/scan_reader.h"
+#include "core/base/math.h"
 #include "core/base/random.h"
 #include "core/base/return_if_error.h"
 #include "core/geometry/bounding.h"
@@ -50,7 +51,7 @@ constexpr std::array<Condition, 7> kConditions = {{
 
 Point3 randomDirection(Random& random) {
     const double z = random.uniform(-1.0, 1.0);
-    const double angle = random.uniform(0.0, 6.283185307179586);
+    const double angle = random.uniform(0.0, 2.0 * kPi);
     const double across = std::sqrt(1.0 - z * z);
     return {across * std::cos(angle), across * std::sin(angle), z};
 }

@@ -14,6 +14,7 @@
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/convex_hull_3.h>
 
+#include "core/base/math.h"
 #include "core/base/random.h"
 #include "core/geometry/cull_hull_interior.h"
 #include "core/geometry/motion.h"
@@ -140,7 +141,7 @@ class BoxTrial {
 
 Point3 randomDirection(Random& random) {
     const double z = random.uniform(-1.0, 1.0);
-    const double angle = random.uniform(0.0, 6.283185307179586);
+    const double angle = random.uniform(0.0, 2.0 * kPi);
     const double across = std::sqrt(1.0 - z * z);
     return {across * std::cos(angle), across * std::sin(angle), z};
 }

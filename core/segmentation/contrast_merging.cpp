@@ -8,6 +8,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "core/base/disjoint_sets.h"
 #include "core/base/return_if_error.h"
 
 namespace shapedb {
@@ -28,15 +29,14 @@ class Groups {
     using Passages = std::vector<std::pair<std::uint32_t, double>>;
 
     explicit Groups(const SegmentGraph& graph)
-        : parent_(graph.volumes.size()),
+        : sets_(graph.volumes.size()),
           weight_(graph.volumes),
           logRadius_(graph.volumes.size()),
           radius_(graph.volumes.size()),
           passages_(graph.volumes.size()) {
         for (const double volume : graph.volumes) total_ += volume;
         const double least = std::max(kLeastWeight * total_, std::numeric_limits<double>::min());
-        for (std::uint32_t i = 0; i < parent_.size(); ++i) {
-            parent_[i] = i;
+        for (std::uint32_t i = 0; i < size(); ++i) {
             weight_[i] = std::max(weight_[i], least);
             logRadius_[i] = std::log(graph.radii[i]);
             radius_[i] = graph.radii[i];
@@ -47,9 +47,9 @@ class Groups {
         }
     }
 
-    std::uint32_t size() const { return static_cast<std::uint32_t>(parent_.size()); }
+    std::uint32_t size() const { return static_cast<std::uint32_t>(sets_.size()); }
     double totalVolume() const { return total_; }
-    bool isGroup(std::uint32_t i) const { return parent_[i] == i; }
+    bool isGroup(std::uint32_t i) const { return sets_.isRepresentative(i); }
     double weight(std::uint32_t group) const { return weight_[group]; }
     double logRadius(std::uint32_t group) const { return logRadius_[group]; }
     const std::unordered_map<std::uint32_t, double>& neighbours(std::uint32_t group) const {
@@ -61,10 +61,7 @@ class Groups {
         return most / std::min(least, saddleRadius);
     }
 
-    std::uint32_t groupOf(std::uint32_t i) {
-        while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-        return i;
-    }
+    std::uint32_t groupOf(std::uint32_t i) { return sets_.find(i); }
 
     // Joins two groups that touch. The one with fewer neighbours, or else less weight, goes into the
     // other: returns the one that remains, and the neighbours it got by this, with their passages.
@@ -77,7 +74,7 @@ class Groups {
         logRadius_[a] = (weight_[a] * logRadius_[a] + weight_[b] * logRadius_[b]) / weight;
         radius_[a] = std::exp(logRadius_[a]);
         weight_[a] = weight;
-        parent_[b] = a;
+        sets_.absorb(a, b);
         Passages moved;
         passages_[a].erase(b);
         for (const auto& [next, saddleRadius] : passages_[b]) {
@@ -93,7 +90,7 @@ class Groups {
     }
 
   private:
-    std::vector<std::uint32_t> parent_;
+    DisjointSets sets_;
     std::vector<double> weight_;
     std::vector<double> logRadius_;
     std::vector<double> radius_;

@@ -4,14 +4,13 @@
 #include <cmath>
 #include <utility>
 
+#include "core/base/math.h"
 #include "core/base/prefetch.h"
 #include "core/base/return_if_error.h"
 
 namespace shapedb {
 
 namespace {
-
-constexpr double kRadiansPerDegree = 3.14159265358979323846 / 180.0;
 
 // The three corners of facet i.
 std::array<Point3, 3> facetCorners(const PointCloud& points, const std::array<std::uint32_t, 4>& vertices,
@@ -125,8 +124,8 @@ Result<std::vector<std::uint8_t>> interiorTetrahedra(const PointCloud& points, c
                                                      const std::vector<std::uint8_t>& big,
                                                      const SegmentationOptions& options,
                                                      const RunContext& context) {
-    const DeepAngle deep(options.deepAngleDegrees * kRadiansPerDegree);
-    const double cosHullAngle = std::cos(options.hullAngleDegrees * kRadiansPerDegree);
+    const DeepAngle deep(toRadians(options.deepAngleDegrees));
+    const double cosHullAngle = std::cos(toRadians(options.hullAngleDegrees));
     std::vector<std::uint8_t> inside = big;
     std::vector<std::uint32_t> layer;
     for (std::size_t t = 0; t < tetrahedra.size(); ++t) {

@@ -220,18 +220,14 @@ Result<PreparedPoints> prepare(const PointCloud& points, const SegmentationOptio
 }
 
 // Sites that are neighbours in space become neighbours in memory: every later stage runs along them.
-void sortAlongCurve(PointCloud& sites, std::vector<std::uint32_t>& siteOfPoint) {
-    const std::vector<std::uint32_t> order = hilbertOrder(sites);
-    PointCloud sorted(sites.size());
+HilbertSortedCloud sortSites(PointCloud sites, std::vector<std::uint32_t>& siteOfPoint) {
+    HilbertSortedCloud sorted(sites);
     std::vector<std::uint32_t> rank(sites.size());
-    for (std::uint32_t i = 0; i < order.size(); ++i) {
-        sorted[i] = sites[order[i]];
-        rank[order[i]] = i;
-    }
+    for (std::uint32_t i = 0; i < rank.size(); ++i) rank[sorted.order()[i]] = i;
     for (std::uint32_t& site : siteOfPoint) {
         if (site != kNoSite) site = rank[site];
     }
-    sites = std::move(sorted);
+    return sorted;
 }
 
 // Per tetrahedron 1 when it is interior; notes in the result how that was found.
@@ -290,8 +286,9 @@ Result<Segmentation> segmentOrThrow(const PointCloud& points, const Segmentation
     auto prepared = prepare(points, options, context, clock, result);
     RETURN_IF_ERROR(prepared);
     RETURN_IF_ERROR(clock.begin("delaunay"));
-    sortAlongCurve(prepared->sites, result.siteOfPoint);
-    auto tetrahedra = triangulate(prepared->sites, context, PointOrder::kHilbert);
+    HilbertSortedCloud sorted = sortSites(std::move(prepared->sites), result.siteOfPoint);
+    auto tetrahedra = triangulate(sorted, context);
+    prepared->sites = std::move(sorted).takePoints();
     RETURN_IF_ERROR(tetrahedra);
     result.tetrahedra = std::move(*tetrahedra);
     clock.end();

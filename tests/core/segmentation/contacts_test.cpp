@@ -9,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/base/math.h"
 #include "core/base/random.h"
 #include "core/segmentation/flow.h"
 #include "core/segmentation/segmentation.h"
@@ -95,7 +96,7 @@ TEST(SegmentContacts, OfADumbbellAreTheEndsOfItsRodInScanUnits) {
         EXPECT_EQ(s.contacts[ball].first, ball);
         EXPECT_EQ(s.contacts[ball].second, 2U);
         EXPECT_NEAR(s.contacts[ball].saddleRadius, 40.0 * 0.3, 0.15 * 40.0 * 0.3);
-        const double section = std::acos(-1.0) * 144.0;
+        const double section = kPi * 144.0;
         EXPECT_GT(s.contacts[ball].area, 0.7 * section);
         EXPECT_LT(s.contacts[ball].area, 4.0 * section);
     }
