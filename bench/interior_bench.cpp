@@ -15,6 +15,7 @@
 #include "client/cli/exit_code.h"
 #include "client/cli/retrieval_task.h"
 #include "client/io/scan_reader.h"
+#include "core/base/math.h"
 #include "core/base/random.h"
 #include "core/base/return_if_error.h"
 #include "core/geometry/bounding.h"

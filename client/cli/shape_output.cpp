@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/cli/text.h"
+#include "core/base/math.h"
 #include "core/signature/signature_codec.h"
 
 namespace shapedb::cli {
@@ -366,7 +367,7 @@ std::string statisticsTable(const client::Signature& signature) {
 double rotationDegrees(const Motion& motion) {
     const double trace = motion.rotation[0][0] + motion.rotation[1][1] + motion.rotation[2][2];
     const double cosine = motion.reflected ? (trace + 1.0) / 2.0 : (trace - 1.0) / 2.0;
-    return std::acos(std::clamp(cosine, -1.0, 1.0)) * 180.0 / 3.14159265358979323846;
+    return toDegrees(std::acos(std::clamp(cosine, -1.0, 1.0)));
 }
 
 std::string explanationText(const client::Explanation& explanation, const client::Signature& query,

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include "core/base/math.h"
+
 namespace shapedb {
 
 /// SplitMix64 (Steele, Lea, Flood 2014). Not for secrets. Not thread-safe: one per thread.
@@ -38,7 +40,7 @@ class Random {
             return spare_;
         }
         const double radius = std::sqrt(-2.0 * std::log(1.0 - uniform()));
-        const double angle = 6.283185307179586476925 * uniform();
+        const double angle = 2.0 * kPi * uniform();
         spare_ = radius * std::sin(angle);
         hasSpare_ = true;
         return radius * std::cos(angle);

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "core/base/math.h"
+
 namespace shapedb {
 
 Point3 rotate(const Matrix3& r, const Point3& v) {
@@ -77,7 +79,7 @@ Matrix3 randomRotation(Random& random) {
 Point3 randomDirection(Random& random) {
     // Archimedes: z is uniform over the sphere.
     const double z = random.uniform(-1.0, 1.0);
-    const double angle = random.uniform(0.0, 6.283185307179586);
+    const double angle = random.uniform(0.0, 2.0 * kPi);
     const double across = std::sqrt(1.0 - z * z);
     return {across * std::cos(angle), across * std::sin(angle), z};
 }

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "core/base/return_if_error.h"
-#include "core/preparation/merge_duplicates.h"
+#include "core/geometry/merge_duplicates.h"
 
 namespace shapedb {
 

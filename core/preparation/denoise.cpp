@@ -12,6 +12,7 @@
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
 
+#include "core/base/math.h"
 #include "core/base/parallel.h"
 #include "core/base/return_if_error.h"
 
@@ -19,7 +20,6 @@ namespace shapedb {
 
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr std::size_t kSamples = 500;
 constexpr std::array<std::size_t, 10> kNeighbourhoods = {12, 16, 24, 32, 48, 64, 96, 128, 192, 256};
 

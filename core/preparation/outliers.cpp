@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <new>
-#include <numeric>
 #include <string>
 
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
 
+#include "core/base/disjoint_sets.h"
 #include "core/base/parallel.h"
 #include "core/base/return_if_error.h"
 
@@ -82,31 +82,17 @@ bool liesInHaze(const PointCloud& points, const NeighbourIndex& index, const Poi
     return across > kHazeFlatness * std::sqrt(std::max(0.0, solver.eigenvalues()[1]));
 }
 
-// Groups of points connected by short links between neighbours.
-class Groups {
-  public:
-    explicit Groups(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0u); }
-
-    std::uint32_t find(std::uint32_t i) {
-        while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-        return i;
-    }
-    void join(std::uint32_t a, std::uint32_t b) { parent_[find(a)] = find(b); }
-
-  private:
-    std::vector<std::uint32_t> parent_;
-};
-
+// A group: points connected by short links between neighbours.
 void markSmallGroups(const PointCloud& points, const Surroundings& around,
                      std::vector<std::uint8_t>& outlier) {
-    Groups groups(points.size());
+    DisjointSets groups(points.size());
     for (std::uint32_t i = 0; i < points.size(); ++i) {
         for (std::size_t k = 0; !outlier[i] && k < kNeighbours; ++k) {
             const std::uint32_t j = around.neighbour(i, k);
             if (outlier[j]) continue;
             const double link = std::max(kLinkInReaches * around.common,
                                          kOwnLinkInReaches * 0.5 * (around.reach[i] + around.reach[j]));
-            if (squaredDistance(points[i], points[j]) <= link * link) groups.join(i, j);
+            if (squaredDistance(points[i], points[j]) <= link * link) groups.unite(i, j);
         }
     }
     std::vector<std::uint32_t> size(points.size(), 0);

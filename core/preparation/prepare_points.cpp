@@ -5,9 +5,9 @@
 #include <utility>
 
 #include "core/base/return_if_error.h"
+#include "core/geometry/merge_duplicates.h"
 #include "core/geometry/neighbours.h"
 #include "core/preparation/decimate.h"
-#include "core/preparation/merge_duplicates.h"
 #include "core/preparation/outliers.h"
 #include "core/preparation/sanitise.h"
 #include "core/preparation/scan_grid.h"

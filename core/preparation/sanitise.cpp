@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "core/base/return_if_error.h"
+#include "core/geometry/merge_duplicates.h"
 #include "core/preparation/flatness.h"
-#include "core/preparation/merge_duplicates.h"
 
 namespace shapedb {
 

@@ -11,10 +11,10 @@
 #include "core/base/prefetch.h"
 #include "core/base/radix_sort.h"
 #include "core/base/return_if_error.h"
+#include "core/geometry/merge_duplicates.h"
 #include "core/geometry/morton.h"
 #include "core/preparation/decimate.h"
 #include "core/preparation/flatness.h"
-#include "core/preparation/merge_duplicates.h"
 
 namespace shapedb {
 

@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/base/math.h"
 #include "core/base/parallel.h"
 #include "core/base/return_if_error.h"
 #include "core/geometry/tetrahedron.h"
@@ -15,8 +16,6 @@
 namespace shapedb {
 
 namespace {
-
-constexpr double kRadiansPerDegree = 3.14159265358979323846 / 180.0;
 
 // Degrees; the preferred one first, then by distance from it.
 constexpr std::array<double, 8> kAngles = {22.0, 20.0, 24.0, 18.0, 26.0, 15.0, 30.0, 34.0};
@@ -174,7 +173,7 @@ std::vector<std::uint8_t> leftByWalk(const std::vector<std::uint8_t>& big,
                                      const std::vector<double>& bottlenecks, double angleDegrees) {
     std::vector<std::uint8_t> inside(big.size());
     for (std::size_t t = 0; t < big.size(); ++t) {
-        inside[t] = big[t] != 0 && bottlenecks[t] >= angleDegrees * kRadiansPerDegree ? 1 : 0;
+        inside[t] = big[t] != 0 && bottlenecks[t] >= toRadians(angleDegrees) ? 1 : 0;
     }
     return inside;
 }

@@ -8,6 +8,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "core/base/disjoint_sets.h"
 #include "core/base/return_if_error.h"
 #include "core/geometry/tetrahedron.h"
 
@@ -29,15 +30,14 @@ class Groups {
     using Saddles = std::vector<std::pair<std::uint32_t, double>>;
 
     explicit Groups(const SegmentGraph& graph)
-        : parent_(graph.volumes.size()),
+        : sets_(graph.volumes.size()),
           weight_(graph.volumes),
           logRadius_(graph.volumes.size()),
           radius_(graph.volumes.size()),
           saddles_(graph.volumes.size()) {
         for (const double volume : graph.volumes) total_ += volume;
         const double least = std::max(kLeastWeight * total_, std::numeric_limits<double>::min());
-        for (std::uint32_t i = 0; i < parent_.size(); ++i) {
-            parent_[i] = i;
+        for (std::uint32_t i = 0; i < size(); ++i) {
             weight_[i] = std::max(weight_[i], least);
             logRadius_[i] = std::log(graph.radii[i]);
             radius_[i] = graph.radii[i];
@@ -48,9 +48,9 @@ class Groups {
         }
     }
 
-    std::uint32_t size() const { return static_cast<std::uint32_t>(parent_.size()); }
+    std::uint32_t size() const { return static_cast<std::uint32_t>(sets_.size()); }
     double totalVolume() const { return total_; }
-    bool isGroup(std::uint32_t i) const { return parent_[i] == i; }
+    bool isGroup(std::uint32_t i) const { return sets_.isRepresentative(i); }
     double weight(std::uint32_t group) const { return weight_[group]; }
     double logRadius(std::uint32_t group) const { return logRadius_[group]; }
     const std::unordered_map<std::uint32_t, double>& neighbours(std::uint32_t group) const {
@@ -62,10 +62,7 @@ class Groups {
         return most / std::min(least, saddleRadius);
     }
 
-    std::uint32_t groupOf(std::uint32_t i) {
-        while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-        return i;
-    }
+    std::uint32_t groupOf(std::uint32_t i) { return sets_.find(i); }
 
     // Joins two groups that touch. The one with fewer neighbours (or else less weight) goes into the other.
     // Returns the remaining group, and its new neighbours with their saddle radii.
@@ -78,7 +75,7 @@ class Groups {
         logRadius_[a] = (weight_[a] * logRadius_[a] + weight_[b] * logRadius_[b]) / weight;
         radius_[a] = std::exp(logRadius_[a]);
         weight_[a] = weight;
-        parent_[b] = a;
+        sets_.absorb(a, b);
         Saddles moved;
         saddles_[a].erase(b);
         for (const auto& [next, saddleRadius] : saddles_[b]) {
@@ -94,7 +91,7 @@ class Groups {
     }
 
   private:
-    std::vector<std::uint32_t> parent_;
+    DisjointSets sets_;
     std::vector<double> weight_;
     std::vector<double> logRadius_;
     std::vector<double> radius_;

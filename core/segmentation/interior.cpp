@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/base/math.h"
 #include "core/base/prefetch.h"
 #include "core/base/return_if_error.h"
 #include "core/geometry/tetrahedron.h"
@@ -11,8 +12,6 @@
 namespace shapedb {
 
 namespace {
-
-constexpr double kRadiansPerDegree = 3.14159265358979323846 / 180.0;
 
 // Whether the ball behind a hull facet is nearly the half space beyond it: its centre lies outside the hull,
 // and the circle in which its sphere cuts the facet's plane is small compared to it.
@@ -115,8 +114,8 @@ Result<std::vector<std::uint8_t>> interiorTetrahedra(const PointCloud& points, c
                                                      const std::vector<std::uint8_t>& big,
                                                      const SegmentationOptions& options,
                                                      const RunContext& context) {
-    const DeepAngle deep(options.deepAngleDegrees * kRadiansPerDegree);
-    const double cosHullAngle = std::cos(options.hullAngleDegrees * kRadiansPerDegree);
+    const DeepAngle deep(toRadians(options.deepAngleDegrees));
+    const double cosHullAngle = std::cos(toRadians(options.hullAngleDegrees));
     std::vector<std::uint8_t> inside = big;
     std::vector<std::uint32_t> layer;
     for (std::size_t t = 0; t < tetrahedra.size(); ++t) {

@@ -4,9 +4,9 @@
 #include <array>
 #include <cstring>
 #include <limits>
-#include <numeric>
 #include <utility>
 
+#include "core/base/disjoint_sets.h"
 #include "core/base/prefetch.h"
 #include "core/base/radix_sort.h"
 #include "core/base/return_if_error.h"
@@ -199,27 +199,6 @@ void labelIslands(const Tetrahedra& tetrahedra, std::vector<std::uint32_t> lefto
     }
 }
 
-// Union by smaller index: the representative is the segment with the largest maximum.
-class DisjointSets {
-  public:
-    explicit DisjointSets(std::size_t count) : parent_(count) {
-        std::iota(parent_.begin(), parent_.end(), 0);
-    }
-    std::int32_t find(std::int32_t i) {
-        while (at(i) != i) i = at(i) = at(at(i));
-        return i;
-    }
-    void unite(std::int32_t a, std::int32_t b) {
-        a = find(a);
-        b = find(b);
-        at(std::max(a, b)) = std::min(a, b);
-    }
-
-  private:
-    std::int32_t& at(std::int32_t i) { return parent_[static_cast<std::size_t>(i)]; }
-    std::vector<std::int32_t> parent_;
-};
-
 }  // namespace
 
 Result<SegmentLabels> stableManifolds(const Tetrahedra& tetrahedra, const std::vector<std::uint8_t>& interior,
@@ -254,6 +233,7 @@ Result<SegmentLabels> stableManifolds(const Tetrahedra& tetrahedra, const std::v
 
 SegmentLabels mergeSegments(const PointCloud& points, const Tetrahedra& tetrahedra, SegmentLabels labels,
                             double mergeRatio) {
+    // Segments come by falling radius, so a merged set is represented by the one with the largest maximum.
     DisjointSets sets(labels.maxima.size());
     std::vector<double> maximumRadii(labels.maxima.size());
     for (std::size_t s = 0; s < maximumRadii.size(); ++s)
@@ -272,21 +252,21 @@ SegmentLabels mergeSegments(const PointCloud& points, const Tetrahedra& tetrahed
             if (static_cast<unsigned>(other < 0) | static_cast<unsigned>(other == mine)) continue;
             const double higher = std::max(maximumRadii[static_cast<std::size_t>(mine)],
                                            maximumRadii[static_cast<std::size_t>(other)]);
-            if (higher > most || sets.find(other) == sets.find(mine)) continue;
+            const auto a = static_cast<std::uint32_t>(mine);
+            const auto b = static_cast<std::uint32_t>(other);
+            if (higher > most || sets.find(a) == sets.find(b)) continue;
             const double circle = circumradiusOf(facetCorners(points, tetrahedra.vertices[t], facet));
-            if (higher <= mergeRatio * circle) sets.unite(mine, other);
+            if (higher <= mergeRatio * circle) sets.unite(a, b);
         }
     }
     std::vector<std::uint32_t> maxima;
     std::vector<std::int32_t> dense(labels.maxima.size(), -1);
-    for (std::size_t s = 0; s < labels.maxima.size(); ++s) {
-        if (sets.find(static_cast<std::int32_t>(s)) != static_cast<std::int32_t>(s)) continue;
+    for (std::uint32_t s = 0; s < labels.maxima.size(); ++s) {
+        if (!sets.isRepresentative(s)) continue;
         dense[s] = static_cast<std::int32_t>(maxima.size());
         maxima.push_back(labels.maxima[s]);
     }
-    for (std::size_t s = 0; s < dense.size(); ++s) {
-        dense[s] = dense[static_cast<std::size_t>(sets.find(static_cast<std::int32_t>(s)))];
-    }
+    for (std::uint32_t s = 0; s < dense.size(); ++s) dense[s] = dense[sets.find(s)];
     for (std::int32_t& segment : labels.ofTetrahedron) {
         if (segment >= 0) segment = dense[static_cast<std::size_t>(segment)];
     }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/math.h"
 #include "core/base/random.h"
 #include "core/base/return_if_error.h"
 #include "core/geometry/motion.h"
@@ -13,7 +14,7 @@ namespace shapedb {
 
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
+// Rounds differently from toRadians: a change would alter the shapes that known seeds give.
 constexpr double degrees(double d) { return d * kPi / 180.0; }
 
 // The point at distance `length` from `from`; `azimuth` turns from x towards y, `elevation` is above the

@@ -2,13 +2,12 @@
 
 #include <cmath>
 
+#include "core/base/math.h"
 #include "core/synthetic/parts.h"
 
 namespace shapedb {
 
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 double ballVolume(double radius) { return 4.0 / 3.0 * kPi * radius * radius * radius; }
 

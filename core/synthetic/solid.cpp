@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "core/base/math.h"
 #include "core/base/random.h"
 #include "core/base/return_if_error.h"
 
@@ -13,7 +14,6 @@ namespace shapedb {
 
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 // How far off the boundary samples are probed, as a share of the diagonal: far above rounding, far below any
 // distance between samples.
 constexpr double kProbeShare = 1e-9;

@@ -5,13 +5,14 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "core/base/math.h"
 #include "core/base/random.h"
 
 namespace shapedb::cli {
 namespace {
 
 Matrix3 aboutZ(double degrees) {
-    const double angle = degrees * 3.14159265358979323846 / 180.0;
+    const double angle = toRadians(degrees);
     return {
         {{std::cos(angle), -std::sin(angle), 0.0}, {std::sin(angle), std::cos(angle), 0.0}, {0.0, 0.0, 1.0}}};
 }

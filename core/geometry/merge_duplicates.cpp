@@ -1,4 +1,4 @@
-#include "core/preparation/merge_duplicates.h"
+#include "core/geometry/merge_duplicates.h"
 
 #include <algorithm>
 #include <cmath>
