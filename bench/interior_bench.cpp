@@ -19,6 +19,7 @@
 #include "core/base/random.h"
 #include "core/base/return_if_error.h"
 #include "core/geometry/bounding.h"
+#include "core/geometry/motion.h"
 #include "core/pipeline.h"
 #include "core/segmentation/segmentation.h"
 #include "core/synthetic/noise.h"
@@ -48,13 +49,6 @@ constexpr std::array<Condition, 7> kConditions = {{
     {"1 % outliers", Damage::kOutliers, 0.0},
     {"cap missing", Damage::kCap, 0.0},
 }};
-
-Point3 randomDirection(Random& random) {
-    const double z = random.uniform(-1.0, 1.0);
-    const double angle = random.uniform(0.0, 2.0 * kPi);
-    const double across = std::sqrt(1.0 - z * z);
-    return {across * std::cos(angle), across * std::sin(angle), z};
-}
 
 // Points uniform in the box of the cloud, as many as kOutlierShare of it.
 void addOutliers(PointCloud& points) {

@@ -25,10 +25,6 @@ struct ScanContent {
     std::string format;
 };
 
-inline bool isFinite(const Point3& p) {
-    return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
-}
-
 /// Collects vertices under the rules that hold for all of them.
 class VertexSink {
   public:

@@ -14,9 +14,9 @@
 #include "core/delaunay/bowyer_watson.h"
 #include "core/delaunay/flat_delaunay.h"
 #include "core/delaunay/hilbert_order.h"
+#include "core/geometry/merge_duplicates.h"
 #include "core/geometry/tetrahedron.h"
 #include "core/geometry/vec3x2.h"
-#include "core/preparation/sanitise.h"
 
 namespace shapedb {
 

@@ -20,8 +20,8 @@ constexpr std::size_t kNeighbours = 8;
 constexpr std::size_t kSurroundings = 12;  // enough to tell a surface from a haze
 constexpr double kCommonShare = 0.9;
 constexpr double kHazeReach = 2.5;
-// Spread across the plane over spread along it: a surface's is below this, unless it is as curved
-// as its sampling is coarse.
+// Spread across the local plane over spread along it: below this on a surface, unless its radius of
+// curvature is as small as its spacing.
 constexpr double kHazeFlatness = 0.25;
 constexpr double kLinkInReaches = 3.0;     // of the common reach
 constexpr double kOwnLinkInReaches = 1.5;  // of the mean reach of the two ends
@@ -31,7 +31,7 @@ constexpr double kSmallGroupShare = 0.01;
 struct Surroundings {
     std::vector<std::uint32_t> near;  // kNeighbours per point, nearest first
     std::vector<double> reach;
-    double common = 0.0;  // the reach that kCommonShare of the points do not exceed
+    double common = 0.0;  // the reach that kCommonShare of the points stay within
 
     std::uint32_t neighbour(std::size_t point, std::size_t rank) const {
         return near[point * kNeighbours + rank];
@@ -82,7 +82,7 @@ bool liesInHaze(const PointCloud& points, const NeighbourIndex& index, const Poi
     return across > kHazeFlatness * std::sqrt(std::max(0.0, solver.eigenvalues()[1]));
 }
 
-// A group: points that short links between neighbours hold together.
+// A group: points connected by short links between neighbours.
 void markSmallGroups(const PointCloud& points, const Surroundings& around,
                      std::vector<std::uint8_t>& outlier) {
     DisjointSets groups(points.size());

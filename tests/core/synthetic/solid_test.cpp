@@ -65,7 +65,7 @@ TEST(Solid, SamplesLieOnTheBoundary) {
 TEST(Solid, BoundsAreTightAndHoldTheSamples) {
     for (const Solid& still : onePrimitiveEach()) {
         const Solid solid = movedSolid(someMotion(still.parts[0].shape.index()), still);
-        const SolidBounds bounds = boundsOf(solid);
+        const Box bounds = boundsOf(solid);
         Point3 low = bounds.high;
         Point3 high = bounds.low;
         for (const Point3& p : sample(solid)) {
