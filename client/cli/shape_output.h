@@ -6,7 +6,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "client/api/types.h"
-#include "core/matching/score.h"
+#include "core/matching/explanation.h"
 #include "core/segmentation/segmentation.h"
 #include "core/signature/signature.h"
 
