@@ -8,19 +8,9 @@
 #include "core/base/run_context.h"
 #include "core/delaunay/delaunay.h"
 #include "core/geometry/point.h"
+#include "core/segmentation/interior_kinds.h"
 
 namespace shapedb {
-
-/// Where an interior comes from.
-enum class InteriorSource : int {
-    kWalk = 0,       ///< what a walk from outside leaves, at the angle reported
-    kPotential = 1,  ///< what the potential puts inside: a walk would leak in, or be shut out of a cavity
-    kThickened =
-        2,  ///< no side can be told: all tetrahedra with small balls, the neighbourhood of the points
-};
-
-/// "walk", "potential" or "thickened".
-[[nodiscard]] const char* interiorSourceName(InteriorSource source) noexcept;
 
 struct AdaptiveInterior {
     std::vector<std::uint8_t> inside;  ///< per tetrahedron 1 when it is interior
