@@ -1,5 +1,5 @@
-// The work behind `shapedb evaluate`: from files to signatures and from signatures to scores, both in
-// parallel and with the same result for any number of threads.
+// The work behind `shapedb evaluate`: files to signatures to scores, in parallel, with the same result for
+// any number of threads.
 #pragma once
 
 #include <cstddef>
@@ -13,35 +13,34 @@
 #include "core/base/error.h"
 #include "core/base/run_context.h"
 #include "core/evaluation/metrics.h"
-#include "core/matching/score_options.h"
+#include "core/matching/score.h"
 #include "core/pipeline.h"
 
 namespace shapedb::cli {
 
 struct EvaluatedShape : CollectionScan {
-    /// Set exactly when `failure` is not. A shape without a signature scores 0 against everything.
+    /// Set unless `failure` is. A shape without a signature scores 0 against everything.
     std::optional<Signature> signature;
     std::optional<Error> failure;
-    double seconds = 0.0;  ///< for reading, noise and segmentation
+    double seconds = 0.0;  ///< for reading, noise and segmentation together
 };
 
 /// One per processor that this program may use.
 [[nodiscard]] unsigned defaultThreads();
 
-/// Runs body(i) for all i below `count` on `threads` threads, at least 1, one item at a time: their costs
-/// differ widely. An error that the body returns ends the run and is its result (with several threads,
-/// one of them).
+/// Runs body(i) for all i below `count` on `threads` threads, at least 1. Items are handed out one at a time,
+/// because their costs differ widely. An error from the body ends the run and is its result (if there are
+/// several, one of them).
 ///
-/// Errors: those of the body; kCancelled, kDeadlineExceeded; kOutOfMemory.
+/// Errors: that of the body; kCancelled, kDeadlineExceeded; kOutOfMemory.
 [[nodiscard]] Result<void> forEachItem(std::size_t count, unsigned threads, const RunContext& context,
                                        const std::function<std::optional<Error>(std::size_t)>& body);
 
-/// The scans, with nothing computed yet.
+/// Shapes with nothing computed yet.
 [[nodiscard]] std::vector<EvaluatedShape> shapesOf(const std::vector<CollectionScan>& scans);
 
-/// Fills in `signature` or `failure` of each shape, on `threads` threads, at least 1. The seed of noise
-/// and subset is fileSeed(flags.seed, name). A file that cannot be read or segmented is a `failure`, not
-/// an error.
+/// Sets `signature` or `failure` of each shape, on `threads` threads, at least 1. Noise and subset are seeded
+/// with fileSeed(flags.seed, name). A file that cannot be read or segmented is a `failure`, not an error.
 ///
 /// Errors: kCancelled, kDeadlineExceeded; kInvalidArgument (flags).
 [[nodiscard]] Result<void> describeShapes(std::vector<EvaluatedShape>& shapes, const ScanFlags& flags,
@@ -49,9 +48,9 @@ struct EvaluatedShape : CollectionScan {
                                           const std::function<void(std::size_t done)>& progress,
                                           const RunContext& context);
 
-/// Row-major scores of `rows` (the queries) against `columns`. When both are the same vector, each pair is
-/// scored once, because scores are symmetric bit for bit unless partial. Shapes without a signature
-/// score 0.
+/// Row-major scores of `rows` x `columns`; a partial score says how much of the row the column contains. If
+/// both are the same vector each pair is scored once, as scores are symmetric bit for bit unless partial.
+/// Shapes without a signature score 0.
 ///
 /// Errors: kCancelled, kDeadlineExceeded.
 [[nodiscard]] Result<ScoreMatrix> scorePairs(const std::vector<EvaluatedShape>& rows,

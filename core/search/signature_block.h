@@ -4,16 +4,14 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <map>
 #include <string>
 #include <vector>
 
+#include "core/base/metadata.h"
 #include "core/matching/shape_row.h"
 #include "core/signature/signature.h"
 
 namespace shapedb {
-
-using Metadata = std::map<std::string, std::string>;
 
 struct IndexEntry {
     std::int64_t id = 0;  ///< > 0, unique in the set; breaks ties
