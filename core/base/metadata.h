@@ -1,4 +1,4 @@
-// The labels a client gives to a shape.
+// What clients say about a shape: text under unique text keys, such as its label.
 #pragma once
 
 #include <map>
@@ -6,7 +6,8 @@
 
 namespace shapedb {
 
-/// Unique keys, sorted. Whoever accepts metadata from outside checks its limits.
+/// Sorted by key. The limits (64 entries; keys 1 to 128 bytes of [A-Za-z0-9_.-]; values up to 1,024 bytes of
+/// UTF-8) are checked where requests arrive.
 using Metadata = std::map<std::string, std::string>;
 
 }  // namespace shapedb
