@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/preparation/sanitise.h"
 #include "core/synthetic/named_shapes.h"
 #include "core/synthetic/noise.h"
 
