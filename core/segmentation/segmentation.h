@@ -76,7 +76,7 @@ struct Segmentation {
 /// Segments the interior of the shape the points were sampled from.
 ///
 /// Deterministic: the same points in any order give the same segments, bit for bit.
-/// Thread-safe (no shared state). Memory: about 600 bytes a distinct point at the peak.
+/// Thread-safe (no shared state). Memory: about 600 bytes per distinct point at the peak.
 ///
 /// Errors: those of `preparePoints` and `triangulate`; kInvalidArgument (options); kNoInterior
 /// when the walk from outside reaches every big ball (an open surface or too much noise; with

@@ -33,10 +33,10 @@ std::size_t countOf(const std::vector<std::uint32_t>& groups) {
 }
 
 // Segments in a row; the saddle radius of two neighbours is given between their radii.
-SegmentGraph row(const std::vector<double>& radii, const std::vector<double>& passages) {
+SegmentGraph row(const std::vector<double>& radii, const std::vector<double>& saddles) {
     SegmentGraph graph{std::vector<double>(radii.size(), 1.0), radii, {}};
-    for (std::uint32_t i = 0; i < passages.size(); ++i)
-        graph.contacts.push_back({i, i + 1, passages[i], 1.0});
+    for (std::uint32_t i = 0; i < saddles.size(); ++i)
+        graph.contacts.push_back({i, i + 1, saddles[i], 1.0});
     return graph;
 }
 
@@ -61,7 +61,7 @@ SegmentGraph randomGraph(Random& random, std::uint32_t count) {
 struct Left {
     std::vector<double> volumes;
     std::vector<double> radii;
-    std::map<std::pair<std::uint32_t, std::uint32_t>, double> passages;
+    std::map<std::pair<std::uint32_t, std::uint32_t>, double> saddles;
 
     Left(const SegmentGraph& graph, const std::vector<std::uint32_t>& groups)
         : volumes(countOf(groups)), radii(volumes.size()) {
@@ -73,13 +73,13 @@ struct Left {
         for (const SegmentContact& c : graph.contacts) {
             const auto [low, high] = std::minmax(groups[c.first], groups[c.second]);
             if (low == high) continue;
-            double& widest = passages[{low, high}];
+            double& widest = saddles[{low, high}];
             widest = std::max(widest, c.saddleRadius);
         }
     }
     std::set<std::uint32_t> touching() const {
         std::set<std::uint32_t> all;
-        for (const auto& [pair, saddleRadius] : passages) all.insert({pair.first, pair.second});
+        for (const auto& [pair, saddleRadius] : saddles) all.insert({pair.first, pair.second});
         return all;
     }
 };
@@ -102,7 +102,7 @@ TEST(MergeByContrast, GroupsAreConnectedAndEveryPairLeftIsAboveTheContrast) {
         const SegmentGraph graph = randomGraph(random, 120);
         const auto groups = merge(graph, kOnlyAlike);
         const Left left(graph, groups);
-        for (const auto& [pair, saddleRadius] : left.passages) {
+        for (const auto& [pair, saddleRadius] : left.saddles) {
             const double ra = left.radii[pair.first];
             const double rb = left.radii[pair.second];
             EXPECT_GT(std::max(ra, rb) / std::min({ra, rb, saddleRadius}), 1.3 * (1.0 - 2.1e-3));
