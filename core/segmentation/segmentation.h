@@ -1,7 +1,7 @@
 // From a noisy point cloud to the segments of the shape's interior: Sections 2 and 3 of
 // Dey and Goswami, "Shape Segmentation and Matching from Noisy Point Clouds" (2004).
 // Runs the stages in order, each of which has a header: core/preparation/prepare_points.h,
-// core/delaunay/delaunay.h, local_spacing.h, interior.h or adaptive_interior.h, flow.h,
+// core/delaunay/delaunay.h, core/geometry/neighbours.h, interior.h or adaptive_interior.h, flow.h,
 // segments.h, contrast_merging.h.
 #pragma once
 

@@ -6,8 +6,8 @@
 #include <gtest/gtest.h>
 
 #include "core/base/math.h"
+#include "core/geometry/neighbours.h"
 #include "core/segmentation/interior.h"
-#include "core/segmentation/local_spacing.h"
 #include "tests/core/segmentation/small_clouds.h"
 
 namespace shapedb {

@@ -9,7 +9,7 @@
 
 #include "core/base/math.h"
 #include "core/base/random.h"
-#include "core/segmentation/local_spacing.h"
+#include "core/geometry/neighbours.h"
 #include "tests/core/segmentation/small_clouds.h"
 
 namespace shapedb {

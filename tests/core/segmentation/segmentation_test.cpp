@@ -11,8 +11,8 @@
 
 #include "core/base/random.h"
 #include "core/geometry/bounding.h"
+#include "core/geometry/neighbours.h"
 #include "core/segmentation/interior.h"
-#include "core/segmentation/local_spacing.h"
 #include "core/synthetic/named_shapes.h"
 #include "core/synthetic/noise.h"
 

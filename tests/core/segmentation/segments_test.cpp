@@ -12,9 +12,9 @@
 #include <gtest/gtest.h>
 
 #include "core/base/random.h"
+#include "core/geometry/neighbours.h"
 #include "core/segmentation/flow.h"
 #include "core/segmentation/interior.h"
-#include "core/segmentation/local_spacing.h"
 #include "tests/core/segmentation/small_clouds.h"
 
 namespace shapedb {
