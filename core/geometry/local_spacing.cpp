@@ -1,4 +1,4 @@
-#include "core/segmentation/local_spacing.h"
+#include "core/geometry/neighbours.h"
 
 #include <algorithm>
 #include <array>
