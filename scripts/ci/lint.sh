@@ -33,5 +33,7 @@ long=$(sources | xargs -r wc -l | awk '$2 != "total" && $1 > 500 { print $2 " ("
 unfinished=$(git grep -nE 'TODO|FIXME|\bXXX\b|DISABLED_' -- '*.cpp' '*.h')
 [ -z "$unfinished" ] || complain "unfinished:"$'\n'"$unfinished"
 
+python3 scripts/constants.py || complain "docs/constants.md does not list the constants of core/ as they are"
+
 [ "$failed" -eq 0 ] && echo "lint: clean"
 exit "$failed"
