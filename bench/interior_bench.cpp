@@ -15,9 +15,11 @@
 #include "client/cli/exit_code.h"
 #include "client/cli/retrieval_task.h"
 #include "client/io/scan_reader.h"
+#include "core/base/math.h"
 #include "core/base/random.h"
 #include "core/base/return_if_error.h"
 #include "core/geometry/bounding.h"
+#include "core/geometry/motion.h"
 #include "core/pipeline.h"
 #include "core/segmentation/segmentation.h"
 #include "core/synthetic/noise.h"
@@ -47,13 +49,6 @@ constexpr std::array<Condition, 7> kConditions = {{
     {"1 % outliers", Damage::kOutliers, 0.0},
     {"cap missing", Damage::kCap, 0.0},
 }};
-
-Point3 randomDirection(Random& random) {
-    const double z = random.uniform(-1.0, 1.0);
-    const double angle = random.uniform(0.0, 6.283185307179586);
-    const double across = std::sqrt(1.0 - z * z);
-    return {across * std::cos(angle), across * std::sin(angle), z};
-}
 
 // Points uniform in the box of the cloud, as many as kOutlierShare of it.
 void addOutliers(PointCloud& points) {

@@ -12,10 +12,15 @@
 #include "core/base/large_block.h"
 #include "core/base/parallel.h"
 #include "core/base/return_if_error.h"
+#include "core/geometry/box.h"
 
 namespace shapedb {
 
 namespace {
+
+// Points that follow one another on the curve form leaves, eight leaves a group, and boxes around leaves a
+// tree. Each group searches the tree once, with a box around all its points and their farthest neighbour so
+// far, and its leaves then share the leaves found. This beats a k-d tree, which must descend once per point.
 
 constexpr std::size_t kNeighbours = 3;
 constexpr std::size_t kPairs = 4;  // of points in a leaf
@@ -23,7 +28,7 @@ constexpr std::size_t kLanes = 2 * kPairs;
 constexpr std::size_t kFan = 8;  // children of a node
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// Points that follow one another; infinitely far away where there are no more.
+// Consecutive points; infinitely far away where there are no more.
 struct Leaf {
     std::array<double, kLanes> x;
     std::array<double, kLanes> y;
@@ -33,17 +38,6 @@ struct Leaf {
 Double2 pairAt(const std::array<double, kLanes>& lanes, std::size_t i) {
     return {lanes[2 * i], lanes[2 * i + 1]};
 }
-
-struct Box {
-    Point3 low{kInfinity, kInfinity, kInfinity};
-    Point3 high{-kInfinity, -kInfinity, -kInfinity};
-
-    void add(const Box& other) {
-        low = {std::min(low.x, other.low.x), std::min(low.y, other.low.y), std::min(low.z, other.low.z)};
-        high = {std::max(high.x, other.high.x), std::max(high.y, other.high.y),
-                std::max(high.z, other.high.z)};
-    }
-};
 
 // The boxes of two nodes.
 struct BoxPair {
@@ -55,8 +49,8 @@ BoxPair together(const Box& a, const Box& b) {
             {a.high.x, b.high.x}, {a.high.y, b.high.y}, {a.high.z, b.high.z}};
 }
 
-// No more than the squared distance of any point in a box of the pair to any in the other: rounding keeps
-// the order of what it rounds.
+// Squared distances from both boxes of the pair to `box`, also with rounding no more than that of any two
+// of their points.
 Double2 squaredGaps(const BoxPair& boxes, const Box& box) {
     const Double2 x = greater(greater(boxes.lowX - box.high.x, Double2(box.low.x) - boxes.highX), 0.0);
     const Double2 y = greater(greater(boxes.lowY - box.high.y, Double2(box.low.y) - boxes.highY), 0.0);
@@ -64,7 +58,7 @@ Double2 squaredGaps(const BoxPair& boxes, const Box& box) {
     return x * x + y * y + z * z;
 }
 
-// Points along a curve, cut into leaves, and the boxes of leaves, of kFan leaves and so on up to one.
+// Boxes of leaves, boxes of kFan of those, and so on up to one.
 class BoxTree {
   public:
     explicit BoxTree(const PointCloud& points) : leaves_((points.size() + kLanes - 1) / kLanes) {
@@ -76,7 +70,7 @@ class BoxTree {
             leaf.x[at % kLanes] = p.x;
             leaf.y[at % kLanes] = p.y;
             leaf.z[at % kLanes] = p.z;
-            if (!none) boxes[at / kLanes].add({p, p});
+            if (!none) boxes[at / kLanes].add(p);
         }
         levels_.push_back(std::move(boxes));
         while (levels_.back().size() > 1) {
@@ -85,7 +79,7 @@ class BoxTree {
             for (std::size_t b = 0; b < below.size(); ++b) above[b / kFan].add(below[b]);
             levels_.push_back(std::move(above));
         }
-        // An empty box, which is far from all, where the last pair has but one.
+        // An empty box, infinitely far away, completes the last pair.
         for (std::vector<Box>& level : levels_) level.resize((level.size() + 1) / 2 * 2);
         for (const std::vector<Box>& level : levels_) {
             std::vector<BoxPair> pairs;
@@ -98,14 +92,14 @@ class BoxTree {
     const LargeVector<Leaf>& leaves() const { return leaves_; }
     const Box& boxOfLeaf(std::size_t leaf) const { return levels_.front()[leaf]; }
 
-    // The leaves whose boxes come nearer than that to `box`.
+    // The leaves whose boxes are closer to `box` than `squared`.
     void leavesWithin(const Box& box, double squared, std::vector<std::uint32_t>& found) const {
         found.clear();
         visit(levels_.size() - 1, 0, box, squared, found);
     }
 
   private:
-    // The children in pairs [begin, end) of a level.
+    // Visits the children of one node: kFan boxes of a level, from `pair` on.
     void visit(std::size_t level, std::size_t pair, const Box& box, double squared,
                std::vector<std::uint32_t>& found) const {
         const std::size_t end = std::min(pairs_[level].size(), pair + kFan / 2);
@@ -128,7 +122,7 @@ class BoxTree {
     std::vector<std::vector<BoxPair>> pairs_;
 };
 
-// The squared distances of a leaf's points to the nearest others seen so far, by rank.
+// For each point of a leaf, the squared distances to the nearest others seen so far, by rank.
 struct Nearest {
     std::array<std::array<Double2, kPairs>, kNeighbours> squared;
 
@@ -136,7 +130,8 @@ struct Nearest {
         for (auto& lanes : squared) lanes.fill(kInfinity);
     }
 
-    // Without branches; two pairs at a time, because the ranks of one wait for each other.
+    // Offers all points of `other`. Without branches; two pairs at a time, because each insertion into the
+    // ranks is a chain of dependent operations.
     template <bool kSame>
     void offer(const Leaf& own, const Leaf& other) {
         for (std::size_t i = 0; i < kPairs; i += 2) offerTo<kSame>(own, other, i);
@@ -187,10 +182,10 @@ struct Nearest {
     }
 };
 
-// The scales of the points of kFan leaves, which share the search for the leaves around them.
-class GroupScales {
+// Measures the points of kFan leaves, which share the search for leaves around them.
+class GroupSpacings {
   public:
-    GroupScales(const BoxTree& tree, std::vector<double>& scales) : tree_(tree), scales_(scales) {}
+    GroupSpacings(const BoxTree& tree, std::vector<double>& spacings) : tree_(tree), spacings_(spacings) {}
 
     void measure(std::size_t group) {
         const std::size_t begin = group * kFan;
@@ -211,7 +206,7 @@ class GroupScales {
     }
 
   private:
-    std::size_t countOf(std::size_t leaf) const { return std::min(kLanes, scales_.size() - leaf * kLanes); }
+    std::size_t countOf(std::size_t leaf) const { return std::min(kLanes, spacings_.size() - leaf * kLanes); }
 
     void offer(std::size_t leaf, std::size_t other, Nearest& own) const {
         own.offer<false>(tree_.leaves()[leaf], tree_.leaves()[other]);
@@ -234,7 +229,7 @@ class GroupScales {
             const unsigned near = less(squaredGaps(boxes_[i], box), reach);
             if (near == 0) continue;
             for (std::size_t k = 0; k < 2; ++k) {
-                // Leaves next to it on the curve have been looked at.
+                // Itself and its neighbours on the curve were offered before the search.
                 const std::size_t other = around_[2 * i + k];
                 if ((near >> k & 1u) == 0 || other + 1 - leaf <= 2) continue;
                 if (k == 1 && around_[2 * i] == other) continue;
@@ -245,12 +240,12 @@ class GroupScales {
         for (std::size_t i = 0; i < count; ++i) {
             double sum = 0.0;
             for (std::size_t rank = 0; rank < kNeighbours; ++rank) sum += std::sqrt(own.at(rank, i));
-            scales_[leaf * kLanes + i] = sum / static_cast<double>(kNeighbours);
+            spacings_[leaf * kLanes + i] = sum / static_cast<double>(kNeighbours);
         }
     }
 
     const BoxTree& tree_;
-    std::vector<double>& scales_;
+    std::vector<double>& spacings_;
     std::vector<std::uint32_t> around_;
     std::vector<BoxPair> boxes_;  // of those leaves
 };
@@ -258,17 +253,17 @@ class GroupScales {
 }  // namespace
 
 Result<std::vector<double>> localSpacings(const PointCloud& points, const RunContext& context) {
-    std::vector<double> scales(points.size());
-    if (points.empty()) return scales;
+    std::vector<double> spacings(points.size());
+    if (points.empty()) return spacings;
     constexpr std::size_t kGroupsAtOnce = 64;
     const BoxTree tree(points);
     const std::size_t groups = (tree.leaves().size() + kFan - 1) / kFan;
     auto done = parallelFor(groups, kGroupsAtOnce, context, [&](std::size_t from, std::size_t to) {
-        GroupScales measured(tree, scales);
+        GroupSpacings measured(tree, spacings);
         for (std::size_t group = from; group < to; ++group) measured.measure(group);
     });
     RETURN_IF_ERROR(done);
-    return scales;
+    return spacings;
 }
 
 }  // namespace shapedb

@@ -9,10 +9,9 @@
 
 namespace shapedb {
 
-/// For each point the mean distance to its three nearest other points, in the points' unit; infinite
-/// when there are fewer than three. Points should follow a curve through space (curve_order.h): in any
-/// other order the result is the same, but the time grows with the square of their number. On the
-/// threads of the caller's arena.
+/// For each point the mean distance to its three nearest other points, in their unit; infinite when there
+/// are fewer than three. Points should be in Hilbert order (hilbert_order.h): the result is the same in any
+/// order, but the time may grow with the square of their number. On the threads of the caller's arena.
 ///
 /// Errors: kCancelled, kDeadlineExceeded. May throw std::bad_alloc.
 [[nodiscard]] Result<std::vector<double>> localSpacings(const PointCloud& points,

@@ -27,8 +27,13 @@ class CrashIsolation {
         const bool suspect_;
     };
 
+    /// Whether a Pass made now would have to wait.
+    [[nodiscard]] bool wouldWait(bool suspect) const;
+
   private:
-    std::mutex mutex_;
+    [[nodiscard]] bool isOpen(bool suspect) const;
+
+    mutable std::mutex mutex_;
     std::condition_variable changed_;
     int ordinary_ = 0;         ///< inside
     int waitingSuspects_ = 0;  ///< outside

@@ -3,11 +3,9 @@
 
 #include <optional>
 
+#include "common/wire.h"
 #include "core/base/error.h"
-#include "core/matching/score.h"
 #include "core/pipeline.h"
-#include "core/segmentation/segmentation.h"
-#include "core/signature/signature.h"
 #include "server/index/collection_index.h"
 #include "server/store/store.h"
 #include "shapedb/v1/collection_service.pb.h"
@@ -19,15 +17,16 @@ namespace shapedb::rpc {
 
 namespace pb = shapedb::v1;
 
+// What core/ computes: common/wire.h.
+using wire::fromProto;
+using wire::toProto;
+
 /// `quality` is that of the signature that serves, if there is one and it says.
 void toProto(const store::Shape& shape, const std::string& collection, std::optional<double> quality,
              pb::Shape* out);
 [[nodiscard]] pb::ShapeState toProto(store::ShapeState state);
 void toProto(const Error& failure, pb::Failure* out);
 void toProto(const store::Collection& collection, const ShapeParameters& parameters, pb::Collection* out);
-void toProto(const Signature& signature, pb::Signature* out);
-void toProto(const Segmentation& segmentation, pb::SegmentationReport* out);
-void toProto(const Explanation& explanation, pb::Explanation* out);
 void toProto(store::TimestampMs time, google::protobuf::Timestamp* out);
 
 /// Empty for UNSPECIFIED. Errors: kInvalidArgument (a number without a name).

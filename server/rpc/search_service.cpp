@@ -1,8 +1,11 @@
 #include "server/rpc/search_service.h"
 
+#include <memory>
 #include <utility>
 
 #include "core/base/return_if_error.h"
+#include "core/matching/score.h"
+#include "core/matching/scorer.h"
 #include "core/signature/signature_codec.h"
 #include "server/rpc/call.h"
 #include "server/rpc/convert.h"
@@ -14,7 +17,7 @@
 namespace shapedb::rpc {
 namespace {
 
-/// One request's options, checked, and the snapshot all its queries read.
+/// The checked options of one request, and the snapshot that all its queries read.
 struct Prepared {
     index::SnapshotPtr collection;
     SearchOptions options;
@@ -42,18 +45,18 @@ Result<Prepared> prepare(const Services& services, Call& call, const pb::SearchO
     return prepared;
 }
 
-/// Leaves the explanation out where what was scored has been replaced meanwhile.
-Result<void> explainHit(const Services& services, const Prepared& prepared, const Signature& query,
+/// Leaves the explanation out where the scored signature has been replaced meanwhile.
+Result<void> explainHit(const Services& services, const Prepared& prepared, const Scorer& scorer,
                         const SearchHit& hit, pb::Hit* out) {
     const auto signature = storedSignature(services, *prepared.collection, hit.id);
     if (!signature && signature.error().code == ErrorCode::kDataLoss) return fail(signature.error());
     if (!signature) return {};
-    const Explanation explanation = explain(query, *signature, prepared.options.score);
+    const Explanation explanation = scorer.explain(*signature);
     if (explanation.score == hit.score) toProto(explanation, out->mutable_explanation());
     return {};
 }
 
-/// Fills `response`; `room` is what the whole answer may still grow by, bytes.
+/// Fills `response`. `room`: how many bytes the whole answer may still grow by.
 Result<void> answer(const Services& services, const Prepared& prepared, const Signature& query,
                     const SearchResult& found, std::size_t& room, pb::SearchResponse* response) {
     response->set_candidates(found.counts.candidates);
@@ -64,6 +67,7 @@ Result<void> answer(const Services& services, const Prepared& prepared, const Si
     if (response->query().has_attributes()) {
         response->mutable_query()->mutable_attributes()->clear_statistics();
     }
+    const std::unique_ptr<const Scorer> scorer = makeScorer(query, prepared.options.score);
     for (const SearchHit& hit : found.hits) {
         const auto shape = services.store.getShapeById(hit.id);
         if (!shape && shape.error().code == ErrorCode::kNotFound) continue;  // deleted meanwhile
@@ -72,15 +76,12 @@ Result<void> answer(const Services& services, const Prepared& prepared, const Si
         toProto(*shape, prepared.collection->collection.name,
                 qualityIn(prepared.collection->signatures, hit.id), out->mutable_shape());
         out->set_score(hit.score);
-        if (prepared.explain) {
-            const auto explained = explainHit(services, prepared, query, hit, out);
-            if (!explained) return explained;
-        }
+        if (prepared.explain) RETURN_IF_ERROR(explainHit(services, prepared, *scorer, hit, out));
         const std::size_t bytes = out->ByteSizeLong();
         if (bytes > room) {
             return fail(ErrorCode::kInvalidArgument,
-                        "the answer would pass " + std::to_string(kMaxAnswerBytes) +
-                            " bytes: ask for a smaller k or fewer queries, or set no_explanation");
+                        "the answer would exceed " + std::to_string(kMaxAnswerBytes) +
+                            " bytes; ask for a smaller k or fewer queries, or set no_explanation");
         }
         room -= bytes;
     }

@@ -15,19 +15,18 @@
 #include <array>
 #include <cstdint>
 #include <functional>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/metadata.h"
 #include "core/base/run_context.h"
 
 namespace shapedb::store {
 
-/// Client-supplied labels: unique keys, sorted. Limits are checked by the caller.
-using Metadata = std::map<std::string, std::string>;
+using shapedb::Metadata;
 
 /// SHA-256 of the points as they travel: packed little-endian float32 x y z.
 using Checksum = std::array<std::uint8_t, 32>;

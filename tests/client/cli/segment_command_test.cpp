@@ -5,6 +5,7 @@
 #include <ostream>
 
 #include "client/io/scan_reader.h"
+#include "core/base/math.h"
 #include "core/pipeline.h"
 #include "core/synthetic/noise.h"
 #include "tests/client/cli/run_command.h"
@@ -53,7 +54,7 @@ TEST_F(SegmentCommand, JsonHasThePromisedKeys) {
 
 TEST_F(SegmentCommand, FindsTheTwoBallsOfADumbbell) {
     const auto document = runCommand({"segment", dumbbell(), "--json", "--profile", "paper"}).json();
-    const double ball = 4.0 / 3.0 * 3.14159265358979;
+    const double ball = 4.0 / 3.0 * kPi;
     for (int i = 0; i < 2; ++i) {
         const auto& point = document["signature"][i];
         EXPECT_NEAR(point["weight"].get<double>(), ball, 0.1 * ball);
@@ -95,7 +96,7 @@ TEST_F(SegmentCommand, FlagsBeyondThePaperReachTheMethod) {
     EXPECT_EQ(plain["quality"], 1.0);
     const auto all = with({"--interior", "adaptive", "--merge-contrast", "1.25", "--max-segments", "2",
                            "--min-segment-share", "0.01", "--outlier-ratio", "3", "--smoothing-reach", "5",
-                           "--even-spacing", "1", "--attributes"});
+                           "--thinning", "1", "--attributes"});
     ShapeParameters parameters = parametersOf(Profile::kPaper);
     parameters.segmentation.interiorMethod = InteriorMethod::kAdaptive;
     parameters.segmentation.mergeContrast = 1.25;
@@ -116,7 +117,19 @@ TEST_F(SegmentCommand, FlagsBeyondThePaperReachTheMethod) {
     EXPECT_FALSE(with({"--no-attributes"}).contains("statistics"));
 }
 
-TEST_F(SegmentCommand, LabelledPlyHasThePointsAndLabelsOfTheSegmentation) {
+TEST_F(SegmentCommand, FormerFlagNamesGiveTheSameResult) {
+    const auto run = [&](const std::string& outliers, const std::string& thinning) {
+        return timeless(
+            runCommand({"segment", dumbbell(), "--json", outliers, "2.5", thinning, "1.5"}).json());
+    };
+    const auto current = run("--outlier-ratio", "--thinning");
+    EXPECT_EQ(current, run("--stray-ratio", "--even-spacing"));
+    EXPECT_EQ(current["strays"], current["outliers"]);
+    EXPECT_EQ(current["parameters"]["stray_ratio"], 2.5);
+    EXPECT_EQ(current["parameters"]["even_spacing"], 1.5);
+}
+
+TEST_F(SegmentCommand, LabelledPlyHasPointsAndLabels) {
     const CommandRun run =
         runCommand({"segment", dumbbell(), "--json", "--profile", "paper", "--out", path("out.ply")});
     ASSERT_EQ(run.exitCode, 0) << run.err;
@@ -145,7 +158,7 @@ TEST_F(SegmentCommand, LabelledPlyHasThePointsAndLabelsOfTheSegmentation) {
     EXPECT_GT(labels[1], 500u);
 }
 
-TEST_F(SegmentCommand, SameSeedSameResult) {
+TEST_F(SegmentCommand, SameSeedGivesTheSameResult) {
     const std::vector<std::string> arguments = {"segment", dumbbell(), "--json", "--noise",
                                                 "0.002",   "--points", "2000"};
     auto with = [&](const char* seed) {
@@ -162,8 +175,8 @@ TEST_F(SegmentCommand, TextNamesFileCountsAndSegments) {
     const CommandRun run = runCommand({"segment", dumbbell()});
     ASSERT_EQ(run.exitCode, 0) << run.err;
     EXPECT_NE(run.out.find("dumbbell.xyz"), std::string::npos);
-    EXPECT_NE(run.out.find("segments, volume"), std::string::npos);
-    EXPECT_NE(run.out.find("heaviest"), std::string::npos);
+    EXPECT_NE(run.out.find("parts, volume"), std::string::npos);
+    EXPECT_NE(run.out.find("Largest parts:"), std::string::npos);
     EXPECT_EQ(run.out.find('\x1b'), std::string::npos) << "no terminal codes in a pipe";
     EXPECT_EQ(run.err, "");
 }
@@ -187,7 +200,7 @@ std::string repeated(const std::string& line, int count) {
 
 class SegmentBadScan : public SegmentCommand, public ::testing::WithParamInterface<BadScan> {};
 
-TEST_P(SegmentBadScan, HasItsErrorAndExitCode) {
+TEST_P(SegmentBadScan, GivesItsErrorAndExitCode) {
     const BadScan& bad = GetParam();
     const std::string file = write(bad.file, bad.bytes);
     const CommandRun run = runCommand({"segment", file, "--json", "--out", path("out.ply")});
@@ -217,7 +230,7 @@ INSTANTIATE_TEST_SUITE_P(
                 "malformed_file", 3}),
     [](const ::testing::TestParamInfo<BadScan>& bad) { return bad.param.name; });
 
-TEST_F(SegmentCommand, MissingFileAndUnwritableOutput) {
+TEST_F(SegmentCommand, ReportsMissingFileAndUnwritableOutput) {
     const CommandRun missing = runCommand({"segment", path("missing.ply"), "--json"});
     EXPECT_EQ(missing.exitCode, 3);
     EXPECT_EQ(missing.json()["error"]["name"], "file_not_readable");
@@ -228,7 +241,7 @@ TEST_F(SegmentCommand, MissingFileAndUnwritableOutput) {
     EXPECT_EQ(unwritable.json()["error"]["name"], "file_not_writable");
 }
 
-TEST_F(SegmentCommand, HugeAndTinyCoordinatesAreTheSameShape) {
+TEST_F(SegmentCommand, HugeAndTinyCoordinatesGiveTheSameShape) {
     for (const double scale : {1e-6, 1e6}) {
         PointCloud points = dumbbellPoints();
         for (Point3& p : points) p = scale * p;

@@ -44,7 +44,7 @@ class PlyScalars : public FileTest {
     }
 };
 
-TEST_F(PlyScalars, EveryTypeUnderBothNamesInBothByteOrders) {
+TEST_F(PlyScalars, ReadsEveryTypeUnderBothNamesInBothByteOrders) {
     for (const char* name : {"char", "int8"}) check<std::int8_t>(name);
     for (const char* name : {"uchar", "uint8"}) check<std::uint8_t>(name);
     for (const char* name : {"short", "int16"}) check<std::int16_t>(name);
@@ -76,7 +76,7 @@ TEST_F(Ply, PolygonsBecomeFans) {
     EXPECT_EQ(scan.trianglesInFile, 4U);
 }
 
-TEST_F(Ply, BlankLinesMissingLastLineEndAndPaddingAreTolerated) {
+TEST_F(Ply, ToleratesBlankLinesPaddingAndAMissingLineEnd) {
     EXPECT_EQ(readGood("a.ply", ascii("element vertex 2\n" + kXyz, "\n1 2 3\n\n \t\n4 5 6")).points.size(),
               2U);
     EXPECT_EQ(readGood("b.ply", ascii("element vertex 1\n" + kXyz, "1 2 3\n\n  \n")).points.size(), 1U);
@@ -92,12 +92,12 @@ TEST_F(Ply, ElementsWithoutPropertiesHaveNoBody) {
               1U);
 }
 
-TEST_F(Ply, NoVerticesIsAnEmptyScan) {
+TEST_F(Ply, FileWithoutVerticesIsAnEmptyScan) {
     EXPECT_TRUE(readGood("a.ply", ascii("element vertex 0\n" + kXyz, "")).points.empty());
     EXPECT_TRUE(readGood("b.ply", binary("element vertex 0\n" + kXyz, "")).points.empty());
 }
 
-TEST_F(Ply, ValuesBeyondSinglePrecisionAreLeftToLaterStages) {
+TEST_F(Ply, AcceptsValuesBeyondSinglePrecision) {
     const Scan scan =
         readGood("a.ply", ascii("element vertex 1\nproperty double x\nproperty double y\nproperty double z\n",
                                 "1e300 -1e300 1e-300\n"));

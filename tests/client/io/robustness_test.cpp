@@ -82,7 +82,7 @@ TEST_F(Robustness, BinaryAndCountedFilesNeverPassWhenCut) {
     }
 }
 
-TEST_F(Robustness, RandomDamageNeverHarms) {
+TEST_F(Robustness, RandomDamageNeverCrashes) {
     Random random(20240607);
     const std::vector<SampleFile> files = sampleFiles();
     for (int round = 0; round < 6000; ++round) {
@@ -109,7 +109,7 @@ TEST_F(Robustness, RandomDamageNeverHarms) {
     }
 }
 
-TEST_F(Robustness, LyingHeadersAllocateNothing) {
+TEST_F(Robustness, FalseHeadersAllocateNothing) {
     const std::string xyz = "property float x\nproperty float y\nproperty float z\n";
     const std::string tenPoints = std::string(120, '\1');
     std::string tenLines;
@@ -151,7 +151,7 @@ TEST_F(Robustness, LyingHeadersAllocateNothing) {
     }
 }
 
-TEST_F(Robustness, LiesThroughAPipeOfUnknownLengthAllocateNothingEither) {
+TEST_F(Robustness, FalseHeadersFromPipesAllocateNothing) {
     const std::string bytes =
         "ply\nformat binary_little_endian 1.0\nelement vertex 1000000000\nproperty float x\nproperty float "
         "y\n"

@@ -6,6 +6,8 @@
 
 #include <gtest/gtest.h>
 
+#include "core/base/math.h"
+
 namespace shapedb {
 namespace {
 
@@ -122,7 +124,7 @@ TEST(Motion, RandomRotationIsUniform) {
         }
         const double cosine = std::min(1.0, std::max(-1.0, (r[0][0] + r[1][1] + r[2][2] - 1.0) / 2.0));
         const double t = std::acos(cosine);
-        const double u = (t - std::sin(t)) / 3.14159265358979323846;
+        const double u = (t - std::sin(t)) / kPi;
         ++angle[static_cast<std::size_t>(std::min(kCells - 1.0, u * kCells))];
     }
     const auto largestGap = [](const std::array<int, kCells>& counts) {

@@ -5,6 +5,9 @@
 #include <map>
 #include <utility>
 
+#include <gtest/gtest.h>
+
+#include "core/matching/score.h"
 #include "core/pipeline.h"
 #include "core/synthetic/families.h"
 #include "tests/core/matching/random_signatures.h"
@@ -87,6 +90,36 @@ Signature turnedAttributed(Signature signature, const Matrix3& rotation) {
     for (WeightedPoint& p : result.points) p.covariance = turnedCovariance(p.covariance, rotation);
     updateBody(result);
     return result;
+}
+
+AttributedPair randomAttributedPair(Random& random, double leastNoise, double mostNoise) {
+    AttributedPair pair;
+    pair.a = randomAttributed(random);
+    const double noise = std::pow(10.0, random.uniform(std::log10(leastNoise), std::log10(mostNoise)));
+    switch (random.below(4)) {
+        case 0: pair.b = disturbedAttributed(pair.a, random, noise); break;
+        case 1:
+            pair.b = turnedAttributed(disturbedAttributed(pair.a, random, noise), randomRotation(random));
+            break;
+        case 2:
+            pair.b = turnedAttributed(disturbedAttributed(pair.a, random, noise), randomReflection(random));
+            break;
+        default: pair.b = randomAttributed(random);
+    }
+    return pair;
+}
+
+void expectSoundScore(const Signature& a, const Signature& b, const ScoreOptions& options) {
+    const double value = score(a, b, options);
+    ASSERT_GT(value, 0.0);
+    ASSERT_LE(value, 1.0);
+    const bool same = sameShape(a, b) && (!options.keepScale || a.scale == b.scale);
+    ASSERT_EQ(value == 1.0, same);
+    ASSERT_TRUE(sameBits(value, score(b, a, options)));
+    const double bound = scoreUpperBound(a, b, options);
+    ASSERT_GE(bound, value);
+    ASSERT_LE(bound, 1.0);
+    ASSERT_GE(scoreUpperBound(b, a, options), value);
 }
 
 const std::vector<Scan>& scannedFamilies(std::size_t members, std::size_t scans) {

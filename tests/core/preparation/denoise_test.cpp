@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/base/math.h"
 #include "core/base/random.h"
 #include "core/geometry/motion.h"
 
@@ -24,7 +25,7 @@ PointCloud noisySphere(double sigma) {
     return points;
 }
 
-double sphereSpacing() { return std::sqrt(4.0 * 3.14159265358979323846 / static_cast<double>(kPoints)); }
+double sphereSpacing() { return std::sqrt(4.0 * kPi / static_cast<double>(kPoints)); }
 
 double radialError(const PointCloud& points) {
     double sum = 0.0;

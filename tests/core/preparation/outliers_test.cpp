@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/base/math.h"
 #include "core/base/random.h"
 #include "core/geometry/motion.h"
 
@@ -80,7 +81,7 @@ TEST(FindOutliers, KeepsASparseRegionAndAThinPart) {
     }
     const std::size_t rod = points.size();
     for (int i = 0; i < 400; ++i) {
-        const double angle = random.uniform(0.0, 6.283185307179586);
+        const double angle = random.uniform(0.0, 2.0 * kPi);
         points.push_back({-1.0 - random.uniform(0.0, 2.0), 0.03 * std::cos(angle), 0.03 * std::sin(angle)});
     }
     const auto outliers = outliersOf(points);

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/base/math.h"
 #include "core/base/random.h"
 #include "core/geometry/bounding.h"
 #include "core/geometry/motion.h"
@@ -95,7 +96,7 @@ PointCloud withoutCap(PointCloud points) {
 TEST(AdaptiveInterior, AMissingCapIsClosed) {
     // A ball without the fifth of its surface above z = 0.6: the cap of height 0.4 is lost.
     const Segmentation s = found(withoutCap(sampled(makeSphere())));
-    const double cap = 3.14159265358979323846 * 0.4 * 0.4 * (1.0 - 0.4 / 3.0);
+    const double cap = kPi * 0.4 * 0.4 * (1.0 - 0.4 / 3.0);
     EXPECT_NEAR(s.volume / (makeSphere().volume - cap), 1.0, 0.03);
     EXPECT_GT(s.quality, 0.6);
     EXPECT_LT(s.quality, 0.95);
@@ -149,12 +150,12 @@ TEST(AdaptiveInterior, SeenFromAboveTwoBarsAreNoPlate) {
     Random random(21);
     PointCloud points;
     for (int i = 0; i < 6000; ++i) {
-        const double angle = random.uniform(0.0, 3.14159265358979323846);
+        const double angle = random.uniform(0.0, kPi);
         const double side = i % 2 == 0 ? -0.3 : 0.3;
         points.push_back({random.uniform(-1.0, 1.0), side + 0.1 * std::cos(angle), 0.1 * std::sin(angle)});
     }
     const Segmentation s = found(points);
-    const double halfRods = 2.0 * 2.0 * 0.5 * 3.14159265358979323846 * 0.01;
+    const double halfRods = 2.0 * 2.0 * 0.5 * kPi * 0.01;
     EXPECT_NEAR(s.volume / halfRods, 1.0, 0.1);
     EXPECT_LT(s.quality, 0.7);
 }
@@ -171,14 +172,12 @@ TEST(AdaptiveInterior, AnOpenCupIsNotFilled) {
         if (p.z < 0.5) points.push_back(p);
     }
     for (int i = 0; i < 600; ++i) {
-        const double angle = random.uniform(0.0, 6.283185307179586);
+        const double angle = random.uniform(0.0, 2.0 * kPi);
         const double r = random.uniform(std::sqrt(0.64 - 0.25), std::sqrt(0.75));
         points.push_back({r * std::cos(angle), r * std::sin(angle), 0.5});
     }
     // Balls cut at z = 0.5: pi h^2 (R - h / 3) with h = R + 0.5.
-    const auto below = [](double r) {
-        return 3.14159265358979323846 * (r + 0.5) * (r + 0.5) * (r - (r + 0.5) / 3.0);
-    };
+    const auto below = [](double r) { return kPi * (r + 0.5) * (r + 0.5) * (r - (r + 0.5) / 3.0); };
     const Segmentation s = found(points);
     EXPECT_NEAR(s.volume / (below(1.0) - below(0.8)), 1.0, 0.05);
     EXPECT_GT(s.quality, 0.8);

@@ -5,14 +5,13 @@
 
 #include <gtest/gtest.h>
 
+#include "core/base/math.h"
 #include "core/segmentation/interior.h"
 #include "core/segmentation/local_spacing.h"
 #include "tests/core/segmentation/small_clouds.h"
 
 namespace shapedb {
 namespace {
-
-constexpr double kDegree = 3.14159265358979323846 / 180.0;
 
 // The tetrahedra that a plain walk reaches when it passes facets below `angle`, the hull's included.
 std::vector<std::uint8_t> reached(const Triangulated& cloud, const std::vector<std::uint8_t>& big,
@@ -40,11 +39,12 @@ TEST(LeakAngles, AreTheAnglesAtWhichAWalkGetsThrough) {
         const auto leaks = bottleneckAngles(cloud.points, cloud.tetrahedra, big);
         ASSERT_TRUE(leaks);
         for (const double degrees : {3.0, 11.0, 22.0, 37.0, 61.0, 95.0, 140.0}) {
-            const auto walk = reached(cloud, big, degrees * kDegree);
+            const auto walk = reached(cloud, big, toRadians(degrees));
             for (std::size_t t = 0; t < big.size(); ++t) {
                 const double leak = (*leaks)[t];
-                if (std::abs(leak - degrees * kDegree) < 1e-9) continue;  // rounding decides
-                ASSERT_EQ(walk[t] != 0, leak < degrees * kDegree) << cloud.name << " " << t << " " << degrees;
+                if (std::abs(leak - toRadians(degrees)) < 1e-9) continue;  // rounding decides
+                ASSERT_EQ(walk[t] != 0, leak < toRadians(degrees))
+                    << cloud.name << " " << t << " " << degrees;
             }
         }
     }

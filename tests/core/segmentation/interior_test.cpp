@@ -7,14 +7,13 @@
 
 #include <gtest/gtest.h>
 
+#include "core/base/math.h"
 #include "core/base/random.h"
 #include "core/segmentation/local_spacing.h"
-#include "tests/core/segmentation/small_clouds.h"
+#include "tests/core/segmentation/exact_balls.h"
 
 namespace shapedb {
 namespace {
-
-constexpr double kDegree = 3.14159265358979323846 / 180.0;
 
 // Exact centre and squared radius of every ball.
 struct Balls {
@@ -112,12 +111,12 @@ TEST(BigBalls, GrowFewerAsTheRatioGrows) {
 
 TEST(IntersectionAngle, KnownPositions) {
     // Two unit spheres through the origin, centres on the axes: they meet at a right angle.
-    EXPECT_DOUBLE_EQ(intersectionAngle({1, 0, 0}, {0, 1, 0}, {0, 0, 0}), 90 * kDegree);
-    EXPECT_DOUBLE_EQ(intersectionAngle({1, 0, 0}, {-1, 0, 0}, {0, 0, 0}), 180 * kDegree);
+    EXPECT_DOUBLE_EQ(intersectionAngle({1, 0, 0}, {0, 1, 0}, {0, 0, 0}), kPi / 2);
+    EXPECT_DOUBLE_EQ(intersectionAngle({1, 0, 0}, {-1, 0, 0}, {0, 0, 0}), kPi);
     EXPECT_DOUBLE_EQ(intersectionAngle({1, 0, 0}, {5, 0, 0}, {0, 0, 0}), 0.0);
     EXPECT_DOUBLE_EQ(intersectionAngle({1, 2, 3}, {1, 2, 3}, {0, 2, 3}), 0.0);
     // A huge ball is a half space: the angle is that between its normal and the radius.
-    EXPECT_NEAR(intersectionAngle({0, 0, 1e12}, {1, 0, 1}, {0, 0, 0}), 45 * kDegree, 1e-11);
+    EXPECT_NEAR(intersectionAngle({0, 0, 1e12}, {1, 0, 1}, {0, 0, 0}), kPi / 4, 1e-11);
 }
 
 TEST(IntersectionAngle, AgreesWithTheLawOfCosines) {
@@ -155,9 +154,9 @@ TEST(Interior, IsTheFixpointOfTheWalk) {
             options.deepAngleDegrees = degrees;
             const auto big = bigOf(cloud, options.bigBallRatio);
             const auto inside = interiorTetrahedra(cloud.points, cloud.tetrahedra, big, options).value();
-            const double hull = options.hullAngleDegrees * kDegree;
-            const auto most = referenceInterior(cloud, balls, big, degrees * kDegree - 1e-5, hull - 1e-7);
-            const auto least = referenceInterior(cloud, balls, big, degrees * kDegree + 1e-5, hull + 1e-7);
+            const double hull = toRadians(options.hullAngleDegrees);
+            const auto most = referenceInterior(cloud, balls, big, toRadians(degrees) - 1e-5, hull - 1e-7);
+            const auto least = referenceInterior(cloud, balls, big, toRadians(degrees) + 1e-5, hull + 1e-7);
             ASSERT_EQ(inside.size(), big.size());
             for (std::size_t t = 0; t < inside.size(); ++t) {
                 ASSERT_LE(inside[t], most[t]) << cloud.name << " at " << degrees;

@@ -15,7 +15,7 @@
 #include "core/segmentation/flow.h"
 #include "core/segmentation/interior.h"
 #include "core/segmentation/local_spacing.h"
-#include "tests/core/segmentation/small_clouds.h"
+#include "tests/core/segmentation/exact_balls.h"
 
 namespace shapedb {
 namespace {
@@ -218,7 +218,7 @@ TEST(FacetCircumradius, AgreesWithRationalArithmetic) {
                 const double expected = std::sqrt(
                     CGAL::to_double(CGAL::squared_radius(p[(i + 1) % 4], p[(i + 2) % 4], p[(i + 3) % 4])));
                 const double radius =
-                    facetCircumradius(cloud.points, cloud.tetrahedra, t, static_cast<int>(i));
+                    circumradiusOf(facetCorners(cloud.points, cloud.tetrahedra.vertices[t], i));
                 // Needle triangles lose as many digits as the sine of the angle at a corner has zeros.
                 const auto c = cornersOf(cloud, t);
                 const Point3 u = c[(i + 2) % 4] - c[(i + 1) % 4];
@@ -246,7 +246,7 @@ TEST(MergeSegments, IsTheClosureOfMergeablePairs) {
                     if (low < 0 || low == high) continue;
                     double& radius = widest[{low, high}];
                     radius = std::max(radius,
-                                      facetCircumradius(c.cloud->points, c.flat(), t, static_cast<int>(i)));
+                                      circumradiusOf(facetCorners(c.cloud->points, c.flat().vertices[t], i)));
                 }
             }
             std::vector<std::size_t> group(n);

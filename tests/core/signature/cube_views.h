@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/base/random.h"
 #include "core/signature/interior_view.h"
 
 namespace shapedb::testing_support {
@@ -23,6 +24,9 @@ std::vector<Cube> horseshoe(int length, int thick, int gap);
 /// have side `side`, the centroid is the origin. Turned off the axes, so that no face lies in a
 /// plane of coordinates.
 InteriorView viewOfCubes(const std::vector<Cube>& cubes, double side);
+
+/// Uniform over tetrahedron t of the view.
+Point3 randomPointIn(const InteriorView& view, std::size_t t, Random& random);
 
 /// Weight of `value` in bin `bin` of `count` bins over [low, high]: the share of a triangle of two
 /// bins' width whose top is the bin's centre; beyond the outermost centres all belongs to these.

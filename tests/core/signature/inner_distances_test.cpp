@@ -185,7 +185,7 @@ TEST(InnerDistances, OfASingleTetrahedronHaveAUnit) {
     keepOne(view.radii);
     view.neighbours = {{kNoTetrahedron, kNoTetrahedron, kNoTetrahedron, kNoTetrahedron}};
     view.volume = view.volumes.front();
-    std::fill(view.innerOwner.begin(), view.innerOwner.end(), 0U);
+    std::fill(view.sampled.begin(), view.sampled.end(), 0U);
     const auto inner = innerDistances(view);
     ASSERT_TRUE(inner);
     EXPECT_EQ(inner->centres.size(), 1U);

@@ -15,6 +15,7 @@ namespace {
 using testing_support::barycentric;
 using testing_support::block;
 using testing_support::horseshoe;
+using testing_support::randomPointIn;
 using testing_support::viewOfCubes;
 
 // Only what Voxels reads: tetrahedra that may well overlap.
@@ -112,8 +113,8 @@ TEST(Voxels, ShareInsideOfALineIsTheShareOfItsLength) {
     double sum = 0.0;
     constexpr int kLines = 300;
     for (int n = 0; n < kLines; ++n) {
-        const Point3 a = view.inner[random.below(view.inner.size())];
-        const Point3 b = view.inner[random.below(view.inner.size())];
+        const Point3 a = randomPointIn(view, random.below(view.vertices.size()), random);
+        const Point3 b = randomPointIn(view, random.below(view.vertices.size()), random);
         int found = 0;
         constexpr int kSteps = 100;
         for (int s = 0; s < kSteps; ++s)
@@ -132,8 +133,8 @@ TEST(Voxels, LinesOfAConvexSolidAreInside) {
     Random random(5);
     double sum = 0.0;
     for (int n = 0; n < 500; ++n) {
-        const Point3& a = view.inner[random.below(view.inner.size())];
-        const Point3& b = view.inner[random.below(view.inner.size())];
+        const Point3 a = randomPointIn(view, random.below(view.vertices.size()), random);
+        const Point3 b = randomPointIn(view, random.below(view.vertices.size()), random);
         sum += voxels.shareInside(a, b);
         EXPECT_EQ(voxels.shareInside(a, b), voxels.shareInside(a, b));
     }

@@ -2,12 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <set>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
+
+#include "core/base/disjoint_sets.h"
 
 namespace shapedb {
 namespace {
@@ -20,25 +21,21 @@ Solid member(const std::string& family, std::size_t index, std::uint64_t seed) {
 
 // Whether every part can be reached from the first over points that two parts share.
 bool isConnected(const Solid& solid) {
-    std::vector<std::size_t> root(solid.parts.size());
-    std::iota(root.begin(), root.end(), std::size_t{0});
-    const auto find = [&](std::size_t i) {
-        while (root[i] != i) i = root[i];
-        return i;
-    };
-    for (std::size_t i = 0; i < solid.parts.size(); ++i) {
+    DisjointSets groups(solid.parts.size());
+    for (std::uint32_t i = 0; i < solid.parts.size(); ++i) {
         const auto own = sampleBoundary({{solid.parts[i]}}, 1500, i);
         if (!own) return false;
-        for (std::size_t j = 0; j < solid.parts.size(); ++j) {
+        for (std::uint32_t j = 0; j < solid.parts.size(); ++j) {
             const bool touches = std::any_of(own->begin(), own->end(), [&](const Point3& p) {
                 return implicitValue(solid.parts[j], p) <= 0.0;
             });
-            if (i != j && touches) root[find(i)] = find(j);
+            if (touches) groups.unite(i, j);
         }
     }
-    std::set<std::size_t> roots;
-    for (std::size_t i = 0; i < root.size(); ++i) roots.insert(find(i));
-    return roots.size() == 1;
+    for (std::uint32_t i = 1; i < solid.parts.size(); ++i) {
+        if (groups.find(i) != groups.find(0)) return false;
+    }
+    return true;
 }
 
 TEST(Families, AreNamedSortedAndMany) {

@@ -15,7 +15,7 @@ TEST(NamedShapes, AreUsableAndDistinct) {
     for (const NamedShape& shape : namedShapes()) {
         EXPECT_TRUE(checkSolid(shape.solid)) << shape.name;
         EXPECT_TRUE(names.insert(shape.name).second);
-        const SolidBounds bounds = boundsOf(shape.solid);
+        const Box bounds = boundsOf(shape.solid);
         EXPECT_GT(thinnestPart(shape.solid), 0.03 * bounds.diagonal()) << shape.name;
         // About the origin.
         EXPECT_LT(length(bounds.low + bounds.high), 1e-12) << shape.name;

@@ -10,13 +10,12 @@
 
 #include <gtest/gtest.h>
 
+#include "core/base/math.h"
 #include "core/base/random.h"
 #include "core/synthetic/parts.h"
 
 namespace shapedb {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 // Share of points for which `in` holds, against `expected`, at five standard deviations.
 void expectShare(const PointCloud& points, const std::function<bool(const Point3&)>& in, double expected) {
@@ -66,7 +65,7 @@ TEST(Solid, SamplesLieOnTheBoundary) {
 TEST(Solid, BoundsAreTightAndHoldTheSamples) {
     for (const Solid& still : onePrimitiveEach()) {
         const Solid solid = movedSolid(someMotion(still.parts[0].shape.index()), still);
-        const SolidBounds bounds = boundsOf(solid);
+        const Box bounds = boundsOf(solid);
         Point3 low = bounds.high;
         Point3 high = bounds.low;
         for (const Point3& p : sample(solid)) {

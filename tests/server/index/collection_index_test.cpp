@@ -45,10 +45,8 @@ class Index : public ::testing::Test {
             const auto place = now->signatures.find(row.shapeId);
             ASSERT_TRUE(place) << row.shapeId;
             EXPECT_EQ(place.block->metadata(place.row), row.metadata);
-            Signature cached;
-            place.block->scored(place.row, cached);
-            EXPECT_TRUE(sameShape(cached, decodeSignature(row.signature.bytes).value()));
-            EXPECT_EQ(cached.scale, decodeSignature(row.signature.bytes)->scale);
+            const PackedShape stored(decodeSignature(row.signature.bytes).value());
+            EXPECT_TRUE(sameShape(place.block->rows()[place.row], stored.row(), true));
         }
     }
 
@@ -245,9 +243,7 @@ TEST_F(Index, SwitchingReloadsParametersAndSignaturesTogether) {
     const SnapshotPtr switched = snapshot();
     const auto place = switched->signatures.find(a.id);
     ASSERT_TRUE(place);
-    Signature cached;
-    place.block->scored(place.row, cached);
-    EXPECT_TRUE(sameShape(cached, signatureOf(9.0)));
+    EXPECT_TRUE(sameShape(place.block->rows()[place.row], PackedShape(signatureOf(9.0)).row()));
     EXPECT_FALSE(index.whileGeneration(parts.id, 1, [] { FAIL(); }));
     EXPECT_EQ(index.switchGeneration(999, [] { return Result<bool>(true); }).error().code,
               ErrorCode::kNotFound);

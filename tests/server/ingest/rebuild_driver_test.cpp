@@ -235,7 +235,10 @@ TEST_F(Driver, PauseAndResume) {
     driver->pause();
     const int before = described;
     closed = false;
-    std::this_thread::sleep_for(20ms);
+    // While the driver is paused the pool gets ten scans done.
+    for (int i = 0; i < 10; ++i) put("meanwhile " + std::to_string(i), 1.0f);
+    pool->wake();
+    ASSERT_TRUE(eventually([&] { return store.queueDepth()->jobs == 0; }));
     EXPECT_EQ(described, before);
     ASSERT_TRUE(driver->resume());
     EXPECT_EQ(finished(rebuild).state, store::RebuildState::kDone);

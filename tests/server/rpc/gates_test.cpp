@@ -84,13 +84,17 @@ TEST(RestoreGate, OneAtATimeAndEpochsRise) {
 
 TEST(RestoreGate, WaitsForWrites) {
     RestoreGate gate;
-    std::atomic<bool> writing{true};
+    std::atomic<bool> writing{false};
+    std::atomic<bool> restoreComes{false};
     std::thread writer([&] {
         const RestoreGate::Write write(gate);
-        std::this_thread::sleep_for(30ms);
+        writing = true;
+        while (!restoreComes) std::this_thread::yield();
+        std::this_thread::sleep_for(10ms);  // time in which a gate that does not wait would let it in
         writing = false;
     });
-    std::this_thread::sleep_for(10ms);
+    while (!writing) std::this_thread::yield();
+    restoreComes = true;
     {
         const auto exclusive = gate.exclusive();
         EXPECT_FALSE(writing);

@@ -35,9 +35,7 @@ inline Signature signatureOf(double volume) {
 inline double cachedVolume(const SignatureSet& signatures, std::int64_t id) {
     const SignatureSet::Place place = signatures.find(id);
     if (!place) return 0.0;
-    Signature cached;
-    place.block->scored(place.row, cached);
-    return cached.points.at(0).weight * 1024.0;
+    return place.block->rows()[place.row].points[0].weight * 1024.0;
 }
 
 /// Points whose first coordinate is `tag`.

@@ -1,4 +1,4 @@
-#include "core/search/packed_statistics.h"
+#include "core/matching/attributed/packed_statistics.h"
 
 #include <algorithm>
 #include <cstdlib>

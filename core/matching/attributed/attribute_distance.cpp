@@ -1,23 +1,21 @@
-#include "core/matching/attributed/attribute_score.h"
+#include "core/matching/attributed/attribute_distance.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdlib>
 
 namespace shapedb {
 
 namespace {
 
-// What two unrelated shapes differ by (median over pairs of different synthetic families): it
-// gives every term an equal say, whatever the number of its bins.
+// What two unrelated shapes differ by (median over pairs of different synthetic families). It gives
+// every term an equal say, whatever the number of its bins.
 constexpr std::array<double, kStatisticKinds> kTypical{2.17, 3.24, 3.93, 1.10, 4.62,
                                                        1.27, 4.20, 1.69, 2.95, 0.76};
 constexpr double kTypicalDisagreement = 0.9;
 
-// How much a statistic counts where the interior is told, and where it is a guess: the scan then
-// shows one side of the surface, or thin parts in noise. Two sides of a surface and one of them have
-// the same outline as they lie, and nearly the same distances.
+// How much a term counts where the interior is reliable and where it is not: the scan then shows one
+// side of the surface, or thin parts in noise. One side of a surface has the same outline as both, as
+// it lies, and nearly the same distances.
 struct EvidenceWeight {
     double reliable;
     double unreliable;
@@ -31,14 +29,14 @@ constexpr EvidenceWeight weightOf(Evidence evidence) {
     return {1.0, 1.0};
 }
 
-// Of a piece, what its whole contains of it against what the two look like: segments of a guess are
-// cut otherwise than those of the whole.
+// Partial: how much the contained parts count against how much the two look alike. An unreliable
+// interior is cut into other segments than that of the whole.
 constexpr EvidenceWeight kContainedWeight{0.5, 0.25};
 
-// Parts say both which parts there are and where they lie: two of the statistics' worth.
+// The parts say both which parts there are and where they lie: as much as two statistics.
 constexpr double kPartsWeight = 2.0;
 
-// The distance, in units of what unrelated shapes differ by, at which a score has fallen to 0.5.
+// The distance, in units of what unrelated shapes differ by, at which the score is 0.5.
 constexpr double kHalfWay = 0.5;
 
 double scoreOf(double distance) {
@@ -46,40 +44,14 @@ double scoreOf(double distance) {
     return 1.0 / (1.0 + d * d);
 }
 
-// An interior of this quality is trusted in full. Below it is a guess, and trust falls fast: a
-// thickness off by half spoils its histograms altogether.
+// An interior of this quality is fully trusted. Below, trust falls fast: a thickness that is off by
+// half makes its histograms useless.
 constexpr double kTrustedQuality = 0.5;
 
 double trust(std::uint8_t qualityA, std::uint8_t qualityB) {
     const double worse = std::min(qualityA, qualityB) / 255.0;
     const double share = std::min(1.0, worse / kTrustedQuality);
     return share * share * share * share;
-}
-
-double trust(const Signature& a, const Signature& b) {
-    return trust(a.attributes->quality, b.attributes->quality);
-}
-
-int difference(const std::uint8_t* x, const std::uint8_t* y, std::size_t count) {
-    int sum = 0;
-    for (std::size_t i = 0; i < count; ++i) sum += std::abs(static_cast<int>(x[i]) - static_cast<int>(y[i]));
-    return sum;
-}
-
-double termDistance(const Signature& a, const Signature& b, std::size_t kind) {
-    const StatisticLayout& layout = kStatistics[kind];
-    const std::uint8_t* x = a.attributes->statistics.data() + layout.offset;
-    const std::uint8_t* y = b.attributes->statistics.data() + layout.offset;
-    int sum = difference(x, y, layout.count);
-    if (layout.reversibleRows > 0) {
-        const std::size_t columns = layout.count / layout.reversibleRows;
-        int reversed = 0;
-        for (std::size_t from = 0; from < layout.count; from += columns) {
-            reversed += difference(x + from, y + (layout.count - columns - from), columns);
-        }
-        sum = std::min(sum, reversed);
-    }
-    return sum * kRootPerLevel / kTypical[kind];
 }
 
 double between(const EvidenceWeight& weight, double trust) {
@@ -90,8 +62,8 @@ double termWeight(std::size_t kind, double trust) {
     return between(weightOf(kStatistics[kind].evidence), trust);
 }
 
-double scaleDistance(const Signature& a, const Signature& b, const ScoreOptions& options) {
-    return options.keepScale ? octavesBetween(a.scale, b.scale) : 0.0;
+double termDistance(const LevelSums& sums, std::size_t kind) {
+    return sums[kind] * kRootPerLevel / kTypical[kind];
 }
 
 double disagreement(double agreement) { return std::max(0.0, 1.0 - agreement) / kTypicalDisagreement; }
@@ -102,18 +74,27 @@ double meanDistance(const AttributeDistance& distance, double agreement) {
 
 }  // namespace
 
-AttributeDistance attributeDistance(const Signature& a, const Signature& b, const ScoreOptions& options) {
-    AttributeDistance result;
-    const double interior = trust(a, b);
+double statisticsDistance(const LevelSums& sums, std::uint8_t qualityA, std::uint8_t qualityB) {
+    const double interior = trust(qualityA, qualityB);
+    double distance = 0.0;
     for (std::size_t kind = 0; kind < kStatisticKinds; ++kind) {
-        const double weight = termWeight(kind, interior);
-        result.statistics += weight * termDistance(a, b, kind);
-        result.totalWeight += weight;
+        distance += termWeight(kind, interior) * termDistance(sums, kind);
+    }
+    return distance;
+}
+
+AttributeDistance attributeDistance(double statistics, std::uint8_t qualityA, std::uint8_t qualityB,
+                                    double octaves) {
+    const double interior = trust(qualityA, qualityB);
+    AttributeDistance result;
+    result.statistics = statistics;
+    for (std::size_t kind = 0; kind < kStatisticKinds; ++kind) {
+        result.totalWeight += termWeight(kind, interior);
     }
     result.partsWeight = kPartsWeight * between(weightOf(Evidence::kInside), interior);
     result.totalWeight += result.partsWeight;
     result.containedWeight = between(kContainedWeight, interior);
-    result.scale = scaleDistance(a, b, options);
+    result.scale = octaves;
     return result;
 }
 
@@ -121,7 +102,7 @@ double attributeScore(const AttributeDistance& distance, double agreement) {
     return scoreOf(std::hypot(meanDistance(distance, agreement), distance.scale));
 }
 
-double pieceScore(const AttributeDistance& distance, double agreement, double share) {
+double partialScore(const AttributeDistance& distance, double agreement, double share) {
     return scoreOf((1.0 - distance.containedWeight) * meanDistance(distance, agreement) +
                    distance.containedWeight * disagreement(share));
 }
@@ -140,13 +121,13 @@ LevelWeights levelWeights(std::uint8_t qualityA, std::uint8_t qualityB) {
 }
 
 double maxDistanceForScore(double score) {
-    // Near 1 a difference of rounding in the score is one of 1e-8 in the distance.
+    // Near 1, a rounding difference in the score is one of 1e-8 in the distance.
     return score > 0.0 ? kHalfWay * std::sqrt(std::max(0.0, 1.0 / score - 1.0)) * (1.0 + 1e-9) + 1e-7
                        : INFINITY;
 }
 
-double scoreAt(double distance) {
-    // Distance 0 may be a shape itself.
+double maxScoreAtDistance(double distance) {
+    // At distance 0 it may be the shape itself.
     return distance > 0.0 ? std::min(1.0, scoreOf(distance) * (1.0 + 1e-9)) : 1.0;
 }
 
@@ -154,23 +135,23 @@ double octavesBetween(double scaleA, double scaleB) {
     return std::abs(std::log2(std::max(scaleA, scaleB) / std::min(scaleA, scaleB)));
 }
 
-std::vector<ScoreTerm> scoreTerms(const Signature& a, const Signature& b, const ScoreOptions& options,
+std::vector<ScoreTerm> scoreTerms(const LevelSums& sums, std::uint8_t qualityA, std::uint8_t qualityB,
                                   double agreement) {
-    const AttributeDistance distance = attributeDistance(a, b, options);
-    const double interior = trust(a, b);
+    const double interior = trust(qualityA, qualityB);
+    const AttributeDistance distance = attributeDistance(0.0, qualityA, qualityB, 0.0);
     std::vector<ScoreTerm> terms;
     for (std::size_t kind = 0; kind < kStatisticKinds; ++kind) {
-        terms.push_back({kStatistics[kind].name, termDistance(a, b, kind),
+        terms.push_back({kStatistics[kind].name, termDistance(sums, kind),
                          termWeight(kind, interior) / distance.totalWeight});
     }
     terms.push_back({"parts", disagreement(agreement), distance.partsWeight / distance.totalWeight});
     return terms;
 }
 
-std::vector<ScoreTerm> pieceTerms(const Signature& a, const Signature& b, const ScoreOptions& options,
-                                  double agreement, double share) {
-    std::vector<ScoreTerm> terms = scoreTerms(a, b, options, agreement);
-    const double contained = between(kContainedWeight, trust(a, b));
+std::vector<ScoreTerm> partialTerms(const LevelSums& sums, std::uint8_t qualityA, std::uint8_t qualityB,
+                                    double agreement, double share) {
+    std::vector<ScoreTerm> terms = scoreTerms(sums, qualityA, qualityB, agreement);
+    const double contained = between(kContainedWeight, trust(qualityA, qualityB));
     for (ScoreTerm& term : terms) term.weight *= 1.0 - contained;
     terms.push_back({"contained parts", disagreement(share), contained});
     return terms;

@@ -1,6 +1,6 @@
-// Statistics as a search reads them: levels two in a byte, arranged so that the differences of a
-// whole statistic are summed in one or two machine instructions, in two halves of which the second
-// is only looked at where the first leaves hope.
+// Statistics as a search reads them: two levels in a byte, arranged so that the differences of a whole
+// statistic are summed in one or two machine instructions. They lie in two halves, and the second is
+// only read where the first does not rule a shape out.
 #pragma once
 
 #include <array>
@@ -20,8 +20,8 @@ struct alignas(32) HalfRow {
 
 constexpr std::size_t kKindsPerHalf = kStatisticKinds / 2;
 
-/// Which statistics a half holds, in the order in which HalfSums counts them. The first half was
-/// chosen to tell most shapes apart.
+/// Which statistics a half holds, in the order of HalfSums. The first half was chosen to tell most
+/// shapes apart.
 constexpr std::array<Statistic, kKindsPerHalf> kFirstHalf{
     Statistic::kChords, Statistic::kThicknessByCentrality, Statistic::kThicknessByRadius, Statistic::kBending,
     Statistic::kSurfaceDistances};
@@ -29,32 +29,33 @@ constexpr std::array<Statistic, kKindsPerHalf> kSecondHalf{
     Statistic::kInteriorHarmonics, Statistic::kSurfaceHarmonics, Statistic::kFootprint, Statistic::kSpread,
     Statistic::kFootprintDistances};
 
-/// Sums of differences of levels between two shapes, for each statistic of a half; a reversible
-/// statistic's in the better sense.
+/// The L1 distance, in levels, of each statistic of a half; of a reversible one the smaller of both
+/// orders.
 using HalfSums = std::array<std::uint32_t, kKindsPerHalf>;
 
-/// Levels above kTopLevel are cut off.
+/// Without loss for levels up to kTopLevel; larger ones count as kTopLevel.
 void packStatistics(const ShapeStatistics& levels, HalfRow& first, HalfRow& second) noexcept;
 void unpackStatistics(const HalfRow& first, const HalfRow& second, ShapeStatistics& levels) noexcept;
 
 /// How to sum; the results are the same.
 enum class Instructions {
-    kBest,      ///< what this processor offers
+    kBest,      ///< the best that this processor has
     kPortable,  ///< plain loops
 };
 
-/// A query's statistics, prepared for differences against many. Immutable, thread-safe.
+/// A query's statistics, prepared to be compared with many. Immutable, thread-safe.
 class StatisticsDifference {
   public:
     explicit StatisticsDifference(const ShapeStatistics& query, Instructions use = Instructions::kBest);
 
-    /// Of rows[0, count) each; in the order of kFirstHalf and kSecondHalf.
+    /// Of each of rows[0, count); in the order of kFirstHalf.
     void first(const HalfRow* rows, std::size_t count, HalfSums* sums) const noexcept;
+    /// In the order of kSecondHalf.
     [[nodiscard]] HalfSums second(const HalfRow& row) const noexcept;
 
   private:
     HalfRow first_, second_;
-    HalfRow reversed_;  // the second half, where rows of reversible statistics are in reverse
+    HalfRow reversed_;  // the second half, with the rows of reversible statistics in reverse
     bool wide_;
 };
 

@@ -1,4 +1,4 @@
-#include "core/search/packed_statistics.h"
+#include "core/matching/attributed/packed_statistics.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "core/base/random.h"
-#include "core/matching/attributed/attribute_score.h"
+#include "core/matching/attributed/attributed_query.h"
 #include "tests/core/matching/attributed_signatures.h"
 
 namespace shapedb {
@@ -39,7 +39,7 @@ std::uint32_t plainSum(const ShapeStatistics& a, const ShapeStatistics& b, Stati
     return layout.reversibleRows > 0 ? std::min(sum(false), sum(true)) : sum(false);
 }
 
-TEST(PackedStatistics, UnpackIsTheInverse) {
+TEST(PackedStatistics, UnpackingReversesPacking) {
     Random random(1);
     for (int round = 0; round < 300; ++round) {
         const ShapeStatistics levels = randomLevels(random);
@@ -51,7 +51,7 @@ TEST(PackedStatistics, UnpackIsTheInverse) {
     }
 }
 
-TEST(PackedStatistics, CutsOffWhatIsNoLevel) {
+TEST(PackedStatistics, CutsOffLevelsAboveTheTop) {
     ShapeStatistics levels;
     levels.fill(200);
     HalfRow first, second;
@@ -68,7 +68,7 @@ TEST(PackedStatistics, HalvesHoldEveryStatisticOnce) {
     for (std::size_t i = 0; i < all.size(); ++i) EXPECT_EQ(static_cast<std::size_t>(all[i]), i);
 }
 
-TEST(PackedStatistics, SumsAreThoseOfPlainLoops) {
+TEST(PackedStatistics, SumsEqualPlainLoops) {
     Random random(2);
     for (int round = 0; round < 200; ++round) {
         const ShapeStatistics query = randomLevels(random);
@@ -93,8 +93,7 @@ TEST(PackedStatistics, SumsAreThoseOfPlainLoops) {
     }
 }
 
-// What the sums are weighed with is what the score weighs them with.
-TEST(PackedStatistics, WeightedSumsAreTheMeanDistance) {
+TEST(PackedStatistics, WeightedSumsEqualTheMeanDistance) {
     Random random(3);
     for (int round = 0; round < 500; ++round) {
         const Signature a = testing_support::randomAttributed(random);
@@ -105,19 +104,22 @@ TEST(PackedStatistics, WeightedSumsAreTheMeanDistance) {
             mean += weights.perLevel[kind] * plainSum(a.attributes->statistics, b.attributes->statistics,
                                                       static_cast<Statistic>(kind));
         }
-        const AttributeDistance distance = attributeDistance(a, b, {});
+        const double statistics = statisticsDistance(AttributedQuery(a).levelSums(PackedShape(b).row()),
+                                                     a.attributes->quality, b.attributes->quality);
+        const AttributeDistance distance =
+            attributeDistance(statistics, a.attributes->quality, b.attributes->quality, 0.0);
         EXPECT_NEAR(mean, distance.statistics / distance.totalWeight, 1e-12);
         EXPECT_NEAR(weights.partial, 1.0 - distance.containedWeight, 1e-12);
 
         const double best = attributeScore(distance, 1.0);
-        EXPECT_GE(scoreAt(mean), best);
-        EXPECT_LE(scoreAt(mean), best * (1.0 + 1e-6));
+        EXPECT_GE(maxScoreAtDistance(mean), best);
+        EXPECT_LE(maxScoreAtDistance(mean), best * (1.0 + 1e-6));
         EXPECT_GE(maxDistanceForScore(best), mean);
         EXPECT_LE(maxDistanceForScore(best), mean * (1.0 + 1e-6) + 1e-6);
     }
     EXPECT_EQ(maxDistanceForScore(0.0), INFINITY);
     EXPECT_LT(maxDistanceForScore(1.0), 1e-6);
-    EXPECT_EQ(scoreAt(0.0), 1.0);
+    EXPECT_EQ(maxScoreAtDistance(0.0), 1.0);
 }
 
 }  // namespace
