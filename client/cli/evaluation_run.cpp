@@ -36,7 +36,7 @@ Result<void> forEachItem(std::size_t count, unsigned threads, const RunContext& 
         stopped.store(true, std::memory_order_relaxed);
     };
     try {
-        // Without this oneTBB gives no more threads than processors, and says so on standard error.
+        // Without this, oneTBB starts no more threads than there are processors, with a warning on stderr.
         const tbb::global_control allowed(tbb::global_control::max_allowed_parallelism, threads);
         tbb::task_arena arena(static_cast<int>(threads));
         arena.execute([&] {

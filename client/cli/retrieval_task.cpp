@@ -35,7 +35,7 @@ std::string listed(const std::set<std::string>& names) {
     return text;
 }
 
-/// A misspelt class would quietly measure something else.
+/// A misspelt class must not silently change what is measured.
 Result<void> checkClasses(const std::vector<std::string>& asked, const std::set<std::string>& known) {
     for (const std::string& name : asked) {
         if (known.count(name) == 0) {
