@@ -13,7 +13,7 @@ namespace shapedb {
 
 /// The L1 distance of each statistic of two shapes, in levels (steps of the square root of a share); of
 /// a reversible statistic the smaller of both orders. By Statistic.
-using LevelSums = std::array<std::uint32_t, kStatisticKinds>;
+using LevelSums = std::array<std::uint16_t, kStatisticKinds>;
 
 /// What the mean distance D of two shapes is made of. Each term is in units of what unrelated shapes
 /// typically differ by. The weights depend on the worse of the two interiors: the less reliable it is,
