@@ -149,7 +149,7 @@ TEST_F(AdminRpc, RebuildWithNewParametersWhileSearching) {
 }
 
 TEST_F(AdminRpc, ShapesAddedDuringARebuildGetTheNewParameters) {
-    fill(10, 8'000);
+    fill(10, 4'000);
     pb::RebuildRequest request = rebuildRequest();
     request.mutable_signature()->set_max_points(2);
     request.set_detach(true);
@@ -167,12 +167,12 @@ TEST_F(AdminRpc, ShapesAddedDuringARebuildGetTheNewParameters) {
         return encodeSignature(describe(unpack(dumbbell(seed, points)), parameters)->signature);
     };
     EXPECT_EQ(listAll(client, collection).size(), 15u);
-    EXPECT_EQ(signatureOf("9"), expected(10, 8'000));
+    EXPECT_EQ(signatureOf("9"), expected(10, 4'000));
     for (int i = 0; i < 5; ++i) EXPECT_EQ(signatureOf("new " + std::to_string(i)), expected(100, 3'000));
 }
 
 TEST_F(AdminRpc, SecondRebuildFollowsTheFirstOrIsRefused) {
-    fill(6, 20'000);
+    fill(6, 12'000);
     pb::RebuildRequest request = rebuildRequest();
     request.mutable_signature()->set_max_points(4);
     request.set_detach(true);
@@ -189,7 +189,7 @@ TEST_F(AdminRpc, SecondRebuildFollowsTheFirstOrIsRefused) {
 }
 
 TEST_F(AdminRpc, CancelledRebuildChangesNothing) {
-    fill(4, 30'000);
+    fill(4, 12'000);
     const std::string before = signatureOf("0");
     pb::RebuildRequest request = rebuildRequest();
     request.mutable_signature()->set_max_points(1);
@@ -211,7 +211,7 @@ TEST_F(AdminRpc, CancelledRebuildChangesNothing) {
 }
 
 TEST_F(AdminRpc, RebuildContinuesWhenItsCallIsLost) {
-    fill(5, 20'000);
+    fill(5, 8'000);
     {
         CallContext context;
         const auto reader = client.admin->Rebuild(&context, rebuildRequest());

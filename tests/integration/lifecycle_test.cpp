@@ -179,7 +179,7 @@ TEST_F(Lifecycle, KillDuringIngestLosesNothingAcknowledged) {
     }
     EXPECT_TRUE(eventually([&] {
         const std::lock_guard<std::mutex> lock(mutex);
-        return acknowledged.size() >= 60;
+        return acknowledged.size() >= 40;
     }));
     server->kill();
     stop = true;
@@ -280,7 +280,7 @@ TEST_F(Lifecycle, RestartContinuesARebuild) {
     start();
     for (int i = 0; i < 6; ++i) {
         ASSERT_TRUE(
-            addAndWait(*client, "", std::to_string(i), slowScan(static_cast<std::uint64_t>(i), 25'000)).ok());
+            addAndWait(*client, "", std::to_string(i), slowScan(static_cast<std::uint64_t>(i), 12'000)).ok());
     }
     pb::RebuildRequest request;
     request.set_collection("default");
