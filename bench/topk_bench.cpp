@@ -24,6 +24,7 @@
 #include "client/cli/exit_code.h"
 #include "core/base/random.h"
 #include "core/base/return_if_error.h"
+#include "core/matching/score.h"
 #include "core/search/top_k.h"
 
 namespace shapedb::bench {
@@ -270,9 +271,9 @@ class TopKRun {
     Result<void> checkQuery(std::size_t q, const std::vector<std::uint64_t>& rows,
                             const std::vector<Signature>& signatures, bool full) const {
         std::vector<SearchHit> expected(rows.size());
+        const auto scorer = makeScorer(queries_.signatures[q], options_.score);
         tbb::parallel_for(std::size_t{0}, rows.size(), [&](std::size_t i) {
-            expected[i] = {static_cast<std::int64_t>(rows[i] + 1),
-                           score(queries_.signatures[q], signatures[i], options_.score)};
+            expected[i] = {static_cast<std::int64_t>(rows[i] + 1), scorer->score(signatures[i])};
         });
         const auto before = [](const SearchHit& a, const SearchHit& b) {
             return a.score != b.score ? a.score > b.score : a.id < b.id;
@@ -295,7 +296,7 @@ class TopKRun {
             }
             for (const SearchHit& hit : hits) {
                 const Signature anew = generator_->make(static_cast<std::uint64_t>(hit.id - 1));
-                right = right && score(queries_.signatures[q], anew, options_.score) == hit.score;
+                right = right && scorer->score(anew) == hit.score;
             }
         }
         if (right) return {};

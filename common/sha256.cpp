@@ -8,12 +8,12 @@ namespace shapedb {
 
 namespace {
 
-// OpenSSL's digest calls fail for want of memory only: the algorithm is always built in.
+// OpenSSL's digest calls fail only without memory: the algorithm is always built in.
 void require(int ok) {
     if (ok != 1) throw std::bad_alloc();
 }
 
-// Looked up once: EVP_sha256() is searched for by name at each use, which takes as long as hashing some
+// Fetched once: using EVP_sha256() looks it up by name every time, which takes as long as hashing some
 // hundred bytes.
 const EVP_MD* algorithm() {
     static const EVP_MD* const found = EVP_MD_fetch(nullptr, "SHA256", nullptr);
@@ -58,15 +58,18 @@ Sha256Digest sha256(const void* data, std::size_t size) {
     return digest;
 }
 
-std::string toHex(const Sha256Digest& digest) {
+std::string toHex(const void* data, std::size_t size) {
     static constexpr char kDigits[] = "0123456789abcdef";
+    const auto* bytes = static_cast<const unsigned char*>(data);
     std::string text;
-    text.reserve(2 * digest.size());
-    for (const std::uint8_t byte : digest) {
-        text.push_back(kDigits[byte >> 4]);
-        text.push_back(kDigits[byte & 15]);
+    text.reserve(2 * size);
+    for (std::size_t i = 0; i < size; ++i) {
+        text.push_back(kDigits[bytes[i] >> 4]);
+        text.push_back(kDigits[bytes[i] & 15]);
     }
     return text;
 }
+
+std::string toHex(const Sha256Digest& digest) { return toHex(digest.data(), digest.size()); }
 
 }  // namespace shapedb

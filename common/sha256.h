@@ -1,5 +1,4 @@
-// SHA-256 for the checksum of points (on the wire and in the database) and for the
-// fingerprints the store keeps. Used by server/ and client/, so that both mean the same.
+// SHA-256: the checksum of points on the wire and in the database, and of backups.
 #pragma once
 
 #include <array>
@@ -12,15 +11,15 @@ namespace shapedb {
 
 using Sha256Digest = std::array<std::uint8_t, 32>;
 
-/// The digest of `size` bytes at `data` (which may be null when size is 0).
-/// Throws std::bad_alloc, nothing else. Thread-safe.
+/// `data` may be null if `size` is 0. Throws only std::bad_alloc. Thread-safe.
 Sha256Digest sha256(const void* data, std::size_t size);
 
-/// 64 lower-case hexadecimal digits.
+/// Two lower-case hexadecimal digits per byte.
+std::string toHex(const void* data, std::size_t size);
 std::string toHex(const Sha256Digest& digest);
 
-/// The same digest over pieces that arrive one after another. Not thread-safe: one per
-/// thread. Movable, not copyable. The constructor throws std::bad_alloc, nothing else.
+/// The digest of data that arrives in pieces. Movable, not copyable; not thread-safe. The constructor throws
+/// only std::bad_alloc.
 class Sha256 {
   public:
     Sha256();
@@ -28,11 +27,10 @@ class Sha256 {
     Sha256(Sha256&&) noexcept;
     Sha256& operator=(Sha256&&) noexcept;
 
-    /// Appends `size` bytes; null is allowed when size is 0.
+    /// `data` may be null if `size` is 0.
     void update(const void* data, std::size_t size);
 
-    /// The digest of all pieces since the start or since the last `finish`; afterwards
-    /// the object is as new.
+    /// The digest of everything since the last `finish`; the object can then be used again.
     Sha256Digest finish();
 
   private:

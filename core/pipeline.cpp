@@ -27,14 +27,6 @@ void recommend(ShapeParameters& parameters) {
 
 }  // namespace
 
-const char* profileName(Profile profile) noexcept {
-    switch (profile) {
-        case Profile::kPaper: return "paper";
-        case Profile::kDefault: return "default";
-    }
-    return "default";
-}
-
 Result<Profile> profileFromName(const std::string& name) {
     for (const Profile profile : {Profile::kPaper, Profile::kDefault}) {
         if (name == profileName(profile)) return profile;

@@ -5,19 +5,12 @@
 
 #include "core/base/error.h"
 #include "core/base/run_context.h"
+#include "core/profile.h"
 #include "core/segmentation/segmentation.h"
 #include "core/signature/signature.h"
 
 namespace shapedb {
 
-/// The numbers are persisted in collection parameters: never renumber.
-enum class Profile : int {
-    kPaper = 0,    ///< points and weights exactly as published; all points, no decimation
-    kDefault = 1,  ///< for real scans: prepared points, adaptive interior, attributes; what we recommend
-};
-
-/// "paper" or "default".
-[[nodiscard]] const char* profileName(Profile profile) noexcept;
 /// Errors: kInvalidArgument listing the names.
 [[nodiscard]] Result<Profile> profileFromName(const std::string& name);
 

@@ -20,7 +20,6 @@ constexpr std::size_t kBackupChunkBytes = std::size_t{1} << 20;
 
 std::string asBytes(const Sha256Digest& digest) { return {digest.begin(), digest.end()}; }
 
-/// Receives one backup stream into `file`.
 template <typename Stream>
 Result<BackupReport> receiveBackup(Stream& stream, BackupFile& file, const RunContext& context) {
     RETURN_IF_ERROR(file.open());
@@ -49,7 +48,7 @@ Result<BackupReport> receiveBackup(Stream& stream, BackupFile& file, const RunCo
     return report;
 }
 
-/// Sends the file: the size goes with the first chunk, the checksum with the last.
+/// The size goes with the first chunk, the checksum with the last.
 template <typename Stream>
 Result<void> sendBackup(Stream& stream, std::ifstream& file, std::uint64_t size, const std::string& path,
                         const RunContext& context) {
@@ -57,7 +56,7 @@ Result<void> sendBackup(Stream& stream, std::ifstream& file, std::uint64_t size,
     std::string buffer(kBackupChunkBytes, '\0');
     std::uint64_t sent = 0;
     while (sent < size) {
-        // Never beyond the announced size, even if somebody appends to the file meanwhile.
+        // Never beyond the announced size, even if the file grows meanwhile.
         file.read(buffer.data(),
                   static_cast<std::streamsize>(std::min<std::uint64_t>(buffer.size(), size - sent)));
         const auto count = static_cast<std::size_t>(file.gcount());
@@ -78,9 +77,8 @@ Result<void> sendBackup(Stream& stream, std::ifstream& file, std::uint64_t size,
     return {};
 }
 
-// grpc.health.v1 has one field each way: field 1 of HealthCheckRequest is the name of the service,
-// field 1 of HealthCheckResponse the status. Written out here, so that clients need not carry
-// another generated file.
+// grpc.health.v1 has one field each way: the name of the service in HealthCheckRequest, the status in
+// HealthCheckResponse. Written by hand, which spares a generated file.
 constexpr std::uint32_t kServiceTag = 0x0a;  // field 1, length-delimited
 constexpr std::uint32_t kStatusTag = 0x08;   // field 1, varint
 
@@ -154,8 +152,8 @@ Result<BackupReport> Client::backupToFile(const std::string& path, const RunCont
                                [&](grpc::ClientContext& rpc, Result<void>& local) {
                                    const auto stream = impl_->admin->Backup(&rpc, v1::BackupRequest());
                                    report = receiveBackup(*stream, file, context);
-                                   // Only a full disk of ours ends the call from this side; a short stream
-                                   // has its reason in the status.
+                                   // Only a full disk here ends the call from this side; a short stream has
+                                   // its reason in the status.
                                    if (!report && report.error().code == ErrorCode::kFileNotWritable) {
                                        local = fail(report.error());
                                        rpc.TryCancel();
@@ -172,7 +170,7 @@ Result<RestoreReport> Client::restoreFromFile(const std::string& path, const Run
     std::ifstream file(path, std::ios::binary | std::ios::ate);
     const std::streamoff size = file ? static_cast<std::streamoff>(file.tellg()) : -1;
     if (size < 0) return fail(ErrorCode::kFileNotReadable, path + ": cannot be opened for reading");
-    if (size == 0) return fail(ErrorCode::kFileNotReadable, path + ": is empty, so no backup");
+    if (size == 0) return fail(ErrorCode::kFileNotReadable, path + ": is empty, not a backup");
     file.seekg(0);
     v1::RestoreResponse response;
     const auto made =

@@ -1,4 +1,4 @@
-// The file a backup is written to. Private to client/api.
+// The file that a backup is written to. Private to client/api.
 #pragma once
 
 #include <cstdio>
@@ -8,8 +8,8 @@
 
 namespace shapedb::client {
 
-/// Collects a backup under `PATH.part` and gives it its name when it is complete and on the
-/// disk; without `commit` nothing is left behind. Not thread-safe.
+/// Collects a backup in `PATH.part` and renames it once it is complete and on disk; without `commit` nothing
+/// is left behind. Not thread-safe.
 class BackupFile {
   public:
     explicit BackupFile(std::string path) : path_(std::move(path)), part_(path_ + ".part") {}
@@ -17,10 +17,10 @@ class BackupFile {
     BackupFile& operator=(const BackupFile&) = delete;
     ~BackupFile();
 
-    /// Creates the file, empty; what an earlier attempt wrote is dropped.
+    /// Creates an empty file, dropping what an earlier attempt wrote.
     [[nodiscard]] Result<void> open();
     [[nodiscard]] Result<void> write(const std::string& data);
-    /// Flushes to the disk and renames. Errors of all three: kFileNotWritable.
+    /// Flushes to disk and renames. Errors of all three: kFileNotWritable.
     [[nodiscard]] Result<void> commit();
 
   private:

@@ -17,11 +17,11 @@ namespace {
 
 using Clock = RunContext::Clock;
 
-/// How often a waiting call looks whether it was cancelled.
+/// How often a waiting call checks for cancellation.
 constexpr auto kPoll = std::chrono::milliseconds(20);
 
-/// Cancels one rpc when the flag goes up. Blocking stubs have no other way in; the thread is
-/// only made for callers that can cancel at all.
+/// Cancels an rpc when the flag is set: blocking stubs offer no other way. Starts a thread only for callers
+/// that can cancel.
 class CancelWatch {
   public:
     CancelWatch(grpc::ClientContext& rpc, const std::atomic<bool>* flag) {
@@ -53,7 +53,7 @@ class CancelWatch {
     std::thread thread_;
 };
 
-/// The earlier of the caller's deadline and the one every call has.
+/// The earlier of the caller's deadline and the client's.
 Clock::time_point deadlineOf(const ClientOptions& options, const RunContext& context, CallTraits traits) {
     if (!traits.bounded || options.deadline.count() == 0) return context.deadline;
     return std::min(context.deadline, Clock::now() + options.deadline);
@@ -67,7 +67,7 @@ void setDeadline(grpc::ClientContext& rpc, Clock::time_point deadline) {
         std::chrono::duration_cast<std::chrono::system_clock::duration>(deadline - Clock::now()));
 }
 
-/// False when there is no time for it, or the caller cancels meanwhile.
+/// False if there is no time for it, or the caller cancels.
 bool sleepFor(std::chrono::milliseconds delay, Clock::time_point deadline, const RunContext& context) {
     const auto until = Clock::now() + delay;
     if (until >= deadline) return false;
@@ -82,7 +82,7 @@ Result<void> makeCallUnguarded(const ClientOptions& options, const RunContext& c
                                const Attempt& attempt) {
     RETURN_IF_ERROR(context.checkpoint());
     const Clock::time_point deadline = deadlineOf(options, context, traits);
-    // Jitter must differ between clients that failed together.
+    // Clients that failed together must not come back together.
     Random random(std::random_device{}());
     int inARow = 0;
     ErrorCode reason = ErrorCode::kInternal;
@@ -97,7 +97,7 @@ Result<void> makeCallUnguarded(const ClientOptions& options, const RunContext& c
         }
         RETURN_IF_ERROR(local);
         if (status.ok()) return {};
-        // Our own cancellation comes back as a failure of the rpc.
+        // A cancellation by the caller comes back as a failure of the rpc.
         if (const auto proceed = context.checkpoint();
             !proceed && proceed.error().code == ErrorCode::kCancelled) {
             return fail(proceed.error());
@@ -121,7 +121,7 @@ Result<void> makeCall(const ClientOptions& options, const RunContext& context, C
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::kOutOfMemory, "not enough memory for the call");
     } catch (const std::exception& e) {
-        return fail(ErrorCode::kInternal, std::string("the call failed on this side: ") + e.what());
+        return fail(ErrorCode::kInternal, std::string("the call failed in the client: ") + e.what());
     }
 }
 

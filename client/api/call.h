@@ -1,5 +1,4 @@
-// How every rpc is made: deadline, cancellation, retries and translation of the outcome, once.
-// Private to client/api.
+// How every rpc is made: deadline, cancellation, retries and errors in one place. Private to client/api.
 #pragma once
 
 #include <chrono>
@@ -21,7 +20,7 @@
 namespace shapedb::client {
 
 struct Client::Impl {
-    ClientOptions options;  ///< address with its port
+    ClientOptions options;  ///< the address includes the port
     std::shared_ptr<grpc::Channel> channel;
     std::unique_ptr<v1::ShapeService::Stub> shapes;
     std::unique_ptr<v1::SearchService::Stub> search;
@@ -29,9 +28,8 @@ struct Client::Impl {
     std::unique_ptr<v1::AdminService::Stub> admin;
 };
 
-/// How one rpc may be treated.
 struct CallTraits {
-    bool idempotent = true;  ///< may be made again
+    bool idempotent = true;  ///< may be retried
     bool bounded = true;     ///< ClientOptions::deadline applies
 };
 
@@ -40,16 +38,16 @@ constexpr CallTraits kOnce{false, true};
 constexpr CallTraits kIdempotentUnbounded{true, false};
 constexpr CallTraits kOnceUnbounded{false, false};
 
-/// One attempt: makes the rpc with the given context and returns its status. A failure on this
-/// side (a file that cannot be written) goes to `local`; the attempt then cancels the rpc.
+/// One attempt: makes the rpc and returns its status. For a failure on this side (a file that cannot be
+/// written) it sets `local` and cancels the rpc.
 using Attempt = std::function<grpc::Status(grpc::ClientContext& rpc, Result<void>& local)>;
 
-/// Makes the call until it succeeds, its failure is final, or time is up. No exception leaves.
-/// The error of the last attempt is reported even when it is time that forbids another one.
+/// Retries until the call succeeds, fails for good or runs out of time, and returns the error of the last
+/// attempt. Never throws.
 [[nodiscard]] Result<void> makeCall(const ClientOptions& options, const RunContext& context,
                                     CallTraits traits, const Attempt& attempt);
 
-/// A unary rpc: `Stub::Method` of `stub` with `request`.
+/// A unary rpc.
 template <typename Stub, typename Request, typename Response>
 [[nodiscard]] Result<Response> callUnary(
     const ClientOptions& options, const RunContext& context, CallTraits traits, Stub& stub,

@@ -11,20 +11,20 @@ namespace shapedb::client {
 
 namespace {
 
-/// A lost connection is tried again about as soon as a call is.
+/// Reconnecting keeps pace with RetryPolicy.
 constexpr int kFirstReconnectMs = 100;
 constexpr int kLongestReconnectMs = 2000;
 
 grpc::ChannelArguments channelArguments() {
     grpc::ChannelArguments arguments;
-    // Replies are as large as the caller asked for (1,000 hits with their metadata).
+    // A reply may be large: 1,000 hits with metadata and explanations.
     arguments.SetMaxReceiveMessageSize(-1);
-    // Retries are decided here, with the server's own error names; gRPC must not add its own.
+    // call.cpp retries, by the server's error names; gRPC must not retry as well.
     arguments.SetInt(GRPC_ARG_ENABLE_RETRIES, 0);
     arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, kFirstReconnectMs);
     arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, kFirstReconnectMs);
     arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, kLongestReconnectMs);
-    // Two clients of one process have a connection each.
+    // Each Client has its own connection.
     arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
     return arguments;
 }

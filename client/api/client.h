@@ -21,17 +21,16 @@
 
 namespace shapedb::client {
 
-/// The port of an address without one.
+/// Used for addresses without a port.
 constexpr int kDefaultPort = 7878;
 
-/// When a call that changes nothing by being made twice is made again: after the server could
-/// not be reached or said that its queue is full, never after any other error. The wait before
-/// try n is initialBackoff * multiplier^(n - 2), at most maxBackoff, and shortened or lengthened
-/// at random by up to `jitter` of itself; when the server says how long to wait
-/// (`grpc-retry-pushback-ms`), that is the wait. Tries are counted anew when the reason changes.
+/// When an idempotent call is retried: if the server cannot be reached or its queue is full, never after any
+/// other error. Before try n the client waits initialBackoff * multiplier^(n - 2), at most maxBackoff, varied
+/// at random by `jitter`; or as long as the server asks for (`grpc-retry-pushback-ms`). The count starts
+/// again when the reason changes.
 struct RetryPolicy {
-    int maxAttempts = 5;       ///< while the server cannot be reached; at least 1; 1: never again
-    int maxQueueAttempts = 5;  ///< while its queue is full; the same
+    int maxAttempts = 5;       ///< tries in all while the server cannot be reached; at least 1
+    int maxQueueAttempts = 5;  ///< tries in all while its queue is full; at least 1
     std::chrono::milliseconds initialBackoff{100};
     double multiplier = 2.0;  ///< at least 1
     std::chrono::milliseconds maxBackoff{5000};
@@ -39,25 +38,23 @@ struct RetryPolicy {
 };
 
 struct ClientOptions {
-    /// HOST, HOST:PORT, [IPV6]:PORT, or a name gRPC understands ("unix:/run/shapedb.sock").
+    /// HOST, HOST:PORT, [IPV6]:PORT, or any name that gRPC understands ("unix:/run/shapedb.sock").
     std::string address = "127.0.0.1:7878";
-    /// What one call may take, all its tries together; 0: as long as it takes. Calls that follow
-    /// work on the server (watchIngest, addShape with wait, rebuild, backup, restore, check)
-    /// are bounded by the deadline of their RunContext alone.
+    /// The most one call may take, retries included; 0: no limit. Calls that follow work on the server
+    /// (watchIngest, addShape with wait, rebuild, backup, restore, check) are limited by their RunContext
+    /// alone.
     std::chrono::milliseconds deadline{60000};
     RetryPolicy retry{};
 };
 
-/// A connection to one server. It is made when first needed and again after it was lost.
+/// A connection to one server, opened when first needed and reopened when lost.
 ///
-/// Every call blocks until its answer is there. A RunContext cancels it (kCancelled, within
-/// about 20 ms) and bounds it further (kDeadlineExceeded); uploads and downloads report progress
-/// to it in bytes.
+/// Every call blocks until it is answered. A RunContext can cancel it (kCancelled, within about 20 ms) and
+/// limit its time (kDeadlineExceeded), and hears the progress of uploads and downloads in bytes.
 ///
-/// Errors of every call, not repeated below: those the server sends, by its own name and
-/// message; kUnavailable when it cannot be reached; kDeadlineExceeded; kCancelled;
-/// kOutOfMemory; kInternal. Scans are checked before they are sent: kTooFewPoints (none at all),
-/// kNonFiniteCoordinate, and kCoordinateOutOfRange for what single precision cannot hold.
+/// Errors of every call, not repeated below: the server's, with its name and message; kUnavailable (cannot be
+/// reached); kDeadlineExceeded; kCancelled; kOutOfMemory; kInternal. Scans are checked before they are sent:
+/// kTooFewPoints (none), kNonFiniteCoordinate, kCoordinateOutOfRange (beyond single precision).
 ///
 /// Thread-safety: all member functions may be called from any number of threads at once.
 class Client {
@@ -69,20 +66,19 @@ class Client {
     Client(Client&&) noexcept;
     Client& operator=(Client&&) noexcept;
 
-    /// As connected to, with the port.
+    /// The server's address, with the port.
     [[nodiscard]] const std::string& address() const;
 
     // ------------------------------------------------------------------------------------ shapes
 
-    /// Uploads one scan with its count and checksum, in chunks of at most 1 MiB. When it returns
-    /// the scan is durable. The same key with the same points and metadata is the same shape, so
-    /// it is retried unless expectedVersion is set.
+    /// Uploads one scan with its count and checksum, in chunks of at most 1 MiB. On return the scan is
+    /// durable. The same key with the same points and metadata is the same shape, so the call is retried
+    /// unless expectedVersion is set.
     ///
-    /// Points travel in single precision. When the scan lies so far from the origin that this
-    /// would round away its detail (a coordinate beyond 16 times the diagonal of its bounding
-    /// box, as in surveyed coordinates), the centre of the box is taken off first: the method
-    /// does not depend on where a shape lies. The offset is returned and kept in the metadata
-    /// under kOffsetKey; coordinates of this shape that the server returns are without it.
+    /// Points travel in single precision. If the scan lies so far from the origin that rounding would hurt it
+    /// (a coordinate beyond 16 diagonals of the bounding box, as in surveyed coordinates), the centre of the
+    /// box is subtracted first. The offset is returned, and kept in the metadata under kOffsetKey;
+    /// coordinates of this shape that the server returns are relative to it.
     [[nodiscard]] Result<AddReply> addShape(const AddRequest& request, const PointCloud& points,
                                             const RunContext& context = {}) const;
 
@@ -93,18 +89,18 @@ class Client {
     [[nodiscard]] Result<ListPage> listShapes(const ListRequest& request,
                                               const RunContext& context = {}) const;
 
-    /// How many shapes listShapes would give in all; page size and cursor do not matter.
+    /// How many shapes listShapes would return in all; page size and cursor are ignored.
     [[nodiscard]] Result<std::uint64_t> countShapes(const ListRequest& request,
                                                     const RunContext& context = {}) const;
 
-    /// Removes shape, points and signature; returns the shape as it was. Not retried.
-    /// Errors: kNotFound; kVersionConflict when `expectedVersion` is set and not the current one.
+    /// Deletes the shape with its points and signature; returns what it was. Not retried.
+    /// Errors: kNotFound; kVersionConflict if `expectedVersion` is set and is not the current one.
     [[nodiscard]] Result<Shape> deleteShape(const ShapeRef& shape,
                                             std::optional<std::int64_t> expectedVersion = {},
                                             const RunContext& context = {}) const;
 
-    /// Calls `onEvent` with the current state and then with each change until the shape is
-    /// kReady or kFailed; returns that last event. Errors: kNotFound.
+    /// Calls `onEvent` with the current state and with each change until the shape is kReady or kFailed;
+    /// returns the last event. Errors: kNotFound.
     [[nodiscard]] Result<IngestEvent> watchIngest(const ShapeRef& shape,
                                                   const std::function<void(const IngestEvent&)>& onEvent,
                                                   const RunContext& context = {}) const;
@@ -112,24 +108,24 @@ class Client {
     /// Errors: kNotFound, kNotReady.
     [[nodiscard]] Result<Signature> getSignature(const ShapeRef& shape, const RunContext& context = {}) const;
 
-    /// The stored points with their segments. Errors: kNotFound, those of a segmentation.
+    /// The stored points with their segments. Errors: kNotFound; those of a segmentation.
     [[nodiscard]] Result<SegmentedScan> getSegments(const ShapeRef& shape,
                                                     const RunContext& context = {}) const;
 
-    /// Segments a scan on the server without storing it. The points returned are as they
-    /// travelled: see addShape. Errors: those of a segmentation.
+    /// Segments a scan on the server without storing it. The points come back as they were sent (see
+    /// addShape). Errors: those of a segmentation.
     [[nodiscard]] Result<SegmentedScan> segment(const PointCloud& points, const Parameters& parameters,
                                                 bool summaryOnly, const RunContext& context = {}) const;
 
     // ------------------------------------------------------------------------------------ search
 
-    /// Errors of the searches: kNotFound, kNotReady, kInvalidArgument (k, threshold),
-    /// kMalformedFilter, kMalformedSignature.
+    /// Errors of all searches: kNotFound, kNotReady, kInvalidArgument (k, threshold), kMalformedFilter,
+    /// kMalformedSignature.
     [[nodiscard]] Result<SearchReply> searchByKey(const SearchOptions& options, const std::string& key,
                                                   bool includeSelf = false,
                                                   const RunContext& context = {}) const;
 
-    /// The query travels as in addShape; motions lead to its coordinates without the offset.
+    /// The query travels as in addShape; motions lead to its coordinates relative to the offset.
     [[nodiscard]] Result<SearchReply> searchByScan(const SearchOptions& options, const PointCloud& points,
                                                    const RunContext& context = {}) const;
 
@@ -137,7 +133,7 @@ class Client {
                                                         const std::string& encodedSignature,
                                                         const RunContext& context = {}) const;
 
-    /// Answers in the order of the queries; the first error ends the call and names its query.
+    /// Replies in the order of the queries. The first error ends the call and names its query.
     [[nodiscard]] Result<std::vector<SearchReply>> searchBatch(const SearchOptions& options,
                                                                const std::vector<BatchQuery>& queries,
                                                                const RunContext& context = {}) const;
@@ -160,44 +156,43 @@ class Client {
     /// By name.
     [[nodiscard]] Result<std::vector<Collection>> listCollections(const RunContext& context = {}) const;
 
-    /// With every shape in it. Not retried. Errors: kNotFound; kRejected when it holds shapes and
-    /// `force` is false.
+    /// Deletes its shapes too. Not retried. Errors: kNotFound; kRejected if it has shapes and `force` is
+    /// false.
     [[nodiscard]] Result<void> deleteCollection(const std::string& name, bool force,
                                                 const RunContext& context = {}) const;
 
     // ------------------------------------------------------------------------------------- admin
 
-    /// Follows a rebuild until it is done; calls `onProgress` on the way and returns its last
-    /// word on each collection. The rebuild goes on when the call is cancelled or lost; calling
-    /// again follows it. Errors: kNotFound; kRejected when one with other parameters runs.
+    /// Starts a rebuild, or joins one that is running, and follows it to its end. Returns the last progress
+    /// of each collection. Cancelling or losing the call does not stop the rebuild; calling again follows it.
+    /// Errors: kNotFound; kRejected if one with other parameters is running.
     [[nodiscard]] Result<std::vector<RebuildProgress>> rebuild(
         const RebuildRequest& request, const std::function<void(const RebuildProgress&)>& onProgress,
         const RunContext& context = {}) const;
 
-    /// Not retried. Errors: kNotFound: none is running.
+    /// Not retried. Errors: kNotFound (none is running).
     [[nodiscard]] Result<void> cancelRebuild(const std::string& collection,
                                              const RunContext& context = {}) const;
 
-    /// Writes a consistent copy of the database to `path`: under another name first, and renamed
-    /// when it is complete and its checksum is right. Errors: kFileNotWritable,
-    /// kChecksumMismatch, kCountMismatch.
+    /// Writes a consistent copy of the database to `path`, under another name first and renamed when it is
+    /// complete and its checksum right. Errors: kFileNotWritable, kChecksumMismatch, kCountMismatch.
     [[nodiscard]] Result<BackupReport> backupToFile(const std::string& path,
                                                     const RunContext& context = {}) const;
 
-    /// Replaces everything on the server by the backup at `path`. Not retried.
+    /// Replaces everything on the server with the backup at `path`. Not retried.
     /// Errors: kFileNotReadable.
     [[nodiscard]] Result<RestoreReport> restoreFromFile(const std::string& path,
                                                         const RunContext& context = {}) const;
 
-    /// Reads the whole database; the problems it found, one line each, none when it is sound.
+    /// Reads the whole database. Returns the problems found, one line each; empty if it is sound.
     [[nodiscard]] Result<std::vector<std::string>> check(
         const std::function<void(const CheckProgress&)>& onProgress, const RunContext& context = {}) const;
 
     [[nodiscard]] Result<Stats> stats(const RunContext& context = {}) const;
     [[nodiscard]] Result<ServerInfo> serverInfo(const RunContext& context = {}) const;
 
-    /// Of one service by its full name ("shapedb.v1.SearchService"), or of the server as a whole
-    /// when empty. Not retried: an answer late is no answer. Errors: kNotFound.
+    /// State of one service by its full name ("shapedb.v1.SearchService"), or of the whole server if empty.
+    /// Not retried. Errors: kNotFound.
     [[nodiscard]] Result<Health> health(const std::string& service = {},
                                         const RunContext& context = {}) const;
 

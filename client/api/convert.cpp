@@ -23,14 +23,6 @@ ShapeState fromWire(v1::ShapeState from) {
     }
 }
 
-InteriorSource fromWire(v1::InteriorSource from) {
-    switch (from) {
-        case v1::INTERIOR_SOURCE_POTENTIAL: return InteriorSource::kPotential;
-        case v1::INTERIOR_SOURCE_THICKENED: return InteriorSource::kThickened;
-        default: return InteriorSource::kWalk;
-    }
-}
-
 Motion fromWire(const v1::Motion& from) {
     Motion motion;
     motion.scale = from.scale();
@@ -54,15 +46,6 @@ const char* stateName(ShapeState state) noexcept {
         case ShapeState::kFailed: return "failed";
     }
     return "pending";
-}
-
-const char* sourceName(InteriorSource source) noexcept {
-    switch (source) {
-        case InteriorSource::kWalk: return "walk";
-        case InteriorSource::kPotential: return "potential";
-        case InteriorSource::kThickened: return "thickened";
-    }
-    return "walk";
 }
 
 const char* outcomeName(AddOutcome outcome) noexcept {
@@ -181,7 +164,7 @@ SegmentationReport fromWire(const v1::SegmentationReport& from) {
     to.duplicates = from.duplicates();
     to.outliers = from.outliers();
     if (from.has_quality()) to.quality = from.quality();
-    to.interiorSource = fromWire(from.interior_source());
+    to.interiorSource = wire::fromProto(from.interior_source()).value_or(InteriorSource::kWalk);
     to.angleDegrees = from.angle_degrees();
     to.noise = from.noise();
     to.tetrahedra = from.tetrahedra();
@@ -235,7 +218,7 @@ Collection fromWire(const v1::Collection& from) {
     Collection to;
     to.name = from.name();
     to.description = from.description();
-    to.parameters.profile = from.profile() == v1::PROFILE_PAPER ? Profile::kPaper : Profile::kDefault;
+    to.parameters.profile = wire::fromProto(from.profile()).value_or(Profile::kDefault);
     const v1::SegmentationParameters& segmentation = from.segmentation();
     to.parameters.bigBallRatio = segmentation.big_ball_ratio();
     to.parameters.deepAngleDegrees = segmentation.deep_angle_degrees();
@@ -248,9 +231,8 @@ Collection fromWire(const v1::Collection& from) {
     to.parameters.outlierRatio = segmentation.outlier_ratio();
     to.parameters.smoothingReach = segmentation.smoothing_reach();
     to.parameters.thinning = segmentation.thinning();
-    to.parameters.interiorMethod = segmentation.interior_method() == v1::INTERIOR_METHOD_ADAPTIVE
-                                       ? InteriorMethod::kAdaptive
-                                       : InteriorMethod::kWalk;
+    to.parameters.interiorMethod =
+        wire::fromProto(segmentation.interior_method()).value_or(InteriorMethod::kWalk);
     to.parameters.maxPoints = from.signature().max_points();
     to.parameters.attributes = from.signature().attributes();
     to.generation = from.generation();

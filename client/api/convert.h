@@ -1,10 +1,10 @@
-// Between the values of types.h and the messages of the wire. Private to client/api.
+// Between the values of types.h and the messages of the API. Not installed.
 //
-// Nothing here trusts the server: a value it has no business sending (an unknown state, too few
-// extents) becomes the nearest harmless one, because a newer server may mean something by it.
+// Values that only a newer server knows (an unknown state, too few extents) become the nearest harmless ones.
 #pragma once
 
 #include "client/api/types.h"
+#include "common/wire_enums.h"
 #include "shapedb/v1/admin_service.pb.h"
 #include "shapedb/v1/collection_service.pb.h"
 #include "shapedb/v1/search_service.pb.h"
@@ -15,12 +15,10 @@ namespace shapedb::client {
 void fill(const ShapeRef& from, v1::ShapeRef* to);
 void fill(const SearchOptions& from, v1::SearchOptions* to);
 
-/// The parameters as the three fields each request has for them.
+/// Sets the three fields that each request has for parameters.
 template <typename Message>
 void fillParameters(const Parameters& from, Message* to) {
-    if (from.profile) {
-        to->set_profile(*from.profile == Profile::kPaper ? v1::PROFILE_PAPER : v1::PROFILE_DEFAULT);
-    }
+    if (from.profile) to->set_profile(wire::toProto(*from.profile));
     if (from.bigBallRatio) to->mutable_segmentation()->set_big_ball_ratio(*from.bigBallRatio);
     if (from.deepAngleDegrees) to->mutable_segmentation()->set_deep_angle_degrees(*from.deepAngleDegrees);
     if (from.hullAngleDegrees) to->mutable_segmentation()->set_hull_angle_degrees(*from.hullAngleDegrees);
@@ -33,9 +31,7 @@ void fillParameters(const Parameters& from, Message* to) {
     if (from.smoothingReach) to->mutable_segmentation()->set_smoothing_reach(*from.smoothingReach);
     if (from.thinning) to->mutable_segmentation()->set_thinning(*from.thinning);
     if (from.interiorMethod) {
-        to->mutable_segmentation()->set_interior_method(*from.interiorMethod == InteriorMethod::kWalk
-                                                            ? v1::INTERIOR_METHOD_WALK
-                                                            : v1::INTERIOR_METHOD_ADAPTIVE);
+        to->mutable_segmentation()->set_interior_method(wire::toProto(*from.interiorMethod));
     }
     if (from.maxPoints) to->mutable_signature()->set_max_points(*from.maxPoints);
     if (from.attributes) to->mutable_signature()->set_attributes(*from.attributes);

@@ -14,15 +14,14 @@ namespace shapedb::client {
 namespace {
 
 constexpr double kLargest = std::numeric_limits<float>::max();
-/// Below this diagonal rounding to float32 loses detail to subnormals: 2^24 times the smallest
-/// normal number.
+/// Below this diagonal float32 loses detail to subnormals: 2^24 times the smallest normal number.
 constexpr double kSmallestDiagonal = static_cast<double>(std::numeric_limits<float>::min()) * 16777216.0;
 
 struct Extent {
     Point3 low;
     Point3 high;
 
-    // hypot, because the squares of 1e-300 are zero.
+    // std::hypot: the square of 1e-300 is zero.
     [[nodiscard]] double diagonal() const {
         return std::hypot(high.x - low.x, high.y - low.y, high.z - low.z);
     }
@@ -44,7 +43,7 @@ Result<Extent> extentOf(const PointCloud& points) {
         const Point3& p = points[i];
         if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
             return fail(ErrorCode::kNonFiniteCoordinate,
-                        pointText(i, p) + "; remove points without a measurement before sending the scan");
+                        pointText(i, p) + "; remove such points before sending the scan");
         }
         if (std::abs(p.x) > kLargest || std::abs(p.y) > kLargest || std::abs(p.z) > kLargest) {
             return fail(ErrorCode::kCoordinateOutOfRange,
@@ -78,7 +77,7 @@ double getFloat(const char* from) {
 
 Result<PackedPoints> packPoints(const PointCloud& points) {
     if (points.empty()) {
-        return fail(ErrorCode::kTooFewPoints, "the scan holds no points; a shape needs at least 4");
+        return fail(ErrorCode::kTooFewPoints, "the scan has no points; a shape needs at least 4");
     }
     const auto extent = extentOf(points);
     RETURN_IF_ERROR(extent);
@@ -87,7 +86,7 @@ Result<PackedPoints> packPoints(const PointCloud& points) {
         char buffer[160];
         std::snprintf(
             buffer, sizeof buffer,
-            "the whole scan is %g across, below what single precision holds (%.2g); use a smaller unit",
+            "the whole scan is only %g across, too small for single precision (%.2g); use a smaller unit",
             diagonal, kSmallestDiagonal);
         return fail(ErrorCode::kCoordinateOutOfRange, buffer);
     }
@@ -115,7 +114,7 @@ Result<void> unpackPoints(const std::string& bytes, PointCloud& points) {
     if (bytes.size() % kPointBytes != 0) {
         return fail(ErrorCode::kMalformedStream, "the server sent a chunk of " +
                                                      std::to_string(bytes.size()) +
-                                                     " bytes, which is no whole number of points");
+                                                     " bytes, not a whole number of points");
     }
     for (std::size_t at = 0; at < bytes.size(); at += kPointBytes) {
         const char* from = bytes.data() + at;

@@ -8,7 +8,7 @@ namespace shapedb::client {
 
 namespace {
 
-/// Nothing when the server says not to come back.
+/// Nothing if the server says not to come back.
 std::optional<std::chrono::milliseconds> parsePushback(const std::string& text) {
     std::int64_t value = 0;
     const char* end = text.data() + text.size();
@@ -17,7 +17,7 @@ std::optional<std::chrono::milliseconds> parsePushback(const std::string& text) 
     return std::chrono::milliseconds(value);
 }
 
-/// How often a call that fails for this reason is made.
+/// Tries in all for a call that fails for this reason.
 int attemptsFor(const RetryPolicy& policy, ErrorCode code) {
     if (code == ErrorCode::kUnavailable) return policy.maxAttempts;
     return code == ErrorCode::kQueueFull ? policy.maxQueueAttempts : 1;

@@ -1,4 +1,4 @@
-// When and how soon a failed call is made again. Pure decisions; call.h does the waiting.
+// Whether and when to retry a failed call. Decisions only; call.h does the waiting.
 #pragma once
 
 #include <chrono>
@@ -11,16 +11,15 @@
 
 namespace shapedb::client {
 
-/// What a failed attempt leaves to decide by.
 struct AttemptFailure {
     ErrorCode code = ErrorCode::kInternal;
-    /// Trailing metadata `grpc-retry-pushback-ms`: how long to wait; negative or not a number
-    /// means "do not try again" (gRFC A6).
+    /// Trailing metadata `grpc-retry-pushback-ms`: how long to wait. Negative or not a number: do not retry
+    /// (gRFC A6).
     std::optional<std::string> pushback;
 };
 
-/// How long to wait before the next try, or nothing when the failure is final. `attempt` says how
-/// many tries in a row have now failed for this reason, from 1. Advances `random`.
+/// How long to wait before the next try; nothing if the failure is final. `attempt` counts the failures in a
+/// row for this reason, from 1. Advances `random`.
 [[nodiscard]] std::optional<std::chrono::milliseconds> retryDelay(const RetryPolicy& policy, int attempt,
                                                                   const AttemptFailure& failure,
                                                                   Random& random);

@@ -25,7 +25,7 @@ v1::AddShapeRequest addHeader(const AddRequest& request, const PackedPoints& pac
     return message;
 }
 
-/// Reads the answer of GetSegments and Segment to its end.
+/// Reads the reply of GetSegments or Segment.
 template <typename Stream>
 Result<void> readSegments(Stream& stream, SegmentedScan& scan, const RunContext& context) {
     v1::SegmentedPoints message;

@@ -25,7 +25,7 @@ ErrorCode codeOf(grpc::StatusCode code) {
         case grpc::StatusCode::CANCELLED: return ErrorCode::kCancelled;
         case grpc::StatusCode::DEADLINE_EXCEEDED: return ErrorCode::kDeadlineExceeded;
         case grpc::StatusCode::DATA_LOSS: return ErrorCode::kDataLoss;
-        default: return ErrorCode::kInternal;  // also RESOURCE_EXHAUSTED: the server's own has a name
+        default: return ErrorCode::kInternal;  // RESOURCE_EXHAUSTED too: the server names its own
     }
 }
 
@@ -44,7 +44,7 @@ Error errorOf(const grpc::Status& status, const TrailingMetadata& trailing, cons
             return {error.code, "the server at " + address + " did not answer before the deadline"};
         case grpc::StatusCode::UNIMPLEMENTED:
             return {error.code, "the server at " + address + " does not know this call (" + error.message +
-                                    "); is it a ShapeDB server, and not an older one?"};
+                                    "): is it a ShapeDB server, and new enough?"};
         default: return error;
     }
 }

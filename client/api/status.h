@@ -1,4 +1,4 @@
-// From the outcome of a gRPC call to an Error with the server's own name for it.
+// From the status of a gRPC call to an Error.
 #pragma once
 
 #include <map>
@@ -13,14 +13,13 @@ namespace shapedb::client {
 
 using TrailingMetadata = std::multimap<grpc::string_ref, grpc::string_ref>;
 
-/// The error of a call that failed. The server's name of the error (trailing metadata
-/// `shapedb-error`) decides the code; without one, as from a proxy or when nothing answered, the
-/// gRPC code does. `address` is named when the server could not be reached.
+/// The error of a failed call. Its code is the one the server names in the trailing metadata `shapedb-error`;
+/// without that (a proxy answered, or nobody) it follows from the gRPC code. `address` is for the message.
 [[nodiscard]] Error errorOf(const grpc::Status& status, const TrailingMetadata& trailing,
                             const std::string& address);
 
-/// What retryDelay needs of the same call. A RESOURCE_EXHAUSTED that is not the server's own full
-/// queue (a message too large, a proxy's quota) stays final unless it says when to come back.
+/// The same failure for retryDelay. RESOURCE_EXHAUSTED from elsewhere than the server's queue (a message too
+/// large, a proxy's quota) is final unless it says when to come back.
 [[nodiscard]] AttemptFailure failureOf(const grpc::Status& status, const TrailingMetadata& trailing,
                                        const Error& error);
 

@@ -1,4 +1,4 @@
-// Streams a packed scan into an rpc. Private to client/api.
+// Sends a packed scan. Private to client/api.
 #pragma once
 
 #include <algorithm>
@@ -8,8 +8,8 @@
 
 namespace shapedb::client {
 
-/// Writes `header` and then the points in chunks. Stops early when the server has already
-/// answered; the status of the call then says why. `Request` has the oneof {header, chunk}.
+/// Writes `header`, then the points in chunks. Stops early if the server has already answered; the status of
+/// the call then says why. `Request` has the oneof {header, chunk}.
 template <typename Request, typename Stream>
 void writeScan(Stream& stream, const Request& header, const PackedPoints& points, const RunContext& context) {
     if (!stream.Write(header)) return;

@@ -1,4 +1,4 @@
-// `shapedb add`: files and folders of scans into a collection.
+// `shapedb add`: stores files and folders of scans in a collection.
 #include <algorithm>
 #include <memory>
 #include <mutex>
@@ -21,7 +21,7 @@ using nlohmann::json;
 
 namespace {
 
-/// Results of more files than this are summed up instead of listed one by one.
+/// With more files than this only the totals are printed.
 constexpr std::size_t kListedFiles = 30;
 
 struct AddFlags {
@@ -39,7 +39,7 @@ struct AddFlags {
 
 struct Upload {
     std::string path;
-    std::string name;  ///< relative to the path that was given; decides key and seed
+    std::string name;  ///< relative to the given path; decides key and seed
     std::string key;
     std::string label;
     std::optional<client::AddReply> reply;
@@ -63,7 +63,7 @@ Result<std::vector<Upload>> listUploads(const AddFlags& flags) {
     if (!flags.key.empty()) {
         if (uploads.size() != 1) {
             return fail(ErrorCode::kInvalidArgument,
-                        "--key names one shape, but there are " + std::to_string(uploads.size()) + " files");
+                        "--key is for one scan, but there are " + std::to_string(uploads.size()) + " files");
         }
         uploads.front().key = flags.key;
     }
@@ -73,8 +73,7 @@ Result<std::vector<Upload>> listUploads(const AddFlags& flags) {
         if (!isNew) {
             return fail(ErrorCode::kInvalidArgument,
                         other->second + " and " + upload.path + " would both get the key '" + upload.key +
-                            "'; add them in two calls with --key, or from a folder "
-                            "above both");
+                            "'; add them separately with --key, or add a folder above both");
         }
     }
     return uploads;
@@ -105,17 +104,17 @@ void uploadOne(const client::Client& client, const AddFlags& flags, const client
     }
 }
 
-/// Nothing sent after this has a chance.
+/// After such an error the other files would fail too.
 bool endsTheRun(const Error& error) {
     return error.code == ErrorCode::kUnavailable || error.code == ErrorCode::kCancelled ||
            error.code == ErrorCode::kDeadlineExceeded;
 }
 
-/// `jobs` threads take the next file each until all are done or the server is gone.
+/// `jobs` threads take one file after the other until all are done or the server is gone.
 void uploadAll(Session& session, const client::Client& client, const AddFlags& flags,
                const client::Metadata& metadata, std::vector<Upload>& uploads) {
     RunContext context = session.context();
-    context.progress = nullptr;  // counted in files
+    context.progress = nullptr;  // progress counts files
     std::atomic<std::size_t> next{0};
     std::atomic<std::size_t> done{0};
     std::mutex mutex;
@@ -144,7 +143,7 @@ void uploadAll(Session& session, const client::Client& client, const AddFlags& f
     for (std::thread& worker : workers) worker.join();
 }
 
-/// Follows each stored shape to its end; all are being segmented meanwhile.
+/// Follows the shapes one after the other; the server segments all of them meanwhile.
 void waitForAll(Session& session, const client::Client& client, const AddFlags& flags,
                 std::vector<Upload>& uploads) {
     RunContext context = session.context();
@@ -216,13 +215,13 @@ std::string uploadsText(const std::vector<Upload>& uploads) {
         separator = ", ";
     }
     if (doubtful > 0) {
-        text += "; in " + formatCount(doubtful) + " of them the interior is a guess (quality below " +
-                formatNumber(kQualityWorthWarning) + ")";
+        text += "; in " + formatCount(doubtful, "scan", "scans") +
+                " the interior is a guess (quality below " + formatNumber(kQualityWorthWarning) + ")";
     }
     return text + "\n";
 }
 
-/// Names each failure; the exit code of the whole.
+/// Prints each failure; returns the exit code of the command.
 int reportFailures(Session& session, const std::vector<Upload>& uploads) {
     std::size_t failed = 0;
     int last = kOk;
@@ -239,7 +238,7 @@ int reportFailures(Session& session, const std::vector<Upload>& uploads) {
         session.console().note(formatCount(failed) + " of " + formatCount(uploads.size(), "file", "files") +
                                " failed");
     }
-    // One reason for everything is told as that; a mixed result as "some failed".
+    // If everything failed for one reason, that reason's code; otherwise "some failed".
     const bool interrupted = last == kInterrupted;
     return failed == uploads.size() && (uploads.size() == 1 || last == kUnavailable) ? last
            : interrupted                                                             ? kInterrupted
@@ -264,22 +263,22 @@ CommandResult runAdd(Session& session, const AddFlags& flags) {
 
 void addAddCommand(CLI::App& app, Session& session) {
     auto flags = std::make_shared<AddFlags>();
-    CLI::App* command = app.add_subcommand("add", "Store scans: files, and folders searched to any depth");
-    command->add_option("PATH", flags->paths, "Scans, or folders of scans")->required();
+    CLI::App* command = app.add_subcommand("add", "Store scans: files, or folders searched to any depth");
+    command->add_option("PATH", flags->paths, "Scan files or folders")->required();
     addCollectionOption(*command, flags->collection);
     command->add_option("--key", flags->key,
-                        "Key of the one scan [its path below the folder given, no ending]");
+                        "Key, if there is only one scan [path below the given folder, without ending]");
     command->add_flag("--label-from-folder", flags->labelFromFolder,
-                      "Metadata label: the name of the folder that holds the file");
-    command->add_option("--meta", flags->metadata, "Metadata for every scan; repeat for more")
+                      "Set the metadata 'label' to the name of the file's folder");
+    command->add_option("--meta", flags->metadata, "Metadata of all scans; may be repeated")
         ->type_name("NAME=VALUE")
         ->allow_extra_args(false);
-    auto* insertOnly = command->add_flag("--insert-only", flags->insertOnly, "Fail when the key is taken");
-    command->add_flag("--update-only", flags->updateOnly, "Fail when the key is free")->excludes(insertOnly);
-    command->add_flag("--wait", flags->wait, "Return when all are segmented, not when all are stored");
+    auto* insertOnly = command->add_flag("--insert-only", flags->insertOnly, "Fail if the key is taken");
+    command->add_flag("--update-only", flags->updateOnly, "Fail if the key is free")->excludes(insertOnly);
+    command->add_flag("--wait", flags->wait, "Wait until all scans are segmented, not only stored");
     command
         ->add_option("--jobs", flags->jobs,
-                     "Files read and sent at the same time; with 1 the server numbers them in their order")
+                     "Files sent at the same time; with 1 their ids follow the order of the files")
         ->check(CLI::Range(1, 64))
         ->capture_default_str();
     addScanFlags(*command, flags->scan);

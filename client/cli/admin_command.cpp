@@ -10,6 +10,7 @@
 #include "client/cli/session.h"
 #include "client/cli/shape_output.h"
 #include "client/cli/text.h"
+#include "common/sha256.h"
 #include "core/base/return_if_error.h"
 
 namespace shapedb::cli {
@@ -39,7 +40,7 @@ CommandResult runRebuild(Session& session, const RebuildFlags& flags) {
     RETURN_IF_ERROR(client);
     if (flags.cancel) return runCancelRebuild(session, *client, flags);
     client::RebuildRequest request = flags.request;
-    request.parameters = flags.parameters.forServer();
+    request.parameters = flags.parameters.given;
     const auto results = client->rebuild(
         request,
         [&](const client::RebuildProgress& progress) {
@@ -60,7 +61,7 @@ CommandResult runRebuild(Session& session, const RebuildFlags& flags) {
                         {"seconds", one.seconds}});
         table.add({one.collection, formatCount(one.done) + " / " + formatCount(one.total),
                    formatCount(one.failed), formatSeconds(one.seconds),
-                   one.finished ? "done" : "goes on in the background"});
+                   one.finished ? "done" : "continues in the background"});
     }
     session.console().document({{"rebuilt", list}});
     session.console().text(table.empty() ? "nothing to rebuild\n" : table.render());
@@ -72,9 +73,10 @@ CommandResult runBackup(Session& session, const std::string& file) {
     RETURN_IF_ERROR(client);
     const auto report = client->backupToFile(file, session.context());
     RETURN_IF_ERROR(report);
-    session.console().document(
-        {{"file", file}, {"bytes", report->bytes}, {"sha256", hexText(report->sha256)}});
-    session.console().text(file + ": " + formatBytes(report->bytes) + "\n");
+    session.console().document({{"file", file},
+                                {"bytes", report->bytes},
+                                {"sha256", toHex(report->sha256.data(), report->sha256.size())}});
+    session.console().text(formatBytes(report->bytes) + " written to " + file + "\n");
     return kOk;
 }
 
@@ -135,15 +137,15 @@ CommandResult runStats(Session& session) {
                              " pending, " + formatCount(stats->shapesFailed) + " failed"});
     table.add({"cache", formatCount(stats->cachedSignatures, "signature", "signatures") + ", " +
                             formatBytes(stats->cacheBytes)});
-    table.add({"queue", formatCount(stats->queuedJobs, "job", "jobs") + " of " +
-                            formatBytes(stats->queuedBytes) + ", " + formatCount(stats->runningJobs) +
+    table.add({"queue", formatCount(stats->queuedJobs, "scan", "scans") + ", " +
+                            formatBytes(stats->queuedBytes) + "; " + formatCount(stats->runningJobs) +
                             " running"});
     table.add({"database", formatBytes(stats->databaseBytes) + ", log " + formatBytes(stats->walBytes)});
     table.add(
-        {"points", formatBytes(stats->pointBytes) + ", stored as " + formatBytes(stats->storedPointBytes)});
-    table.add({"since start", formatSeconds(stats->uptimeSeconds) + ", " +
-                                  formatCount(stats->searches, "search", "searches") + ", " +
-                                  formatCount(stats->ingested) + " ingested"});
+        {"points", formatBytes(stats->pointBytes) + ", compressed " + formatBytes(stats->storedPointBytes)});
+    table.add({"uptime", formatSeconds(stats->uptimeSeconds) + ", " +
+                             formatCount(stats->searches, "search", "searches") + ", " +
+                             formatCount(stats->ingested, "scan", "scans") + " segmented"});
     session.console().text(table.render());
     return kOk;
 }
@@ -169,9 +171,9 @@ CommandResult runInfo(Session& session) {
     table.add({"server", client->address()});
     table.add({"version", info->version + ", database schema " + std::to_string(info->schemaVersion)});
     table.add({"ingest threads", std::to_string(info->ingestThreads)});
-    table.add({"points of one scan", "at most " + formatCount(limits.maxPoints)});
-    table.add({"hits of one search", "at most " + formatCount(limits.maxK)});
-    table.add({"ingest queue", "at most " + formatCount(limits.maxQueuedJobs, "scan", "scans") + " and " +
+    table.add({"points per scan", "up to " + formatCount(limits.maxPoints)});
+    table.add({"hits per search", "up to " + formatCount(limits.maxK)});
+    table.add({"ingest queue", "up to " + formatCount(limits.maxQueuedJobs, "scan", "scans") + " and " +
                                    formatBytes(limits.maxQueuedBytes)});
     session.console().text(table.render());
     return kOk;
@@ -180,13 +182,13 @@ CommandResult runInfo(Session& session) {
 void addRebuild(CLI::App& group, Session& session) {
     auto flags = std::make_shared<RebuildFlags>();
     CLI::App* command = group.add_subcommand(
-        "rebuild",
-        "Segment stored scans again, or follow a rebuild that is running; searches go on meanwhile");
-    command->add_option("--collection", flags->request.collection, "Only this one [all]")->type_name("NAME");
-    command->add_flag("--cancel", flags->cancel, "Stop a running rebuild and forget its partial result");
+        "rebuild", "Segment stored scans again, or follow a running rebuild; searches are not interrupted");
+    command->add_option("--collection", flags->request.collection, "Only this collection [all]")
+        ->type_name("NAME");
+    command->add_flag("--cancel", flags->cancel, "Stop a running rebuild and discard its partial result");
     command->add_flag("--cache-only", flags->request.cacheOnly,
-                      "Only reload the signatures from the database");
-    command->add_flag("--detach", flags->request.detach, "Start it and return");
+                      "Only reload the signatures from the database into the cache");
+    command->add_flag("--detach", flags->request.detach, "Start the rebuild and return");
     addParameterFlags(*command, flags->parameters);
     command->callback(
         [&session, flags] { session.action = [&session, flags] { return runRebuild(session, *flags); }; });
@@ -212,15 +214,15 @@ void addPlainCommand(CLI::App& group, Session& session, const char* name, const 
 }  // namespace
 
 void addAdminCommands(CLI::App& app, Session& session) {
-    CLI::App* group = app.add_subcommand("admin", "Care of a running server");
+    CLI::App* group = app.add_subcommand("admin", "Maintain a running server");
     group->require_subcommand(1);
     addRebuild(*group, session);
-    addFileCommand(*group, session, "backup", "Copy the whole database to a file while it serves",
+    addFileCommand(*group, session, "backup", "Copy the whole database to a file while the server runs",
                    &runBackup);
-    addFileCommand(*group, session, "restore", "Replace the whole database by a backup", &runRestore);
+    addFileCommand(*group, session, "restore", "Replace the whole database with a backup", &runRestore);
     addPlainCommand(*group, session, "check", "Read the whole database and report damage", &runCheck);
-    addPlainCommand(*group, session, "stats", "Counts and sizes", &runStats);
-    addPlainCommand(*group, session, "info", "Version and limits", &runInfo);
+    addPlainCommand(*group, session, "stats", "Show counts and sizes", &runStats);
+    addPlainCommand(*group, session, "info", "Show version and limits", &runInfo);
 }
 
 }  // namespace shapedb::cli

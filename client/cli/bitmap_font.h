@@ -1,4 +1,4 @@
-// A 5x7 pixel font for the few words in a picture; ASCII only.
+// A 5x7 pixel font for the labels of a picture; ASCII only.
 #pragma once
 
 #include <array>
@@ -11,8 +11,8 @@ inline constexpr std::size_t kGlyphColumns = 5;
 inline constexpr std::size_t kGlyphRows = 8;     ///< seven above the base line, one for descenders
 inline constexpr std::size_t kGlyphAdvance = 6;  ///< pixels from one character to the next
 
-/// The columns of a character from left to right; bit r is set where row r (from the top) is ink.
-/// A character outside printable ASCII shows as `?`. Valid for ever; any thread.
+/// The columns of a character from left to right; bit r of a column is row r from the top. Characters outside
+/// printable ASCII are drawn as `?`. The reference is always valid; any thread.
 [[nodiscard]] const std::array<std::uint8_t, kGlyphColumns>& glyphOf(char c) noexcept;
 
 }  // namespace shapedb::cli

@@ -1,5 +1,4 @@
-// Checks of flag values whose refusal reads well: CLI11's own print both ends of the range of a
-// double in full.
+// Checks of flag values with readable messages: CLI11's own print the limits of a double in full.
 #pragma once
 
 #include <string>
@@ -13,7 +12,7 @@ namespace shapedb::cli {
     return {[](const std::string& text) {
                 double value = 0.0;
                 const bool good = CLI::detail::lexical_cast(text, value) && value >= 0.0 && value <= 1e300;
-                return good ? std::string() : "'" + text + "' is not a number of at least 0";
+                return good ? std::string() : "'" + text + "' is not a number of 0 or more";
             },
             ">=0", "at least zero"};
 }

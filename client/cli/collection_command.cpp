@@ -24,10 +24,6 @@ struct CollectionFlags {
     bool force = false;
 };
 
-const char* profileText(const client::Collection& collection) {
-    return collection.parameters.profile == client::Profile::kPaper ? "paper" : "default";
-}
-
 json toJson(const client::Collection& collection) {
     return {{"name", collection.name},
             {"description", collection.description},
@@ -50,8 +46,8 @@ std::string toText(const std::vector<client::Collection>& collections) {
                  {"description"}});
     for (const client::Collection& one : collections) {
         table.add({one.name, formatCount(one.shapes), formatCount(one.shapesReady),
-                   formatCount(one.shapesFailed), std::to_string(one.generation), profileText(one),
-                   one.description});
+                   formatCount(one.shapesFailed), std::to_string(one.generation),
+                   profileName(one.parameters.profile.value_or(Profile::kDefault)), one.description});
     }
     return table.render();
 }
@@ -66,7 +62,7 @@ CommandResult show(Session& session, const Result<client::Collection>& collectio
 CommandResult runCreate(Session& session, const CollectionFlags& flags) {
     const auto client = connectToServer(session);
     RETURN_IF_ERROR(client);
-    return show(session, client->createCollection(flags.name, flags.description, flags.parameters.forServer(),
+    return show(session, client->createCollection(flags.name, flags.description, flags.parameters.given,
                                                   session.context()));
 }
 
@@ -112,7 +108,8 @@ CLI::App* addOne(CLI::App& group, Session& session, const char* name, const char
 }  // namespace
 
 void addCollectionCommands(CLI::App& app, Session& session) {
-    CLI::App* group = app.add_subcommand("collection", "Collections: shapes that share parameters");
+    CLI::App* group =
+        app.add_subcommand("collection", "Manage collections: sets of shapes with the same parameters");
     group->require_subcommand(1);
     auto flags = std::make_shared<CollectionFlags>();
     const auto addName = [&](CLI::App* command) {
@@ -121,13 +118,13 @@ void addCollectionCommands(CLI::App& app, Session& session) {
 
     CLI::App* create = addOne(*group, session, "create", "Create a collection", flags, &runCreate);
     addName(create);
-    create->add_option("--description", flags->description, "What it is for, for people");
+    create->add_option("--description", flags->description, "What the collection is for");
     addParameterFlags(*create, flags->parameters);
     addName(addOne(*group, session, "get", "Show one collection", flags, &runGet));
     addOne(*group, session, "list", "List all collections", flags, &runList);
     CLI::App* remove = addOne(*group, session, "delete", "Delete a collection", flags, &runDelete);
     addName(remove);
-    remove->add_flag("--force", flags->force, "Even if it holds shapes: they are deleted with it");
+    remove->add_flag("--force", flags->force, "Delete its shapes too");
 }
 
 }  // namespace shapedb::cli

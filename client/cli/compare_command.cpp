@@ -1,4 +1,4 @@
-// `shapedb compare`: two stored shapes, or two files without a server, and why they have their score.
+// `shapedb compare`: the score of two stored shapes, or of two files without a server, explained.
 #include <memory>
 
 #include <CLI/CLI.hpp>
@@ -6,12 +6,14 @@
 
 #include "client/cli/connection.h"
 #include "client/cli/exit_code.h"
+#include "client/cli/local_result.h"
 #include "client/cli/parameters.h"
 #include "client/cli/scan_source.h"
 #include "client/cli/session.h"
 #include "client/cli/shape_output.h"
 #include "client/cli/text.h"
 #include "core/base/return_if_error.h"
+#include "core/matching/score.h"
 
 namespace shapedb::cli {
 
@@ -52,7 +54,7 @@ Result<client::Comparison> compareStored(Session& session, const CompareFlags& f
     if (flags.parameters.any()) {
         return fail(
             ErrorCode::kInvalidArgument,
-            "stored shapes have the parameters of their collection; --profile and the like need --files");
+            "stored shapes use the parameters of their collection; --profile and the like need --files");
     }
     const auto client = connectToServer(session);
     RETURN_IF_ERROR(client);
@@ -83,10 +85,10 @@ CommandResult runCompare(Session& session, const CompareFlags& flags) {
 void addCompareCommand(CLI::App& app, Session& session) {
     auto flags = std::make_shared<CompareFlags>();
     CLI::App* command =
-        app.add_subcommand("compare", "Score two stored shapes, or two files without a server, and say why");
-    command->add_option("A", flags->a, "Key, or file with --files")->required();
-    command->add_option("B", flags->b, "Key, or file with --files")->required();
-    command->add_flag("--files", flags->files, "A and B are scan files; no server is asked");
+        app.add_subcommand("compare", "Score two stored shapes, or two files with --files, and explain why");
+    command->add_option("A", flags->a, "First key; with --files, first scan")->required();
+    command->add_option("B", flags->b, "Second key; with --files, second scan")->required();
+    command->add_flag("--files", flags->files, "A and B are scan files; needs no server");
     addCollectionOption(*command, flags->collection);
     addScoreFlags(*command, flags->score);
     addScanFlags(*command, flags->scan);

@@ -7,7 +7,7 @@ namespace shapedb::cli {
 namespace {
 
 constexpr std::chrono::hours kHeavyDeadline{1};
-/// A full queue is waited for as long as there is time; the server says how long between tries.
+/// A full queue is waited for as long as there is time; the server says how long to wait.
 constexpr int kPatientAttempts = 1'000'000;
 
 }  // namespace
@@ -24,7 +24,7 @@ Result<client::Client> connectToServer(const Session& session, Work work) {
 }
 
 void addCollectionOption(CLI::App& command, std::string& collection) {
-    command.add_option("--collection", collection, "Collection [default]")->type_name("NAME");
+    command.add_option("--collection", collection, "Collection to use [default]")->type_name("NAME");
 }
 
 Result<client::Metadata> parseMetadata(const std::vector<std::string>& pairs) {
@@ -36,7 +36,7 @@ Result<client::Metadata> parseMetadata(const std::vector<std::string>& pairs) {
         }
         const std::string name = pair.substr(0, equals);
         if (!metadata.emplace(name, pair.substr(equals + 1)).second) {
-            return fail(ErrorCode::kInvalidArgument, "--meta names '" + name + "' twice");
+            return fail(ErrorCode::kInvalidArgument, "--meta gives '" + name + "' twice");
         }
     }
     return metadata;

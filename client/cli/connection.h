@@ -1,4 +1,4 @@
-// The server a command talks to.
+// The server that a command talks to.
 #pragma once
 
 #include <map>
@@ -11,23 +11,23 @@
 
 namespace shapedb::cli {
 
-/// What a command's calls ask of the server.
+/// How much a command asks of the server, which decides how long a call may take.
 enum class Work {
-    kLight,  ///< an answer from what it has: a minute is plenty
-    kHeavy,  ///< a scan sent and perhaps segmented, a full queue waited for: an hour
+    kLight,  ///< a minute
+    kHeavy,  ///< an hour: scans are sent and segmented, a full queue is waited for
 };
 
-/// A client for --server. With --timeout the session's context bounds the calls, without it the
-/// time that the work may take does. Errors: kInvalidArgument.
+/// A client for --server. With --timeout the session's context limits the calls instead of `work`.
+/// Errors: kInvalidArgument.
 [[nodiscard]] Result<client::Client> connectToServer(const Session& session, Work work = Work::kLight);
 
-/// --collection, empty for the default one.
+/// --collection; empty for the default one.
 void addCollectionOption(CLI::App& command, std::string& collection);
 
-/// "name=value" pairs as given with --meta. Errors: kInvalidArgument naming the pair.
+/// The NAME=VALUE pairs of --meta. Errors: kInvalidArgument naming the pair.
 [[nodiscard]] Result<client::Metadata> parseMetadata(const std::vector<std::string>& pairs);
 
-/// The label of a shape, for tables: its metadata "label", or nothing.
+/// The metadata "label" of a shape; empty if there is none.
 [[nodiscard]] std::string labelOf(const client::Shape& shape);
 
 }  // namespace shapedb::cli

@@ -1,4 +1,4 @@
-// Where a command's words go: results to one stream, errors and progress to the other.
+// Where output goes: results to one stream, errors and progress to the other.
 #pragma once
 
 #include <chrono>
@@ -12,10 +12,10 @@
 
 namespace shapedb::cli {
 
-/// With --json the result stream carries exactly one JSON document and nothing else; without,
-/// text for people. Errors and notes always go to the error stream as `PROGRAM: MESSAGE`.
+/// With --json the result stream gets exactly one JSON document, otherwise text for people. Errors and notes
+/// go to the error stream as `PROGRAM: MESSAGE`.
 ///
-/// Thread-safety: `note` and `progress` from any thread; the rest from one thread.
+/// Thread-safety: `note` and `progress` from any thread, the rest from one thread.
 class Console {
   public:
     /// The streams must outlive the console. `errorIsTerminal`: draw a progress bar there.
@@ -33,17 +33,17 @@ class Console {
     /// `PROGRAM: MESSAGE` on the error stream.
     void note(const std::string& message);
 
-    /// The error that ends the command: a note, and with --json the document
-    /// {"error": {"name": ..., "message": ...}} unless a document was printed before.
+    /// The error that ends the command: a note, and with --json also the document {"error": {"name": ...,
+    /// "message": ...}} unless a document was already printed.
     void failure(const Error& error);
 
-    /// Redraws the progress bar, at most ten times a second; nothing unless the error stream is
-    /// a terminal. total 0: unknown, shows the count alone.
+    /// Redraws the progress bar, at most ten times a second and only if the error stream is a terminal.
+    /// total 0: unknown, only the count is shown.
     void progress(const std::string& what, std::uint64_t done, std::uint64_t total);
-    /// Wipes the bar, so that other output starts on a clean line.
+    /// Erases the bar, so that other output starts on a clean line.
     void clearProgress();
 
-    /// False when the result stream refused something (a full disk, a closed pipe).
+    /// False if the result could not be written (a full disk, a closed pipe).
     [[nodiscard]] bool flush();
 
   private:
@@ -56,12 +56,12 @@ class Console {
     bool json_ = false;
     bool documentPrinted_ = false;
 
-    std::mutex mutex_;  ///< guards err_ and what follows
+    std::mutex mutex_;  ///< guards err_ and the members below
     bool barShown_ = false;
     std::chrono::steady_clock::time_point lastBar_{};
 };
 
-/// JSON text that never throws: bytes that are not UTF-8 become U+FFFD.
+/// JSON text; bytes that are not UTF-8 become U+FFFD. Does not throw.
 [[nodiscard]] std::string dump(const nlohmann::json& document);
 
 /// {"name": ..., "message": ...}

@@ -1,5 +1,5 @@
-// `shapedb evaluate`: how well the method finds shapes of the same class (leave-one-out), or the
-// right entries of a gallery, measured here without a server.
+// `shapedb evaluate`: how well the method finds shapes of the same class (leave-one-out), or the right
+// entries of a gallery; needs no server.
 #include <memory>
 
 #include <CLI/CLI.hpp>
@@ -98,7 +98,7 @@ std::string timingText(const Timing& timing, std::size_t shapes, std::size_t pai
            ", matched " + formatCount(pairs, "pair", "pairs") + " in " + formatSeconds(timing.match) + ".\n";
 }
 
-/// Names what failed; says whether anything but a segmentation did.
+/// Prints the failures. The exit code tells whether anything other than a segmentation failed.
 int reportFailures(Session& session, const std::vector<const EvaluatedShape*>& failures) {
     bool unreadable = false;
     for (const EvaluatedShape* shape : failures) {
@@ -170,10 +170,10 @@ std::vector<std::string> metricCells(const RetrievalMetrics& metrics) {
 std::string leaveOneOutText(const EvaluateFlags& flags, const ShapeParameters& parameters,
                             const RetrievalReport& report, const std::vector<EvaluatedShape>& shapes,
                             const std::vector<const EvaluatedShape*>& failures, const Timing& timing) {
-    std::string text = formatCount(report.queries, "query", "queries") + " among " +
-                       formatCount(shapes.size(), "shape", "shapes") + " of " +
-                       formatCount(report.perClass.size(), "class", "classes") +
-                       ", each against all others; " + settingsText(flags, parameters) + "\n\n";
+    std::string text = formatCount(report.queries, "query", "queries") + ", each against all others of " +
+                       formatCount(shapes.size(), "shape", "shapes") + " in " +
+                       formatCount(report.perClass.size(), "class", "classes") + "; " +
+                       settingsText(flags, parameters) + "\n\n";
     const auto right = Table::Align::kRight;
     Table table({{"class"},
                  {"queries", right},
@@ -193,14 +193,13 @@ std::string leaveOneOutText(const EvaluateFlags& flags, const ShapeParameters& p
     add("all", report.queries, report.mean);
     text += table.render() + "\n";
     if (report.lonely > 0) {
-        text +=
-            formatCount(report.lonely, "shape is", "shapes are") + " alone in a class and asked nothing.\n";
+        text += formatCount(report.lonely, "shape is", "shapes are") + " alone in a class: no query.\n";
     }
     if (!failures.empty()) {
         text += formatCount(failures.size(), "shape", "shapes") +
-                " could not be segmented and counted as matching nothing.\n";
+                " could not be segmented; they count as matching nothing.\n";
     }
-    // A partial score has a direction: each pair is scored both ways.
+    // Partial scores have a direction: each pair is scored both ways.
     const std::size_t pairs = shapes.size() * (shapes.size() - 1) / (flags.score.partial ? 1 : 2);
     return text + timingText(timing, shapes.size(), pairs);
 }
@@ -208,8 +207,8 @@ std::string leaveOneOutText(const EvaluateFlags& flags, const ShapeParameters& p
 CommandResult runLeaveOneOut(Session& session, const EvaluateFlags& flags) {
     if (flags.paths.size() != 1) {
         return fail(ErrorCode::kInvalidArgument,
-                    "leave-one-out takes one folder of class folders; to rank "
-                    "queries against other shapes give --gallery");
+                    "leave-one-out takes one folder of class folders; use --gallery to rank queries against "
+                    "other shapes");
     }
     if (!flags.confusion.empty()) {
         RETURN_IF_ERROR(checkFigurePath(flags.confusion));
@@ -238,7 +237,7 @@ CommandResult runLeaveOneOut(Session& session, const EvaluateFlags& flags) {
         labels.push_back(shape.label);
         failed.push_back(shape.failure.has_value());
     }
-    // Failed pairs score 0, the least there is.
+    // Failed pairs score 0, the lowest score there is.
     const auto report = evaluateLeaveOneOut(withTiesAgainstFailures(*scores, labels, failed, -1.0), labels);
     RETURN_IF_ERROR(report);
     if (!flags.confusion.empty()) {
@@ -258,7 +257,7 @@ CommandResult runLeaveOneOut(Session& session, const EvaluateFlags& flags) {
 
 // ---------------------------------------------------------------------------------------- gallery
 
-/// What is told of one query.
+/// The outcome of one query.
 struct RankedQuery {
     const EvaluatedShape* query = nullptr;
     const EvaluatedShape* best = nullptr;   ///< null when nothing was ranked
@@ -297,8 +296,8 @@ std::string galleryText(const EvaluateFlags& flags, const ShapeParameters& param
                         const GalleryReport& report, const std::vector<RankedQuery>& ranked,
                         std::size_t gallerySize, const Timing& timing) {
     std::string text = formatCount(ranked.size(), "query", "queries") + " against a gallery of " +
-                       formatCount(gallerySize, "shape", "shapes") + ", right when the " +
-                       (flags.match == "stem" ? "file name" : "folder name") + " is the same; " +
+                       formatCount(gallerySize, "shape", "shapes") + "; right answers have the same " +
+                       (flags.match == "stem" ? "file name" : "folder name") + "; " +
                        settingsText(flags, parameters) + "\n\n";
     const auto right = Table::Align::kRight;
     Table table(
@@ -345,14 +344,12 @@ std::vector<RankedQuery> tellRanks(const std::vector<EvaluatedShape>& queries,
 
 CommandResult runGallery(Session& session, const EvaluateFlags& flags) {
     if (!flags.confusion.empty() || flags.perClass) {
-        return fail(ErrorCode::kInvalidArgument,
-                    "--confusion and --per-class need class folders on both sides; "
-                    "leave --gallery out");
+        return fail(ErrorCode::kInvalidArgument, "--confusion and --per-class do not work with --gallery");
     }
     if (flags.classes.any()) {
-        return fail(ErrorCode::kInvalidArgument,
-                    "--classes and --except-classes are for leave-one-out over class folders; "
-                    "with --gallery name the folders that take part");
+        return fail(
+            ErrorCode::kInvalidArgument,
+            "--classes and --except-classes do not work with --gallery; give the folders that take part");
     }
     const auto match = matchFromName(flags.match);
     RETURN_IF_ERROR(match);
@@ -365,7 +362,7 @@ CommandResult runGallery(Session& session, const EvaluateFlags& flags) {
     std::vector<EvaluatedShape> queries = shapesOf(*queryScans);
     std::vector<EvaluatedShape> gallery = shapesOf(*galleryScans);
 
-    // The gallery is what a user has stored: it stays as it is; noise and subset are the query's.
+    // The gallery stands for what a user has stored: noise and subset are for the queries alone.
     ScanFlags clean = flags.scan;
     clean.noise = 0.0;
     clean.points.reset();
@@ -407,24 +404,26 @@ void addEvaluateCommand(CLI::App& app, Session& session) {
     auto flags = std::make_shared<EvaluateFlags>();
     CLI::App* command =
         app.add_subcommand("evaluate",
-                           "Measure retrieval on labelled scans here, without a server: leave-one-out over "
+                           "Measure retrieval on labelled scans (needs no server): leave-one-out over "
                            "DIR/CLASS/*, or queries against a gallery");
     command
         ->add_option("DIR", flags->paths,
-                     "Folder of class folders; with --gallery: queries (files or folders)")
+                     "Folder of class folders; with --gallery, the queries (files or folders)")
         ->required();
     command->add_option("--gallery", flags->gallery, "Rank the queries against these files or folders")
         ->type_name("DIR");
     command
         ->add_option("--match", flags->match,
-                     "With --gallery, what makes an entry right: the same folder name or file name")
+                     "With --gallery: right answers have the same folder name, or the same file name")
         ->check(CLI::IsMember({"folder", "stem"}))
         ->capture_default_str();
-    command->add_option("--confusion", flags->confusion, "Draw the similarity matrix of the paper's Figure 6")
+    command
+        ->add_option("--confusion", flags->confusion,
+                     "Draw the similarity matrix (as in the paper's Figure 6)")
         ->type_name("FILE.png|svg");
     addClassFlags(*command, flags->classes);
-    command->add_flag("--per-class", flags->perClass, "Measures of each class too");
-    command->add_option("--threads", flags->threads, "Threads; the result does not depend on them")
+    command->add_flag("--per-class", flags->perClass, "Also print the figures of each class");
+    command->add_option("--threads", flags->threads, "Number of threads; does not change the result")
         ->check(CLI::Range(1, 1024))
         ->capture_default_str();
     addScanFlags(*command, flags->scan);

@@ -10,6 +10,7 @@
 #include <tbb/task_arena.h>
 
 #include "core/base/return_if_error.h"
+#include "core/matching/scorer.h"
 
 namespace shapedb::cli {
 
@@ -35,7 +36,7 @@ Result<void> forEachItem(std::size_t count, unsigned threads, const RunContext& 
         stopped.store(true, std::memory_order_relaxed);
     };
     try {
-        // Without this oneTBB gives no more threads than processors, and says so on standard error.
+        // Otherwise oneTBB stops at the number of processors, with a warning on standard error.
         const tbb::global_control allowed(tbb::global_control::max_allowed_parallelism, threads);
         tbb::task_arena arena(static_cast<int>(threads));
         arena.execute([&] {
@@ -68,7 +69,7 @@ Result<void> describeShapes(std::vector<EvaluatedShape>& shapes, const ScanFlags
                             const ShapeParameters& parameters, unsigned threads,
                             const std::function<void(std::size_t done)>& progress,
                             const RunContext& context) {
-    RunContext quiet = context;  // progress is counted in shapes, not in stages of one of them
+    RunContext quiet = context;  // progress counts shapes, not the stages of one
     quiet.progress = nullptr;
     std::atomic<std::size_t> done{0};
     return forEachItem(shapes.size(), threads, context, [&](std::size_t i) -> std::optional<Error> {
@@ -99,11 +100,12 @@ Result<ScoreMatrix> scorePairs(const std::vector<EvaluatedShape>& rows,
     std::atomic<std::size_t> done{0};
     const auto scored =
         forEachItem(rows.size(), threads, context, [&](std::size_t r) -> std::optional<Error> {
-            for (std::size_t c = symmetric ? r : 0; c < width; ++c) {
-                if (!rows[r].signature || !columns[c].signature) continue;
-                const double value = score(*rows[r].signature, *columns[c].signature, options);
+            const auto scorer = rows[r].signature ? makeScorer(*rows[r].signature, options) : nullptr;
+            for (std::size_t c = symmetric ? r : 0; c < width && scorer; ++c) {
+                if (!columns[c].signature) continue;
+                const double value = scorer->score(*columns[c].signature);
                 scores[r * width + c] = value;
-                // Only this task writes (c, r): its row starts right of the diagonal.
+                // Only this task writes (c, r): no other row reaches left of its diagonal.
                 if (symmetric) scores[c * width + r] = value;
             }
             progress(++done);

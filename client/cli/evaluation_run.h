@@ -1,5 +1,5 @@
-// The work behind `shapedb evaluate`: a collection of files to signatures, signatures to scores,
-// both in parallel and with the same result for any number of threads.
+// The work behind `shapedb evaluate`: files to signatures to scores, in parallel, with the same result for
+// any number of threads.
 #pragma once
 
 #include <cstddef>
@@ -19,29 +19,28 @@
 namespace shapedb::cli {
 
 struct EvaluatedShape : CollectionScan {
-    /// Set exactly when `failure` is not. A shape without one scores 0 against everything.
+    /// Set unless `failure` is. A shape without a signature scores 0 against everything.
     std::optional<Signature> signature;
     std::optional<Error> failure;
-    double seconds = 0.0;  ///< reading, noise and segmentation together
+    double seconds = 0.0;  ///< for reading, noise and segmentation together
 };
 
-/// One a processor this program may use.
+/// One per processor that this program may use.
 [[nodiscard]] unsigned defaultThreads();
 
-/// Runs body(i) for all i below `count` on `threads` threads, at least 1; items are handed out one
-/// at a time because their costs differ widely. An error that the body returns ends the run and is
-/// its result (with several threads, one of those returned).
+/// Runs body(i) for all i below `count` on `threads` threads, at least 1. Items are handed out one at a time,
+/// because their costs differ widely. An error from the body ends the run and is its result (if there are
+/// several, one of them).
 ///
 /// Errors: that of the body; kCancelled, kDeadlineExceeded; kOutOfMemory.
 [[nodiscard]] Result<void> forEachItem(std::size_t count, unsigned threads, const RunContext& context,
                                        const std::function<std::optional<Error>(std::size_t)>& body);
 
-/// The scans, nothing computed yet.
+/// Shapes with nothing computed yet.
 [[nodiscard]] std::vector<EvaluatedShape> shapesOf(const std::vector<CollectionScan>& scans);
 
-/// Fills in `signature` or `failure` of each shape; noise and subset come from
-/// fileSeed(flags.seed, name). Files are taken by `threads` threads, at least 1.
-/// A file that cannot be read or segmented is a `failure`, not an error.
+/// Sets `signature` or `failure` of each shape, on `threads` threads, at least 1. Noise and subset are seeded
+/// with fileSeed(flags.seed, name). A file that cannot be read or segmented is a `failure`, not an error.
 ///
 /// Errors: kCancelled, kDeadlineExceeded; kInvalidArgument (flags).
 [[nodiscard]] Result<void> describeShapes(std::vector<EvaluatedShape>& shapes, const ScanFlags& flags,
@@ -49,9 +48,9 @@ struct EvaluatedShape : CollectionScan {
                                           const std::function<void(std::size_t done)>& progress,
                                           const RunContext& context);
 
-/// Row-major scores of `rows` x `columns`. Passing the same vector twice scores each pair once,
-/// because a score is symmetric bit for bit, unless it is partial: of the row in the column. Shapes without a
-/// signature score 0.
+/// Row-major scores of `rows` x `columns`; a partial score says how much of the row the column contains. If
+/// both are the same vector each pair is scored once, as scores are symmetric bit for bit unless partial.
+/// Shapes without a signature score 0.
 ///
 /// Errors: kCancelled, kDeadlineExceeded.
 [[nodiscard]] Result<ScoreMatrix> scorePairs(const std::vector<EvaluatedShape>& rows,

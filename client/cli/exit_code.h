@@ -1,4 +1,4 @@
-// What the shell gets back. docs/command-line.md lists the same numbers.
+// Exit codes; docs/command-line.md lists them with the error names.
 #pragma once
 
 #include "core/base/error.h"
@@ -7,16 +7,16 @@ namespace shapedb::cli {
 
 enum ExitCode : int {
     kOk = 0,
-    kSomeFailed = 1,    ///< several items were asked for, some of them failed
-    kUsage = 2,         ///< the command line, a parameter, a filter or a cursor is wrong
-    kBadData = 3,       ///< a file cannot be read or written, or its points are no usable scan
-    kWrongState = 4,    ///< not found, already there, or not allowed in this state
-    kUnavailable = 5,   ///< the server is not reachable, full, or took too long
-    kDefect = 6,        ///< storage, memory or a defect: nothing the caller asked wrongly
-    kInterrupted = 130  ///< stopped by Ctrl-C (128 + SIGINT, as shells count)
+    kSomeFailed = 1,    ///< some of several items failed
+    kUsage = 2,         ///< wrong command line, parameter, filter or cursor
+    kBadData = 3,       ///< a file that cannot be read or written, or a scan that cannot be used
+    kWrongState = 4,    ///< not found, already there, or not allowed now
+    kUnavailable = 5,   ///< the server cannot be reached, is full, or took too long
+    kDefect = 6,        ///< storage, memory or a bug: not the caller's fault
+    kInterrupted = 130  ///< Ctrl-C (128 + SIGINT, as in shells)
 };
 
-/// The exit code of a command that ended with this error.
+/// For a command that ended with this error.
 [[nodiscard]] ExitCode exitCodeOf(ErrorCode code) noexcept;
 
 }  // namespace shapedb::cli

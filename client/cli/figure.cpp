@@ -34,10 +34,10 @@ std::string lowerCaseEnding(const std::string& path) {
     return ending;
 }
 
-// The bands whose names fit one below the other in lines of this height.
+// The bands whose names do not overlap at this line height.
 std::vector<const ClassBand*> namedBands(const SimilarityRaster& raster, std::size_t lineHeight) {
     std::vector<const ClassBand*> named;
-    std::size_t free = 0;  // twice the first pixel not taken; names are centred on their bands
+    std::size_t free = 0;  // twice the first free pixel; names are centred on their bands
     for (const ClassBand& band : raster.classes) {
         const std::size_t middle = 2 * band.firstPixel + band.pixels;
         if (!named.empty() && middle < free + lineHeight) continue;
@@ -61,8 +61,8 @@ struct FileCloser {
     void operator()(std::FILE* file) const { std::fclose(file); }
 };
 
-// Creates the file, lets `write` fill it (returning an empty string or what went wrong), and
-// removes it again if anything failed, also the last flush.
+// `write` fills the file and returns what went wrong, or an empty string. The file is removed if anything
+// failed, the last flush included.
 template <typename Write>
 Result<void> writeFile(const std::string& path, Write write) {
     std::unique_ptr<std::FILE, FileCloser> file(std::fopen(path.c_str(), "wb"));
@@ -75,7 +75,6 @@ Result<void> writeFile(const std::string& path, Write write) {
     return notWritable(path, problem);
 }
 
-// An RGB picture that names can be drawn on.
 struct Canvas {
     std::size_t width = 0;
     std::size_t height = 0;
@@ -87,7 +86,7 @@ struct Canvas {
     }
 };
 
-// The pixels of a text, as (along, across) from its upper left corner.
+// Calls draw(along, across) for each pixel of the text, counted from its upper left corner.
 template <typename Draw>
 void forEachTextPixel(const std::string& text, Draw draw) {
     for (std::size_t i = 0; i < text.size(); ++i) {
@@ -102,7 +101,7 @@ void forEachTextPixel(const std::string& text, Draw draw) {
 
 Canvas withNames(const SimilarityRaster& raster) {
     const std::size_t strip = std::min(longestName(raster), kMaxNameCharacters) * kGlyphAdvance;
-    const std::size_t origin = 2 * kMargin + strip;  // the raster's corner, in both directions
+    const std::size_t origin = 2 * kMargin + strip;  // corner of the raster, in both directions
     Canvas canvas;
     canvas.width = origin + raster.width + kMargin;
     canvas.height = origin + raster.height + kMargin;
@@ -141,8 +140,8 @@ Result<void> writePng(const SimilarityRaster& raster, const std::string& path) {
     });
 }
 
-// The picture as rectangles of one colour each, white left out: from each pixel not yet covered as
-// far right as the colour goes, then as far down as the whole run does.
+// The picture as rectangles of one colour, without white: from each uncovered pixel as far right as the
+// colour goes, then as far down as the whole run does.
 std::string rectangles(const SimilarityRaster& raster) {
     const std::size_t width = raster.width;
     std::vector<bool> covered(width * raster.height, false);
@@ -213,13 +212,14 @@ Result<void> checkFigurePath(const std::string& path) {
     const std::string ending = lowerCaseEnding(path);
     if (ending == ".png" || ending == ".svg") return {};
     return fail(ErrorCode::kUnknownFileFormat,
-                "cannot tell the picture format of " + path + "; end it in .png or .svg");
+                "unknown picture format: " + path + " must end in .png or .svg");
 }
 
 Result<void> writeSimilarityFigure(const SimilarityRaster& raster, const std::string& path) try {
     RETURN_IF_ERROR(checkFigurePath(path));
     if (raster.width == 0 || raster.height == 0 || raster.rgb.size() != 3 * raster.width * raster.height) {
-        return fail(ErrorCode::kInvalidArgument, "the picture's bytes do not match its size");
+        return fail(ErrorCode::kInvalidArgument,
+                    "the number of bytes does not match the size of the picture");
     }
     return lowerCaseEnding(path) == ".png" ? writePng(raster, path) : writeSvg(raster, path);
 } catch (const std::bad_alloc&) {

@@ -1,4 +1,4 @@
-// Pictures of a similarity matrix with the names of its classes.
+// Pictures of a similarity matrix, labelled with the class names.
 #pragma once
 
 #include <string>
@@ -8,20 +8,16 @@
 
 namespace shapedb::cli {
 
-/// The format by the ending of `path`, in either case: ".png" or ".svg".
-///
-/// Errors: kUnknownFileFormat for any other ending. A command calls this before it starts long
-/// work whose result would have nowhere to go.
+/// Commands call this before starting long work. Errors: kUnknownFileFormat unless `path` ends in ".png" or
+/// ".svg" (in either case).
 [[nodiscard]] Result<void> checkFigurePath(const std::string& path);
 
-/// Writes the raster to `path`, replacing what is there, with the classes' names on the left and
-/// on top. PNG: names in a small built-in font that knows ASCII (anything else shows as `?`),
-/// names cut after 24 characters. SVG: names in full, in the viewer's font. A name is left out
-/// where its band is too narrow to hold it beside its neighbour's.
+/// Writes the raster to `path`, replacing an existing file, with the class names on the left and on top. PNG:
+/// a small built-in font, ASCII only (anything else becomes `?`), names cut to 24 characters. SVG: full names
+/// in the viewer's font. A name whose band is too narrow for it is left out.
 ///
-/// Errors: those of `checkFigurePath`; kInvalidArgument when the raster's bytes do not match its
-/// size; kFileNotWritable when the file cannot be created or written in full (no partial file
-/// stays behind); kOutOfMemory.
+/// Errors: those of `checkFigurePath`; kInvalidArgument (the raster's bytes do not match its size);
+/// kFileNotWritable (no partial file is left behind); kOutOfMemory.
 [[nodiscard]] Result<void> writeSimilarityFigure(const SimilarityRaster& raster, const std::string& path);
 
 }  // namespace shapedb::cli

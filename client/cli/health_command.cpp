@@ -1,4 +1,4 @@
-// `shapedb health`: whether the server serves; made for the health check of a container.
+// `shapedb health`: is the server serving? Made for container health checks.
 #include <memory>
 
 #include <CLI/CLI.hpp>
@@ -13,7 +13,7 @@ namespace shapedb::cli {
 
 namespace {
 
-/// A server that takes longer than this to say that it is well is not, unless --timeout says so.
+/// A server that takes longer is not healthy, unless --timeout allows it.
 constexpr double kPatienceSeconds = 5.0;
 
 const char* healthName(client::Health health) {
@@ -43,8 +43,9 @@ CommandResult runHealth(Session& session, const std::string& service) {
 void addHealthCommand(CLI::App& app, Session& session) {
     auto service = std::make_shared<std::string>();
     CLI::App* command =
-        app.add_subcommand("health", "Ask whether the server serves; exit code 0 only if it does");
-    command->add_option("--service", *service, "Full name of one service, e.g. shapedb.v1.SearchService");
+        app.add_subcommand("health", "Check that the server is serving (then the exit code is 0)");
+    command->add_option("--service", *service,
+                        "Only this service, by its full name, e.g. shapedb.v1.SearchService");
     command->callback([&session, service] {
         session.action = [&session, service] { return runHealth(session, *service); };
     });

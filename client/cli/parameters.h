@@ -1,15 +1,11 @@
 // The flags that choose how a scan is segmented and scored, the same for every command.
 #pragma once
 
-#include <cstdint>
-#include <optional>
-#include <string>
-
 #include <nlohmann/json_fwd.hpp>
 
 #include "client/api/types.h"
 #include "core/base/error.h"
-#include "core/matching/score.h"
+#include "core/matching/score_options.h"
 #include "core/pipeline.h"
 
 namespace CLI {
@@ -18,17 +14,15 @@ class App;
 
 namespace shapedb::cli {
 
-/// --profile and one flag per parameter; what is not given keeps the profile's value.
+/// --profile and one flag per parameter.
 struct ParameterFlags {
-    std::optional<std::string> profile;
-    std::optional<std::string> interior;
-    client::Parameters numbers;  ///< all but `profile` and `interiorMethod`, which have a name
+    /// What the user gave; a server fills in the rest.
+    client::Parameters given;
 
-    /// For segmenting here. Errors: kInvalidArgument naming the value and its range.
-    [[nodiscard]] Result<ShapeParameters> resolve() const;
-    /// For the server, which fills in what is not given.
-    [[nodiscard]] client::Parameters forServer() const;
     [[nodiscard]] bool any() const;
+    /// For segmenting here: the rest comes from the profile. Errors: kInvalidArgument naming the value and
+    /// its range.
+    [[nodiscard]] Result<ShapeParameters> resolve() const;
 };
 
 /// `flags` must outlive the parsing.
@@ -45,9 +39,8 @@ struct ScoreFlags {
 
 void addScoreFlags(CLI::App& command, ScoreFlags& flags);
 
-/// One member a parameter, by its name in the API.
+/// One member per parameter, by its name in the API.
 [[nodiscard]] nlohmann::json toJson(const ShapeParameters& parameters);
-/// The same of a server's collection.
 [[nodiscard]] nlohmann::json toJson(const client::Parameters& parameters);
 
 }  // namespace shapedb::cli

@@ -1,4 +1,4 @@
-// `shapedb query`: the stored shapes most like a scan, or like a stored one.
+// `shapedb query`: the stored shapes most like a scan, or like a stored shape.
 #include <memory>
 
 #include <CLI/CLI.hpp>
@@ -59,12 +59,12 @@ std::string replyText(const QueryFlags& flags, const client::SearchReply& reply)
     std::string text;
     if (reply.report) {
         text += flags.path + ": " + formatCount(reply.report->points, "point", "points") + ", " +
-                formatCount(reply.report->segments, "segment", "segments") + ", segmented in " +
+                formatCount(reply.report->segments, "part", "parts") + ", segmented in " +
                 formatSeconds(reply.secondsSegment) + "\n";
-        if (reply.report->quality < 1.0) text += interiorText(*reply.report);
+        if (reply.report->quality < 1.0) text += interiorText(*reply.report, reply.query.scale);
     }
     text += formatCount(reply.candidates, "shape", "shapes") + " searched";
-    if (reply.filtered != reply.candidates) text += ", " + formatCount(reply.filtered) + " of them asked for";
+    if (reply.filtered != reply.candidates) text += ", " + formatCount(reply.filtered) + " pass the filter";
     text += ", " + formatCount(reply.scored) + " scored in full, in " + formatSeconds(reply.secondsSearch) +
             "\n\n";
     if (reply.hits.empty()) return text + "Nothing found.\n";
@@ -90,7 +90,7 @@ std::string replyText(const QueryFlags& flags, const client::SearchReply& reply)
 CommandResult runQuery(Session& session, const QueryFlags& flags) {
     if (flags.path.empty() == flags.key.empty()) {
         return fail(ErrorCode::kInvalidArgument, flags.key.empty()
-                                                     ? "name a scan file, or a stored shape by --key"
+                                                     ? "give a scan file, or --key with a stored shape"
                                                      : "give either a scan file or --key, not both");
     }
     client::SearchOptions options = flags.options;
@@ -124,20 +124,19 @@ CommandResult runQuery(Session& session, const QueryFlags& flags) {
 void addQueryCommand(CLI::App& app, Session& session) {
     auto flags = std::make_shared<QueryFlags>();
     CLI::App* command =
-        app.add_subcommand("query", "Find the stored shapes most like a scan or a stored shape");
+        app.add_subcommand("query", "Find the stored shapes most like a scan, or like a stored shape");
     command->add_option("PATH", flags->path, "Scan to search with; it is not stored");
-    command->add_option("--key", flags->key, "Search with this stored shape instead; it is left out itself");
-    command->add_flag("--include-self", flags->includeSelf, "With --key: rank the shape itself too");
+    command->add_option("--key", flags->key, "Search with this stored shape instead");
+    command->add_flag("--include-self", flags->includeSelf,
+                      "With --key: keep the shape itself among the hits");
     addCollectionOption(*command, flags->options.collection);
-    command->add_option("-k,--k", flags->options.k, "Hits at most")->capture_default_str();
-    command->add_option("--threshold", flags->options.threshold,
-                        "Only hits with at least this score, 0 to 1");
+    command->add_option("-k,--k", flags->options.k, "Most hits to return")->capture_default_str();
+    command->add_option("--threshold", flags->options.threshold, "Lowest score of a hit, 0 to 1");
     command->add_option("--filter", flags->options.filter,
-                        "Only shapes whose metadata passes, e.g. 'label=cup'");
+                        "Only shapes with such metadata, e.g. 'label=cup'");
     addScoreFlags(*command, flags->score);
-    auto* none = command->add_flag("--no-explanation", flags->noExplanation, "Do not say why");
-    command->add_flag("--explain", flags->explain, "Say why for every hit, not only the first")
-        ->excludes(none);
+    auto* none = command->add_flag("--no-explanation", flags->noExplanation, "Do not explain the hits");
+    command->add_flag("--explain", flags->explain, "Explain every hit, not only the first")->excludes(none);
     addScanFlags(*command, flags->scan);
     command->callback(
         [&session, flags] { session.action = [&session, flags] { return runQuery(session, *flags); }; });

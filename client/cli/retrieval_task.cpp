@@ -35,7 +35,7 @@ std::string listed(const std::set<std::string>& names) {
     return text;
 }
 
-/// A misspelt class would quietly measure something else.
+/// A misspelt class would silently measure something else.
 Result<void> checkClasses(const std::vector<std::string>& asked, const std::set<std::string>& known) {
     for (const std::string& name : asked) {
         if (known.count(name) == 0) {
@@ -71,10 +71,10 @@ Result<void> keepClasses(std::vector<CollectionScan>& scans, const ClassFlags& c
 }  // namespace
 
 void addClassFlags(CLI::App& command, ClassFlags& flags) {
-    command.add_option("--classes", flags.only, "Only these classes take part, as queries and as candidates")
+    command.add_option("--classes", flags.only, "Measure only these classes, as queries and as candidates")
         ->delimiter(',')
         ->type_name("A,B,...");
-    command.add_option("--except-classes", flags.except, "All classes but these take part")
+    command.add_option("--except-classes", flags.except, "Measure all classes but these")
         ->delimiter(',')
         ->type_name("A,B,...");
 }
@@ -97,9 +97,8 @@ Result<std::vector<CollectionScan>> listClasses(const std::string& root, const C
     for (CollectionScan& scan : *scans) {
         const std::size_t slash = scan.name.find('/');
         if (slash == std::string::npos) {
-            return fail(ErrorCode::kInvalidArgument,
-                        scan.path + " lies in no class folder; " + root +
-                            " must hold a folder for each class (DIR/CLASS/FILE)");
+            return fail(ErrorCode::kInvalidArgument, scan.path + " is in no class folder; " + root +
+                                                         " must have one folder per class (DIR/CLASS/FILE)");
         }
         scan.label = scan.name.substr(0, slash);
     }
@@ -110,8 +109,7 @@ Result<std::vector<CollectionScan>> listClasses(const std::string& root, const C
 Result<Match> matchFromName(const std::string& name) {
     if (name == "folder") return Match::kFolder;
     if (name == "stem") return Match::kStem;
-    return fail(ErrorCode::kInvalidArgument,
-                "'" + name + "' is no way to match; the ways are folder and stem");
+    return fail(ErrorCode::kInvalidArgument, "'" + name + "' is not a way to match; use folder or stem");
 }
 
 GalleryQuery rankGallery(Match match, const CollectionScan& query, const std::vector<CollectionScan>& gallery,

@@ -1,4 +1,4 @@
-// `shapedb sample`: labelled noisy scans of made-up shapes, to try everything else on.
+// `shapedb sample`: labelled noisy scans of made-up shapes, as test and demo data.
 #include <algorithm>
 #include <filesystem>
 #include <memory>
@@ -40,7 +40,7 @@ struct SampleFile {
     std::string path;
 };
 
-/// "animal/animal_01.ply": sorts by number up to 99 a family, and later ones still differ.
+/// "animal/animal_01.ply": names sort by number up to 99.
 std::string sampleName(const std::string& family, std::size_t number) {
     std::string digits = std::to_string(number);
     if (digits.size() < 2) digits.insert(0, 1, '0');
@@ -49,7 +49,7 @@ std::string sampleName(const std::string& family, std::size_t number) {
 
 CommandResult listFamilyNames(Session& session) {
     nlohmann::json list = nlohmann::json::array();
-    Table table({{"family"}, {"what it is"}});
+    Table table({{"family"}, {"description"}});
     for (const FamilyInfo& family : listFamilies()) {
         list.push_back({{"family", family.name}, {"description", family.description}});
         table.add({family.name, family.description});
@@ -66,7 +66,7 @@ Result<std::vector<std::string>> chosenFamilies(const std::vector<std::string>& 
     for (const std::string& name : asked) {
         if (std::find(known.begin(), known.end(), name) == known.end()) {
             return fail(ErrorCode::kInvalidArgument,
-                        "there is no family '" + name + "'; 'shapedb sample --list' names them all");
+                        "there is no family '" + name + "'; 'shapedb sample --list' lists them");
         }
     }
     std::vector<std::string> chosen = asked;
@@ -110,7 +110,7 @@ CommandResult runSample(Session& session, const SampleFlags& flags) {
     if (flags.list) return listFamilyNames(session);
     if (flags.folder.empty()) {
         return fail(ErrorCode::kInvalidArgument,
-                    "name the folder to write to (or --list to see the families)");
+                    "give the folder to write to, or --list to see the families");
     }
     const auto families = chosenFamilies(flags.families);
     RETURN_IF_ERROR(families);
@@ -149,26 +149,27 @@ CommandResult runSample(Session& session, const SampleFlags& flags) {
 
 void addSampleCommand(CLI::App& app, Session& session) {
     auto flags = std::make_shared<SampleFlags>();
-    CLI::App* command = app.add_subcommand("sample", "Write labelled noisy scans of made-up shapes");
-    command->add_option("DIR", flags->folder, "Where to: DIR/FAMILY/FAMILY_01.ply, ...");
-    command->add_option("--families", flags->families, "Only these, separated by commas [all]")
+    CLI::App* command =
+        app.add_subcommand("sample", "Write labelled noisy scans of made-up shapes (needs no server)");
+    command->add_option("DIR", flags->folder, "Folder to write to: DIR/FAMILY/FAMILY_01.ply, ...");
+    command->add_option("--families", flags->families, "Only these families, separated by commas [all]")
         ->delimiter(',')
         ->allow_extra_args(false);
-    command->add_option("--count", flags->count, "Scans of each family")
+    command->add_option("--count", flags->count, "Scans per family")
         ->check(CLI::Range(1, 1000000))
         ->capture_default_str();
-    command->add_option("--first", flags->first, "Number of the first one; others make other shapes")
+    command->add_option("--first", flags->first, "Number of the first scan; each number is another shape")
         ->check(CLI::Range(1, 1000000))
         ->capture_default_str();
-    command->add_option("--points", flags->points, "Points of each scan")
+    command->add_option("--points", flags->points, "Points per scan")
         ->check(CLI::Range(4, 100000000))
         ->capture_default_str();
     command->add_option("--noise", flags->noise, "Gaussian noise, as a share of the bounding-box diagonal")
         ->check(atLeastZero())
         ->capture_default_str();
-    command->add_option("--seed", flags->seed, "Seed of shapes, poses and noise")->capture_default_str();
-    command->add_flag("--upright", flags->upright, "Leave shapes as built: do not turn, scale or move them");
-    command->add_flag("--list", flags->list, "List the families and stop");
+    command->add_option("--seed", flags->seed, "Seed for shapes, poses and noise")->capture_default_str();
+    command->add_flag("--upright", flags->upright, "Do not turn, scale or move the shapes");
+    command->add_flag("--list", flags->list, "List the families");
     command->callback(
         [&session, flags] { session.action = [&session, flags] { return runSample(session, *flags); }; });
 }

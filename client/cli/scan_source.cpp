@@ -15,19 +15,19 @@ namespace fs = std::filesystem;
 void addScanFlags(CLI::App& command, ScanFlags& flags) {
     CLI::App& group = addScanFlagsButNoise(command, flags);
     group
-        .add_option("--noise", flags.noise,
-                    "Gaussian noise with this standard deviation, as a share of the bounding-box diagonal "
-                    "(0.01: 1 %)")
+        .add_option(
+            "--noise", flags.noise,
+            "Add Gaussian noise with this standard deviation, as a share of the bounding-box diagonal")
         ->check(atLeastZero());
 }
 
 CLI::App& addScanFlagsButNoise(CLI::App& command, ScanFlags& flags) {
-    const auto group = command.add_option_group("Scans", "What is done to a scan after reading it");
-    group->add_option("--points", flags.points, "Random subset of this many points (4 or more)");
-    group->add_option("--seed", flags.seed, "Seed of noise, subset and mesh samples [1]");
+    const auto group = command.add_option_group("Scans", "Applied to a scan after reading it");
+    group->add_option("--points", flags.points, "Keep a random subset of this many points, 4 or more");
+    group->add_option("--seed", flags.seed, "Seed for noise, subset and mesh samples [1]");
     group
         ->add_option("--mesh-samples", flags.meshSamples,
-                     "Points drawn from the surface of a file with triangles [20000]")
+                     "Points to sample from the surface of a mesh [20000]")
         ->check(aboveZero());
     return *group;
 }
@@ -52,7 +52,7 @@ Result<Scan> loadScan(const std::string& path, const ScanFlags& flags, std::uint
     options.seed = flags.seed;
     auto scan = readScan(path, options, context);
     if (!scan) return scan;
-    // Two streams: the subset of a cloud does not change with its noise.
+    // Two streams, so that the subset does not depend on the noise.
     Random random(seed);
     const std::uint64_t noiseSeed = random.next();
     const std::uint64_t subsetSeed = random.next();

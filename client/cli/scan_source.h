@@ -1,4 +1,4 @@
-// Scan files as the commands use them: read, made worse on purpose, named.
+// Scan files as the commands use them: read, degraded on request, named.
 #pragma once
 
 #include <cstdint>
@@ -17,8 +17,8 @@ namespace shapedb::cli {
 
 /// --noise, --points, --seed and --mesh-samples.
 struct ScanFlags {
-    double noise = 0.0;                   ///< sigma as a share of the bounding-box diagonal
-    std::optional<std::uint64_t> points;  ///< random subset of this many
+    double noise = 0.0;                   ///< standard deviation, as a share of the bounding-box diagonal
+    std::optional<std::uint64_t> points;  ///< size of a random subset
     std::uint64_t seed = 1;
     std::uint64_t meshSamples = ReadOptions{}.meshSamples;
 };
@@ -26,25 +26,24 @@ struct ScanFlags {
 /// `flags` must outlive the parsing.
 void addScanFlags(CLI::App& command, ScanFlags& flags);
 
-/// For a command that takes several noise levels. The group of the flags, to add to.
+/// For a command with several noise levels. Returns the group of the flags.
 CLI::App& addScanFlagsButNoise(CLI::App& command, ScanFlags& flags);
 
-/// The seed of one file: depends on the run's seed and the file's name in the collection only,
-/// so that neither order nor thread count nor the other files change what a file gets.
+/// The seed of one file. Depends only on the run's seed and the file's name in the collection: not on the
+/// order of files, the number of threads or the other files.
 [[nodiscard]] std::uint64_t fileSeed(std::uint64_t seed, const std::string& name);
 
-/// Reads `path`, adds noise to all its points, then subsamples, with random numbers from `seed`.
-/// Points drawn from a mesh depend on flags.seed alone.
+/// Reads `path`, adds noise to all points, then takes the subset, with random numbers from `seed`. Points
+/// sampled from a mesh depend on flags.seed alone.
 ///
-/// Errors: those of readScan; kInvalidArgument when points is below 4.
+/// Errors: those of readScan; kInvalidArgument if fewer than 4 points are asked for.
 [[nodiscard]] Result<Scan> loadScan(const std::string& path, const ScanFlags& flags, std::uint64_t seed,
                                     const RunContext& context = {});
 
-/// `path` as seen from `folder`, with '/' between the parts; the file's name when `folder` is the
-/// file itself.
+/// `path` relative to `folder`, with '/' as separator; the file name if `folder` is the file itself.
 [[nodiscard]] std::string relativeName(const std::string& path, const std::string& folder);
 
-/// The same without the ending: "Hand/193.ply" -> "Hand/193". The key of an uploaded file.
+/// "Hand/193.ply" -> "Hand/193": the key of an uploaded file.
 [[nodiscard]] std::string withoutEnding(const std::string& name);
 
 }  // namespace shapedb::cli

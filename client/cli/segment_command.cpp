@@ -1,10 +1,11 @@
-// `shapedb segment`: one scan, its segments and its signature, without a server.
+// `shapedb segment`: the parts and the signature of one scan, without a server.
 #include <memory>
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "client/cli/exit_code.h"
+#include "client/cli/local_result.h"
 #include "client/cli/parameters.h"
 #include "client/cli/scan_source.h"
 #include "client/cli/session.h"
@@ -45,20 +46,20 @@ std::string segmentText(const SegmentFlags& flags, const Scan& scan, const Shape
                         const client::SegmentationReport& report, const client::Signature& signature) {
     std::string text = flags.file + ": " + scan.format + ", " +
                        formatCount(report.points, "point", "points") +
-                       (scan.sampledFromMesh ? " drawn from its surface" : "") + "\n";
+                       (scan.sampledFromMesh ? " sampled from its surface" : "") + "\n";
     if (scan.skippedNonFinite > 0) {
-        text += formatCount(scan.skippedNonFinite, "point", "points") + " without a measurement left out\n";
+        text += formatCount(scan.skippedNonFinite, "point", "points") + " without a measurement skipped\n";
     }
     text += preparationText(report);
-    text += formatCount(report.segments, "segment", "segments") + ", volume " + formatNumber(report.volume) +
-            ", from " + formatCount(report.tetrahedra) + " tetrahedra (profile " +
-            profileName(parameters.profile) + ") in " + formatSeconds(report.totalSeconds) + ", " +
-            formatSeconds(report.delaunaySeconds) + " of it Delaunay\n";
+    text += formatCount(report.segments, "part", "parts") + ", volume " + formatNumber(report.volume) + "; " +
+            formatCount(report.tetrahedra) + " tetrahedra, profile " + profileName(parameters.profile) +
+            ", " + formatSeconds(report.totalSeconds) + " (Delaunay " +
+            formatSeconds(report.delaunaySeconds) + ")\n";
     if (parameters.segmentation.interiorMethod == InteriorMethod::kAdaptive) {
-        text += interiorText(report);
+        text += interiorText(report, signature.scale);
     }
-    text += "\nThe " + std::to_string(signature.points.size()) + " heaviest:\n" + signatureTable(signature);
-    if (!flags.out.empty()) text += "\nPoints coloured by segment: " + flags.out + "\n";
+    text += "\nLargest parts:\n" + signatureTable(signature);
+    if (!flags.out.empty()) text += "\nPoints coloured by part: " + flags.out + "\n";
     return text;
 }
 
@@ -77,7 +78,7 @@ CommandResult runSegment(Session& session, const SegmentFlags& flags) {
             writeLabelledPly(flags.out, scan->points, description->segmentation.pointSegment);
         RETURN_IF_ERROR(written);
     }
-    const client::SegmentationReport report = reportOf(description->segmentation);
+    const client::SegmentationReport report = toClient(description->segmentation);
     const client::Signature signature = toClient(description->signature);
     session.console().document(segmentJson(flags, *scan, *parameters, report, signature));
     session.console().text(segmentText(flags, *scan, *parameters, report, signature));
@@ -88,9 +89,9 @@ CommandResult runSegment(Session& session, const SegmentFlags& flags) {
 
 void addSegmentCommand(CLI::App& app, Session& session) {
     auto flags = std::make_shared<SegmentFlags>();
-    CLI::App* command = app.add_subcommand("segment", "Segment one scan here, without a server");
-    command->add_option("FILE", flags->file, "Scan: PLY, PCD, OFF, OBJ, STL or XYZ")->required();
-    command->add_option("--out", flags->out, "Write the points, coloured and labelled by segment")
+    CLI::App* command = app.add_subcommand("segment", "Cut one scan into its parts (needs no server)");
+    command->add_option("FILE", flags->file, "Scan file: PLY, PCD, OFF, OBJ, STL or XYZ")->required();
+    command->add_option("--out", flags->out, "Write the points, coloured and labelled by part")
         ->type_name("FILE.ply");
     addScanFlags(*command, flags->scan);
     addParameterFlags(*command, flags->parameters);

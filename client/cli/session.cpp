@@ -16,24 +16,23 @@ namespace shapedb::cli {
 namespace {
 
 constexpr const char* kFooter =
-    "Every command takes --json; 'shapedb COMMAND --help' tells the rest.\n"
-    "Exit codes: 0 ok, 1 some items failed, 2 usage, 3 bad file or scan, 4 not found or wrong state,\n"
-    "5 server unavailable, 6 internal, 130 interrupted.";
+    "Every command takes --json. 'shapedb COMMAND --help' lists its flags.\n"
+    "Exit codes: 0 done, 1 some items failed, 2 wrong usage, 3 bad file or scan,\n"
+    "4 not found or wrong state, 5 server unavailable, 6 internal error, 130 interrupted.";
 
 void addGlobalOptions(CLI::App& app, GlobalOptions& options) {
-    app.add_flag("--json", options.json, "One JSON document on standard output instead of text");
-    app.add_option("--server", options.server, "Address of the server")
+    app.add_flag("--json", options.json, "Print one JSON document instead of text");
+    app.add_option("--server", options.server, "Server address")
         ->envname("SHAPEDB_SERVER")
         ->default_str("127.0.0.1:7878")
         ->type_name("HOST:PORT");
     app.add_option("--timeout", options.timeoutSeconds,
-                   "Give up on the whole command after this long; without it a call to the server may take a "
-                   "minute, sending a scan an hour, and following something as long as it takes")
+                   "Give up after this long [a minute per call, an hour per scan, no limit for following]")
         ->check(aboveZero())
         ->type_name("SECONDS");
 }
 
-/// Options of the program may follow the command: `shapedb segment FILE --json`.
+/// Global options may follow the command: `shapedb segment FILE --json`.
 void letGlobalOptionsFollow(CLI::App& app) {
     for (CLI::App* sub : app.get_subcommands({})) {
         sub->fallthrough();
@@ -43,12 +42,12 @@ void letGlobalOptionsFollow(CLI::App& app) {
 
 int finish(Console& console, int exitCode) {
     if (console.flush()) return exitCode;
-    console.note("cannot write the result: standard output is closed or its device is full");
+    console.note("cannot write the result: standard output is closed or full");
     return exitCode == kOk ? kBadData : exitCode;
 }
 
 int usageError(Console& console, const CLI::App& app, const CLI::ParseError& error) {
-    // The subcommand that was being read knows best which help to offer.
+    // Point to the help of the subcommand that was being read.
     std::string command = app.get_name();
     for (const CLI::App* at = &app; !at->get_subcommands().empty();) {
         at = at->get_subcommands().front();
@@ -75,7 +74,7 @@ RunContext Session::context(const std::string& what) {
     RunContext context;
     context.cancel = &cancel_;
     if (options_.timeoutSeconds && !deadline_) {
-        // A year is beyond any patience and still far from the clock's end.
+        // At most a year: the clock must not overflow.
         const std::chrono::duration<double> wait(std::min(*options_.timeoutSeconds, 86400.0 * 365.0));
         deadline_ = RunContext::Clock::now() + std::chrono::duration_cast<RunContext::Clock::duration>(wait);
     }
@@ -87,14 +86,14 @@ RunContext Session::context(const std::string& what) {
 }
 
 int run(int argc, const char* const* argv, Console& console, const std::atomic<bool>& cancel) {
-    // Known before parsing, so that an error of parsing is told in JSON too.
+    // Before parsing, so that a parse error is reported as JSON too.
     console.setJson(
         std::any_of(argv, argv + argc, [](const char* a) { return std::strcmp(a, "--json") == 0; }));
     try {
         Session session(console, cancel);
         CLI::App app(
-            "Shape retrieval for noisy 3D point clouds: segment scans, compare them, and ask a "
-            "ShapeDB server for the most similar ones.",
+            "Finds 3D objects that look like your scan: stores scans on a ShapeDB server, searches them by "
+            "shape, and cuts scans into parts. Scans may be noisy and need no mesh.",
             "shapedb");
         app.set_version_flag("--version", "shapedb " SHAPEDB_VERSION);
         app.footer(kFooter);
@@ -128,7 +127,7 @@ int run(int argc, const char* const* argv, Console& console, const std::atomic<b
     } catch (const std::bad_alloc&) {
         console.failure({ErrorCode::kOutOfMemory, "not enough memory"});
     } catch (const std::exception& e) {
-        console.failure({ErrorCode::kInternal, std::string("unexpected failure: ") + e.what()});
+        console.failure({ErrorCode::kInternal, std::string("internal error: ") + e.what()});
     }
     return finish(console, kDefect);
 }

@@ -1,4 +1,4 @@
-// What every command gets: the options all commands share, the console, and how to be stopped.
+// What every command gets: the global options, the console and the means to stop it.
 #pragma once
 
 #include <atomic>
@@ -19,10 +19,10 @@ namespace shapedb::cli {
 struct GlobalOptions {
     bool json = false;
     std::string server;                    ///< HOST:PORT
-    std::optional<double> timeoutSeconds;  ///< of the whole command when set
+    std::optional<double> timeoutSeconds;  ///< for the whole command
 };
 
-/// A finished command gives its exit code; an error that ends it is printed by the caller.
+/// The exit code of a finished command, or the error that ended it, which the caller prints.
 using CommandResult = Result<int>;
 
 /// One run of the program.
@@ -35,11 +35,11 @@ class Session {
     [[nodiscard]] const GlobalOptions& options() const { return options_; }
     [[nodiscard]] GlobalOptions& options() { return options_; }
 
-    /// Cancelled by Ctrl-C, bounded by --timeout (counted from the first call), reporting to the
-    /// progress bar with `what` in front of the stage.
+    /// Cancelled by Ctrl-C, limited by --timeout (from the first call on), and shown in the progress bar with
+    /// `what` before the stage.
     [[nodiscard]] RunContext context(const std::string& what = {});
 
-    /// Set by the subcommand the user named; run after the whole command line was read.
+    /// Set by the subcommand that was named; runs after the whole command line was read.
     std::function<CommandResult()> action;
 
   private:
@@ -49,7 +49,7 @@ class Session {
     std::optional<RunContext::Clock::time_point> deadline_;
 };
 
-/// Each adds its subcommands to `app`; both must live as long as the program.
+/// Each adds its subcommands to `app`; both arguments must outlive the parsing and the action.
 void addSegmentCommand(CLI::App& app, Session& session);
 void addSampleCommand(CLI::App& app, Session& session);
 void addEvaluateCommand(CLI::App& app, Session& session);
@@ -61,8 +61,8 @@ void addCollectionCommands(CLI::App& app, Session& session);
 void addAdminCommands(CLI::App& app, Session& session);
 void addHealthCommand(CLI::App& app, Session& session);
 
-/// The whole program but for the signal handler: reads the command line, runs the command,
-/// prints its result or error. Never throws.
+/// The whole program without its signal handler: reads the command line, runs the command, prints the result
+/// or the error. Never throws.
 [[nodiscard]] int run(int argc, const char* const* argv, Console& console, const std::atomic<bool>& cancel);
 
 }  // namespace shapedb::cli

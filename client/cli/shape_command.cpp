@@ -1,4 +1,4 @@
-// `shapedb get|list|count|delete|watch|signature`: looking after single shapes.
+// `shapedb get|list|count|delete|watch|signature`: single stored shapes.
 #include <algorithm>
 #include <memory>
 
@@ -20,7 +20,7 @@ using nlohmann::json;
 
 namespace {
 
-/// Shapes of one request while paging through a listing; the server's own limit.
+/// Shapes per request while listing: the server's limit.
 constexpr std::uint32_t kPageSize = 1000;
 
 struct KeyFlags {
@@ -61,7 +61,7 @@ CommandResult runGet(Session& session, const KeyFlags& flags) {
         document["report"] = toJson(scan->report);
         document["signature"] = pointsJson(scan->signature);
         document["out"] = flags.out;
-        text += "\nPoints coloured by segment: " + flags.out + "\n";
+        text += "\nPoints coloured by part: " + flags.out + "\n";
     }
     session.console().document(document);
     session.console().text(text);
@@ -138,7 +138,7 @@ std::optional<client::ShapeState> stateOf(const std::string& name) {
     return std::nullopt;
 }
 
-/// Shapes of as many pages as the limit asks for.
+/// As many pages as the limit allows.
 Result<client::ListPage> listAll(const client::Client& client, const ListFlags& flags,
                                  const RunContext& context) {
     client::ListRequest request = flags.request;
@@ -195,7 +195,7 @@ struct DeleteFlags {
 
 CommandResult runDelete(Session& session, const DeleteFlags& flags) {
     if (flags.expectedVersion && flags.keys.size() != 1) {
-        return fail(ErrorCode::kInvalidArgument, "--expected-version is of one shape; name one key");
+        return fail(ErrorCode::kInvalidArgument, "--expected-version applies to one shape; give one key");
     }
     const auto client = connectToServer(session);
     RETURN_IF_ERROR(client);
@@ -214,7 +214,7 @@ CommandResult runDelete(Session& session, const DeleteFlags& flags) {
         failed.push_back({{"key", key}, {"error", toJson(shape.error())}});
         session.console().note(key + ": " + shape.error().message);
         last = exitCodeOf(shape.error().code);
-        if (last == kUnavailable || last == kInterrupted) break;  // the rest would fare no better
+        if (last == kUnavailable || last == kInterrupted) break;  // the others would fail too
     }
     session.console().document({{"deleted", deleted}, {"failed", failed}});
     if (failed.empty()) return kOk;
@@ -242,7 +242,7 @@ std::shared_ptr<ListFlags> addListCommand(CLI::App& app, Session& session, const
     CLI::App* command = app.add_subcommand(name, help);
     addCollectionOption(*command, flags->request.collection);
     command->add_option("--filter", flags->request.filter,
-                        "Only shapes whose metadata passes, e.g. 'label=cup'");
+                        "Only shapes with such metadata, e.g. 'label=cup'");
     command->add_option("--state", flags->state, "Only shapes in this state")
         ->check(CLI::IsMember({"pending", "ready", "failed"}));
     command->callback([&session, flags, runner] {
@@ -256,23 +256,25 @@ std::shared_ptr<ListFlags> addListCommand(CLI::App& app, Session& session, const
 void addShapeCommands(CLI::App& app, Session& session) {
     const auto get = addKeyCommand(app, session, "get", "Show one stored shape", &runGet);
     app.get_subcommand("get")
-        ->add_option("--out", get->out, "Write its points, coloured and labelled by segment")
+        ->add_option("--out", get->out, "Write its points, coloured and labelled by part")
         ->type_name("FILE.ply");
-    addKeyCommand(app, session, "signature", "Show the weighted points a search compares", &runSignature);
+    addKeyCommand(app, session, "signature", "Show what a search compares: parts and statistics of a shape",
+                  &runSignature);
     addKeyCommand(app, session, "watch", "Follow a shape until it is segmented", &runWatch);
     const auto list = addListCommand(app, session, "list", "List stored shapes", &runList);
     app.get_subcommand("list")
-        ->add_option("--limit", list->limit, "At most this many [all]")
+        ->add_option("--limit", list->limit, "List at most this many [all]")
         ->check(aboveZero());
     app.get_subcommand("list")->add_option("--cursor", list->request.cursor,
-                                           "Go on after an earlier --limit");
+                                           "Continue an earlier list --limit");
     addListCommand(app, session, "count", "Count stored shapes", &runCount);
 
     auto flags = std::make_shared<DeleteFlags>();
     CLI::App* command = app.add_subcommand("delete", "Delete stored shapes");
     command->add_option("KEY", flags->keys, "Keys of the shapes")->required();
     addCollectionOption(*command, flags->collection);
-    command->add_option("--expected-version", flags->expectedVersion, "Only if this is its version now");
+    command->add_option("--expected-version", flags->expectedVersion,
+                        "Only if the shape has this version now");
     command->callback(
         [&session, flags] { session.action = [&session, flags] { return runDelete(session, *flags); }; });
 }

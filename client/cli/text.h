@@ -1,4 +1,4 @@
-// Numbers and tables for people. JSON output never goes through here.
+// Numbers and tables for people; not used for JSON.
 #pragma once
 
 #include <array>
@@ -41,10 +41,10 @@ namespace shapedb::cli {
 /// For the content or an attribute of an XML element; control characters become `?`.
 [[nodiscard]] std::string escapeXml(const std::string& text);
 
-/// How many terminal columns a UTF-8 text takes (code points; no wide or combining ones).
+/// Terminal columns of a UTF-8 text, counting code points (no wide or combining characters).
 [[nodiscard]] std::size_t displayWidth(const std::string& text);
 
-/// Columns padded to their widest cell, two blanks between them, no blanks at line ends.
+/// Columns padded to their widest cell, separated by two blanks, no trailing blanks.
 class Table {
   public:
     enum class Align { kLeft, kRight };
@@ -56,12 +56,12 @@ class Table {
 
     explicit Table(std::vector<Column> columns) : columns_(std::move(columns)) {}
 
-    /// Missing cells are empty; there must not be more than columns.
+    /// Missing cells are empty. At most one cell per column.
     void add(std::vector<std::string> cells) { rows_.push_back(std::move(cells)); }
 
     [[nodiscard]] bool empty() const { return rows_.empty(); }
 
-    /// With a title line unless all titles are empty. Ends in a newline.
+    /// Starts with a line of titles unless all are empty; ends in a newline.
     [[nodiscard]] std::string render() const;
 
   private:

@@ -1,4 +1,4 @@
-// Stores a scan and asks for the shapes most like it. Usage: quick [HOST:PORT]
+// Stores a scan, then finds the shapes most like it. Usage: quick [HOST:PORT]
 #include <cmath>
 #include <cstdio>
 

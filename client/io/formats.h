@@ -1,8 +1,8 @@
-// The reader of each format, one .cpp each. Private to client/io: callers use readScan.
+// One reader per format. Private to client/io: callers use readScan.
 //
-// All of them read from the file's start, stop at the first defect, and allocate in proportion
-// to the bytes that are really there, whatever a header announces. Errors: kMalformedFile,
-// kNonFiniteCoordinate (not PCD), kPointLimitExceeded.
+// Each starts at the beginning of the file, stops at the first defect, and allocates in proportion to the
+// bytes that are really there, not to what a header announces. Errors: kMalformedFile, kNonFiniteCoordinate
+// (not PCD), kPointLimitExceeded.
 #pragma once
 
 #include <cstddef>
@@ -20,8 +20,7 @@ Result<ScanContent> readObj(InputFile& file, std::size_t maxPoints);
 Result<ScanContent> readStl(InputFile& file, std::size_t maxPoints);
 Result<ScanContent> readXyz(InputFile& file, std::size_t maxPoints);
 
-/// Does the first line of content, after a count or column names, read as a point? Tells scans
-/// from notes.
+/// True if the first line of content, after a count or column names, is a point: tells scans from notes.
 bool looksLikeXyz(InputFile& file);
 
 }  // namespace shapedb::io

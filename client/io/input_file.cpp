@@ -14,11 +14,11 @@ namespace shapedb::io {
 
 namespace {
 
-// Large enough that system calls and progress reports cost nothing beside parsing.
+// Large enough that system calls and progress reports cost nothing compared with parsing.
 constexpr std::size_t kBufferBytes = std::size_t{1} << 20;
 
-// A triangle strip of a big model is one line of text, so lines may be long; this only stops
-// a file that is no text at all from being gathered into one.
+// Lines may be long (a triangle strip of a big model is one line); the limit only stops binary files from
+// being read as a single line.
 constexpr std::size_t kLongestLine = std::size_t{256} << 20;
 
 Error notReadable(const std::string& path, const std::string& why) {

@@ -1,5 +1,5 @@
-// A file read front to back through a buffer that grows only with bytes that really arrive.
-// Private to client/io.
+// A file read front to back, through a buffer that grows only with the bytes that arrive. Private to
+// client/io.
 #pragma once
 
 #include <cstddef>
@@ -14,9 +14,8 @@
 
 namespace shapedb::io {
 
-/// Not thread-safe. A device error, a cancelled context or an absurdly long line makes the file
-/// look as if it ended there; `failure` then holds the real reason, and readScan reports it
-/// instead of what the parser made of the early end.
+/// After a device error, a cancellation or an absurdly long line the file appears to end; `failure` then has
+/// the real reason, which readScan reports in place of the parser's error. Not thread-safe.
 class InputFile {
   public:
     /// Errors: kFileNotReadable. `context` must outlive the file.
@@ -33,33 +32,32 @@ class InputFile {
 
     /// Byte position of data() in the file.
     std::uint64_t offset() const { return bufferOffset_ + begin_; }
-    /// Bytes from offset() to the end of the file; nothing for a pipe.
+    /// Bytes from offset() to the end of the file; unknown for a pipe.
     std::optional<std::uint64_t> remaining() const;
-    /// False only if it is certain that fewer than `bytes` remain.
+    /// False only if fewer than `bytes` remain for certain.
     bool mayHold(std::uint64_t bytes) const;
 
-    /// The bytes in the buffer that have not been consumed. Valid until the next call of a
-    /// non-const member.
+    /// The bytes in the buffer not yet consumed. Valid until the next call of a non-const member.
     const char* data() const { return buffer_.data() + begin_; }
     std::size_t available() const { return end_ - begin_; }
 
-    /// Makes `bytes` available; false if the file ends before (what is available then is open).
+    /// Makes `bytes` available; false if the file ends before, with an unspecified number available.
     bool fill(std::uint64_t bytes) { return available() >= bytes || fillSlowly(bytes); }
-    /// The first at most `bytes` of data(), fewer only where the file ends before.
+    /// The first `bytes` of data(), fewer only if the file ends before.
     std::string_view peek(std::size_t bytes);
     /// `bytes` <= available().
     void consume(std::size_t bytes) { begin_ += bytes; }
-    /// Passes over bytes that need not be in the buffer; false if the file ends before.
+    /// Skips bytes, also beyond the buffer; false if the file ends before.
     bool skip(std::uint64_t bytes);
-    /// True if only white space and zero bytes are left: padding some writers add. Consumes it.
+    /// True if only white space and zero bytes are left (some writers pad). Consumes them.
     bool onlyPaddingLeft();
-    /// Passes over the UTF-8 mark some editors put in front of a text file.
+    /// Skips a UTF-8 byte order mark.
     void skipByteOrderMark();
 
-    /// The next line without its \n or \r\n; false at the end of the file. The view is valid
-    /// until the next call of a non-const member.
+    /// The next line without its \n or \r\n; false at the end of the file. The view is valid until the next
+    /// call of a non-const member.
     bool readLine(std::string_view& line);
-    /// Number of the line last read, from 1.
+    /// Of the line last read, from 1.
     std::uint64_t lineNumber() const { return lineNumber_; }
 
     // "scan.ply: line 7: ..." / "scan.ply: byte 132: ..." with kMalformedFile.

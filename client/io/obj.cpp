@@ -1,8 +1,7 @@
-// Wavefront OBJ: v and f lines; everything else of the format does not change the surface.
+// Wavefront OBJ: v and f lines; nothing else changes the surface.
 //
-// Our own reader rather than tinyobjloader, which reads "v 1 abc nan" as (1, 0, 0) without an
-// error, overflows on long indices (atoi), loses the last digits of coordinates, and reports no
-// line for a face that names a missing vertex.
+// Not tinyobjloader, which reads "v 1 abc nan" as (1, 0, 0) without an error, overflows on long indices
+// (atoi), loses the last digits of coordinates, and gives no line for a face with a missing vertex.
 #include <cstdint>
 #include <limits>
 #include <string>
@@ -45,7 +44,7 @@ class ObjReader {
     }
 
   private:
-    // The next line, joined with those that follow a backslash at its end.
+    // A backslash at the end of a line continues it.
     bool nextLogicalLine() {
         if (!file_.readLine(line_)) return false;
         if (line_.empty() || line_.back() != '\\') return true;
@@ -88,7 +87,7 @@ class ObjReader {
                 return fail(missingVertex(file_.lineNumber(), std::to_string(index)));
             }
             if (index < 0) index += known + 1;
-            // The vertex may still come, so this is checked at the end.
+            // Checked at the end: the vertex may come later in the file.
             if (index > greatestIndex_) {
                 greatestIndex_ = index;
                 greatestIndexLine_ = file_.lineNumber();

@@ -1,4 +1,4 @@
-// OFF (Geomview object file format), text, with the prefixes that only add data to a vertex.
+// OFF (Geomview object file format) as text, with the prefixes that only add data to vertices.
 #include <cstdint>
 #include <limits>
 #include <string>
@@ -42,7 +42,7 @@ class OffReader {
     }
 
   private:
-    // Puts the next line that is more than a comment into line_.
+    // Reads the next line with content into line_.
     bool nextContentLine() {
         while (file_.readLine(line_)) {
             line_ = withoutComment(line_);
@@ -53,7 +53,7 @@ class OffReader {
 
     Result<void> readHeader() {
         if (!nextContentLine()) return fail(file_.malformedLine("expected OFF; the file is empty"));
-        // "OFF 8 6 12", and "OFF8 6 12" as in some well-known collections; the word may be missing.
+        // "OFF 8 6 12", "OFF8 6 12" (in well-known collections), or without the word.
         std::string_view rest = line_;
         while (!rest.empty() && isBlank(rest.front())) rest.remove_prefix(1);
         const std::string_view magic = rest.substr(0, rest.find("OFF") + 3);
@@ -91,7 +91,7 @@ class OffReader {
             "vertex " + std::to_string(index) + " of " + std::to_string(counts_.vertices);
         if (!nextContentLine()) return fail(cutShort(name));
         Point3 p;
-        // What follows (normal, colour, texture position) is of no use here.
+        // Ignore what follows: normal, colour, texture position.
         for (double* coordinate : {&p.x, &p.y, &p.z}) {
             const std::string_view word = nextWord(line_);
             if (!parseReal(word, *coordinate)) {

@@ -37,7 +37,7 @@ Result<OutputFile> OutputFile::create(const std::string& path) {
         if (descriptor < 0) return fail(notWritable(path, errno));
         return OutputFile(path, path, "", descriptor);
     }
-    // Renaming must replace the file a link leads to, not the link.
+    // Replace the file that a link points to, not the link.
     std::string target = path;
     if (fs::exists(status)) {
         const fs::path resolved = fs::canonical(path, error);
@@ -92,7 +92,7 @@ Result<void> OutputFile::flush() {
 
 Result<void> OutputFile::commit() {
     RETURN_IF_ERROR(flush());
-    // A pipe or a terminal cannot be synchronised, which is no failure.
+    // A pipe or a terminal cannot be synchronised; that is fine.
     if (::fsync(descriptor_) != 0 && errno != EINVAL && errno != ENOTSUP && errno != EROFS) {
         return fail(failed(errno));
     }

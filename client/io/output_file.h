@@ -1,4 +1,4 @@
-// A file that appears under its name whole or not at all. Private to client/io.
+// A file that appears complete or not at all. Private to client/io.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +10,7 @@
 
 namespace shapedb::io {
 
-/// Not thread-safe. What is not committed is removed by the destructor. Errors: kFileNotWritable.
+/// The destructor removes what was not committed. Errors: kFileNotWritable. Not thread-safe.
 class OutputFile {
   public:
     static Result<OutputFile> create(const std::string& path);
@@ -22,7 +22,7 @@ class OutputFile {
     ~OutputFile();
 
     Result<void> write(std::string_view bytes);
-    /// Writes out everything, down to the device, and puts the file in its place.
+    /// Flushes to the device and renames the file to its place.
     Result<void> commit();
 
   private:
@@ -31,9 +31,9 @@ class OutputFile {
     Result<void> flush();
     Error failed(int number) const;
 
-    std::string path_;       ///< as the caller named it, for messages
-    std::string target_;     ///< where it goes, links resolved
-    std::string temporary_;  ///< empty when written directly
+    std::string path_;       ///< as given by the caller, for messages
+    std::string target_;     ///< with links resolved
+    std::string temporary_;  ///< empty if written directly
     int descriptor_;
     std::vector<char> buffer_;
 };

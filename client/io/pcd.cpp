@@ -1,6 +1,6 @@
 // PCD (Point Cloud Library): ASCII, binary and binary_compressed.
 //
-// A point whose coordinate is not finite means "nothing measured here" and is skipped and counted.
+// A point with a coordinate that is not finite means "nothing measured here": it is skipped and counted.
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -23,7 +23,7 @@ namespace {
 
 constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
 
-// LZF writes at most 264 bytes (a reference of the longest kind) for 3 bytes read.
+// LZF writes at most 264 bytes (its longest back reference) for 3 bytes read.
 constexpr std::uint64_t kLzfGreatestRatio = 88;
 
 struct PcdField {
@@ -33,7 +33,7 @@ struct PcdField {
     std::uint64_t count = 1;
 
     std::uint64_t bytes() const { return size * count; }
-    // Filler that aligns the fields after it.
+    // Padding before the next field.
     bool isPadding() const { return name == "_"; }
 };
 
@@ -200,7 +200,7 @@ class HeaderParser {
         return {};
     }
 
-    // What only the whole header can tell; completes the number of points.
+    // Checks across header lines; completes the number of points.
     Result<void> check() {
         if (header_.fields.empty()) return fail(file_.malformedLine("the header has no FIELDS line"));
         for (const std::size_t at : header_.coordinates) {
@@ -333,7 +333,7 @@ class PcdBody {
         const std::uint64_t packed = loadAs<std::uint32_t>(file_.data(), !machineIsLittleEndian());
         const std::uint64_t unpacked = loadAs<std::uint32_t>(file_.data() + 4, !machineIsLittleEndian());
         file_.consume(8);
-        // PCL leaves the padding fields out of compressed data; others write them.
+        // PCL omits padding fields in compressed data; others write them.
         const auto fits = [&](bool withPadding) {
             const std::uint64_t size = header_.bytesPerPoint(withPadding);
             return unpacked / size == count() && unpacked % size == 0;
@@ -378,7 +378,7 @@ class PcdBody {
         return sum;
     }
 
-    // PCD files carry the byte order of the machine that wrote them: little-endian in practice.
+    // PCD files have the byte order of the machine that wrote them: little-endian in practice.
     Point3 load(const char* x, const char* y, const char* z) const {
         const bool swapped = !machineIsLittleEndian();
         return {loadScalar(x, type_[0], swapped), loadScalar(y, type_[1], swapped),

@@ -1,9 +1,9 @@
-// PLY: ASCII and both binary byte orders, any elements and properties in any order. Our own
-// reader because Debian 12 packages no PLY library.
+// PLY: ASCII and both binary byte orders, any elements and properties in any order. Written here because
+// Debian 12 packages no PLY library.
 //
-// Elements are read one after the other as the header lists them. An element without lists has
-// records of one size and is read (vertex) or passed over in one go; everything else goes through
-// a record reader, TextRecord or BinaryRecord, which offer the same calls.
+// Elements are read in the order of the header. A binary element without lists has records of one size and is
+// read (vertices) or skipped in one go; everything else goes through a record reader, TextRecord or
+// BinaryRecord, with the same interface.
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -116,7 +116,7 @@ Error negativeLength(const InputFile& file, const std::string& where, const PlyE
     return file.malformed(where + ": " + recordName(element, index) + " has a list of negative length");
 }
 
-// Passes over one property of the current record.
+// Skips one property of the current record.
 template <typename Record>
 Result<void> skipProperty(const InputFile& file, Record& record, const PlyElement& element,
                           std::uint64_t index, const PlyProperty& property) {
@@ -137,7 +137,7 @@ Result<void> endRecord(Record& record, const PlyElement& element, std::uint64_t 
     return {};
 }
 
-// Which properties are x, y and z.
+// Finds the properties x, y and z.
 Result<std::array<std::size_t, 3>> findCoordinates(const InputFile& file, const PlyElement& vertex) {
     std::array<std::size_t, 3> at = {kNone, kNone, kNone};
     for (std::size_t i = 0; i < vertex.properties.size(); ++i) {
@@ -174,7 +174,7 @@ class PlyBody {
         }
         if (!file_.onlyPaddingLeft()) {
             return fail(file_.malformedByte(file_.offset(),
-                                            "data after the last element; the header announces too little"));
+                                            "data after the last element; the header announces too few"));
         }
         return {};
     }
@@ -299,7 +299,7 @@ class PlyBody {
         return {};
     }
 
-    // Triangles are made while the indices arrive, so a list's announced length costs nothing.
+    // Triangles are made while the indices arrive, so the announced length of a list allocates nothing.
     template <typename Builder, typename Record>
     Result<void> readIndices(Record& record, const PlyElement& element, std::uint64_t index,
                              const PlyProperty& property) {

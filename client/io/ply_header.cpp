@@ -99,7 +99,7 @@ std::optional<std::uint64_t> PlyElement::fixedSize() const {
 }
 
 std::uint64_t PlyElement::leastSize(PlyEncoding encoding) const {
-    // A number of text takes a digit and the blank or line end after it.
+    // As text: a digit and the blank or line end after it.
     if (encoding == PlyEncoding::kAscii) return 2 * properties.size();
     std::uint64_t size = 0;
     for (const PlyProperty& property : properties) {
@@ -109,7 +109,7 @@ std::uint64_t PlyElement::leastSize(PlyEncoding encoding) const {
 }
 
 Result<PlyHeader> readPlyHeader(InputFile& file) {
-    // Checked before reading a line: a file of another kind may have no line ends.
+    // Before reading a line: a file of another kind may have no line ends.
     if (!file.fill(4) || std::string_view(file.data(), 3) != "ply" ||
         (file.data()[3] != '\n' && !isBlank(file.data()[3]))) {
         return fail(file.malformed("line 1: expected 'ply'; this is not a PLY file"));

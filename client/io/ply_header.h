@@ -1,5 +1,4 @@
-// The header of a PLY file: which elements follow, made of which properties, in which encoding.
-// Private to client/io.
+// The header of a PLY file: its elements, their properties and the encoding. Private to client/io.
 #pragma once
 
 #include <cstdint>
@@ -24,12 +23,12 @@ struct PlyProperty {
 
 struct PlyElement {
     std::string name;
-    std::uint64_t count = 0;  ///< as announced, not yet believed
+    std::uint64_t count = 0;  ///< as announced, not yet verified
     std::vector<PlyProperty> properties;
 
-    /// Bytes of one binary record; nothing if there is a list among the properties.
+    /// Bytes of one binary record; nothing if it has a list.
     std::optional<std::uint64_t> fixedSize() const;
-    /// Fewest bytes one record can take.
+    /// The fewest bytes that one record can take.
     std::uint64_t leastSize(PlyEncoding encoding) const;
 };
 
@@ -38,7 +37,7 @@ struct PlyHeader {
     std::vector<PlyElement> elements;
 };
 
-/// Leaves the file at the first byte after the header. Errors: kMalformedFile with the line.
+/// Stops at the first byte after the header. Errors: kMalformedFile with the line.
 Result<PlyHeader> readPlyHeader(InputFile& file);
 
 }  // namespace shapedb::io

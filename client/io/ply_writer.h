@@ -1,8 +1,8 @@
-// Points out to PLY files any viewer opens.
+// Writes points to PLY files that any viewer opens.
 //
-// A regular file is written under a temporary name beside its place and then renamed, so that a
-// reader never meets half a file and a failure leaves an old one as it was. Anything else that
-// exists under the name (a pipe, a device) is written to directly.
+// A regular file is written under a temporary name and then renamed: readers never see half a file, and a
+// failure leaves an existing one alone. Anything else under that name (a pipe, a device) is written to
+// directly.
 //
 // Thread-safety: all functions may be called from any number of threads at once.
 #pragma once
@@ -16,25 +16,24 @@
 
 namespace shapedb {
 
-/// A colour of a screen, each part 0 to 255.
+/// A colour, each part 0 to 255.
 struct Rgb {
     std::uint8_t red = 0;
     std::uint8_t green = 0;
     std::uint8_t blue = 0;
 };
 
-/// The colour a segment is drawn in, always the same for the same label. 0 to 17 are picked by
-/// hand to be told apart at a glance; from 18 on hues turn by the golden angle in three shades,
-/// less far apart; the first 300 labels all differ. Negative: grey, which no segment has.
+/// The colour of a segment, always the same for the same label. 0 to 17 are hand-picked to be easy to tell
+/// apart; from 18 on hues step by the golden angle in three shades. The first 300 labels all differ. Negative
+/// labels are grey, which no segment is.
 [[nodiscard]] Rgb segmentColour(std::int32_t label);
 
 /// Writes binary little-endian PLY with the vertex properties float x y z, uchar red green blue
 /// (segmentColour) and int segment (the label). `labels` has one entry per point, -1 for none.
 ///
-/// Errors: kInvalidArgument when there are not as many labels as points; kNonFiniteCoordinate or
-/// kCoordinateOutOfRange when a coordinate is not finite or beyond single precision (the message
-/// names the point); kFileNotWritable when the file cannot be created or written in full;
-/// kOutOfMemory. On error nothing is left under the name that was not there before.
+/// Errors: kInvalidArgument (not as many labels as points); kNonFiniteCoordinate and kCoordinateOutOfRange
+/// (beyond single precision), naming the point; kFileNotWritable; kOutOfMemory. An error leaves no new file
+/// behind.
 [[nodiscard]] Result<void> writeLabelledPly(const std::string& path, const PointCloud& points,
                                             const std::vector<std::int32_t>& labels);
 

@@ -1,4 +1,4 @@
-// The number types binary PLY and PCD records are made of. Private to client/io.
+// The number types of binary PLY and PCD records. Private to client/io.
 #pragma once
 
 #include <cstddef>
@@ -54,8 +54,7 @@ T loadAs(const char* bytes, bool swapped) {
     return value;
 }
 
-/// `swapped`: the bytes are in the other order than this machine's. Exact for all types but
-/// 64-bit integers beyond 2^53.
+/// `swapped`: the byte order is not this machine's. Exact, except for 64-bit integers beyond 2^53.
 inline double loadScalar(const char* bytes, ScalarType type, bool swapped) {
     switch (type) {
         case ScalarType::kInt8: return loadAs<std::int8_t>(bytes, swapped);
@@ -72,7 +71,7 @@ inline double loadScalar(const char* bytes, ScalarType type, bool swapped) {
     return 0.0;
 }
 
-/// True when this machine stores the low byte first, as almost all do.
+/// True if this machine stores the low byte first, as almost all do.
 inline bool machineIsLittleEndian() {
     const std::uint16_t probe = 1;
     return loadAs<std::uint8_t>(reinterpret_cast<const char*>(&probe), false) == 1;

@@ -6,7 +6,7 @@ namespace shapedb::io {
 
 namespace {
 
-// Triangles that name a vertex twice stitch strips together; they have no area.
+// Triangles with a repeated vertex stitch strips together; they have no area.
 void addTriangle(std::vector<Triangle>& triangles, const Triangle& t) {
     if (t[0] != t[1] && t[1] != t[2] && t[2] != t[0]) triangles.push_back(t);
 }
@@ -38,7 +38,7 @@ void PolygonFan::add(std::uint32_t vertex) {
 
 void TriangleStrip::add(std::uint32_t vertex) {
     if (corners_ >= 2) {
-        // Every second triangle of a strip runs the other way round.
+        // Every second triangle of a strip is wound the other way.
         const bool swapped = corners_ % 2 == 1;
         addTriangle(*triangles_, {last_[swapped ? 1 : 0], last_[swapped ? 0 : 1], vertex});
     }

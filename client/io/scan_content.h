@@ -1,4 +1,4 @@
-// What every format reader produces, and the checks they share. Private to client/io.
+// What the format readers produce, and the code they share. Private to client/io.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +17,7 @@ namespace shapedb::io {
 
 using Triangle = std::array<std::uint32_t, 3>;
 
-/// The file's content before anybody decides between vertices and surface samples.
+/// The content of a file, before the choice between vertices and surface samples.
 struct ScanContent {
     PointCloud vertices;
     std::vector<Triangle> triangles;  ///< indices are below vertices.size()
@@ -25,13 +25,17 @@ struct ScanContent {
     std::string format;
 };
 
-/// Collects vertices under the rules that hold for all of them.
+inline bool isFinite(const Point3& p) {
+    return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
+}
+
+/// Collects vertices, checking each.
 class VertexSink {
   public:
     VertexSink(const InputFile& file, PointCloud& vertices, std::size_t maxPoints)
         : file_(&file), vertices_(&vertices), maxPoints_(maxPoints) {}
 
-    /// False if the vertex is not finite or one too many; `refusal` then says it in words.
+    /// False if the vertex is not finite or one too many; `refusal` then gives the error.
     bool add(const Point3& p) {
         if (!isFinite(p) || vertices_->size() >= maxPoints_) return false;
         vertices_->push_back(p);
@@ -41,7 +45,7 @@ class VertexSink {
     /// `where`: "line 7" or "byte 132".
     Error refusal(const Point3& p, const std::string& where) const;
 
-    /// Makes room for vertices the file has been shown to have room for.
+    /// For vertices that are known to fit into the file.
     void reserve(std::uint64_t count);
 
   private:
@@ -50,7 +54,7 @@ class VertexSink {
     std::size_t maxPoints_;
 };
 
-/// Cuts a polygon into triangles as its corners arrive: (first, previous, current).
+/// Splits a polygon into triangles (first, previous, current) as its corners arrive.
 class PolygonFan {
   public:
     explicit PolygonFan(std::vector<Triangle>& triangles) : triangles_(&triangles) {}
@@ -64,7 +68,7 @@ class PolygonFan {
     std::uint32_t previous_ = 0;
 };
 
-/// Cuts a triangle strip as its corners arrive; `begin` also restarts it.
+/// Splits a triangle strip as its corners arrive; `begin` also restarts it.
 class TriangleStrip {
   public:
     explicit TriangleStrip(std::vector<Triangle>& triangles) : triangles_(&triangles) {}
@@ -77,8 +81,8 @@ class TriangleStrip {
     std::array<std::uint32_t, 2> last_ = {};
 };
 
-/// Calls visit(record, index) for `count` records of `size` bytes each, straight from the buffer;
-/// stops early when it returns false or the file ends. Returns the records visited with success.
+/// Calls visit(record, index) for `count` records of `size` bytes, straight from the buffer. Stops if it
+/// returns false or the file ends. Returns the number of successful visits.
 template <typename Visit>
 std::uint64_t visitRecords(InputFile& file, std::uint64_t count, std::uint64_t size, const Visit& visit) {
     std::uint64_t done = 0;

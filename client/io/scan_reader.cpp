@@ -96,7 +96,7 @@ bool verticesServeBetter(const ScanContent& content, std::size_t samples) {
     };
     double area = 0.0;
     for (const Triangle& t : content.triangles) area += measure(t).area;
-    // Coordinates too large or too small to have an area are for the segmentation to refuse.
+    // Coordinates too large or too small for an area: the segmentation refuses them.
     if (!(area > 0.0) || !std::isfinite(area)) return true;
     if (content.vertices.size() < samples) return false;
     const double greatest = kDenseEdge * kDenseEdge * area / static_cast<double>(samples);
@@ -116,13 +116,12 @@ bool wantsSamples(const ScanContent& content, const ReadOptions& options) {
 
 Result<PointCloud> samplePoints(const std::string& path, ScanContent&& content, const ReadOptions& options) {
     if (content.triangles.empty()) {
-        return fail(
-            ErrorCode::kInvalidArgument,
-            path + ": surface samples were asked for, but the file has no triangles; read its vertices");
+        return fail(ErrorCode::kInvalidArgument,
+                    path + ": the file has no triangles to sample; read its vertices");
     }
     if (options.meshSamples > options.maxPoints) {
         return fail(ErrorCode::kPointLimitExceeded, path + ": " + std::to_string(options.meshSamples) +
-                                                        " surface samples were asked for, the limit is " +
+                                                        " surface samples are above the limit of " +
                                                         std::to_string(options.maxPoints) + " points");
     }
     const TriangleMesh mesh = {std::move(content.vertices), std::move(content.triangles)};
@@ -141,7 +140,7 @@ Result<Scan> readScanUnguarded(const std::string& path, const ReadOptions& optio
     const Format* format = formatOf(path);
     if (format == nullptr) return fail(unknownFormat(path));
     auto content = format->read(*file, options.maxPoints);
-    // What the parser made of an end that came too early is not the reason.
+    // The real reason comes before the parser's complaint about an early end.
     if (file->failure()) return fail(*file->failure());
     RETURN_IF_ERROR(content);
 
@@ -165,7 +164,7 @@ Error notSearchable(const std::string& path, const std::string& why) {
     return {ErrorCode::kFileNotReadable, path + ": " + why};
 }
 
-// Text files of any content lie beside scans.
+// A .txt file may be anything.
 bool isScanFile(const std::string& path) {
     if (formatOf(path) == nullptr) return false;
     if (endingOf(path) != ".txt") return true;
@@ -252,7 +251,7 @@ Result<std::vector<ScanFile>> listScanFiles(const std::vector<std::string>& path
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::kOutOfMemory, "not enough memory to list the scan files");
     } catch (const std::exception& e) {
-        return fail(ErrorCode::kFileNotReadable, std::string("the scan files cannot be listed: ") + e.what());
+        return fail(ErrorCode::kFileNotReadable, std::string("cannot list the scan files: ") + e.what());
     }
 }
 

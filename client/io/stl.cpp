@@ -1,4 +1,4 @@
-// STL, binary and ASCII. Corners at the very same position become one vertex.
+// STL, binary and ASCII. Corners at the same position become one vertex.
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
@@ -22,14 +22,14 @@ constexpr std::uint64_t kTriangleBytes = 50;  // normal, three corners, two attr
 constexpr std::uint64_t kNormalBytes = 12;
 constexpr std::size_t kSniffedBytes = 1024;  // a text file this long without a zero byte is text
 
-// Finds the vertex at a position. An open table of vertex numbers: a map of positions would take
-// most of the time of reading a large file.
+// Finds the vertex at a position, by open addressing: a map of positions would take most of the reading time
+// of a large file.
 class VertexTable {
   public:
     explicit VertexTable(const PointCloud& vertices) : vertices_(&vertices) {}
 
-    /// The place for `p`: it holds the number of the vertex there, or kFree, which the caller
-    /// replaces once the vertex is the last of the cloud.
+    /// The slot of `p`: the number of the vertex there, or kFree, which the caller replaces after appending
+    /// one.
     std::uint32_t& place(const Point3& p) {
         if (2 * vertices_->size() >= places_.size()) grow();
         return find(p);
@@ -40,7 +40,7 @@ class VertexTable {
   private:
     static std::uint64_t hash(const Point3& p) {
         std::uint64_t hash = 0;
-        // Adding zero makes -0 and 0, which are equal, hash alike.
+        // Adding zero turns -0 into 0: they are equal and must hash alike.
         for (const double coordinate : {p.x + 0.0, p.y + 0.0, p.z + 0.0}) {
             std::uint64_t bits = 0;
             std::memcpy(&bits, &coordinate, sizeof bits);
@@ -63,7 +63,7 @@ class VertexTable {
     }
 
     const PointCloud* vertices_;
-    std::vector<std::uint32_t> places_;  // a power of two of them, at most half taken
+    std::vector<std::uint32_t> places_;  // a power of two, at most half used
 };
 
 class StlReader {
@@ -83,8 +83,7 @@ class StlReader {
     }
 
   private:
-    // Many binary files start with "solid" as well, so the word alone proves nothing: the size a
-    // binary file must have, or a zero byte, which no text has, decides.
+    // Binary files may start with "solid" too, so the exact size of a binary file, or a zero byte, decides.
     bool looksAscii() {
         std::string_view head = file_.peek(kSniffedBytes);
         if (head.substr(0, 3) == "\xEF\xBB\xBF") head.remove_prefix(3);
@@ -99,7 +98,7 @@ class StlReader {
         return head.find('\0') == std::string_view::npos;
     }
 
-    // The file must have the header in its buffer.
+    // The header must be in the buffer.
     std::uint64_t announcedTriangles() const {
         return loadAs<std::uint32_t>(file_.data() + kHeaderBytes, !machineIsLittleEndian());
     }

@@ -17,7 +17,7 @@ std::string_view withoutPlus(std::string_view word) {
     return word;
 }
 
-// Is this number, known to be outside of the range of double, too small rather than too big?
+// Whether a number outside the range of double is too small rather than too large.
 bool isTiny(std::string_view word) {
     const std::size_t exponentAt = std::min(word.find_first_of("eE"), word.size());
     std::int64_t exponent = 0;

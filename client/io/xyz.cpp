@@ -76,7 +76,7 @@ bool nextContentLine(InputFile& file, std::string_view& line) {
 Result<Point3> parsePoint(const InputFile& file, std::string_view line) {
     if (line.find(',') != std::string_view::npos && hasDecimalCommas(line)) {
         return fail(file.malformedLine(
-            "commas inside numbers; write decimals with a point, or part the columns with commas only"));
+            "commas inside numbers: write decimals with a point, or separate columns with commas only"));
     }
     Point3 p;
     for (double* coordinate : {&p.x, &p.y, &p.z}) {

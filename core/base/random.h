@@ -1,6 +1,6 @@
-// A small seeded generator whose stream is the same on every platform and library, so
-// that a seed in a test, a document or a bug report means the same points everywhere.
-// (std::normal_distribution and std::shuffle leave their results to the implementation.)
+// A small seeded generator with the same stream on every platform, so that a seed in a test, a document or a
+// bug report means the same points everywhere. (The results of std::normal_distribution and std::shuffle
+// depend on the standard library.)
 #pragma once
 
 #include <cmath>

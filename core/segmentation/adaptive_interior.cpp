@@ -215,15 +215,6 @@ AdaptiveInterior thickened(const PointCloud& points, const Tetrahedra& tetrahedr
 
 }  // namespace
 
-const char* interiorSourceName(InteriorSource source) noexcept {
-    switch (source) {
-        case InteriorSource::kWalk: return "walk";
-        case InteriorSource::kPotential: return "potential";
-        case InteriorSource::kThickened: return "thickened";
-    }
-    return "walk";
-}
-
 Result<AdaptiveInterior> adaptiveInterior(const PointCloud& points, const Tetrahedra& tetrahedra,
                                           const std::vector<std::uint8_t>& big,
                                           const std::vector<double>& spacings, const RunContext& context) {

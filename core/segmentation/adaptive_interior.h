@@ -8,18 +8,9 @@
 #include "core/base/run_context.h"
 #include "core/delaunay/delaunay.h"
 #include "core/geometry/point.h"
+#include "core/segmentation/interior_kinds.h"
 
 namespace shapedb {
-
-/// How an interior was found.
-enum class InteriorSource : int {
-    kWalk = 0,       ///< by walking in from outside, at the angle reported
-    kPotential = 1,  ///< by `insidePotential`: a walk would leak in, or miss a cavity
-    kThickened = 2,  ///< inside and outside cannot be told apart: a thin layer around the points
-};
-
-/// "walk", "potential" or "thickened".
-[[nodiscard]] const char* interiorSourceName(InteriorSource source) noexcept;
 
 struct AdaptiveInterior {
     std::vector<std::uint8_t> inside;  ///< per tetrahedron 1 when it is interior

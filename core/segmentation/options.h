@@ -5,14 +5,9 @@
 
 #include "core/base/error.h"
 #include "core/preparation/options.h"
+#include "core/segmentation/interior_kinds.h"
 
 namespace shapedb {
-
-/// How inner big balls are told from outer ones.
-enum class InteriorMethod : int {
-    kWalk = 0,      ///< the walk of Section 2 at a fixed angle; fails when nothing is left inside
-    kAdaptive = 1,  ///< chosen from the shape itself: always an interior, with its quality
-};
 
 struct SegmentationOptions {
     /// What is done to the points before.

@@ -197,19 +197,15 @@ Result<PreparedPoints> prepare(const PointCloud& points, const SegmentationOptio
     return prepared;
 }
 
-// Puts neighbours in space next to each other in memory, for the sake of all later stages.
-void sortAlongCurve(PointCloud& sites, std::vector<std::uint32_t>& siteOfPoint) {
-    const std::vector<std::uint32_t> order = hilbertOrder(sites);
-    PointCloud sorted(sites.size());
+// Sites that are neighbours in space become neighbours in memory: every later stage runs along them.
+HilbertSortedCloud sortSites(PointCloud sites, std::vector<std::uint32_t>& siteOfPoint) {
+    HilbertSortedCloud sorted(sites);
     std::vector<std::uint32_t> rank(sites.size());
-    for (std::uint32_t i = 0; i < order.size(); ++i) {
-        sorted[i] = sites[order[i]];
-        rank[order[i]] = i;
-    }
+    for (std::uint32_t i = 0; i < rank.size(); ++i) rank[sorted.order()[i]] = i;
     for (std::uint32_t& site : siteOfPoint) {
         if (site != kNoSite) site = rank[site];
     }
-    sites = std::move(sorted);
+    return sorted;
 }
 
 // Per tetrahedron 1 when it is interior; records in the result how it was found.
@@ -263,8 +259,9 @@ Result<Segmentation> segmentOrThrow(const PointCloud& points, const Segmentation
     auto prepared = prepare(points, options, context, clock, result);
     RETURN_IF_ERROR(prepared);
     RETURN_IF_ERROR(clock.begin("delaunay"));
-    sortAlongCurve(prepared->sites, result.siteOfPoint);
-    auto tetrahedra = triangulate(prepared->sites, context, PointOrder::kHilbert);
+    HilbertSortedCloud sorted = sortSites(std::move(prepared->sites), result.siteOfPoint);
+    auto tetrahedra = triangulate(sorted, context);
+    prepared->sites = std::move(sorted).takePoints();
     RETURN_IF_ERROR(tetrahedra);
     result.tetrahedra = std::move(*tetrahedra);
     clock.end();

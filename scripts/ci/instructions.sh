@@ -11,7 +11,7 @@ cd "$(dirname "$0")/../.."
 
 build_dir=${BUILD_DIR:-build}
 scripts/install-deps.sh
-cmake -S . -B "$build_dir" -G Ninja -DCMAKE_BUILD_TYPE=Release -DSHAPEDB_BUILD_BENCH=ON
 export CCACHE_BASEDIR="$PWD"
+cmake --preset bench -B "$build_dir"
 cmake --build "$build_dir" --target shapedb_bench
 exec "$build_dir/bin/shapedb-bench" instructions bench/instructions.json "$@"

@@ -3,41 +3,9 @@
 #include <string>
 
 #include "core/base/return_if_error.h"
-#include "core/signature/signature_codec.h"
 
 namespace shapedb::rpc {
 namespace {
-
-void toProto(const Point3& p, pb::Vector3* out) {
-    out->set_x(p.x);
-    out->set_y(p.y);
-    out->set_z(p.z);
-}
-
-pb::Profile toProto(Profile profile) {
-    switch (profile) {
-        case Profile::kPaper: return pb::PROFILE_PAPER;
-        case Profile::kDefault: return pb::PROFILE_DEFAULT;
-    }
-    return pb::PROFILE_DEFAULT;
-}
-
-pb::InteriorMethod toProto(InteriorMethod method) {
-    switch (method) {
-        case InteriorMethod::kWalk: return pb::INTERIOR_METHOD_WALK;
-        case InteriorMethod::kAdaptive: return pb::INTERIOR_METHOD_ADAPTIVE;
-    }
-    return pb::INTERIOR_METHOD_WALK;
-}
-
-pb::InteriorSource toProto(InteriorSource source) {
-    switch (source) {
-        case InteriorSource::kWalk: return pb::INTERIOR_SOURCE_WALK;
-        case InteriorSource::kPotential: return pb::INTERIOR_SOURCE_POTENTIAL;
-        case InteriorSource::kThickened: return pb::INTERIOR_SOURCE_THICKENED;
-    }
-    return pb::INTERIOR_SOURCE_UNSPECIFIED;
-}
 
 tl::unexpected<Error> unknownNumber(const char* field, int value) {
     return fail(ErrorCode::kInvalidArgument,
@@ -47,7 +15,7 @@ tl::unexpected<Error> unknownNumber(const char* field, int value) {
 }  // namespace
 
 void toProto(store::TimestampMs time, google::protobuf::Timestamp* out) {
-    // Rounds towards the past, as Timestamp wants nanos >= 0 before 1970 too.
+    // Rounds towards the past: nanos must not be negative, before 1970 either.
     store::TimestampMs seconds = time / 1'000;
     store::TimestampMs rest = time % 1'000;
     if (rest < 0) seconds -= 1, rest += 1'000;
@@ -89,102 +57,9 @@ void toProto(const store::Collection& collection, const ShapeParameters& paramet
     out->set_name(collection.name);
     out->set_description(collection.description);
     out->set_profile(toProto(parameters.profile));
-    pb::SegmentationParameters* segmentation = out->mutable_segmentation();
-    segmentation->set_big_ball_ratio(parameters.segmentation.bigBallRatio);
-    segmentation->set_deep_angle_degrees(parameters.segmentation.deepAngleDegrees);
-    segmentation->set_hull_angle_degrees(parameters.segmentation.hullAngleDegrees);
-    segmentation->set_merge_ratio(parameters.segmentation.mergeRatio);
-    segmentation->set_decimate_to(parameters.segmentation.preparation.decimateTo);
-    segmentation->set_merge_contrast(parameters.segmentation.mergeContrast);
-    segmentation->set_min_segment_share(parameters.segmentation.minSegmentShare);
-    segmentation->set_max_segments(parameters.segmentation.maxSegments);
-    segmentation->set_outlier_ratio(parameters.segmentation.preparation.outlierRatio);
-    segmentation->set_smoothing_reach(parameters.segmentation.preparation.smoothingReach);
-    segmentation->set_thinning(parameters.segmentation.preparation.thinning);
-    segmentation->set_interior_method(toProto(parameters.segmentation.interiorMethod));
-    out->mutable_signature()->set_max_points(parameters.signature.maxPoints);
-    out->mutable_signature()->set_attributes(parameters.signature.attributes);
+    toProto(parameters, out->mutable_segmentation(), out->mutable_signature());
     out->set_generation(collection.generation);
     toProto(collection.createdAt, out->mutable_created());
-}
-
-void toProto(const ShapeAttributes& attributes, pb::ShapeAttributes* out) {
-    out->set_quality(attributes.quality / 255.0);
-    for (const StatisticLayout& layout : kStatistics) {
-        pb::ShapeStatistic* statistic = out->add_statistics();
-        statistic->set_name(layout.name);
-        statistic->set_of_interior(layout.evidence == Evidence::kInside);
-        for (std::size_t i = layout.offset; i < std::size_t{layout.offset} + layout.count; ++i) {
-            statistic->add_shares(static_cast<float>(shareOfLevel(attributes.statistics[i])));
-        }
-    }
-}
-
-void toProto(const Signature& signature, pb::Signature* out) {
-    for (std::size_t i = 0; i < signature.points.size(); ++i) {
-        const WeightedPoint& point = signature.points[i];
-        pb::WeightedPoint* weighted = out->add_points();
-        toProto(pointPosition(signature, i), weighted->mutable_position());
-        weighted->set_weight(pointVolume(signature, i));
-        weighted->set_volume_share(point.volumeShare);
-        weighted->set_peak_radius(static_cast<double>(point.maximumRadius) * signature.scale);
-        for (const double extent : pointExtents(signature, i)) weighted->add_extents(extent);
-    }
-    out->set_scale(signature.scale);
-    out->set_volume(signature.volume);
-    out->set_encoded(encodeSignature(signature));
-    if (signature.attributes) toProto(*signature.attributes, out->mutable_attributes());
-}
-
-void toProto(const Segmentation& segmentation, pb::SegmentationReport* out) {
-    out->set_points(segmentation.siteOfPoint.size());
-    out->set_points_used(segmentation.sites.size());
-    out->set_duplicates(segmentation.duplicates);
-    out->set_outliers(segmentation.outliers);
-    out->set_quality(segmentation.quality);
-    out->set_interior_source(toProto(segmentation.interiorSource));
-    out->set_angle_degrees(segmentation.angleDegrees);
-    out->set_noise(segmentation.noise);
-    out->set_tetrahedra(segmentation.tetrahedra.size());
-    out->set_interior_tetrahedra(segmentation.interiorTetrahedra);
-    out->set_maxima(segmentation.maxima);
-    out->set_segments(segmentation.segments.size());
-    out->set_volume(segmentation.volume);
-    out->set_delaunay_seconds(segmentation.delaunaySeconds);
-    out->set_total_seconds(segmentation.totalSeconds);
-    for (const StageTime& stage : segmentation.stages) {
-        pb::StageTime* time = out->add_stages();
-        time->set_stage(stage.stage);
-        time->set_seconds(stage.seconds);
-    }
-}
-
-void toProto(const Explanation& explanation, pb::Explanation* out) {
-    out->set_similarity(explanation.similarity);
-    out->set_dissimilarity(explanation.dissimilarity);
-    pb::Motion* motion = out->mutable_motion();
-    for (const auto& row : explanation.motion.rotation) {
-        for (const double entry : row) motion->add_rotation(entry);
-    }
-    motion->set_scale(explanation.motion.scale);
-    toProto(explanation.motion.translation, motion->mutable_translation());
-    motion->set_reflected(explanation.motion.reflected);
-    for (const PointMatch& match : explanation.matches) {
-        pb::SegmentMatch* pair = out->add_matches();
-        pair->set_query_segment(match.a);
-        pair->set_hit_segment(match.b);
-        pair->set_share(match.share);
-        pair->set_distance(match.distance);
-    }
-    for (const std::uint32_t segment : explanation.unmatchedA) out->add_unmatched_query(segment);
-    for (const std::uint32_t segment : explanation.unmatchedB) out->add_unmatched_hit(segment);
-    out->set_degenerate(explanation.degenerate);
-    for (const ScoreTerm& term : explanation.terms) {
-        pb::ScoreTerm* part = out->add_terms();
-        part->set_name(term.name);
-        part->set_distance(term.distance);
-        part->set_weight(term.weight);
-    }
 }
 
 Result<std::optional<store::ShapeState>> fromProto(pb::ShapeState state) {
@@ -212,11 +87,10 @@ Result<ShapeParameters> parametersFrom(pb::Profile profile, const pb::Segmentati
                                        const pb::SignatureParameters& signature,
                                        const ShapeParameters& current) {
     ShapeParameters parameters = current;
-    switch (static_cast<int>(profile)) {
-        case pb::PROFILE_UNSPECIFIED: break;
-        case pb::PROFILE_DEFAULT: parameters = parametersOf(Profile::kDefault); break;
-        case pb::PROFILE_PAPER: parameters = parametersOf(Profile::kPaper); break;
-        default: return unknownNumber("profile", profile);
+    if (profile != pb::PROFILE_UNSPECIFIED) {
+        const auto known = fromProto(profile);
+        if (!known) return unknownNumber("profile", profile);
+        parameters = parametersOf(*known);
     }
     SegmentationOptions& options = parameters.segmentation;
     if (segmentation.has_big_ball_ratio()) options.bigBallRatio = segmentation.big_ball_ratio();
@@ -231,11 +105,10 @@ Result<ShapeParameters> parametersFrom(pb::Profile profile, const pb::Segmentati
     if (segmentation.has_smoothing_reach())
         options.preparation.smoothingReach = segmentation.smoothing_reach();
     if (segmentation.has_thinning()) options.preparation.thinning = segmentation.thinning();
-    switch (static_cast<int>(segmentation.interior_method())) {
-        case pb::INTERIOR_METHOD_UNSPECIFIED: break;
-        case pb::INTERIOR_METHOD_WALK: options.interiorMethod = InteriorMethod::kWalk; break;
-        case pb::INTERIOR_METHOD_ADAPTIVE: options.interiorMethod = InteriorMethod::kAdaptive; break;
-        default: return unknownNumber("interior_method", segmentation.interior_method());
+    if (const auto method = segmentation.interior_method(); method != pb::INTERIOR_METHOD_UNSPECIFIED) {
+        const auto known = fromProto(method);
+        if (!known) return unknownNumber("interior_method", method);
+        options.interiorMethod = *known;
     }
     if (signature.has_max_points()) parameters.signature.maxPoints = signature.max_points();
     if (signature.has_attributes()) parameters.signature.attributes = signature.attributes();
@@ -243,7 +116,7 @@ Result<ShapeParameters> parametersFrom(pb::Profile profile, const pb::Segmentati
     return parameters;
 }
 
-store::Metadata toMetadata(const google::protobuf::Map<std::string, std::string>& metadata) {
+Metadata toMetadata(const google::protobuf::Map<std::string, std::string>& metadata) {
     return {metadata.begin(), metadata.end()};
 }
 

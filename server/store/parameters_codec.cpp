@@ -9,12 +9,12 @@
 
 #include <nlohmann/json.hpp>
 
-namespace shapedb::index {
+namespace shapedb::store {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Reads the members of one object and, at the end, knows the ones nobody asked for.
+/// Reads the members of one object and finds those that are not parameters.
 class ObjectReader {
   public:
     ObjectReader(const Json& object, std::string prefix) : object_(object), prefix_(std::move(prefix)) {
@@ -95,7 +95,7 @@ tl::unexpected<Error> damaged(const std::string& what) {
     return fail(ErrorCode::kDataLoss, "stored collection parameters: " + what);
 }
 
-/// Refuses doubled keys, of which the library would silently keep the last.
+/// Refuses repeated keys, of which the library would silently keep the last.
 Json parseStrictly(const std::string& text) {
     std::vector<std::set<std::string>> open;
     return Json::parse(text, [&](int, Json::parse_event_t event, Json& parsed) {
@@ -106,22 +106,6 @@ Json parseStrictly(const std::string& text) {
         }
         return true;
     });
-}
-
-/// Persisted.
-const char* nameOf(InteriorMethod method) {
-    switch (method) {
-        case InteriorMethod::kWalk: return "walk";
-        case InteriorMethod::kAdaptive: return "adaptive";
-    }
-    return "walk";
-}
-
-std::optional<InteriorMethod> interiorMethodFrom(const std::string& name) {
-    for (const InteriorMethod method : {InteriorMethod::kWalk, InteriorMethod::kAdaptive}) {
-        if (name == nameOf(method)) return method;
-    }
-    return std::nullopt;
 }
 
 Result<void> readSegmentation(const Json& json, SegmentationOptions& options) {
@@ -137,10 +121,10 @@ Result<void> readSegmentation(const Json& json, SegmentationOptions& options) {
     reader.read("stray_ratio", options.preparation.outlierRatio);
     reader.read("smoothing_reach", options.preparation.smoothingReach);
     reader.read("even_spacing", options.preparation.thinning);
-    std::string method = nameOf(options.interiorMethod);
+    std::string method = interiorMethodName(options.interiorMethod);
     reader.read("interior_method", method);
     if (const std::string problem = reader.problem(); !problem.empty()) return damaged(problem);
-    const auto known = interiorMethodFrom(method);
+    const auto known = interiorMethodFromName(method);
     if (!known) return damaged("'segmentation.interior_method' is '" + method + "'");
     options.interiorMethod = *known;
     return {};
@@ -163,7 +147,7 @@ std::string encodeParameters(const ShapeParameters& parameters) {
                             {"stray_ratio", segmentation.preparation.outlierRatio},
                             {"smoothing_reach", segmentation.preparation.smoothingReach},
                             {"even_spacing", segmentation.preparation.thinning},
-                            {"interior_method", nameOf(segmentation.interiorMethod)}};
+                            {"interior_method", interiorMethodName(segmentation.interiorMethod)}};
     json["signature"] = {{"max_points", parameters.signature.maxPoints},
                          {"attributes", parameters.signature.attributes}};
     return json.dump();
@@ -202,4 +186,4 @@ Result<ShapeParameters> decodeParameters(const std::string& text) {
     }
 }
 
-}  // namespace shapedb::index
+}  // namespace shapedb::store

@@ -61,7 +61,7 @@ TEST(Client, ErrorsCarryTheServersNameAndMessage) {
     EXPECT_EQ(server.shapes.calls, 1) << "not worth a second try";
 }
 
-TEST(Client, TriesAgainUntilTheServerIsThere) {
+TEST(Client, RetriesUntilTheServerIsReachable) {
     FakeServer server;
     server.shapes.answer = [](grpc::ServerContext&, int call) {
         return call < 3 ? grpc::Status(grpc::StatusCode::UNAVAILABLE, "starting") : grpc::Status::OK;
@@ -85,7 +85,7 @@ TEST(Client, GivesUpAfterTheLastAttempt) {
     EXPECT_EQ(server.shapes.calls, 4);
 }
 
-TEST(Client, WhatIsNotIdempotentIsTriedOnce) {
+TEST(Client, CallsThatAreNotIdempotentAreNotRetried) {
     FakeServer server;
     server.shapes.answer = [](grpc::ServerContext&, int) {
         return grpc::Status(grpc::StatusCode::UNAVAILABLE, "down");
@@ -115,9 +115,9 @@ TEST(Client, WaitsAsLongAsTheServerAsks) {
     EXPECT_LT(seconds, 5.0);
 }
 
-TEST(Client, TriesAreCountedAnewForAnotherReason) {
+TEST(Client, RetryCountRestartsForAnotherReason) {
     FakeServer server;
-    // Three times full, three times away, then there: neither reason came four times in a row.
+    // Three times full, three times unreachable, then fine: neither reason four times in a row.
     server.shapes.answer = [](grpc::ServerContext& context, int call) {
         if (call <= 3) return namedError(context, grpc::StatusCode::RESOURCE_EXHAUSTED, "queue_full", "full");
         return call <= 6 ? grpc::Status(grpc::StatusCode::UNAVAILABLE, "away") : grpc::Status::OK;
@@ -127,7 +127,7 @@ TEST(Client, TriesAreCountedAnewForAnotherReason) {
     EXPECT_EQ(server.shapes.calls, 7);
 }
 
-TEST(Client, AServerThatSaysNeverIsNotAskedAgain) {
+TEST(Client, NegativePushbackEndsTheRetries) {
     FakeServer server;
     server.shapes.answer = [](grpc::ServerContext& context, int) {
         context.AddTrailingMetadata("grpc-retry-pushback-ms", "-1");
@@ -139,7 +139,7 @@ TEST(Client, AServerThatSaysNeverIsNotAskedAgain) {
     EXPECT_EQ(server.shapes.calls, 1);
 }
 
-TEST(Client, AWaitLongerThanTheDeadlineIsNotBegun) {
+TEST(Client, DoesNotWaitBeyondTheDeadline) {
     FakeServer server;
     server.shapes.answer = [](grpc::ServerContext& context, int) {
         context.AddTrailingMetadata("grpc-retry-pushback-ms", "60000");
@@ -182,7 +182,7 @@ TEST(Client, UploadsInChunksWithCountAndChecksum) {
     EXPECT_FALSE(server.shapes.header.has_expected_version());
 }
 
-TEST(Client, ARetriedUploadIsWholeAgain) {
+TEST(Client, ARetriedUploadIsComplete) {
     FakeServer server;
     server.shapes.answer = [](grpc::ServerContext&, int call) {
         return call < 3 ? grpc::Status(grpc::StatusCode::UNAVAILABLE, "busy") : grpc::Status::OK;
@@ -193,7 +193,7 @@ TEST(Client, ARetriedUploadIsWholeAgain) {
     EXPECT_EQ(server.shapes.points, packPoints(points)->bytes);
 }
 
-TEST(Client, AnOffsetIsRecordedInTheMetadata) {
+TEST(Client, OffsetIsRecordedInTheMetadata) {
     FakeServer server;
     PointCloud points = cloud(1000);
     for (Point3& p : points) p = p + Point3{5e6, 0.0, 0.0};
@@ -203,7 +203,7 @@ TEST(Client, AnOffsetIsRecordedInTheMetadata) {
     EXPECT_EQ(server.shapes.header.metadata().at(kOffsetKey), offsetText(reply->offset));
 }
 
-TEST(Client, ABadScanIsNotSent) {
+TEST(Client, BadScansAreNotSent) {
     FakeServer server;
     EXPECT_EQ(server.client().addShape({{"", "a"}}, {}).error().code, ErrorCode::kTooFewPoints);
     EXPECT_EQ(server.client().searchByScan({}, {{0, 0, 1e300}}).error().code,
@@ -211,7 +211,7 @@ TEST(Client, ABadScanIsNotSent) {
     EXPECT_EQ(server.shapes.calls, 0);
 }
 
-TEST(Client, DeadlineOfTheOptionsAndOfTheContext) {
+TEST(Client, HonoursTheDeadlinesOfOptionsAndContext) {
     FakeServer server;
     server.shapes.answer = [](grpc::ServerContext& context, int) {
         for (int i = 0; i < 300 && !context.IsCancelled(); ++i) std::this_thread::sleep_for(milliseconds(10));
@@ -276,7 +276,7 @@ TEST(Client, CancellingEndsTheWaitBetweenAttempts) {
     EXPECT_FALSE(reply);
 }
 
-TEST(Client, WatchTellsEveryEventAndReturnsTheLast) {
+TEST(Client, WatchReportsEveryEventAndReturnsTheLast) {
     FakeServer server;
     v1::IngestEvent pending;
     pending.set_state(v1::SHAPE_STATE_PENDING);
@@ -347,7 +347,7 @@ class ClientBackup : public ::testing::Test {
     FakeServer server_;
 };
 
-TEST_F(ClientBackup, IsWrittenWhole) {
+TEST_F(ClientBackup, WritesTheCompleteFile) {
     const auto report = server_.client().backupToFile(file());
     ASSERT_TRUE(report) << report.error().message;
     EXPECT_EQ(report->bytes, content_.size());
@@ -355,7 +355,7 @@ TEST_F(ClientBackup, IsWrittenWhole) {
     EXPECT_EQ(written(), content_);
 }
 
-TEST_F(ClientBackup, DamagedOrShortLeavesNothing) {
+TEST_F(ClientBackup, DamagedOrShortBackupLeavesNoFile) {
     server_.admin.backup.back().set_data("otherwise");
     server_.admin.backup.front().set_total_bytes(13);
     EXPECT_EQ(server_.client().backupToFile(file()).error().code, ErrorCode::kChecksumMismatch);
@@ -366,7 +366,7 @@ TEST_F(ClientBackup, DamagedOrShortLeavesNothing) {
     EXPECT_TRUE(nothingLeft());
 }
 
-TEST_F(ClientBackup, AFailingServerKeepsItsReasonAndTheOldFile) {
+TEST_F(ClientBackup, ServerErrorIsReportedAndTheOldFileKept) {
     std::ofstream(file()) << "older backup";
     server_.admin.backup.pop_back();
     server_.admin.backupStatus = grpc::Status(grpc::StatusCode::DATA_LOSS, "page 7 is damaged");
@@ -376,7 +376,7 @@ TEST_F(ClientBackup, AFailingServerKeepsItsReasonAndTheOldFile) {
     EXPECT_EQ(written(), "older backup");
 }
 
-TEST_F(ClientBackup, AFullDiskIsToldAsThat) {
+TEST_F(ClientBackup, FullDiskIsReported) {
     const auto report = server_.client().backupToFile(folder_ + "/no/such/folder/copy.db");
     ASSERT_FALSE(report);
     EXPECT_EQ(report.error().code, ErrorCode::kFileNotWritable);
@@ -400,21 +400,21 @@ TEST_F(ClientBackup, RestoreSendsSizeChunksAndChecksum) {
     EXPECT_EQ(joined, large);
 }
 
-TEST_F(ClientBackup, RestoreNeedsAFile) {
+TEST_F(ClientBackup, RestoreRefusesMissingAndEmptyFiles) {
     EXPECT_EQ(server_.client().restoreFromFile(file()).error().code, ErrorCode::kFileNotReadable);
     EXPECT_EQ(server_.client().restoreFromFile(folder_).error().code, ErrorCode::kFileNotReadable);
     std::ofstream(file()).close();
     EXPECT_EQ(server_.client().restoreFromFile(file()).error().code, ErrorCode::kFileNotReadable);
 }
 
-TEST(Client, HealthOfAServerWithoutTheServiceIsAnError) {
+TEST(Client, HealthFailsWithoutTheHealthService) {
     FakeServer server;
     const auto health = server.client().health();
     ASSERT_FALSE(health);
     EXPECT_EQ(health.error().code, ErrorCode::kRejected);
 }
 
-TEST(Client, NobodyThere) {
+TEST(Client, UnreachableServerIsUnavailable) {
     ClientOptions options;
     options.address = "127.0.0.1:1";
     options.retry.maxAttempts = 2;

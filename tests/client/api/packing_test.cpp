@@ -52,7 +52,7 @@ TEST(Packing, RoundTripsAtEverySize) {
     }
 }
 
-TEST(Packing, FarFromTheOriginTheShapeSurvives) {
+TEST(Packing, KeepsTheShapeFarFromTheOrigin) {
     const Point3 far{4.5e6, -5.4e6, 300.0};
     const PointCloud points = cloud(2.0, far);
     const auto packed = packPoints(points);
@@ -64,7 +64,7 @@ TEST(Packing, FarFromTheOriginTheShapeSurvives) {
     }
 }
 
-TEST(Packing, TheOffsetStartsWhereRoundingWouldHurt) {
+TEST(Packing, OffsetStartsWhereRoundingWouldHurt) {
     const double size = 1.0;
     const auto offsetAt = [&](double distanceFromOrigin) {
         PointCloud corners = {{0, 0, 0}, {size, 0, 0}, {0, size, 0}, {0, 0, size}};
@@ -74,17 +74,17 @@ TEST(Packing, TheOffsetStartsWhereRoundingWouldHurt) {
     const double diagonal = std::sqrt(3.0);
     EXPECT_EQ(offsetAt(kFarFromOrigin * diagonal - 1.1), Point3{});
     EXPECT_NE(offsetAt(kFarFromOrigin * diagonal), Point3{});
-    // Without it nothing moves further than the promised millionth of the diagonal.
+    // Without an offset no coordinate moves by more than a millionth of the diagonal.
     const double x = kFarFromOrigin * diagonal - 1.1 + 0.123456789;
     EXPECT_LE(std::abs(static_cast<double>(static_cast<float>(x)) - x), diagonal * 0x1p-20);
 }
 
-TEST(Packing, SameScanSameBytes) {
+TEST(Packing, SameScanGivesTheSameBytes) {
     const PointCloud points = cloud(1.0, {1e7, 1e7, 0.0});
     EXPECT_EQ(packPoints(points)->sha256, packPoints(points)->sha256);
 }
 
-TEST(Packing, RefusesWhatSinglePrecisionCannotHold) {
+TEST(Packing, RefusesCoordinatesBeyondSinglePrecision) {
     const double nan = std::numeric_limits<double>::quiet_NaN();
     const double infinity = std::numeric_limits<double>::infinity();
     const auto codeOf = [](const PointCloud& points) { return packPoints(points).error().code; };
@@ -102,24 +102,22 @@ TEST(Packing, RefusesWhatSinglePrecisionCannotHold) {
     EXPECT_EQ(codeOf(cloud(1e-35, {})), ErrorCode::kCoordinateOutOfRange);
 }
 
-TEST(Packing, EqualPointsAreTheServersToJudge) {
-    EXPECT_TRUE(packPoints(PointCloud(10, Point3{1e9, 0.0, 0.0})));
-}
+TEST(Packing, AcceptsEqualPoints) { EXPECT_TRUE(packPoints(PointCloud(10, Point3{1e9, 0.0, 0.0}))); }
 
-TEST(Packing, AChunkIsWholePointsAndUnderAMebibyte) {
+TEST(Packing, ChunksHoldWholePointsAndAtMostOneMebibyte) {
     EXPECT_EQ(kChunkBytes % kPointBytes, 0u);
     EXPECT_LE(kChunkBytes, std::size_t{1} << 20);
     EXPECT_GT(kChunkBytes, (std::size_t{1} << 20) - kPointBytes);
 }
 
-TEST(Packing, UnpackRefusesHalfAPoint) {
+TEST(Packing, UnpackRefusesAPartialPoint) {
     PointCloud points;
     const auto result = unpackPoints(std::string(13, '\0'), points);
     ASSERT_FALSE(result);
     EXPECT_EQ(result.error().code, ErrorCode::kMalformedStream);
 }
 
-TEST(Packing, OffsetTextGivesTheSameNumbersAgain) {
+TEST(Packing, OffsetTextRoundTrips) {
     const Point3 offset{1.0 / 3.0, -4.5e6, 1e-300};
     double x = 0.0;
     double y = 0.0;

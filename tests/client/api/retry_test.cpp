@@ -11,7 +11,7 @@ AttemptFailure failure(ErrorCode code, std::optional<std::string> pushback = {})
     return {code, std::move(pushback)};
 }
 
-TEST(Retry, OnlyWhatMayPassByWaiting) {
+TEST(Retry, RetriesOnlyErrorsThatWaitingMayCure) {
     Random random(1);
     for (int i = 0; i <= static_cast<int>(ErrorCode::kInternal); ++i) {
         const auto code = static_cast<ErrorCode>(i);
@@ -23,7 +23,7 @@ TEST(Retry, OnlyWhatMayPassByWaiting) {
     }
 }
 
-TEST(Retry, GrowsUpToTheLongestWithinTheJitter) {
+TEST(Retry, BackoffGrowsToItsMaximumWithinTheJitter) {
     RetryPolicy policy;
     policy.maxAttempts = 100;
     policy.initialBackoff = std::chrono::milliseconds(100);
@@ -64,7 +64,7 @@ TEST(Retry, EndsAfterTheLastAttempt) {
     EXPECT_FALSE(retryDelay(policy, 1, failure(ErrorCode::kUnavailable), random));
 }
 
-TEST(Retry, TheServerKnowsBetterHowLong) {
+TEST(Retry, ServerPushbackReplacesTheBackoff) {
     Random random(1);
     EXPECT_EQ(retryDelay({}, 1, failure(ErrorCode::kQueueFull, "1234"), random)->count(), 1234);
     EXPECT_EQ(retryDelay({}, 1, failure(ErrorCode::kQueueFull, "0"), random)->count(), 0);

@@ -9,7 +9,7 @@ Error translate(grpc::StatusCode code, const TrailingMetadata& trailing = {}) {
     return errorOf(grpc::Status(code, "words"), trailing, "host:1");
 }
 
-TEST(Status, TheServersOwnNameDecides) {
+TEST(Status, ServerErrorNameDecidesTheCode) {
     for (int i = 0; i <= static_cast<int>(ErrorCode::kInternal); ++i) {
         const auto code = static_cast<ErrorCode>(i);
         const Error error =
@@ -19,7 +19,7 @@ TEST(Status, TheServersOwnNameDecides) {
     }
 }
 
-TEST(Status, WithoutANameTheGrpcCodeDoes) {
+TEST(Status, GrpcCodeDecidesWithoutAName) {
     EXPECT_EQ(translate(grpc::StatusCode::NOT_FOUND).code, ErrorCode::kNotFound);
     EXPECT_EQ(translate(grpc::StatusCode::INVALID_ARGUMENT).code, ErrorCode::kInvalidArgument);
     EXPECT_EQ(translate(grpc::StatusCode::UNAVAILABLE).code, ErrorCode::kUnavailable);
@@ -29,14 +29,14 @@ TEST(Status, WithoutANameTheGrpcCodeDoes) {
     EXPECT_EQ(translate(grpc::StatusCode::UNKNOWN).code, ErrorCode::kInternal);
 }
 
-TEST(Status, AnUnreachableServerIsNamed) {
+TEST(Status, MessageNamesAnUnreachableServer) {
     for (const auto code : {grpc::StatusCode::UNAVAILABLE, grpc::StatusCode::DEADLINE_EXCEEDED,
                             grpc::StatusCode::UNIMPLEMENTED}) {
         EXPECT_NE(translate(code).message.find("host:1"), std::string::npos);
     }
 }
 
-TEST(Status, PushbackMakesAnyExhaustionWorthWaitingFor) {
+TEST(Status, ExhaustionWithPushbackIsRetried) {
     const grpc::Status status(grpc::StatusCode::RESOURCE_EXHAUSTED, "full");
     const TrailingMetadata named = {{"shapedb-error", "queue_full"}};
     EXPECT_EQ(failureOf(status, named, errorOf(status, named, "")).code, ErrorCode::kQueueFull);

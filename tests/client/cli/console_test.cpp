@@ -8,7 +8,7 @@
 namespace shapedb::cli {
 namespace {
 
-TEST(Console, TextOrJsonNeverBoth) {
+TEST(Console, PrintsTextOrJsonNeverBoth) {
     std::ostringstream out;
     std::ostringstream err;
     Console console(out, err, false);
@@ -23,7 +23,7 @@ TEST(Console, TextOrJsonNeverBoth) {
     EXPECT_EQ(nlohmann::json::parse(out.str()), nlohmann::json({{"a", 1}}));
 }
 
-TEST(Console, FailureIsANoteAndInJsonTheDocument) {
+TEST(Console, FailureIsANoteAndAJsonDocument) {
     std::ostringstream out;
     std::ostringstream err;
     Console console(out, err, false);
@@ -38,7 +38,7 @@ TEST(Console, FailureIsANoteAndInJsonTheDocument) {
     EXPECT_EQ(document["error"]["message"], "no shape 'x'");
 }
 
-TEST(Console, OneDocumentOnly) {
+TEST(Console, PrintsOnlyOneDocument) {
     std::ostringstream out;
     std::ostringstream err;
     Console console(out, err, false);
@@ -48,7 +48,7 @@ TEST(Console, OneDocumentOnly) {
     EXPECT_EQ(nlohmann::json::parse(out.str()), nlohmann::json({{"done", true}}));
 }
 
-TEST(Console, ProgressOnlyOnATerminalAndWipedBeforeOtherOutput) {
+TEST(Console, ShowsProgressOnlyOnATerminalAndErasesIt) {
     std::ostringstream out;
     std::ostringstream err;
     Console piped(out, err, false);
@@ -65,7 +65,7 @@ TEST(Console, ProgressOnlyOnATerminalAndWipedBeforeOtherOutput) {
     EXPECT_EQ(out.str(), "");
 }
 
-TEST(Console, BytesThatAreNoTextDoNotBreakJson) {
+TEST(Console, JsonSurvivesBytesThatAreNotUtf8) {
     std::ostringstream out;
     std::ostringstream err;
     Console console(out, err, false);
@@ -74,7 +74,7 @@ TEST(Console, BytesThatAreNoTextDoNotBreakJson) {
     EXPECT_FALSE(nlohmann::json::parse(out.str(), nullptr, false).is_discarded());
 }
 
-TEST(Console, FlushTellsOfAResultThatWasNotWritten) {
+TEST(Console, FlushReportsAFailedWrite) {
     std::ostringstream out;
     std::ostringstream err;
     Console console(out, err, false);

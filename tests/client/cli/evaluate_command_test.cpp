@@ -14,11 +14,11 @@ namespace fs = std::filesystem;
 
 class EvaluateCommand : public CommandTest {
   protected:
-    /// Three clearly different families, three scans each.
+    /// Three very different families of three scans.
     static void SetUpTestSuite() {
         samples() = (fs::temp_directory_path() / ("shapedb-evaluate-" + std::to_string(::getpid()))).string();
         const CommandRun run = runCommand(
-            {"sample", samples(), "--count", "3", "--points", "1800", "--families", "human,mug,airplane"});
+            {"sample", samples(), "--count", "3", "--points", "1200", "--families", "human,mug,airplane"});
         ASSERT_EQ(run.exitCode, 0) << run.err;
     }
     static void TearDownTestSuite() { fs::remove_all(samples()); }
@@ -36,7 +36,7 @@ class EvaluateCommand : public CommandTest {
         return run.json();
     }
 
-    /// Without what may differ from run to run.
+    /// Without values that differ from run to run.
     static nlohmann::json timeless(nlohmann::json document) {
         for (const char* key : {"seconds_segment", "seconds_match", "threads"}) document.erase(key);
         return document;
@@ -64,7 +64,7 @@ TEST_F(EvaluateCommand, LeaveOneOutHasThePromisedKeys) {
     EXPECT_GT(document["nn"].get<double>(), 0.5) << "three very different families";
 }
 
-TEST_F(EvaluateCommand, TheMeanIsTheMeanOfTheClasses) {
+TEST_F(EvaluateCommand, MeanIsTheMeanOfEqualClasses) {
     const auto document = evaluate({samples(), "--per-class"});
     ASSERT_EQ(document["per_class"].size(), 3u);
     for (const char* key : kMeasures) {
@@ -77,7 +77,7 @@ TEST_F(EvaluateCommand, TheMeanIsTheMeanOfTheClasses) {
     }
 }
 
-TEST_F(EvaluateCommand, OnlyTheClassesAskedForAreMeasured) {
+TEST_F(EvaluateCommand, MeasuresOnlyChosenClasses) {
     const auto only = evaluate({samples(), "--classes", "human,mug", "--per-class"});
     EXPECT_EQ(only["queries"], 6);
     EXPECT_EQ(only["shapes"], 6);
@@ -90,7 +90,7 @@ TEST_F(EvaluateCommand, OnlyTheClassesAskedForAreMeasured) {
     evaluate({samples(), "--gallery", samples(), "--classes", "human"}, 2);
 }
 
-TEST_F(EvaluateCommand, SameForAnyNumberOfThreads) {
+TEST_F(EvaluateCommand, ResultDoesNotDependOnThreads) {
     const std::vector<std::string> noisy = {samples(), "--noise", "0.005", "--points", "2000", "--per-class"};
     const auto with = [&](const char* threads) {
         auto arguments = noisy;
@@ -104,7 +104,7 @@ TEST_F(EvaluateCommand, SameForAnyNumberOfThreads) {
 }
 
 TEST_F(EvaluateCommand, NoiseOfAFileDoesNotDependOnTheOthers) {
-    // The score of two files against each other, alone and in company, through the gallery.
+    // The score of the same two files, with and without other queries.
     const auto scoreOf = [&](const std::vector<std::string>& queries) {
         std::vector<std::string> arguments = queries;
         arguments.insert(arguments.end(),
@@ -122,11 +122,11 @@ TEST_F(EvaluateCommand, NoiseOfAFileDoesNotDependOnTheOthers) {
     EXPECT_EQ(alone, scoreOf({samples() + "/airplane/airplane_01.ply", samples() + "/human/human_01.ply"}));
 }
 
-TEST_F(EvaluateCommand, AShapeThatCannotBeSegmentedCountsAsFoundNothing) {
+TEST_F(EvaluateCommand, UnsegmentableShapesCountAsMisses) {
     fs::copy(samples(), path("set"), fs::copy_options::recursive);
     PointCloud flat;
     for (int i = 0; i < 50; ++i) flat.push_back({0.1 * (i % 7), 0.1 * (i / 7), 0.0});
-    // First in the order of files, where a tie at 0 would otherwise be broken in its favour.
+    // First in the order of files, which would otherwise favour it in a tie at 0.
     writePoints("set/airplane/aaa_flat.xyz", flat);
     const auto clean = evaluate({samples(), "--per-class"});
     const auto document = evaluate({path("set"), "--per-class"});
@@ -139,7 +139,7 @@ TEST_F(EvaluateCommand, AShapeThatCannotBeSegmentedCountsAsFoundNothing) {
     EXPECT_EQ(document["per_class"]["human"]["nn"], clean["per_class"]["human"]["nn"]);
 }
 
-TEST_F(EvaluateCommand, AnUnreadableFileIsNamedAndMakesTheExitCodeOne) {
+TEST_F(EvaluateCommand, UnreadableFilesAreNamedWithExitCodeOne) {
     fs::copy(samples(), path("set"), fs::copy_options::recursive);
     write("set/mug/broken.ply", "ply\nformat ascii 1.0\nelement vertex 10\n");
     const auto document = evaluate({path("set")}, 1);
@@ -161,7 +161,7 @@ TEST_F(EvaluateCommand, DrawsTheSimilarityMatrix) {
     EXPECT_NE(text.find("human"), std::string::npos);
 }
 
-TEST_F(EvaluateCommand, RefusesAFigureItCannotDrawBeforeTheWork) {
+TEST_F(EvaluateCommand, RefusesAnUnknownFigureFormatBeforeTheWork) {
     const auto document = evaluate({samples(), "--confusion", path("matrix.bmp")}, 3);
     EXPECT_EQ(document["error"]["name"], "unknown_file_format");
 }
@@ -173,7 +173,7 @@ TEST_F(EvaluateCommand, RefusesFilesOutsideClassFolders) {
     EXPECT_NE(document["error"]["message"].get<std::string>().find("stray.xyz"), std::string::npos);
 }
 
-TEST_F(EvaluateCommand, TheClassIsTheFolderBelowTheRoot) {
+TEST_F(EvaluateCommand, ClassIsTheFolderBelowTheRoot) {
     fs::create_directories(path("set/people/of"));
     fs::create_directories(path("set/cups/of"));
     fs::copy(samples() + "/human", path("set/people/of/one"));
@@ -183,7 +183,7 @@ TEST_F(EvaluateCommand, TheClassIsTheFolderBelowTheRoot) {
     EXPECT_EQ(document["per_class"]["people"]["queries"], 3);
 }
 
-TEST_F(EvaluateCommand, GalleryByFolder) {
+TEST_F(EvaluateCommand, GalleryMatchesByFolder) {
     const auto document =
         evaluate({samples() + "/human/human_01.ply", "--gallery", samples() + "/human", samples() + "/mug"});
     EXPECT_EQ(document["queries"], 1);
@@ -207,7 +207,7 @@ TEST_F(EvaluateCommand, GalleryByStemFindsTheCleanScanOfANoisyOne) {
     for (const auto& rank : exact["ranks"]) EXPECT_EQ(rank["right_score"], 1.0);
 }
 
-TEST_F(EvaluateCommand, GalleryQueriesWithoutARightAnswerAreToldApart) {
+TEST_F(EvaluateCommand, GalleryReportsQueriesWithoutARightAnswer) {
     const auto document = evaluate({samples() + "/human", "--gallery", samples() + "/mug"});
     EXPECT_EQ(document["queries"], 0);
     EXPECT_EQ(document["without_right_answer"], 3);
@@ -215,7 +215,7 @@ TEST_F(EvaluateCommand, GalleryQueriesWithoutARightAnswerAreToldApart) {
     for (const auto& rank : document["ranks"]) EXPECT_EQ(rank["rank"], 0);
 }
 
-TEST_F(EvaluateCommand, GalleryFailuresAreMisses) {
+TEST_F(EvaluateCommand, GalleryFailuresCountAsMisses) {
     PointCloud flat;
     for (int i = 0; i < 50; ++i) flat.push_back({0.1 * (i % 7), 0.1 * (i / 7), 0.0});
     writePoints("queries/human/flat.xyz", flat);

@@ -47,7 +47,7 @@ TEST_F(EvaluationRun, AShapeThatCannotBeSegmentedIsAFailureAndScoresZero) {
     EXPECT_EQ((*scores)[0], 1.0) << "a shape against itself";
 }
 
-TEST_F(EvaluationRun, SameForAnyNumberOfThreads) {
+TEST_F(EvaluationRun, ResultDoesNotDependOnThreads) {
     ScanFlags noisy;
     noisy.noise = 0.004;
     noisy.points = 500;
@@ -63,7 +63,7 @@ TEST_F(EvaluationRun, SameForAnyNumberOfThreads) {
               *scorePairs(four, four, {}, 4, [](std::size_t) {}, {}));
 }
 
-TEST_F(EvaluationRun, HalfThePairsGiveTheWholeMatrix) {
+TEST_F(EvaluationRun, ScoringHalfThePairsFillsTheMatrix) {
     const auto shapes = described(2);
     const auto copy = shapes;
     for (const bool partial : {false, true}) {
@@ -76,7 +76,7 @@ TEST_F(EvaluationRun, HalfThePairsGiveTheWholeMatrix) {
     }
 }
 
-TEST_F(EvaluationRun, CountsEveryShapeOnce) {
+TEST_F(EvaluationRun, ProgressCountsEveryShapeOnce) {
     std::vector<EvaluatedShape> shapes = listed();
     std::mutex mutex;
     std::vector<std::size_t> counts;

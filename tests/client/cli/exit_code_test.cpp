@@ -7,7 +7,7 @@
 namespace shapedb::cli {
 namespace {
 
-TEST(ExitCode, EachKindOfFailureHasItsOwn) {
+TEST(ExitCode, EachKindOfFailureHasItsOwnCode) {
     EXPECT_EQ(exitCodeOf(ErrorCode::kInvalidArgument), 2);
     EXPECT_EQ(exitCodeOf(ErrorCode::kMalformedFilter), 2);
     EXPECT_EQ(exitCodeOf(ErrorCode::kCoplanar), 3);
@@ -22,7 +22,7 @@ TEST(ExitCode, EachKindOfFailureHasItsOwn) {
     EXPECT_EQ(exitCodeOf(ErrorCode::kCancelled), 130);
 }
 
-TEST(ExitCode, NoErrorLooksLikeSuccessOrLikeSomeFailed) {
+TEST(ExitCode, NoErrorMapsToSuccessOrSomeFailed) {
     const std::set<int> allowed = {2, 3, 4, 5, 6, 130};
     for (int i = 0; i <= static_cast<int>(ErrorCode::kInternal); ++i) {
         const auto code = static_cast<ErrorCode>(i);

@@ -70,9 +70,9 @@ std::string readText(const std::string& path) {
     return {std::istreambuf_iterator<char>(file), {}};
 }
 
-// The lower right part of the picture is the raster, pixel by pixel; black ink lies left of it
-// beside every class and above it.
-TEST_F(Figure, PngHoldsTheRasterAndItsNames) {
+// The lower right of the picture is the raster, pixel by pixel; every class has black ink left of it and
+// above.
+TEST_F(Figure, PngHasTheRasterAndItsLabels) {
     const SimilarityRaster drawn = raster({"ant", "bee", "cat"}, 6);
     ASSERT_TRUE(writeSimilarityFigure(drawn, path("a.png")));
     const Picture picture = readPng(path("a.png"));
@@ -101,8 +101,8 @@ TEST_F(Figure, PngHoldsTheRasterAndItsNames) {
     }
 }
 
-// Paint the rectangles of the SVG: the raster must come out.
-TEST_F(Figure, SvgPaintsTheSamePixels) {
+// Painting the rectangles of the SVG must give the raster.
+TEST_F(Figure, SvgHasTheSamePixels) {
     const SimilarityRaster drawn = raster({"ant", "bee", "cat"}, 7);
     ASSERT_TRUE(writeSimilarityFigure(drawn, path("a.SVG")));
     const std::string svg = readText(path("a.SVG"));
@@ -130,7 +130,7 @@ TEST_F(Figure, SvgPaintsTheSamePixels) {
     EXPECT_EQ(painted, drawn.rgb);
 }
 
-TEST_F(Figure, SvgNamesEveryClassTwiceAndEscapes) {
+TEST_F(Figure, SvgLabelsEveryClassTwiceAndEscapesNames) {
     const SimilarityRaster drawn = raster({"ant & bee", "<cat>", "d\"o\ng"}, 5);
     ASSERT_TRUE(writeSimilarityFigure(drawn, path("a.svg")));
     const std::string svg = readText(path("a.svg"));
@@ -162,7 +162,7 @@ TEST_F(Figure, RefusesOtherEndings) {
     EXPECT_TRUE(checkFigurePath("x.PNG"));
 }
 
-TEST_F(Figure, SaysWhenTheFileCannotBeWritten) {
+TEST_F(Figure, ReportsAnUnwritableFile) {
     const SimilarityRaster drawn = raster({"a", "b"}, 2);
     for (const std::string name : {"missing/a.png", "missing/a.svg"}) {
         const auto written = writeSimilarityFigure(drawn, path(name));
@@ -172,14 +172,14 @@ TEST_F(Figure, SaysWhenTheFileCannotBeWritten) {
     }
 }
 
-TEST_F(Figure, RefusesARasterWhoseBytesDoNotFit) {
+TEST_F(Figure, RefusesARasterOfTheWrongSize) {
     SimilarityRaster drawn = raster({"a", "b"}, 2);
     drawn.rgb.pop_back();
     EXPECT_EQ(writeSimilarityFigure(drawn, path("a.png")).error().code, ErrorCode::kInvalidArgument);
     EXPECT_EQ(writeSimilarityFigure({}, path("a.png")).error().code, ErrorCode::kInvalidArgument);
 }
 
-// A full device must be reported, whichever call notices it.
+// A full device is reported, whichever call notices it.
 TEST_F(Figure, FullDeviceIsAnError) {
     const SimilarityRaster drawn = raster({"a", "b"}, 5);
     for (const std::string name : {"full.png", "full.svg"}) {

@@ -1,4 +1,4 @@
-// The online commands against a real shapedbd.
+// The commands that need a server, against a real shapedbd.
 #include <filesystem>
 #include <fstream>
 
@@ -14,7 +14,7 @@ using nlohmann::json;
 using testing::ServerProcess;
 using testing::TemporaryDirectory;
 
-/// One server for all tests; each works in a collection of its own.
+/// One server for all tests, one collection per test.
 class Online : public CommandTest {
   protected:
     static void SetUpTestSuite() {
@@ -97,7 +97,7 @@ TEST_F(Online, AddStoresEveryFileOnce) {
               "not_found");
 }
 
-TEST_F(Online, AddGoesOnAfterABadFile) {
+TEST_F(Online, AddContinuesAfterABadFile) {
     onlineJson({"collection", "create", "mixed"});
     writePoints("in/good.xyz", dumbbellPoints(2000));
     writePoints("in/flat.xyz", ellipsoidPoints(1.0, 1.0, 0.0, 100));
@@ -113,7 +113,7 @@ TEST_F(Online, AddGoesOnAfterABadFile) {
     EXPECT_NE(run.err.find("2 of 3 files failed"), std::string::npos) << run.err;
 }
 
-TEST_F(Online, AddRefusesTwoFilesOfOneKey) {
+TEST_F(Online, AddRefusesTwoFilesWithOneKey) {
     writePoints("in/a.xyz", dumbbellPoints(500));
     writePoints("in/a.pts.xyz", dumbbellPoints(500));
     writePoints("other/a.xyz", dumbbellPoints(500));
@@ -177,7 +177,7 @@ TEST_F(Online, QueryByKeyAndByScanRankTheSame) {
               1u);
 }
 
-TEST_F(Online, QueryTextRanksAndSaysWhy) {
+TEST_F(Online, QueryTextRanksAndExplains) {
     fill("why");
     const CommandRun run = online({"query", "--key", "human/human_01", "--collection", "why"});
     ASSERT_EQ(run.exitCode, 0) << run.err;
@@ -188,7 +188,7 @@ TEST_F(Online, QueryTextRanksAndSaysWhy) {
     EXPECT_NE(every.out.find("Why fish/fish_01"), std::string::npos) << every.out;
 }
 
-TEST_F(Online, QueryRefusesWhatTheServerRefuses) {
+TEST_F(Online, QueryReportsServerErrors) {
     fill("refuse");
     const std::vector<std::string> base = {"query", "--key", "mug/mug_01", "--collection", "refuse"};
     const auto with = [&](const std::vector<std::string>& more, int exitCode) {
@@ -208,7 +208,7 @@ TEST_F(Online, QueryRefusesWhatTheServerRefuses) {
     EXPECT_EQ(onlineJson({"query", flat, "--collection", "refuse"}, 3)["error"]["name"], "coplanar");
 }
 
-TEST_F(Online, CompareStoredAndFilesAgree) {
+TEST_F(Online, CompareAgreesForStoredShapesAndFiles) {
     fill("compare");
     const json stored = onlineJson({"compare", "mug/mug_01", "mug/mug_02", "--collection", "compare"});
     const json files = onlineJson({"compare", "--files", scans() + "/mug/mug_01.ply",
@@ -220,7 +220,7 @@ TEST_F(Online, CompareStoredAndFilesAgree) {
               "invalid_argument");
 }
 
-TEST_F(Online, ListPagesAndStates) {
+TEST_F(Online, ListPagesAndFiltersByState) {
     fill("list");
     const json all = onlineJson({"list", "--collection", "list"});
     ASSERT_EQ(all["shapes"].size(), 6u);
@@ -251,7 +251,7 @@ TEST_F(Online, GetWritesTheSegmentedPoints) {
     EXPECT_EQ(onlineJson({"get", "nobody", "--collection", "get"}, 4)["error"]["name"], "not_found");
 }
 
-TEST_F(Online, WatchEndsReadyOrFailed) {
+TEST_F(Online, WatchEndsWhenReady) {
     onlineJson({"collection", "create", "watch"});
     writePoints("flat.xyz", ellipsoidPoints(1.0, 1.0, 0.0, 100));
     writePoints("bell.xyz", dumbbellPoints(2000));
@@ -260,7 +260,7 @@ TEST_F(Online, WatchEndsReadyOrFailed) {
     EXPECT_EQ(onlineJson({"watch", "nobody", "--collection", "watch"}, 4)["error"]["name"], "not_found");
 }
 
-TEST_F(Online, DeleteIsForGood) {
+TEST_F(Online, DeleteRemovesShapes) {
     fill("delete");
     EXPECT_EQ(onlineJson({"delete", "mug/mug_01", "--collection", "delete", "--expected-version", "7"},
                          4)["error"]["name"],
@@ -274,7 +274,7 @@ TEST_F(Online, DeleteIsForGood) {
               "not_found");
 }
 
-TEST_F(Online, Collections) {
+TEST_F(Online, CollectionsAreCreatedListedAndDeleted) {
     const json made = onlineJson({"collection", "create", "mine", "--description", "for the test",
                                   "--profile", "paper", "--segments", "5", "--deep-angle", "22"});
     EXPECT_EQ(made["parameters"]["max_points"], 5);
@@ -306,7 +306,7 @@ TEST_F(Online, RebuildWithNewParametersChangesTheSignatures) {
     EXPECT_EQ(online({"admin", "rebuild", "--collection", "rebuild", "--cache-only"}).exitCode, 0);
 }
 
-TEST_F(Online, BackupAndRestore) {
+TEST_F(Online, RestoreBringsBackABackup) {
     // A server of its own: restoring replaces everything.
     const TemporaryDirectory directory;
     const ServerProcess own(directory.path() + "/data");
@@ -333,7 +333,7 @@ TEST_F(Online, BackupAndRestore) {
     EXPECT_EQ(ask({"admin", "backup", path("no/such/folder/copy.db")}).exitCode, 3);
 }
 
-TEST_F(Online, CheckStatsAndInfo) {
+TEST_F(Online, CheckStatsAndInfoReport) {
     fill("care");
     EXPECT_EQ(onlineJson({"admin", "check"})["sound"], true);
     const json stats = onlineJson({"admin", "stats"});

@@ -1,37 +1,40 @@
 #include "client/cli/parameters.h"
 
+#include <algorithm>
+
+#include <CLI/CLI.hpp>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
 namespace shapedb::cli {
 namespace {
 
-TEST(Parameters, NothingGivenIsTheDefaultProfile) {
+TEST(Parameters, WithoutFlagsTheDefaultProfileApplies) {
     const ParameterFlags flags;
     EXPECT_FALSE(flags.any());
     const auto resolved = flags.resolve();
     ASSERT_TRUE(resolved);
     EXPECT_EQ(toJson(*resolved), toJson(parametersOf(Profile::kDefault)));
-    EXPECT_FALSE(flags.forServer().profile.has_value());
+    EXPECT_FALSE(flags.given.profile.has_value());
 }
 
-TEST(Parameters, EachFlagOverridesItsFieldOnly) {
+TEST(Parameters, EachFlagOverridesOnlyItsField) {
     ParameterFlags flags;
-    flags.profile = "paper";
-    flags.interior = "adaptive";
-    flags.numbers.bigBallRatio = 0.75;
-    flags.numbers.deepAngleDegrees = 25.0;
-    flags.numbers.hullAngleDegrees = 6.0;
-    flags.numbers.mergeRatio = 2.0;
-    flags.numbers.decimateTo = 5000;
-    flags.numbers.mergeContrast = 1.75;
-    flags.numbers.minSegmentShare = 0.03125;
-    flags.numbers.maxSegments = 12;
-    flags.numbers.outlierRatio = 4.0;
-    flags.numbers.smoothingReach = 6.0;
-    flags.numbers.thinning = 1.5;
-    flags.numbers.maxPoints = 9;
-    flags.numbers.attributes = true;
+    flags.given.profile = Profile::kPaper;
+    flags.given.interiorMethod = InteriorMethod::kAdaptive;
+    flags.given.bigBallRatio = 0.75;
+    flags.given.deepAngleDegrees = 25.0;
+    flags.given.hullAngleDegrees = 6.0;
+    flags.given.mergeRatio = 2.0;
+    flags.given.decimateTo = 5000;
+    flags.given.mergeContrast = 1.75;
+    flags.given.minSegmentShare = 0.03125;
+    flags.given.maxSegments = 12;
+    flags.given.outlierRatio = 4.0;
+    flags.given.smoothingReach = 6.0;
+    flags.given.thinning = 1.5;
+    flags.given.maxPoints = 9;
+    flags.given.attributes = true;
     const auto resolved = flags.resolve();
     ASSERT_TRUE(resolved) << resolved.error().message;
     EXPECT_EQ(toJson(*resolved), nlohmann::json({{"profile", "paper"},
@@ -46,38 +49,80 @@ TEST(Parameters, EachFlagOverridesItsFieldOnly) {
                                                  {"outlier_ratio", 4.0},
                                                  {"smoothing_reach", 6.0},
                                                  {"thinning", 1.5},
+                                                 {"stray_ratio", 4.0},   // former name of outlier_ratio
+                                                 {"even_spacing", 1.5},  // former name of thinning
                                                  {"interior_method", "adaptive"},
                                                  {"max_points", 9},
                                                  {"attributes", true}}));
-    const client::Parameters sent = flags.forServer();
-    EXPECT_EQ(sent.profile, client::Profile::kPaper);
-    EXPECT_EQ(sent.interiorMethod, client::InteriorMethod::kAdaptive);
-    EXPECT_EQ(toJson(sent), toJson(*resolved)) << "what a collection shows is what a scan here would get";
+    EXPECT_EQ(toJson(flags.given), toJson(*resolved)) << "a collection shows what a scan here would get";
 }
 
-TEST(Parameters, AnySingleFlagIsNoticed) {
+TEST(Parameters, AnyNoticesASingleFlag) {
     ParameterFlags contrast;
-    contrast.numbers.mergeContrast = 0.0;
+    contrast.given.mergeContrast = 0.0;
     EXPECT_TRUE(contrast.any()) << "0 given is not nothing given";
     ParameterFlags interior;
-    interior.interior = "walk";
+    interior.given.interiorMethod = InteriorMethod::kWalk;
     EXPECT_TRUE(interior.any());
-    EXPECT_EQ(interior.forServer().interiorMethod, client::InteriorMethod::kWalk);
     ParameterFlags points;
-    points.numbers.maxPoints = 3;
+    points.given.maxPoints = 3;
     EXPECT_TRUE(points.any());
+}
+
+struct Parsed {
+    ParameterFlags flags;
+    std::string help;
+    bool refused = false;
+};
+
+/// Flags as a command reads them.
+Parsed parse(std::vector<std::string> arguments) {
+    Parsed parsed;
+    CLI::App app;
+    addParameterFlags(app, parsed.flags);
+    std::reverse(arguments.begin(), arguments.end());
+    try {
+        app.parse(arguments);
+    } catch (const CLI::ParseError&) {
+        parsed.refused = true;
+    }
+    parsed.help = app.help();
+    return parsed;
+}
+
+TEST(Parameters, NamedValuesAreParsed) {
+    const Parsed parsed = parse({"--profile", "paper", "--interior", "adaptive", "--no-attributes"});
+    ASSERT_FALSE(parsed.refused);
+    EXPECT_EQ(parsed.flags.given.profile, Profile::kPaper);
+    EXPECT_EQ(parsed.flags.given.interiorMethod, InteriorMethod::kAdaptive);
+    EXPECT_EQ(parsed.flags.given.attributes, false);
+    EXPECT_TRUE(parse({"--profile", "best"}).refused);
+}
+
+TEST(Parameters, FormerFlagNamesStillWorkButAreNotInTheHelp) {
+    const Parsed former = parse({"--stray-ratio", "4", "--even-spacing", "1.5"});
+    ASSERT_FALSE(former.refused);
+    EXPECT_EQ(former.flags.given.outlierRatio, 4.0);
+    EXPECT_EQ(former.flags.given.thinning, 1.5);
+    const Parsed current = parse({"--outlier-ratio", "4", "--thinning", "1.5"});
+    EXPECT_EQ(toJson(former.flags.given), toJson(current.flags.given));
+    EXPECT_NE(former.help.find("--outlier-ratio"), std::string::npos);
+    EXPECT_NE(former.help.find("--thinning"), std::string::npos);
+    EXPECT_EQ(former.help.find("--stray-ratio"), std::string::npos);
+    EXPECT_EQ(former.help.find("--even-spacing"), std::string::npos);
+    EXPECT_TRUE(parse({"--outlier-ratio", "4", "--stray-ratio", "3"}).refused) << "one or the other";
 }
 
 TEST(Parameters, ZeroTurnsOffWhatTheProfileTurnsOn) {
     ParameterFlags flags;
-    flags.numbers.decimateTo = 0;
-    flags.numbers.mergeContrast = 0.0;
-    flags.numbers.outlierRatio = 0.0;
-    flags.numbers.smoothingReach = 0.0;
-    flags.numbers.thinning = 0.0;
-    flags.interior = "walk";
-    flags.numbers.attributes = false;
-    flags.numbers.deepAngleDegrees = 20.0;
+    flags.given.decimateTo = 0;
+    flags.given.mergeContrast = 0.0;
+    flags.given.outlierRatio = 0.0;
+    flags.given.smoothingReach = 0.0;
+    flags.given.thinning = 0.0;
+    flags.given.interiorMethod = InteriorMethod::kWalk;
+    flags.given.attributes = false;
+    flags.given.deepAngleDegrees = 20.0;
     const auto resolved = flags.resolve();
     ASSERT_TRUE(resolved) << resolved.error().message;
     nlohmann::json expected = toJson(parametersOf(Profile::kPaper));
@@ -88,15 +133,15 @@ TEST(Parameters, ZeroTurnsOffWhatTheProfileTurnsOn) {
     EXPECT_EQ(toJson(*resolved), expected);
 }
 
-TEST(Parameters, OutOfRangeIsRefusedWithItsRange) {
+TEST(Parameters, RefusesAValueOutOfRange) {
     ParameterFlags flags;
-    flags.numbers.deepAngleDegrees = 90.0;
+    flags.given.deepAngleDegrees = 90.0;
     const auto resolved = flags.resolve();
     ASSERT_FALSE(resolved);
     EXPECT_EQ(resolved.error().code, ErrorCode::kInvalidArgument);
 }
 
-TEST(Parameters, ScoreFlagsTurnReflectionOffAndScaleOn) {
+TEST(Parameters, ScoreFlagsSetTheScoreOptions) {
     EXPECT_TRUE(ScoreFlags{}.resolve().reflection);
     EXPECT_FALSE(ScoreFlags{}.resolve().keepScale);
     EXPECT_FALSE((ScoreFlags{true, true, false}.resolve().reflection));

@@ -41,7 +41,7 @@ class RetrievalTask : public CommandTest {
     }
 };
 
-TEST_F(RetrievalTask, ACollectionIsLabelledByTheFolderThatHoldsTheFile) {
+TEST_F(RetrievalTask, CollectionLabelsAreTheFoldersOfTheFiles) {
     const auto scans = listCollection({path("set")});
     ASSERT_TRUE(scans);
     ASSERT_EQ(scans->size(), 4u);
@@ -52,7 +52,7 @@ TEST_F(RetrievalTask, ACollectionIsLabelledByTheFolderThatHoldsTheFile) {
     EXPECT_FALSE(listCollection({path("nowhere")}));
 }
 
-TEST_F(RetrievalTask, AClassIsTheFolderBelowTheRoot) {
+TEST_F(RetrievalTask, ClassIsTheFolderBelowTheRoot) {
     const auto scans = listClasses(path("set"));
     ASSERT_TRUE(scans);
     EXPECT_EQ((*scans)[1].name, "bell/old/2.xyz");
@@ -61,27 +61,27 @@ TEST_F(RetrievalTask, AClassIsTheFolderBelowTheRoot) {
     EXPECT_THAT(refusalOf({}), HasSubstr("stray.xyz"));
 }
 
-TEST_F(RetrievalTask, OnlyTheClassesAskedForTakePart) {
+TEST_F(RetrievalTask, OnlyChosenClassesTakePart) {
     EXPECT_THAT(namesOf({{"round", "bell"}, {}}), ElementsAre("bell/1.xyz", "bell/old/2.xyz", "round/7.xyz"));
     EXPECT_THAT(namesOf({{}, {"bell"}}), ElementsAre("cup/1.xyz", "round/7.xyz"));
     EXPECT_THAT(namesOf({{"bell", "cup"}, {"bell"}}), ElementsAre("cup/1.xyz"));
 }
 
-TEST_F(RetrievalTask, TheTwoHalvesAreTheWhole) {
+TEST_F(RetrievalTask, ClassesAndTheirComplementMakeTheWhole) {
     const auto half = namesOf({{"cup"}, {}});
     auto both = namesOf({{}, {"cup"}});
     both.insert(both.end(), half.begin(), half.end());
     EXPECT_THAT(both, ::testing::UnorderedElementsAreArray(namesOf({})));
 }
 
-TEST_F(RetrievalTask, AMisspeltClassIsRefusedAndTheClassesListed) {
+TEST_F(RetrievalTask, RefusesAnUnknownClassAndListsTheClasses) {
     EXPECT_THAT(refusalOf({{"bel"}, {}}),
                 ::testing::AllOf(HasSubstr("'bel'"), HasSubstr("bell, cup, round")));
     EXPECT_THAT(refusalOf({{}, {"Cup"}}), HasSubstr("'Cup'"));
     EXPECT_THAT(refusalOf({{"cup"}, {"cup"}}), HasSubstr("leave no class"));
 }
 
-TEST_F(RetrievalTask, ByFolderAQueryIsNoAnswerToItself) {
+TEST_F(RetrievalTask, MatchByFolderExcludesTheQueryItself) {
     const auto scans = listCollection({path("set")});
     ASSERT_TRUE(scans);
     const std::vector<double> scores = {1.0, 0.5, 0.2, 0.9};
@@ -94,7 +94,7 @@ TEST_F(RetrievalTask, ByFolderAQueryIsNoAnswerToItself) {
     EXPECT_THAT(byStem.right, ElementsAre(0, 2)) << "the files named 1";
 }
 
-TEST_F(RetrievalTask, WhatIsNotUsableIsNotRankedButStaysRight) {
+TEST_F(RetrievalTask, UnusableEntriesAreNotRankedButStillRight) {
     const auto scans = listCollection({path("set")});
     ASSERT_TRUE(scans);
     const std::vector<double> scores = {0.5, 0.5, 0.5, 0.5};
@@ -104,13 +104,13 @@ TEST_F(RetrievalTask, WhatIsNotUsableIsNotRankedButStaysRight) {
     EXPECT_THAT(query.right, ElementsAre(0, 2));
 }
 
-TEST(Match, ByName) {
+TEST(Match, IsParsedFromItsName) {
     EXPECT_EQ(*matchFromName("folder"), Match::kFolder);
     EXPECT_EQ(*matchFromName("stem"), Match::kStem);
     EXPECT_EQ(matchFromName("colour").error().code, ErrorCode::kInvalidArgument);
 }
 
-TEST(TiesAgainstFailures, OnlyPairsOfTheSameClassWithAFailureAreMoved) {
+TEST(TiesAgainstFailures, LowersOnlySameClassPairsWithAFailure) {
     const std::vector<std::string> labels = {"a", "a", "b"};
     const ScoreMatrix scores(9, 0.0);
     const ScoreMatrix moved = withTiesAgainstFailures(scores, labels, {false, true, false}, -2.0);

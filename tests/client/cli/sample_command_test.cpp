@@ -24,7 +24,7 @@ TEST_F(SampleCommand, ListsTheFamilies) {
     EXPECT_EQ(document["families"][0]["family"], listFamilies()[0].name);
 }
 
-TEST_F(SampleCommand, WritesWhatItSays) {
+TEST_F(SampleCommand, WritesTheFilesItReports) {
     const CommandRun run = runCommand({"sample", path("s"), "--count", "2", "--points", "600", "--families",
                                        "mug,bird", "--noise", "0.01", "--json"});
     ASSERT_EQ(run.exitCode, 0) << run.err;
@@ -38,7 +38,7 @@ TEST_F(SampleCommand, WritesWhatItSays) {
     EXPECT_EQ(document["files"][0]["label"], "bird");
 }
 
-TEST_F(SampleCommand, SameSeedSameBytesWhateverElseIsWritten) {
+TEST_F(SampleCommand, FilesDependOnlyOnSeedAndName) {
     const auto sample = [&](const char* folder, std::vector<std::string> more) {
         more.insert(more.begin(), {"sample", path(folder), "--points", "500"});
         EXPECT_EQ(runCommand(more).exitCode, 0);

@@ -21,7 +21,7 @@ TEST_F(ScanSource, FileSeedDependsOnSeedAndNameAlone) {
     EXPECT_EQ(seeds.size(), 21u);
 }
 
-TEST_F(ScanSource, NameIsThePathBelowTheFolder) {
+TEST_F(ScanSource, NameIsRelativeToTheFolder) {
     EXPECT_EQ(relativeName("scans/Hand/193.ply", "scans"), "Hand/193.ply");
     EXPECT_EQ(relativeName("scans/Hand/193.ply", "scans/"), "Hand/193.ply");
     EXPECT_EQ(relativeName("./scans/Hand/193.ply", "scans/./"), "Hand/193.ply");
@@ -29,13 +29,13 @@ TEST_F(ScanSource, NameIsThePathBelowTheFolder) {
     EXPECT_EQ(relativeName("/a/b/c.ply", "/a"), "b/c.ply");
 }
 
-TEST_F(ScanSource, KeyLosesTheLastEndingOnly) {
+TEST_F(ScanSource, KeyLosesOnlyTheLastEnding) {
     EXPECT_EQ(withoutEnding("Hand/193.ply"), "Hand/193");
     EXPECT_EQ(withoutEnding("193.ply"), "193");
     EXPECT_EQ(withoutEnding("v1.2/cup.final.ply"), "v1.2/cup.final");
 }
 
-TEST_F(ScanSource, WithoutFlagsThePointsAreTheFile) {
+TEST_F(ScanSource, WithoutFlagsPointsAreThoseOfTheFile) {
     const PointCloud points = ellipsoidPoints(1.0, 0.5, 0.25, 50);
     const auto scan = loadScan(writePoints("a.xyz", points), {}, 7);
     ASSERT_TRUE(scan) << scan.error().message;
@@ -56,7 +56,7 @@ TEST_F(ScanSource, NoiseAndSubsetAreDeterministicAndIndependent) {
     EXPECT_EQ(first->points, again->points);
     EXPECT_NE(first->points, other->points);
 
-    // The same subset without its noise: each point moved, none far.
+    // The same subset with noise: every point moved, none far.
     ScanFlags clean = noisy;
     clean.noise = 0.0;
     const auto subset = loadScan(file, clean, 7);
@@ -67,7 +67,7 @@ TEST_F(ScanSource, NoiseAndSubsetAreDeterministicAndIndependent) {
     }
 }
 
-TEST_F(ScanSource, RefusesASubsetThatIsNoShape) {
+TEST_F(ScanSource, RefusesASubsetBelowFourPoints) {
     ScanFlags flags;
     flags.points = 3;
     const auto scan = loadScan(writePoints("a.xyz", ellipsoidPoints(1, 1, 1, 50)), flags, 1);

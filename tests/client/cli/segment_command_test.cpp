@@ -18,7 +18,7 @@ class SegmentCommand : public CommandTest {
     std::string dumbbell() const { return writePoints("dumbbell.xyz", dumbbellPoints()); }
 };
 
-/// Without what differs from run to run.
+/// Without values that differ from run to run.
 nlohmann::json timeless(nlohmann::json document) {
     for (const char* key : {"delaunay_seconds", "total_seconds", "stages"}) document.erase(key);
     return document;
@@ -96,7 +96,7 @@ TEST_F(SegmentCommand, FlagsBeyondThePaperReachTheMethod) {
     EXPECT_EQ(plain["quality"], 1.0);
     const auto all = with({"--interior", "adaptive", "--merge-contrast", "1.25", "--max-segments", "2",
                            "--min-segment-share", "0.01", "--outlier-ratio", "3", "--smoothing-reach", "5",
-                           "--even-spacing", "1", "--attributes"});
+                           "--thinning", "1", "--attributes"});
     ShapeParameters parameters = parametersOf(Profile::kPaper);
     parameters.segmentation.interiorMethod = InteriorMethod::kAdaptive;
     parameters.segmentation.mergeContrast = 1.25;
@@ -117,7 +117,19 @@ TEST_F(SegmentCommand, FlagsBeyondThePaperReachTheMethod) {
     EXPECT_FALSE(with({"--no-attributes"}).contains("statistics"));
 }
 
-TEST_F(SegmentCommand, LabelledPlyHasThePointsAndLabelsOfTheSegmentation) {
+TEST_F(SegmentCommand, FormerFlagNamesGiveTheSameResult) {
+    const auto run = [&](const std::string& outliers, const std::string& thinning) {
+        return timeless(
+            runCommand({"segment", dumbbell(), "--json", outliers, "2.5", thinning, "1.5"}).json());
+    };
+    const auto current = run("--outlier-ratio", "--thinning");
+    EXPECT_EQ(current, run("--stray-ratio", "--even-spacing"));
+    EXPECT_EQ(current["strays"], current["outliers"]);
+    EXPECT_EQ(current["parameters"]["stray_ratio"], 2.5);
+    EXPECT_EQ(current["parameters"]["even_spacing"], 1.5);
+}
+
+TEST_F(SegmentCommand, LabelledPlyHasPointsAndLabels) {
     const CommandRun run =
         runCommand({"segment", dumbbell(), "--json", "--profile", "paper", "--out", path("out.ply")});
     ASSERT_EQ(run.exitCode, 0) << run.err;
@@ -146,7 +158,7 @@ TEST_F(SegmentCommand, LabelledPlyHasThePointsAndLabelsOfTheSegmentation) {
     EXPECT_GT(labels[1], 500u);
 }
 
-TEST_F(SegmentCommand, SameSeedSameResult) {
+TEST_F(SegmentCommand, SameSeedGivesTheSameResult) {
     const std::vector<std::string> arguments = {"segment", dumbbell(), "--json", "--noise",
                                                 "0.002",   "--points", "2000"};
     auto with = [&](const char* seed) {
@@ -163,8 +175,8 @@ TEST_F(SegmentCommand, TextNamesFileCountsAndSegments) {
     const CommandRun run = runCommand({"segment", dumbbell()});
     ASSERT_EQ(run.exitCode, 0) << run.err;
     EXPECT_NE(run.out.find("dumbbell.xyz"), std::string::npos);
-    EXPECT_NE(run.out.find("segments, volume"), std::string::npos);
-    EXPECT_NE(run.out.find("heaviest"), std::string::npos);
+    EXPECT_NE(run.out.find("parts, volume"), std::string::npos);
+    EXPECT_NE(run.out.find("Largest parts:"), std::string::npos);
     EXPECT_EQ(run.out.find('\x1b'), std::string::npos) << "no terminal codes in a pipe";
     EXPECT_EQ(run.err, "");
 }
@@ -177,7 +189,7 @@ struct BadScan {
     int exitCode;
 };
 
-// In the test's name; without it there would be addresses.
+// Names the parameter in the output; the default prints addresses.
 void PrintTo(const BadScan& bad, std::ostream* out) { *out << bad.file; }
 
 std::string repeated(const std::string& line, int count) {
@@ -188,7 +200,7 @@ std::string repeated(const std::string& line, int count) {
 
 class SegmentBadScan : public SegmentCommand, public ::testing::WithParamInterface<BadScan> {};
 
-TEST_P(SegmentBadScan, HasItsErrorAndExitCode) {
+TEST_P(SegmentBadScan, GivesItsErrorAndExitCode) {
     const BadScan& bad = GetParam();
     const std::string file = write(bad.file, bad.bytes);
     const CommandRun run = runCommand({"segment", file, "--json", "--out", path("out.ply")});
@@ -218,7 +230,7 @@ INSTANTIATE_TEST_SUITE_P(
                 "malformed_file", 3}),
     [](const ::testing::TestParamInfo<BadScan>& bad) { return bad.param.name; });
 
-TEST_F(SegmentCommand, MissingFileAndUnwritableOutput) {
+TEST_F(SegmentCommand, ReportsMissingFileAndUnwritableOutput) {
     const CommandRun missing = runCommand({"segment", path("missing.ply"), "--json"});
     EXPECT_EQ(missing.exitCode, 3);
     EXPECT_EQ(missing.json()["error"]["name"], "file_not_readable");
@@ -229,7 +241,7 @@ TEST_F(SegmentCommand, MissingFileAndUnwritableOutput) {
     EXPECT_EQ(unwritable.json()["error"]["name"], "file_not_writable");
 }
 
-TEST_F(SegmentCommand, HugeAndTinyCoordinatesAreTheSameShape) {
+TEST_F(SegmentCommand, HugeAndTinyCoordinatesGiveTheSameShape) {
     for (const double scale : {1e-6, 1e6}) {
         PointCloud points = dumbbellPoints();
         for (Point3& p : points) p = scale * p;

@@ -5,8 +5,10 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "client/cli/local_result.h"
 #include "core/base/math.h"
 #include "core/base/random.h"
+#include "core/signature/signature.h"
 
 namespace shapedb::cli {
 namespace {
@@ -27,7 +29,7 @@ client::Signature signatureOf(const std::vector<double>& shares) {
     return signature;
 }
 
-TEST(ShapeOutput, AngleOfARotation) {
+TEST(ShapeOutput, RotationAngleInDegrees) {
     for (const double degrees : {0.0, 1.0, 37.0, 90.0, 179.0}) {
         Motion motion;
         motion.rotation = aboutZ(degrees);
@@ -35,7 +37,7 @@ TEST(ShapeOutput, AngleOfARotation) {
     }
 }
 
-TEST(ShapeOutput, AngleOfARotationIsTheSameAboutAnyAxis) {
+TEST(ShapeOutput, RotationAngleDoesNotDependOnTheAxis) {
     Random random(3);
     for (int i = 0; i < 20; ++i) {
         // Conjugating with a rotation turns the axis and leaves the angle.
@@ -47,7 +49,7 @@ TEST(ShapeOutput, AngleOfARotationIsTheSameAboutAnyAxis) {
     }
 }
 
-TEST(ShapeOutput, AMirrorAloneTurnsNothing) {
+TEST(ShapeOutput, AMirrorAloneIsNoRotation) {
     Motion mirror;
     mirror.reflected = true;
     mirror.rotation = {{{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, -1.0}}};
@@ -58,7 +60,7 @@ TEST(ShapeOutput, AMirrorAloneTurnsNothing) {
     EXPECT_NEAR(rotationDegrees(compose(turn, mirror)), 30.0, 1e-6);
 }
 
-TEST(ShapeOutput, ExplanationTellsPairsMotionAndWhatIsLeft) {
+TEST(ShapeOutput, ExplanationListsPairsMotionAndUnmatchedParts) {
     client::Explanation explanation;
     explanation.matches = {{0, 1, 0.9, 0.0}, {2, 0, 0.09, 0.02}, {3, 2, 0.009, 0.1}, {4, 3, 0.001, 0.1}};
     explanation.unmatchedQuery = {1};
@@ -67,13 +69,13 @@ TEST(ShapeOutput, ExplanationTellsPairsMotionAndWhatIsLeft) {
     explanation.motion.scale = 2.5;
     const std::string text =
         explanationText(explanation, signatureOf({0.5, 0.2, 0.15, 0.1, 0.05}), "the query", "cup-7");
-    EXPECT_EQ(
-        text,
-        "4 of 5 segments of the query, 80 % of its volume, lie on segments of cup-7: 1 on 2 (90 % of the "
-        "match, "
-        "0 % of the size apart), 3 on 1 (9 % of the match, 2 % of the size apart) and 2 that hardly count.\n"
-        "To get there cup-7 is turned by 37 degrees, enlarged to 2.5 times its size and not mirrored.\n"
-        "Without a partner: segment 2 of the query (20 % of its volume), segments 5, 6 and 7 of cup-7.\n");
+    EXPECT_EQ(text,
+              "4 of 5 parts of the query match (80 % of its volume)\n"
+              "  part 1 <-> part 2: 90 % of the match, centres 0 % apart\n"
+              "  part 3 <-> part 1: 9 % of the match, centres 2 % apart\n"
+              "  and 2 more below 1 %\n"
+              "To match, cup-7 is turned by 37 degrees and scaled by 2.5.\n"
+              "Unmatched: part 2 of the query (20 % of its volume) and parts 5, 6 and 7 of cup-7.\n");
 }
 
 TEST(ShapeOutput, ExplanationOfAMirroredShapeOfTheSameSize) {
@@ -82,18 +84,18 @@ TEST(ShapeOutput, ExplanationOfAMirroredShapeOfTheSameSize) {
     explanation.motion.reflected = true;
     explanation.motion.rotation = {{{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, -1.0}}};
     EXPECT_EQ(explanationText(explanation, signatureOf({1.0}), "a", "b"),
-              "1 of 1 segment of a, 100 % of its volume, lies on segments of b: 1 on 1 (100 % of the match, "
-              "0 % of the "
-              "size apart).\nTo get there b is mirrored and turned by 0 degrees at its own size.\n");
+              "1 of 1 part of a match (100 % of its volume)\n"
+              "  part 1 <-> part 1: 100 % of the match, centres 0 % apart\n"
+              "To match, b is mirrored and turned by 0 degrees.\n");
 }
 
 TEST(ShapeOutput, ExplanationOfADegenerateOrEmptyMatch) {
     client::Explanation explanation;
     EXPECT_EQ(explanationText(explanation, signatureOf({1.0}), "a", "b"),
-              "No segment of a lies on one of b.\n");
+              "no part of a matches a part of b\n");
     explanation.matches = {{0, 0, 1.0, 0.0}};
     explanation.degenerate = true;
-    EXPECT_NE(explanationText(explanation, signatureOf({1.0}), "a", "b").find("single segment"),
+    EXPECT_NE(explanationText(explanation, signatureOf({1.0}), "a", "b").find("single part"),
               std::string::npos);
     // A server that names a segment the signature does not have must not crash the client.
     explanation.matches = {{7, 9, 1.0, 0.0}};
@@ -101,7 +103,7 @@ TEST(ShapeOutput, ExplanationOfADegenerateOrEmptyMatch) {
     EXPECT_FALSE(explanationText(explanation, signatureOf({1.0}), "a", "b").empty());
 }
 
-TEST(ShapeOutput, SignaturePointsHaveTheDocumentedKeys) {
+TEST(ShapeOutput, SignatureJsonHasTheDocumentedKeys) {
     client::Signature signature = signatureOf({1.0});
     signature.points[0].position = {1.0, 2.0, 3.0};
     signature.points[0].extents = {3.0, 2.0, 1.0};
@@ -113,24 +115,24 @@ TEST(ShapeOutput, SignaturePointsHaveTheDocumentedKeys) {
         EXPECT_TRUE(points[0].contains(key)) << key;
 }
 
-TEST(ShapeOutput, PointsThatWereNotUsedAreAccountedFor) {
+TEST(ShapeOutput, PreparationTextAccountsForUnusedPoints) {
     client::SegmentationReport report;
     report.points = report.pointsUsed = 1000;
     EXPECT_EQ(preparationText(report), "");
     report.pointsUsed = 990;
     report.outliers = 10;
-    EXPECT_EQ(preparationText(report), "990 after leaving out 10 outliers\n");
+    EXPECT_EQ(preparationText(report), "990 points used: 10 outliers dropped\n");
     report.duplicates = 1;
     report.pointsUsed = 500;
     EXPECT_EQ(preparationText(report),
-              "500 after leaving out 10 outliers, merging 1 duplicate and averaging and thinning\n");
+              "500 points used: 10 outliers dropped, 1 duplicate merged and the rest averaged and thinned\n");
     report.outliers = report.duplicates = 0;
-    EXPECT_EQ(preparationText(report), "500 after averaging and thinning\n");
+    EXPECT_EQ(preparationText(report), "500 points used: averaged and thinned\n");
     report.duplicates = 500;
-    EXPECT_EQ(preparationText(report), "500 after merging 500 duplicates\n");
+    EXPECT_EQ(preparationText(report), "500 points used: 500 duplicates merged\n");
 }
 
-TEST(ShapeOutput, LowQualityIsExplained) {
+TEST(ShapeOutput, QualityTextWarnsBelowOneHalf) {
     EXPECT_EQ(qualityText(0.937), "interior quality 0.94 of 1\n");
     EXPECT_NE(qualityText(0.1).find("guess"), std::string::npos);
 }
@@ -139,43 +141,51 @@ TEST(ShapeOutput, ReportInJson) {
     client::SegmentationReport report;
     report.outliers = 3;
     report.quality = 0.25;
-    report.interiorSource = client::InteriorSource::kThickened;
+    report.interiorSource = InteriorSource::kThickened;
     report.noise = 0.5;
     const nlohmann::json document = toJson(report);
     EXPECT_EQ(document["outliers"], 3);
+    EXPECT_EQ(document["strays"], 3) << "the former name stays";
     EXPECT_EQ(document["quality"], 0.25);
     EXPECT_EQ(document["interior_source"], "thickened");
     EXPECT_EQ(document["angle_degrees"], 0.0);
     EXPECT_EQ(document["estimated_noise"], 0.5);
 }
 
-TEST(ShapeOutput, InteriorSaysWhereItComesFromAndItsNoise) {
+TEST(ShapeOutput, InteriorTextNamesSourceNoiseAndQuality) {
     client::SegmentationReport report;
     report.angleDegrees = 22.0;
     report.quality = 0.75;
-    EXPECT_EQ(interiorText(report),
-              "interior: what a walk from outside leaves at 22 degrees\ninterior quality 0.75 of 1\n");
-    report.interiorSource = client::InteriorSource::kPotential;
+    EXPECT_EQ(interiorText(report, 10.0),
+              "interior found by walking in from outside (22 degrees)\ninterior quality 0.75 of 1\n");
     report.noise = 0.01;
-    EXPECT_EQ(interiorText(report),
-              "interior: what the potential puts inside; noise 0.01\ninterior quality 0.75 of 1\n");
+    EXPECT_EQ(interiorText(report, 10.0),
+              "interior found by walking in from outside (22 degrees), noise about 0.1 % of the size\n"
+              "interior quality 0.75 of 1\n");
+    report.interiorSource = InteriorSource::kPotential;
+    report.noise = 0.0;
+    EXPECT_EQ(interiorText(report, 10.0),
+              "interior estimated: the scan is open or noisy\ninterior quality 0.75 of 1\n");
+    report.interiorSource = InteriorSource::kThickened;
+    EXPECT_EQ(interiorText(report, 10.0).rfind("no interior found", 0), 0u);
 }
 
-TEST(ShapeOutput, ASegmentMatchedTwiceCountsOnceAndTermsAreTold) {
+TEST(ShapeOutput, ASegmentMatchedTwiceCountsOnceAndTermsAreListed) {
     client::Explanation explanation;
     explanation.matches = {{0, 1, 0.6, 0.0}, {0, 2, 0.4, 0.0}};
     explanation.terms = {{"chords", 0.123, 0.5}, {"parts", 1.0, 0.5}};
     const std::string text = explanationText(explanation, signatureOf({0.5, 0.2}), "a", "b");
-    EXPECT_EQ(text.rfind("1 of 2 segments of a, 50 % of its volume, lies on segments of b: 1 on 2 ", 0), 0u)
+    EXPECT_EQ(text.rfind("1 of 2 parts of a match (50 % of its volume)\n  part 1 <-> part 2: ", 0), 0u)
         << text;
-    EXPECT_NE(text.find("1 being what unrelated shapes differ by: chords 0.12, parts 1.00.\n"),
-              std::string::npos)
+    EXPECT_NE(
+        text.find("Differences (0 = identical, 1 = typical of unrelated shapes): chords 0.12, parts 1.00.\n"),
+        std::string::npos)
         << text;
     const nlohmann::json document = toJson(explanation);
     EXPECT_EQ(document["terms"][1], nlohmann::json({{"name", "parts"}, {"distance", 1.0}, {"weight", 0.5}}));
 }
 
-TEST(ShapeOutput, AttributesAreToldByStatistic) {
+TEST(ShapeOutput, AttributesAreShownByStatistic) {
     client::Signature signature = signatureOf({1.0});
     EXPECT_EQ(statisticsTable(signature), "");
     EXPECT_TRUE(statisticsJson(signature).empty());
@@ -191,7 +201,7 @@ TEST(ShapeOutput, AttributesAreToldByStatistic) {
     EXPECT_EQ(toJson(signature)["quality"], 0.75);
 }
 
-TEST(ShapeOutput, ASignatureMadeHereIsToldAsTheServerWould) {
+TEST(LocalResult, SignatureIsWhatTheServerWouldSend) {
     Signature signature;
     signature.points.resize(1);
     EXPECT_FALSE(toClient(signature).attributes.has_value());

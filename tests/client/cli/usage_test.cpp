@@ -1,4 +1,4 @@
-// What the command line itself refuses, and what holds for every command alike.
+// Command lines that are refused, and what all commands have in common.
 #include <csignal>
 
 #include <sys/wait.h>
@@ -11,7 +11,7 @@ namespace {
 
 using Usage = CommandTest;
 
-TEST_F(Usage, WrongCommandLinesAreExitCodeTwo) {
+TEST_F(Usage, WrongCommandLinesGiveExitCodeTwo) {
     const std::vector<std::vector<std::string>> wrong = {
         {},
         {"nonsense"},
@@ -28,7 +28,7 @@ TEST_F(Usage, WrongCommandLinesAreExitCodeTwo) {
         {"segment", "a.ply", "--min-segment-share", "1.5"},
         {"segment", "a.ply", "--outlier-ratio", "1"},
         {"segment", "a.ply", "--smoothing-reach", "21"},
-        {"segment", "a.ply", "--even-spacing", "-1"},
+        {"segment", "a.ply", "--thinning", "-1"},
         {"segment", "a.ply", "--max-segments", "-1"},
         {"segment", "a.ply", "--no-such-flag"},
         {"sample"},
@@ -58,13 +58,13 @@ TEST_F(Usage, WrongCommandLinesAreExitCodeTwo) {
     }
 }
 
-TEST_F(Usage, AQueryWithoutAShapeIsToldWhatItNeeds) {
-    EXPECT_NE(runCommand({"query"}).err.find("name a scan file, or a stored shape by --key"),
+TEST_F(Usage, QueryWithoutAShapeSaysWhatItNeeds) {
+    EXPECT_NE(runCommand({"query"}).err.find("give a scan file, or --key with a stored shape"),
               std::string::npos);
     EXPECT_NE(runCommand({"query", "a.ply", "--key", "b"}).err.find("not both"), std::string::npos);
 }
 
-TEST_F(Usage, WithJsonTheErrorIsADocument) {
+TEST_F(Usage, ErrorIsADocumentWithJson) {
     const CommandRun run = runCommand({"segment", "--json", "--no-such-flag"});
     EXPECT_EQ(run.exitCode, 2);
     const auto document = run.json();
@@ -72,7 +72,7 @@ TEST_F(Usage, WithJsonTheErrorIsADocument) {
     EXPECT_NE(document["error"]["message"].get<std::string>().find("segment --help"), std::string::npos);
 }
 
-TEST_F(Usage, HelpAndVersionAreOnStandardOutput) {
+TEST_F(Usage, HelpAndVersionGoToStandardOutput) {
     const std::vector<std::vector<std::string>> asked = {{"--help"},
                                                          {"segment", "--help"},
                                                          {"admin", "rebuild", "-h"},
@@ -91,12 +91,12 @@ TEST_F(Usage, HelpAndVersionAreOnStandardOutput) {
     }
 }
 
-TEST_F(Usage, JsonMayStandBeforeOrAfterTheCommand) {
+TEST_F(Usage, JsonFlagWorksBeforeAndAfterTheCommand) {
     EXPECT_TRUE(runCommand({"--json", "sample", "--list"}).json().contains("families"));
     EXPECT_TRUE(runCommand({"sample", "--list", "--json"}).json().contains("families"));
 }
 
-TEST_F(Usage, AResultThatCannotBeWrittenIsNoSuccess) {
+TEST_F(Usage, UnwritableResultIsAFailure) {
     const std::string file = writePoints("a.xyz", dumbbellPoints());
     const std::string line =
         std::string(SHAPEDB_PATH) + " segment " + file + " --json > /dev/full 2> " + path("err");
@@ -105,8 +105,8 @@ TEST_F(Usage, AResultThatCannotBeWrittenIsNoSuccess) {
     EXPECT_EQ(WEXITSTATUS(status), 3);
 }
 
-TEST_F(Usage, InterruptEndsWithItsOwnExitCode) {
-    // Enough work to be met in the middle of it.
+TEST_F(Usage, InterruptHasItsOwnExitCode) {
+    // Enough work to be interrupted in the middle.
     for (int i = 0; i < 20; ++i) {
         writePoints("set/a/" + std::to_string(i) + ".xyz", ellipsoidPoints(1.0, 0.8, 0.6 + 0.01 * i, 20000));
     }
@@ -119,7 +119,7 @@ TEST_F(Usage, InterruptEndsWithItsOwnExitCode) {
     EXPECT_EQ(WEXITSTATUS(status), 130);
 }
 
-TEST_F(Usage, TimeoutEndsOfflineWorkToo) {
+TEST_F(Usage, TimeoutEndsOfflineWork) {
     for (int i = 0; i < 20; ++i) {
         writePoints("set/a/" + std::to_string(i) + ".xyz", ellipsoidPoints(1.0, 0.8, 0.6 + 0.01 * i, 20000));
     }
@@ -129,7 +129,7 @@ TEST_F(Usage, TimeoutEndsOfflineWorkToo) {
     EXPECT_EQ(run.json()["error"]["name"], "deadline_exceeded");
 }
 
-TEST_F(Usage, NoServerIsExitCodeFiveAndNamesTheAddress) {
+TEST_F(Usage, UnreachableServerGivesExitCodeFiveAndItsAddress) {
     const std::string file = writePoints("a.xyz", dumbbellPoints());
     const std::vector<std::vector<std::string>> online = {{"health"},
                                                           {"list"},
@@ -142,7 +142,7 @@ TEST_F(Usage, NoServerIsExitCodeFiveAndNamesTheAddress) {
                                                           {"admin", "stats"},
                                                           {"admin", "backup", path("b")}};
     for (auto arguments : online) {
-        // Port 1 of loopback: nobody listens there.
+        // Nobody listens on port 1.
         arguments.insert(arguments.end(), {"--server", "127.0.0.1:1", "--json", "--timeout", "0.2"});
         const CommandRun run = runCommand(arguments);
         EXPECT_EQ(run.exitCode, 5) << arguments[0] << run.err;

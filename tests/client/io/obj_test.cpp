@@ -9,13 +9,13 @@ using Obj = FileTest;
 
 constexpr auto kMalformed = ErrorCode::kMalformedFile;
 
-TEST_F(Obj, PointsAloneAreAScan) {
+TEST_F(Obj, ReadsFilesWithoutFaces) {
     const Scan scan = readGood("a.obj", "v 1 2 3\nv 4 5 6 1.0\nv 7 8 9 0.5 0.5 0.5\np 1 2 3\n");
     EXPECT_EQ(scan.points, (PointCloud{{1, 2, 3}, {4, 5, 6}, {7, 8, 9}}));
     EXPECT_EQ(scan.trianglesInFile, 0U);
 }
 
-TEST_F(Obj, NegativeForwardAndPolygonFaces) {
+TEST_F(Obj, ReadsNegativeForwardAndPolygonFaces) {
     const Scan scan = readGood("a.obj",
                                "f 1/1/1 2/2/2 3/3/3 4/4/4\nv 0 0 0\nv 1 0 0\nv 1 1 0\nf -3 -2 -1\nv 0 1 0\n"
                                "f -4//-1 -3//-1 -2//-1\nf 1 2 \\\n 3 4\nl 1 2\n");
@@ -37,7 +37,7 @@ TEST_F(Obj, SamplesOfANegativeIndexFaceLieOnIt) {
     }
 }
 
-TEST_F(Obj, CommentsBlankLinesCarriageReturnsAndUnknownKeywordsAreTolerated) {
+TEST_F(Obj, ToleratesCommentsBlankLinesAndUnknownKeywords) {
     const Scan scan =
         readGood("a.obj",
                  "\xEF\xBB\xBF# c\r\n\r\ng group\r\nusemtl m\r\nvp 1 2\r\n  v   1\t2 3 # c\r\nv 2 2 2\r\n"

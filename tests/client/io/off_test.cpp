@@ -9,7 +9,7 @@ using Off = FileTest;
 
 constexpr auto kMalformed = ErrorCode::kMalformedFile;
 
-TEST_F(Off, EveryHeaderSpelling) {
+TEST_F(Off, ReadsEveryHeaderSpelling) {
     const std::string body = "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
     for (const std::string start :
          {"OFF\n3 1 3\n", "OFF\n3 1\n", "OFF 3 1 3\n", "OFF3 1 3\n", "3 1 3\n",
@@ -21,7 +21,7 @@ TEST_F(Off, EveryHeaderSpelling) {
     }
 }
 
-TEST_F(Off, ExtraColumnsCommentsAndPolygons) {
+TEST_F(Off, ReadsExtraColumnsCommentsAndPolygons) {
     const Scan scan = readGood("a.off",
                                "COFF\n5 2 0\n0 0 0 255 0 0 255\n1 0 0 0.5 0.5 0.5 1 # red\n\n1 1 0\n0 1 0 7\n"
                                "0.5 2 0\n5 0 1 2 4 3 0.1 0.2 0.3\n# between\n3 0 1 2\n# end\n\n");

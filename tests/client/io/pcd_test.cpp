@@ -22,7 +22,7 @@ std::string xyz(const std::string& width, const std::string& height, const std::
     return header("x y z", "4 4 4", "F F F", "1 1 1", width, height, data);
 }
 
-TEST_F(Pcd, NotANumberPointsOfOrganisedCloudsAreSkippedAndCounted) {
+TEST_F(Pcd, SkipsAndCountsPointsThatAreNotANumber) {
     const Scan text = readGood("a.pcd", xyz("2", "2", "ascii") + "1 2 3\nnan nan nan\n4 5 6\n1 nan 2\n");
     EXPECT_EQ(text.points, (PointCloud{{1, 2, 3}, {4, 5, 6}}));
     EXPECT_EQ(text.skippedNonFinite, 2U);
@@ -42,7 +42,7 @@ TEST_F(Pcd, NotANumberPointsOfOrganisedCloudsAreSkippedAndCounted) {
     EXPECT_EQ(packed.skippedNonFinite, 1U);
 }
 
-TEST_F(Pcd, FieldsOfManyValuesPaddingAndMixedTypes) {
+TEST_F(Pcd, ReadsArrayFieldsPaddingAndMixedTypes) {
     const std::string fields = "_ fpfh z label x y";
     const std::string sizes = "1 4 8 2 4 1";
     const std::string types = "U F F U I I";
@@ -57,13 +57,13 @@ TEST_F(Pcd, FieldsOfManyValuesPaddingAndMixedTypes) {
     row.add(0.5).add(std::uint16_t{9}).add(std::int32_t{-70000}).add(std::int8_t{-7});
     EXPECT_EQ(readGood("b.pcd", header(fields, sizes, types, counts, "1", "1", "binary") + row.str()).points,
               text.points);
-    // With one point the columns are the row; padding may be in compressed data or not.
+    // With a single point, column order equals row order; compressed data may include the padding or not.
     const std::string packed = header(fields, sizes, types, counts, "1", "1", "binary_compressed");
     EXPECT_EQ(readGood("c.pcd", packed + compressedPcdBody(row.str())).points, text.points);
     EXPECT_EQ(readGood("d.pcd", packed + compressedPcdBody(row.str().substr(3))).points, text.points);
 }
 
-TEST_F(Pcd, OlderHeadersNeedNoCountOrSizeAndMayUsePoints) {
+TEST_F(Pcd, ReadsOlderHeadersWithoutSizeAndCount) {
     EXPECT_EQ(
         readGood("a.pcd", "# .PCD v.5\r\nVERSION .5\r\nCOLUMNS x y z\r\nPOINTS 1\r\nDATA ascii\r\n1 2 3\r\n")
             .points,
@@ -111,7 +111,7 @@ TEST_F(Pcd, BodyDefectsNameLineOrByte) {
                 {"byte " + std::to_string(start.size()), "2 points", "room for 1"});
 }
 
-TEST_F(Pcd, DamagedCompressedDataIsRefused) {
+TEST_F(Pcd, RefusesDamagedCompressedData) {
     const std::string start = xyz("2", "1", "binary_compressed");
     const std::string body = compressedPcdBody(std::string(24, '\0'));
     EXPECT_EQ(readGood("good.pcd", start + body).points.size(), 2U);
@@ -121,7 +121,7 @@ TEST_F(Pcd, DamagedCompressedDataIsRefused) {
     std::string damaged = body;
     damaged[8] = '\xff';
     expectError("d.pcd", start + damaged, kMalformed, {"damaged"});
-    // 4 GiB out of six bytes: refused before anything is allocated.
+    // Six bytes that claim 4 GiB: refused before anything is allocated.
     const Bytes lie = Bytes().add(std::uint32_t{6}).add(std::uint32_t{4294967292U}).text("abcdef");
     expectError("e.pcd", xyz("357913941", "1", "binary_compressed") + lie.str(), kMalformed, {"cut short"});
 }

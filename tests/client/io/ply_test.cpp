@@ -20,7 +20,7 @@ std::string binary(const std::string& elements, const std::string& body) {
     return "ply\nformat binary_little_endian 1.0\n" + elements + "end_header\n" + body;
 }
 
-// Every scalar type for a coordinate and for a property in front of it, in both byte orders.
+// Every scalar type, as a coordinate and as a property before it, in both byte orders.
 class PlyScalars : public FileTest {
   protected:
     template <typename T>
@@ -44,7 +44,7 @@ class PlyScalars : public FileTest {
     }
 };
 
-TEST_F(PlyScalars, EveryTypeUnderBothNamesInBothByteOrders) {
+TEST_F(PlyScalars, ReadsEveryTypeUnderBothNamesInBothByteOrders) {
     for (const char* name : {"char", "int8"}) check<std::int8_t>(name);
     for (const char* name : {"uchar", "uint8"}) check<std::uint8_t>(name);
     for (const char* name : {"short", "int16"}) check<std::int16_t>(name);
@@ -61,7 +61,7 @@ TEST_F(Ply, StripsAlternateAndRestart) {
         ascii("element vertex 6\n" + kXyz + "element tristrips 1\nproperty list int int vertex_indices\n",
               "0 0 0\n1 0 0\n0 1 0\n1 1 0\n5 0 0\n5 1 0\n10 0 1 2 3 -1 3 4 4 5 -1\n"));
     EXPECT_EQ(scan.verticesInFile, 6U);
-    // 012, 213 and from the second strip 344 and 445 without area: two remain.
+    // 012 and 213; the second strip gives 344 and 445, which have no area.
     EXPECT_EQ(scan.trianglesInFile, 2U);
 }
 
@@ -76,7 +76,7 @@ TEST_F(Ply, PolygonsBecomeFans) {
     EXPECT_EQ(scan.trianglesInFile, 4U);
 }
 
-TEST_F(Ply, BlankLinesMissingLastLineEndAndPaddingAreTolerated) {
+TEST_F(Ply, ToleratesBlankLinesPaddingAndAMissingLineEnd) {
     EXPECT_EQ(readGood("a.ply", ascii("element vertex 2\n" + kXyz, "\n1 2 3\n\n \t\n4 5 6")).points.size(),
               2U);
     EXPECT_EQ(readGood("b.ply", ascii("element vertex 1\n" + kXyz, "1 2 3\n\n  \n")).points.size(), 1U);
@@ -92,12 +92,12 @@ TEST_F(Ply, ElementsWithoutPropertiesHaveNoBody) {
               1U);
 }
 
-TEST_F(Ply, NoVerticesIsAnEmptyScan) {
+TEST_F(Ply, FileWithoutVerticesIsAnEmptyScan) {
     EXPECT_TRUE(readGood("a.ply", ascii("element vertex 0\n" + kXyz, "")).points.empty());
     EXPECT_TRUE(readGood("b.ply", binary("element vertex 0\n" + kXyz, "")).points.empty());
 }
 
-TEST_F(Ply, ValuesBeyondSinglePrecisionAreLeftToLaterStages) {
+TEST_F(Ply, AcceptsValuesBeyondSinglePrecision) {
     const Scan scan =
         readGood("a.ply", ascii("element vertex 1\nproperty double x\nproperty double y\nproperty double z\n",
                                 "1e300 -1e300 1e-300\n"));

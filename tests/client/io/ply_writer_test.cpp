@@ -30,7 +30,7 @@ std::size_t entries(const std::string& folder) {
     return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder), {}));
 }
 
-// Coordinates that single precision holds exactly.
+// Exact in single precision.
 PointCloud randomPoints(std::size_t count) {
     Random random(5);
     const auto coordinate = [&] { return static_cast<double>(random.below(1 << 24)) / 4096.0 - 2048.0; };
@@ -39,7 +39,7 @@ PointCloud randomPoints(std::size_t count) {
     return points;
 }
 
-TEST_F(PlyWriter, BytesOfALabelledFile) {
+TEST_F(PlyWriter, LabelledFileHasTheseBytes) {
     ASSERT_TRUE(writeLabelledPly(path("a.ply"), {{1, 2, 3}, {-1, 0, 0.5}}, {2, -1}));
     Bytes expected;
     expected.text(
@@ -52,7 +52,7 @@ TEST_F(PlyWriter, BytesOfALabelledFile) {
     EXPECT_EQ(entries(folder()), 1U);
 }
 
-TEST_F(PlyWriter, WhatIsWrittenIsReadBack) {
+TEST_F(PlyWriter, WrittenPointsAreReadBack) {
     const PointCloud points = randomPoints(200000);
     ASSERT_TRUE(writePointsPly(path("a.ply"), points));
     ASSERT_TRUE(writeLabelledPly(path("b.ply"), points, std::vector<std::int32_t>(points.size(), 3)));
@@ -71,7 +71,7 @@ TEST_F(PlyWriter, ReplacesFilesAndFollowsLinks) {
     EXPECT_EQ(entries(folder()), 2U);
 }
 
-TEST_F(PlyWriter, AFullDeviceIsAnError) {
+TEST_F(PlyWriter, FullDeviceIsAnError) {
     ASSERT_TRUE(fs::is_character_file("/dev/full"));
     for (const std::size_t count : {std::size_t{1}, std::size_t{300000}}) {
         const auto done = writePointsPly("/dev/full", PointCloud(count));
@@ -82,7 +82,7 @@ TEST_F(PlyWriter, AFullDeviceIsAnError) {
     EXPECT_TRUE(fs::is_character_file("/dev/full"));
 }
 
-TEST_F(PlyWriter, UnwritablePlacesAreNamedAndLeaveNothing) {
+TEST_F(PlyWriter, UnwritablePathsAreNamedAndLeaveNoFile) {
     for (const std::string& place : {path("no/such/folder/a.ply"), folder(), std::string()}) {
         const auto done = writePointsPly(place, {{1, 2, 3}});
         ASSERT_FALSE(done) << place;
@@ -92,7 +92,7 @@ TEST_F(PlyWriter, UnwritablePlacesAreNamedAndLeaveNothing) {
     EXPECT_EQ(entries(folder()), 0U);
 }
 
-TEST_F(PlyWriter, BadValuesLeaveTheOldFileAsItWas) {
+TEST_F(PlyWriter, BadValuesLeaveTheOldFile) {
     write("a.ply", "old");
     const auto expectRefused = [&](const PointCloud& points, const std::vector<std::int32_t>& labels,
                                    ErrorCode code) {
@@ -109,7 +109,7 @@ TEST_F(PlyWriter, BadValuesLeaveTheOldFileAsItWas) {
         writePointsPly(path("a.ply"), {{static_cast<double>(std::numeric_limits<float>::max()), 0, 0}}));
 }
 
-TEST(SegmentColour, DistinctStableAndNeverTheGreyOfNoSegment) {
+TEST(SegmentColour, ColoursAreDistinctStableAndNeverGrey) {
     const auto distance = [](const Rgb& a, const Rgb& b) {
         return std::hypot(a.red - b.red, a.green - b.green, a.blue - b.blue);
     };

@@ -1,5 +1,5 @@
-// Files that are cut, damaged or lie: whatever the bytes, a value or an error comes back, and
-// memory follows the bytes that are there, not the numbers a header announces.
+// Truncated, damaged and false files: any bytes give a value or an error, and memory grows with the bytes
+// that are there, not with what a header announces.
 #include <atomic>
 #include <cmath>
 #include <cstdlib>
@@ -36,7 +36,7 @@ namespace {
 
 using Robustness = FileTest;
 
-// The read buffer is 1 MiB; nothing else may be larger for files of a few hundred bytes.
+// The read buffer is 1 MiB; for files of a few hundred bytes nothing else may be larger.
 constexpr std::size_t kMostForASmallFile = std::size_t{2} << 20;
 
 void expectSaneResult(const Result<Scan>& scan, const std::string& name, std::size_t bytes) {
@@ -71,7 +71,7 @@ TEST_F(Robustness, BinaryAndCountedFilesNeverPassWhenCut) {
     for (const SampleFile& file : sampleFiles()) {
         const bool noCount = file.name == "plain.xyz" || file.name == "crlf.txt" || file.name == "plain.obj";
         if (noCount) continue;
-        // A cut inside the last number or line end of a text file cannot be seen.
+        // A cut inside the last number or line end of a text file cannot be detected.
         const std::size_t lastLine = file.bytes.find_last_of('\n', file.bytes.size() - 3);
         const bool text = file.bytes.back() == '\n';
         const std::size_t end = text ? lastLine : file.bytes.size();
@@ -82,7 +82,7 @@ TEST_F(Robustness, BinaryAndCountedFilesNeverPassWhenCut) {
     }
 }
 
-TEST_F(Robustness, RandomDamageNeverHarms) {
+TEST_F(Robustness, RandomDamageNeverCrashes) {
     Random random(20240607);
     const std::vector<SampleFile> files = sampleFiles();
     for (int round = 0; round < 6000; ++round) {
@@ -90,7 +90,7 @@ TEST_F(Robustness, RandomDamageNeverHarms) {
         std::string bytes = file.bytes;
         for (std::uint64_t i = 0, flips = 1 + random.below(4); i < flips; ++i) {
             char& byte = bytes[random.below(bytes.size())];
-            // Digits make lying numbers, blanks make missing ones, anything makes anything.
+            // Digits give wrong numbers, blanks missing ones, random bytes everything else.
             switch (random.below(4)) {
                 case 0: byte = static_cast<char>('0' + random.below(10)); break;
                 case 1: byte = " \n-.e#/"[random.below(7)]; break;
@@ -109,7 +109,7 @@ TEST_F(Robustness, RandomDamageNeverHarms) {
     }
 }
 
-TEST_F(Robustness, LyingHeadersAllocateNothing) {
+TEST_F(Robustness, FalseHeadersAllocateNothing) {
     const std::string xyz = "property float x\nproperty float y\nproperty float z\n";
     const std::string tenPoints = std::string(120, '\1');
     std::string tenLines;
@@ -151,7 +151,7 @@ TEST_F(Robustness, LyingHeadersAllocateNothing) {
     }
 }
 
-TEST_F(Robustness, LiesThroughAPipeOfUnknownLengthAllocateNothingEither) {
+TEST_F(Robustness, FalseHeadersFromPipesAllocateNothing) {
     const std::string bytes =
         "ply\nformat binary_little_endian 1.0\nelement vertex 1000000000\nproperty float x\nproperty float "
         "y\n"

@@ -23,7 +23,7 @@ using ScanReader = FileTest;
 using ScanFiles = FileTest;
 using SharedData = FileTest;
 
-// A flat square grid of cells x cells squares with side 1, as OFF; its area is 1.
+// The unit square, divided into cells x cells squares, as OFF.
 std::string grid(std::size_t cells) {
     const std::size_t side = cells + 1;
     std::string text = "OFF\n" + std::to_string(side * side) + " " + std::to_string(cells * cells) + " 0\n";
@@ -49,7 +49,7 @@ TEST_F(ScanReader, EveryFormatGivesTheSamePoints) {
         PointCloud expected = sampleVertices();
         expected.resize(file.vertices);
         PointCloud points = scan.points;
-        // STL has no order of its own.
+        // STL has no vertex order.
         std::sort(points.begin(), points.end(), lexicographicLess);
         std::sort(expected.begin(), expected.end(), lexicographicLess);
         EXPECT_EQ(points, expected) << file.name;
@@ -59,7 +59,7 @@ TEST_F(ScanReader, EveryFormatGivesTheSamePoints) {
     }
 }
 
-TEST_F(ScanReader, MeshesAreSampledUniformlyByAreaWithASeed) {
+TEST_F(ScanReader, SamplesMeshesUniformlyByAreaWithASeed) {
     const std::string file = write("square.off", grid(3));
     ReadOptions options;
     options.meshSamples = 5000;
@@ -69,7 +69,7 @@ TEST_F(ScanReader, MeshesAreSampledUniformlyByAreaWithASeed) {
     EXPECT_EQ(scan->verticesInFile, 16U);
     EXPECT_EQ(scan->trianglesInFile, 18U);
     ASSERT_EQ(scan->points.size(), 5000U);
-    // Every quarter of the square gets a quarter of the points, within five standard deviations.
+    // A quarter of the points in every quarter of the square, within five standard deviations.
     for (const double x : {0.0, 0.5}) {
         for (const double y : {0.0, 0.5}) {
             const auto count = std::count_if(scan->points.begin(), scan->points.end(), [&](const Point3& p) {
@@ -103,7 +103,7 @@ TEST_F(ScanReader, AutoTakesVerticesThatAreDenserThanSamples) {
     EXPECT_FALSE(readScan(file, options)->sampledFromMesh);
 }
 
-TEST_F(ScanReader, AutoSamplesManyVerticesThatLeaveLargeFacesBare) {
+TEST_F(ScanReader, AutoSamplesMeshesWithLargeFaces) {
     // The dense square and one large triangle: more vertices than samples, but not everywhere.
     std::string text = grid(40);
     text.replace(0, text.find('\n', 4), "OFF\n1684 1601 0");
@@ -117,7 +117,7 @@ TEST_F(ScanReader, AutoSamplesManyVerticesThatLeaveLargeFacesBare) {
     EXPECT_TRUE(scan->sampledFromMesh);
 }
 
-TEST_F(ScanReader, AutoTakesVerticesOfACloudWithAFewFacesAndOfFacesWithoutArea) {
+TEST_F(ScanReader, AutoTakesVerticesOfCloudsWithFewOrFlatFaces) {
     auto scan = readScan(
         write("few.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 2 2 2\nv 3 3 3\nv 4 4 4\nv 5 5 5\nf 1 2 3\n"));
     ASSERT_TRUE(scan);
@@ -164,7 +164,7 @@ TEST_F(ScanReader, PointLimitHoldsInEveryFormat) {
     EXPECT_EQ(readScan(path("plain.off"), options).error().code, ErrorCode::kPointLimitExceeded);
 }
 
-TEST_F(ScanReader, UnreadableAndUnknownFilesAreNamed) {
+TEST_F(ScanReader, ErrorsNameUnreadableAndUnknownFiles) {
     auto scan = readScan(path("missing.ply"));
     ASSERT_FALSE(scan);
     EXPECT_EQ(scan.error().code, ErrorCode::kFileNotReadable);
@@ -174,7 +174,7 @@ TEST_F(ScanReader, UnreadableAndUnknownFilesAreNamed) {
     ASSERT_FALSE(scan);
     EXPECT_EQ(scan.error().code, ErrorCode::kFileNotReadable);
     EXPECT_NE(scan.error().message.find("folder"), std::string::npos);
-    if (::geteuid() != 0) {  // nothing is unreadable for root
+    if (::geteuid() != 0) {  // root can read everything
         ::chmod(write("secret.ply", "ply\n").c_str(), 0);
         EXPECT_EQ(readScan(path("secret.ply")).error().code, ErrorCode::kFileNotReadable);
     }
@@ -188,7 +188,7 @@ TEST_F(ScanReader, UnreadableAndUnknownFilesAreNamed) {
     }
 }
 
-TEST_F(ScanReader, PipesAreRead) {
+TEST_F(ScanReader, ReadsPipes) {
     for (const SampleFile& file : sampleFiles()) {
         const std::string pipe = path("pipe-" + file.name);
         ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
@@ -202,7 +202,7 @@ TEST_F(ScanReader, PipesAreRead) {
     }
 }
 
-TEST_F(ScanReader, CancelAndProgress) {
+TEST_F(ScanReader, ReportsProgressAndCanBeCancelled) {
     std::string text;
     for (int i = 0; i < 300000; ++i) text += "1.5 2.5 3.5\n";
     const std::string file = write("long.xyz", text);
@@ -227,7 +227,7 @@ TEST_F(ScanReader, CancelAndProgress) {
     EXPECT_EQ(readScan(file, {}, context).error().code, ErrorCode::kDeadlineExceeded);
 }
 
-TEST_F(ScanFiles, FoldersAreSearchedAndLabelledByFolder) {
+TEST_F(ScanFiles, SearchesFoldersAndLabelsByFolder) {
     write("scans/hand/b.ply", "");
     write("scans/hand/A.PCD", "");
     write("scans/cup/deep/c.off", "");
@@ -248,7 +248,7 @@ TEST_F(ScanFiles, FoldersAreSearchedAndLabelledByFolder) {
                                                                      {"scans/hand/b.ply", "hand"}}));
 }
 
-TEST_F(ScanFiles, BadPathsAreNamed) {
+TEST_F(ScanFiles, ErrorsNameBadPaths) {
     EXPECT_EQ(listScanFiles({path("missing")}).error().code, ErrorCode::kFileNotReadable);
     const auto unknown = listScanFiles({write("a.las", "")});
     ASSERT_FALSE(unknown);
@@ -261,7 +261,7 @@ TEST_F(ScanFiles, BadPathsAreNamed) {
     EXPECT_TRUE(listScanFiles({})->empty());
 }
 
-TEST_F(SharedData, PublicScansAndMeshesHaveTheirKnownCounts) {
+TEST_F(SharedData, PublicScansHaveTheirKnownCounts) {
     const char* data = std::getenv("SHAPEDB_DATA");
     if (data == nullptr) {
         std::cout << "SHAPEDB_DATA is not set: public scans are not read\n";

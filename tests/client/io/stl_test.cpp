@@ -26,7 +26,7 @@ std::string triangle(float z) {
     return bytes.add(std::uint16_t{0xabcd}).str();
 }
 
-TEST_F(Stl, EqualCornersAreOneVertex) {
+TEST_F(Stl, MergesEqualCorners) {
     const Scan scan = readGood("a.stl", "solid\n" + facet("0 0 0", "1 0 0", "0 1 0") +
                                             facet("-0 0 0", "0 1 0", "0 0 1") + "endsolid\n");
     EXPECT_EQ(scan.verticesInFile, 4U);
@@ -34,22 +34,22 @@ TEST_F(Stl, EqualCornersAreOneVertex) {
     EXPECT_EQ(scan.format, "STL ASCII");
 }
 
-TEST_F(Stl, SeveralSolidsAndAnyCase) {
+TEST_F(Stl, ReadsSeveralSolidsInAnyCase) {
     const Scan scan = readGood("a.stl", "\n SOLID one two\n" + facet("0 0 0", "1 0 0", "0 1 0") +
                                             "ENDSOLID one two\r\n\r\nsolid\r\n" +
                                             facet("5 0 0", "6 0 0", "5 1 0") + "EndSolid");
     EXPECT_EQ(scan.trianglesInFile, 2U);
 }
 
-TEST_F(Stl, BinaryFilesThatSaySolidAreBinary) {
+TEST_F(Stl, ReadsBinaryFilesThatStartWithSolid) {
     EXPECT_EQ(readGood("a.stl", binary(2, triangle(0) + triangle(1), "solid exported by a test")).format,
               "STL binary");
-    // Size wrong, but no text has zero bytes: still read, and refused, as binary.
+    // The size is wrong, but text has no zero bytes: read as binary, and refused.
     expectError("b.stl", binary(3, triangle(0) + triangle(1), "solid exported"), kMalformed,
                 {"byte 80", "3 triangles", "room for 2"});
 }
 
-TEST_F(Stl, BinaryDefects) {
+TEST_F(Stl, BinaryDefectsNameTheByte) {
     expectError("empty.stl", "", kMalformed, {"84 bytes"});
     expectError("a.stl", std::string(83, '\0'), kMalformed, {"found 83"});
     expectError("b.stl", binary(4000000000U, triangle(0)), kMalformed, {"4000000000", "room for 1"});

@@ -31,14 +31,14 @@ TEST(Text, ReadsNumbersInEverySpelling) {
     EXPECT_TRUE(std::isinf(real("inf")));
 }
 
-TEST(Text, RefusesWhatIsNotWhollyANumber) {
+TEST(Text, RefusesWordsThatAreNotNumbers) {
     double value = 0.0;
     for (const char* word : {"", "+", "-", "+-1", "1,5", "1.5x", "abc", "0x10", "1e", "--1", ".", "e5"}) {
         EXPECT_FALSE(parseReal(word, value)) << word;
     }
 }
 
-TEST(Text, MagnitudesOutsideOfDoubleBecomeInfiniteOrZero) {
+TEST(Text, NumbersBeyondDoubleBecomeInfiniteOrZero) {
     const std::string zeros(400, '0');
     EXPECT_TRUE(std::isinf(real("1e999")));
     EXPECT_TRUE(std::isinf(real("-1e999")));
@@ -80,7 +80,7 @@ TEST(Text, QuotesOnlyPrintableAndShortText) {
     EXPECT_EQ(inQuotes(std::string(100, 'a')), "'" + std::string(40, 'a') + "...'");
 }
 
-TEST(Text, WordsArePartedByAnyBlanks) {
+TEST(Text, AnyBlanksSeparateWords) {
     std::string_view rest = " \t a bc\v\fd ";
     EXPECT_EQ(nextWord(rest), "a");
     EXPECT_EQ(nextWord(rest), "bc");

@@ -23,13 +23,13 @@ TEST_F(Xyz, EverySeparatorGivesTheSamePoints) {
     }
 }
 
-TEST_F(Xyz, EveryEndingIsRead) {
+TEST_F(Xyz, ReadsEveryEnding) {
     for (const std::string ending : {".xyz", ".txt", ".pts", ".asc", ".XYZ"}) {
         EXPECT_EQ(readGood("a" + ending, "1 2 3\n").format, "XYZ text");
     }
 }
 
-TEST_F(Xyz, DecimalCommasAreRefusedRatherThanMisread) {
+TEST_F(Xyz, RefusesDecimalCommas) {
     for (const std::string text : {"1,5 2,5 3,5\n", "1,5;2,5;3,5\n", "1,5\t2,5\t3,5\n", "1,5; 2,5; 3,5\n"}) {
         expectError("a.xyz", "0 0 0\n" + text, kMalformed, {"line 2", "commas inside numbers"});
     }

@@ -1,5 +1,3 @@
-#include "core/geometry/neighbours.h"
-
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -11,6 +9,7 @@
 
 #include "core/base/random.h"
 #include "core/delaunay/hilbert_order.h"
+#include "core/geometry/neighbours.h"
 #include "tests/core/segmentation/small_clouds.h"
 
 namespace shapedb {

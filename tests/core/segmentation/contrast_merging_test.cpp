@@ -35,8 +35,7 @@ std::size_t countOf(const std::vector<std::uint32_t>& groups) {
 // Segments in a row; the saddle radius of two neighbours is given between their radii.
 SegmentGraph row(const std::vector<double>& radii, const std::vector<double>& saddles) {
     SegmentGraph graph{std::vector<double>(radii.size(), 1.0), radii, {}};
-    for (std::uint32_t i = 0; i < saddles.size(); ++i)
-        graph.contacts.push_back({i, i + 1, saddles[i], 1.0});
+    for (std::uint32_t i = 0; i < saddles.size(); ++i) graph.contacts.push_back({i, i + 1, saddles[i], 1.0});
     return graph;
 }
 

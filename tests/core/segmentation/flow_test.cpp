@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "core/geometry/tetrahedron.h"
-#include "tests/core/segmentation/small_clouds.h"
+#include "tests/core/segmentation/exact_balls.h"
 
 namespace shapedb {
 namespace {

@@ -10,7 +10,7 @@
 #include "core/base/math.h"
 #include "core/base/random.h"
 #include "core/geometry/neighbours.h"
-#include "tests/core/segmentation/small_clouds.h"
+#include "tests/core/segmentation/exact_balls.h"
 
 namespace shapedb {
 namespace {
@@ -56,21 +56,23 @@ std::vector<std::uint8_t> referenceInterior(const Triangulated& cloud, const Bal
                                             const std::vector<std::uint8_t>& big, double deep, double hull) {
     const auto& neighbours = cloud.tetrahedra.neighbours;
     std::vector<std::uint8_t> outside(big.size(), 0);
-    for (std::size_t t = 0; t < big.size(); ++t) {
-        for (std::size_t i = 0; i < 4; ++i) {
-            if (big[t] && neighbours[t][i] == kNoTetrahedron && opens(cloud, balls, t, i, hull))
+    std::vector<std::uint32_t> reached;
+    for (std::uint32_t t = 0; t < big.size(); ++t) {
+        for (std::size_t i = 0; i < 4 && !outside[t]; ++i) {
+            if (big[t] && neighbours[t][i] == kNoTetrahedron && opens(cloud, balls, t, i, hull)) {
                 outside[t] = 1;
+                reached.push_back(t);
+            }
         }
     }
-    for (bool changed = true; changed;) {
-        changed = false;
-        for (std::size_t t = 0; t < big.size(); ++t) {
-            for (const std::uint32_t next : neighbours[t]) {
-                if (!outside[t] || next == kNoTetrahedron || outside[next] || !big[next]) continue;
-                if (lawOfCosines(balls, t, next) >= deep) continue;
-                outside[next] = 1;
-                changed = true;
-            }
+    while (!reached.empty()) {
+        const std::uint32_t t = reached.back();
+        reached.pop_back();
+        for (const std::uint32_t next : neighbours[t]) {
+            if (next == kNoTetrahedron || outside[next] || !big[next]) continue;
+            if (lawOfCosines(balls, t, next) >= deep) continue;
+            outside[next] = 1;
+            reached.push_back(next);
         }
     }
     std::vector<std::uint8_t> inside(big.size());

@@ -15,7 +15,7 @@
 #include "core/geometry/neighbours.h"
 #include "core/segmentation/flow.h"
 #include "core/segmentation/interior.h"
-#include "tests/core/segmentation/small_clouds.h"
+#include "tests/core/segmentation/exact_balls.h"
 
 namespace shapedb {
 namespace {

@@ -105,7 +105,7 @@ TEST(AttributesInvariance, MotionsChangeStatisticsFarLessThanAnotherShape) {
         }
     }
     Random random(21);
-    constexpr int kTurns = 4;
+    constexpr int kTurns = 3;
     for (std::size_t i = 0; i < all.size(); ++i) {
         for (int turn = 0; turn < kTurns; ++turn) {
             const Motion motion = anyMotion(random, turn, kTurns);

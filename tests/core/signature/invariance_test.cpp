@@ -102,10 +102,10 @@ void expectInvariantWhenTurned(const NamedShape& shape, std::size_t count) {
 }
 
 TEST(SignatureInvariance, DumbbellUnderTenMotions) {
-    expectInvariant(makeDumbbell(), 8000, sample(makeDumbbell(), 8000));
+    expectInvariant(makeDumbbell(), 5000, sample(makeDumbbell(), 5000));
 }
 TEST(SignatureInvariance, JackUnderTenMotions) {
-    expectInvariant(makeJack(), 8000, sample(makeJack(), 8000));
+    expectInvariant(makeJack(), 5000, sample(makeJack(), 5000));
 }
 TEST(SignatureInvariance, LShapeUnderTenMotions) { expectInvariantWhenTurned(makeLShape(), 2000); }
 TEST(SignatureInvariance, BoxUnderTenMotions) { expectInvariantWhenTurned(makeBox(), 2000); }

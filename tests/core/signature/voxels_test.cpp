@@ -111,12 +111,12 @@ TEST(Voxels, MeasureTheFractionOfALineInside) {
     Random random(4);
     double worst = 0.0;
     double sum = 0.0;
-    constexpr int kLines = 300;
+    constexpr int kLines = 150;
     for (int n = 0; n < kLines; ++n) {
         const Point3 a = randomPointIn(view, random.below(view.vertices.size()), random);
         const Point3 b = randomPointIn(view, random.below(view.vertices.size()), random);
         int found = 0;
-        constexpr int kSteps = 100;
+        constexpr int kSteps = 50;
         for (int s = 0; s < kSteps; ++s)
             found += depth(view, a + ((s + 0.5) / kSteps) * (b - a)) > 0.0 ? 1 : 0;
         const double error = std::abs(voxels.shareInside(a, b) - found / static_cast<double>(kSteps));

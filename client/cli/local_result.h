@@ -1,0 +1,18 @@
+// What the command computes itself, in the form the server answers in, so that both are shown alike.
+#pragma once
+
+#include "client/api/types.h"
+
+namespace shapedb {
+struct Explanation;
+struct Segmentation;
+struct Signature;
+}  // namespace shapedb
+
+namespace shapedb::cli {
+
+[[nodiscard]] client::Signature toClient(const Signature& signature);
+[[nodiscard]] client::Explanation toClient(const Explanation& explanation);
+[[nodiscard]] client::SegmentationReport toClient(const Segmentation& segmentation);
+
+}  // namespace shapedb::cli

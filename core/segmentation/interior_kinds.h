@@ -1,0 +1,50 @@
+// How an interior may be found, and where one came from. Apart from the rest of core/segmentation because
+// the client library and the wire use these two as well.
+#pragma once
+
+#include <optional>
+#include <string>
+
+namespace shapedb {
+
+/// How the interior of a shape is told from its outside. The names are persisted.
+enum class InteriorMethod : int {
+    kWalk = 0,      ///< the paper's walk with one fixed angle; finding nothing inside is an error
+    kAdaptive = 1,  ///< chosen from the shape itself; always gives an interior, and its quality
+};
+
+/// Where an interior came from.
+enum class InteriorSource : int {
+    kWalk = 0,       ///< walking in from outside, at the angle reported
+    kPotential = 1,  ///< the potential: a walk would leak in, or be shut out of a cavity
+    kThickened = 2,  ///< no side can be told: all tetrahedra close to the points
+};
+
+/// "walk" or "adaptive".
+[[nodiscard]] inline const char* interiorMethodName(InteriorMethod method) noexcept {
+    switch (method) {
+        case InteriorMethod::kWalk: return "walk";
+        case InteriorMethod::kAdaptive: return "adaptive";
+    }
+    return "walk";
+}
+
+/// Empty for any other name.
+[[nodiscard]] inline std::optional<InteriorMethod> interiorMethodFromName(const std::string& name) {
+    for (const InteriorMethod method : {InteriorMethod::kWalk, InteriorMethod::kAdaptive}) {
+        if (name == interiorMethodName(method)) return method;
+    }
+    return std::nullopt;
+}
+
+/// "walk", "potential" or "thickened".
+[[nodiscard]] inline const char* interiorSourceName(InteriorSource source) noexcept {
+    switch (source) {
+        case InteriorSource::kWalk: return "walk";
+        case InteriorSource::kPotential: return "potential";
+        case InteriorSource::kThickened: return "thickened";
+    }
+    return "walk";
+}
+
+}  // namespace shapedb
