@@ -1,3 +1,5 @@
+#include "core/geometry/neighbours.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,7 +13,6 @@
 #include "core/base/parallel.h"
 #include "core/base/return_if_error.h"
 #include "core/geometry/box.h"
-#include "core/geometry/neighbours.h"
 
 namespace shapedb {
 
