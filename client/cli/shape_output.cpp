@@ -169,7 +169,9 @@ std::string preparationText(const client::SegmentationReport& report) {
         steps.emplace_back("the rest averaged and thinned");
         if (steps.size() == 1) steps = {"averaged and thinned"};
     }
-    return formatCount(report.pointsUsed, "point", "points") + " used: " + joined(steps) + "\n";
+    std::string text = formatCount(report.pointsUsed, "point", "points") + " used: ";
+    for (std::size_t i = 0; i < steps.size(); ++i) text += (i > 0 ? ", " : "") + steps[i];
+    return text + "\n";
 }
 
 std::string qualityText(double quality) {

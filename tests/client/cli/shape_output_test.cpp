@@ -124,7 +124,7 @@ TEST(ShapeOutput, PreparationTextAccountsForUnusedPoints) {
     report.duplicates = 1;
     report.pointsUsed = 500;
     EXPECT_EQ(preparationText(report),
-              "500 points used: 10 outliers dropped, 1 duplicate merged and the rest averaged and thinned\n");
+              "500 points used: 10 outliers dropped, 1 duplicate merged, the rest averaged and thinned\n");
     report.outliers = report.duplicates = 0;
     EXPECT_EQ(preparationText(report), "500 points used: averaged and thinned\n");
     report.duplicates = 500;
