@@ -193,7 +193,8 @@ std::string interiorText(const client::SegmentationReport& report, double scale)
             break;
     }
     if (report.noise > 0.0 && scale > 0.0) {
-        text += ", noise about " + formatPercent(report.noise / scale) + " of the size";
+        const std::string noise = "noise about " + formatPercent(report.noise / scale) + " of the size";
+        text += report.interiorSource == InteriorSource::kWalk ? ", " + noise : " (" + noise + ")";
     }
     return text + "\n" + qualityText(report.quality);
 }

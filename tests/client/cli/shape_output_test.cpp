@@ -162,6 +162,9 @@ TEST(ShapeOutput, InteriorTextNamesSourceNoiseAndQuality) {
               "interior found by walking in from outside (22 degrees), noise about 0.1 % of the size\n"
               "interior quality 0.75 of 1\n");
     report.interiorSource = InteriorSource::kPotential;
+    EXPECT_EQ(interiorText(report, 10.0)
+                  .rfind("interior estimated: the scan is open or noisy (noise about 0.1 %", 0),
+              0u);
     report.noise = 0.0;
     EXPECT_EQ(interiorText(report, 10.0),
               "interior estimated: the scan is open or noisy\ninterior quality 0.75 of 1\n");
