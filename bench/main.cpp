@@ -10,7 +10,7 @@
 
 namespace {
 
-// The one thing a signal handler may touch.
+// All that a signal handler may touch.
 std::atomic<bool> interrupted{false};
 static_assert(std::atomic<bool>::is_always_lock_free);
 

@@ -26,7 +26,7 @@ constexpr std::chrono::minutes kStartTime{10};
 constexpr std::size_t kLogTail = 2'000;
 constexpr const char* kBanner = "listening on ";
 
-/// Without our variables: the flags alone decide.
+/// Without our environment variables, so that only the flags count.
 std::vector<std::string> plainEnvironment() {
     std::vector<std::string> all;
     for (char** entry = environ; *entry != nullptr; ++entry) {
