@@ -63,6 +63,8 @@ long=$(awk '$1 > 500 { print $2 " (" $1 " lines)" }' <<< "$lengths")
 unfinished=$(git grep -nE 'TODO|FIXME|\bXXX\b|DISABLED_' -- '*.cpp' '*.h')
 [ -z "$unfinished" ] || complain "unfinished:"$'\n'"$unfinished"
 
+python3 scripts/constants.py || complain "docs/constants.md does not list the constants of core/ as they are"
+
 # Not an error: many small files are harder to read than a few.
 short=$(awk '$1 < 40 { n++ } END { printf "%d of %d sources are shorter than 40 lines", n, NR }' <<< "$lengths")
 [ "$failed" -eq 0 ] && echo "lint: clean ($short)"
