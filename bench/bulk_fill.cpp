@@ -9,7 +9,9 @@
 #include "server/store/sqlite/rows.h"
 #include "server/store/sqlite/sql.h"
 
-namespace shapedb::store {
+namespace shapedb::bench {
+
+using namespace store;
 
 namespace {
 
@@ -67,4 +69,4 @@ Result<void> fillDatabase(const SqliteOptions& options, const std::string& colle
     return (*store)->checkpoint();
 }
 
-}  // namespace shapedb::store
+}  // namespace shapedb::bench

@@ -9,7 +9,7 @@
 #include "core/base/run_context.h"
 #include "server/store/sqlite/sqlite_store.h"
 
-namespace shapedb::store {
+namespace shapedb::bench {
 
 struct FillShape {
     std::string key;  ///< unique
@@ -24,9 +24,9 @@ struct FillShape {
 ///
 /// Errors: those of openSqliteStore; kAlreadyExists (collection, or a key); kCancelled,
 /// kDeadlineExceeded. Not thread-safe.
-[[nodiscard]] Result<void> fillDatabase(const SqliteOptions& options, const std::string& collection,
+[[nodiscard]] Result<void> fillDatabase(const store::SqliteOptions& options, const std::string& collection,
                                         const std::string& parameters, std::uint64_t count,
                                         const std::function<FillShape(std::uint64_t)>& make,
                                         const RunContext& context = {});
 
-}  // namespace shapedb::store
+}  // namespace shapedb::bench

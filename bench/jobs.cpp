@@ -10,7 +10,6 @@
 #include "bench/stored_shapes.h"
 #include "client/io/ply_writer.h"
 #include "client/io/scan_reader.h"
-#include "common/sha256.h"
 #include "core/base/return_if_error.h"
 #include "core/matching/score.h"
 #include "core/pipeline.h"
@@ -125,12 +124,12 @@ Result<Work> topKJob(const JobFolder& folder) {
 /// One shape's way through the store.
 Result<void> storeOne(store::Store& store, std::int64_t collection, const std::string& key,
                       const std::vector<float>& points, const std::string& signature) {
-    store::PutRequest put;
+    auto scan = store::VerifiedScan::verify(points);
+    RETURN_IF_ERROR(scan);
+    store::PutRequest put(std::move(*scan));
     put.collectionId = collection;
     put.key = key;
     put.metadata = {{"family", "mug"}};
-    put.points = &points;
-    put.checksum = sha256(points.data(), points.size() * sizeof(float));
     const auto stored = store.putShape(put);
     RETURN_IF_ERROR(stored);
     const auto job = store.claimJob();

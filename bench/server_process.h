@@ -3,10 +3,10 @@
 
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include <sys/types.h>
-
+#include "common/child_process.h"
 #include "core/base/error.h"
 
 namespace shapedb::bench {
@@ -41,11 +41,8 @@ class ServerProcess {
     /// (it ended, or does not listen within ten minutes; the message has the end of its log).
     [[nodiscard]] static Result<ServerProcess> start(const std::string& program, const std::string& data,
                                                      const std::vector<std::string>& flags);
-    ~ServerProcess();
-    ServerProcess(ServerProcess&& other) noexcept;
-    ServerProcess& operator=(ServerProcess&&) = delete;
 
-    [[nodiscard]] const std::string& address() const { return address_; }
+    [[nodiscard]] const std::string& address() const { return server_.address(); }
     /// Errors: kUnavailable: it is gone.
     [[nodiscard]] Result<MemoryUse> memory() const;
     /// The peak counts from now on. False where the system does not allow it.
@@ -54,12 +51,9 @@ class ServerProcess {
     [[nodiscard]] Result<double> processorSeconds() const;
 
   private:
-    ServerProcess() = default;
-    Result<void> awaitAddress(const std::string& log);
+    explicit ServerProcess(ShapedbdProcess server) : server_(std::move(server)) {}
 
-    pid_t process_ = -1;
-    int output_ = -1;
-    std::string address_;
+    ShapedbdProcess server_;
 };
 
 }  // namespace shapedb::bench

@@ -74,12 +74,12 @@ Result<void> fillDataDirectory(const std::string& data, const SignatureGenerator
     std::filesystem::create_directories(data, error);
     store::SqliteOptions options;
     options.path = data + "/shapedb.sqlite";
-    return store::fillDatabase(
-        options, "default", index::encodeParameters(parametersOf(Profile::kDefault)), count,
+    return fillDatabase(
+        options, "default", store::encodeParameters(parametersOf(Profile::kDefault)), count,
         [&](std::uint64_t i) {
-            return store::FillShape{"shape-" + std::to_string(i),
-                                    {{"label", "class-" + std::to_string(generator.classOf(i))}},
-                                    encodeSignature(generator.make(i))};
+            return FillShape{"shape-" + std::to_string(i),
+                             {{"label", "class-" + std::to_string(generator.classOf(i))}},
+                             encodeSignature(generator.make(i))};
         },
         context);
 }

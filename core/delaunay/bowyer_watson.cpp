@@ -1,4 +1,4 @@
-// Inserting a site p takes five steps. The first two only read; if one of them fails, nothing has changed.
+// Inserting a site p takes five steps. If one of the first three fails, nothing has changed.
 //
 //   1. locate:       walk to a cell that contains p, or sees it from outside the hull.
 //   2. findCavity:   from there, collect all cells in conflict with p: those whose balls contain p. They are
@@ -170,10 +170,14 @@ bool BowyerWatson::hasVertexAt(std::uint32_t cell, const Site& p) const {
 
 // ---- Step 2: the cavity ----------------------------------------------------------------------------------
 
-// Post: room for the four cells and facets that one cell of the cavity can add.
+// Whether there is room for the four cells and facets that one cell of the cavity can add.
+bool BowyerWatson::listsHaveRoom() const {
+    return cavityCount_ + 4 <= cavity_.size() && facetCount_ + 4 <= facets_.size();
+}
+
 void BowyerWatson::growLists() {
-    if (cavityCount_ + 4 > cavity_.size()) cavity_.resize(2 * cavity_.size());
-    if (facetCount_ + 4 > facets_.size()) facets_.resize(2 * facets_.size());
+    cavity_.resize(2 * cavity_.size());
+    facets_.resize(2 * facets_.size());
 }
 
 // Breadth-first search over the cells in conflict with p.
@@ -200,7 +204,7 @@ bool BowyerWatson::findCavity(std::uint32_t first, const Site& p) {
     cells_[first].vertices[0] |= kInCavity;
     prefetchNeighbours(cells_, first);
     for (std::size_t k = 0; k < cavityCount_; ++k) {
-        growLists();
+        if (!listsHaveRoom()) growLists();
         const std::uint32_t cell = cavity_[k];
         const unsigned conflicting = conflictingNeighbours(cell, p);
         for (std::uint32_t i = 0; i < 4; ++i) {
@@ -244,11 +248,10 @@ Insertion BowyerWatson::insertAs(std::uint32_t vertex) {
         unmarkCavity();
         return Insertion::kNotOwned;
     }
-    if (!takeNewCells()) {
+    if (!fillCavity<kSerial>(vertex)) {
         unmarkCavity();
         return Insertion::kStoreFull;
     }
-    fillCavity<kSerial>(vertex);
     return Insertion::kInserted;
 }
 

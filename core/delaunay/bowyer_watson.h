@@ -80,15 +80,16 @@ class BowyerWatson {
     template <bool kSerial>
     std::uint32_t walk(std::uint32_t start, const Site& p) const;
     bool hasVertexAt(std::uint32_t cell, const Site& p) const;
+    bool listsHaveRoom() const;
     void growLists();
     template <bool kSerial>
     bool findCavity(std::uint32_t first, const Site& p);
     void unmarkCavity();
 
     // Filling it: cavity_filling.cpp. kAllOwned: every corner of the cavity is this inserter's.
-    bool takeNewCells();
     template <bool kSerial>
-    void fillCavity(std::uint32_t vertex);
+    bool fillCavity(std::uint32_t vertex);
+    bool takeNewCells();
     void placeNewCells(std::uint32_t vertex, std::uint32_t mark);
     void markSolelyOwned();
     template <bool kAllOwned>

@@ -252,12 +252,15 @@ void BowyerWatson::computeBalls(const Site& p) {
     }
 }
 
-// ---- Steps 4 and 5 ---------------------------------------------------------------------------------------
+// ---- Steps 3 to 5 ----------------------------------------------------------------------------------------
 
-// Pre:  takeNewCells returned true.
-// Post: the site is a vertex of the triangulation, the cells of the cavity are free, `hint_` is a new cell.
+// Pre:  findCavity returned true.
+// Post: if true, the site is a vertex of the triangulation, the cells of the cavity are free, and `hint_` is
+// a
+//       new cell. If false, the store is full and the triangulation is unchanged, the cavity still marked.
 template <bool kSerial>
-void BowyerWatson::fillCavity(std::uint32_t vertex) {
+bool BowyerWatson::fillCavity(std::uint32_t vertex) {
+    if (!takeNewCells()) return false;
     placeNewCells(vertex, cavityMark_);
     if (kSerial || cavityMark_ != 0) {
         linkNewCells<true>(vertex);
@@ -271,9 +274,10 @@ void BowyerWatson::fillCavity(std::uint32_t vertex) {
         free_.push_back(cell);
     }
     hint_ = facets_.front().created;
+    return true;
 }
 
-template void BowyerWatson::fillCavity<true>(std::uint32_t vertex);
-template void BowyerWatson::fillCavity<false>(std::uint32_t vertex);
+template bool BowyerWatson::fillCavity<true>(std::uint32_t vertex);
+template bool BowyerWatson::fillCavity<false>(std::uint32_t vertex);
 
 }  // namespace shapedb

@@ -21,15 +21,15 @@ constexpr int kMaxSteps = 32;
 constexpr int kSecantSteps = 4;
 constexpr double kAcceptedShare = 0.9;
 
-using KeyedIndex = std::pair<std::uint64_t, std::uint32_t>;  // cell, point
+using CellAndPoint = std::pair<std::uint64_t, std::uint32_t>;  // cell, point
 
 std::uint64_t cellKey(const Point3& p, double cell) {
     const auto index = [cell](double v) { return static_cast<std::uint64_t>((v + 1.0) / cell); };
     return (index(p.x) << 42) | (index(p.y) << 21) | index(p.z);
 }
 
-std::vector<KeyedIndex> sortedByCell(const PointCloud& points, double cell) {
-    std::vector<KeyedIndex> keyed(points.size());
+std::vector<CellAndPoint> sortedByCell(const PointCloud& points, double cell) {
+    std::vector<CellAndPoint> keyed(points.size());
     for (std::size_t i = 0; i < points.size(); ++i) {
         keyed[i] = {cellKey(points[i], cell), static_cast<std::uint32_t>(i)};
     }
@@ -64,7 +64,7 @@ std::size_t countCells(const PointCloud& points, double cell) {
     return cells;
 }
 
-DecimatedPoints averageCells(const PointCloud& points, const std::vector<KeyedIndex>& keyed, double cell) {
+DecimatedPoints averageCells(const PointCloud& points, const std::vector<CellAndPoint>& keyed, double cell) {
     PointCloud means;
     std::vector<std::uint32_t> cellOfPoint(points.size());
     for (std::size_t begin = 0; begin < keyed.size();) {

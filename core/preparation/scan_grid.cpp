@@ -37,7 +37,7 @@ constexpr std::size_t kCellsPerTarget = 8;
 constexpr std::size_t kPointsBetweenCheckpoints = 1 << 16;
 // With fewer points per cell, merging a stretch costs more than filling it saves.
 constexpr std::size_t kPointsPerCell = 4;
-// Size of the sample that tells how fine the grid will be.
+// Points per cell of the limit in the sample that tells how fine the grid will be.
 constexpr std::size_t kSampledPerCell = 3;
 // Bits of an axis when a cell code has 32: enough unless the points are concentrated.
 constexpr int kShortCodeBits = 10;

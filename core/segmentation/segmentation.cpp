@@ -12,12 +12,12 @@
 #include "core/base/return_if_error.h"
 #include "core/delaunay/hilbert_order.h"
 #include "core/geometry/bounding.h"
+#include "core/geometry/neighbours.h"
 #include "core/geometry/tetrahedron.h"
 #include "core/preparation/prepare_points.h"
 #include "core/segmentation/contrast_merging.h"
 #include "core/segmentation/flow.h"
 #include "core/segmentation/interior.h"
-#include "core/segmentation/local_spacing.h"
 #include "core/segmentation/segments.h"
 
 namespace shapedb {

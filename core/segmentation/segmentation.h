@@ -1,7 +1,7 @@
 // From a noisy point cloud to the segments of the shape's interior: Sections 2 and 3 of
 // Dey and Goswami, "Shape Segmentation and Matching from Noisy Point Clouds" (2004).
 // Runs the stages in order, each of which has a header: core/preparation/prepare_points.h,
-// core/delaunay/delaunay.h, local_spacing.h, interior.h or adaptive_interior.h, flow.h,
+// core/delaunay/delaunay.h, core/geometry/neighbours.h, interior.h or adaptive_interior.h, flow.h,
 // segments.h, contrast_merging.h.
 #pragma once
 
@@ -76,7 +76,7 @@ struct Segmentation {
 /// Segments the interior of the shape the points were sampled from.
 ///
 /// Deterministic: the same points in any order give the same segments, bit for bit.
-/// Thread-safe (no shared state). Memory: about 600 bytes a distinct point at the peak.
+/// Thread-safe (no shared state). Memory: about 600 bytes per distinct point at the peak.
 ///
 /// Errors: those of `preparePoints` and `triangulate`; kInvalidArgument (options); kNoInterior
 /// when the walk from outside reaches every big ball (an open surface or too much noise; with

@@ -21,7 +21,7 @@ scripts/install-deps.sh --analysis
 build_dir=${BUILD_DIR:-build-tidy}
 cmake --preset bench -B "$build_dir" -DCMAKE_CXX_COMPILER=clang++-14 -DCMAKE_C_COMPILER=clang-14 \
   -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON > /dev/null
-# Generated headers.
-cmake --build "$build_dir" --target shapedb_proto shapedb_embedded_migrations > /dev/null
+# The headers that protoc generates, and nothing compiled.
+ninja -C "$build_dir" $(ninja -C "$build_dir" -t targets all | sed -nE 's/^(.*\.pb\.h): .*/\1/p') > /dev/null
 xargs -P "$(nproc)" -n 4 clang-tidy-14 -p "$build_dir" --quiet <<< "$files"
 echo "tidy: clean"

@@ -4,7 +4,10 @@
 
 #include "tests/server/store/sqlite/store_fixture.h"
 
-namespace shapedb::store {
+namespace shapedb::bench {
+
+using namespace store;
+
 namespace {
 
 FillShape made(std::uint64_t i) {
@@ -58,4 +61,4 @@ TEST(BulkFill, CanBeStopped) {
 }
 
 }  // namespace
-}  // namespace shapedb::store
+}  // namespace shapedb::bench

@@ -44,7 +44,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     shapedb::ReadOptions options;
     options.meshSamples = 50;
     options.maxPoints = 10'000;
-    for (const MeshHandling handling : {MeshHandling::kAuto, MeshHandling::kVertices, MeshHandling::kSurface}) {
+    for (const MeshHandling handling :
+         {MeshHandling::kAuto, MeshHandling::kVertices, MeshHandling::kSurface}) {
         options.meshHandling = handling;
         const auto scan = shapedb::readScan(path, options);
         if (!scan) {

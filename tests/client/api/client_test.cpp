@@ -117,7 +117,7 @@ TEST(Client, WaitsAsLongAsTheServerAsks) {
 
 TEST(Client, RetryCountRestartsForAnotherReason) {
     FakeServer server;
-    // Three times full, three times away, then there: neither reason came four times in a row.
+    // Three times full, three times unreachable, then fine: neither reason four times in a row.
     server.shapes.answer = [](grpc::ServerContext& context, int call) {
         if (call <= 3) return namedError(context, grpc::StatusCode::RESOURCE_EXHAUSTED, "queue_full", "full");
         return call <= 6 ? grpc::Status(grpc::StatusCode::UNAVAILABLE, "away") : grpc::Status::OK;

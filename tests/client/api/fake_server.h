@@ -1,4 +1,4 @@
-// A ShapeDB server in this process that does what a test tells it to.
+// A ShapeDB server inside the test process, with scripted answers.
 #pragma once
 
 #include <atomic>
@@ -16,10 +16,10 @@
 
 namespace shapedb::client {
 
-/// One way to answer a call; `call` counts the calls of this rpc from 1.
+/// Answers a call; `call` counts the calls of this rpc from 1.
 using Answer = std::function<grpc::Status(grpc::ServerContext& context, int call)>;
 
-/// Fails with the server's own error name in the trailing metadata, as shapedbd does.
+/// Fails with an error name in the trailing metadata, as shapedbd does.
 [[nodiscard]] grpc::Status namedError(grpc::ServerContext& context, grpc::StatusCode code, const char* name,
                                       const char* message);
 
@@ -65,7 +65,7 @@ class FakeServer {
     FakeServer();
     ~FakeServer();
 
-    /// Without waiting between attempts for longer than a test can.
+    /// With waits between retries short enough for a test.
     [[nodiscard]] Client client(int maxAttempts = 4) const;
     [[nodiscard]] const std::string& address() const { return address_; }
 

@@ -74,7 +74,7 @@ TEST(Packing, OffsetStartsWhereRoundingWouldHurt) {
     const double diagonal = std::sqrt(3.0);
     EXPECT_EQ(offsetAt(kFarFromOrigin * diagonal - 1.1), Point3{});
     EXPECT_NE(offsetAt(kFarFromOrigin * diagonal), Point3{});
-    // Without it nothing moves further than the promised millionth of the diagonal.
+    // Without an offset no coordinate moves by more than a millionth of the diagonal.
     const double x = kFarFromOrigin * diagonal - 1.1 + 0.123456789;
     EXPECT_LE(std::abs(static_cast<double>(static_cast<float>(x)) - x), diagonal * 0x1p-20);
 }

@@ -14,11 +14,11 @@ namespace fs = std::filesystem;
 
 class EvaluateCommand : public CommandTest {
   protected:
-    /// Three clearly different families, three scans each.
+    /// Three very different families of three scans.
     static void SetUpTestSuite() {
         samples() = (fs::temp_directory_path() / ("shapedb-evaluate-" + std::to_string(::getpid()))).string();
         const CommandRun run = runCommand(
-            {"sample", samples(), "--count", "3", "--points", "1800", "--families", "human,mug,airplane"});
+            {"sample", samples(), "--count", "3", "--points", "1200", "--families", "human,mug,airplane"});
         ASSERT_EQ(run.exitCode, 0) << run.err;
     }
     static void TearDownTestSuite() { fs::remove_all(samples()); }
@@ -36,7 +36,7 @@ class EvaluateCommand : public CommandTest {
         return run.json();
     }
 
-    /// Without what may differ from run to run.
+    /// Without values that differ from run to run.
     static nlohmann::json timeless(nlohmann::json document) {
         for (const char* key : {"seconds_segment", "seconds_match", "threads"}) document.erase(key);
         return document;
@@ -104,7 +104,7 @@ TEST_F(EvaluateCommand, ResultDoesNotDependOnThreads) {
 }
 
 TEST_F(EvaluateCommand, NoiseOfAFileDoesNotDependOnTheOthers) {
-    // The score of two files against each other, alone and in company, through the gallery.
+    // The score of the same two files, with and without other queries.
     const auto scoreOf = [&](const std::vector<std::string>& queries) {
         std::vector<std::string> arguments = queries;
         arguments.insert(arguments.end(),
@@ -126,7 +126,7 @@ TEST_F(EvaluateCommand, UnsegmentableShapesCountAsMisses) {
     fs::copy(samples(), path("set"), fs::copy_options::recursive);
     PointCloud flat;
     for (int i = 0; i < 50; ++i) flat.push_back({0.1 * (i % 7), 0.1 * (i / 7), 0.0});
-    // First in the order of files, where a tie at 0 would otherwise be broken in its favour.
+    // First in the order of files, which would otherwise favour it in a tie at 0.
     writePoints("set/airplane/aaa_flat.xyz", flat);
     const auto clean = evaluate({samples(), "--per-class"});
     const auto document = evaluate({path("set"), "--per-class"});

@@ -70,8 +70,8 @@ std::string readText(const std::string& path) {
     return {std::istreambuf_iterator<char>(file), {}};
 }
 
-// The lower right part of the picture is the raster, pixel by pixel; black ink lies left of it
-// beside every class and above it.
+// The lower right of the picture is the raster, pixel by pixel; every class has black ink left of it and
+// above.
 TEST_F(Figure, PngHasTheRasterAndItsLabels) {
     const SimilarityRaster drawn = raster({"ant", "bee", "cat"}, 6);
     ASSERT_TRUE(writeSimilarityFigure(drawn, path("a.png")));
@@ -101,7 +101,7 @@ TEST_F(Figure, PngHasTheRasterAndItsLabels) {
     }
 }
 
-// Paint the rectangles of the SVG: the raster must come out.
+// Painting the rectangles of the SVG must give the raster.
 TEST_F(Figure, SvgHasTheSamePixels) {
     const SimilarityRaster drawn = raster({"ant", "bee", "cat"}, 7);
     ASSERT_TRUE(writeSimilarityFigure(drawn, path("a.SVG")));
@@ -179,7 +179,7 @@ TEST_F(Figure, RefusesARasterOfTheWrongSize) {
     EXPECT_EQ(writeSimilarityFigure({}, path("a.png")).error().code, ErrorCode::kInvalidArgument);
 }
 
-// A full device must be reported, whichever call notices it.
+// A full device is reported, whichever call notices it.
 TEST_F(Figure, FullDeviceIsAnError) {
     const SimilarityRaster drawn = raster({"a", "b"}, 5);
     for (const std::string name : {"full.png", "full.svg"}) {

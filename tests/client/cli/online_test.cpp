@@ -1,4 +1,4 @@
-// The online commands against a real shapedbd.
+// The commands that need a server, against a real shapedbd.
 #include <filesystem>
 #include <fstream>
 
@@ -14,7 +14,7 @@ using nlohmann::json;
 using testing::ServerProcess;
 using testing::TemporaryDirectory;
 
-/// One server for all tests; each works in a collection of its own.
+/// One server for all tests, one collection per test.
 class Online : public CommandTest {
   protected:
     static void SetUpTestSuite() {

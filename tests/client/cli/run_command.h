@@ -1,4 +1,4 @@
-// The real `shapedb`, run as a user runs it.
+// Runs the real `shapedb` as a user would.
 #pragma once
 
 #include <map>
@@ -17,7 +17,7 @@ struct CommandRun {
     std::string out;
     std::string err;
 
-    /// `out` as the one JSON document it must be; fails the test when it is not.
+    /// `out` as one JSON document; fails the test if it is none.
     [[nodiscard]] nlohmann::json json() const;
 };
 
@@ -25,10 +25,10 @@ struct CommandRun {
 [[nodiscard]] CommandRun runCommand(const std::vector<std::string>& arguments,
                                     const std::map<std::string, std::string>& environment = {});
 
-/// Starts it with its output going nowhere; the caller waits for the process.
+/// Starts it with its output discarded; returns the process, which the caller waits for.
 [[nodiscard]] int startCommand(const std::vector<std::string>& arguments);
 
-/// A folder of its own for each test, removed at the end.
+/// Gives each test a temporary folder.
 class CommandTest : public ::testing::Test {
   protected:
     CommandTest();
@@ -36,7 +36,7 @@ class CommandTest : public ::testing::Test {
 
     [[nodiscard]] const std::string& folder() const { return folder_; }
     [[nodiscard]] std::string path(const std::string& name) const { return folder_ + "/" + name; }
-    /// Folders in `name` are created. Returns the path.
+    /// Creates folders in `name` as needed. Returns the path.
     std::string write(const std::string& name, const std::string& bytes) const;
     /// An XYZ file of the points.
     std::string writePoints(const std::string& name, const PointCloud& points) const;
@@ -45,9 +45,9 @@ class CommandTest : public ::testing::Test {
     std::string folder_;
 };
 
-/// About `count` points evenly over two unit balls at x = -1.4 and x = 1.4 that touch a rod.
+/// About `count` points, evenly on two unit balls at x = -1.4 and x = 1.4 joined by a rod.
 [[nodiscard]] PointCloud dumbbellPoints(std::size_t count = 3000);
-/// Evenly over an ellipsoid with these half axes.
+/// Evenly on an ellipsoid with these half axes.
 [[nodiscard]] PointCloud ellipsoidPoints(double a, double b, double c, std::size_t count = 1500);
 
 }  // namespace shapedb::cli

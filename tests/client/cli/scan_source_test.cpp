@@ -56,7 +56,7 @@ TEST_F(ScanSource, NoiseAndSubsetAreDeterministicAndIndependent) {
     EXPECT_EQ(first->points, again->points);
     EXPECT_NE(first->points, other->points);
 
-    // The same subset without its noise: each point moved, none far.
+    // The same subset with noise: every point moved, none far.
     ScanFlags clean = noisy;
     clean.noise = 0.0;
     const auto subset = loadScan(file, clean, 7);

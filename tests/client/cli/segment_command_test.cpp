@@ -18,7 +18,7 @@ class SegmentCommand : public CommandTest {
     std::string dumbbell() const { return writePoints("dumbbell.xyz", dumbbellPoints()); }
 };
 
-/// Without what differs from run to run.
+/// Without values that differ from run to run.
 nlohmann::json timeless(nlohmann::json document) {
     for (const char* key : {"delaunay_seconds", "total_seconds", "stages"}) document.erase(key);
     return document;
@@ -189,7 +189,7 @@ struct BadScan {
     int exitCode;
 };
 
-// In the test's name; without it there would be addresses.
+// Names the parameter in the output; the default prints addresses.
 void PrintTo(const BadScan& bad, std::ostream* out) { *out << bad.file; }
 
 std::string repeated(const std::string& line, int count) {

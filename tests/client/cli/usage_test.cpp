@@ -1,4 +1,4 @@
-// What the command line itself refuses, and what holds for every command alike.
+// Command lines that are refused, and what all commands have in common.
 #include <csignal>
 
 #include <sys/wait.h>
@@ -106,7 +106,7 @@ TEST_F(Usage, UnwritableResultIsAFailure) {
 }
 
 TEST_F(Usage, InterruptHasItsOwnExitCode) {
-    // Enough work to be met in the middle of it.
+    // Enough work to be interrupted in the middle.
     for (int i = 0; i < 20; ++i) {
         writePoints("set/a/" + std::to_string(i) + ".xyz", ellipsoidPoints(1.0, 0.8, 0.6 + 0.01 * i, 20000));
     }
@@ -142,7 +142,7 @@ TEST_F(Usage, UnreachableServerGivesExitCodeFiveAndItsAddress) {
                                                           {"admin", "stats"},
                                                           {"admin", "backup", path("b")}};
     for (auto arguments : online) {
-        // Port 1 of loopback: nobody listens there.
+        // Nobody listens on port 1.
         arguments.insert(arguments.end(), {"--server", "127.0.0.1:1", "--json", "--timeout", "0.2"});
         const CommandRun run = runCommand(arguments);
         EXPECT_EQ(run.exitCode, 5) << arguments[0] << run.err;

@@ -57,7 +57,7 @@ TEST_F(Pcd, ReadsArrayFieldsPaddingAndMixedTypes) {
     row.add(0.5).add(std::uint16_t{9}).add(std::int32_t{-70000}).add(std::int8_t{-7});
     EXPECT_EQ(readGood("b.pcd", header(fields, sizes, types, counts, "1", "1", "binary") + row.str()).points,
               text.points);
-    // With one point the columns are the row; padding may be in compressed data or not.
+    // With a single point, column order equals row order; compressed data may include the padding or not.
     const std::string packed = header(fields, sizes, types, counts, "1", "1", "binary_compressed");
     EXPECT_EQ(readGood("c.pcd", packed + compressedPcdBody(row.str())).points, text.points);
     EXPECT_EQ(readGood("d.pcd", packed + compressedPcdBody(row.str().substr(3))).points, text.points);
@@ -121,7 +121,7 @@ TEST_F(Pcd, RefusesDamagedCompressedData) {
     std::string damaged = body;
     damaged[8] = '\xff';
     expectError("d.pcd", start + damaged, kMalformed, {"damaged"});
-    // 4 GiB out of six bytes: refused before anything is allocated.
+    // Six bytes that claim 4 GiB: refused before anything is allocated.
     const Bytes lie = Bytes().add(std::uint32_t{6}).add(std::uint32_t{4294967292U}).text("abcdef");
     expectError("e.pcd", xyz("357913941", "1", "binary_compressed") + lie.str(), kMalformed, {"cut short"});
 }

@@ -20,7 +20,7 @@ std::string binary(const std::string& elements, const std::string& body) {
     return "ply\nformat binary_little_endian 1.0\n" + elements + "end_header\n" + body;
 }
 
-// Every scalar type for a coordinate and for a property in front of it, in both byte orders.
+// Every scalar type, as a coordinate and as a property before it, in both byte orders.
 class PlyScalars : public FileTest {
   protected:
     template <typename T>
@@ -61,7 +61,7 @@ TEST_F(Ply, StripsAlternateAndRestart) {
         ascii("element vertex 6\n" + kXyz + "element tristrips 1\nproperty list int int vertex_indices\n",
               "0 0 0\n1 0 0\n0 1 0\n1 1 0\n5 0 0\n5 1 0\n10 0 1 2 3 -1 3 4 4 5 -1\n"));
     EXPECT_EQ(scan.verticesInFile, 6U);
-    // 012, 213 and from the second strip 344 and 445 without area: two remain.
+    // 012 and 213; the second strip gives 344 and 445, which have no area.
     EXPECT_EQ(scan.trianglesInFile, 2U);
 }
 

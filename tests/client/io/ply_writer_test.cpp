@@ -30,7 +30,7 @@ std::size_t entries(const std::string& folder) {
     return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder), {}));
 }
 
-// Coordinates that single precision holds exactly.
+// Exact in single precision.
 PointCloud randomPoints(std::size_t count) {
     Random random(5);
     const auto coordinate = [&] { return static_cast<double>(random.below(1 << 24)) / 4096.0 - 2048.0; };

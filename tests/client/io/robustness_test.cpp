@@ -1,5 +1,5 @@
-// Files that are cut, damaged or lie: whatever the bytes, a value or an error comes back, and
-// memory follows the bytes that are there, not the numbers a header announces.
+// Truncated, damaged and false files: any bytes give a value or an error, and memory grows with the bytes
+// that are there, not with what a header announces.
 #include <atomic>
 #include <cmath>
 #include <cstdlib>
@@ -36,7 +36,7 @@ namespace {
 
 using Robustness = FileTest;
 
-// The read buffer is 1 MiB; nothing else may be larger for files of a few hundred bytes.
+// The read buffer is 1 MiB; for files of a few hundred bytes nothing else may be larger.
 constexpr std::size_t kMostForASmallFile = std::size_t{2} << 20;
 
 void expectSaneResult(const Result<Scan>& scan, const std::string& name, std::size_t bytes) {
@@ -71,7 +71,7 @@ TEST_F(Robustness, BinaryAndCountedFilesNeverPassWhenCut) {
     for (const SampleFile& file : sampleFiles()) {
         const bool noCount = file.name == "plain.xyz" || file.name == "crlf.txt" || file.name == "plain.obj";
         if (noCount) continue;
-        // A cut inside the last number or line end of a text file cannot be seen.
+        // A cut inside the last number or line end of a text file cannot be detected.
         const std::size_t lastLine = file.bytes.find_last_of('\n', file.bytes.size() - 3);
         const bool text = file.bytes.back() == '\n';
         const std::size_t end = text ? lastLine : file.bytes.size();
@@ -90,7 +90,7 @@ TEST_F(Robustness, RandomDamageNeverCrashes) {
         std::string bytes = file.bytes;
         for (std::uint64_t i = 0, flips = 1 + random.below(4); i < flips; ++i) {
             char& byte = bytes[random.below(bytes.size())];
-            // Digits make lying numbers, blanks make missing ones, anything makes anything.
+            // Digits give wrong numbers, blanks missing ones, random bytes everything else.
             switch (random.below(4)) {
                 case 0: byte = static_cast<char>('0' + random.below(10)); break;
                 case 1: byte = " \n-.e#/"[random.below(7)]; break;

@@ -23,7 +23,7 @@ using ScanReader = FileTest;
 using ScanFiles = FileTest;
 using SharedData = FileTest;
 
-// A flat square grid of cells x cells squares with side 1, as OFF; its area is 1.
+// The unit square, divided into cells x cells squares, as OFF.
 std::string grid(std::size_t cells) {
     const std::size_t side = cells + 1;
     std::string text = "OFF\n" + std::to_string(side * side) + " " + std::to_string(cells * cells) + " 0\n";
@@ -49,7 +49,7 @@ TEST_F(ScanReader, EveryFormatGivesTheSamePoints) {
         PointCloud expected = sampleVertices();
         expected.resize(file.vertices);
         PointCloud points = scan.points;
-        // STL has no order of its own.
+        // STL has no vertex order.
         std::sort(points.begin(), points.end(), lexicographicLess);
         std::sort(expected.begin(), expected.end(), lexicographicLess);
         EXPECT_EQ(points, expected) << file.name;
@@ -69,7 +69,7 @@ TEST_F(ScanReader, SamplesMeshesUniformlyByAreaWithASeed) {
     EXPECT_EQ(scan->verticesInFile, 16U);
     EXPECT_EQ(scan->trianglesInFile, 18U);
     ASSERT_EQ(scan->points.size(), 5000U);
-    // Every quarter of the square gets a quarter of the points, within five standard deviations.
+    // A quarter of the points in every quarter of the square, within five standard deviations.
     for (const double x : {0.0, 0.5}) {
         for (const double y : {0.0, 0.5}) {
             const auto count = std::count_if(scan->points.begin(), scan->points.end(), [&](const Point3& p) {
@@ -174,7 +174,7 @@ TEST_F(ScanReader, ErrorsNameUnreadableAndUnknownFiles) {
     ASSERT_FALSE(scan);
     EXPECT_EQ(scan.error().code, ErrorCode::kFileNotReadable);
     EXPECT_NE(scan.error().message.find("folder"), std::string::npos);
-    if (::geteuid() != 0) {  // nothing is unreadable for root
+    if (::geteuid() != 0) {  // root can read everything
         ::chmod(write("secret.ply", "ply\n").c_str(), 0);
         EXPECT_EQ(readScan(path("secret.ply")).error().code, ErrorCode::kFileNotReadable);
     }

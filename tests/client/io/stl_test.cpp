@@ -44,7 +44,7 @@ TEST_F(Stl, ReadsSeveralSolidsInAnyCase) {
 TEST_F(Stl, ReadsBinaryFilesThatStartWithSolid) {
     EXPECT_EQ(readGood("a.stl", binary(2, triangle(0) + triangle(1), "solid exported by a test")).format,
               "STL binary");
-    // Size wrong, but no text has zero bytes: still read, and refused, as binary.
+    // The size is wrong, but text has no zero bytes: read as binary, and refused.
     expectError("b.stl", binary(3, triangle(0) + triangle(1), "solid exported"), kMalformed,
                 {"byte 80", "3 triangles", "room for 2"});
 }

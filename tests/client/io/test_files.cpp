@@ -24,7 +24,7 @@ FileTest::~FileTest() {
 std::string FileTest::write(const std::string& name, const std::string& bytes) const {
     const std::string full = path(name);
     fs::create_directories(fs::path(full).parent_path());
-    // A new file each time: some file systems wait for the disk when an old one is overwritten.
+    // Always a new file: on some file systems overwriting one waits for the disk.
     if (fs::is_regular_file(full)) fs::remove(full);
     std::ofstream(full, std::ios::binary) << bytes;
     return full;
@@ -108,7 +108,7 @@ std::string binaryPly(bool bigEndian, const std::string& scalar) {
     return bytes.str();
 }
 
-// range_grid before the vertices, a list inside of them, strips after them.
+// range_grid before the vertices, a list within them, strips after them.
 std::string listPly(bool text) {
     const std::string header = std::string("ply\nformat ") + (text ? "ascii" : "binary_little_endian") +
                                " 1.0\nelement range_grid 3\nproperty list uchar int vertex_indices\n"

@@ -1,4 +1,4 @@
-// Files of every format, made in a temporary folder.
+// Files of every format, in a temporary folder.
 #pragma once
 
 #include <cstdint>
@@ -11,22 +11,22 @@
 
 namespace shapedb {
 
-/// A folder of its own for each test, removed at the end.
+/// Gives each test a temporary folder.
 class FileTest : public ::testing::Test {
   protected:
     FileTest();
     ~FileTest() override;
 
-    /// Writes the bytes and returns the path; folders in `name` are created.
+    /// Creates folders in `name` as needed. Returns the path.
     std::string write(const std::string& name, const std::string& bytes) const;
     std::string path(const std::string& name) const { return folder_ + "/" + name; }
     const std::string& folder() const { return folder_; }
 
-    /// Writes and reads; the vertices as they are.
+    /// Writes and reads, with MeshHandling::kVertices.
     Result<Scan> readVertices(const std::string& name, const std::string& bytes) const;
-    /// Writes and reads, expects success (an empty Scan after a failure).
+    /// Writes and reads; fails the test (and returns an empty Scan) on an error.
     Scan readGood(const std::string& name, const std::string& bytes) const;
-    /// Writes and reads, expects this error, and that the message names the file and has every part.
+    /// Writes and reads; expects this error, with the file and all parts in the message.
     void expectError(const std::string& name, const std::string& bytes, ErrorCode code,
                      const std::vector<std::string>& parts) const;
 
@@ -34,7 +34,7 @@ class FileTest : public ::testing::Test {
     std::string folder_;
 };
 
-/// Bytes of numbers in either order.
+/// Numbers as bytes, in either byte order.
 class Bytes {
   public:
     explicit Bytes(bool bigEndian = false) : bigEndian_(bigEndian) {}
@@ -56,7 +56,7 @@ class Bytes {
     std::string bytes_;
 };
 
-/// A small file that is read without an error.
+/// A small valid file.
 struct SampleFile {
     std::string name;
     std::string bytes;
@@ -64,12 +64,12 @@ struct SampleFile {
     std::size_t triangles;
 };
 
-/// At least one file of every format and variant; each has the vertices of sampleVertices() in
-/// this order (STL: the first four).
+/// At least one file of every format and variant, each with the vertices of sampleVertices() in that order
+/// (STL: the first four).
 std::vector<SampleFile> sampleFiles();
 PointCloud sampleVertices();
 
-/// Field-by-field, LZF-compressed body of a PCD file with both sizes in front.
+/// Body of a binary_compressed PCD file: both sizes, then the LZF-compressed data, field by field.
 std::string compressedPcdBody(const std::string& fieldByField);
 
 }  // namespace shapedb

@@ -202,7 +202,7 @@ TEST(Triangulation, HasTheSameTetrahedraForAnyNumberOfThreads) {
         ASSERT_GE(points.size(), kShared) << name;
         const auto alone = byThreads(points, 1);
         ASSERT_FALSE(alone.empty()) << name;
-        for (const std::size_t threads : {2, 3, 5})
+        for (const std::size_t threads : {2, 5})
             EXPECT_TRUE(byThreads(points, threads) == alone) << name << threads;
     }
 }

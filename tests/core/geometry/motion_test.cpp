@@ -39,7 +39,7 @@ TEST(Motion, DefaultIsTheIdentity) {
     EXPECT_EQ(determinant(Motion{}.rotation), 1.0);
 }
 
-TEST(Motion, LiteralQuarterTurn) {
+TEST(Motion, AppliesAKnownQuarterTurn) {
     Motion motion;  // a quarter turn about z, doubled, moved: x -> y, y -> -x
     motion.scale = 2.0;
     motion.rotation = {{{0, -1, 0}, {1, 0, 0}, {0, 0, 1}}};
@@ -59,7 +59,7 @@ TEST(Motion, ScalesEveryDistanceByItsScale) {
     }
 }
 
-TEST(Motion, InverseUndoesEitherSide) {
+TEST(Motion, InverseUndoesTheMotionFromBothSides) {
     Random random(2);
     for (int i = 0; i < 200; ++i) {
         const Motion motion = randomMotion(random);
@@ -71,7 +71,7 @@ TEST(Motion, InverseUndoesEitherSide) {
     }
 }
 
-TEST(Motion, ComposeIsOneAfterTheOther) {
+TEST(Motion, ComposeAppliesOneAfterTheOther) {
     Random random(3);
     for (int i = 0; i < 200; ++i) {
         const Motion first = randomMotion(random);
@@ -83,7 +83,7 @@ TEST(Motion, ComposeIsOneAfterTheOther) {
     }
 }
 
-TEST(Motion, CloudIsMovedPointByPointInOrder) {
+TEST(Motion, MovesACloudPointByPoint) {
     Random random(4);
     const Motion motion = randomMotion(random);
     PointCloud points;

@@ -23,7 +23,7 @@ PointCloud randomPoints(std::size_t count, std::uint64_t seed) {
     return points;
 }
 
-TEST(Sanitise, PutsPointsInTheUnitFrameSorted) {
+TEST(Sanitise, SortsPointsInTheUnitFrame) {
     const PointCloud scan = randomPoints(1000, 1);
     const auto clean = sanitise(scan);
     ASSERT_TRUE(clean);
@@ -62,7 +62,7 @@ TEST(Sanitise, MergesAndCountsDuplicates) {
     EXPECT_EQ(sites.size(), 50U);
 }
 
-TEST(Sanitise, OrderAndPowersOfTwoLeaveNoTrace) {
+TEST(Sanitise, DoesNotDependOnOrderOrPowersOfTwo) {
     const PointCloud scan = randomPoints(300, 3);
     const auto clean = sanitise(scan);
     PointCloud changed(scan.rbegin(), scan.rend());
@@ -106,7 +106,7 @@ TEST(Sanitise, NamesTheFirstBadCoordinate) {
     }
 }
 
-TEST(Sanitise, NamesWhatSpansNoSpace) {
+TEST(Sanitise, RefusesScansWithoutVolume) {
     EXPECT_EQ(sanitise({}).error().code, ErrorCode::kTooFewPoints);
     EXPECT_EQ(sanitise(randomPoints(3, 1)).error().code, ErrorCode::kTooFewPoints);
     EXPECT_EQ(sanitise(PointCloud(9, {1, 2, 3})).error().code, ErrorCode::kAllPointsEqual);

@@ -145,7 +145,7 @@ TEST(TopK, EqualsBruteForceOnScansBitForBit) {
         entries.push_back(entryOf(id++, plain));
     }
     const Library library(std::move(entries));
-    for (int round = 0; round < 150; ++round) {
+    for (int round = 0; round < 60; ++round) {
         SearchOptions options = randomOptions(random, library);
         options.score.partial = round % 4 == 0;
         Signature query = scans[random.below(scans.size())].signature;

@@ -1,4 +1,4 @@
-// The adaptive interior and the preparation before it, through `segment`, on solids of known volume.
+// The adaptive interior, together with the preparation, by `segment` on solids of known volume.
 #include "core/segmentation/adaptive_interior.h"
 
 #include <algorithm>
@@ -40,7 +40,7 @@ Segmentation found(const PointCloud& points) {
 
 double sizeOf(const PointCloud& points) { return smallestBoxDiagonal(points).value_or(0.0); }
 
-TEST(AdaptiveInterior, CleanSolidsKeepTheirVolumeAndAreTrusted) {
+TEST(AdaptiveInterior, CleanSolidsKeepTheirVolumeWithHighQuality) {
     for (const NamedShape& shape : namedShapes()) {
         const PointCloud points = sampled(shape);
         const Segmentation s = found(points);
@@ -52,7 +52,7 @@ TEST(AdaptiveInterior, CleanSolidsKeepTheirVolumeAndAreTrusted) {
     }
 }
 
-TEST(AdaptiveInterior, NoiseMovesVolumeAndSizeLittle) {
+TEST(AdaptiveInterior, NoiseHardlyChangesVolumeAndSize) {
     for (const NamedShape& shape : namedShapes()) {
         const PointCloud clean = sampled(shape);
         for (const double noise : {0.005, 0.01}) {
@@ -67,7 +67,7 @@ TEST(AdaptiveInterior, NoiseMovesVolumeAndSizeLittle) {
     }
 }
 
-TEST(AdaptiveInterior, OutliersChangeNothingThatMatters) {
+TEST(AdaptiveInterior, OutliersHardlyChangeTheResult) {
     for (const NamedShape& shape : namedShapes()) {
         const PointCloud clean = sampled(shape);
         PointCloud points = clean;
@@ -86,14 +86,14 @@ TEST(AdaptiveInterior, OutliersChangeNothingThatMatters) {
     }
 }
 
-// What is left when the highest fifth of the points is gone.
+// Without the highest fifth of the points.
 PointCloud withoutCap(PointCloud points) {
     std::sort(points.begin(), points.end(), [](const Point3& a, const Point3& b) { return a.z < b.z; });
     points.resize(points.size() * 4 / 5);
     return points;
 }
 
-TEST(AdaptiveInterior, AMissingCapIsClosed) {
+TEST(AdaptiveInterior, ClosesAMissingCap) {
     // A ball without the fifth of its surface above z = 0.6: the cap of height 0.4 is lost.
     const Segmentation s = found(withoutCap(sampled(makeSphere())));
     const double cap = kPi * 0.4 * 0.4 * (1.0 - 0.4 / 3.0);
@@ -102,7 +102,7 @@ TEST(AdaptiveInterior, AMissingCapIsClosed) {
     EXPECT_LT(s.quality, 0.95);
 }
 
-TEST(AdaptiveInterior, OpenSurfacesGetAnAnswerThatIsNotTrusted) {
+TEST(AdaptiveInterior, OpenSurfacesGetAnInteriorOfLowQuality) {
     PointCloud hemisphere;
     for (const Point3& p : sampled(makeSphere())) {
         if (p.z > 0.0) hemisphere.push_back(p);
@@ -125,7 +125,7 @@ TEST(AdaptiveInterior, OpenSurfacesGetAnAnswerThatIsNotTrusted) {
     }
 }
 
-TEST(AdaptiveInterior, PointsInNoOrderAtAllStillGiveAnAnswer) {
+TEST(AdaptiveInterior, RandomPointsStillHaveAnInterior) {
     Random random(22);
     PointCloud cloud;
     for (int i = 0; i < 3000; ++i) cloud.push_back({random.uniform(), random.uniform(), random.uniform()});
@@ -133,7 +133,7 @@ TEST(AdaptiveInterior, PointsInNoOrderAtAllStillGiveAnAnswer) {
     EXPECT_LT(s.quality, 0.5);
     EXPECT_GT(s.volume, 0.0);
     EXPECT_LE(s.volume, 1.0);
-    // From the smallest possible cloud on: a result or the documented error.
+    // From the smallest possible cloud upwards: a result or the documented error.
     for (std::size_t count = 4; count < 40; ++count) {
         const auto few = segment(
             PointCloud(cloud.begin(), cloud.begin() + static_cast<std::ptrdiff_t>(count)), adaptive());
@@ -145,7 +145,7 @@ TEST(AdaptiveInterior, PointsInNoOrderAtAllStillGiveAnAnswer) {
     }
 }
 
-TEST(AdaptiveInterior, SeenFromAboveTwoBarsAreNoPlate) {
+TEST(AdaptiveInterior, DoesNotBridgeTwoBarsSeenFromAbove) {
     // The upper halves of two parallel rods of radius 0.1, 0.6 apart, as a sensor above a table sees them.
     Random random(21);
     PointCloud points;
@@ -160,7 +160,7 @@ TEST(AdaptiveInterior, SeenFromAboveTwoBarsAreNoPlate) {
     EXPECT_LT(s.quality, 0.7);
 }
 
-TEST(AdaptiveInterior, AnOpenCupIsNotFilled) {
+TEST(AdaptiveInterior, DoesNotFillAnOpenCup) {
     // Outer ball of radius 1 without its top, inner one of 0.8, and the rim between them.
     Random random(13);
     PointCloud points;
@@ -183,7 +183,7 @@ TEST(AdaptiveInterior, AnOpenCupIsNotFilled) {
     EXPECT_GT(s.quality, 0.8);
 }
 
-TEST(AdaptiveInterior, OrderAndPoseLeaveNoTrace) {
+TEST(AdaptiveInterior, DoesNotDependOnOrderOrPose) {
     PointCloud points = sampled(makeDumbbell(), 5000);
     ASSERT_TRUE(addGaussianNoise(points, 0.005, 3));
     const Segmentation s = found(points);

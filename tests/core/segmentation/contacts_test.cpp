@@ -19,7 +19,7 @@
 namespace shapedb {
 namespace {
 
-// Labels at random, a fifth of the tetrahedra outside.
+// Random labels, with a sixth of the tetrahedra outside.
 std::vector<std::int32_t> randomLabels(std::size_t count, Random& random) {
     std::vector<std::int32_t> labels(count);
     for (auto& label : labels) label = static_cast<std::int32_t>(random.uniform() * 6.0) - 1;
@@ -33,9 +33,9 @@ double nearestOnSegment(const Point3& a, const Point3& b, const Point3& to) {
     return distance(a + at * d, to);
 }
 
-// The way between two circumcentres runs at the same distance from the three corners of the facet,
-// so its narrowest ball is where it comes nearest to one of them.
-TEST(SegmentContacts, ArePairsWithTheWidestWayAndAllSharedArea) {
+// A Voronoi edge has the same distance from all three corners of its facet, so its smallest ball is where it
+// comes nearest to one of them.
+TEST(SegmentContacts, HaveTheWidestPassageAndAllSharedArea) {
     Random random(5);
     std::size_t pairs = 0;
     for (const Triangulated& cloud : triangulatedClouds()) {
@@ -71,7 +71,7 @@ TEST(SegmentContacts, ArePairsWithTheWidestWayAndAllSharedArea) {
     EXPECT_GT(pairs, 50U);
 }
 
-TEST(SegmentContacts, StopWhenToldTo) {
+TEST(SegmentContacts, CanBeCancelled) {
     const Triangulated& cloud = triangulatedClouds().front();
     const std::vector<std::uint8_t> flow(cloud.tetrahedra.size(), 0);
     const std::vector<std::int32_t> labels(cloud.tetrahedra.size(), 0);
@@ -84,7 +84,7 @@ TEST(SegmentContacts, StopWhenToldTo) {
 }
 
 // Between the balls of a dumbbell and its rod the passage is as wide as the rod.
-TEST(SegmentContacts, FindsTheEndsOfADumbbellsRod) {
+TEST(SegmentContacts, AreTheEndsOfADumbbellsRod) {
     SegmentationOptions options;
     options.mergeContrast = 1.3;
     const Segmentation s = segment(sampleBoundary(makeDumbbell().solid, 6000, 3).value(), options).value();

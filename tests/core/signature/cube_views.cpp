@@ -61,7 +61,7 @@ void measure(InteriorView& view, double side) {
         for (const std::uint32_t site : v) centroid = centroid + 0.25 * view.sites[site];
         view.centroids.push_back(centroid);
         view.volumes.push_back(side * side * side / 6.0);
-        // Any thickness will do; a different one each makes mistaken indices show.
+        // Any thickness will do; with a different one for each, wrong indices show.
         view.radii.push_back(side * random.uniform(0.2, 4.0));
         view.meanRadius += length(centroid) / static_cast<double>(view.vertices.size());
     }
@@ -110,7 +110,7 @@ InteriorView viewOfCubes(const std::vector<Cube>& cubes, double side) {
         return at->second;
     };
     for (const Cube& c : cubes) {
-        // One tetrahedron for each order in which a walk from corner to far corner takes the axes.
+        // One tetrahedron for each order of axes on a path from corner to opposite corner (Kuhn).
         std::array<std::size_t, 3> axes{0, 1, 2};
         do {
             std::array<std::uint32_t, 4> vertices;
@@ -153,7 +153,7 @@ std::vector<std::uint8_t> levelsOf(const std::vector<double>& sums) {
     for (const double s : sums) whole += s;
     std::vector<std::uint8_t> bytes;
     for (const double s : sums) {
-        // By way of the nearest of 255 steps of the root, then the nearest of 15 up to the root of a half.
+        // Rounded to 255 steps of the root first, then to 15 steps up to the root of a half.
         const double root = std::floor(255.0 * std::sqrt(s / whole) + 0.5) / 255.0;
         bytes.push_back(
             static_cast<std::uint8_t>(std::min(15.0, std::floor(15.0 * std::sqrt(2.0) * root + 0.5))));

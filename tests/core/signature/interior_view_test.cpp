@@ -22,7 +22,7 @@ Segmentation segmented(const NamedShape& shape) {
     return segment(points, parametersOf(Profile::kDefault).segmentation).value();
 }
 
-TEST(InteriorView, HasTheInteriorsFrameAndUnit) {
+TEST(InteriorView, IsInThePrincipalFrameAndUnit) {
     const NamedShape box = makeBox();
     const Segmentation s = segmented(box);
     const InteriorView view = interiorView(s);
@@ -50,7 +50,7 @@ TEST(InteriorView, HasTheInteriorsFrameAndUnit) {
         mixed[1] += share * p.x * p.z;
         mixed[2] += share * p.y * p.z;
     }
-    // A box of sides 2, 1.4 and 1: a twelfth of the square of each.
+    // The variances of a box: a twelfth of the square of each side.
     const std::array<double, 3> sides{2.0, 1.4, 1.0};
     for (std::size_t axis = 0; axis < 3; ++axis) {
         EXPECT_NEAR(spread[axis] * s.size * s.size * 12.0 / (sides[axis] * sides[axis]), 1.0, 0.12);
@@ -90,7 +90,7 @@ TEST(InteriorView, HoldsTheInteriorTetrahedraOnly) {
     EXPECT_NEAR(view.meanRadius, radius, 1e-12);
 }
 
-TEST(InteriorView, DrawsEvenlyByVolumeAndFromTheSurface) {
+TEST(InteriorView, SamplesEvenlyByVolumeAndListsTheSurface) {
     const Segmentation s = segmented(makeDumbbell());
     const InteriorView view = interiorView(s);
     ASSERT_EQ(view.sampled.size(), InteriorView::kSamples);
@@ -118,11 +118,12 @@ TEST(InteriorView, DrawsEvenlyByVolumeAndFromTheSurface) {
     EXPECT_NEAR(view.meanSurfaceDistance / (sum / pairs), 1.0, 0.005) << "400,000 draws";
 }
 
-TEST(InteriorView, OfABallHasItsMeans) {
+TEST(InteriorView, HasTheKnownMeansOfABall) {
     const Segmentation s = segmented(makeSphere());
     const InteriorView view = interiorView(s);
     EXPECT_NEAR(view.meanSurfaceDistance * s.size, 4.0 / 3.0, 0.03);
-    // Of the centroids of tetrahedra, which reach from skin to skin: less than the 3/4 of matter.
+    // Less than the 3/4 of solid matter, since tetrahedra reach from skin to skin and only their centroids
+    // count.
     EXPECT_LT(view.meanRadius * s.size, 0.76);
     EXPECT_GT(view.meanRadius * s.size, 0.3);
     double thickness = 0.0;

@@ -19,7 +19,7 @@ Solid member(const std::string& family, std::size_t index, std::uint64_t seed) {
     return solid ? *solid : Solid{};
 }
 
-// Whether every part can be reached from the first over points that two parts share.
+// Whether every part is connected to the first by points that two parts share.
 bool isConnected(const Solid& solid) {
     DisjointSets groups(solid.parts.size());
     for (std::uint32_t i = 0; i < solid.parts.size(); ++i) {
@@ -38,7 +38,7 @@ bool isConnected(const Solid& solid) {
     return true;
 }
 
-TEST(Families, AreNamedSortedAndMany) {
+TEST(Families, AreSortedByName) {
     const auto families = listFamilies();
     EXPECT_GE(families.size(), 8U);
     for (std::size_t i = 0; i < families.size(); ++i) {
@@ -128,7 +128,7 @@ TEST(Scan, NoiseIsAShareOfTheDiagonal) {
     EXPECT_NEAR(sigma, expected, 0.02 * expected);
 }
 
-// The pose is a similarity motion: all distances change by one factor, and handedness stays.
+// The pose is a similarity motion: all distances change by the same factor, and handedness is kept.
 TEST(Scan, RandomPoseIsAMotionOfTheSameScan) {
     const Solid solid = member("hammer", 1, 1);
     std::set<double> scales;

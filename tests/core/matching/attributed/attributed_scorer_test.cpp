@@ -49,7 +49,7 @@ TEST(AttributedScore, IsSymmetricAndBoundedOnRandomPairs) {
 }
 
 TEST(AttributedScore, IsSymmetricAndBoundedOnScans) {
-    const auto& scans = scannedFamilies(2, 1);
+    const auto& scans = scannedFamilies(1, 1);
     double score0 = 0.0;
     double bound0 = 0.0;
     for (const auto& x : scans) {

@@ -1,5 +1,3 @@
-#include "core/segmentation/local_spacing.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -13,6 +11,7 @@
 #include "core/base/parallel.h"
 #include "core/base/return_if_error.h"
 #include "core/geometry/box.h"
+#include "core/geometry/neighbours.h"
 
 namespace shapedb {
 

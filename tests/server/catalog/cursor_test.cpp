@@ -1,13 +1,13 @@
-#include "server/rpc/cursor.h"
+#include "server/catalog/cursor.h"
 
 #include <limits>
 
 #include <gtest/gtest.h>
 
-namespace shapedb::rpc {
+namespace shapedb::catalog {
 namespace {
 
-TEST(Cursor, RoundTrip) {
+TEST(Cursor, DecodesWhatItEncoded) {
     const Listing listing{7, "label=cup, year>=1990", 2};
     for (const std::int64_t id :
          {std::int64_t{1}, std::int64_t{255}, std::numeric_limits<std::int64_t>::max()}) {
@@ -17,14 +17,14 @@ TEST(Cursor, RoundTrip) {
     }
 }
 
-TEST(Cursor, EmptyIsTheStart) { EXPECT_EQ(*decodeCursor({1, "", 0}, ""), 0); }
+TEST(Cursor, EmptyCursorIsTheStart) { EXPECT_EQ(*decodeCursor({1, "", 0}, ""), 0); }
 
 TEST(Cursor, IsPlainText) {
     for (const char c : encodeCursor({1, "x", 0}, 42))
         EXPECT_TRUE(std::isalnum(static_cast<unsigned char>(c)));
 }
 
-TEST(Cursor, ForeignListingIsRefused) {
+TEST(Cursor, RefusesTheCursorOfAnotherListing) {
     const std::string cursor = encodeCursor({7, "a", 1}, 42);
     for (const Listing& other :
          {Listing{8, "a", 1}, Listing{7, "b", 1}, Listing{7, "", 1}, Listing{7, "a", 2}}) {
@@ -34,13 +34,13 @@ TEST(Cursor, ForeignListingIsRefused) {
     }
 }
 
-// Parts of a listing cannot be moved from one field into the next.
-TEST(Cursor, FieldsDoNotRunIntoEachOther) {
+// Text moved from one field to the next gives another listing.
+TEST(Cursor, DistinguishesListingsWithSimilarFields) {
     EXPECT_NE(encodeCursor({1, "2 x", 0}, 5), encodeCursor({1, "x", 2}, 5));
     EXPECT_FALSE(decodeCursor({1, "1 x", 0}, encodeCursor({1, "x", 0}, 5)));
 }
 
-TEST(Cursor, EveryDamageIsSeen) {
+TEST(Cursor, DetectsDamage) {
     const Listing listing{7, "a", 1};
     const std::string cursor = encodeCursor(listing, 42);
     for (std::size_t i = 0; i < cursor.size(); ++i) {
@@ -56,4 +56,4 @@ TEST(Cursor, EveryDamageIsSeen) {
 }
 
 }  // namespace
-}  // namespace shapedb::rpc
+}  // namespace shapedb::catalog

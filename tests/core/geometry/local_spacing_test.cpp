@@ -1,5 +1,3 @@
-#include "core/segmentation/local_spacing.h"
-
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -11,12 +9,13 @@
 
 #include "core/base/random.h"
 #include "core/delaunay/hilbert_order.h"
+#include "core/geometry/neighbours.h"
 #include "tests/core/segmentation/small_clouds.h"
 
 namespace shapedb {
 namespace {
 
-// All pairs; the sum begins with the nearest.
+// From all pairs; summed from the nearest on.
 double meanOfThreeNearest(const PointCloud& points, std::size_t of) {
     std::vector<double> squared;
     for (std::size_t i = 0; i < points.size(); ++i) {
@@ -28,10 +27,10 @@ double meanOfThreeNearest(const PointCloud& points, std::size_t of) {
 }
 
 void expectAllPairs(const PointCloud& points, const std::string& name) {
-    const auto scales = localSpacings(points).value();
-    ASSERT_EQ(scales.size(), points.size());
-    for (std::size_t p = 0; p < scales.size(); ++p) {
-        ASSERT_EQ(scales[p], meanOfThreeNearest(points, p))
+    const auto spacings = localSpacings(points).value();
+    ASSERT_EQ(spacings.size(), points.size());
+    for (std::size_t p = 0; p < spacings.size(); ++p) {
+        ASSERT_EQ(spacings[p], meanOfThreeNearest(points, p))
             << name << " point " << p << " of " << points.size();
     }
 }
@@ -51,7 +50,7 @@ PointCloud randomPoints(std::size_t count, std::uint64_t seed) {
     return points;
 }
 
-// Dense here, sparse there: what is near to whom differs by four orders of magnitude.
+// Spacings that differ by four orders of magnitude.
 PointCloud clusters(std::size_t count, std::uint64_t seed) {
     Random random(seed);
     PointCloud points = randomPoints(count, seed + 1);
@@ -63,15 +62,15 @@ PointCloud clusters(std::size_t count, std::uint64_t seed) {
     return points;
 }
 
-TEST(PointScale, IsTheMeanDistanceToTheThreeNearestByAllPairs) {
+TEST(LocalSpacings, AgreeWithAllPairs) {
     for (const SmallCloud& cloud : smallClouds()) {
         expectAllPairs(cloud.points, cloud.name);
         expectAllPairs(alongCurve(cloud.points), cloud.name + " along the curve");
     }
 }
 
-// The last leaf, pair and node are then full, nearly full and nearly empty.
-TEST(PointScale, OfAnyNumberOfPoints) {
+// So that the last leaf, pair and node are full, nearly full and nearly empty.
+TEST(LocalSpacings, AgreeWithAllPairsForAnyNumberOfPoints) {
     for (std::size_t count = 0; count <= 150; ++count) {
         expectAllPairs(alongCurve(randomPoints(count, count)), "random");
     }
@@ -80,14 +79,14 @@ TEST(PointScale, OfAnyNumberOfPoints) {
     }
 }
 
-TEST(PointScale, OfPointsInAnyOrderAndAtTheSamePlace) {
+TEST(LocalSpacings, AgreeWithAllPairsInAnyOrderAndForRepeatedPoints) {
     expectAllPairs(randomPoints(700, 5), "not along the curve");
     PointCloud repeated = randomPoints(100, 6);
     for (std::size_t i = 0; i < 200; ++i) repeated.push_back(repeated[i % 40]);
     expectAllPairs(alongCurve(repeated), "repeated");
 }
 
-TEST(PointScale, OfUnevenClusters) {
+TEST(LocalSpacings, AgreeWithAllPairsForUnevenClusters) {
     expectAllPairs({{0, 0, 0},
                     {0.01, 0, 0},
                     {0.02, 0.001, 0},
@@ -99,7 +98,7 @@ TEST(PointScale, OfUnevenClusters) {
                    "a row and four far away");
 }
 
-TEST(PointScale, IsTheSameForAnyNumberOfThreads) {
+TEST(LocalSpacings, AreTheSameForAnyNumberOfThreads) {
     const PointCloud points = alongCurve(clusters(40000, 9));
     std::vector<std::vector<double>> results;
     for (const int threads : {1, 3}) {
@@ -109,7 +108,7 @@ TEST(PointScale, IsTheSameForAnyNumberOfThreads) {
     EXPECT_EQ(results[0], results[1]);
 }
 
-TEST(PointScale, StopsWhenToldTo) {
+TEST(LocalSpacings, CanBeCancelled) {
     const std::atomic<bool> cancel{true};
     RunContext context;
     context.cancel = &cancel;

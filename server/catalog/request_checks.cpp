@@ -1,10 +1,10 @@
-#include "server/rpc/request_checks.h"
+#include "server/catalog/request_checks.h"
 
 #include <algorithm>
 
-#include "server/rpc/limits.h"
+#include "server/catalog/limits.h"
 
-namespace shapedb::rpc {
+namespace shapedb::catalog {
 namespace {
 
 tl::unexpected<Error> bad(std::string message) {
@@ -17,7 +17,7 @@ bool isAlphanumeric(char c) {
 
 bool isNameByte(char c) { return isAlphanumeric(c) || c == '_' || c == '.' || c == '-'; }
 
-/// Bytes of the UTF-8 character at `at`, 0 when there is none.
+/// Length in bytes of the UTF-8 character at `at`; 0 when it is invalid.
 std::size_t characterLength(const std::string& text, std::size_t at) noexcept {
     const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
     const unsigned char first = byte(at);
@@ -92,7 +92,7 @@ Result<void> checkKey(const std::string& key) {
     return {};
 }
 
-Result<void> checkMetadata(const std::map<std::string, std::string>& metadata) {
+Result<void> checkMetadata(const Metadata& metadata) {
     if (metadata.size() > kMaxMetadataEntries) {
         return bad("metadata: " + std::to_string(metadata.size()) + " entries, at most " +
                    std::to_string(kMaxMetadataEntries) + " are allowed");
@@ -112,9 +112,14 @@ Result<void> checkMetadata(const std::map<std::string, std::string>& metadata) {
     return {};
 }
 
-Result<void> checkK(std::uint32_t k, const config::ServerConfig& config) {
-    if (k >= 1 && k <= config.limits.maxK) return {};
-    return bad("k: " + std::to_string(k) + " is outside 1 to " + std::to_string(config.limits.maxK));
+Result<void> checkK(std::uint32_t k, std::uint32_t maxK) {
+    if (k >= 1 && k <= maxK) return {};
+    return bad("k: " + std::to_string(k) + " is outside 1 to " + std::to_string(maxK));
+}
+
+Result<void> checkBatchSize(std::uint64_t queries, std::uint32_t maxBatch) {
+    if (queries >= 1 && queries <= maxBatch) return {};
+    return bad("queries: " + std::to_string(queries) + " is outside 1 to " + std::to_string(maxBatch));
 }
 
 Result<void> checkThreshold(double threshold) {
@@ -133,4 +138,4 @@ Result<void> checkPageSize(std::uint32_t pageSize) {
     return bad("page_size: " + std::to_string(pageSize) + " is outside 1 to " + std::to_string(kMaxPageSize));
 }
 
-}  // namespace shapedb::rpc
+}  // namespace shapedb::catalog

@@ -1,15 +1,14 @@
-// Checks of what a request says, before anything is done. Each error names the field, what is
-// wrong with it and what would be right.
+// Checks of the fields of a request, whatever its transport. Each error names the field, what is
+// wrong with it and what is allowed.
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <string>
 
 #include "core/base/error.h"
-#include "server/config/server_config.h"
+#include "core/base/metadata.h"
 
-namespace shapedb::rpc {
+namespace shapedb::catalog {
 
 constexpr const char* kDefaultCollection = "default";
 
@@ -22,10 +21,12 @@ constexpr const char* kDefaultCollection = "default";
 [[nodiscard]] Result<void> checkDescription(const std::string& description);
 /// 1 to kMaxKeyBytes of UTF-8 without control characters.
 [[nodiscard]] Result<void> checkKey(const std::string& key);
-/// kMaxMetadataEntries, and the limits of each key and value.
-[[nodiscard]] Result<void> checkMetadata(const std::map<std::string, std::string>& metadata);
-/// 1 to config.limits.maxK. The message names the limit.
-[[nodiscard]] Result<void> checkK(std::uint32_t k, const config::ServerConfig& config);
+/// At most kMaxMetadataEntries, each key and value within its limits.
+[[nodiscard]] Result<void> checkMetadata(const Metadata& metadata);
+/// 1 to `maxK`.
+[[nodiscard]] Result<void> checkK(std::uint32_t k, std::uint32_t maxK);
+/// 1 to `maxBatch` queries.
+[[nodiscard]] Result<void> checkBatchSize(std::uint64_t queries, std::uint32_t maxBatch);
 /// [0, 1], not NaN.
 [[nodiscard]] Result<void> checkThreshold(double threshold);
 /// At most kMaxFilterBytes.
@@ -36,4 +37,4 @@ constexpr const char* kDefaultCollection = "default";
 /// Valid UTF-8: no overlong forms, surrogates or code points past U+10FFFF.
 [[nodiscard]] bool isUtf8(const std::string& text) noexcept;
 
-}  // namespace shapedb::rpc
+}  // namespace shapedb::catalog

@@ -1,4 +1,4 @@
-// What calls share besides data: who may enter, who may write, who may compute.
+// Admission: which calls may enter, write, compute and hold memory.
 #pragma once
 
 #include <atomic>
@@ -11,18 +11,18 @@
 #include "core/base/error.h"
 #include "core/base/run_context.h"
 
-namespace shapedb::rpc {
+namespace shapedb::catalog {
 
-/// Counts running calls and, once draining, lets no more in. Thread-safe.
+/// Counts running calls; once draining, admits no more. Thread-safe.
 class CallGate {
   public:
-    /// False when draining; otherwise `leave` must follow.
+    /// False when draining; otherwise call `leave` at the end.
     [[nodiscard]] bool enter();
     void leave();
-    /// From now on `enter` refuses.
+    /// From now on `enter` returns false.
     void drain();
     [[nodiscard]] bool draining() const { return draining_.load(); }
-    /// True when no call is left at `until` at the latest.
+    /// Waits at most until `until`; true when no call is left.
     [[nodiscard]] bool waitUntilEmpty(std::chrono::steady_clock::time_point until);
 
   private:
@@ -32,11 +32,11 @@ class CallGate {
     std::atomic<bool> draining_{false};
 };
 
-/// Keeps writes and the replacement of the whole database (restore) apart, and tells calls
-/// that span one. Thread-safe.
+/// Keeps writes apart from restores, which replace the whole database, and lets calls notice that one
+/// happened. Thread-safe.
 class RestoreGate {
   public:
-    /// Held shared around "look up a collection, write to it".
+    /// Held (shared) from looking up a collection until the write to it is done.
     class Write {
       public:
         explicit Write(RestoreGate& gate) : lock_(gate.mutex_) {}
@@ -45,12 +45,12 @@ class RestoreGate {
         std::shared_lock<std::shared_mutex> lock_;
     };
 
-    /// Raised by each restore: ids read under one epoch mean nothing under another.
+    /// Rises with each restore: ids read under one epoch mean other shapes under another.
     [[nodiscard]] std::uint64_t epoch() const { return epoch_.load(); }
 
     /// Errors: kRejected (a restore is running).
     [[nodiscard]] Result<void> beginRestore();
-    /// The exclusive part; between `beginRestore` and `endRestore`.
+    /// Excludes writes; between `beginRestore` and `endRestore`.
     [[nodiscard]] std::unique_lock<std::shared_mutex> exclusive() {
         return std::unique_lock<std::shared_mutex>(mutex_);
     }
@@ -64,13 +64,12 @@ class RestoreGate {
     std::atomic<bool> restoring_{false};
 };
 
-/// At most so many segmentations for callers at one moment; the others wait their turn.
-/// Thread-safe.
+/// Limits how many segmentations run for callers at a time; the others wait. Thread-safe.
 class SegmentationSlots {
   public:
     explicit SegmentationSlots(int slots) : free_(slots) {}
 
-    /// Until destroyed, one slot is taken (if `acquire` succeeded).
+    /// After `acquire`, one slot until destroyed.
     class Slot {
       public:
         explicit Slot(SegmentationSlots& slots) : slots_(slots) {}
@@ -91,13 +90,13 @@ class SegmentationSlots {
     int free_;
 };
 
-/// So much of something that all calls may hold together. Thread-safe.
+/// An amount that all calls may hold together. Thread-safe.
 class Budget {
   public:
-    /// `what` completes "all of the N ...": static, e.g. "bytes that uploads may hold".
+    /// `what` completes the message "all of the N ... are taken"; static storage.
     Budget(std::uint64_t total, const char* what) : total_(total), what_(what), free_(total) {}
 
-    /// One call's share; given back when destroyed.
+    /// One call's share; returned when destroyed.
     class Share {
       public:
         explicit Share(Budget& budget) : budget_(budget) {}
@@ -118,4 +117,14 @@ class Budget {
     std::atomic<std::uint64_t> free_;
 };
 
-}  // namespace shapedb::rpc
+/// What every call of every transport passes or draws on.
+struct Admission {
+    /// `uploadBytes`: config limits.max_upload_bytes.
+    explicit Admission(std::uint64_t uploadBytes);
+
+    CallGate calls;
+    Budget uploads;    ///< bytes of points being received
+    Budget followers;  ///< calls that wait for a shape or a rebuild
+};
+
+}  // namespace shapedb::catalog

@@ -1,11 +1,11 @@
-#include "server/rpc/gates.h"
+#include "server/catalog/gates.h"
 
 #include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-namespace shapedb::rpc {
+namespace shapedb::catalog {
 namespace {
 
 using namespace std::chrono_literals;
@@ -26,7 +26,7 @@ TEST(CallGate, RefusesOnceDraining) {
     call.join();
 }
 
-TEST(SegmentationSlots, NeverMoreThanThereAre) {
+TEST(SegmentationSlots, LimitsConcurrentHolders) {
     SegmentationSlots slots(2);
     std::atomic<int> inside{0};
     std::atomic<int> most{0};
@@ -49,7 +49,7 @@ TEST(SegmentationSlots, NeverMoreThanThereAre) {
     EXPECT_EQ(most, 2);
 }
 
-TEST(SegmentationSlots, WaitingHonoursCancelAndDeadline) {
+TEST(SegmentationSlots, WaitEndsOnCancelOrDeadline) {
     SegmentationSlots slots(1);
     {
         SegmentationSlots::Slot taken(slots);
@@ -67,10 +67,10 @@ TEST(SegmentationSlots, WaitingHonoursCancelAndDeadline) {
     SegmentationSlots::Slot free(slots);
     RunContext soon;
     soon.deadline = RunContext::Clock::now() + 10s;
-    EXPECT_TRUE(free.acquire(soon)) << "who gave up took nothing with him";
+    EXPECT_TRUE(free.acquire(soon)) << "a caller that gave up holds no slot";
 }
 
-TEST(RestoreGate, OneAtATimeAndEpochsRise) {
+TEST(RestoreGate, AdmitsOneRestoreAndRaisesTheEpoch) {
     RestoreGate gate;
     const auto before = gate.epoch();
     ASSERT_TRUE(gate.beginRestore());
@@ -82,7 +82,7 @@ TEST(RestoreGate, OneAtATimeAndEpochsRise) {
     EXPECT_TRUE(gate.beginRestore());
 }
 
-TEST(RestoreGate, WaitsForWrites) {
+TEST(RestoreGate, WaitsForRunningWrites) {
     RestoreGate gate;
     std::atomic<bool> writing{false};
     std::atomic<bool> restoreComes{false};
@@ -103,4 +103,4 @@ TEST(RestoreGate, WaitsForWrites) {
 }
 
 }  // namespace
-}  // namespace shapedb::rpc
+}  // namespace shapedb::catalog

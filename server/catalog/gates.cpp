@@ -1,11 +1,11 @@
-#include "server/rpc/gates.h"
+#include "server/catalog/gates.h"
 
 #include <string>
 
 #include "core/base/return_if_error.h"
-#include "server/rpc/limits.h"
+#include "server/catalog/limits.h"
 
-namespace shapedb::rpc {
+namespace shapedb::catalog {
 
 bool CallGate::enter() {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -66,4 +66,8 @@ Result<void> Budget::Share::take(std::uint64_t amount) {
     return {};
 }
 
-}  // namespace shapedb::rpc
+Admission::Admission(std::uint64_t uploadBytes)
+    : uploads(uploadBytes, "bytes of points that uploads in progress may hold"),
+      followers(kMaxFollowers, "calls that may wait for shapes and rebuilds") {}
+
+}  // namespace shapedb::catalog

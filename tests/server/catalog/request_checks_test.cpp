@@ -1,15 +1,15 @@
-#include "server/rpc/request_checks.h"
+#include "server/catalog/request_checks.h"
 
 #include <cmath>
 
 #include <gtest/gtest.h>
 
-#include "server/rpc/limits.h"
+#include "server/catalog/limits.h"
 
-namespace shapedb::rpc {
+namespace shapedb::catalog {
 namespace {
 
-TEST(RequestChecks, CollectionNames) {
+TEST(RequestChecks, AcceptsOnlyValidCollectionNames) {
     for (const std::string& good :
          {std::string("a"), std::string("9"), std::string("A_b.c-1"), std::string(128, 'x')}) {
         EXPECT_TRUE(checkCollectionName(good)) << good;
@@ -23,7 +23,7 @@ TEST(RequestChecks, CollectionNames) {
     EXPECT_EQ(collectionNameOrDefault("x"), "x");
 }
 
-TEST(RequestChecks, Keys) {
+TEST(RequestChecks, AcceptsOnlyValidKeys) {
     for (const std::string& good : {std::string("a"), std::string("folder/file name.ply"),
                                     std::string("ключ 鍵 𝄞"), std::string(512, 'x')}) {
         EXPECT_TRUE(checkKey(good)) << good;
@@ -35,7 +35,7 @@ TEST(RequestChecks, Keys) {
     }
 }
 
-TEST(RequestChecks, Metadata) {
+TEST(RequestChecks, LimitsMetadata) {
     std::map<std::string, std::string> metadata;
     for (int i = 0; i < 64; ++i) metadata["k" + std::to_string(i)] = std::string(1'024, 'v');
     EXPECT_TRUE(checkMetadata(metadata));
@@ -49,13 +49,14 @@ TEST(RequestChecks, Metadata) {
     EXPECT_FALSE(checkMetadata({{"k", "\xed\xa0\x80"}})) << "a surrogate";
 }
 
-TEST(RequestChecks, Numbers) {
-    config::ServerConfig config;
-    config.limits.maxK = 10;
-    EXPECT_FALSE(checkK(0, config));
-    EXPECT_TRUE(checkK(1, config));
-    EXPECT_TRUE(checkK(10, config));
-    EXPECT_FALSE(checkK(11, config));
+TEST(RequestChecks, LimitsNumbersAndTexts) {
+    EXPECT_FALSE(checkK(0, 10));
+    EXPECT_TRUE(checkK(1, 10));
+    EXPECT_TRUE(checkK(10, 10));
+    EXPECT_FALSE(checkK(11, 10));
+    EXPECT_FALSE(checkBatchSize(0, 10));
+    EXPECT_TRUE(checkBatchSize(10, 10));
+    EXPECT_FALSE(checkBatchSize(11, 10));
     for (const double good : {0.0, 0.5, 1.0}) EXPECT_TRUE(checkThreshold(good));
     for (const double bad : {-1e-9, 1.0000001, std::nan(""), HUGE_VAL}) EXPECT_FALSE(checkThreshold(bad));
     EXPECT_TRUE(checkPageSize(0));
@@ -68,8 +69,8 @@ TEST(RequestChecks, Numbers) {
     EXPECT_FALSE(checkDescription(std::string(1'025, 'd')));
 }
 
-// Against a plain reference: encode every code point and see that exactly the valid ones pass.
-TEST(IsUtf8, EveryCodePoint) {
+// Encodes every code point; exactly the valid ones must pass.
+TEST(IsUtf8, AcceptsExactlyTheValidCodePoints) {
     const auto encode = [](std::uint32_t code) {
         std::string text;
         const auto tail = [&](int shift) { text += static_cast<char>(0x80 | ((code >> shift) & 0x3f)); };
@@ -103,4 +104,4 @@ TEST(IsUtf8, EveryCodePoint) {
 }
 
 }  // namespace
-}  // namespace shapedb::rpc
+}  // namespace shapedb::catalog

@@ -1,10 +1,10 @@
-#include "server/rpc/cursor.h"
+#include "server/catalog/cursor.h"
 
 #include <charconv>
 
 #include "common/sha256.h"
 
-namespace shapedb::rpc {
+namespace shapedb::catalog {
 namespace {
 
 // "1" (version), 16 digits of the id, 16 digits of the checksum.
@@ -19,8 +19,7 @@ std::string hex16(std::uint64_t value) {
     return text;
 }
 
-/// Over everything the cursor depends on; the parts cannot run into each other because the
-/// only one of free length comes last.
+/// Of everything the cursor depends on. Unambiguous: only the last part has a variable length.
 std::string checksum(const Listing& listing, const std::string& id) {
     const std::string bound = std::string("shapedb cursor ") + kVersion + ' ' + id + ' ' +
                               hex16(static_cast<std::uint64_t>(listing.collectionId)) + ' ' +
@@ -54,4 +53,4 @@ Result<std::int64_t> decodeCursor(const Listing& listing, const std::string& cur
     return static_cast<std::int64_t>(afterId);
 }
 
-}  // namespace shapedb::rpc
+}  // namespace shapedb::catalog
