@@ -41,6 +41,7 @@ void addLoadOperation(CLI::App& app, Bench& bench);
 void addInstructionsOperation(CLI::App& app, Bench& bench);
 void addJobOperation(CLI::App& app, Bench& bench);
 void addSegmentOperation(CLI::App& app, Bench& bench);
+void addTypicalOperation(CLI::App& app, Bench& bench);
 void addFingerprintOperation(CLI::App& app, Bench& bench);
 
 }  // namespace shapedb::bench

@@ -50,6 +50,7 @@ int run(int argc, const char* const* argv, cli::Console& console, const std::ato
         addInstructionsOperation(app, bench);
         addJobOperation(app, bench);
         addSegmentOperation(app, bench);
+        addTypicalOperation(app, bench);
         addFingerprintOperation(app, bench);
         try {
             app.parse(argc, argv);
