@@ -1,5 +1,6 @@
 #include "core/base/disjoint_sets.h"
 
+#include <algorithm>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -56,7 +57,8 @@ TEST(DisjointSets, AgreesWithRelabellingUnderRandomUnions) {
         const auto a = static_cast<std::uint32_t>(random.below(kCount));
         const auto b = static_cast<std::uint32_t>(random.below(kCount));
         sets.unite(a, b);
-        const auto [low, high] = std::minmax(smallest[a], smallest[b]);
+        const std::uint32_t low = std::min(smallest[a], smallest[b]);
+        const std::uint32_t high = std::max(smallest[a], smallest[b]);
         for (std::uint32_t& s : smallest) {
             if (s == high) s = low;
         }
