@@ -258,7 +258,7 @@ CommandResult runLeaveOneOut(Session& session, const EvaluateFlags& flags) {
 
 // ---------------------------------------------------------------------------------------- gallery
 
-/// What is told of one query.
+/// The outcome of one query.
 struct RankedQuery {
     const EvaluatedShape* query = nullptr;
     const EvaluatedShape* best = nullptr;   ///< null when nothing was ranked
