@@ -1,4 +1,4 @@
-// A search knows no method: any scorer can be plugged in.
+// The search is independent of the method: any scorer can be plugged in.
 #include <algorithm>
 #include <cmath>
 
@@ -33,7 +33,7 @@ class SizeScorer final : public Scorer {
     PackedShape query_;
 };
 
-// Hands what its scan found on to the score, and counts rows that are ruled out in between.
+// Scores from what its scan handed on alone.
 class HandingOnScorer final : public Scorer {
   public:
     bool compares(const ShapeRow&) const override { return true; }
@@ -43,7 +43,8 @@ class HandingOnScorer final : public Scorer {
     void scan(const ShapeRows& rows, const std::vector<std::uint8_t>& wanted, double,
               std::vector<Survivor>& left, ScanCounts&) const override {
         for (std::uint32_t row = 0; row < rows.count; ++row) {
-            if (wanted.empty() || wanted[row] != 0) left.push_back({1.0, row, {static_cast<std::uint16_t>(rows.scales[row])}});
+            if (wanted.empty() || wanted[row] != 0)
+                left.push_back({1.0, row, {static_cast<std::uint16_t>(rows.scales[row])}});
         }
     }
     std::optional<double> scoreIfReaches(const ShapeRow&, const Survivor& survivor,
