@@ -7,8 +7,8 @@ namespace shapedb {
 
 namespace {
 
-// What two unrelated shapes differ by (median over pairs of different synthetic families). It gives
-// every term an equal say, whatever the number of its bins.
+// What two unrelated shapes differ by: medians over pairs of different synthetic families
+// (`shapedb-bench typical`). It gives every term an equal say, whatever the number of its bins.
 constexpr std::array<double, kStatisticKinds> kTypical{2.17, 3.24, 3.93, 1.10, 4.62,
                                                        1.27, 4.20, 1.69, 2.95, 0.76};
 constexpr double kTypicalDisagreement = 0.9;
@@ -73,6 +73,13 @@ double meanDistance(const AttributeDistance& distance, double agreement) {
 }
 
 }  // namespace
+
+std::array<double, kStatisticKinds + 1> typicalDifferences() noexcept {
+    std::array<double, kStatisticKinds + 1> differences{};
+    std::copy(kTypical.begin(), kTypical.end(), differences.begin());
+    differences.back() = kTypicalDisagreement;
+    return differences;
+}
 
 double statisticsDistance(const LevelSums& sums, std::uint8_t qualityA, std::uint8_t qualityB) {
     const double interior = trust(qualityA, qualityB);

@@ -13,7 +13,11 @@ namespace shapedb {
 
 /// The L1 distance of each statistic of two shapes, in levels (steps of the square root of a share); of
 /// a reversible statistic the smaller of both orders. By Statistic.
-using LevelSums = std::array<std::uint32_t, kStatisticKinds>;
+using LevelSums = std::array<std::uint16_t, kStatisticKinds>;
+
+/// What two unrelated shapes typically differ by: root distances of the statistics by Statistic, then one
+/// less the agreement of the parts. `shapedb-bench typical` measures them.
+[[nodiscard]] std::array<double, kStatisticKinds + 1> typicalDifferences() noexcept;
 
 /// What the mean distance D of two shapes is made of. Each term is in units of what unrelated shapes
 /// typically differ by. The weights depend on the worse of the two interiors: the less reliable it is,
