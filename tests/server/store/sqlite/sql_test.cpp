@@ -1,7 +1,9 @@
 // Query plans: what has to be logarithmic uses an index.
 #include "server/store/sqlite/sql.h"
 
+#include <list>
 #include <set>
+#include <string>
 
 #include "server/store/sqlite/migrator.h"
 #include "tests/server/store/sqlite/store_fixture.h"
@@ -14,13 +16,14 @@ class SqlitePlanTest : public ::testing::Test {
     SqlitePlanTest() { migrate(connection_, embeddedMigrations(), 1); }
 
     std::string plan(const std::string& sql) {
-        const std::string explain = "EXPLAIN QUERY PLAN " + sql;
+        texts_.push_back("EXPLAIN QUERY PLAN " + sql);
         std::string lines;
-        Query query(connection_, explain.c_str());
+        Query query(connection_, texts_.back().c_str());
         while (query.step()) lines += query.text(3) + "\n";
         return lines;
     }
 
+    std::list<std::string> texts_;  ///< kept: the address of a text is its key among prepared statements
     Connection connection_{":memory:", OpenMode::kReadWriteCreate, 0};
 };
 
