@@ -9,7 +9,9 @@
 #include "server/store/sqlite/rows.h"
 #include "server/store/sqlite/sql.h"
 
-namespace shapedb::store {
+namespace shapedb::bench {
+
+using namespace store;
 
 namespace {
 
@@ -17,7 +19,7 @@ constexpr std::uint64_t kShapesPerCommit = 10'000;
 constexpr std::int64_t kFirstGeneration = 1;
 constexpr int kBusyTimeoutMs = 5'000;
 
-/// What every shape shares.
+/// The same for every shape.
 struct Scan {
     std::vector<float> points = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
     std::string blob = orRaise(encodePoints(points, 1));
@@ -67,4 +69,4 @@ Result<void> fillDatabase(const SqliteOptions& options, const std::string& colle
     return (*store)->checkpoint();
 }
 
-}  // namespace shapedb::store
+}  // namespace shapedb::bench

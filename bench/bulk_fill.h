@@ -1,5 +1,4 @@
-// Fills a database with shapes that are already described, for measurements at sizes that would
-// take days to upload. The server never calls it.
+// Fills a database with ready-made shapes, for measurements at sizes that would take days to upload.
 #pragma once
 
 #include <cstdint>
@@ -9,12 +8,12 @@
 #include "core/base/run_context.h"
 #include "server/store/sqlite/sqlite_store.h"
 
-namespace shapedb::store {
+namespace shapedb::bench {
 
 struct FillShape {
     std::string key;  ///< unique
     Metadata metadata;
-    std::string signature;  ///< core/signature/signature_codec.h; not looked at
+    std::string signature;  ///< as core/signature/signature_codec.h encodes it; not checked
 };
 
 /// Creates the database at `options.path`, or opens it as openSqliteStore does, makes the collection and
@@ -24,9 +23,9 @@ struct FillShape {
 ///
 /// Errors: those of openSqliteStore; kAlreadyExists (collection, or a key); kCancelled,
 /// kDeadlineExceeded. Not thread-safe.
-[[nodiscard]] Result<void> fillDatabase(const SqliteOptions& options, const std::string& collection,
+[[nodiscard]] Result<void> fillDatabase(const store::SqliteOptions& options, const std::string& collection,
                                         const std::string& parameters, std::uint64_t count,
                                         const std::function<FillShape(std::uint64_t)>& make,
                                         const RunContext& context = {});
 
-}  // namespace shapedb::store
+}  // namespace shapedb::bench

@@ -1,20 +1,20 @@
-// A shapedbd of its own: a child process, so that its time and memory are not mixed with ours.
+// Runs shapedbd as a child process, so that its time and memory can be told from ours.
 #pragma once
 
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include <sys/types.h>
-
+#include "common/child_process.h"
 #include "core/base/error.h"
 
 namespace shapedb::bench {
 
-/// A directory that is gone with this object.
+/// A directory that is deleted with this object.
 class WorkDirectory {
   public:
-    /// Below `parent`; empty: where temporary files go. Errors: kFileNotWritable.
+    /// Below `parent`; empty: the folder for temporary files. Errors: kFileNotWritable.
     [[nodiscard]] static Result<WorkDirectory> create(const std::string& parent);
     ~WorkDirectory();
     WorkDirectory(WorkDirectory&& other) noexcept;
@@ -27,7 +27,7 @@ class WorkDirectory {
     std::string path_;
 };
 
-/// What /proc tells of a process.
+/// From /proc.
 struct MemoryUse {
     std::uint64_t resident = 0;  ///< bytes now
     std::uint64_t peak = 0;      ///< most resident bytes since the start or since `forgetPeak`
@@ -41,25 +41,19 @@ class ServerProcess {
     /// (it ended, or does not listen within ten minutes; the message has the end of its log).
     [[nodiscard]] static Result<ServerProcess> start(const std::string& program, const std::string& data,
                                                      const std::vector<std::string>& flags);
-    ~ServerProcess();
-    ServerProcess(ServerProcess&& other) noexcept;
-    ServerProcess& operator=(ServerProcess&&) = delete;
 
-    [[nodiscard]] const std::string& address() const { return address_; }
+    [[nodiscard]] const std::string& address() const { return server_.address(); }
     /// Errors: kUnavailable: it is gone.
     [[nodiscard]] Result<MemoryUse> memory() const;
-    /// The peak counts from now on. False where the system does not allow it.
+    /// Restarts the peak. False where the system does not allow it.
     bool forgetPeak() const;
     /// Processor time it took so far, all threads, seconds. Errors: as `memory`.
     [[nodiscard]] Result<double> processorSeconds() const;
 
   private:
-    ServerProcess() = default;
-    Result<void> awaitAddress(const std::string& log);
+    explicit ServerProcess(ShapedbdProcess server) : server_(std::move(server)) {}
 
-    pid_t process_ = -1;
-    int output_ = -1;
-    std::string address_;
+    ShapedbdProcess server_;
 };
 
 }  // namespace shapedb::bench

@@ -20,7 +20,7 @@ namespace {
 
 constexpr double kScanNoise = 0.005;  // of the diagonal
 
-/// Runs `work(i)` for all i < count, on so many threads. The first error ends it.
+/// Runs `work(i)` for all i < count on that many threads; the first error ends it.
 template <typename Work>
 Result<void> forEach(std::size_t count, unsigned threads, const RunContext& context, Work&& work) {
     std::vector<std::optional<Error>> errors(count);
@@ -74,12 +74,12 @@ Result<void> fillDataDirectory(const std::string& data, const SignatureGenerator
     std::filesystem::create_directories(data, error);
     store::SqliteOptions options;
     options.path = data + "/shapedb.sqlite";
-    return store::fillDatabase(
-        options, "default", index::encodeParameters(parametersOf(Profile::kDefault)), count,
+    return fillDatabase(
+        options, "default", store::encodeParameters(parametersOf(Profile::kDefault)), count,
         [&](std::uint64_t i) {
-            return store::FillShape{"shape-" + std::to_string(i),
-                                    {{"label", "class-" + std::to_string(generator.classOf(i))}},
-                                    encodeSignature(generator.make(i))};
+            return FillShape{"shape-" + std::to_string(i),
+                             {{"label", "class-" + std::to_string(generator.classOf(i))}},
+                             encodeSignature(generator.make(i))};
         },
         context);
 }

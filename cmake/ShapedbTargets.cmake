@@ -1,9 +1,9 @@
-# One way to declare a library and a test, so that warnings, optimisation, precompiled headers, sanitizers and
-# include paths are the same everywhere.
+# How libraries and tests are declared: warnings, optimisation, precompiled headers, sanitizers and include paths
+# are the same everywhere.
 
 find_program(SHAPEDB_CCACHE ccache)
 if(SHAPEDB_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
-  # What ccache must overlook to keep files that use precompiled headers.
+  # Without this ccache never reuses files that include precompiled headers.
   set(CMAKE_CXX_COMPILER_LAUNCHER
       env CCACHE_SLOPPINESS=pch_defines,time_macros,include_file_mtime,include_file_ctime ${SHAPEDB_CCACHE})
 endif()
@@ -12,7 +12,7 @@ if(SHAPEDB_MOLD)
   add_link_options(-fuse-ld=mold)
 endif()
 
-# -O3 is for the few libraries that gain by it (FAST); the rest builds in two thirds of the time without.
+# -O3 only for libraries that gain by it (FAST): the others build in two thirds of the time without it.
 set(CMAKE_CXX_FLAGS_RELEASE "-O2 -DNDEBUG")
 
 add_library(shapedb_options INTERFACE)
@@ -21,7 +21,7 @@ target_compile_features(shapedb_options INTERFACE cxx_std_17)
 target_compile_options(shapedb_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
                                                  -Woverloaded-virtual -Wno-psabi)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-  target_compile_options(shapedb_options INTERFACE -fpch-preprocess)  # ccache needs it to keep what uses them
+  target_compile_options(shapedb_options INTERFACE -fpch-preprocess)  # for ccache
 endif()
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
   # g++ 12.2's vectoriser of straight-line code drops the rounding of double -> float -> double
@@ -32,10 +32,16 @@ if(SHAPEDB_WARNINGS_AS_ERRORS)
   target_compile_options(shapedb_options INTERFACE -Werror)
 endif()
 if(SHAPEDB_SANITIZE)
-  # With sanitizers g++ suspects values unset that are not, in its own library too.
-  add_compile_options(-Wno-maybe-uninitialized)
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    # With sanitizers g++ takes initialised values for uninitialised ones, even in its own library.
+    add_compile_options(-Wno-maybe-uninitialized)
+  endif()
   add_compile_options(-fsanitize=${SHAPEDB_SANITIZE} -fno-omit-frame-pointer -g)
   add_link_options(-fsanitize=${SHAPEDB_SANITIZE})
+endif()
+
+if(SHAPEDB_BUILD_FUZZ)
+  add_compile_options(-fsanitize=fuzzer-no-link)
 endif()
 
 # shapedb_library(NAME SOURCES a.cpp ... [PUBLIC lib ...] [PRIVATE lib ...] [PCH header ...] [FAST | SMALL])
@@ -57,8 +63,8 @@ function(shapedb_library name)
 endfunction()
 
 # shapedb_test(NAME FOLDERS folder ... [SUPPORT file.cpp ...] LIBS lib ... [PCH header ...] [TIMEOUT seconds] [LABEL name]):
-# one executable of every *_test.cpp in and below the folders; a test file cannot be left out by forgetting to
-# list it. Built with -O1: most of a test's time goes into compiling it.
+# one program of every *_test.cpp in and below the folders, so that no test file can be forgotten. ctest runs it once
+# for each suite. Built with -O1: most of a test's time goes into compiling it.
 function(shapedb_test name)
   cmake_parse_arguments(ARG "" "TIMEOUT;LABEL" "FOLDERS;SUPPORT;LIBS;PCH" ${ARGN})
   set(patterns)
@@ -76,8 +82,23 @@ function(shapedb_test name)
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
   endif()
+  if(SHAPEDB_SANITIZE)
+    math(EXPR ARG_TIMEOUT "12 * ${ARG_TIMEOUT}")
+  endif()
   if(NOT ARG_LABEL)
     set(ARG_LABEL unit)
   endif()
-  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABEL}")
+  string(REGEX REPLACE "^shapedb_|_test$" "" prefix ${name})
+  set(suites ${CMAKE_CURRENT_BINARY_DIR}/${name}_suites.cmake)
+  set(discover ${PROJECT_SOURCE_DIR}/cmake/discover_suites.cmake)
+  add_custom_command(
+    TARGET ${name} POST_BUILD
+    COMMAND ${CMAKE_COMMAND} -D PROGRAM=$<TARGET_FILE:${name}> -D PREFIX=${prefix} -D OUTPUT=${suites} -D
+            TIMEOUT=${ARG_TIMEOUT} -D LABEL=${ARG_LABEL} -P ${discover}
+    VERBATIM)
+  set_property(TARGET ${name} APPEND PROPERTY LINK_DEPENDS ${discover})
+  # Before the first build ctest says that the program is missing instead of passing without it.
+  file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/${name}_include.cmake
+       "if(EXISTS \"${suites}\")\n  include(\"${suites}\")\nelse()\n  add_test(${prefix}_NOT_BUILT ${name}_NOT_BUILT)\nendif()\n")
+  set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES ${CMAKE_CURRENT_BINARY_DIR}/${name}_include.cmake)
 endfunction()

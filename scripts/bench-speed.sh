@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# Takes the figures of speed of docs/benchmarks.md anew: what the program prints, and all figures as JSON,
-# into a folder. Builds the programs first, with the peers (install-deps.sh --bench). On a quiet machine of
-# two cores: segment a quarter of an hour, topk an hour and 24 GiB, load half an hour.
-#   scripts/bench-speed.sh FOLDER [segment] [topk] [load]     all three when none is named
-#   BUILD_DIR=...  where to build (build-bench)
-#   BENCH=...      this shapedb-bench instead of building one; load needs the shapedbd beside it
+# Measures the speeds of docs/benchmarks.md again and saves what the program prints, as text and as JSON, in
+# a folder. Builds the programs first, with the peers (install-deps.sh --bench installs what they need). On a
+# quiet machine with two cores, segment takes a quarter of an hour, topk an hour and 24 GiB, load half an hour.
+#   scripts/bench-speed.sh FOLDER [segment] [topk] [load]     default: all three
+#   BUILD_DIR=...  folder to build in [build-bench]
+#   BENCH=...      use this shapedb-bench instead of building one; load needs the shapedbd beside it
 set -euo pipefail
-: "${1:?name the folder for the figures}"
+: "${1:?name a folder for the figures}"
 mkdir -p "$1"
 folder=$(cd "$1" && pwd)
 shift
@@ -16,7 +16,7 @@ parts=("$@")
 for part in "${parts[@]}"; do
   case "$part" in
     segment | topk | load) ;;
-    *) echo "bench-speed: unknown part $part; there are segment, topk and load" >&2; exit 2 ;;
+    *) echo "bench-speed: unknown part $part; the parts are segment, topk and load" >&2; exit 2 ;;
   esac
 done
 
@@ -27,7 +27,7 @@ if [ -z "$bench" ]; then
   bench=$build_dir/bin/shapedb-bench
 fi
 
-# measure NAME OPERATION OPTIONS...: NAME.txt and NAME.json
+# measure NAME OPERATION OPTIONS...: writes NAME.txt and NAME.json
 measure() {
   local name=$1
   shift

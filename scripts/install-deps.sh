@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
 # Installs the Debian 12 packages that ShapeDB needs, and only those that are missing.
 #   scripts/install-deps.sh             everything to build, test and check
-#   scripts/install-deps.sh --runtime   only what the built programs load
-#   scripts/install-deps.sh --bench     that to build, and the Point Cloud Library and FAISS, which
-#                                       shapedb-bench measures beside ours (SHAPEDB_BENCH_PCL, SHAPEDB_BENCH_FAISS)
+#   scripts/install-deps.sh --analysis  that, and clang for scripts/ci/tidy.sh and scripts/ci/fuzz.sh
+#   scripts/install-deps.sh --runtime   only what the programs need to run
+#   scripts/install-deps.sh --bench     everything to build, and the Point Cloud Library and FAISS, which
+#                                       shapedb-bench measures too (preset peers)
 set -euo pipefail
 
 build_packages=(
@@ -18,13 +19,15 @@ runtime_packages=(
   ca-certificates libgmpxx4ldbl libmpfr6 libtbb12 libgrpc++1.51 libprotobuf32 libsqlite3-0
   libzstd1 libssl3 libspdlog1.10 libpng16-16 liblzf1 zlib1g
 )
+analysis_packages=(clang-14 clang-tidy-14 libclang-rt-14-dev)
 bench_packages=(libpcl-dev libfaiss-dev libopenblas-dev)
 
 case "${1:-}" in
   "") packages=("${build_packages[@]}") ;;
+  --analysis) packages=("${build_packages[@]}" "${analysis_packages[@]}") ;;
   --runtime) packages=("${runtime_packages[@]}") ;;
   --bench) packages=("${build_packages[@]}" "${bench_packages[@]}") ;;
-  *) echo "install-deps: unknown option $1; there are --runtime and --bench" >&2; exit 2 ;;
+  *) echo "install-deps: unknown option $1; there are --analysis, --runtime and --bench" >&2; exit 2 ;;
 esac
 
 missing=()

@@ -1,8 +1,7 @@
 #!/usr/bin/env bash
-# From a fresh Debian 12 machine to a first answer: installs what is missing, builds, starts a
-# server on loopback, uploads sample scans, rebuilds the index and asks for the shapes most like
-# a new noisy scan.
-#   scripts/quickstart.sh          stops the server at the end; its data stay in build/quickstart/
+# From a fresh Debian 12 machine to a first result: installs what is missing, builds, starts a
+# server on loopback, uploads sample scans, rebuilds the index and searches with a new, noisy scan.
+#   scripts/quickstart.sh          stops the server at the end; its data stays in build/quickstart/
 #   scripts/quickstart.sh --keep   leaves the server running
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -10,13 +9,13 @@ cd "$(dirname "$0")/.."
 step() { printf '\n== %s\n' "$1"; }
 run() { printf '$ %s\n' "$*" | sed 's#build/bin/##g'; "$@"; }
 
-step "Packages and build"
+step "Install packages and build"
 scripts/install-deps.sh
-echo "building; a few minutes the first time (build/quickstart-build.log)"
+echo "building; takes a few minutes the first time (log: build/quickstart-build.log)"
 mkdir -p build
 if ! scripts/build.sh > build/quickstart-build.log 2>&1; then
   tail -n 40 build/quickstart-build.log >&2
-  echo "the build failed; all of it is in build/quickstart-build.log" >&2
+  echo "the build failed; the whole log is build/quickstart-build.log" >&2
   exit 1
 fi
 echo "built build/bin/shapedbd (server) and build/bin/shapedb (client)"
@@ -25,7 +24,7 @@ demo=build/quickstart
 rm -rf "$demo"
 mkdir -p "$demo/data"
 
-step "Server, with its database in $demo/data"
+step "Start a server; its database is in $demo/data"
 build/bin/shapedbd --listen 127.0.0.1:0 --data "$demo/data" > "$demo/server.out" 2> "$demo/server.log" &
 server=$!
 stop_server() { kill -TERM "$server" 2>/dev/null && wait "$server" 2>/dev/null || true; }
@@ -39,24 +38,24 @@ SHAPEDB_SERVER=$(sed -n 's/^listening on //p' "$demo/server.out")
 export SHAPEDB_SERVER
 run build/bin/shapedb health
 
-step "Sample scans: 13 families of shapes, noisy, turned and scaled at random"
+step "Make sample scans: 13 families of shapes, noisy, randomly rotated and scaled"
 run build/bin/shapedb sample "$demo/scans" --count 4 --points 10000 > /dev/null
 ls "$demo/scans" | paste -sd' '
 
-step "Upload and segment them"
+step "Upload and segment"
 run build/bin/shapedb add "$demo/scans" --label-from-folder --wait
 
 step "Rebuild the index from the stored points"
 run build/bin/shapedb admin rebuild
 
-step "A new animal, scanned with more noise: what is it like?"
+step "Search with a new animal, scanned with more noise"
 build/bin/shapedb sample "$demo/new" --families animal --first 7 --count 1 --points 10000 --noise 0.004 > /dev/null
 run build/bin/shapedb query "$demo"/new/animal/*.ply -k 5
 
 if [ "${1:-}" = "--keep" ]; then
   trap - EXIT
-  printf '\nThe server goes on at %s (process %s). Try:\n  build/bin/shapedb --server %s list\n' \
+  printf '\nThe server is still running at %s (process %s). Try:\n  build/bin/shapedb --server %s list\n' \
     "$SHAPEDB_SERVER" "$server" "$SHAPEDB_SERVER"
 else
-  printf '\nStart it again with the same data:\n  build/bin/shapedbd --listen 127.0.0.1:7878 --data %s/data\n' "$demo"
+  printf '\nTo start the server again with the same data:\n  build/bin/shapedbd --listen 127.0.0.1:7878 --data %s/data\n' "$demo"
 fi

@@ -1,18 +1,15 @@
-// shapedbd: reads the configuration, serves until SIGTERM or SIGINT, drains.
+// shapedbd: reads the configuration, serves until SIGTERM or SIGINT, shuts down cleanly.
 //
-// Standard output carries one line, `listening on HOST:PORT`; everything else is logged.
-// Exit codes: 0 drained or nothing to do, 1 could not start or not end cleanly, 2 wrong
-// configuration, 130 stopped at once by a second signal.
+// Prints one line to standard output, `listening on HOST:PORT`; everything else is logged.
+// Exit codes: 0 success, 1 could not start or not shut down cleanly, 2 wrong configuration, 130
+// stopped at once by a second signal.
 
 #include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <string>
-#include <thread>
 
-#include <signal.h>
-#include <unistd.h>
-
+#include "common/stop_signals.h"
 #include "core/base/return_if_error.h"
 #include "core/pipeline.h"
 #include "server/config/load.h"
@@ -33,15 +30,6 @@ int report(const Error& error, int exitCode) {
     return exitCode;
 }
 
-/// The signals that end the server; blocked in every thread and waited for in one.
-sigset_t endSignals() {
-    sigset_t signals;
-    sigemptyset(&signals);
-    sigaddset(&signals, SIGTERM);
-    sigaddset(&signals, SIGINT);
-    return signals;
-}
-
 Result<telemetry::LoggerPtr> openLog(const config::ServerConfig::Log& log) {
     const auto level = telemetry::levelFromName(log.level);
     RETURN_IF_ERROR(level);
@@ -49,10 +37,7 @@ Result<telemetry::LoggerPtr> openLog(const config::ServerConfig::Log& log) {
 }
 
 int serve(const config::ServerConfig& config) {
-    const sigset_t signals = endSignals();
-    pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-    signal(SIGPIPE, SIG_IGN);
-
+    const StopSignals signals;
     const auto log = openLog(config.log);
     if (!log) return report(log.error(), kWrongConfiguration);
     (*log)->info("starting", {{"version", std::string(config::version())}, {"data", config.data}});
@@ -74,23 +59,17 @@ int serve(const config::ServerConfig& config) {
     std::printf("listening on %s\n", endpoint.text().c_str());
     std::fflush(stdout);
 
-    int received = 0;
-    sigwait(&signals, &received);
+    const int received = signals.wait(kStoppedAtOnce);
     (*log)->info("draining", {{"signal", std::int64_t{received}}});
-    std::thread([signals] {
-        int second = 0;
-        sigwait(&signals, &second);
-        ::_exit(kStoppedAtOnce);
-    }).detach();
     const auto drained = (*daemon)->drain();
-    if (!drained) (*log)->error("not ended cleanly", telemetry::fieldsOf(drained.error()));
+    if (!drained) (*log)->error("did not shut down cleanly", telemetry::fieldsOf(drained.error()));
     daemon->reset();
     (*log)->info("stopped");
     return drained ? 0 : kCannotServe;
 }
 
 int run(int argc, char** argv) {
-    // Of a check the exit code is the answer: 0 or 1, also when the mistake is in the flags.
+    // The exit code is the answer of a check: 0, or 1 also for a mistake in the flags.
     const bool checking = std::any_of(argv, argv + argc,
                                       [](const char* flag) { return std::string(flag) == "--check-config"; });
     const int mistake = checking ? 1 : kWrongConfiguration;

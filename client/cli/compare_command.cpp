@@ -13,6 +13,7 @@
 #include "client/cli/shape_output.h"
 #include "client/cli/text.h"
 #include "core/base/return_if_error.h"
+#include "core/matching/score.h"
 
 namespace shapedb::cli {
 

@@ -10,6 +10,7 @@
 #include <tbb/task_arena.h>
 
 #include "core/base/return_if_error.h"
+#include "core/matching/scorer.h"
 
 namespace shapedb::cli {
 
@@ -99,9 +100,10 @@ Result<ScoreMatrix> scorePairs(const std::vector<EvaluatedShape>& rows,
     std::atomic<std::size_t> done{0};
     const auto scored =
         forEachItem(rows.size(), threads, context, [&](std::size_t r) -> std::optional<Error> {
-            for (std::size_t c = symmetric ? r : 0; c < width; ++c) {
-                if (!rows[r].signature || !columns[c].signature) continue;
-                const double value = score(*rows[r].signature, *columns[c].signature, options);
+            const auto scorer = rows[r].signature ? makeScorer(*rows[r].signature, options) : nullptr;
+            for (std::size_t c = symmetric ? r : 0; c < width && scorer; ++c) {
+                if (!columns[c].signature) continue;
+                const double value = scorer->score(*columns[c].signature);
                 scores[r * width + c] = value;
                 // Only this task writes (c, r): no other row reaches left of its diagonal.
                 if (symmetric) scores[c * width + r] = value;

@@ -1,6 +1,4 @@
 // The `shapedb` command.
-#include <atomic>
-#include <csignal>
 #include <cstdlib>
 #include <iostream>
 
@@ -8,26 +6,10 @@
 
 #include "client/cli/console.h"
 #include "client/cli/session.h"
-
-namespace {
-
-// The one thing a signal handler may touch.
-std::atomic<bool> interrupted{false};
-static_assert(std::atomic<bool>::is_always_lock_free);
-
-extern "C" void onInterrupt(int signal) {
-    interrupted.store(true, std::memory_order_relaxed);
-    // A second Ctrl-C ends the program at once.
-    std::signal(signal, SIG_DFL);
-}
-
-}  // namespace
+#include "common/stop_signals.h"
 
 int main(int argc, char** argv) {
-    std::signal(SIGINT, onInterrupt);
-    std::signal(SIGTERM, onInterrupt);
-    // A reader that goes away (`shapedb list | head -1`) is a failed write, not a crash.
-    std::signal(SIGPIPE, SIG_IGN);
+    const std::atomic<bool>& interrupted = shapedb::stopFlag();
     // gRPC writes its own log lines to standard error unless told not to; errors reach the user
     // through the results of the calls.
     setenv("GRPC_VERBOSITY", "NONE", 0);

@@ -10,6 +10,7 @@
 
 #include "client/cli/text.h"
 #include "common/sha256.h"
+#include "core/base/math.h"
 
 namespace shapedb::cli {
 
@@ -281,7 +282,7 @@ std::string statisticsTable(const client::Signature& signature) {
 double rotationDegrees(const Motion& motion) {
     const double trace = motion.rotation[0][0] + motion.rotation[1][1] + motion.rotation[2][2];
     const double cosine = motion.reflected ? (trace + 1.0) / 2.0 : (trace - 1.0) / 2.0;
-    return std::acos(std::clamp(cosine, -1.0, 1.0)) * 180.0 / 3.14159265358979323846;
+    return toDegrees(std::acos(std::clamp(cosine, -1.0, 1.0)));
 }
 
 std::string explanationText(const client::Explanation& explanation, const client::Signature& query,

@@ -25,10 +25,6 @@ struct ScanContent {
     std::string format;
 };
 
-inline bool isFinite(const Point3& p) {
-    return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
-}
-
 /// Collects vertices, checking each.
 class VertexSink {
   public:

@@ -1,5 +1,5 @@
-// Two doubles that one instruction handles: two equal computations side by side. Every operation rounds
-// as it does on one double, so results have the same bits.
+// Two doubles in one SSE2 register, for running one computation on two inputs at once. Each half rounds as
+// a plain double does, so results have the same bits.
 #pragma once
 
 #include <cmath>
@@ -18,7 +18,7 @@ namespace shapedb {
 class Double2 {
   public:
     Double2() = default;
-    Double2(double both) : v_(_mm_set1_pd(both)) {}  // NOLINT: a number stands for two of it
+    Double2(double both) : v_(_mm_set1_pd(both)) {}  // NOLINT: implicit, a number stands for both halves
     Double2(double low, double high) : v_(_mm_set_pd(high, low)) {}
 
     double low() const { return _mm_cvtsd_f64(v_); }
@@ -49,7 +49,7 @@ class Double2 {
 class Double2 {
   public:
     Double2() = default;
-    Double2(double both) : low_(both), high_(both) {}  // NOLINT: a number stands for two of it
+    Double2(double both) : low_(both), high_(both) {}  // NOLINT: implicit, a number stands for both halves
     Double2(double low, double high) : low_(low), high_(high) {}
 
     double low() const { return low_; }

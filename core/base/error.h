@@ -18,26 +18,26 @@ namespace shapedb {
 enum class ErrorCode {
     // The scan itself is unusable.
     kNonFiniteCoordinate,   ///< a coordinate is NaN or infinite
-    kCoordinateOutOfRange,  ///< a magnitude or the whole extent is beyond single precision
+    kCoordinateOutOfRange,  ///< a magnitude or the whole extent exceeds single precision
     kTooFewPoints,          ///< fewer than four distinct points
     kAllPointsEqual,        ///< every point is the same point
     kCollinear,             ///< all points lie on one line
     kCoplanar,              ///< all points lie in one plane
     kNoInterior,            ///< no closed interior: every big Delaunay ball is reached from outside
     kPointLimitExceeded,    ///< more points than the configured limit
-    // A file cannot be read as what it says it is.
+    // A file cannot be read or written.
     kFileNotReadable,    ///< missing, a folder, or no permission
-    kUnknownFileFormat,  ///< the ending names no format we read
-    kMalformedFile,      ///< header or body break the format, or the body is cut short
+    kUnknownFileFormat,  ///< the extension is of no format we read
+    kMalformedFile,      ///< header or body break the format, or the file is truncated
     kFileNotWritable,    ///< output cannot be created or written in full
     // The request is wrong.
     kInvalidArgument,     ///< a parameter is outside its documented range
     kMalformedFilter,     ///< a metadata filter does not parse
     kMalformedCursor,     ///< a page cursor is damaged or belongs to another listing
     kMalformedSignature,  ///< signature bytes are damaged or of an unknown version
-    kMalformedStream,     ///< messages of a stream come in an order that has no meaning
-    kChecksumMismatch,    ///< the received points do not have the announced checksum
-    kCountMismatch,       ///< the received points are not as many as announced
+    kMalformedStream,     ///< the messages of a stream come in an invalid order
+    kChecksumMismatch,    ///< the points received do not have the announced checksum
+    kCountMismatch,       ///< the number of points received is not the announced one
     // The request is fine, the state does not allow it.
     kNotFound,         ///< no such collection, shape, key or job
     kAlreadyExists,    ///< insert-only and the key is taken, or the collection exists
@@ -54,19 +54,18 @@ enum class ErrorCode {
     kStorageFull,       ///< no room left on the device
     kDataLoss,          ///< stored bytes are damaged
     kSchemaTooNew,      ///< the database was written by a newer version
-    kInternal,          ///< a broken invariant; always a defect of ours
+    kInternal,          ///< a broken invariant: always a bug of ours
 };
 
 /// Stable snake_case name without the `k`, e.g. "non_finite_coordinate". Used in JSON
 /// output, in logs and in the database.
 const char* errorCodeName(ErrorCode code) noexcept;
 
-/// The inverse of `errorCodeName`; kInternal for a name it does not know (a name
-/// written by a newer version).
+/// The inverse of `errorCodeName`; kInternal for an unknown name (written by a newer version).
 ErrorCode errorCodeFromName(const std::string& name) noexcept;
 
-/// What went wrong and where, in words for the person who has to act on it: what was
-/// wrong, where, and what to do. No trailing full stop, no newline.
+/// The message tells the person who has to act on it what was wrong, where, and what to do. No trailing full
+/// stop, no newline.
 struct Error {
     ErrorCode code = ErrorCode::kInternal;
     std::string message;
@@ -80,7 +79,7 @@ inline tl::unexpected<Error> fail(ErrorCode code, std::string message) {
     return tl::unexpected<Error>(Error{code, std::move(message)});
 }
 
-/// Passes on the error of another Result: `if (!r) return fail(r.error());`
+/// Forwards the error of another Result: `if (!r) return fail(r.error());` (see RETURN_IF_ERROR).
 inline tl::unexpected<Error> fail(Error error) { return tl::unexpected<Error>(std::move(error)); }
 
 }  // namespace shapedb

@@ -1,5 +1,5 @@
-// Memory for large tables: one block, not written until it is used, on large pages where the system has
-// them, because reading it at random waits for the page tables as much as for the memory.
+// Uninitialised memory for large arrays, on huge pages where the system has them: random access to an array
+// of hundreds of megabytes waits as much for page tables as for memory.
 #pragma once
 
 #include <cstddef>
@@ -13,45 +13,46 @@ namespace shapedb {
 
 namespace large_block {
 
-/// Blocks from here on come straight from the system and go back to it at once, smaller ones from the heap.
-constexpr std::size_t kLeastMapped = std::size_t{1} << 20;
-/// From here on large pages are asked for; in less memory the rest of the last one would show.
-constexpr std::size_t kLeastOnLargePages = std::size_t{1} << 23;
+/// Blocks of this size and more are mapped from the system and returned to it at once; smaller ones come
+/// from the heap.
+constexpr std::size_t kMinMapped = std::size_t{1} << 20;
+/// Blocks of this size and more ask for huge pages; in smaller ones the unused end of a page would matter.
+constexpr std::size_t kMinHugePages = std::size_t{1} << 23;
 
-/// Null when there is no such memory. Aligned to 64 bytes at least. On any thread.
-[[nodiscard]] void* take(std::size_t bytes) noexcept;
-/// What take gave for as many bytes.
-void give(void* block, std::size_t bytes) noexcept;
-/// Puts the pages at the front of what is left of one block under another, and what was in either is lost.
-/// Returns how many bytes of the first are gone; 0 where that cannot be done. `from` is at the beginning of a
-/// block or where such a call left it, `to` at the beginning of one.
+/// Null when out of memory. Aligned to at least 64 bytes. Thread-safe.
+[[nodiscard]] void* allocate(std::size_t bytes) noexcept;
+/// `bytes`: as given to allocate.
+void release(void* block, std::size_t bytes) noexcept;
+/// Moves whole pages from the front of one block (`left` bytes remain of it) to the front of another. The
+/// content of both is lost. Returns how many bytes `from` lost; 0 where pages cannot be moved. `from` is the
+/// beginning of a block, or the point up to which earlier calls emptied it; `to` is the beginning of a block.
 [[nodiscard]] std::size_t movePages(void* from, std::size_t left, void* to, std::size_t bytes) noexcept;
 
 }  // namespace large_block
 
-/// Releases what allocateLarge gave.
+/// The deleter of allocateLarge.
 struct FreeLarge {
     std::size_t bytes = 0;
-    void operator()(void* block) const noexcept { large_block::give(block, bytes); }
+    void operator()(void* block) const noexcept { large_block::release(block, bytes); }
 };
 
 template <typename T>
 using LargeBlock = std::unique_ptr<T[], FreeLarge>;
 
-/// Room for `count` of a type that needs no construction, uninitialised; pages that nobody writes take
-/// no memory. Throws std::bad_alloc.
+/// Uninitialised room for `count` elements of a trivial type; pages that are never written take no memory.
+/// Throws std::bad_alloc.
 template <typename T>
 [[nodiscard]] LargeBlock<T> allocateLarge(std::size_t count) {
     static_assert(std::is_trivially_copyable_v<T> && std::is_trivially_destructible_v<T>);
     static_assert(alignof(T) <= 64);
     if (count > static_cast<std::size_t>(-1) / 2 / sizeof(T)) throw std::bad_alloc();
     const std::size_t bytes = count * sizeof(T);
-    void* block = large_block::take(bytes);
+    void* block = large_block::allocate(bytes);
     if (block == nullptr) throw std::bad_alloc();
     return LargeBlock<T>(static_cast<T*>(block), FreeLarge{bytes});
 }
 
-/// Such memory for vectors. What resize() adds is not written: it holds anything until it is assigned.
+/// The same for vectors. Elements that resize() adds are uninitialised.
 template <typename T>
 struct LargeAllocator {
     using value_type = T;
@@ -63,7 +64,7 @@ struct LargeAllocator {
     T* allocate(std::size_t count) { return allocateLarge<T>(count).release(); }
     void deallocate(T* block, std::size_t count) noexcept { FreeLarge{count * sizeof(T)}(block); }
 
-    // Not even members' default values: those would be written, page after page, to be overwritten.
+    // Default member initialisers are skipped too: writing them would touch every page for nothing.
     template <typename U>
     void construct(U*) noexcept {
         static_assert(std::is_trivially_copyable_v<U> && std::is_trivially_destructible_v<U>);
@@ -79,19 +80,19 @@ struct LargeAllocator {
 template <typename T>
 using LargeVector = std::vector<T, LargeAllocator<T>>;
 
-/// A block whose content is not needed any more. A new block gets its pages, which the system then need not
-/// clear: that takes as long as writing them.
-class SpentBlock {
+/// Reuses the pages of a block that is no longer needed for new vectors. Pages fresh from the system would
+/// have to be cleared first, which takes as long as writing them.
+class PageRecycler {
   public:
     template <typename T>
-    explicit SpentBlock(LargeBlock<T>&& block) : left_(block.get_deleter().bytes), next_(block.release()) {}
-    SpentBlock(const SpentBlock&) = delete;
-    SpentBlock& operator=(const SpentBlock&) = delete;
-    ~SpentBlock() {
-        if (left_ > 0) large_block::give(next_, left_);
+    explicit PageRecycler(LargeBlock<T>&& block) : left_(block.get_deleter().bytes), next_(block.release()) {}
+    PageRecycler(const PageRecycler&) = delete;
+    PageRecycler& operator=(const PageRecycler&) = delete;
+    ~PageRecycler() {
+        if (left_ > 0) large_block::release(next_, left_);
     }
 
-    /// A vector of so many elements, which hold anything until they are assigned.
+    /// A vector of `count` uninitialised elements, on recycled pages as far as they last.
     template <typename T>
     [[nodiscard]] LargeVector<T> makeVector(std::size_t count) {
         LargeVector<T> vector(count);

@@ -1,4 +1,4 @@
-// Loops over things that do not depend on each other, on the threads of the caller's arena.
+// Parallel loops over independent items, on the threads of the caller's oneTBB arena.
 #pragma once
 
 #include <algorithm>
@@ -18,15 +18,15 @@
 
 namespace shapedb {
 
-/// As many threads as the caller's arena, and whatever limits it, allow; at least 1.
+/// How many threads the caller's arena and any global limit allow; at least 1.
 [[nodiscard]] inline std::size_t threadsOfArena() {
     const auto allowed = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
     return std::min(static_cast<std::size_t>(std::max(1, tbb::this_task_arena::max_concurrency())), allowed);
 }
 
-/// Calls `work(begin, end)` with ranges that together are [0, count), from any thread; a range has at most
-/// `block` indices. What `work` writes must belong to its indices; then results have the same bits whatever
-/// the number of threads.
+/// Calls `work(begin, end)`, on any thread, for ranges of at most `block` indices that together make
+/// [0, count). If `work` writes only what belongs to its indices, results have the same bits for any number
+/// of threads. Stops between ranges when the context says so.
 ///
 /// Errors: kCancelled, kDeadlineExceeded.
 template <typename Work>
@@ -41,19 +41,19 @@ template <typename Work>
         }
         work(range.begin(), range.end());
     };
-    // Isolated: a thread that waits for the last block must not begin work of its caller's caller. Ranges
-    // are divided down to the block, so that each comes to the checkpoint.
+    // Isolated: a thread waiting for the last range must not pick up unrelated work of an outer loop.
+    // simple_partitioner splits down to `block`, so that checkpoints come often enough.
     tbb::this_task_arena::isolate([&] {
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, block), runBlock,
                           tbb::simple_partitioner());
     });
     if (!stopped) return {};
-    // What stopped a block still holds: a cancelled context stays so, and deadlines do not come back.
+    // The reason still holds: a context stays cancelled, and a deadline that has passed stays passed.
     return context.checkpoint();
 }
 
-/// Calls `work(part, begin, end)` once for each of so many parts of [0, count), as equal as can be and in
-/// order. Otherwise as parallelFor.
+/// Divides [0, count) into `parts` nearly equal ranges and calls `work(part, begin, end)` once for each.
+/// Otherwise as parallelFor.
 template <typename Work>
 [[nodiscard]] Result<void> parallelForParts(std::size_t count, std::size_t parts, const RunContext& context,
                                             const Work& work) {
@@ -62,15 +62,15 @@ template <typename Work>
     });
 }
 
-/// Does all of it, on any threads, and returns when all is done.
+/// Runs all of `works`, on any threads, and returns when all are done.
 template <typename... Works>
 void parallelInvoke(const Works&... works) {
     // Isolated, as above.
     tbb::this_task_arena::isolate([&] { tbb::parallel_invoke(works...); });
 }
 
-/// Calls a copy of `work` with every point of `order`, once each; each block of points, which follow one
-/// another in `order`, has a copy of its own. Otherwise as parallelFor.
+/// Calls `work(point)` once for every point of `order`. Each block of consecutive points gets its own copy of
+/// `work`, which may therefore carry state from point to point. Otherwise as parallelFor.
 template <typename Work>
 [[nodiscard]] Result<void> parallelForPoints(const std::vector<std::uint32_t>& order,
                                              const RunContext& context, const Work& work) {

@@ -1,16 +1,15 @@
-// Asking for memory before it is read.
+// Prefetching for loops that read memory in random order.
 #pragma once
 
 #include <cstddef>
 
 namespace shapedb {
 
-/// In a loop that reads memory at random: how many steps before it is read it is asked for; and what leads
-/// to it.
+/// How many steps ahead to prefetch what a loop reads, and what it needs to compute that address.
 constexpr std::size_t kPrefetchDistance = 8;
 constexpr std::size_t kPrefetchFarDistance = 16;
 
-/// Starts to bring the cache line at `address` near, where the compiler can say so. Any address is allowed.
+/// Starts loading the cache line at `address`, where the compiler supports it. Any address is allowed.
 inline void prefetch(const void* address) {
 #if defined(__GNUC__)
     __builtin_prefetch(address);

@@ -1,4 +1,4 @@
-// Sorting by whole numbers in a time that does not depend on their order.
+// Stable parallel radix sort by unsigned integer keys.
 #pragma once
 
 #include <algorithm>
@@ -18,21 +18,21 @@ struct KeyedIndex {
     std::uint32_t index;
 };
 
-/// Sorts by rising `key`, a whole number; what has equal keys stays in order. Counts digit after digit from
-/// the lowest, leaving out those in which all keys agree. Needs as much memory again. On the threads of the
-/// caller's arena. May throw std::bad_alloc.
+/// Sorts stably by ascending `key(element)`, an unsigned integer: digit by digit from the lowest, skipping
+/// digits in which all keys agree. Needs a second array of the same size. Runs on the threads of the caller's
+/// arena. May throw std::bad_alloc.
 template <typename T, typename Key>
 void radixSort(LargeVector<T>& elements, Key key) {
     constexpr std::uint32_t kDigitBits = 11;
     constexpr std::size_t kValues = std::size_t{1} << kDigitBits;
-    constexpr std::size_t kLeastPart = 1 << 16;
+    constexpr std::size_t kMinPart = 1 << 16;
     using Places = std::array<std::size_t, kValues>;
     if (elements.empty()) return;
     LargeVector<T> other(elements.size());
-    const std::size_t parts = std::clamp<std::size_t>(elements.size() / kLeastPart, 1, threadsOfArena());
-    std::vector<Places> places(parts);  // where the next of each digit goes, for each part
+    const std::size_t parts = std::clamp<std::size_t>(elements.size() / kMinPart, 1, threadsOfArena());
+    std::vector<Places> places(parts);  // by part: where the next element of each digit goes
     const auto inParts = [&](const auto& work) {
-        // Nothing can stop it: there is no context.
+        // Cannot fail: the default context never cancels.
         static_cast<void>(parallelForParts(
             elements.size(), parts, {},
             [&](std::size_t part, std::size_t from, std::size_t to) { work(places[part], from, to); }));
@@ -45,9 +45,9 @@ void radixSort(LargeVector<T>& elements, Key key) {
             counts.fill(0);
             for (std::size_t i = from; i < to; ++i) ++counts[digit(elements[i])];
         });
-        std::size_t alike = 0;
-        for (const Places& counts : places) alike += counts[digit(elements.front())];
-        if (alike == elements.size()) continue;
+        std::size_t agreeing = 0;
+        for (const Places& counts : places) agreeing += counts[digit(elements.front())];
+        if (agreeing == elements.size()) continue;
         std::size_t next = 0;
         for (std::size_t v = 0; v < kValues; ++v) {
             for (Places& counts : places) next += std::exchange(counts[v], next);

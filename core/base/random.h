@@ -1,10 +1,12 @@
-// A small seeded generator whose stream is the same on every platform and library, so
-// that a seed in a test, a document or a bug report means the same points everywhere.
-// (std::normal_distribution and std::shuffle leave their results to the implementation.)
+// A small seeded generator with the same stream on every platform, so that a seed in a test, a document or a
+// bug report means the same points everywhere. (The results of std::normal_distribution and std::shuffle
+// depend on the standard library.)
 #pragma once
 
 #include <cmath>
 #include <cstdint>
+
+#include "core/base/math.h"
 
 namespace shapedb {
 
@@ -38,7 +40,7 @@ class Random {
             return spare_;
         }
         const double radius = std::sqrt(-2.0 * std::log(1.0 - uniform()));
-        const double angle = 6.283185307179586476925 * uniform();
+        const double angle = 2.0 * kPi * uniform();
         spare_ = radius * std::sin(angle);
         hasSpare_ = true;
         return radius * std::cos(angle);

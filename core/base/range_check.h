@@ -1,4 +1,4 @@
-// Checking that a parameter is in range.
+// Range checks of parameters.
 #pragma once
 
 #include <string>

@@ -1,225 +1,124 @@
-// The incremental Delaunay triangulation on flat arrays: the tetrahedra and how a point goes in.
+// Inserting one point into a Delaunay triangulation (Bowyer 1981, Watson 1981): remove the cells whose balls
+// contain it, and join it to the facets around the hole.
 #pragma once
 
 #include <array>
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <utility>
 #include <vector>
 
 #include "core/base/error.h"
 #include "core/base/large_block.h"
-#include "core/delaunay/delaunay_ball.h"
+#include "core/delaunay/cell_store.h"
+#include "core/delaunay/ownership.h"
 #include "core/delaunay/predicates.h"
+#include "core/delaunay/start_cells.h"
 
 namespace shapedb {
 
-/// The vertex at infinity, which closes the triangulation outside the hull.
-constexpr std::uint32_t kInfinite = 0x3fffffffu;
-/// Mark on the first vertex of a cell while a point goes in; set in a free one.
-constexpr std::uint32_t kInCavity = 0x80000000u;
-/// Mark on the first vertex of a cell whose vertices all belong to one worker. No other comes there, so whose
-/// it is needs no question.
-constexpr std::uint32_t kInner = 0x40000000u;
-constexpr std::uint32_t kFreeCell = 0xffffffffu;
-constexpr std::uint32_t kNoCell = 0xffffffffu;
-constexpr std::uint32_t kVertexBits = 0x3fffffffu;
-
-/// A tetrahedron, half a cache line. Neighbour i is opposite vertex i; vertices are positively
-/// oriented (with the one at infinity: if it were moved to a point beyond the other three).
-struct alignas(32) Cell {
-    std::array<std::uint32_t, 4> vertices;  // the first with marks
-    std::array<std::uint32_t, 4> neighbours;
-
-    std::uint32_t firstVertex() const { return vertices[0] & kVertexBits; }
-    /// The vertices without marks.
-    std::array<std::uint32_t, 4> corners() const {
-        return {firstVertex(), vertices[1], vertices[2], vertices[3]};
-    }
-};
-
-/// Whether none of a cell's corners is the vertex at infinity; false for a free cell. Without branches.
-inline bool isFinite(const std::array<std::uint32_t, 4>& corners) {
-    return (static_cast<unsigned>(corners[0] < kInfinite) & static_cast<unsigned>(corners[1] < kInfinite) &
-            static_cast<unsigned>(corners[2] < kInfinite) & static_cast<unsigned>(corners[3] < kInfinite)) !=
-           0;
-}
-
-/// The cells and their balls in a block of memory each, taken from the front. Pages nobody took are never
-/// touched.
-class CellStore {
-  public:
-    /// Makes room for as many cells; what is there stays. Not while another thread takes any.
-    void reserve(std::size_t capacity);
-    /// `count` cells that follow one another, kNoCell when there is no room.
-    std::uint32_t take(std::uint32_t count);
-
-    Cell& operator[](std::uint32_t i) { return cells_[i]; }
-    const Cell& operator[](std::uint32_t i) const { return cells_[i]; }
-    DelaunayBall& ball(std::uint32_t i) { return balls_[i]; }
-    const DelaunayBall& ball(std::uint32_t i) const { return balls_[i]; }
-    /// The memory of the balls, when nothing more is inserted, and that of the cells, when they are not
-    /// needed.
-    SpentBlock giveUpBalls() { return SpentBlock(std::move(balls_)); }
-    SpentBlock giveUpCells() { return SpentBlock(std::move(cells_)); }
-    std::size_t used() const { return used_.load(std::memory_order_relaxed); }
-    std::size_t capacity() const { return capacity_; }
-
-  private:
-    LargeBlock<Cell> cells_;
-    LargeBlock<DelaunayBall> balls_;
-    std::atomic<std::size_t> used_{0};
-    std::size_t capacity_ = 0;
-};
-
-/// Which vertices belong to a worker. The one at infinity belongs to nobody, a cell to the worker that three
-/// of its vertices belong to, or all four.
-///
-/// Workers may insert at the same time without locks. Of the vertices of a facet of its own cells at least
-/// two belong to a worker, so no cell of one is next to a cell of another. What lies between belongs to
-/// nobody and keeps its vertices, and of its four neighbours each worker changes only those behind facets
-/// with two vertices of its own.
-struct Ownership {
-    const std::uint8_t* workers = nullptr;  ///< by vertex
-    std::uint8_t worker = 0;
-    std::uint32_t innerMark = 0;  ///< kInner when cells have that mark now, 0 when it means nothing
-
-    bool holds(std::uint32_t v) const { return v != kInfinite && workers[v] == worker; }
-    bool holdsTwo(std::uint32_t a, std::uint32_t b, std::uint32_t c) const {
-        return count(a) + count(b) + count(c) >= 2;
-    }
-    bool holdsThree(const std::array<std::uint32_t, 4>& v) const { return count(v) >= 3; }
-    bool holdsAll(const std::array<std::uint32_t, 4>& v) const { return count(v) == 4; }
-
-  private:
-    unsigned count(std::uint32_t v) const { return holds(v) ? 1 : 0; }
-    unsigned count(const std::array<std::uint32_t, 4>& v) const {
-        return count(v[0]) + count(v[1]) + count(v[2]) + count(v[3]);
-    }
-};
-
-/// Some cells of one worker all along the order of the vertices, to walk from when the way from the last
-/// point inserted is barred. They may be free by now.
-class StartCells {
-  public:
-    explicit StartCells(std::size_t siteCount) : siteCount_(siteCount), cells_(kSlots, kNoCell) {}
-
-    /// `vertex`: one of its corners.
-    void add(std::uint32_t vertex, std::uint32_t cell) { cells_[slotOf(vertex)] = cell; }
-    /// Calls `visit(cell)` with those around a vertex, the nearest first, until it returns true.
-    template <typename Visit>
-    void visitAround(std::uint32_t vertex, const Visit& visit) const {
-        const auto see = [&](std::size_t slot) { return cells_[slot] != kNoCell && visit(cells_[slot]); };
-        const std::size_t middle = slotOf(vertex);
-        for (std::size_t away = 0; away <= kReach; ++away) {
-            if (middle + away < kSlots && see(middle + away)) return;
-            if (away != 0 && away <= middle && see(middle - away)) return;
-        }
-    }
-
-    static constexpr std::size_t kSlots = 4096;
-
-  private:
-    static constexpr std::size_t kReach = 3;  // slots to either side
-
-    std::size_t slotOf(std::uint32_t vertex) const { return vertex * kSlots / siteCount_; }
-
-    std::size_t siteCount_;
-    std::vector<std::uint32_t> cells_;
-};
-
 enum class Insertion {
-    kDone,
-    kRepeated,   ///< there is a vertex at the same place
-    kElsewhere,  ///< the cavity, or the way to it, leaves the worker's cells: nothing was changed
-    kNoRoom,     ///< the store is full: nothing was changed
+    kInserted,
+    kDuplicate,  ///< there is a vertex at the same place: nothing changed
+    kNotOwned,   ///< the way to the point, or its cavity, leaves the worker's cells: nothing changed
+    kStoreFull,  ///< no room for the new cells: nothing changed
 };
 
-/// What kRepeated means to a caller: kInternal, since points are made distinct before.
-[[nodiscard]] Error notDistinct();
+/// What kDuplicate means to a caller: kInternal, since points are made distinct earlier.
+[[nodiscard]] Error duplicatePointsError();
 
-/// So often who inserts many asks whether to go on.
+/// How many points a loop inserts between two looks at its RunContext.
 constexpr std::size_t kInsertsBetweenCheckpoints = 1024;
 
-/// Inserts points one at a time (Bowyer 1981, Watson 1981). One for each thread.
+/// Inserts sites, one at a time. Not thread-safe: one for each thread. Several may work on the same sites and
+/// cells at once if each has an Ownership of its own.
+///
+/// Between two calls of `insert`: the finite cells are the Delaunay triangulation of the sites inserted so
+/// far; neighbours are mutual; no cell carries kInCavity; the ball of each cell is that of its corners within
+/// the margin of delaunay_ball.h, or says nothing.
 class BowyerWatson {
   public:
-    /// All of them, the first walk beginning at the cell `start`.
+    /// Inserts everywhere. The first walk begins at the cell `start`, which must be in use. The references
+    /// must stay valid, here and below.
     BowyerWatson(LargeVector<Site>& sites, CellStore& cells, std::uint32_t start);
-    /// A worker's. What it is given must live as long as this.
-    BowyerWatson(LargeVector<Site>& sites, CellStore& cells, const Ownership& share,
+    /// Inserts only within what `ownership` allows.
+    BowyerWatson(LargeVector<Site>& sites, CellStore& cells, const Ownership& ownership,
                  const StartCells& starts);
 
-    /// Inserts the site `vertex`, which must be in the share.
+    /// `vertex`: a site that is not inserted yet and, with an Ownership, belongs to its worker. May throw
+    /// std::bad_alloc, which leaves the triangulation unusable.
     Insertion insert(std::uint32_t vertex);
 
     /// A cell of the last point inserted.
     std::uint32_t lastCell() const { return hint_; }
-    /// Cells this worker took and does not use, marked as free.
+    /// Cells of the store that are this inserter's but not in use, all marked kFreeCell.
     std::vector<std::uint32_t>& freeCells() { return free_; }
 
   private:
-    // Corners of cavities have numbers of their own; up to this many, facets meet in a table.
-    static constexpr std::uint32_t kMostCorners = 64;
+    // Corners of a cavity are numbered from 1 (0: the vertex at infinity). With fewer than this many, new
+    // cells find each other in a table.
+    static constexpr std::uint32_t kMaxCorners = 64;
 
-    struct Facet {
-        std::uint32_t cell;                   // inside the cavity
-        std::uint32_t beyond;                 // outside of it
-        std::uint32_t fresh;                  // the new cell on it
-        std::uint8_t index;                   // of the facet in `cell`
-        std::array<std::uint8_t, 3> corners;  // numbers of its corners, seen from inside
+    // A facet of the hole that removing the cavity leaves.
+    struct CavityFacet {
+        std::uint32_t inner;                  // the cell of the cavity that has it
+        std::uint32_t outer;                  // the cell behind it, which stays
+        std::uint32_t created;                // the new cell on it
+        std::uint8_t index;                   // which facet of `inner` it is
+        std::array<std::uint8_t, 3> corners;  // numbers of its corners, in the order of kFacet[index]
     };
 
-    // kAlone: everything is this one's, which needs no questions.
-    template <bool kAlone>
+    // Finding the cavity: bowyer_watson.cpp. kSerial: everything is this inserter's, nothing to check.
+    template <bool kSerial>
     Insertion insertAs(std::uint32_t vertex);
-    template <bool kAlone>
+    template <bool kSerial>
     bool owns(std::uint32_t cell) const;
-    bool ownsAtBorder(std::uint32_t cell) const;
+    bool ownsByVertices(std::uint32_t cell) const;
     bool conflicts(std::uint32_t cell, const Site& p) const;
-    unsigned neighboursHolding(std::uint32_t cell, const Site& p) const;
-    void makeRoom();
-    template <bool kAlone>
+    unsigned conflictingNeighbours(std::uint32_t cell, const Site& p) const;
+    template <bool kSerial>
     std::uint32_t locate(std::uint32_t vertex, const Site& p) const;
-    template <bool kAlone>
+    template <bool kSerial>
     std::uint32_t walk(std::uint32_t start, const Site& p) const;
-    bool isVertexOf(std::uint32_t cell, const Site& p) const;
-    template <bool kAlone>
+    bool hasVertexAt(std::uint32_t cell, const Site& p) const;
+    bool listsHaveRoom() const;
+    void growLists();
+    template <bool kSerial>
     bool findCavity(std::uint32_t first, const Site& p);
-    void unmark();
-    bool takeFresh();
-    template <bool kAlone>
-    void fillCavity(std::uint32_t vertex);
-    // kOurs: all corners of the cavity are this one's.
-    template <bool kOurs>
-    void joinFresh(std::uint32_t vertex);
-    void placeFresh(std::uint32_t vertex, std::uint32_t mark);
-    void markInner();
-    void measureBalls(const Site& p);
+    void unmarkCavity();
+
+    // Filling it: cavity_filling.cpp. kAllOwned: every corner of the cavity is this inserter's.
+    template <bool kSerial>
+    bool fillCavity(std::uint32_t vertex);
+    bool takeNewCells();
+    void placeNewCells(std::uint32_t vertex, std::uint32_t mark);
+    void markSolelyOwned();
+    template <bool kAllOwned>
+    void linkNewCells(std::uint32_t vertex);
     std::uint32_t numberAmong(std::uint32_t vertex, std::uint32_t count) const;
-    template <bool kOurs>
+    template <bool kAllOwned>
     bool numberCorners(std::uint32_t inserted);
     void linkByTable();
     void linkByTurning();
-    void linkAround(const Facet& facet, std::uint32_t j);
+    void linkAroundEdge(const CavityFacet& facet, std::uint32_t j);
+    void computeBalls(const Site& p);
 
     LargeVector<Site>& sites_;
     CellStore& cells_;
-    Ownership share_;
-    const StartCells* starts_ = nullptr;  // none: everything is this one's
-    std::uint32_t hint_;
+    Ownership ownership_;
+    const StartCells* starts_ = nullptr;  // null: everything is this inserter's
+    std::uint32_t hint_;                  // where the next walk begins
     std::vector<std::uint32_t> free_;
-    // Lists with room to spare at the end, where entries are written before it is known whether they count.
+    // Lists of which only the first `count` entries are valid; findCavity writes the next before it knows
+    // whether it belongs.
     std::vector<std::uint32_t> cavity_;
     std::size_t cavityCount_ = 0;
-    std::uint32_t cavityMark_ = 0;  // kInner when all cells of the cavity have it
-    std::vector<Facet> facets_;
+    std::uint32_t cavityMark_ = 0;  // kSoleOwner when all cells of the cavity have it
+    std::vector<CavityFacet> facets_;
     std::size_t facetCount_ = 0;
-    std::array<std::uint32_t, kMostCorners> corners_{};  // the vertex of each number
+    std::array<std::uint32_t, kMaxCorners> corners_{};  // the vertex of each number
     std::uint32_t cornerCount_ = 0;
-    // For an edge from one corner to another: the facet to its left.
-    std::array<std::array<std::uint16_t, kMostCorners>, kMostCorners> sides_{};
+    // facetLeftOf_[a][b]: the facet to the left of the edge from corner a to corner b.
+    std::array<std::array<std::uint16_t, kMaxCorners>, kMaxCorners> facetLeftOf_{};
 };
 
 }  // namespace shapedb

@@ -14,20 +14,20 @@
 #include "core/delaunay/bowyer_watson.h"
 #include "core/delaunay/flat_delaunay.h"
 #include "core/delaunay/hilbert_order.h"
+#include "core/geometry/merge_duplicates.h"
 #include "core/geometry/tetrahedron.h"
 #include "core/geometry/vec3x2.h"
-#include "core/preparation/sanitise.h"
 
 namespace shapedb {
 
 namespace {
 
-// A tetrahedron is computed exactly when its volume, as a share of the box spanned by its three
-// edges at a corner, leaves fewer than about six correct digits in double precision.
-constexpr double kFlatShare = 1e-10;
+// Below this ratio of six volumes to the product of the edges at the first corner, double precision leaves
+// fewer than about six correct digits of the circumcentre, and it is computed exactly.
+constexpr double kFlatRatio = 1e-10;
 
-// Where they lie seen from their first corners, as two tetrahedra have it side by side. Bit 0 or 1 of the
-// result: in double precision it would be good for nothing.
+// The circumcentres of two tetrahedra, side by side, relative to their first corners; a, b and c are the
+// other corners, likewise. Bit 0 or 1 of the result: that tetrahedron is too flat for double precision.
 unsigned circumcentres(const Vec3x2& a, const Vec3x2& b, const Vec3x2& c, Vec3x2& fromFirst) {
     const Vec3x2 bc = cross(b, c);
     const Double2 aa = squaredLength(a);
@@ -36,26 +36,26 @@ unsigned circumcentres(const Vec3x2& a, const Vec3x2& b, const Vec3x2& c, Vec3x2
     const Double2 sixVolumes = dot(a, bc);
     fromFirst = (Double2(0.5) / sixVolumes) * (aa * bc + bb * cross(c, a) + cc * cross(a, b));
     const unsigned solid = less(0.0, sixVolumes) &
-                           less(Double2(kFlatShare * kFlatShare) * (aa * bb * cc), sixVolumes * sixVolumes);
+                           less(Double2(kFlatRatio * kFlatRatio) * (aa * bb * cc), sixVolumes * sixVolumes);
     return ~solid & 3u;
 }
 
 using Corners = std::array<std::uint32_t, 4>;
 
-// The even permutation of the corners that has the lowest first and the lowest of the others second,
-// applied to corners and neighbours. So a tetrahedron looks the same whatever made it. Two exchanges
-// keep the sense; comparing without branches, because which corner is lowest is random.
+// Applies the even permutation that puts the lowest corner first and the lowest of the others second to
+// corners and neighbours, so that a tetrahedron looks the same however it came about. An even number of swaps
+// keeps the orientation. Branch-free as far as possible, because which corner is lowest is random.
 void makeCanonical(Cell& cell) {
     Corners& v = cell.vertices;
     Corners& n = cell.neighbours;
-    const auto exchange = [&](std::uint32_t i, std::uint32_t j) {
+    const auto swapPlaces = [&](std::uint32_t i, std::uint32_t j) {
         std::swap(v[i], v[j]);
         std::swap(n[i], n[j]);
     };
     const std::uint32_t low01 = v[1] < v[0] ? 1 : 0;
     const std::uint32_t low23 = v[3] < v[2] ? 3 : 2;
     const std::uint32_t first = v[low23] < v[low01] ? low23 : low01;
-    // The lowest to the front by exchanging both pairs: (0 1)(2 3), (0 2)(1 3) or (0 3)(1 2).
+    // The lowest to the front by a double swap: (0 1)(2 3), (0 2)(1 3) or (0 3)(1 2).
     const Corners w = v;
     const Corners m = n;
     for (std::uint32_t i = 0; i < 4; ++i) {
@@ -63,25 +63,25 @@ void makeCanonical(Cell& cell) {
         n[i] = m[i ^ first];
     }
     if (v[2] < v[1] && v[2] < v[3]) {
-        exchange(1, 2);
-        exchange(2, 3);
+        swapPlaces(1, 2);
+        swapPlaces(2, 3);
     } else if (v[3] < v[1]) {
-        exchange(1, 3);
-        exchange(2, 3);
+        swapPlaces(1, 3);
+        swapPlaces(2, 3);
     }
 }
 
-// How many steps before it is read memory at random is asked for; and what leads to such memory.
+// How many steps ahead to prefetch what a loop reads, and what it needs to compute that address.
 constexpr std::size_t kAhead = 12;
 constexpr std::size_t kFarAhead = 24;
 
-// Cells or tetrahedra that a thread takes at a time.
-constexpr std::size_t kBlock = 8192;
-// A part of the store with fewer cells is not worth counts of its own.
-constexpr std::size_t kLeastPart = std::size_t{1} << 18;
+constexpr std::size_t kBlock = 8192;  // points, cells or tetrahedra that a thread handles at a time
+// Parts of the store with fewer cells are not worth counters of their own.
+constexpr std::size_t kMinPart = std::size_t{1} << 18;
 
-// How many finite cells of each part of the store have a vertex as their lowest, and then where in the list
-// of all they begin.
+// A counting sort by lowest vertex, over parts of the store in parallel. First `at` counts the finite cells
+// of a part that have a vertex as their lowest; after toPlaces it is where the next of them goes in the
+// sorted list.
 class LowestVertices {
   public:
     LowestVertices(std::size_t parts, std::size_t siteCount)
@@ -92,7 +92,7 @@ class LowestVertices {
         const auto begin = counts_.begin() + static_cast<std::ptrdiff_t>(part * siteCount_);
         std::fill(begin, begin + static_cast<std::ptrdiff_t>(siteCount_), 0);
     }
-    // Returns where the cells of each vertex begin, and their number.
+    // Returns where the cells of each vertex begin and, as the last entry, their total number.
     LargeVector<std::uint32_t> toPlaces() {
         LargeVector<std::uint32_t> begin(siteCount_ + 1);
         std::uint32_t next = 0;
@@ -112,11 +112,12 @@ class LowestVertices {
     LargeVector<std::uint32_t> counts_;
 };
 
-// The finite cells, made canonical, by their corners. The places of cells in the store, which depend on
-// the threads, leave no trace. `place`: kNoTetrahedron for the others.
+// Makes the finite cells canonical and returns them sorted by their corners: where they lie in the store,
+// which depends on the threads, leaves no trace. Post: place[c] is the position of cell c in that list,
+// kNoTetrahedron for cells at infinity and free ones; no cell has marks.
 Result<LargeVector<std::uint32_t>> sortedCells(CellStore& cells, std::size_t siteCount,
                                                LargeVector<std::uint32_t>& place, const RunContext& context) {
-    const std::size_t parts = std::clamp<std::size_t>(cells.used() / kLeastPart, 1, threadsOfArena());
+    const std::size_t parts = std::clamp<std::size_t>(cells.used() / kMinPart, 1, threadsOfArena());
     LowestVertices lowest(parts, siteCount);
     auto done = parallelForParts(cells.used(), parts, context,
                                  [&](std::size_t part, std::size_t from, std::size_t to) {
@@ -124,7 +125,7 @@ Result<LargeVector<std::uint32_t>> sortedCells(CellStore& cells, std::size_t sit
                                      for (std::size_t c = from; c < to; ++c) {
                                          Cell& cell = cells[static_cast<std::uint32_t>(c)];
                                          place[c] = kNoTetrahedron;
-                                         cell.vertices[0] = cell.firstVertex();  // no mark from here on
+                                         cell.vertices[0] = cell.firstVertex();  // not finite for a free cell
                                          if (!isFinite(cell.vertices)) continue;
                                          makeCanonical(cell);
                                          ++lowest.at(part, cell.vertices[0]);
@@ -142,7 +143,8 @@ Result<LargeVector<std::uint32_t>> sortedCells(CellStore& cells, std::size_t sit
                                 }
                             });
     RETURN_IF_ERROR(done);
-    // Three corners in their sense belong to one tetrahedron, so the second and third decide.
+    // Within the cells of one lowest vertex: the second and third corner decide, since only one cell lies on
+    // either side of a facet.
     done = parallelFor(siteCount, kBlock, context, [&](std::size_t from, std::size_t to) {
         std::vector<std::pair<std::uint64_t, std::uint32_t>> group;
         for (std::size_t v = from; v < to; ++v) {
@@ -163,16 +165,17 @@ Result<LargeVector<std::uint32_t>> sortedCells(CellStore& cells, std::size_t sit
     return sorted;
 }
 
-// `order`: the point of each site.
+// Copies the finite cells into their final order, balls apart. `order`: the point of each site.
+// Pre: nothing more is inserted; the memory of the cached balls is reused.
 Result<Tetrahedra> flatten(CellStore& cells, const std::vector<std::uint32_t>& order,
                            const RunContext& context) {
-    LargeVector<std::uint32_t> place(cells.used());  // of a cell among the tetrahedra
+    LargeVector<std::uint32_t> place(cells.used());
     const auto sorted = sortedCells(cells, order.size(), place, context);
     RETURN_IF_ERROR(sorted);
     const LargeVector<std::uint32_t>& cellOf = *sorted;
     Tetrahedra flat;
     {
-        SpentBlock balls = cells.giveUpBalls();
+        PageRecycler balls = cells.recycleBalls();
         flat.vertices = balls.makeVector<Corners>(cellOf.size());
         flat.neighbours = balls.makeVector<Corners>(cellOf.size());
     }
@@ -193,18 +196,18 @@ Result<Tetrahedra> flatten(CellStore& cells, const std::vector<std::uint32_t>& o
     return flat;
 }
 
-// The balls of two tetrahedra, which may be the same.
-void measureTwoBalls(const PointCloud& points, Tetrahedra& flat, std::size_t t, std::size_t u) {
+// The balls of tetrahedra t and u, which may be the same.
+void computeTwoBalls(const PointCloud& points, Tetrahedra& flat, std::size_t t, std::size_t u) {
     const Corners& v = flat.vertices[t];
     const Corners& w = flat.vertices[u];
     const Vec3x2 first(points[v[0]], points[w[0]]);
-    const auto wayTo = [&](std::size_t i) { return Vec3x2(points[v[i]], points[w[i]]) - first; };
+    const auto offsetTo = [&](std::size_t i) { return Vec3x2(points[v[i]], points[w[i]]) - first; };
     Vec3x2 fromFirst;
-    const unsigned flatOnes = circumcentres(wayTo(1), wayTo(2), wayTo(3), fromFirst);
+    const unsigned tooFlat = circumcentres(offsetTo(1), offsetTo(2), offsetTo(3), fromFirst);
     Vec3x2 centre = first + fromFirst;
-    if (flatOnes != 0) {
-        centre = Vec3x2((flatOnes & 1u) != 0 ? exactCircumcentre(cornersOf(points, v)) : centre.low(),
-                        (flatOnes & 2u) != 0 ? exactCircumcentre(cornersOf(points, w)) : centre.high());
+    if (tooFlat != 0) {
+        centre = Vec3x2((tooFlat & 1u) != 0 ? exactCircumcentre(cornersOf(points, v)) : centre.low(),
+                        (tooFlat & 2u) != 0 ? exactCircumcentre(cornersOf(points, w)) : centre.high());
     }
     const Double2 radius = length(centre - first);
     flat.circumcentres[t] = centre.low();
@@ -213,30 +216,23 @@ void measureTwoBalls(const PointCloud& points, Tetrahedra& flat, std::size_t t, 
     flat.circumradii[u] = radius.high();
 }
 
-// `spent`: memory for them.
-Result<void> measureBalls(const PointCloud& points, Tetrahedra& flat, SpentBlock spent,
+Result<void> computeBalls(const PointCloud& points, Tetrahedra& flat, PageRecycler pages,
                           const RunContext& context) {
-    flat.circumcentres = spent.makeVector<Point3>(flat.size());
-    flat.circumradii = spent.makeVector<double>(flat.size());
+    flat.circumcentres = pages.makeVector<Point3>(flat.size());
+    flat.circumradii = pages.makeVector<double>(flat.size());
     return parallelFor(flat.size(), kBlock, context, [&](std::size_t from, std::size_t to) {
-        for (std::size_t t = from; t < to; t += 2) measureTwoBalls(points, flat, t, std::min(t + 1, to - 1));
+        for (std::size_t t = from; t < to; t += 2) computeTwoBalls(points, flat, t, std::min(t + 1, to - 1));
     });
 }
 
 Result<void> checkDistinct(const PointCloud& points) {
     if (mergeDuplicates(points).points.size() == points.size()) return {};
-    return fail(notDistinct());
+    return fail(duplicatePointsError());
 }
 
-std::vector<std::uint32_t> insertionOrder(const PointCloud& points, PointOrder given) {
-    if (given == PointOrder::kAny) return hilbertOrder(points);
-    std::vector<std::uint32_t> order(points.size());
-    std::iota(order.begin(), order.end(), 0);
-    return order;
-}
-
-Result<Tetrahedra> triangulateOrThrow(const PointCloud& points, const RunContext& context, PointOrder given) {
-    const std::vector<std::uint32_t> order = insertionOrder(points, given);
+// Sites are numbered by `order`, so that they lie in Hilbert order in memory.
+Result<Tetrahedra> triangulateInOrder(const PointCloud& points, const std::vector<std::uint32_t>& order,
+                                      const RunContext& context) {
     CellStore cells;
     LargeVector<Site> sites(points.size());
     auto placed = parallelFor(sites.size(), kBlock, context, [&](std::size_t from, std::size_t to) {
@@ -246,31 +242,46 @@ Result<Tetrahedra> triangulateOrThrow(const PointCloud& points, const RunContext
         }
     });
     RETURN_IF_ERROR(placed);
-    if (auto done = insertAll(sites, cells, threadsOfArena(), context); !done) {
+    if (auto done = buildTriangulation(sites, cells, threadsOfArena(), context); !done) {
         if (done.error().code == ErrorCode::kCollinear || done.error().code == ErrorCode::kCoplanar) {
             RETURN_IF_ERROR(checkDistinct(points));
         }
         return fail(done.error());
     }
-    LargeVector<Site>().swap(sites);  // only so is its memory free
+    LargeVector<Site>().swap(sites);  // unlike clear(), frees the memory
     auto flat = flatten(cells, order, context);
     if (!flat) return flat;
-    RETURN_IF_ERROR(measureBalls(points, *flat, cells.giveUpCells(), context));
+    RETURN_IF_ERROR(computeBalls(points, *flat, cells.recycleCells(), context));
     return flat;
 }
 
-}  // namespace
-
-Result<Tetrahedra> triangulate(const PointCloud& points, const RunContext& context, PointOrder order) {
+// `makeOrder` returns the order in which the points are numbered as sites.
+template <typename MakeOrder>
+Result<Tetrahedra> triangulateWith(const PointCloud& points, const RunContext& context,
+                                   const MakeOrder& makeOrder) {
     if (points.size() < 4) return fail(ErrorCode::kTooFewPoints, "fewer than 4 distinct points");
     try {
-        return triangulateOrThrow(points, context, order);
+        return triangulateInOrder(points, makeOrder(), context);
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::kOutOfMemory, "not enough memory for the Delaunay triangulation of " +
                                                  std::to_string(points.size()) + " points");
     } catch (const std::exception& e) {
         return fail(ErrorCode::kInternal, std::string("Delaunay triangulation: ") + e.what());
     }
+}
+
+}  // namespace
+
+Result<Tetrahedra> triangulate(const PointCloud& points, const RunContext& context) {
+    return triangulateWith(points, context, [&] { return hilbertOrder(points); });
+}
+
+Result<Tetrahedra> triangulate(const HilbertSortedCloud& sorted, const RunContext& context) {
+    return triangulateWith(sorted.points(), context, [&] {
+        std::vector<std::uint32_t> order(sorted.points().size());
+        std::iota(order.begin(), order.end(), 0);
+        return order;
+    });
 }
 
 }  // namespace shapedb

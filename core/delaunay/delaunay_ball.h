@@ -1,5 +1,6 @@
-// The ball of a cell as doubles give it, which most often tells whether it holds a point. Quicker than
-// the determinant of predicates.h, and of the cell's corners it needs none.
+// The ball of a cell in double precision, cached beside the cell. It nearly always tells whether a point lies
+// inside, with a fraction of the arithmetic of sideOfSphere and without reading the cell's corners. Within a
+// proven margin of the sphere it says "unknown", and the exact predicate decides.
 #pragma once
 
 #include <algorithm>
@@ -14,7 +15,7 @@
 
 namespace shapedb {
 
-/// Centre and squared radius. A NaN for the latter: the ball says nothing.
+/// Centre and squared radius. With kNoBall as squared radius everything is unknown.
 struct alignas(32) DelaunayBall {
     double x;
     double y;
@@ -24,47 +25,48 @@ struct alignas(32) DelaunayBall {
 
 constexpr double kNoBall = std::numeric_limits<double>::quiet_NaN();
 
-/// From a point to another and its squared length.
-struct Way {
+/// The vector from one point to another and its squared length.
+struct Offset {
     double x = 0.0;
     double y = 0.0;
     double z = 0.0;
     double squared = 0.0;
 };
 
-[[nodiscard]] inline Way wayTo(const Site& from, const Site& to) {
+[[nodiscard]] inline Offset offsetTo(const Site& from, const Site& to) {
     const double x = to.x - from.x, y = to.y - from.y, z = to.z - from.z;
     return {x, y, z, x * x + y * y + z * z};
 }
 
-/// The share of the squares in the comparison of ballsHold that their errors may reach. See ballsThrough.
-constexpr double kBallSlack = 1e-8;
+/// What ballsContain compares is off by less than a fifth of this share of the squares compared; the proof is
+/// at ballsThrough.
+constexpr double kBallMargin = 1e-8;
 
-/// What two balls say about a point; bit 0 or 1 for each.
-struct Held {
-    unsigned surely;   ///< the ball holds the point
-    unsigned unknown;  ///< it may hold it, or have it on its sphere
+/// What two balls say about a point, bit 0 for the first and bit 1 for the second.
+struct Containment {
+    unsigned inside;   ///< the point is strictly inside, for certain
+    unsigned unknown;  ///< it may be inside, outside or on the sphere
 };
 
-[[nodiscard]] inline Held ballsHold(const DelaunayBall& a, const DelaunayBall& b, const Site& p) {
+[[nodiscard]] inline Containment ballsContain(const DelaunayBall& a, const DelaunayBall& b, const Site& p) {
     const Double2 x = Double2(a.x, b.x) - p.x, y = Double2(a.y, b.y) - p.y, z = Double2(a.z, b.z) - p.z;
     const Double2 squaredRadius(a.squaredRadius, b.squaredRadius);
     const Double2 squared = x * x + y * y + z * z;
     const Double2 within = squaredRadius - squared;
-    const Double2 slack = Double2(kBallSlack) * (squaredRadius + squared);
-    const unsigned surely = less(slack, within);
-    const unsigned surelyNot = less(within, Double2(0.0) - slack);
-    return {surely, ~(surely | surelyNot) & 3u};
+    const Double2 margin = Double2(kBallMargin) * (squaredRadius + squared);
+    const unsigned inside = less(margin, within);
+    const unsigned outside = less(within, Double2(0.0) - margin);
+    return {inside, ~(inside | outside) & 3u};  // comparisons with NaN are false: unknown
 }
 
-/// Three ways from a point, and three others from it.
-struct Ways2 {
+/// Two sets of three offsets from one point, side by side.
+struct Offsets2 {
     std::array<Double2, 3> x;
     std::array<Double2, 3> y;
     std::array<Double2, 3> z;
     std::array<Double2, 3> squared;
 
-    Ways2(const std::array<const Way*, 3>& first, const std::array<const Way*, 3>& second) {
+    Offsets2(const std::array<const Offset*, 3>& first, const std::array<const Offset*, 3>& second) {
         for (std::size_t i = 0; i < 3; ++i) {
             x[i] = {first[i]->x, second[i]->x};
             y[i] = {first[i]->y, second[i]->y};
@@ -74,19 +76,25 @@ struct Ways2 {
     }
 };
 
-/// The balls with p and the ends of three ways from p on their spheres, for two times three; without a
-/// radius where they would not be accurate enough.
+/// Two balls: each has p, and the three points at its offsets from p, on its sphere. A ball that would not be
+/// accurate enough gets kNoBall as its radius.
 ///
-/// With u = 2^-53, R the radius and S = |a| |b| |c|: the cross products are off by 6 u |b| |c|, so the
-/// determinant by 12 u S and the centre seen from p, whose ways are at most 2 R long, by
-/// (40 u S / det + 12 u S / det) R. Flatness is limited so that S / det < 1e5, which makes 6e-10 R. The
-/// centre is rounded at a place that is at most 1e6 R from the origin: 2e-10 R. A centre off by d moves
-/// what ballsHold compares by 2 |p - q| d, less than 2e-9 of the sum of the squares, a fifth of
-/// kBallSlack. The limits on the determinant keep all of it clear of underflow.
-inline void ballsThrough(const Site& p, const Ways2& w, DelaunayBall& first, DelaunayBall& second) {
-    constexpr double kSquaredFlatness = 1e-10;
-    constexpr double kLeastSquaredDeterminant = 1e-200;
-    constexpr double kSquaredNearness = 1e-12;
+/// Proof of the margin. Let u = 2^-53, a, b, c the offsets from p, R the radius and S = |a| |b| |c|.
+///  - A cross product is off by at most 6 u |b| |c|, so the determinant by 12 u S, and the centre as seen
+///  from p,
+///    since no offset is longer than 2 R, by (40 u S / det + 12 u S / det) R. `accurate` demands S / det <
+///    1e5, which makes that 6e-10 R.
+///  - Adding p rounds each coordinate of the centre by u times its size. `accurate` demands R > 1e-6 max
+///  |p_i|,
+///    so that size is at most about 1e6 R, and the centre moves by 2e-10 R.
+///  - A centre off by d moves what ballsContain compares, for a point q, by at most 2 |p - q| d, less than
+///  2e-9
+///    of the sum of the squares: a fifth of kBallMargin.
+/// The bound on the determinant itself keeps all of this clear of underflow.
+inline void ballsThrough(const Site& p, const Offsets2& w, DelaunayBall& first, DelaunayBall& second) {
+    constexpr double kMinSquaredFlatness = 1e-10;
+    constexpr double kMinSquaredDeterminant = 1e-200;
+    constexpr double kMinSquaredNearness = 1e-12;
     const auto& [x, y, z, squared] = w;
     const Double2 bcx = y[1] * z[2] - z[1] * y[2], bcy = z[1] * x[2] - x[1] * z[2],
                   bcz = x[1] * y[2] - y[1] * x[2];
@@ -101,10 +109,10 @@ inline void ballsThrough(const Site& p, const Ways2& w, DelaunayBall& first, Del
     const Double2 cz = Double2(p.z) + half * (squared[0] * bcz + squared[1] * caz + squared[2] * abz);
     const Double2 fromX = cx - p.x, fromY = cy - p.y, fromZ = cz - p.z;
     const Double2 squaredRadius = fromX * fromX + fromY * fromY + fromZ * fromZ;
-    const double reach = most(std::abs(p.x), std::abs(p.y), std::abs(p.z));
+    const double reach = max3(std::abs(p.x), std::abs(p.y), std::abs(p.z));
     const unsigned accurate =
-        less(Double2(kSquaredFlatness) * squared[0] * squared[1] * squared[2], det * det) &
-        less(kLeastSquaredDeterminant, det * det) & less(kSquaredNearness * reach * reach, squaredRadius);
+        less(Double2(kMinSquaredFlatness) * squared[0] * squared[1] * squared[2], det * det) &
+        less(kMinSquaredDeterminant, det * det) & less(kMinSquaredNearness * reach * reach, squaredRadius);
     first = {cx.low(), cy.low(), cz.low(), (accurate & 1u) != 0 ? squaredRadius.low() : kNoBall};
     second = {cx.high(), cy.high(), cz.high(), (accurate & 2u) != 0 ? squaredRadius.high() : kNoBall};
 }

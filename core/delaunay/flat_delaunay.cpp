@@ -15,21 +15,20 @@ namespace shapedb {
 
 namespace {
 
-// Cells to make room for, by points. A scan has six or seven a point; when there are more the store
-// grows.
+// Cells to reserve for each point. A scan has six or seven; where there are more, the store grows.
 constexpr std::size_t kCellsPerPoint = 8;
 constexpr std::size_t kSpareCells = 4096;
-constexpr std::size_t kMostCells = 0xfffffff0u;
+constexpr std::size_t kMaxCells = 0xfffffff0u;
 
-// Each round inserts this many times as many points as all before it.
+// After each round there are 2^kRoundShift times as many points as before it.
 constexpr int kRoundShift = 2;
 constexpr std::size_t kSmallestRound = 512;
-// What a round leaves is divided again when each thread has this part of the least share of a round: its
-// points lie far from each other, which takes more time for each.
-constexpr std::size_t kLeastLeft = 8;
+// What a parallel round leaves goes in parallel again from this fraction (1 in ...) of minPerThread on: its
+// points lie far apart, so each of them takes longer.
+constexpr std::size_t kPendingFraction = 8;
 
-// Mixes the bits of an index (the finaliser of MurmurHash3).
-std::uint32_t scrambled(std::uint32_t i) {
+// Mixes the bits of an index: the finaliser of MurmurHash3.
+std::uint32_t hashOf(std::uint32_t i) {
     i ^= i >> 16;
     i *= 0x85ebca6bu;
     i ^= i >> 13;
@@ -37,8 +36,10 @@ std::uint32_t scrambled(std::uint32_t i) {
     return i ^ (i >> 16);
 }
 
-// The insertion order (Amenta, Choi and Rote, "Incremental constructions con BRIO", 2003): rounds of
-// random choice, each in the order of the sites. `ends` are where they end.
+// A biased randomised insertion order (Amenta, Choi and Rote, "Incremental constructions con BRIO", 2003):
+// each site goes to a round at random, by a hash of its number; within a round, sites keep their order. The
+// random rounds bound the number of cells made in vain, the order within them keeps walks short and memory
+// close. Round k is order[ends[k - 1]] up to, excluding, order[ends[k]].
 struct Rounds {
     std::vector<std::uint32_t> order;
     std::vector<std::size_t> ends;
@@ -49,8 +50,7 @@ Rounds makeRounds(std::size_t count) {
     while ((count >> (kRoundShift * rounds)) > kSmallestRound) ++rounds;
     const auto roundOf = [&](std::uint32_t i) {
         int round = rounds - 1;
-        for (std::uint32_t bits = scrambled(i); round > 0 && (bits & ((1u << kRoundShift) - 1)) == 0;
-             --round) {
+        for (std::uint32_t bits = hashOf(i); round > 0 && (bits & ((1u << kRoundShift) - 1)) == 0; --round) {
             bits >>= kRoundShift;
         }
         return static_cast<std::size_t>(round);
@@ -73,58 +73,61 @@ bool onOneLine(const Site& a, const Site& b, const Site& c) {
 class Builder {
   public:
     Builder(LargeVector<Site>& sites, CellStore& cells, std::size_t threads, const RunContext& context,
-            const Division& division)
+            const ParallelLimits& limits)
         : sites_(sites),
           cells_(cells),
-          threads_(std::min(threads, ParallelInsertion::kMostWorkers)),
+          threads_(std::min(threads, ParallelInsertion::kMaxWorkers)),
           context_(context),
-          division_(division),
-          crew_(sites, cells, threads_, context, done_) {}
+          limits_(limits),
+          parallel_(sites, cells, threads_, context, done_) {}
 
     Result<void> build() {
         RETURN_IF_ERROR(context_.checkpoint());
         context_.report("delaunay", 0, sites_.size());
         cells_.reserve(kCellsPerPoint * sites_.size() + kSpareCells);
         const Rounds rounds = makeRounds(sites_.size());
-        RETURN_IF_ERROR(beginWithFour(rounds.order));
+        RETURN_IF_ERROR(makeFirstCells(rounds.order));
         std::size_t begin = 0;
         for (const std::size_t end : rounds.ends) {
-            std::vector<std::uint32_t> left(rounds.order.begin() + static_cast<std::ptrdiff_t>(begin),
-                                            rounds.order.begin() + static_cast<std::ptrdiff_t>(end));
-            leaveOutFirst(left);
-            RETURN_IF_ERROR(insertRound(std::move(left)));
+            std::vector<std::uint32_t> pending(rounds.order.begin() + static_cast<std::ptrdiff_t>(begin),
+                                               rounds.order.begin() + static_cast<std::ptrdiff_t>(end));
+            dropFirst(pending);
+            RETURN_IF_ERROR(insertRound(std::move(pending)));
             begin = end;
         }
         return {};
     }
 
   private:
-    void leaveOutFirst(std::vector<std::uint32_t>& list) const {
+    void dropFirst(std::vector<std::uint32_t>& list) const {
         const auto taken = [&](std::uint32_t v) {
             return std::find(first_.begin(), first_.end(), v) != first_.end();
         };
         list.erase(std::remove_if(list.begin(), list.end(), taken), list.end());
     }
-    Result<void> beginWithFour(const std::vector<std::uint32_t>& order);
-    Result<void> insertRound(std::vector<std::uint32_t> left);
-    Result<void> insertAlone(const std::vector<std::uint32_t>& list);
-    Result<void> insertTogether(std::vector<std::uint32_t>& list);
+    Result<void> makeFirstCells(const std::vector<std::uint32_t>& order);
+    Result<void> insertRound(std::vector<std::uint32_t> pending);
+    Result<void> insertSerially(const std::vector<std::uint32_t>& list);
+    Result<void> insertInParallel(std::vector<std::uint32_t>& list);
     std::uint32_t anyCell() const;
 
     LargeVector<Site>& sites_;
     CellStore& cells_;
     std::size_t threads_;
     const RunContext& context_;
-    const Division& division_;
+    const ParallelLimits& limits_;
     std::array<std::uint32_t, 4> first_{};
-    std::vector<std::uint32_t> free_;
-    std::uint32_t last_ = 0;  // a cell to walk from
+    std::vector<std::uint32_t> free_;  // cells of the store that are not in use
+    std::uint32_t last_ = 0;           // a cell in use, where the next walk begins
     std::atomic<std::size_t> done_{0};
-    ParallelInsertion crew_;
+    ParallelInsertion parallel_;
 };
 
-// One cell between the first four points that span space, and the four outside of it.
-Result<void> Builder::beginWithFour(const std::vector<std::uint32_t>& order) {
+// Makes the cell of the first four sites that span space, and the four cells at infinity around it.
+//
+// Post: neighbours are mutual, all five cells are positively oriented and have no ball; `done_` is 4. The
+// four sites have to be skipped later.
+Result<void> Builder::makeFirstCells(const std::vector<std::uint32_t>& order) {
     const auto site = [&](std::size_t i) -> const Site& { return sites_[order[i]]; };
     std::size_t b = 1;
     while (b < order.size() && samePlace(site(0), site(b))) ++b;
@@ -142,14 +145,15 @@ Result<void> Builder::beginWithFour(const std::vector<std::uint32_t>& order) {
     for (std::uint32_t i = 0; i < 5; ++i) cells_.ball(inner + i).squaredRadius = kNoBall;
     cells_[inner] = {first_, {inner + 1, inner + 2, inner + 3, inner + 4}};
     for (std::uint32_t i = 0; i < 4; ++i) {
-        // The inner cell reflected in its facet i: with vertex i beyond, the others change their sense.
+        // The inner cell, with the vertex at infinity instead of vertex i. That lies on the other side of
+        // facet i, so two of the other vertices are swapped to keep the orientation positive.
         Cell& outer = cells_[inner + 1 + i];
         outer.vertices = first_;
         outer.vertices[i] = kInfinite;
         const std::uint32_t p = (i + 1) % 4;
         const std::uint32_t q = (i + 2) % 4;
         std::swap(outer.vertices[p], outer.vertices[q]);
-        // Behind the facet opposite a vertex: the outer cell of the facet opposite it in the inner one.
+        // Opposite infinity lies the inner cell, opposite another vertex the outer cell that lacks it.
         for (std::uint32_t k = 0; k < 4; ++k) {
             const std::uint32_t facet = k == p ? q : k == q ? p : k;
             outer.neighbours[k] = k == i ? inner : inner + 1 + facet;
@@ -159,15 +163,15 @@ Result<void> Builder::beginWithFour(const std::vector<std::uint32_t>& order) {
     return {};
 }
 
-Result<void> Builder::insertRound(std::vector<std::uint32_t> left) {
-    const std::size_t least = threads_ * division_.leastShare;
-    if (threads_ > 1 && sites_.size() >= division_.leastPoints && left.size() >= least) {
-        RETURN_IF_ERROR(insertTogether(left));
+Result<void> Builder::insertRound(std::vector<std::uint32_t> pending) {
+    const std::size_t least = threads_ * limits_.minPerThread;
+    if (threads_ > 1 && sites_.size() >= limits_.minPoints && pending.size() >= least) {
+        RETURN_IF_ERROR(insertInParallel(pending));
     }
-    return insertAlone(left);
+    return insertSerially(pending);
 }
 
-Result<void> Builder::insertAlone(const std::vector<std::uint32_t>& list) {
+Result<void> Builder::insertSerially(const std::vector<std::uint32_t>& list) {
     BowyerWatson inserter(sites_, cells_, last_);
     inserter.freeCells().swap(free_);
     for (std::size_t i = 0; i < list.size(); ++i, ++done_) {
@@ -176,35 +180,35 @@ Result<void> Builder::insertAlone(const std::vector<std::uint32_t>& list) {
             context_.report("delaunay", done_, sites_.size());
         }
         Insertion outcome = inserter.insert(list[i]);
-        while (outcome == Insertion::kNoRoom) {
-            if (cells_.capacity() >= kMostCells) {
-                return fail(ErrorCode::kOutOfMemory, "the Delaunay triangulation has over 4e9 tetrahedra");
+        while (outcome == Insertion::kStoreFull) {
+            if (cells_.capacity() >= kMaxCells) {
+                return fail(ErrorCode::kOutOfMemory,
+                            "the Delaunay triangulation needs more than 4e9 tetrahedra");
             }
-            cells_.reserve(std::min(kMostCells, cells_.capacity() + cells_.capacity() / 2));
+            cells_.reserve(std::min(kMaxCells, cells_.capacity() + cells_.capacity() / 2));
             outcome = inserter.insert(list[i]);
         }
-        if (outcome != Insertion::kDone) {
-            return fail(notDistinct());
-        }
+        if (outcome != Insertion::kInserted) return fail(duplicatePointsError());
     }
     free_.swap(inserter.freeCells());
     last_ = inserter.lastCell();
     return {};
 }
 
-// A cell to walk from.
+// The first cell in use.
 std::uint32_t Builder::anyCell() const {
     std::uint32_t cell = 0;
-    while (cells_[cell].vertices[0] == kFreeCell) ++cell;
+    while (cells_[cell].isFree()) ++cell;
     return cell;
 }
 
-// Inserts what the threads can insert without meeting; what is left replaces `list`.
-Result<void> Builder::insertTogether(std::vector<std::uint32_t>& list) {
-    cells_.reserve(std::min(kMostCells, cells_.used() + kCellsPerPoint * list.size() + kSpareCells));
-    RETURN_IF_ERROR(crew_.insert(list, free_));
-    for (int side = 0; side < 2 && list.size() >= threads_ * division_.leastShare / kLeastLeft; ++side) {
-        RETURN_IF_ERROR(crew_.insertLeft(list, free_));
+// Inserts what the workers can insert independently of each other; the rest stays in `list`.
+Result<void> Builder::insertInParallel(std::vector<std::uint32_t>& list) {
+    cells_.reserve(std::min(kMaxCells, cells_.used() + kCellsPerPoint * list.size() + kSpareCells));
+    RETURN_IF_ERROR(parallel_.insert(list, free_));
+    for (int side = 0; side < 2 && list.size() >= threads_ * limits_.minPerThread / kPendingFraction;
+         ++side) {
+        RETURN_IF_ERROR(parallel_.insertPending(list, free_));
     }
     last_ = anyCell();
     return {};
@@ -212,9 +216,9 @@ Result<void> Builder::insertTogether(std::vector<std::uint32_t>& list) {
 
 }  // namespace
 
-Result<void> insertAll(LargeVector<Site>& sites, CellStore& cells, std::size_t threads,
-                       const RunContext& context, const Division& division) {
-    return Builder(sites, cells, threads, context, division).build();
+Result<void> buildTriangulation(LargeVector<Site>& sites, CellStore& cells, std::size_t threads,
+                                const RunContext& context, const ParallelLimits& limits) {
+    return Builder(sites, cells, threads, context, limits).build();
 }
 
 }  // namespace shapedb

@@ -1,4 +1,4 @@
-// The Delaunay triangulation of points in an order of their own, by one thread or several.
+// Builds the triangulation in the cell store, with one thread or several. delaunay.h is what users call.
 #pragma once
 
 #include <cstddef>
@@ -11,19 +11,19 @@
 
 namespace shapedb {
 
-/// What is worth dividing between threads, in points. Results do not depend on it.
-struct Division {
-    std::size_t leastPoints = 50000;  ///< of the whole triangulation
-    std::size_t leastShare = 4096;    ///< of a round, for each thread; at least 1
+/// How many points make parallel insertion worth its overhead. Results do not depend on it.
+struct ParallelLimits {
+    std::size_t minPoints = 50000;    ///< of the whole triangulation
+    std::size_t minPerThread = 4096;  ///< of one round; at least 1
 };
 
-/// Triangulates `sites`, which should follow a curve through space (curve_order.h), with up to
-/// `threads` threads of the caller's arena. The set of cells is the same for any number; their places
-/// in the store are not.
+/// Triangulates `sites` into the empty `cells`, with up to `threads` threads of the caller's arena. Any order
+/// of the sites gives the same triangulation; Hilbert order is fast. The set of cells is the same for any
+/// number of threads, where they lie in the store is not.
 ///
-/// Errors: kCoplanar, kCollinear, kTooFewPoints (exactly so); kInternal when two sites are at the same
-/// place; kCancelled, kDeadlineExceeded; kOutOfMemory. May throw std::bad_alloc.
-[[nodiscard]] Result<void> insertAll(LargeVector<Site>& sites, CellStore& cells, std::size_t threads,
-                                     const RunContext& context, const Division& division = {});
+/// Errors: kTooFewPoints, kCollinear, kCoplanar (decided exactly); kInternal when two sites coincide;
+/// kCancelled, kDeadlineExceeded; kOutOfMemory. May throw std::bad_alloc.
+[[nodiscard]] Result<void> buildTriangulation(LargeVector<Site>& sites, CellStore& cells, std::size_t threads,
+                                              const RunContext& context, const ParallelLimits& limits = {});
 
 }  // namespace shapedb

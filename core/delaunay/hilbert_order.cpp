@@ -14,16 +14,16 @@ namespace shapedb {
 namespace {
 
 constexpr std::uint32_t kBits = 21;
-constexpr std::size_t kBlock = 4096;  // points that a thread takes at a time
+constexpr std::size_t kBlock = 4096;  // points that a thread handles at a time
 
-// Skilling, "Programming the Hilbert curve" (2004): coordinates to the transposed index, in place,
-// then its bits interleaved.
+// Skilling, "Programming the Hilbert curve" (2004): turns the coordinates into the transposed index, in
+// place; interleaving its bits gives the index.
 std::uint64_t hilbertIndex(std::array<std::uint32_t, 3> x) {
     for (std::uint32_t q = 1u << (kBits - 1); q > 1; q >>= 1) {
         const std::uint32_t below = q - 1;
         for (std::uint32_t& axis : x) {
-            // Without branches: the bits are random. Set: invert the low bits of the first axis; not set:
-            // exchange them with that of this axis.
+            // Bit set: invert the low bits of the first axis. Not set: swap them with those of this axis.
+            // Branch-free, because the bits are random.
             const std::uint32_t set = (axis & q) != 0 ? ~0u : 0u;
             const std::uint32_t swap = (x[0] ^ axis) & below & ~set;
             x[0] ^= swap | (below & set);
@@ -52,7 +52,7 @@ LargeVector<KeyedIndex> keysOf(const PointCloud& points) {
     const double steps = extent > 0.0 && std::isfinite(extent) ? last / extent : 0.0;
     const auto step = [=](double v) { return static_cast<std::uint32_t>(std::min(last, v * steps)); };
     LargeVector<KeyedIndex> keyed(points.size());
-    // Nothing can stop it: there is no context.
+    // Cannot fail: the default context never cancels.
     static_cast<void>(parallelFor(points.size(), kBlock, {}, [&](std::size_t from, std::size_t to) {
         for (std::size_t i = from; i < to; ++i) {
             const Point3 p = points[i] - low;
@@ -71,6 +71,11 @@ std::vector<std::uint32_t> hilbertOrder(const PointCloud& points) {
     std::vector<std::uint32_t> order(points.size());
     for (std::size_t i = 0; i < order.size(); ++i) order[i] = keyed[i].index;
     return order;
+}
+
+HilbertSortedCloud::HilbertSortedCloud(const PointCloud& unsorted) : order_(hilbertOrder(unsorted)) {
+    points_.reserve(unsorted.size());
+    for (const std::uint32_t i : order_) points_.push_back(unsorted[i]);
 }
 
 }  // namespace shapedb

@@ -1,4 +1,4 @@
-// Workers that insert points into one Delaunay triangulation at the same time.
+// Workers that insert points into one Delaunay triangulation at the same time, without locks.
 #pragma once
 
 #include <array>
@@ -13,44 +13,49 @@
 
 namespace shapedb {
 
-/// Space is cut into slabs across its longest side, which makes for short borders, so that workers are done
-/// at about the same time. Each inserts the points of its slab, without locks (Ownership).
+/// Cuts space into one slab for each worker, across its longest side, so that borders are small. Each worker
+/// inserts the sites of its slab and obeys the rules of Ownership; sites whose cavities reach across a border
+/// stay behind. Borders move from round to round, so that workers finish at about the same time.
+///
+/// The clock decides where borders lie, and so which sites stay behind and where cells lie in the store. The
+/// set of cells does not depend on any of that.
 class ParallelInsertion {
   public:
-    static constexpr std::size_t kMostWorkers = 255;
+    static constexpr std::size_t kMaxWorkers = 255;
 
-    /// Everything must live as long as this. `workers`: at most kMostWorkers, to insert at least 1, on up to
-    /// as many threads of the caller's arena. `done`: points inserted, for progress.
+    /// References must stay valid. `workers`: 1 to kMaxWorkers (0 if nothing will be inserted), on at most as
+    /// many threads of the caller's arena. `done`: the number of sites inserted, for progress.
     ParallelInsertion(LargeVector<Site>& sites, CellStore& cells, std::size_t workers,
                       const RunContext& context, std::atomic<std::size_t>& done)
         : sites_(sites), cells_(cells), workers_(workers), context_(context), done_(done) {}
 
-    /// Inserts the sites of `list`, which are in rising order and not empty; those along the borders stay in
-    /// it. `freeCells`: cells of the store that are not in use, marked so, and what then is not.
+    /// Inserts the sites of `list`, which must be ascending and not empty, and leaves in it, ascending, those
+    /// that could not be inserted. `freeCells`: in, the free cells of the store, for use here; out, those
+    /// that are free then.
     ///
-    /// Errors: kInternal when two sites are at the same place; kCancelled, kDeadlineExceeded. May throw
-    /// std::bad_alloc.
+    /// Errors: kInternal when two sites coincide; kCancelled, kDeadlineExceeded; after an error the
+    /// triangulation is unusable. May throw std::bad_alloc.
     [[nodiscard]] Result<void> insert(std::vector<std::uint32_t>& list,
                                       std::vector<std::uint32_t>& freeCells);
-    /// The same for what that left, if anything, with slabs across the next longest side: once, and again
-    /// across the last.
-    [[nodiscard]] Result<void> insertLeft(std::vector<std::uint32_t>& list,
-                                          std::vector<std::uint32_t>& freeCells);
+    /// The same for what `insert` left, with slabs across the longest side not cut yet in this round. May be
+    /// called twice after each `insert`.
+    [[nodiscard]] Result<void> insertPending(std::vector<std::uint32_t>& list,
+                                             std::vector<std::uint32_t>& freeCells);
 
   private:
     struct Worker;
     struct Slabs {
-        std::size_t axis = 0;         // across which they lie
-        std::vector<double> sample;   // places of some sites along it, rising
-        std::vector<double> borders;  // between slabs: shares of the sample, from 0 to 1
+        std::size_t axis = 0;         // to which their borders are perpendicular
+        std::vector<double> sample;   // coordinates of some sites along it, ascending
+        std::vector<double> borders;  // as fractions of the sample, from 0 to 1
     };
 
     Slabs makeSlabs(const std::vector<std::uint32_t>& list) const;
-    Result<void> cut(const Slabs& slabs);
-    Result<void> markInner();
+    Result<void> assignOwners(const Slabs& slabs);
+    Result<void> markSolelyOwned();
     void moveBorders(const std::vector<double>& seconds);
-    Result<std::vector<double>> insertSideBySide(std::vector<std::uint32_t>& list, std::uint32_t innerMark,
-                                                 std::vector<std::uint32_t>& freeCells);
+    Result<std::vector<double>> runWorkers(std::vector<std::uint32_t>& list, std::uint32_t soleOwnerMark,
+                                           std::vector<std::uint32_t>& freeCells);
     void addStarts(std::vector<Worker>& workers) const;
     void work(const std::vector<std::uint32_t>& list, Worker& worker, bool reports);
 
@@ -59,9 +64,9 @@ class ParallelInsertion {
     std::size_t workers_;
     const RunContext& context_;
     std::atomic<std::size_t>& done_;
-    Slabs slabs_;                       // of whole rounds
-    std::array<bool, 3> isCut_{};       // of this round: whether it was cut across each axis
-    std::vector<std::uint8_t> slabOf_;  // the worker of each site
+    Slabs slabs_;                         // of `insert`, kept from round to round
+    std::array<bool, 3> isCut_{};         // axes cut in this round
+    std::vector<std::uint8_t> workerOf_;  // by site
 };
 
 }  // namespace shapedb

@@ -1,5 +1,6 @@
-// The two questions a Delaunay triangulation asks of points, answered exactly: which side of a plane,
-// which side of a sphere. The quick answer is inline; what it leaves open goes to CGAL.
+// The two exact predicates of a Delaunay triangulation: on which side of a plane, and of a sphere, is a
+// point? An inline floating-point filter answers almost always; what it leaves open goes to CGAL's exact
+// kernel.
 #pragma once
 
 #include <algorithm>
@@ -10,36 +11,36 @@
 
 namespace shapedb {
 
-/// A point that fills half a cache line, so that reading one never touches two.
+/// A point to triangulate. Fills half a cache line, so that reading one never touches two.
 struct alignas(32) Site {
     double x = 0.0;
     double y = 0.0;
     double z = 0.0;
-    std::uint64_t mark = 0;  ///< scratch of whoever inserts around this site
+    std::uint64_t mark = 0;  ///< scratch of the inserter that owns this site (BowyerWatson::numberCorners)
 };
 
 inline bool samePlace(const Site& a, const Site& b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
 
-// std::max of a list compares with branches, which these values make unpredictable.
-inline double most(double a, double b, double c) { return std::max(std::max(a, b), c); }
-inline double least(double a, double b, double c) { return std::min(std::min(a, b), c); }
+// Branch-free, unlike std::max of a list: which of these values is the largest is unpredictable.
+inline double max3(double a, double b, double c) { return std::max(std::max(a, b), c); }
+inline double min3(double a, double b, double c) { return std::min(std::min(a, b), c); }
 
-/// What follows is exact but slow: 1, 0 or -1, from CGAL's kernel.
+/// Without the filter, from CGAL's kernel: 1, 0 or -1. Slow.
 [[nodiscard]] int exactOrientation(const Site& a, const Site& b, const Site& c, const Site& d);
 [[nodiscard]] int exactSideOfSphere(const Site& a, const Site& b, const Site& c, const Site& d,
                                     const Site& p);
-/// p on the circle through a, b and c, all four in one plane: 1 inside, -1 outside, symbolically
-/// perturbed as below, never 0.
+/// Four points in one plane: 1 when p lies inside the circle through a, b and c, -1 outside. Never 0: a p on
+/// the circle is perturbed as below.
 [[nodiscard]] int sideOfCircle(const Site& a, const Site& b, const Site& c, const Site& p);
-/// The symbolic perturbation for a p exactly on the sphere of a, b, c and d. As in CGAL (Devillers and
-/// Teillaud, "Perturbations for Delaunay and weighted Delaunay 3D triangulations", 2011), so that both
-/// give the same tetrahedra.
+/// For a p exactly on the sphere through a, b, c and d: on which side it ends up when all points are
+/// perturbed symbolically, 1 or -1. The same perturbation as CGAL's (Devillers and Teillaud, "Perturbations
+/// for Delaunay and weighted Delaunay 3D triangulations", 2011), so both give the same tetrahedra.
 [[nodiscard]] int perturbedSideOfSphere(const Site& a, const Site& b, const Site& c, const Site& d,
                                         const Site& p);
 
-/// Sign of det(b - a, c - a, d - a). The error bounds here and below are those of CGAL's semi-static
-/// filters (Melquiond and Pion, "Formally certified floating-point filters for homogeneous geometric
-/// predicates", 2007), for exactly these orders of operations.
+/// The sign of det(b - a, c - a, d - a): 1, 0 or -1. The error bounds here and below are those of CGAL's
+/// semi-static filters (Melquiond and Pion, "Formally certified floating-point filters for homogeneous
+/// geometric predicates", 2007). They hold for exactly this order of operations.
 [[nodiscard]] inline int orientation(const Site& a, const Site& b, const Site& c, const Site& d) {
     const double bx = b.x - a.x, by = b.y - a.y, bz = b.z - a.z;
     const double cx = c.x - a.x, cy = c.y - a.y, cz = c.z - a.z;
@@ -48,20 +49,20 @@ inline double least(double a, double b, double c) { return std::min(std::min(a, 
     const double bd = bx * dy - dx * by;
     const double cd = cx * dy - dx * cy;
     const double det = bc * dz - bd * cz + cd * bz;
-    const double mx = most(std::abs(bx), std::abs(cx), std::abs(dx));
-    const double my = most(std::abs(by), std::abs(cy), std::abs(dy));
-    const double mz = most(std::abs(bz), std::abs(cz), std::abs(dz));
+    const double mx = max3(std::abs(bx), std::abs(cx), std::abs(dx));
+    const double my = max3(std::abs(by), std::abs(cy), std::abs(dy));
+    const double mz = max3(std::abs(bz), std::abs(cz), std::abs(dz));
     const double bound = 5.1107127829973299e-15 * mx * my * mz;
-    // Guards against underflow and overflow of the products.
-    if (least(mx, my, mz) >= 1e-97 && most(mx, my, mz) < 1e102) {
+    // The bound does not cover underflow and overflow of the products.
+    if (min3(mx, my, mz) >= 1e-97 && max3(mx, my, mz) < 1e102) {
         if (det > bound) return 1;
         if (det < -bound) return -1;
     }
     return exactOrientation(a, b, c, d);
 }
 
-/// 1 when p lies inside the sphere through a, b, c and d (positively oriented), -1 outside, never 0:
-/// points on the sphere are perturbed.
+/// 1 when p lies inside the sphere through a, b, c and d (positively oriented), -1 outside. Never 0: a p on
+/// the sphere is perturbed.
 [[nodiscard]] inline int sideOfSphere(const Site& a, const Site& b, const Site& c, const Site& d,
                                       const Site& p) {
     const double ax = a.x - p.x, ay = a.y - p.y, az = a.z - p.z;
@@ -72,7 +73,7 @@ inline double least(double a, double b, double c) { return std::min(std::min(a, 
     const double bw = bx * bx + by * by + bz * bz;
     const double cw = cx * cx + cy * cy + cz * cz;
     const double dw = dx * dx + dy * dy + dz * dz;
-    // Rows a, c, b, d: CGAL's order.
+    // Rows in CGAL's order: a, c, b, d.
     const double ac = cx * ay - ax * cy;
     const double ab = bx * ay - ax * by;
     const double ad = dx * ay - ax * dy;
@@ -87,9 +88,9 @@ inline double least(double a, double b, double c) { return std::min(std::min(a, 
     const double mx = std::max(std::max(std::abs(ax), std::abs(bx)), std::max(std::abs(cx), std::abs(dx)));
     const double my = std::max(std::max(std::abs(ay), std::abs(by)), std::max(std::abs(cy), std::abs(dy)));
     const double mz = std::max(std::max(std::abs(az), std::abs(bz)), std::max(std::abs(cz), std::abs(dz)));
-    const double widest = most(mx, my, mz);
+    const double widest = max3(mx, my, mz);
     const double bound = 1.2466136531027298e-13 * mx * my * mz * (widest * widest);
-    if (least(mx, my, mz) >= 1e-58 && widest < 1e61) {
+    if (min3(mx, my, mz) >= 1e-58 && widest < 1e61) {
         if (det > bound) return 1;
         if (det < -bound) return -1;
     }

@@ -1,4 +1,4 @@
-// A coordinate by the number of its axis.
+// A coordinate chosen by the number of its axis.
 #pragma once
 
 namespace shapedb {

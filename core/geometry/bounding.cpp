@@ -25,8 +25,11 @@ namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 
-// A box turned by 90 degrees is the same box, so the rotations to search are 1/24 of all: this
-// many starts lie about 12 degrees apart there.
+// The search: descents from many random rotations, coarse ones on an outline of the hull, then fine
+// ones from the best of them on all its vertices.
+//
+// A box turned by 90 degrees is the same box, so only 1/24 of all rotations differ: there this many
+// starts lie about 12 degrees apart.
 constexpr int kStarts = 400;
 constexpr double kFirstStep = 0.1;     // radians, half the distance between starts
 constexpr double kRefineStep = 0.004;  // radians; enough to tell basins apart
@@ -34,11 +37,11 @@ constexpr double kLastStep = 1e-5;     // radians; the diagonal moves by less th
 constexpr std::size_t kCoarseDescents = 120;
 constexpr std::size_t kFineDescents = 12;
 
-// The function has creases (a face of the box passes from one vertex to another), along which
-// only a few directions lead down: as many random turns of up to a step fail before it is halved.
+// The diagonal has creases, where a face of the box passes from one vertex to another, and along them
+// only a few directions lead down. So this many random turns must fail before the step is halved.
 constexpr int kTriesPerStep = 24;
 
-// Basins are searched on no more than the farthest hull vertices in this many directions.
+// The outline: the farthest hull vertex in each of this many directions.
 constexpr int kCoarseDirections = 1500;
 
 PointCloud hullVertices(const PointCloud& points) {
@@ -49,12 +52,12 @@ PointCloud hullVertices(const PointCloud& points) {
     PointCloud vertices;
     vertices.reserve(extreme.size());
     for (const auto& p : extreme) vertices.push_back({p.x(), p.y(), p.z()});
-    // The hull's order depends on the input's; sums below must not.
+    // CGAL's order depends on the order of the input; the result must not.
     std::sort(vertices.begin(), vertices.end(), lexicographicLess);
     return vertices;
 }
 
-// What a box with its edges along the rows of `axes` needs to hold, edge by edge.
+// The range of the points along each edge of a box.
 struct Extent {
     std::array<double, 3> low = {INFINITY, INFINITY, INFINITY};
     std::array<double, 3> high = {-INFINITY, -INFINITY, -INFINITY};
@@ -66,7 +69,7 @@ struct Extent {
     }
 };
 
-// Points two by two; the last alone stands twice.
+// Points two by two; a last one left over is doubled.
 std::vector<Vec3x2> inPairs(const PointCloud& points) {
     std::vector<Vec3x2> pairs;
     for (std::size_t i = 0; i < points.size(); i += 2) {
@@ -79,6 +82,7 @@ Double2 along(const std::array<double, 3>& axis, const Vec3x2& p) {
     return axis[0] * p.x + axis[1] * p.y + axis[2] * p.z;
 }
 
+// Of the box whose edges lie along the rows of `axes`.
 template <typename Pairs>
 Extent extentOf(const Pairs& pairs, const Matrix3& axes) {
     std::array<Double2, 3> low = {INFINITY, INFINITY, INFINITY};
@@ -98,14 +102,14 @@ Extent extentOf(const Pairs& pairs, const Matrix3& axes) {
     return extent;
 }
 
-// Boxes around points, of which only those below a limit matter: most others are ruled out by a few of the
-// points, those that touched boxes before.
+// Measures boxes of which only those below a limit matter. The points that touched earlier boxes rule
+// out most of the others without a look at the rest.
 class BoxTrial {
   public:
     explicit BoxTrial(const std::vector<Vec3x2>& points) : points_(points) { known_.fill(points.front()); }
 
-    // The squared diagonal, or less but not below the limit. Fewer points never give more, with rounding
-    // neither.
+    // The squared diagonal; where that is not below the limit, perhaps a smaller value that is not below
+    // it either. (Fewer points never need a larger box, and rounding keeps that order.)
     double squaredDiagonal(const Matrix3& axes, double limit) {
         const double least = extentOf(known_, axes).squaredDiagonal();
         if (least >= limit) return least;
@@ -138,14 +142,6 @@ class BoxTrial {
     std::size_t next_ = 0;
 };
 
-Point3 randomDirection(Random& random) {
-    const double z = random.uniform(-1.0, 1.0);
-    const double angle = random.uniform(0.0, 6.283185307179586);
-    const double across = std::sqrt(1.0 - z * z);
-    return {across * std::cos(angle), across * std::sin(angle), z};
-}
-
-// The vertices that lie farthest in directions spread over the sphere.
 PointCloud farthestVertices(const PointCloud& vertices) {
     if (vertices.size() <= static_cast<std::size_t>(kCoarseDirections)) return vertices;
     Random random(2);
@@ -177,12 +173,13 @@ Matrix3 turned(const Matrix3& axes, const Point3& about, double angle) {
     return result;
 }
 
-struct Box {
+struct OrientedBox {
     double squaredDiagonal = 0.0;
     Matrix3 axes;
 };
 
-Box descend(const std::vector<Vec3x2>& points, Box box, double firstStep, double lastStep, Random& random) {
+OrientedBox descend(const std::vector<Vec3x2>& points, OrientedBox box, double firstStep, double lastStep,
+                    Random& random) {
     BoxTrial trial(points);
     for (double step = firstStep; step > lastStep; step *= 0.5) {
         for (int failures = 0; failures < kTriesPerStep;) {
@@ -199,27 +196,28 @@ Box descend(const std::vector<Vec3x2>& points, Box box, double firstStep, double
     return box;
 }
 
-void sortBySize(std::vector<Box>& boxes) {
-    std::sort(boxes.begin(), boxes.end(),
-              [](const Box& a, const Box& b) { return a.squaredDiagonal < b.squaredDiagonal; });
+void sortBySize(std::vector<OrientedBox>& boxes) {
+    std::sort(boxes.begin(), boxes.end(), [](const OrientedBox& a, const OrientedBox& b) {
+        return a.squaredDiagonal < b.squaredDiagonal;
+    });
 }
 
 double leastSquaredDiagonal(const PointCloud& vertices) {
     const std::vector<Vec3x2> all = inPairs(vertices);
     const std::vector<Vec3x2> outline = inPairs(farthestVertices(vertices));
     Random random(1);
-    std::vector<Box> boxes(kStarts);
-    for (Box& box : boxes) {
+    std::vector<OrientedBox> boxes(kStarts);
+    for (OrientedBox& box : boxes) {
         box.axes = randomRotation(random);
         box.squaredDiagonal = extentOf(outline, box.axes).squaredDiagonal();
     }
     sortBySize(boxes);
     boxes.resize(kCoarseDescents);
-    for (Box& box : boxes) box = descend(outline, box, kFirstStep, kRefineStep, random);
+    for (OrientedBox& box : boxes) box = descend(outline, box, kFirstStep, kRefineStep, random);
     sortBySize(boxes);
     boxes.resize(kFineDescents);
     double least = INFINITY;
-    for (Box& box : boxes) {
+    for (OrientedBox& box : boxes) {
         box.squaredDiagonal = extentOf(all, box.axes).squaredDiagonal();
         least = std::min(least, descend(all, box, kFirstStep, kLastStep, random).squaredDiagonal);
     }

@@ -1,4 +1,4 @@
-// How large a shape is, by a measure that does not change when the shape is turned.
+// The size of a shape, by a measure that rotation does not change.
 #pragma once
 
 #include "core/base/error.h"
@@ -6,16 +6,15 @@
 
 namespace shapedb {
 
-/// The smallest diagonal that an oriented box around the points can have, in their unit; 0
-/// when all points are equal.
+/// The smallest diagonal of any oriented box around the points, in their unit; 0 when all
+/// points are equal. Deterministic, whatever the order of the points.
 ///
-/// The paper scales shapes "with bounding boxes" (Section 4.2). An axis-aligned box changes
-/// when the shape is turned; so does the diagonal of the box of least volume where several boxes
-/// have nearly that volume. The least diagonal does not: whichever box attains it, the value is
-/// the same. Found by descent from many starts over the rotations, on the convex hull;
-/// docs/algorithm.md shows how little it moves.
+/// The paper scales shapes "with bounding boxes" (Section 4.2) but does not say which. An
+/// axis-aligned box changes when the shape is turned, and the box of least volume may jump
+/// between several of nearly the same volume; the least diagonal is the same for all of them.
+/// docs/algorithm.md has the figures.
 ///
-/// Errors: kInvalidArgument when there are no points, kOutOfMemory, kInternal.
+/// Errors: kInvalidArgument when there are no points; kOutOfMemory; kInternal.
 [[nodiscard]] Result<double> smallestBoxDiagonal(const PointCloud& points);
 
 }  // namespace shapedb

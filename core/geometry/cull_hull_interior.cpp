@@ -18,19 +18,19 @@ namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 
-// With fewer points the hull itself costs no more.
+// With fewer points the hull itself is no dearer.
 constexpr std::size_t kWorthwhile = 2000;
 
-// A body is spanned by the extreme points of every n-th point and of as many directions.
+// The body: the convex hull of the extreme points of a sample, in this many directions.
 constexpr int kDirections = 128;
 
-// Directions are grouped by squares on the faces of a cube.
+// Directions are sorted into squares on the faces of a cube, this many along an edge.
 constexpr std::size_t kSquares = 24;
 
-// A point counts as inside only if it is by this share of the body's reach: far above rounding.
+// A point counts as inside only by this margin, a share of the body's reach: far above rounding.
 constexpr double kMargin = 1e-6;
 
-// Evenly spread (a Fibonacci spiral), the same every time.
+// Evenly spread over the sphere: a Fibonacci spiral, whose steps are the golden angle.
 Point3 direction(int i) {
     const double z = 1.0 - (2.0 * i + 1.0) / kDirections;
     const double angle = 2.399963229728653 * i;
@@ -44,7 +44,7 @@ std::vector<Kernel::Point_3> extremePoints(const PointCloud& points) {
     std::array<Point3, kDirections> directions;
     farthest.fill(-std::numeric_limits<double>::infinity());
     for (int i = 0; i < kDirections; ++i) directions[static_cast<std::size_t>(i)] = direction(i);
-    // A sample is enough to span a body; every point of it is in the hull of all.
+    // The hull of a sample lies inside the hull of all points.
     const std::size_t step = std::max<std::size_t>(1, points.size() / 20000);
     for (std::size_t p = 0; p < points.size(); p += step) {
         for (std::size_t i = 0; i < directions.size(); ++i) {
@@ -59,21 +59,21 @@ std::vector<Kernel::Point_3> extremePoints(const PointCloud& points) {
     return extreme;
 }
 
-// A convex body around its centre: normals over distances, so that a point p is inside when
-// dot(face, inside(p)) < 1 for every face.
-// In coordinates stretched to the points' box, because the grid of directions suits round bodies.
+// A convex body around its centre. A face is its normal over its distance from the centre, so p is
+// inside when dot(face, toBody(p)) < 1 for every face. Coordinates are stretched by the body's box,
+// because the grid of directions suits round bodies.
 struct Body {
     Point3 centre;
     Point3 stretch;
     std::vector<Point3> faces;
 
-    Point3 inside(const Point3& p) const {
+    Point3 toBody(const Point3& p) const {
         const Point3 d = p - centre;
         return {stretch.x * d.x, stretch.y * d.y, stretch.z * d.z};
     }
 };
 
-// Without faces when the points span no body.
+// Has no faces when the points span no volume.
 Body spannedBy(const std::vector<Kernel::Point_3>& extreme) {
     Body body;
     const CGAL::Bbox_3 box = CGAL::bbox_3(extreme.begin(), extreme.end());
@@ -88,19 +88,19 @@ Body spannedBy(const std::vector<Kernel::Point_3>& extreme) {
         std::vector<Point3> corners;
         for (const auto v : CGAL::vertices_around_face(hull.halfedge(face), hull)) {
             const auto& p = hull.point(v);
-            corners.push_back(body.inside({p.x(), p.y(), p.z()}));
+            corners.push_back(body.toBody({p.x(), p.y(), p.z()}));
         }
         const Point3 normal = cross(corners[1] - corners[0], corners[2] - corners[0]);
         const double height = dot(normal, corners[0]);
-        // A face this close to the centre belongs to a body too flat to use.
+        // A face this close to the centre: the body is too flat to use.
         if (!(height > 1e-9 * length(normal) * length(corners[0]))) return {body.centre, body.stretch, {}};
         body.faces.push_back((1.0 / height) * normal);
     }
     return body;
 }
 
-// How far the body reaches in every direction, as its inverse: the largest dot(face, u) for u on the
-// cube, which is convex in u, so over a square of the cube its maximum is at a corner.
+// One over the body's reach in every direction: the largest dot(face, u) for u on the cube. That is
+// convex in u, so its maximum over a square of the cube lies at a corner.
 class Reach {
   public:
     explicit Reach(const Body& body) : body_(body) {
@@ -123,7 +123,7 @@ class Reach {
     }
 
     bool isDeepInside(const Point3& p) const {
-        const Point3 d = body_.inside(p);
+        const Point3 d = body_.toBody(p);
         const std::array<double, 3> v = {d.x, d.y, d.z};
         const std::size_t axis = std::abs(d.x) >= std::abs(d.y) ? (std::abs(d.x) >= std::abs(d.z) ? 0 : 2)
                                                                 : (std::abs(d.y) >= std::abs(d.z) ? 1 : 2);

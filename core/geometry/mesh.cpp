@@ -11,8 +11,6 @@ namespace shapedb {
 
 namespace {
 
-bool isFinite(const Point3& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
-
 // Running sums of triangle areas; the last entry is the total.
 Result<std::vector<double>> cumulativeAreas(const TriangleMesh& mesh) {
     std::vector<double> sums;
@@ -23,9 +21,9 @@ Result<std::vector<double>> cumulativeAreas(const TriangleMesh& mesh) {
         for (int i = 0; i < 3; ++i) {
             const std::uint32_t v = mesh.triangles[t][static_cast<std::size_t>(i)];
             if (v >= mesh.vertices.size()) {
-                return fail(ErrorCode::kInvalidArgument, "triangle " + std::to_string(t) + " names vertex " +
-                                                             std::to_string(v) + " of " +
-                                                             std::to_string(mesh.vertices.size()));
+                return fail(ErrorCode::kInvalidArgument, "triangle " + std::to_string(t) +
+                                                             " refers to vertex " + std::to_string(v) +
+                                                             " of " + std::to_string(mesh.vertices.size()));
             }
             corner[static_cast<std::size_t>(i)] = mesh.vertices[v];
             if (!isFinite(corner[static_cast<std::size_t>(i)])) {

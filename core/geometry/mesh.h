@@ -1,4 +1,4 @@
-// Triangle meshes, only as far as needed to turn one into a point cloud.
+// Triangle meshes, only as far as it takes to turn one into a point cloud.
 #pragma once
 
 #include <array>
@@ -11,16 +11,15 @@
 
 namespace shapedb {
 
-/// Indices are into `vertices`. Nothing is assumed of orientation, closedness or manifoldness.
+/// Indices are into `vertices`. The mesh may be open, non-manifold or inconsistently oriented.
 struct TriangleMesh {
     PointCloud vertices;
     std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 
-/// Draws `count` points uniformly by area from the triangles (a triangle by its share of
-/// the area, then a uniform point inside it). Same mesh, count and seed: same points.
+/// `count` points, independent and uniform by area. Same mesh, count and seed: same points.
 ///
-/// Errors: kInvalidArgument when count is 0 or a triangle names a vertex that does not
+/// Errors: kInvalidArgument when count is 0 or a triangle refers to a vertex that does not
 /// exist; kNonFiniteCoordinate when a used vertex is not finite (the message names it);
 /// kMalformedFile when the triangles have no area at all.
 [[nodiscard]] Result<PointCloud> sampleSurface(const TriangleMesh& mesh, std::size_t count,

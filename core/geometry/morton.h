@@ -1,12 +1,12 @@
-// Bits of three numbers taken in turns, for keys that follow a curve or a tree of cubes through space.
+// Interleaving bits, for Morton codes and other keys that follow a tree of cubes.
 #pragma once
 
 #include <cstdint>
 
 namespace shapedb {
 
-/// The lowest 21 bits of `v` at every third place, from the lowest on: x << 2 | y << 1 | z of three such
-/// is their Morton code.
+/// Spreads the lowest 21 bits of `v` to every third bit. The Morton code of a cell is
+/// spreadBits3(x) << 2 | spreadBits3(y) << 1 | spreadBits3(z).
 constexpr std::uint64_t spreadBits3(std::uint64_t v) {
     v = (v | v << 32) & 0x001f00000000ffffULL;
     v = (v | v << 16) & 0x001f0000ff0000ffULL;

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "core/base/math.h"
+
 namespace shapedb {
 
 Point3 rotate(const Matrix3& r, const Point3& v) {
@@ -56,7 +58,7 @@ Motion compose(const Motion& second, const Motion& first) {
 }
 
 Matrix3 randomRotation(Random& random) {
-    // A vector of four normals has a direction uniform on the unit 3-sphere.
+    // Four independent normals have a direction uniform on the unit 3-sphere.
     double w = 0.0, x = 0.0, y = 0.0, z = 0.0, norm = 0.0;
     while (!(norm > 1e-6)) {
         w = random.normal();
@@ -72,6 +74,14 @@ Matrix3 randomRotation(Random& random) {
     return {{{1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)},
              {2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)},
              {2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)}}};
+}
+
+Point3 randomDirection(Random& random) {
+    // Archimedes: z is uniform over the sphere.
+    const double z = random.uniform(-1.0, 1.0);
+    const double angle = random.uniform(0.0, 2.0 * kPi);
+    const double across = std::sqrt(1.0 - z * z);
+    return {across * std::cos(angle), across * std::sin(angle), z};
 }
 
 }  // namespace shapedb

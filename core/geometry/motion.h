@@ -11,8 +11,8 @@ namespace shapedb {
 /// Row-major: `matrix[row][column]`.
 using Matrix3 = std::array<std::array<double, 3>, 3>;
 
-/// The map y = scale * R x + t. Plain data; the functions below keep, and expect, these
-/// invariants: `scale` is finite and above 0, `rotation` (R) is orthonormal, and its
+/// The map y = scale * R x + t. The functions below expect and keep these invariants:
+/// `scale` is finite and above 0, `rotation` (R) is orthonormal, and its
 /// determinant is -1 exactly when `reflected`, +1 otherwise. The default is the identity.
 struct Motion {
     double scale = 1.0;      ///< ratio of lengths after to before
@@ -21,7 +21,7 @@ struct Motion {
     Point3 translation;  ///< t, in the units of the result
 };
 
-/// R v: a direction through the rotation (and reflection) alone.
+/// R v: rotates (and reflects) a direction.
 [[nodiscard]] Point3 rotate(const Matrix3& rotation, const Point3& v);
 
 /// The determinant of a 3x3 matrix.
@@ -30,8 +30,8 @@ struct Motion {
 /// scale * R p + t.
 [[nodiscard]] Point3 apply(const Motion& motion, const Point3& p);
 
-/// `apply` to every point, in order. (Not an overload of `apply`: for a std::vector the
-/// compiler would also consider std::apply and stop there.)
+/// `apply` to every point, in order. (Not called `apply`: a std::vector argument would bring in
+/// std::apply by argument-dependent lookup.)
 [[nodiscard]] PointCloud applyToCloud(const Motion& motion, const PointCloud& points);
 
 /// The motion that undoes `motion`, up to rounding.
@@ -40,8 +40,11 @@ struct Motion {
 /// First `first`, then `second`: apply(compose(second, first), p) = apply(second, apply(first, p)).
 [[nodiscard]] Motion compose(const Motion& second, const Motion& first);
 
-/// A rotation (determinant +1) uniform over SO(3): the one of a uniform unit quaternion
-/// (Shoemake 1992). Advances `random`.
+/// A rotation (determinant +1) uniform over SO(3), from a uniform unit quaternion (Shoemake 1992).
+/// Advances `random`.
 [[nodiscard]] Matrix3 randomRotation(Random& random);
+
+/// A unit vector uniform over the sphere. Advances `random`.
+[[nodiscard]] Point3 randomDirection(Random& random);
 
 }  // namespace shapedb

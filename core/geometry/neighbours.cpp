@@ -5,26 +5,22 @@
 
 #include "core/base/parallel.h"
 #include "core/geometry/axis.h"
+#include "core/geometry/box.h"
 
 namespace shapedb {
 
 namespace {
 
 constexpr std::uint32_t kLeafSize = 10;
-// Two threads are no quicker with fewer points.
+// With fewer points two threads are no faster than one.
 constexpr std::uint32_t kLeastParallel = 4096;
 
 void setCoordinate(Point3& p, int axis, double value) { (axis == 0 ? p.x : axis == 1 ? p.y : p.z) = value; }
 
 int widestAxis(const PointCloud& points, const std::uint32_t* begin, const std::uint32_t* end) {
-    Point3 low = points[*begin];
-    Point3 high = low;
-    for (const std::uint32_t* i = begin; i != end; ++i) {
-        const Point3& p = points[*i];
-        low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-        high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-    }
-    const Point3 extent = high - low;
+    Box box;
+    for (const std::uint32_t* i = begin; i != end; ++i) box.add(points[*i]);
+    const Point3 extent = box.extent();
     if (extent.x >= extent.y && extent.x >= extent.z) return 0;
     return extent.y >= extent.z ? 1 : 2;
 }
@@ -41,15 +37,16 @@ NeighbourIndex::NeighbourIndex(const PointCloud& points) : indices_(points.size(
     for (const std::uint32_t i : indices_) points_.push_back(points[i]);
 }
 
-// The nodes of so many points: the tree depends on nothing else.
+// How many nodes a tree of `count` points has. Since halves are split at the median, nothing else
+// decides it, so a subtree knows its place before its siblings are built.
 std::uint32_t NeighbourIndex::nodesFor(std::uint32_t count) {
-    // On each level nodes have `size` points or one more.
+    // Level by level: `smaller` nodes of `size` points and `larger` nodes of one more.
     std::uint32_t nodes = 0;
     std::uint32_t size = count, smaller = 1, larger = 0;
     for (;;) {
         nodes += smaller + larger;
         if (size + 1 <= kLeafSize) return nodes;
-        // Nodes of `size` points may be leaves when others are not.
+        // The smaller nodes are leaves, the larger ones split once more.
         if (size <= kLeafSize) return nodes + 2 * larger;
         const bool even = size % 2 == 0;
         const std::uint32_t halves = even ? 2 * smaller + larger : smaller;
@@ -59,7 +56,7 @@ std::uint32_t NeighbourIndex::nodesFor(std::uint32_t count) {
     }
 }
 
-// Fills node `at` and those under it, which follow it.
+// Fills node `at` and its subtree, which follows it.
 void NeighbourIndex::build(const PointCloud& points, std::uint32_t at, std::uint32_t begin,
                            std::uint32_t end) {
     nodes_[at] = {0.0, begin, end, 0, 0};
@@ -86,7 +83,9 @@ void NeighbourIndex::build(const PointCloud& points, std::uint32_t at, std::uint
     }
 }
 
-// `offset` is the vector from the query to the cell of `node`, `squared` its squared length.
+// Visits the points at most reach() (a squared distance, which may shrink on the way) from the query.
+// `offset` leads from the query to the cell of `node`, `squared` is its squared length (Arya and Mount
+// 1993: one coordinate of it changes from a node to its farther child).
 template <typename Visit, typename Reach>
 void NeighbourIndex::search(std::uint32_t node, const Point3& query, Point3 offset, double squared,
                             Visit& visit, Reach& reach) const {
@@ -132,6 +131,18 @@ void NeighbourIndex::within(const Point3& query, double radius, std::vector<Neig
     const auto visit = [&](const Neighbour& neighbour) { found.push_back(neighbour); };
     const auto reach = [squared = radius * radius] { return squared; };
     search(0, query, {}, 0.0, visit, reach);
+}
+
+std::vector<Neighbour> byDistanceFromCentroid(const PointCloud& points) {
+    Point3 centroid;
+    for (const Point3& p : points) centroid = centroid + p;
+    centroid = (1.0 / static_cast<double>(points.size())) * centroid;
+    std::vector<Neighbour> order(points.size());
+    for (std::uint32_t i = 0; i < points.size(); ++i) {
+        order[i] = {squaredDistance(points[i], centroid), i};
+    }
+    std::sort(order.begin(), order.end());
+    return order;
 }
 
 }  // namespace shapedb

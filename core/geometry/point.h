@@ -1,4 +1,4 @@
-// Points and the few vector operations the whole project uses.
+// Points, and the vector operations used everywhere.
 #pragma once
 
 #include <array>
@@ -31,6 +31,9 @@ inline double squaredLength(const Point3& a) { return dot(a, a); }
 inline double length(const Point3& a) { return std::sqrt(squaredLength(a)); }
 inline double squaredDistance(const Point3& a, const Point3& b) { return squaredLength(a - b); }
 inline double distance(const Point3& a, const Point3& b) { return length(a - b); }
+inline bool isFinite(const Point3& a) {
+    return std::isfinite(a.x) && std::isfinite(a.y) && std::isfinite(a.z);
+}
 
 /// Lexicographic order by x, y, z: a total order on finite points.
 inline bool lexicographicLess(const Point3& a, const Point3& b) {

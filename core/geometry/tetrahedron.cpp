@@ -31,8 +31,8 @@ unsigned exactFlowMask(const TetrahedronCorners& corners) {
     for (std::size_t i = 0; i < 4; ++i) p[i] = {corners[i].x, corners[i].y, corners[i].z};
     unsigned mask = 0;
     for (std::size_t i = 0; i < 4; ++i) {
-        // The centre lies beyond a facet when the opposite corner lies inside the smallest sphere
-        // through the facet's corners: a predicate on the corners alone, without the centre.
+        // The centre lies beyond a facet exactly when the opposite corner lies inside the smallest sphere
+        // through the facet's corners: a predicate that needs no centre.
         const auto side = CGAL::side_of_bounded_sphere(p[(i + 1) % 4], p[(i + 2) % 4], p[(i + 3) % 4], p[i]);
         if (side == CGAL::ON_BOUNDED_SIDE) mask |= 1u << i;
     }

@@ -1,5 +1,4 @@
-// Two points side by side, for the same computation on both: the operations of point.h, with the same
-// bits for each.
+// Two points in SIMD lanes: the operations of point.h on both at once, with the same bits for each.
 #pragma once
 
 #include "core/base/double2.h"

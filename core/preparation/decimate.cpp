@@ -7,29 +7,29 @@
 #include <utility>
 
 #include "core/base/return_if_error.h"
-#include "core/preparation/sanitise.h"
+#include "core/geometry/merge_duplicates.h"
 
 namespace shapedb {
 
 namespace {
 
-// Finest grid: 2^20 cells along the unit cube's edge of 2, three indices in one 64-bit key.
+// Finest grid: 2^20 cells along the frame's edge of 2, so that three indices fit a 64-bit key.
 constexpr double kMinCell = 2.0 / (1 << 20);
-// Coarsest: one cell holds everything, the far corner (1, 1, 1) too.
+// Coarsest: one cell holds everything, including the corner (1, 1, 1).
 constexpr double kMaxCell = 2.5;
 constexpr int kMaxSteps = 32;
 constexpr int kSecantSteps = 4;
 constexpr double kAcceptedShare = 0.9;
 
-using KeyedIndex = std::pair<std::uint64_t, std::uint32_t>;  // cell, point
+using CellAndPoint = std::pair<std::uint64_t, std::uint32_t>;  // cell, point
 
 std::uint64_t cellKey(const Point3& p, double cell) {
     const auto index = [cell](double v) { return static_cast<std::uint64_t>((v + 1.0) / cell); };
     return (index(p.x) << 42) | (index(p.y) << 21) | index(p.z);
 }
 
-std::vector<KeyedIndex> sortedByCell(const PointCloud& points, double cell) {
-    std::vector<KeyedIndex> keyed(points.size());
+std::vector<CellAndPoint> sortedByCell(const PointCloud& points, double cell) {
+    std::vector<CellAndPoint> keyed(points.size());
     for (std::size_t i = 0; i < points.size(); ++i) {
         keyed[i] = {cellKey(points[i], cell), static_cast<std::uint32_t>(i)};
     }
@@ -37,7 +37,7 @@ std::vector<KeyedIndex> sortedByCell(const PointCloud& points, double cell) {
     return keyed;
 }
 
-// How many cells are occupied, without sorting: a table of keys with linear probing.
+// Number of occupied cells, by a hash table with linear probing.
 std::size_t countCells(const PointCloud& points, double cell) {
     constexpr std::uint64_t kFree = ~std::uint64_t{0};
     std::vector<std::uint64_t> table(1 << 12, kFree);
@@ -64,7 +64,7 @@ std::size_t countCells(const PointCloud& points, double cell) {
     return cells;
 }
 
-DecimatedPoints averageCells(const PointCloud& points, const std::vector<KeyedIndex>& keyed, double cell) {
+DecimatedPoints averageCells(const PointCloud& points, const std::vector<CellAndPoint>& keyed, double cell) {
     PointCloud means;
     std::vector<std::uint32_t> cellOfPoint(points.size());
     for (std::size_t begin = 0; begin < keyed.size();) {
@@ -88,7 +88,8 @@ Result<DecimatedPoints> decimateOrThrow(const PointCloud& points, std::size_t ta
         MergedPoints merged = mergeDuplicates(points);
         return DecimatedPoints{std::move(merged.points), std::move(merged.siteOfPoint), 0.0};
     }
-    // `fine` gives too many cells, `coarse` few enough.
+    // `fine` gives too many cells, `coarse` few enough. On a surface the number of cells falls with the
+    // square of their size.
     double fine = kMinCell;
     double coarse = kMaxCell;
     double cell = std::clamp(2.0 / std::sqrt(static_cast<double>(target)), fine, coarse);
@@ -104,8 +105,8 @@ Result<DecimatedPoints> decimateOrThrow(const PointCloud& points, std::size_t ta
         } else {
             fine = cell;
         }
-        // Aim a little below the target. Where nearly every point has a cell of its own the count
-        // hardly answers to the size and such steps creep: then every other one bisects.
+        // Aim a little below the target. Where nearly every point has a cell of its own, the count
+        // hardly depends on the size and such steps creep, so after a few every other one bisects.
         const double guess = cell * std::sqrt(share / 0.96);
         const bool bisect = step >= kSecantSteps && step % 2 == 0;
         cell = !bisect && guess > fine && guess < coarse ? guess : std::sqrt(fine * coarse);
@@ -117,7 +118,7 @@ Result<DecimatedPoints> decimateOrThrow(const PointCloud& points, std::size_t ta
 
 Result<DecimatedPoints> decimate(const PointCloud& points, std::size_t target, const RunContext& context) {
     if (target < 4) {
-        return fail(ErrorCode::kInvalidArgument, "the target of the decimation must be at least 4 points");
+        return fail(ErrorCode::kInvalidArgument, "the target of decimation must be at least 4 points");
     }
     try {
         return decimateOrThrow(points, target, context);

@@ -1,5 +1,5 @@
-// Thinning a dense scan: one averaged point per occupied cell of a cubic grid. Averaging
-// also cancels part of the scanner's noise where points overlap.
+// Decimating a dense scan: one averaged point per occupied cell of a cubic grid. Where points
+// overlap, averaging also cancels part of the scanner's noise.
 #pragma once
 
 #include <cstddef>
@@ -15,14 +15,13 @@ namespace shapedb {
 struct DecimatedPoints {
     PointCloud points;                       ///< distinct, in lexicographic order
     std::vector<std::uint32_t> siteOfPoint;  ///< input point -> index into `points`
-    double cellSize = 0.0;  ///< edge of a grid cell, in the points' unit; 0: nothing was done
+    double cellSize = 0.0;                   ///< edge of a grid cell, in the points' unit; 0: not decimated
 };
 
-/// At most `target` points, usually at least nine tenths of that. Scans that have no more
-/// already come back merged and sorted but otherwise unchanged. The cell size is found by a
-/// few secant and bisection steps: a surface's cells grow with the inverse square of the size.
+/// At most `target` points, usually at least nine tenths of that. A scan that has no more is only
+/// merged and sorted. The choice of the cell size depends on the points alone, not on their order.
 ///
-/// Precondition: finite coordinates with magnitude at most 1 (as sanitise returns them).
+/// Precondition: coordinates in [-1, 1], as `sanitise` returns them.
 /// Errors: kInvalidArgument when target < 4; kCancelled, kDeadlineExceeded; kOutOfMemory.
 [[nodiscard]] Result<DecimatedPoints> decimate(const PointCloud& points, std::size_t target,
                                                const RunContext& context = {});

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstddef>
 #include <new>
-#include <numeric>
 #include <string>
 #include <vector>
 
@@ -13,6 +12,7 @@
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
 
+#include "core/base/math.h"
 #include "core/base/parallel.h"
 #include "core/base/return_if_error.h"
 
@@ -20,27 +20,31 @@ namespace shapedb {
 
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr std::size_t kSamples = 500;
 constexpr std::array<std::size_t, 10> kNeighbourhoods = {12, 16, 24, 32, 48, 64, 96, 128, 192, 256};
 
-// A surface whose spread across the plane is below this share of the spread along it, in the
-// smallest neighbourhood, is as smooth as its sampling can tell.
+// The noise shows in how the spread of a neighbourhood across its plane grows with its size: while the
+// neighbourhood is smaller than the layer of noise both grow together; then the spread stays at sigma;
+// then it grows again, by curvature or because the far side of a thin part comes into view. Sigma is
+// that plateau.
+
+// A surface is as smooth as its sampling can tell when, in the smallest neighbourhood, the spread across
+// the plane is below this share of the spread along it.
 constexpr double kSmoothRatio = 0.2;
 
-// Noise below this share of the spacing does not disturb the Delaunay balls.
+// Noise below this share of the spacing does not disturb Delaunay balls.
 constexpr double kHarmlessRatio = 0.1;
 
-// Along a plateau the spread grows with less than this power of the neighbourhood's width.
+// On a plateau the spread grows with less than this power of the neighbourhood's width.
 constexpr double kPlateauSlope = 0.85;
-// Slopes that differ by no more than this are one plateau; one this much steeper ends it: there the
-// neighbourhoods have reached the far side of the part.
+// Slopes within the tolerance belong to one plateau; one that is steeper by kPlateauEnds ends it, since
+// there the neighbourhoods have reached the far side of the part.
 constexpr double kPlateauTolerance = 0.05;
 constexpr double kPlateauEnds = 0.15;
 
 constexpr double kReachInSpacings = 4.0;  // pi * 4^2: about fifty neighbours
-// A point with fewer than this share of the neighbours that its reach should hold lies off the
-// surface and looks for it farther away.
+// A point with fewer than this share of the neighbours to be expected within its reach lies off the
+// surface; its reach is widened.
 constexpr double kEnoughShare = 0.5;
 constexpr double kWiderReach = 1.6;
 constexpr std::size_t kQuadricMinimum = 12;
@@ -52,23 +56,16 @@ double median(std::vector<double> values) {
     return *middle;
 }
 
-// Every n-th point by distance from the centroid: the same choice however the cloud is turned.
+// Every n-th point by distance from the centroid: the choice does not depend on the pose.
 std::vector<std::uint32_t> samplePoints(const PointCloud& points) {
-    Point3 centroid;
-    for (const Point3& p : points) centroid = centroid + p;
-    centroid = (1.0 / static_cast<double>(points.size())) * centroid;
-    std::vector<Neighbour> byDistance(points.size());
-    for (std::uint32_t i = 0; i < points.size(); ++i) {
-        byDistance[i] = {squaredDistance(points[i], centroid), i};
-    }
-    std::sort(byDistance.begin(), byDistance.end());
+    const std::vector<Neighbour> byDistance = byDistanceFromCentroid(points);
     const std::size_t count = std::min(points.size(), kSamples);
     std::vector<std::uint32_t> chosen(count);
     for (std::size_t i = 0; i < count; ++i) chosen[i] = byDistance[i * points.size() / count].point;
     return chosen;
 }
 
-// Spread of each sampled neighbourhood across and along its plane, by neighbourhood size.
+// Spread of each sampled neighbourhood across and along its plane, by size of neighbourhood.
 struct Spreads {
     std::array<std::vector<double>, kNeighbourhoods.size()> across;
     std::array<std::vector<double>, kNeighbourhoods.size()> along;
@@ -77,7 +74,7 @@ struct Spreads {
 
 Eigen::Vector3d toEigen(const Point3& p) { return {p.x, p.y, p.z}; }
 
-// The spreads of one neighbourhood, the sample's `place`-th.
+// Fills the entries of one neighbourhood, number `place` of the sample.
 void measureSpread(const PointCloud& points, std::uint32_t centre, const std::vector<Neighbour>& found,
                    std::size_t place, Spreads& spreads) {
     Eigen::Vector3d first = Eigen::Vector3d::Zero();
@@ -92,7 +89,7 @@ void measureSpread(const PointCloud& points, std::uint32_t centre, const std::ve
         const double n = static_cast<double>(next);
         Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
         solver.computeDirect(second / n - first * first.transpose() / (n * n), Eigen::EigenvaluesOnly);
-        // Three degrees of freedom went into the plane.
+        // The plane took three degrees of freedom.
         spreads.across[s][place] = std::sqrt(std::max(0.0, solver.eigenvalues()[0]) * n / (n - 3.0));
         spreads.along[s][place] = std::sqrt(std::max(0.0, solver.eigenvalues()[1]));
     }
@@ -122,19 +119,19 @@ Spreads measureSpreads(const PointCloud& points, const NeighbourIndex& index) {
     return spreads;
 }
 
-// A disc of radius r spreads by r / 2 along either axis.
+// A disc of radius r has a standard deviation of r / 2 along either axis.
 double spacingFrom(double along, std::size_t neighbours) {
     return 2.0 * along * std::sqrt(kPi / static_cast<double>(neighbours));
 }
 
-// The local frame of a neighbourhood: two directions along the surface and one across.
+// Principal frame of a neighbourhood.
 struct LocalFrame {
     Eigen::Vector3d mean;
-    Eigen::Matrix3d axes;  // columns by rising spread: the first is the normal
+    Eigen::Matrix3d axes;  // columns, by rising spread: the first is the normal
 };
 
-// How far along the normal the fitted quadric lies from the origin (the point to be moved), or
-// the plane where there are too few neighbours for a quadric.
+// Height along the normal, above the origin (the point to be moved), of the fitted quadric; of the plane
+// where there are too few neighbours for a quadric.
 double heightOfFit(const std::vector<Eigen::Vector3d>& offsets, const std::vector<double>& weights,
                    const LocalFrame& frame, double reach) {
     const Eigen::Vector3d normal = frame.axes.col(0);
@@ -156,6 +153,7 @@ double heightOfFit(const std::vector<Eigen::Vector3d>& offsets, const std::vecto
     return factors.solve(right)[0];
 }
 
+// Point `at` moved onto the surface fitted to its neighbours `found`, by at most `limit`.
 Point3 projected(const PointCloud& points, std::uint32_t at, const std::vector<Neighbour>& found,
                  double reach, double limit, std::vector<Eigen::Vector3d>& offsets,
                  std::vector<double>& weights) {
@@ -184,7 +182,7 @@ Point3 projected(const PointCloud& points, std::uint32_t at, const std::vector<N
     return points[at] + Point3{move.x(), move.y(), move.z()};
 }
 
-// With fewer than `enough` neighbours in its reach a point looks farther.
+// Points with fewer than `enough` neighbours get a wider reach.
 Result<PointCloud> smoothOnce(const PointCloud& points, const NeighbourIndex& index, double reach,
                               double enough, double limit, const RunContext& context) {
     PointCloud moved(points.size());

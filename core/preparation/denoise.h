@@ -1,4 +1,4 @@
-// How noisy a scan is, and moving its points back to the surface they were sampled from.
+// Estimating the noise of a scan, and moving its points back to their surface.
 #pragma once
 
 #include "core/base/error.h"
@@ -10,28 +10,23 @@ namespace shapedb {
 
 /// Lengths in the points' unit.
 struct NoiseEstimate {
-    /// Standard deviation of the points about their surface. Below 0.1 * spacing where the
-    /// surface looks smooth at the scale of its sampling: then what is left is curvature.
+    /// Standard deviation of the points about their surface. A value below 0.1 * spacing means that
+    /// the scan is clean: it comes from curvature.
     double sigma = 0.0;
-    /// Edge of the square of surface that holds one point: the density of the sampling as it
-    /// would look without the noise. On the low side: up to a third too small on clean scans.
+    /// Edge of the square of surface that holds one point, as it would be without the noise. On the
+    /// low side: up to a third too small on clean scans.
     double spacing = 0.0;
 };
 
-/// Estimates the noise from the points alone. Around a sample of them the spread across the local
-/// plane is measured for growing neighbourhoods: it grows with the neighbourhood while that is
-/// smaller than the layer of noise, stays at sigma beyond, and grows again with the curvature or
-/// where it meets the far side of a thin part. The plateau is sigma.
+/// An average over the shape, not a bound; noise above about a quarter of a part's thickness cannot be
+/// told from thickness. 0 with fewer than 16 points or so. The pose does not matter (up to rounding).
 ///
-/// The same points in any pose give the same estimate up to rounding. Needs at least 16 points;
-/// with fewer the estimate is 0. Noise above about a quarter of a part's thickness cannot be told
-/// from thickness: the estimate is an average over the shape, not a bound.
+/// `index` must hold `points`.
 [[nodiscard]] NoiseEstimate estimateNoise(const PointCloud& points, const NeighbourIndex& index);
 
-/// Each point moved along the local normal onto a quadric fitted to its neighbours (moving least
-/// squares, weights falling with distance). The neighbourhoods reach `reachInSigmas` times the noise
-/// and hold at least about fifty points. No point moves farther than three sigma.
-/// Points with noise below a share of the spacing come back unchanged.
+/// Moves each point along the local normal onto a quadric fitted to its neighbours (moving least
+/// squares), by at most three sigma. Neighbourhoods reach `reachInSigmas` times the noise and hold
+/// about fifty points or more. A clean scan comes back unchanged.
 ///
 /// `index` must hold `points`. Errors: kCancelled, kDeadlineExceeded, kOutOfMemory.
 [[nodiscard]] Result<PointCloud> smooth(const PointCloud& points, const NeighbourIndex& index,

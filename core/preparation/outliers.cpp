@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <new>
-#include <numeric>
 #include <string>
 
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
 
+#include "core/base/disjoint_sets.h"
 #include "core/base/parallel.h"
 #include "core/base/return_if_error.h"
 
@@ -20,8 +20,8 @@ constexpr std::size_t kNeighbours = 8;
 constexpr std::size_t kSurroundings = 12;  // enough to tell a surface from a haze
 constexpr double kCommonShare = 0.9;
 constexpr double kHazeReach = 2.5;
-// Spread across the plane over spread along it: a surface's is below this, unless it is as curved
-// as its sampling is coarse.
+// Spread across the local plane over spread along it: below this on a surface, unless its radius of
+// curvature is as small as its spacing.
 constexpr double kHazeFlatness = 0.25;
 constexpr double kLinkInReaches = 3.0;     // of the common reach
 constexpr double kOwnLinkInReaches = 1.5;  // of the mean reach of the two ends
@@ -31,7 +31,7 @@ constexpr double kSmallGroupShare = 0.01;
 struct Surroundings {
     std::vector<std::uint32_t> near;  // kNeighbours per point, nearest first
     std::vector<double> reach;
-    double common = 0.0;  // the reach that kCommonShare of the points do not exceed
+    double common = 0.0;  // the reach that kCommonShare of the points stay within
 
     std::uint32_t neighbour(std::size_t point, std::size_t rank) const {
         return near[point * kNeighbours + rank];
@@ -82,31 +82,17 @@ bool liesInHaze(const PointCloud& points, const NeighbourIndex& index, const Poi
     return across > kHazeFlatness * std::sqrt(std::max(0.0, solver.eigenvalues()[1]));
 }
 
-// Groups of points that short links between neighbours hold together.
-class Groups {
-  public:
-    explicit Groups(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0u); }
-
-    std::uint32_t find(std::uint32_t i) {
-        while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-        return i;
-    }
-    void join(std::uint32_t a, std::uint32_t b) { parent_[find(a)] = find(b); }
-
-  private:
-    std::vector<std::uint32_t> parent_;
-};
-
+// A group: points connected by short links between neighbours.
 void markSmallGroups(const PointCloud& points, const Surroundings& around,
                      std::vector<std::uint8_t>& outlier) {
-    Groups groups(points.size());
+    DisjointSets groups(points.size());
     for (std::uint32_t i = 0; i < points.size(); ++i) {
         for (std::size_t k = 0; !outlier[i] && k < kNeighbours; ++k) {
             const std::uint32_t j = around.neighbour(i, k);
             if (outlier[j]) continue;
             const double link = std::max(kLinkInReaches * around.common,
                                          kOwnLinkInReaches * 0.5 * (around.reach[i] + around.reach[j]));
-            if (squaredDistance(points[i], points[j]) <= link * link) groups.join(i, j);
+            if (squaredDistance(points[i], points[j]) <= link * link) groups.unite(i, j);
         }
     }
     std::vector<std::uint32_t> size(points.size(), 0);

@@ -1,4 +1,4 @@
-// Points that lie off every surface.
+// Finding points that lie off every surface.
 #pragma once
 
 #include <cstdint>
@@ -11,16 +11,15 @@
 
 namespace shapedb {
 
-/// Per point 1 when it is an outlier. The reach of a point is the distance to its eighth nearest
-/// neighbour. A point is an outlier when
+/// Per point 1 when it is an outlier. With the reach of a point its distance to its eighth nearest
+/// neighbour, a point is an outlier when
 /// - its reach exceeds `ratio` times the mean reach of those eight: it stands off a surface; or
-/// - its reach exceeds 2.5 times what nine in ten points have, and its neighbours surround it in
-///   space instead of lying along a surface: it belongs to a haze; or
+/// - its reach exceeds 2.5 times that of nine in ten points, and its neighbours surround it instead
+///   of lying along a surface: it belongs to a haze; or
 /// - it belongs to a group of less than 1 % of the points that no short link joins to the rest.
-/// A region of a surface that is sampled more sparsely, a thin part, and a part apart that
-/// holds more points are none of these.
+/// Sparsely sampled regions, thin parts and larger separate parts are kept.
 ///
-/// `index` must hold `points`. The same points in any pose give the same answer up to rounding.
+/// `index` must hold `points`. The pose does not matter (up to rounding).
 /// Errors: kCancelled, kDeadlineExceeded, kOutOfMemory.
 [[nodiscard]] Result<std::vector<std::uint8_t>> findOutliers(const PointCloud& points,
                                                              const NeighbourIndex& index, double ratio,

@@ -5,9 +5,11 @@
 #include <utility>
 
 #include "core/base/return_if_error.h"
+#include "core/geometry/merge_duplicates.h"
 #include "core/geometry/neighbours.h"
 #include "core/preparation/decimate.h"
 #include "core/preparation/outliers.h"
+#include "core/preparation/sanitise.h"
 #include "core/preparation/scan_grid.h"
 #include "core/preparation/thin.h"
 
@@ -15,24 +17,24 @@ namespace shapedb {
 
 namespace {
 
-// Points closer together than the noise say nothing new about the surface.
+// Points closer together than the noise add nothing about the surface.
 constexpr double kSpacingPerSigma = 1.0;
 
-// What smoothing leaves behind away from the surface is sparser than its surroundings by less
-// than an outlier of the raw scan.
+// Points that smoothing could not bring back to the surface stand out less than outliers of the raw
+// scan: by this ratio.
 constexpr double kStragglerRatio = 1.7;
 
-// Scans of more than this many times the target are not sorted before they are decimated.
+// Scans with more than this many times the target are decimated by gridScan, without being sorted.
 constexpr std::size_t kStreamingRatio = 4;
 
-// Composes siteOfPoint with a further step.
+// Composes siteOfPoint with one more step.
 void follow(std::vector<std::uint32_t>& siteOfPoint, const std::vector<std::uint32_t>& step) {
     for (std::uint32_t& site : siteOfPoint) {
         if (site != kNoSite) site = step[site];
     }
 }
 
-// What is prepared so far, and who lies near whom there, looked for once while the sites stay.
+// The points so far, with an index of them that is built once for as long as they stay the same.
 struct Preparation {
     PreparedPoints prepared;
     std::optional<NeighbourIndex> index;
@@ -42,7 +44,7 @@ struct Preparation {
         return *index;
     }
 
-    // `siteOfSite`: where the sites went.
+    // `siteOfSite`: old site -> new site.
     void replaceSites(PointCloud sites, const std::vector<std::uint32_t>& siteOfSite) {
         follow(prepared.siteOfPoint, siteOfSite);
         if (sites == prepared.sites) return;
@@ -86,9 +88,10 @@ Result<void> thinOut(Preparation& work, double multiple, const RunContext& conte
     return {};
 }
 
-// Sanitised and decimated. Large scans go through a grid instead of being sorted first.
-Result<PreparedPoints> fewPoints(const PointCloud& points, std::size_t target, const RunContext& context,
-                                 const std::function<Result<void>(const char*)>& begin) {
+// Sanitises and decimates.
+Result<PreparedPoints> sanitiseAndDecimate(const PointCloud& points, std::size_t target,
+                                           const RunContext& context,
+                                           const std::function<Result<void>(const char*)>& begin) {
     PreparedPoints prepared;
     if (target != 0 && points.size() > kStreamingRatio * target) {
         RETURN_IF_ERROR(begin("decimate"));
@@ -109,10 +112,10 @@ Result<PreparedPoints> fewPoints(const PointCloud& points, std::size_t target, c
     prepared.duplicates = clean->duplicates;
     if (target == 0 || prepared.sites.size() <= target) return prepared;
     RETURN_IF_ERROR(begin("decimate"));
-    auto thinned = decimate(prepared.sites, target, context);
-    RETURN_IF_ERROR(thinned);
-    follow(prepared.siteOfPoint, thinned->siteOfPoint);
-    prepared.sites = std::move(thinned->points);
+    auto decimated = decimate(prepared.sites, target, context);
+    RETURN_IF_ERROR(decimated);
+    follow(prepared.siteOfPoint, decimated->siteOfPoint);
+    prepared.sites = std::move(decimated->points);
     return prepared;
 }
 
@@ -122,7 +125,7 @@ Result<PreparedPoints> preparePoints(const PointCloud& points, const Preparation
                                      const RunContext& context,
                                      const std::function<Result<void>(const char*)>& begin) {
     RETURN_IF_ERROR(begin("sanitise"));
-    auto begun = fewPoints(points, options.decimateTo, context, begin);
+    auto begun = sanitiseAndDecimate(points, options.decimateTo, context, begin);
     if (!begun) return begun;
     Preparation work{std::move(*begun), std::nullopt};
     if (options.outlierRatio > 0.0) {
@@ -145,7 +148,7 @@ Result<PreparedPoints> preparePoints(const PointCloud& points, const Preparation
     prepared.outliers = static_cast<std::uint64_t>(
         std::count(prepared.siteOfPoint.begin(), prepared.siteOfPoint.end(), kNoSite));
     if (prepared.sites.size() < 4) {
-        return fail(ErrorCode::kTooFewPoints, "fewer than 4 points are left without outliers");
+        return fail(ErrorCode::kTooFewPoints, "fewer than 4 points are left after removing outliers");
     }
     return std::move(work.prepared);
 }

@@ -1,4 +1,4 @@
-// From a scan to the points that are triangulated: outliers left out, noise smoothed, density evened.
+// All of the preparation: from a scan to the points that are triangulated.
 #pragma once
 
 #include <cstdint>
@@ -9,29 +9,29 @@
 #include "core/base/run_context.h"
 #include "core/geometry/point.h"
 #include "core/preparation/denoise.h"
+#include "core/preparation/frame.h"
 #include "core/preparation/options.h"
-#include "core/preparation/sanitise.h"
 
 namespace shapedb {
 
-/// Stands for no site: the point was left out.
+/// In place of a site: the point was left out.
 constexpr std::uint32_t kNoSite = 0xffffffffu;
 
 struct PreparedPoints {
     PointCloud sites;  ///< distinct, in the unit frame, in lexicographic order
     Frame frame;
     std::vector<std::uint32_t> siteOfPoint;  ///< input point -> index into `sites`, or kNoSite
-    std::uint64_t duplicates = 0;  ///< input points that repeated another; not counted (0) in scans large
-                                   ///< enough to be decimated as they stream by
+    std::uint64_t duplicates = 0;  ///< input points that repeated another; not counted (0) when the scan
+                                   ///< was decimated by gridScan
     std::uint64_t outliers = 0;    ///< input points left out
     NoiseEstimate noise;           ///< before smoothing, unit frame; zero when not measured
     double spacing = 0.0;          ///< the sites' own, unit frame; zero when not measured
 };
 
-/// Runs the steps that `options` ask for, in this order: sanitise, decimate, outliers, smooth, even
-/// spacing. `begin` is called with the name of each as it starts and may stop the work.
+/// Runs the enabled steps, in this order: sanitise, decimate, outliers, smooth, thin. `begin` is called
+/// with the name of each as it starts; an error from it stops the work.
 ///
-/// Errors: those of the steps and of `begin`.
+/// Errors: those of the steps and of `begin`; kTooFewPoints when fewer than 4 points are left.
 [[nodiscard]] Result<PreparedPoints> preparePoints(const PointCloud& points,
                                                    const PreparationOptions& options,
                                                    const RunContext& context,

@@ -11,29 +11,35 @@
 #include "core/base/prefetch.h"
 #include "core/base/radix_sort.h"
 #include "core/base/return_if_error.h"
+#include "core/geometry/merge_duplicates.h"
 #include "core/geometry/morton.h"
 #include "core/preparation/decimate.h"
+#include "core/preparation/flatness.h"
 
 namespace shapedb {
 
 namespace {
 
-// Coordinates in the unit frame, moved to [0, 2], in steps of 2^-51.
+// Points are gathered in a hash table of small cells, which is coarsened (eight cells become one) whenever
+// it is full. Threads fill tables of their own for stretches of the scan, which are merged in the end. The
+// final fineness is estimated from a sample first, so that little coarsening remains to be done.
+
+// Coordinates in the unit frame, shifted to [0, 2], as integers in steps of 2^-51.
 constexpr double kStepsPerUnit = 0x1p51;
 constexpr int kStepBits = 52;
 // The finest cells: 2^20 along the frame's edge of 2.
 constexpr int kFinestBits = 20;
-// Sums are kept in two parts, so that those of 2^32 points fit.
+// Sums are kept in two parts, so that 2^32 points fit.
 constexpr int kLowBits = 26;
 constexpr std::uint64_t kLowMask = (std::uint64_t{1} << kLowBits) - 1;
 
 constexpr std::size_t kCellsPerTarget = 8;
 constexpr std::size_t kPointsBetweenCheckpoints = 1 << 16;
-// A stretch with fewer points for each cell it may fill costs more to merge than it saves.
+// With fewer points per cell, merging a stretch costs more than filling it saves.
 constexpr std::size_t kPointsPerCell = 4;
-// A sample that tells how fine the grid will be; most often all points when they are as few.
+// Points per cell of the limit in the sample that tells how fine the grid will be.
 constexpr std::size_t kSampledPerCell = 3;
-// Of an axis, when a cell is to have a code of 32 bits: enough unless points lie close together.
+// Bits of an axis when a cell code has 32: enough unless the points are concentrated.
 constexpr int kShortCodeBits = 10;
 constexpr std::uint32_t kFree = 0xffffffffu;
 
@@ -59,7 +65,7 @@ struct Sum {
         }
         count += other.count;
     }
-    // Back in the unit frame.
+    // In the unit frame.
     Point3 mean() const {
         const auto of = [&](std::size_t i) {
             // Whole steps first: the quotient of the high part carries its remainder into the low one.
@@ -75,7 +81,7 @@ struct Sum {
     }
 };
 
-// Of the finest cell along an axis; the far end of the frame belongs to the last.
+// Index of the finest cell along an axis; the far end of the frame belongs to the last one.
 std::uint64_t finestIndex(std::uint64_t steps) {
     return std::min(steps >> (kStepBits - kFinestBits), (std::uint64_t{1} << kFinestBits) - 1);
 }
@@ -85,14 +91,15 @@ struct GridCell {
     Sum sum;
 };
 
+// The occupied cells of a grid, found by key.
 class Grid {
   public:
     Grid(std::size_t limit, int bits) : limit_(limit), bits_(bits), slots_(std::size_t{1} << 12) {
         cells_.reserve(limit + 1);
     }
 
-    // Puts points into their cells, whose numbers, until the next coarsening, go to `cellOf`. Memory is asked
-    // for before it is read: in a scan that jumps about every point waits for it otherwise.
+    // Adds points to their cells and writes the numbers of these, valid until the next coarsening, to
+    // `cellOf`. Prefetches, since consecutive points may lie far apart and each would wait for memory.
     void add(const Steps* steps, std::size_t count, std::uint32_t* cellOf) {
         for (std::size_t i = 0; i < count; ++i) prefetch(&slots_[firstSlotOf(keyOf(steps[i]))]);
         for (std::size_t i = 0; i < count; ++i) {
@@ -101,7 +108,7 @@ class Grid {
         }
         for (std::size_t i = 0; i < count; ++i) cells_[cellOf[i]].sum.add(steps[i]);
     }
-    // Adds the cells of another grid as fine as this one. Returns their numbers here.
+    // Adds the cells of another grid of the same fineness. Returns their numbers here.
     std::vector<std::uint32_t> add(const Grid& other) {
         return add(other.cells_, [](std::uint64_t key) { return key; });
     }
@@ -109,8 +116,8 @@ class Grid {
     bool isFull() const { return cells_.size() > limit_; }
     const std::vector<GridCell>& cells() const { return cells_; }
 
-    // Eight cells become one. How fine the grid is in the end depends on all points, not on their order:
-    // the finest that stays within the limit. Returns the new number of every cell.
+    // Merges cells by eight. The final fineness is the finest within the limit, which depends on all
+    // points but not on their order. Returns the new number of each cell.
     std::vector<std::uint32_t> coarsen() {
         --bits_;
         std::vector<GridCell> finer;
@@ -122,7 +129,8 @@ class Grid {
         return add(finer, [](std::uint64_t key) { return key >> 1 & kHalves; });
     }
 
-    // Orders the cells by their keys, which no order of points decides. Returns their new numbers.
+    // Sorts the cells by key, so that their order does not depend on that of the points. Returns their new
+    // numbers.
     std::vector<std::uint32_t> sort() {
         LargeVector<KeyedIndex> order;
         order.reserve(cells_.size());
@@ -145,7 +153,7 @@ class Grid {
         std::uint32_t cell = kFree;
     };
 
-    // Adds cells whose keys are those of this grid after `keyHere`. Returns their numbers here.
+    // Adds cells whose keys here are keyHere(key). Returns their numbers here.
     template <typename KeyHere>
     std::vector<std::uint32_t> add(const std::vector<GridCell>& cells, KeyHere keyHere) {
         std::vector<std::uint32_t> renumbered;
@@ -162,15 +170,15 @@ class Grid {
         return index(steps[0]) << 42 | index(steps[1]) << 21 | index(steps[2]);
     }
 
-    // Where the search for a key begins.
+    // Where probing for a key starts.
     std::size_t firstSlotOf(std::uint64_t key) const {
         std::uint64_t mixed = key * 0x9e3779b97f4a7c15ULL;
         mixed = (mixed ^ mixed >> 32) * 0xd6e8feb86659fd93ULL;
         return (mixed >> 32) & (slots_.size() - 1);
     }
 
-    // Of the cell with this key, or where it belongs. Keys lie beside the numbers of their cells: most
-    // look-ups touch one cache line.
+    // Slot of the cell with this key, or the free one where it belongs. Slots hold the keys too, so that
+    // most look-ups touch one cache line.
     std::size_t slotOf(std::uint64_t key) const {
         const std::size_t mask = slots_.size() - 1;
         std::size_t slot = firstSlotOf(key);
@@ -178,7 +186,7 @@ class Grid {
         return slot;
     }
 
-    // The cell with this key; a new one when there is none.
+    // The cell with this key, added if necessary.
     std::uint32_t find(std::uint64_t key) {
         const std::size_t slot = slotOf(key);
         if (slots_[slot].cell != kFree) return slots_[slot].cell;
@@ -204,7 +212,7 @@ class Grid {
 };
 
 Steps stepsOf(const Point3& p, const Frame& frame, double inverse) {
-    // Signed first: that is one instruction.
+    // By way of a signed integer, which is one instruction.
     const auto steps = [](double v) {
         return static_cast<std::uint64_t>(static_cast<std::int64_t>((v + 1.0) * kStepsPerUnit));
     };
@@ -217,8 +225,8 @@ void renumber(std::vector<std::uint32_t>& cellOfPoint, std::size_t begin, std::s
     for (std::size_t i = begin; i < end; ++i) cellOfPoint[i] = renumbered[cellOfPoint[i]];
 }
 
-// A stretch of the scan in a grid of its own. Two of them make that of both stretches together: sums are
-// exact, and how fine it is depends on the points alone.
+// A stretch of the scan in a grid of its own. Adding two gives the grid of both: sums are exact, and the
+// fineness depends on the points alone.
 struct Stretch {
     std::size_t begin = 0;
     std::size_t end = 0;
@@ -254,13 +262,13 @@ Result<void> fill(Stretch& stretch, const PointCloud& scan, const Frame& frame, 
     return {};
 }
 
-// How fine a grid is, and about how many cells it has then.
+// Of a grid, and about how many cells it has then.
 struct Fineness {
     int bits = 0;
     std::size_t cells = 0;
 };
 
-// Puts every point into its cell, a stretch to each thread.
+// Adds all points, one stretch per thread.
 Result<Grid> fillAll(const PointCloud& scan, const Frame& frame, std::size_t limit, const Fineness& expected,
                      const RunContext& context, std::vector<std::uint32_t>& cellOfPoint) {
     const std::size_t worthwhile = scan.size() / (kPointsPerCell * expected.cells);
@@ -282,8 +290,7 @@ Result<Grid> fillAll(const PointCloud& scan, const Frame& frame, std::size_t lim
     return std::move(stretches[0].grid);
 }
 
-// The cells of every step-th point in a grid of so many bits, each as one number: three bits to a level, the
-// coarsest first.
+// The Morton code of each step-th point's cell in a grid of that many bits.
 template <typename Code>
 LargeVector<Code> cellCodes(const PointCloud& scan, const Frame& frame, std::size_t step, int bits) {
     const double inverse = 1.0 / frame.unit;
@@ -302,32 +309,33 @@ LargeVector<Code> cellCodes(const PointCloud& scan, const Frame& frame, std::siz
     return codes;
 }
 
-// The finest grid, of up to so many bits, in which every step-th point stays within the limit.
+// The finest grid, of up to `mostBits`, in which the sample (each step-th point) occupies at most `limit`
+// cells.
 template <typename Code>
 Fineness finestOfSample(const PointCloud& scan, const Frame& frame, std::size_t limit, std::size_t step,
                         int mostBits) {
     static_assert(std::is_unsigned_v<Code>);
     LargeVector<Code> codes = cellCodes<Code>(scan, frame, step, mostBits);
     radixSortNumbers(codes);
-    // Sorted codes part where their highest different bits are.
-    std::array<std::size_t, kFinestBits + 1> parted{};
+    // Neighbours in sorted order share a cell down to the level of their highest differing bit.
+    std::array<std::size_t, kFinestBits + 1> splits{};
     for (std::size_t i = 1; i < codes.size(); ++i) {
         const Code differing = codes[i] ^ codes[i - 1];
         int level = mostBits;
         for (Code rest = differing >> 3; rest != 0; rest >>= 3) --level;
-        if (differing != 0) ++parted[static_cast<std::size_t>(level)];
+        if (differing != 0) ++splits[static_cast<std::size_t>(level)];
     }
     Fineness finest{0, 1};
     while (finest.bits < mostBits) {
-        const std::size_t finer = finest.cells + parted[static_cast<std::size_t>(finest.bits) + 1];
+        const std::size_t finer = finest.cells + splits[static_cast<std::size_t>(finest.bits) + 1];
         if (finer > limit) break;
         finest = {finest.bits + 1, finer};
     }
     return finest;
 }
 
-// Where to begin: in a grid no coarser than that of all points in the end. All occupy no fewer cells than
-// some of them, so their finest is no finer than that of a sample.
+// The fineness to begin with, at least the final one: all points occupy at least as many cells as a sample
+// of them, so their finest grid within the limit is no finer than the sample's.
 Fineness finestToTry(const PointCloud& scan, const Frame& frame, std::size_t limit) {
     const std::size_t step = std::max<std::size_t>(1, scan.size() / (kSampledPerCell * limit));
     const auto finest = finestOfSample<std::uint32_t>(scan, frame, limit, step, kShortCodeBits);
@@ -349,7 +357,7 @@ Result<std::optional<GriddedScan>> gridScanOrThrow(const PointCloud& scan, std::
     PointCloud means;
     means.reserve(small.size());
     for (const GridCell& cell : small) means.push_back(cell.sum.mean());
-    RETURN_IF_ERROR(checkSpansSpace(means));
+    RETURN_IF_ERROR(checkNotFlat(means));
     const auto large = decimate(means, target, context);
     RETURN_IF_ERROR(large);
     std::vector<Sum> sums(large->points.size());

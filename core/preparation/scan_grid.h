@@ -1,4 +1,4 @@
-// Decimating a large scan as it streams by: no copy and no sorting of its points.
+// `sanitise` and `decimate` in one pass over a large scan, without copying or sorting its points.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +9,7 @@
 #include "core/base/error.h"
 #include "core/base/run_context.h"
 #include "core/geometry/point.h"
-#include "core/preparation/sanitise.h"
+#include "core/preparation/frame.h"
 
 namespace shapedb {
 
@@ -19,18 +19,17 @@ struct GriddedScan {
     Frame frame;
 };
 
-/// What `sanitise` and then `decimate` do, for scans of far more than `target` points: one mean per
-/// occupied cell of a cubic grid, at most `target`, usually at least nine tenths of that. Differences:
-/// a point that repeats another counts as often as it comes, and points are first gathered in small cells
-/// (at most eight times `target` of them) that go to the cell of the grid their mean lies in.
+/// For scans of far more than `target` points: one mean per occupied cell of a cubic grid, at most
+/// `target`, usually at least nine tenths of that. It differs from `sanitise` and `decimate` in that
+/// repeated points count each time, and that points are first gathered in small cells (at most eight times
+/// `target`), each of which then goes as a whole to the grid cell that its mean lies in.
 ///
-/// The sums are exact, so the order of the points leaves no trace, nor does the number of threads (those of
-/// the caller's arena). Memory besides the result: about 100 bytes for each small cell, for every thread,
-/// whatever the size of the scan. Time linear in the scan.
+/// Sums are exact, so neither the order of the points nor the number of threads (those of the caller's
+/// arena) changes a bit. Linear time. Memory besides the result: about 100 bytes per small cell and thread.
 ///
-/// Nothing when the scan occupies so few cells that its distinct points may be fewer than `target`: then
-/// use `sanitise`. Errors: those of `sanitise` (flatness is judged by the small cells' means); kCancelled,
-/// kDeadlineExceeded.
+/// Nothing when the scan occupies so few cells that it may have fewer than `target` distinct points: use
+/// `sanitise` then. Errors: those of `sanitise` (flatness is judged by the means of the small cells);
+/// kCancelled, kDeadlineExceeded.
 [[nodiscard]] Result<std::optional<GriddedScan>> gridScan(const PointCloud& scan, std::size_t target,
                                                           const RunContext& context = {});
 

@@ -1,6 +1,6 @@
 #include "core/preparation/thin.h"
 
-#include <algorithm>
+#include <cmath>
 #include <new>
 #include <string>
 
@@ -12,18 +12,6 @@ namespace {
 
 constexpr std::uint32_t kUndecided = 0xffffffffu;
 constexpr std::size_t kPointsBetweenCheckpoints = 4096;
-
-std::vector<Neighbour> byDistanceFromCentroid(const PointCloud& points) {
-    Point3 centroid;
-    for (const Point3& p : points) centroid = centroid + p;
-    centroid = (1.0 / static_cast<double>(points.size())) * centroid;
-    std::vector<Neighbour> order(points.size());
-    for (std::uint32_t i = 0; i < points.size(); ++i) {
-        order[i] = {squaredDistance(points[i], centroid), i};
-    }
-    std::sort(order.begin(), order.end());
-    return order;
-}
 
 Result<ThinnedPoints> thinOrThrow(const PointCloud& points, const NeighbourIndex& index, double spacing,
                                   const RunContext& context) {

@@ -1,4 +1,4 @@
-// Thinning to an even density: no two of the points that stay are closer than a given distance.
+// Thinning to an even density: no two points that stay are closer than a given distance.
 #pragma once
 
 #include <cstdint>
@@ -13,13 +13,12 @@ namespace shapedb {
 
 struct ThinnedPoints {
     PointCloud points;                       ///< a subset of the points given, in their order
-    std::vector<std::uint32_t> siteOfPoint;  ///< point given -> the one that stands for it in `points`
+    std::vector<std::uint32_t> siteOfPoint;  ///< input point -> the point of `points` that stands for it
 };
 
-/// Goes through the points by distance from their centroid and keeps each that has no kept point
-/// closer than `spacing`: even where the scan is dense, untouched where it is sparse, and never an
-/// average across a thin part. The choice does not depend on the pose (up to rounding).
-/// A spacing of 0 keeps all. `index` must hold `points`.
+/// Goes through the points by distance from their centroid and keeps each that has no kept point within
+/// `spacing`. Sparse regions stay as they are, and nothing is averaged across a thin part. The choice does
+/// not depend on the pose (up to rounding). A spacing of 0 keeps all. `index` must hold `points`.
 ///
 /// Errors: kCancelled, kDeadlineExceeded, kOutOfMemory.
 [[nodiscard]] Result<ThinnedPoints> thin(const PointCloud& points, const NeighbourIndex& index,

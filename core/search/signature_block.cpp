@@ -16,14 +16,14 @@ void SignatureBlock::reserve(std::size_t count) {
     scales_.reserve(count);
     qualities_.reserve(count);
     metadataOf_.reserve(count);
-    partsEnd_.reserve(count);
+    segmentsEnd_.reserve(count);
     pointsEnd_.reserve(count);
     first_.reserve(count);
     second_.reserve(count);
 }
 
 void SignatureBlock::shrink() {
-    parts_.shrink_to_fit();
+    segments_.shrink_to_fit();
     points_.shrink_to_fit();
     metadata_.shrink_to_fit();
     first_.shrink_to_fit();
@@ -31,7 +31,7 @@ void SignatureBlock::shrink() {
 }
 
 void SignatureBlock::appendMetadata(const Metadata& metadata) {
-    // Shapes that came together are often labelled alike: looks at the last few.
+    // Shapes that were added together often have the same labels: the last few are looked at.
     constexpr std::size_t kLookBack = 16;
     for (std::size_t back = 1; back <= kLookBack && back <= metadata_.size(); ++back) {
         if (metadata_[metadata_.size() - back] != metadata) continue;
@@ -60,13 +60,15 @@ void SignatureBlock::append(const IndexEntry& entry) {
         HalfRow first, second;
         packStatistics(signature.attributes->statistics, first, second);
         appendStatistics(first, second);
-        for (const SegmentDescriptor& part : signature.attributes->body.parts) parts_.push_back(packed(part));
+        for (const SegmentDescriptor& segment : signature.attributes->body.parts) {
+            segments_.push_back(packed(segment));
+        }
     } else {
         for (const WeightedPoint& p : signature.points) points_.push_back({p.position, p.weight});
         if (!first_.empty()) first_.resize(ids_.size());
         if (!second_.empty()) second_.resize(ids_.size());
     }
-    partsEnd_.push_back(static_cast<std::uint16_t>(parts_.size()));
+    segmentsEnd_.push_back(static_cast<std::uint16_t>(segments_.size()));
     pointsEnd_.push_back(static_cast<std::uint16_t>(points_.size()));
 }
 
@@ -81,40 +83,33 @@ void SignatureBlock::append(const SignatureBlock& from, std::size_t row) {
         if (!first_.empty()) first_.resize(ids_.size());
         if (!second_.empty()) second_.resize(ids_.size());
     }
-    for (std::size_t i = from.partsBegin(row); i < from.partsEnd_[row]; ++i) parts_.push_back(from.parts_[i]);
+    for (std::size_t i = from.segmentsBegin(row); i < from.segmentsEnd_[row]; ++i)
+        segments_.push_back(from.segments_[i]);
     for (std::size_t i = from.pointsBegin(row); i < from.pointsEnd_[row]; ++i)
         points_.push_back(from.points_[i]);
-    partsEnd_.push_back(static_cast<std::uint16_t>(parts_.size()));
+    segmentsEnd_.push_back(static_cast<std::uint16_t>(segments_.size()));
     pointsEnd_.push_back(static_cast<std::uint16_t>(points_.size()));
 }
 
-void SignatureBlock::scored(std::size_t row, Signature& signature) const {
-    signature.scale = scales_[row];
-    if (!attributed(row)) {
-        signature.attributes.reset();
-        signature.points.clear();
-        for (std::size_t i = pointsBegin(row); i < pointsEnd_[row]; ++i) {
-            WeightedPoint point;
-            point.position = points_[i].position;
-            point.weight = points_[i].weight;
-            signature.points.push_back(point);
-        }
-        return;
-    }
-    if (!signature.attributes) signature.attributes.emplace();
-    ShapeAttributes& attributes = *signature.attributes;
-    attributes.quality = qualities_[row];
-    unpackStatistics(first_[row], second_[row], attributes.statistics);
-    attributes.body.parts.clear();
-    for (std::size_t i = partsBegin(row); i < partsEnd_[row]; ++i) {
-        attributes.body.parts.push_back(unpacked(parts_[i]));
-    }
+ShapeRows SignatureBlock::rows() const {
+    ShapeRows rows;
+    rows.count = ids_.size();
+    rows.attributedCount = attributedCount_;
+    rows.scales = scales_.data();
+    rows.qualities = qualities_.data();
+    rows.firstHalves = first_.data();
+    rows.secondHalves = second_.data();
+    rows.segments = segments_.data();
+    rows.segmentsEnd = segmentsEnd_.data();
+    rows.points = points_.data();
+    rows.pointsEnd = pointsEnd_.data();
+    return rows;
 }
 
 std::size_t SignatureBlock::memoryBytes() const {
     std::size_t bytes = sizeof *this + bytesOf(ids_) + bytesOf(scales_) + bytesOf(qualities_) +
-                        bytesOf(metadataOf_) + bytesOf(partsEnd_) + bytesOf(pointsEnd_) + bytesOf(first_) +
-                        bytesOf(second_) + bytesOf(parts_) + bytesOf(points_) + bytesOf(metadata_);
+                        bytesOf(metadataOf_) + bytesOf(segmentsEnd_) + bytesOf(pointsEnd_) + bytesOf(first_) +
+                        bytesOf(second_) + bytesOf(segments_) + bytesOf(points_) + bytesOf(metadata_);
     for (const Metadata& metadata : metadata_) {
         // A node of the tree: two strings, three pointers, a colour.
         constexpr std::size_t kNode = 2 * sizeof(std::string) + 32;

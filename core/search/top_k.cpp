@@ -4,8 +4,8 @@
 #include <atomic>
 #include <chrono>
 #include <exception>
-#include <memory>
 #include <new>
+#include <optional>
 #include <string>
 
 #include <tbb/blocked_range.h>
@@ -13,35 +13,35 @@
 #include <tbb/task_arena.h>
 
 #include "core/base/return_if_error.h"
-#include "core/search/statistics_bound.h"
 
 namespace shapedb {
 
 namespace {
 
-// Blocks looked through before the best scores so far are used against the next, larger slice.
+// Blocks that are searched before the best scores so far are used against the next, larger slice.
 constexpr std::size_t kFirstSlice = 4;
 constexpr std::size_t kSliceGrowth = 8;
 
-// Candidates scored before the best scores so far are used against the rest.
+// Candidates that are scored before the best scores so far are used against the rest.
 constexpr std::size_t kFirstChunk = 32;
 constexpr std::size_t kLargestChunk = 1024;
 
 // Candidates that one thread takes at a time.
 constexpr std::size_t kGrain = 4;
 
+// A row that the scan of its block left. Small, for it is sorted.
 struct Candidate {
-    double bound = 0.0;  // its score is no larger
+    double bound = 0.0;
+    const Survivor* survivor = nullptr;
     const SignatureBlock* block = nullptr;
-    std::uint32_t row = 0;
 
-    std::int64_t id() const { return block->id(row); }
+    std::int64_t id() const { return block->id(survivor->row); }
 };
 
-struct BlockBounds {
-    std::vector<Candidate> candidates;
+struct BlockScan {
+    std::vector<Survivor> left;
     std::uint64_t filtered = 0;
-    StatisticsBound::Counts counts;
+    ScanCounts counts;
 };
 
 bool ranksBefore(const SearchHit& a, const SearchHit& b) {
@@ -52,16 +52,21 @@ bool visitedBefore(const Candidate& a, const Candidate& b) {
     return a.bound != b.bound ? a.bound > b.bound : a.id() < b.id();
 }
 
-Result<void> check(const Signature& query, const SignatureSet& set, const SearchOptions& options) {
+Result<void> check(const SearchOptions& options) {
     if (options.k == 0) return fail(ErrorCode::kInvalidArgument, "k is 0; ask for at least 1 hit");
     if (!(options.threshold >= 0.0 && options.threshold <= 1.0)) {
         return fail(ErrorCode::kInvalidArgument,
                     "threshold is " + std::to_string(options.threshold) + "; it must be 0 to 1");
     }
+    return {};
+}
+
+Result<void> check(const Signature& query, const SignatureSet& set, const SearchOptions& options) {
+    RETURN_IF_ERROR(check(options));
     if (!query.attributes && set.attributedCount() > 0) {
         return fail(ErrorCode::kInvalidArgument,
-                    "the query's signature has points and weights alone, those of the collection have "
-                    "attributes: make the query's with the collection's profile");
+                    "the query's signature has only points and weights, but those of the collection have "
+                    "attributes; make the query's signature with the collection's profile");
     }
     return validate(options.score);
 }
@@ -72,14 +77,13 @@ Result<void> parallelUntilStopped(std::size_t begin, std::size_t end, std::size_
                                   const RunContext& context, const Work& work) {
     std::atomic<bool> stop{false};
     tbb::parallel_for(tbb::blocked_range<std::size_t>(begin, end, grain), [&](const auto& range) {
-        Signature scratch;
         for (std::size_t i = range.begin(); i < range.end(); ++i) {
             if (stop.load(std::memory_order_relaxed)) return;
             if (!context.checkpoint()) {
                 stop = true;
                 return;
             }
-            work(i, scratch);
+            work(i);
         }
     });
     return context.checkpoint();
@@ -87,12 +91,11 @@ Result<void> parallelUntilStopped(std::size_t begin, std::size_t end, std::size_
 
 class Searcher {
   public:
-    Searcher(const Signature& query, const SignatureSet& set, const SearchOptions& options,
+    Searcher(const Scorer& scorer, const SignatureSet& set, const SearchOptions& options,
              const RunContext& context)
-        : query_(query), options_(options), context_(context) {
-        if (query.attributes) statistics_ = std::make_unique<const StatisticsBound>(query, options.score);
+        : scorer_(scorer), options_(options), context_(context) {
         result_.counts.candidates = set.size();
-        // Spread evenly: shapes that came together are often alike.
+        // Each slice is spread evenly over the set: shapes that were added together are often alike.
         order_.reserve(set.blocks().size());
         std::size_t stride = 1;
         while (stride * kFirstSlice < set.blocks().size()) stride *= 2;
@@ -110,9 +113,9 @@ class Searcher {
         std::size_t slice = kFirstSlice;
         for (std::size_t begin = 0; begin < order_.size();) {
             const std::size_t end = std::min(order_.size(), begin + slice);
-            auto candidates = boundSlice(begin, end);
-            RETURN_IF_ERROR(candidates);
-            RETURN_IF_ERROR(visit(*candidates));
+            const auto scans = scanSlice(begin, end);
+            RETURN_IF_ERROR(scans);
+            RETURN_IF_ERROR(visit(collect(*scans, begin)));
             begin = end;
             slice *= kSliceGrowth;
             blocksDone_ = end;
@@ -121,7 +124,7 @@ class Searcher {
     }
 
   private:
-    // No candidate below this can be among the hits.
+    // Candidates that score less are no hits.
     double needed() const {
         return result_.hits.size() == options_.k ? result_.hits.back().score : options_.threshold;
     }
@@ -142,49 +145,40 @@ class Searcher {
         return wanted;
     }
 
-    void boundByPoints(const SignatureBlock& block, const std::vector<std::uint8_t>& wanted, double least,
-                       Signature& scratch, BlockBounds& bounds) const {
-        for (std::uint32_t row = 0; row < block.size(); ++row) {
-            if ((!wanted.empty() && wanted[row] == 0) || block.attributed(row)) continue;
-            ++bounds.counts.afterFirstHalf;
-            ++bounds.counts.afterStatistics;
-            block.scored(row, scratch);
-            const double bound = scoreUpperBound(query_, scratch, options_.score);
-            if (bound >= least) bounds.candidates.push_back({bound, &block, row});
-        }
-    }
-
-    BlockBounds boundBlock(const SignatureBlock& block, double least, Signature& scratch) const {
-        BlockBounds bounds;
+    BlockScan scanBlock(const SignatureBlock& block, double least) const {
+        BlockScan scan;
         const std::vector<std::uint8_t> wanted = wantedRows(block);
-        bounds.filtered = wanted.empty()
-                              ? block.size()
-                              : static_cast<std::uint64_t>(std::count(wanted.begin(), wanted.end(), 1));
-        if (bounds.filtered == 0) return bounds;
-        if (statistics_) {
-            std::vector<StatisticsBound::Left> left;
-            statistics_->scan(block, wanted, least, left, bounds.counts);
-            bounds.candidates.reserve(left.size());
-            for (const auto& row : left)
-                bounds.candidates.push_back({scoreAt(row.distance), &block, row.row});
-        }
-        if (block.attributedCount() < block.size()) boundByPoints(block, wanted, least, scratch, bounds);
-        return bounds;
+        scan.filtered = wanted.empty()
+                            ? block.size()
+                            : static_cast<std::uint64_t>(std::count(wanted.begin(), wanted.end(), 1));
+        if (scan.filtered > 0) scorer_.scan(block.rows(), wanted, least, scan.left, scan.counts);
+        return scan;
     }
 
-    Result<std::vector<Candidate>> boundSlice(std::size_t begin, std::size_t end) {
-        std::vector<BlockBounds> perBlock(end - begin);
+    Result<std::vector<BlockScan>> scanSlice(std::size_t begin, std::size_t end) const {
+        std::vector<BlockScan> scans(end - begin);
         const double least = needed();
-        auto done = parallelUntilStopped(begin, end, 1, context_, [&](std::size_t b, Signature& scratch) {
-            perBlock[b - begin] = boundBlock(*order_[b], least, scratch);
-        });
+        auto done = parallelUntilStopped(
+            begin, end, 1, context_, [&](std::size_t b) { scans[b - begin] = scanBlock(*order_[b], least); });
         RETURN_IF_ERROR(done);
+        return scans;
+    }
+
+    // Counts what the scans of the blocks from `begin` left, and puts it in the order of visiting.
+    std::vector<Candidate> collect(const std::vector<BlockScan>& scans, std::size_t begin) {
+        std::size_t left = 0;
+        for (const BlockScan& scan : scans) {
+            left += scan.left.size();
+            result_.counts.filtered += scan.filtered;
+            result_.counts.afterFirstHalf += scan.counts.afterFirstHalf;
+            result_.counts.afterStatistics += scan.counts.afterStatistics;
+        }
         std::vector<Candidate> all;
-        for (const BlockBounds& block : perBlock) {
-            all.insert(all.end(), block.candidates.begin(), block.candidates.end());
-            result_.counts.filtered += block.filtered;
-            result_.counts.afterFirstHalf += block.counts.afterFirstHalf;
-            result_.counts.afterStatistics += block.counts.afterStatistics;
+        all.reserve(left);
+        for (std::size_t b = 0; b < scans.size(); ++b) {
+            for (const Survivor& survivor : scans[b].left) {
+                all.push_back({survivor.bound, &survivor, order_[begin + b]});
+            }
         }
         std::sort(all.begin(), all.end(), visitedBefore);
         return all;
@@ -197,7 +191,9 @@ class Searcher {
             const double least = needed();
             // A candidate whose bound equals the k-th score may still win by its smaller id.
             std::size_t end = begin;
-            while (end < candidates.size() && end - begin < chunk && candidates[end].bound >= least) ++end;
+            while (end < candidates.size() && end - begin < chunk && candidates[end].bound >= least) {
+                ++end;
+            }
             if (end == begin) break;
             RETURN_IF_ERROR(scoreChunk(candidates, begin, end, least));
             begin = end;
@@ -209,35 +205,37 @@ class Searcher {
 
     Result<void> scoreChunk(const std::vector<Candidate>& candidates, std::size_t begin, std::size_t end,
                             double least) {
-        constexpr double kRuledOut = -1.0;
-        std::vector<double> scores(end - begin, kRuledOut);
-        // Signatures of many points take milliseconds each, so a stop is looked for before each.
-        auto done =
-            parallelUntilStopped(begin, end, kGrain, context_, [&](std::size_t i, Signature& scratch) {
-                candidates[i].block->scored(candidates[i].row, scratch);
-                if (scratch.attributes && scoreUpperBound(query_, scratch, options_.score) < least) return;
-                scores[i - begin] = score(query_, scratch, options_.score);
-            });
-        if (!done) return done;
+        std::vector<std::optional<double>> scores(end - begin);
+        // A signature of many points takes milliseconds, so every one is preceded by a look at the context.
+        auto done = parallelUntilStopped(begin, end, kGrain, context_, [&](std::size_t i) {
+            const Candidate& candidate = candidates[i];
+            const ShapeRow shape = candidate.block->rows()[candidate.survivor->row];
+            scores[i - begin] = scorer_.scoreIfReaches(shape, *candidate.survivor, least);
+        });
+        RETURN_IF_ERROR(done);
         for (std::size_t i = begin; i < end; ++i) {
-            if (scores[i - begin] == kRuledOut) continue;
+            const std::optional<double> score = scores[i - begin];
+            if (!score) continue;
             ++result_.counts.scored;
-            if (scores[i - begin] >= options_.threshold)
-                result_.hits.push_back({candidates[i].id(), scores[i - begin]});
+            if (*score >= options_.threshold) result_.hits.push_back({candidates[i].id(), *score});
         }
         std::sort(result_.hits.begin(), result_.hits.end(), ranksBefore);
         if (result_.hits.size() > options_.k) result_.hits.resize(options_.k);
         return {};
     }
 
-    const Signature& query_;
+    const Scorer& scorer_;
     const SearchOptions& options_;
     const RunContext& context_;
-    std::unique_ptr<const StatisticsBound> statistics_;  // null: the query has points alone
     std::vector<const SignatureBlock*> order_;
     std::size_t blocksDone_ = 0;
     SearchResult result_;
 };
+
+Result<SearchResult> outOfMemory(const SignatureSet& set) {
+    return fail(ErrorCode::kOutOfMemory,
+                "not enough memory to search " + std::to_string(set.size()) + " signatures");
+}
 
 }  // namespace
 
@@ -245,13 +243,22 @@ Result<SearchResult> topK(const Signature& query, const SignatureSet& set, const
                           const RunContext& context) {
     RETURN_IF_ERROR(check(query, set, options));
     try {
+        return topK(*makeScorer(query, options.score), set, options, context);
+    } catch (const std::bad_alloc&) {
+        return outOfMemory(set);
+    }
+}
+
+Result<SearchResult> topK(const Scorer& scorer, const SignatureSet& set, const SearchOptions& options,
+                          const RunContext& context) {
+    RETURN_IF_ERROR(check(options));
+    try {
         const auto began = RunContext::Clock::now();
-        auto result = Searcher(query, set, options, context).run();
+        auto result = Searcher(scorer, set, options, context).run();
         if (result) result->seconds = std::chrono::duration<double>(RunContext::Clock::now() - began).count();
         return result;
     } catch (const std::bad_alloc&) {
-        return fail(ErrorCode::kOutOfMemory,
-                    "not enough memory to search " + std::to_string(set.size()) + " signatures");
+        return outOfMemory(set);
     } catch (const std::exception& e) {
         return fail(ErrorCode::kInternal, std::string("search: ") + e.what());
     }
@@ -263,7 +270,7 @@ Result<std::vector<SearchResult>> topKBatch(const std::vector<BatchQuery>& queri
         std::vector<Result<SearchResult>> found(queries.size(), SearchResult{});
         std::atomic<bool> failed{false};
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, queries.size(), 1), [&](const auto& range) {
-            // Alone: what a query spreads over threads it would have to wait for.
+            // Each query on one thread: what it spreads over several it would have to wait for.
             tbb::task_arena alone(1);
             for (std::size_t q = range.begin(); q < range.end() && !failed.load(); ++q) {
                 SearchOptions own = options;

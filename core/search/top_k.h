@@ -7,17 +7,17 @@
 
 #include "core/base/error.h"
 #include "core/base/run_context.h"
-#include "core/matching/score.h"
+#include "core/matching/scorer.h"
 #include "core/search/filter.h"
 #include "core/search/signature_set.h"
 
 namespace shapedb {
 
 struct SearchOptions {
-    std::size_t k = 10;      ///< at least 1
-    double threshold = 0.0;  ///< hits have at least this score; [0, 1]
-    Filter filter;           ///< applied first: the k best of those that pass
-    ScoreOptions score;
+    std::size_t k = 10;                     ///< at least 1
+    double threshold = 0.0;                 ///< hits have at least this score; [0, 1]
+    Filter filter;                          ///< applied first: the k best of those that pass
+    ScoreOptions score;                     ///< not read when a scorer is given
     std::optional<std::int64_t> excludeId;  ///< leaves one shape out (a query by key)
 };
 
@@ -26,7 +26,7 @@ struct SearchHit {
     double score = 0.0;
 };
 
-/// How many candidates each step of a search left to the next.
+/// How many candidates each stage of a search left to the next.
 struct SearchCounts {
     std::uint64_t candidates = 0;       ///< in the snapshot
     std::uint64_t filtered = 0;         ///< of these, passed filter and exclusion
@@ -41,24 +41,29 @@ struct SearchResult {
     double seconds = 0.0;  ///< taken
 };
 
-/// Climbs a ladder of bounds, from sums of differences of the statistics (256 bytes a shape) to the
-/// full score, each only for what the one before leaves; looks through a small share of the snapshot
-/// first, whose best scores then rule out most of the rest. Uses the calling thread's oneTBB arena.
+/// Climbs the scorer's ladder of bounds (for attributed shapes from the statistics, 256 bytes each, to the
+/// full score), each rung only for the candidates that the one before left. A small share of the snapshot
+/// comes first; its best scores then rule out most of the rest. Uses the calling thread's oneTBB arena.
 /// The counts may vary with the number of threads, the hits never do.
 ///
-/// Errors: kInvalidArgument (k, threshold, kernel width; a query of weighted points alone where
+/// Errors: kInvalidArgument (k, threshold, kernel width; a query with points and weights alone where
 /// signatures have attributes), kCancelled, kDeadlineExceeded, kOutOfMemory.
 [[nodiscard]] Result<SearchResult> topK(const Signature& query, const SignatureSet& set,
                                         const SearchOptions& options, const RunContext& context = {});
 
+/// The same with any scorer. Rows that it does not compare are no hits. Errors: as above, except for
+/// what concerns the query.
+[[nodiscard]] Result<SearchResult> topK(const Scorer& scorer, const SignatureSet& set,
+                                        const SearchOptions& options, const RunContext& context = {});
+
 struct BatchQuery {
     Signature signature;
-    std::optional<std::int64_t> excludeId;  ///< in the place of SearchOptions::excludeId
+    std::optional<std::int64_t> excludeId;  ///< instead of SearchOptions::excludeId
 };
 
-/// The same of many queries, each on one thread, as many at once as the arena has: none waits for
-/// another. Results in the order of the queries; the first error ends all and names the query ("query
-/// 3: ...", from 0). Errors: as `topK`.
+/// `topK` of many queries, each on one thread, as many at once as the arena has: none waits for another.
+/// Results in the order of the queries. The first error ends all and names its query ("query 3: ...",
+/// counted from 0). Errors: as `topK`.
 [[nodiscard]] Result<std::vector<SearchResult>> topKBatch(const std::vector<BatchQuery>& queries,
                                                           const SignatureSet& set,
                                                           const SearchOptions& options,

@@ -1,4 +1,4 @@
-// The interior chosen by the shape itself: no angle to set, and always an answer with its worth.
+// An interior without an angle to set: chosen from the shape itself, with a figure of its quality.
 #pragma once
 
 #include <cstdint>
@@ -15,24 +15,23 @@ namespace shapedb {
 struct AdaptiveInterior {
     std::vector<std::uint8_t> inside;  ///< per tetrahedron 1 when it is interior
     InteriorSource source = InteriorSource::kWalk;
-    double angleDegrees = 0.0;  ///< the deep angle of the walk; 0 for the other sources
-    /// The share of the points that the boundary of the interior parts from the outside, times the
-    /// square of the share of the boundary that points cover; in [0, 1]. A closed, clean scan has about
-    /// 1, with a fifth of its points missing 0.8, half a sphere 0.45, an open sheet less.
+    double angleDegrees = 0.0;  ///< deep angle of the walk; 0 for the other sources
+    /// The fraction of points with the interior on one side and the outside on the other, times the square
+    /// of the fraction of the boundary that points cover; in [0, 1]. About 1 for a closed, clean scan, 0.8
+    /// with a fifth of it missing, 0.45 for half a sphere, less for an open sheet.
     double quality = 0.0;
 };
 
-/// Weighs the interiors that walks at several angles leave, and the one that `insidePotential`
-/// gives, by the same two measures of their boundary: how much of it bridges gaps wider than the
-/// sampling, and how many points it leaves on one side. Takes the walk whose angle is nearest to 22
-/// degrees (section 2 of docs/interior.md: the middle of what fits clean and noisy shapes)
-/// among those nearly as good as the best, or the potential where it is clearly better.
+/// Compares the interiors left by walks at several angles and that of `insidePotential` by two measures
+/// of their boundary: how much of it bridges gaps wider than the sampling, and how many points it leaves
+/// on one side. Of those nearly as good as the best, takes the walk nearest to 22 degrees (docs/interior.md,
+/// section 2), else the potential.
 ///
-/// Errors: kCancelled, kDeadlineExceeded. An empty interior is none.
+/// Errors: kCancelled, kDeadlineExceeded. An empty interior is not an error.
 [[nodiscard]] Result<AdaptiveInterior> adaptiveInterior(const PointCloud& points,
                                                         const Tetrahedra& tetrahedra,
                                                         const std::vector<std::uint8_t>& big,
-                                                        const std::vector<double>& scales,
+                                                        const std::vector<double>& spacings,
                                                         const RunContext& context = {});
 
 }  // namespace shapedb

@@ -7,23 +7,13 @@
 #include <utility>
 
 #include "core/base/return_if_error.h"
+#include "core/geometry/tetrahedron.h"
 
 namespace shapedb {
 
 namespace {
 
 constexpr std::size_t kStepsBetweenCheckpoints = 1 << 16;
-
-// Outward unit normal of facet i.
-Point3 outwardNormal(const PointCloud& points, const std::array<std::uint32_t, 4>& vertices, std::size_t i) {
-    const Point3& a = points[vertices[(i + 1) % 4]];
-    const Point3& b = points[vertices[(i + 2) % 4]];
-    const Point3& c = points[vertices[(i + 3) % 4]];
-    const Point3 normal = cross(b - a, c - a);
-    const double size = length(normal);
-    const double sign = dot(normal, points[vertices[i]] - a) > 0.0 ? -1.0 : 1.0;
-    return size > 0.0 ? (sign / size) * normal : Point3{};
-}
 
 }  // namespace
 
@@ -44,7 +34,7 @@ double facetCosine(const PointCloud& points, const Tetrahedra& tetrahedra, std::
 Result<std::vector<double>> bottleneckAngles(const PointCloud& points, const Tetrahedra& tetrahedra,
                                              const std::vector<std::uint8_t>& big,
                                              const RunContext& context) {
-    // Dijkstra on -cosine, which grows with the angle.
+    // Dijkstra, with the largest edge of a path as its length. Edges are -cosine, which grows with the angle.
     using Reached = std::pair<double, std::uint32_t>;
     constexpr double kUnreached = std::numeric_limits<double>::infinity();
     std::vector<double> best(tetrahedra.size(), kUnreached);

@@ -1,4 +1,4 @@
-// How tightly the shape encloses each Delaunay ball: the walk of Section 2 for all angles at once.
+// The walk of Section 2 for all angles at once: how tightly the shape encloses each Delaunay ball.
 #pragma once
 
 #include <cstdint>
@@ -11,16 +11,14 @@
 
 namespace shapedb {
 
-/// The cosine of the angle at which the balls of the two tetrahedra at a facet meet, in [-1, 1]:
-/// near 1 when they are nearly the same ball. Beyond a hull facet lies the half space outside, a
-/// ball without end, so both kinds of facet are judged alike.
+/// The cosine of the angle at which the balls on both sides of a facet meet, in [-1, 1]: near 1 when they
+/// are nearly the same. Behind a hull facet lies the half space outside, taken as an infinite ball.
 [[nodiscard]] double facetCosine(const PointCloud& points, const Tetrahedra& tetrahedra,
                                  std::size_t tetrahedron, std::size_t facet);
 
-/// Per tetrahedron the leak angle, radians in [0, pi]: over all paths from outside through big
-/// balls, the smallest of the largest angle on the path. A walk with deep angle theta reaches exactly
-/// the big balls with a leak angle below theta. Infinity where no path leads; so for every ball
-/// that is not big.
+/// Per tetrahedron, radians in [0, pi]: the largest angle on the path from outside through big balls on
+/// which it is smallest (a minimax path). A walk with deep angle theta reaches exactly the big balls whose
+/// bottleneck angle is below theta. Infinite where no path leads, as for every ball that is not big.
 ///
 /// Errors: kCancelled, kDeadlineExceeded.
 [[nodiscard]] Result<std::vector<double>> bottleneckAngles(const PointCloud& points,

@@ -5,7 +5,7 @@
 #include <tuple>
 
 #include "core/base/return_if_error.h"
-#include "core/segmentation/segments.h"
+#include "core/geometry/tetrahedron.h"
 
 namespace shapedb {
 
@@ -21,20 +21,14 @@ bool flowsTowards(const Tetrahedra& tetrahedra, const std::vector<std::uint8_t>&
     return false;
 }
 
-double facetArea(const PointCloud& points, const Tetrahedra& tetrahedra, std::uint32_t t, std::size_t facet) {
-    const auto& v = tetrahedra.vertices[t];
-    const Point3 a = points[v[(facet + 1) % 4]];
-    return 0.5 * length(cross(points[v[(facet + 2) % 4]] - a, points[v[(facet + 3) % 4]] - a));
-}
-
-// The ball narrowest on the way between two circumcentres: that of the facet where the way crosses
-// it, otherwise the smaller of the two.
-double facetPassage(const PointCloud& points, const Tetrahedra& tetrahedra,
-                    const std::vector<std::uint8_t>& flow, std::uint32_t t, std::size_t facet) {
+// The smallest ball on the Voronoi edge between the circumcentres on both sides of a facet: the one around
+// the facet's circumcircle where the edge crosses the facet, otherwise the smaller of the two at its ends.
+double saddleRadiusAt(const PointCloud& points, const Tetrahedra& tetrahedra,
+                      const std::vector<std::uint8_t>& flow, std::uint32_t t, std::size_t facet) {
     const std::uint32_t next = tetrahedra.neighbours[t][facet];
     const double smaller = std::min(tetrahedra.circumradii[t], tetrahedra.circumradii[next]);
     if (((flow[t] >> facet) & 1u) != 0 || flowsTowards(tetrahedra, flow, next, t)) return smaller;
-    return std::min(smaller, facetCircumradius(points, tetrahedra, t, static_cast<int>(facet)));
+    return std::min(smaller, circumradiusOf(facetCorners(points, tetrahedra.vertices[t], facet)));
 }
 
 }  // namespace
@@ -50,17 +44,17 @@ Result<std::vector<SegmentContact>> segmentContacts(const PointCloud& points, co
         }
         if (labels[t] < 0) continue;
         for (std::size_t facet = 0; facet < 4; ++facet) {
-            // Each facet once. Which of its sides comes first is random, so it is no branch.
+            // Each facet once. Which side comes first is random, so this is a selection, not a branch.
             const std::uint32_t next = tetrahedra.neighbours[t][facet];
             const std::int32_t other = labels[next > t && next != kNoTetrahedron ? next : t];
             if (other == labels[t] || other < 0) continue;
             const auto [low, high] = std::minmax(labels[t], other);
             facets.push_back({static_cast<std::uint32_t>(low), static_cast<std::uint32_t>(high),
-                              facetPassage(points, tetrahedra, flow, t, facet),
-                              facetArea(points, tetrahedra, t, facet)});
+                              saddleRadiusAt(points, tetrahedra, flow, t, facet),
+                              areaOf(facetCorners(points, tetrahedra.vertices[t], facet))});
         }
     }
-    // Stable: areas add up in the order of the tetrahedra.
+    // Stable, so that areas are summed in the order of the tetrahedra.
     std::stable_sort(facets.begin(), facets.end(), [](const SegmentContact& a, const SegmentContact& b) {
         return std::tie(a.first, a.second) < std::tie(b.first, b.second);
     });

@@ -1,4 +1,4 @@
-// Where segments touch, and how wide the way from one into the other is.
+// Where segments touch, and how wide the passage between them is.
 #pragma once
 
 #include <cstdint>
@@ -11,17 +11,17 @@
 
 namespace shapedb {
 
-/// Where two segments touch.
+/// Two segments that share triangles.
 struct SegmentContact {
     std::uint32_t first = 0;   ///< index of a segment
     std::uint32_t second = 0;  ///< index of another, above `first`
-    /// Radius of the largest ball, empty of points, that passes from one into the other
-    /// along the Voronoi edges between them (the saddle), unit of the points, > 0.
+    /// Radius of the largest ball empty of points that can pass from one into the other along the
+    /// Voronoi edges between them: the distance function at the saddle. Unit of the points, > 0.
     double saddleRadius = 0.0;
-    double area = 0.0;  ///< of the triangles they share, unit of the points squared, >= 0
+    double area = 0.0;  ///< of the shared triangles, unit of the points squared, >= 0
 };
 
-/// The contacts of all segments, by `first`, then `second`; each pair once.
+/// All contacts, by `first`, then `second`; each pair once.
 ///
 /// Preconditions: `flow` as flowMasks returns it for the labelled tetrahedra; labels below
 /// 2^31. Errors: kCancelled, kDeadlineExceeded.

@@ -8,7 +8,9 @@
 #include <unordered_map>
 #include <utility>
 
+#include "core/base/disjoint_sets.h"
 #include "core/base/return_if_error.h"
+#include "core/geometry/tetrahedron.h"
 
 namespace shapedb {
 
@@ -16,44 +18,43 @@ namespace {
 
 constexpr std::size_t kStepsBetweenCheckpoints = 4096;
 
-// A group's pairs are looked at again when its radius has moved by this share of itself.
+// A group's pairs are updated when its radius has moved by this share of itself.
 constexpr double kRadiusDrift = 1e-3;
 
-// Weight of a flat segment, as a share of all volume: it must not weigh nothing.
+// Weight of a flat segment, as a share of all volume: weights must not be 0.
 constexpr double kLeastWeight = 1e-12;
 
-// The groups while they grow: radii, weights, and passages to neighbours.
+// The growing groups: radii, weights, and the saddle radii to their neighbours.
 class Groups {
   public:
-    using Passages = std::vector<std::pair<std::uint32_t, double>>;
+    using Saddles = std::vector<std::pair<std::uint32_t, double>>;
 
     explicit Groups(const SegmentGraph& graph)
-        : parent_(graph.volumes.size()),
+        : sets_(graph.volumes.size()),
           weight_(graph.volumes),
           logRadius_(graph.volumes.size()),
           radius_(graph.volumes.size()),
-          passages_(graph.volumes.size()) {
+          saddles_(graph.volumes.size()) {
         for (const double volume : graph.volumes) total_ += volume;
         const double least = std::max(kLeastWeight * total_, std::numeric_limits<double>::min());
-        for (std::uint32_t i = 0; i < parent_.size(); ++i) {
-            parent_[i] = i;
+        for (std::uint32_t i = 0; i < size(); ++i) {
             weight_[i] = std::max(weight_[i], least);
             logRadius_[i] = std::log(graph.radii[i]);
             radius_[i] = graph.radii[i];
         }
         for (const SegmentContact& c : graph.contacts) {
-            passages_[c.first][c.second] = c.saddleRadius;
-            passages_[c.second][c.first] = c.saddleRadius;
+            saddles_[c.first][c.second] = c.saddleRadius;
+            saddles_[c.second][c.first] = c.saddleRadius;
         }
     }
 
-    std::uint32_t size() const { return static_cast<std::uint32_t>(parent_.size()); }
+    std::uint32_t size() const { return static_cast<std::uint32_t>(sets_.size()); }
     double totalVolume() const { return total_; }
-    bool isGroup(std::uint32_t i) const { return parent_[i] == i; }
+    bool isGroup(std::uint32_t i) const { return sets_.isRepresentative(i); }
     double weight(std::uint32_t group) const { return weight_[group]; }
     double logRadius(std::uint32_t group) const { return logRadius_[group]; }
     const std::unordered_map<std::uint32_t, double>& neighbours(std::uint32_t group) const {
-        return passages_[group];
+        return saddles_[group];
     }
 
     double contrast(std::uint32_t a, std::uint32_t b, double saddleRadius) const {
@@ -61,48 +62,45 @@ class Groups {
         return most / std::min(least, saddleRadius);
     }
 
-    std::uint32_t groupOf(std::uint32_t i) {
-        while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-        return i;
-    }
+    std::uint32_t groupOf(std::uint32_t i) { return sets_.find(i); }
 
-    // Joins two groups that touch. The one with fewer neighbours, or else less weight, goes into the
-    // other: returns the one that remains, and the neighbours it got by this, with their passages.
-    std::pair<std::uint32_t, Passages> join(std::uint32_t a, std::uint32_t b) {
-        if (std::make_tuple(passages_[a].size(), weight_[a], b) <
-            std::make_tuple(passages_[b].size(), weight_[b], a)) {
+    // Joins two groups that touch. The one with fewer neighbours (or else less weight) goes into the other.
+    // Returns the remaining group, and its new neighbours with their saddle radii.
+    std::pair<std::uint32_t, Saddles> join(std::uint32_t a, std::uint32_t b) {
+        if (std::make_tuple(saddles_[a].size(), weight_[a], b) <
+            std::make_tuple(saddles_[b].size(), weight_[b], a)) {
             std::swap(a, b);
         }
         const double weight = weight_[a] + weight_[b];
         logRadius_[a] = (weight_[a] * logRadius_[a] + weight_[b] * logRadius_[b]) / weight;
         radius_[a] = std::exp(logRadius_[a]);
         weight_[a] = weight;
-        parent_[b] = a;
-        Passages moved;
-        passages_[a].erase(b);
-        for (const auto& [next, saddleRadius] : passages_[b]) {
+        sets_.absorb(a, b);
+        Saddles moved;
+        saddles_[a].erase(b);
+        for (const auto& [next, saddleRadius] : saddles_[b]) {
             if (next == a) continue;
-            passages_[next].erase(b);
-            double& widest = passages_[a][next];
+            saddles_[next].erase(b);
+            double& widest = saddles_[a][next];
             widest = std::max(widest, saddleRadius);
-            passages_[next][a] = widest;
+            saddles_[next][a] = widest;
             moved.emplace_back(next, widest);
         }
-        passages_[b] = {};
+        saddles_[b] = {};
         return {a, std::move(moved)};
     }
 
   private:
-    std::vector<std::uint32_t> parent_;
+    DisjointSets sets_;
     std::vector<double> weight_;
     std::vector<double> logRadius_;
     std::vector<double> radius_;
-    std::vector<std::unordered_map<std::uint32_t, double>> passages_;
+    std::vector<std::unordered_map<std::uint32_t, double>> saddles_;
     double total_ = 0.0;
 };
 
-// A pair of groups waiting to merge; equal contrasts by index, so that the order of pushing
-// does not matter.
+// A pair of groups waiting to merge. Equal contrasts are ordered by index, so that the order of pushing does
+// not matter.
 struct Candidate {
     double contrast;
     std::uint32_t a;
@@ -161,7 +159,7 @@ std::uint32_t widestNeighbour(const Groups& groups, std::uint32_t group) {
 }
 
 Result<void> absorbLight(Groups& groups, const ContrastMerging& options, const RunContext& context) {
-    // Only groups that touch another: a lump apart can join none, nor take a place from the others.
+    // Only groups that touch another: a separate lump can join none, and does not count towards the limit.
     std::priority_queue<Candidate> lightest;
     for (std::uint32_t i = 0; i < groups.size(); ++i) {
         if (!groups.neighbours(i).empty()) lightest.push({groups.weight(i), i, 0});
@@ -218,15 +216,13 @@ Result<SegmentLabels> mergeSegmentsByContrast(const PointCloud& points, const Te
     for (std::size_t t = 0; t < tetrahedra.size(); ++t) {
         const std::int32_t segment = fine.ofTetrahedron[t];
         if (segment < 0) continue;
-        const auto& v = tetrahedra.vertices[t];
-        const Point3 a = points[v[0]];
-        const double six = dot(points[v[1]] - a, cross(points[v[2]] - a, points[v[3]] - a));
-        graph.volumes[static_cast<std::size_t>(segment)] += std::max(0.0, six / 6.0);
+        graph.volumes[static_cast<std::size_t>(segment)] +=
+            std::max(0.0, signedVolume(cornersOf(points, tetrahedra.vertices[t])));
     }
     for (const std::uint32_t maximum : fine.maxima) graph.radii.push_back(tetrahedra.circumradii[maximum]);
     const auto groups = mergeByContrast(graph, options, context);
     RETURN_IF_ERROR(groups);
-    // Fine segments come by falling maximum (islands last), so the first of a group has its maximum.
+    // Fine segments come by falling maximum (islands last), so the first of a group holds its maximum.
     SegmentLabels merged;
     for (std::size_t s = 0; s < groups->size(); ++s) {
         if ((*groups)[s] == merged.maxima.size()) merged.maxima.push_back(fine.maxima[s]);

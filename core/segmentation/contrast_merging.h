@@ -1,6 +1,6 @@
-// Merging segments by how much thicker one is than the way into it: the paper's criterion
-// (Section 3.3) as a scale along which segments grow together, in place of one threshold.
-// docs/segments.md shows what comes out and how stable it is.
+// Merging segments by contrast: how much thicker a segment is than the passage into it. The paper's
+// criterion (Section 3.3), but with pairs merged in order of contrast and groups compared as they grow.
+// docs/segments.md has the results.
 #pragma once
 
 #include <cstdint>
@@ -15,37 +15,35 @@
 
 namespace shapedb {
 
-/// What merging needs to know of the segments.
+/// What merging needs to know about the segments.
 struct SegmentGraph {
     std::vector<double> volumes;  ///< per segment, >= 0
-    std::vector<double> radii;    ///< per segment its maximum, > 0
+    std::vector<double> radii;    ///< per segment, of its largest ball, > 0
     std::vector<SegmentContact> contacts;
 };
 
 struct ContrastMerging {
     double contrast = 1.3;           ///< segments merge up to this contrast, >= 1
-    double minShare = 0.004;         ///< lighter segments join a neighbour, share of all volume, [0, 1]
-    std::uint32_t maxSegments = 16;  ///< so do the lightest while there are more than this; 0: no limit
+    double minShare = 0.004;         ///< lighter groups join a neighbour; share of all volume, [0, 1]
+    std::uint32_t maxSegments = 16;  ///< so does the lightest while there are more groups; 0: no limit
 };
 
-/// Groups segments; returns for each the index of its group, dense, groups in the order of their
-/// first segment.
+/// Returns the group of each segment; groups are numbered by their first segment.
 ///
-/// The radius of a group is the mean radius of its segments: geometric, weighted by volume. The
-/// contrast of two groups is the larger of their radii over the smallest among their radii and
-/// their saddleRadius. Pairs merge by rising contrast, evaluated anew as groups grow (a group's radius
-/// may drift by a thousandth before all its pairs are), until every pair is above
-/// `options.contrast`. A limb of many maxima is thus one group before its root is compared with
-/// the body, and a limb much thinner than the body stays apart however wide its root.
-/// Then the lightest group below `minShare`, or above the number, joins the neighbour with the
-/// widest saddleRadius; groups that touch no other stay, however light.
+/// The radius of a group is the geometric mean of its segments' radii, weighted by volume. The contrast of
+/// two groups is the larger of their radii over the smallest of both radii and their saddle radius. Pairs
+/// merge by rising contrast, which is updated as groups grow (once a radius has moved by a thousandth),
+/// until every pair is above `options.contrast`. So a limb of many maxima becomes one group before it is
+/// compared with the body, and a limb much thinner than the body stays separate however wide its root.
+/// Then light groups, and the lightest of too many, join the neighbour with the largest saddle radius;
+/// groups that touch no other stay, however light.
 ///
 /// Errors: kCancelled, kDeadlineExceeded.
 [[nodiscard]] Result<std::vector<std::uint32_t>> mergeByContrast(const SegmentGraph& graph,
                                                                  const ContrastMerging& options,
                                                                  const RunContext& context = {});
 
-/// contacts, volumes and mergeByContrast in one: the merged labels, dense, by falling maximum.
+/// Measures contacts and volumes and merges; the labels are numbered by falling maximum.
 /// Errors: kCancelled, kDeadlineExceeded.
 [[nodiscard]] Result<SegmentLabels> mergeSegmentsByContrast(
     const PointCloud& points, const Tetrahedra& tetrahedra, const std::vector<std::uint8_t>& flow,

@@ -11,25 +11,25 @@ namespace shapedb {
 
 namespace {
 
-// Rounding moves a barycentric coordinate of the circumcentre by a few units of 1e-16 times
-// the square of the inverse shape factor (the determinant against its edges); with a thousand
-// times that as a margin a wrong sign would need a thousandfold underestimate.
+// Rounding moves a barycentric coordinate of the circumcentre by a few units of 1e-16 times the square of
+// the inverse shape factor (edges over determinant). The margin is a thousand times that.
 constexpr double kRounding = 1e-13;
 
-// Flatter tetrahedra are not tried: volume against the edges at a corner.
+// Flatter tetrahedra go straight to exact arithmetic: six volumes over the product of the edges at a corner.
 constexpr double kLeastShare = 1e-6;
 
-// Tetrahedra that a thread takes at a time.
+// Tetrahedra per task.
 constexpr std::size_t kBlock = 4096;
 
-// No less than the length and quicker to have.
+// The 1-norm: no less than the length, and cheaper.
 Double2 lengthAtMost(const Vec3x2& a) { return abs(a.x) + abs(a.y) + abs(a.z); }
 
-// Signs of the barycentric coordinates of two circumcentres. The centres are computed afresh, relative to a
-// corner: rounded to the frame's origin they would have lost their digits where tetrahedra are small.
+// Masks of two tetrahedra, from the signs of the barycentric coordinates of their circumcentres. The centres
+// are computed afresh, relative to a corner: the stored ones, relative to the origin of the frame, have lost
+// their digits where tetrahedra are small.
 struct FlowMasks {
     std::array<unsigned, 2> mask;
-    unsigned sure;  // bit 0 or 1: no coordinate is too close to call
+    unsigned sure;  // bits 0 and 1: the mask is certain
 };
 
 FlowMasks approximateFlowMasks(const Vec3x2& a, const Vec3x2& b, const Vec3x2& c) {
@@ -57,14 +57,14 @@ FlowMasks approximateFlowMasks(const Vec3x2& a, const Vec3x2& b, const Vec3x2& c
     return masks;
 }
 
-// The masks of two tetrahedra, which may be the same.
+// Computes the masks of two tetrahedra, which may be the same.
 void maskTwo(const PointCloud& points, const Tetrahedra& tetrahedra, const std::array<std::uint32_t, 2>& two,
              std::vector<std::uint8_t>& masks) {
     const auto& v = tetrahedra.vertices[two[0]];
     const auto& w = tetrahedra.vertices[two[1]];
     const Vec3x2 first(points[v[0]], points[w[0]]);
-    const auto wayTo = [&](std::size_t i) { return Vec3x2(points[v[i]], points[w[i]]) - first; };
-    const FlowMasks found = approximateFlowMasks(wayTo(1), wayTo(2), wayTo(3));
+    const auto edgeTo = [&](std::size_t i) { return Vec3x2(points[v[i]], points[w[i]]) - first; };
+    const FlowMasks found = approximateFlowMasks(edgeTo(1), edgeTo(2), edgeTo(3));
     for (std::size_t k = 0; k < 2; ++k) {
         unsigned mask = found.mask[k];
         if ((found.sure >> k & 1u) == 0) {

@@ -11,13 +11,12 @@
 
 namespace shapedb {
 
-/// Per tetrahedron a mask: bit i is set when it flows through its facet i, that is, when its
-/// circumcentre lies strictly beyond the facet's plane. At most two bits are set. A mask of 0
-/// is a maximum: the circumcentre lies in its own tetrahedron. Exact: what double precision
-/// cannot decide is decided with rational numbers, so the flow has no cycles. Only tetrahedra
-/// with `wanted` set are computed, the others get 0.
+/// Per tetrahedron a mask whose bit i is set when it flows through facet i: when its circumcentre lies
+/// strictly beyond that facet's plane. At most two bits are set; none at a maximum, whose circumcentre lies
+/// in its own tetrahedron. Exact, so the flow has no cycles: what double precision cannot decide is decided
+/// with rational numbers. Tetrahedra without `wanted` get 0.
 ///
-/// Precondition: coordinates as sanitise returns them. Errors: kCancelled, kDeadlineExceeded.
+/// Precondition: coordinates in [-1, 1], as `sanitise` returns them. Errors: kCancelled, kDeadlineExceeded.
 [[nodiscard]] Result<std::vector<std::uint8_t>> flowMasks(const PointCloud& points,
                                                           const Tetrahedra& tetrahedra,
                                                           const std::vector<std::uint8_t>& wanted,

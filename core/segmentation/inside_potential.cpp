@@ -3,25 +3,26 @@
 #include <cmath>
 
 #include "core/base/return_if_error.h"
+#include "core/geometry/tetrahedron.h"
 #include "core/segmentation/bottleneck_angle.h"
 
 namespace shapedb {
 
 namespace {
 
-// How fast the bond between two balls weakens with the angle at which they meet, and that between
-// poles as they leave the straight line. The results hardly depend on either within a factor of two.
+// How fast a bond weakens: between adjacent balls with the angle at which they meet, between poles as they
+// leave the straight line through the point. A factor of two in either hardly changes the result.
 constexpr double kBondDecay = 6.0;
 constexpr double kPoleDecay = 4.0;
 
-// Keeps tetrahedra that hang on nothing (all bonds underflow) from making the system singular.
+// Keeps tetrahedra without bonds (all underflow) from making the system singular.
 constexpr double kAnchor = 1e-9;
 
 constexpr int kMaxIterations = 400;
 constexpr double kResidual = 1e-4;
 constexpr int kIterationsBetweenCheckpoints = 16;
 
-// A symmetric matrix in compressed rows; the outside is known and lives on the right hand side.
+// A symmetric matrix in compressed rows. The outside is known, so its bonds are on the right-hand side.
 struct System {
     std::vector<std::uint32_t> begin;
     std::vector<std::uint32_t> column;
@@ -33,7 +34,7 @@ struct System {
 struct Bond {
     std::uint32_t a = 0;
     std::uint32_t b = kNoTetrahedron;  // kNoTetrahedron: the outside
-    double strength = 0.0;             // below 0: of opposite signs
+    double strength = 0.0;             // negative: pulls towards opposite signs
 };
 
 std::vector<Bond> collectBonds(const PointCloud& points, const Tetrahedra& tetrahedra,
@@ -140,13 +141,11 @@ std::vector<Poles> findPoles(const PointCloud& points, const Tetrahedra& tetrahe
         const auto& v = tetrahedra.vertices[t];
         for (std::size_t facet = 0; facet < 4; ++facet) {
             if (tetrahedra.neighbours[t][facet] != kNoTetrahedron) continue;
-            const Point3& a = points[v[(facet + 1) % 4]];
-            Point3 normal = cross(points[v[(facet + 2) % 4]] - a, points[v[(facet + 3) % 4]] - a);
-            if (dot(normal, points[v[facet]] - a) > 0.0) normal = -1.0 * normal;
+            const Point3 normal = outwardNormal(points, v, facet);
             for (std::size_t k = 1; k < 4; ++k) {
                 const std::uint32_t corner = v[(facet + k) % 4];
                 onHull[corner] = 1;
-                outwards[corner] = outwards[corner] + (1.0 / std::max(length(normal), 1e-300)) * normal;
+                outwards[corner] = outwards[corner] + normal;
             }
         }
         for (const std::uint32_t corner : v) {

@@ -1,4 +1,4 @@
-// Which side of the surface each tetrahedron is on, by evidence from all around it.
+// Which side of the surface each tetrahedron is on, by global evidence instead of a walk.
 #pragma once
 
 #include <cstdint>
@@ -11,24 +11,25 @@
 
 namespace shapedb {
 
-/// The two sides of the surface at a point: the largest Delaunay ball that touches it (beyond the
-/// hull: the half space outside, kNoTetrahedron) and the largest on the other side of it.
+/// The poles of a point (Amenta and Bern 1998), one on either side of the surface: the largest Delaunay ball
+/// that touches the point (on the hull: the half space outside), and the largest on the other side.
 struct Poles {
     std::uint32_t first = kNoTetrahedron;   ///< kNoTetrahedron: outside the hull
     std::uint32_t second = kNoTetrahedron;  ///< kNoTetrahedron: there is none
-    double cosine = 1.0;                    ///< of the angle at the point between the two directions
+    double cosine = 1.0;                    ///< of the angle at the point between the directions to both
 };
 
-/// One per point. Linear time.
+/// One pair per point. Linear time.
 [[nodiscard]] std::vector<Poles> findPoles(const PointCloud& points, const Tetrahedra& tetrahedra);
 
-/// A potential per tetrahedron in [-1, 1]: 1 outside the hull, passed on unchanged between balls
-/// that intersect deeply and with its sign turned between the two poles of a point, which the
-/// surface parts. Below 0 is inside; the magnitude tells how far all evidence agrees. A leak lets
-/// in a little of the wrong sign where a walk would let in everything, and a cavity turns the sign
-/// twice. Found as the least of a quadratic form (after Kolluri, Shewchuk and O'Brien, "Spectral
-/// Surface Reconstruction from Noisy Point Clouds", 2004; we hold the outside fixed, so that there
-/// is a linear system in place of an eigenvector), by conjugate gradients.
+/// A potential per tetrahedron, in [-1, 1]: negative inside, its magnitude telling how far the evidence
+/// agrees. It is 1 outside the hull, tends to be equal where balls intersect deeply, and opposite at the two
+/// poles of a point. A leak lets in a little of the wrong sign where a walk would let in everything, and a
+/// cavity flips the sign twice.
+///
+/// After Kolluri, Shewchuk and O'Brien, "Spectral Surface Reconstruction from Noisy Point Clouds" (2004).
+/// With the outside held fixed, the minimum of their quadratic form solves a linear system instead of an
+/// eigenvalue problem; we use conjugate gradients.
 ///
 /// Errors: kCancelled, kDeadlineExceeded.
 [[nodiscard]] Result<std::vector<double>> insidePotential(const PointCloud& points,

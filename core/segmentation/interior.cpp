@@ -4,31 +4,21 @@
 #include <cmath>
 #include <utility>
 
+#include "core/base/math.h"
 #include "core/base/prefetch.h"
 #include "core/base/return_if_error.h"
+#include "core/geometry/tetrahedron.h"
 
 namespace shapedb {
 
 namespace {
 
-constexpr double kRadiansPerDegree = 3.14159265358979323846 / 180.0;
-
-// The three corners of facet i.
-std::array<Point3, 3> facetCorners(const PointCloud& points, const std::array<std::uint32_t, 4>& vertices,
-                                   int i) {
-    std::array<Point3, 3> corners;
-    for (int k = 1; k < 4; ++k) {
-        corners[static_cast<std::size_t>(k - 1)] = points[vertices[static_cast<std::size_t>((i + k) % 4)]];
-    }
-    return corners;
-}
-
-// The ball behind a hull facet is nearly the half space beyond it: its centre lies outside the
-// hull, and the circle in which its sphere meets the plane of the facet is small against it.
-bool opensToOutside(const PointCloud& points, const Tetrahedra& tetrahedra, std::size_t t, int facet,
+// Whether the ball behind a hull facet is nearly the half space beyond it: its centre lies outside the hull,
+// and the circle in which its sphere cuts the facet's plane is small compared to it.
+bool opensToOutside(const PointCloud& points, const Tetrahedra& tetrahedra, std::size_t t, std::size_t facet,
                     double cosHullAngle) {
-    const auto corners = facetCorners(points, tetrahedra.vertices[t], facet);
-    const Point3 apex = points[tetrahedra.vertices[t][static_cast<std::size_t>(facet)]];
+    const TriangleCorners corners = facetCorners(points, tetrahedra.vertices[t], facet);
+    const Point3 apex = points[tetrahedra.vertices[t][facet]];
     const Point3 normal = cross(corners[1] - corners[0], corners[2] - corners[0]);
     const double inwards = dot(normal, apex - corners[0]) >= 0.0 ? 1.0 : -1.0;
     const Point3 toCentre = tetrahedra.circumcentres[t] - corners[0];
@@ -39,20 +29,19 @@ bool opensToOutside(const PointCloud& points, const Tetrahedra& tetrahedra, std:
 
 }  // namespace
 
-std::vector<std::uint8_t> bigBalls(const Tetrahedra& tetrahedra, const std::vector<double>& scales,
+std::vector<std::uint8_t> bigBalls(const Tetrahedra& tetrahedra, const std::vector<double>& spacings,
                                    double bigBallRatio) {
     std::vector<std::uint8_t> big(tetrahedra.size());
     for (std::size_t t = 0; t < tetrahedra.size(); ++t) {
         const auto& v = tetrahedra.vertices[t];
-        const double smallest = std::min({scales[v[0]], scales[v[1]], scales[v[2]], scales[v[3]]});
+        const double smallest = std::min({spacings[v[0]], spacings[v[1]], spacings[v[2]], spacings[v[3]]});
         big[t] = tetrahedra.circumradii[t] > bigBallRatio * smallest ? 1 : 0;
     }
     return big;
 }
 
 double intersectionAngle(const Point3& centreA, const Point3& centreB, const Point3& shared) {
-    // The angle between the radii to a common point: the law of cosines on centres and radii
-    // gives the same, but cancels when balls are large.
+    // The angle between the radii to a common point. The law of cosines would cancel for large balls.
     const Point3 a = centreA - shared;
     const Point3 b = centreB - shared;
     return std::atan2(length(cross(a, b)), dot(a, b));
@@ -60,7 +49,7 @@ double intersectionAngle(const Point3& centreA, const Point3& centreB, const Poi
 
 namespace {
 
-// intersectionAngle < angle, most often without computing the angle.
+// Tests intersectionAngle < angle, mostly without computing the angle.
 class DeepAngle {
   public:
     explicit DeepAngle(double angle) : angle_(angle), squaredCosine_(std::cos(angle) * std::cos(angle)) {}
@@ -78,14 +67,14 @@ class DeepAngle {
     }
 
   private:
-    // Rounding moves the squares by less, whatever the angle: none is near 0 or 90 degrees.
+    // Rounding moves the squares by less, since no angle is near 0 or 90 degrees.
     static constexpr double kCosineSlack = 1e-9;
     double angle_;
     double squaredCosine_;
 };
 
-// What the walk reaches from there is no longer inside. In which order makes no difference: layer by layer,
-// so that memory can be asked for before it is read.
+// Clears `inside` wherever the walk from `layer` leads. The order makes no difference; going layer by layer
+// allows prefetching.
 Result<void> walkFrom(std::vector<std::uint32_t> layer, const PointCloud& points,
                       const Tetrahedra& tetrahedra, const DeepAngle& deep, const RunContext& context,
                       std::vector<std::uint8_t>& inside) {
@@ -125,14 +114,14 @@ Result<std::vector<std::uint8_t>> interiorTetrahedra(const PointCloud& points, c
                                                      const std::vector<std::uint8_t>& big,
                                                      const SegmentationOptions& options,
                                                      const RunContext& context) {
-    const DeepAngle deep(options.deepAngleDegrees * kRadiansPerDegree);
-    const double cosHullAngle = std::cos(options.hullAngleDegrees * kRadiansPerDegree);
+    const DeepAngle deep(toRadians(options.deepAngleDegrees));
+    const double cosHullAngle = std::cos(toRadians(options.hullAngleDegrees));
     std::vector<std::uint8_t> inside = big;
     std::vector<std::uint32_t> layer;
     for (std::size_t t = 0; t < tetrahedra.size(); ++t) {
         if (!big[t]) continue;
-        for (int facet = 0; facet < 4; ++facet) {
-            if (tetrahedra.neighbours[t][static_cast<std::size_t>(facet)] != kNoTetrahedron) continue;
+        for (std::size_t facet = 0; facet < 4; ++facet) {
+            if (tetrahedra.neighbours[t][facet] != kNoTetrahedron) continue;
             if (!opensToOutside(points, tetrahedra, t, facet, cosHullAngle)) continue;
             inside[t] = 0;
             layer.push_back(static_cast<std::uint32_t>(t));

@@ -1,4 +1,4 @@
-// Which tetrahedra approximate the shape: the inner big Delaunay balls (Section 2).
+// The inner big Delaunay balls, which approximate the shape (Section 2).
 #pragma once
 
 #include <cstdint>
@@ -12,18 +12,18 @@
 
 namespace shapedb {
 
-/// Per tetrahedron 1 when its Delaunay ball is big: its radius exceeds bigBallRatio times the
-/// point scale of at least one of its points.
+/// Per tetrahedron 1 when its Delaunay ball is big: its radius exceeds bigBallRatio times the local spacing
+/// of at least one of its points.
 [[nodiscard]] std::vector<std::uint8_t> bigBalls(const Tetrahedra& tetrahedra,
-                                                 const std::vector<double>& scales, double bigBallRatio);
+                                                 const std::vector<double>& spacings, double bigBallRatio);
 
-/// The angle at which the spheres of two Delaunay balls meet, in radians, [0, pi]: 0 when they
-/// are the same, pi when they touch from outside. `shared` is any point on both spheres.
+/// The angle at which two spheres meet, radians in [0, pi]: 0 when they are the same, pi when they touch
+/// from outside. `shared` is any point on both.
 [[nodiscard]] double intersectionAngle(const Point3& centreA, const Point3& centreB, const Point3& shared);
 
-/// Per tetrahedron 1 when it is interior: its ball is big and the walk from outside does not
-/// reach it. The walk enters through hull facets (hullAngleDegrees) and passes between big
-/// balls of adjacent tetrahedra that intersect deeply (deepAngleDegrees).
+/// Per tetrahedron 1 when it is interior: its ball is big and the walk from outside does not reach it. The
+/// walk enters through hull facets (hullAngleDegrees) and moves between adjacent tetrahedra whose balls are
+/// big and intersect deeply (deepAngleDegrees).
 ///
 /// Errors: kCancelled, kDeadlineExceeded.
 [[nodiscard]] Result<std::vector<std::uint8_t>> interiorTetrahedra(const PointCloud& points,

@@ -6,18 +6,18 @@
 #include <new>
 #include <numeric>
 #include <string>
-#include <tuple>
 #include <utility>
 
 #include "core/base/double2.h"
 #include "core/base/return_if_error.h"
 #include "core/delaunay/hilbert_order.h"
 #include "core/geometry/bounding.h"
+#include "core/geometry/neighbours.h"
+#include "core/geometry/tetrahedron.h"
 #include "core/preparation/prepare_points.h"
 #include "core/segmentation/contrast_merging.h"
 #include "core/segmentation/flow.h"
 #include "core/segmentation/interior.h"
-#include "core/segmentation/local_spacing.h"
 #include "core/segmentation/segments.h"
 
 namespace shapedb {
@@ -30,7 +30,7 @@ double secondsSince(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-// Announces each stage, notes how long it took, and is where stages can be cancelled.
+// Announces and times the stages; each may be cancelled as it begins.
 class StageClock {
   public:
     StageClock(const RunContext& context, std::vector<StageTime>& stages)
@@ -56,27 +56,25 @@ class StageClock {
     Clock::time_point begun_;
 };
 
-// Volume, first and second moments of one segment, added up tetrahedron by tetrahedron about
-// the origin of the unit frame.
+// Volume and first and second moments of a segment, summed over its tetrahedra about the origin of the unit
+// frame.
 struct Moments {
     double volume = 0.0;
     Point3 first;
     std::array<Double2, 3> second = {0.0, 0.0, 0.0};  // xx, xy, xz, yy, yz, zz
-    std::uint64_t tetrahedra = 0;
 
-    void add(const Point3& a, const Point3& b, const Point3& c, const Point3& d) {
-        const double v = std::max(0.0, dot(b - a, cross(c - a, d - a)) / 6.0);
-        const Point3 sum = a + b + c + d;
+    void add(const TetrahedronCorners& p) {
+        const double v = std::max(0.0, signedVolume(p));
+        const Point3 sum = p[0] + p[1] + p[2] + p[3];
         volume += v;
         first = first + (0.25 * v) * sum;
         // Integral of x y over a tetrahedron: v / 20 * (sum_i x_i y_i + sum_i x_i * sum_i y_i).
-        const std::array<Products, 5> terms = {products(sum), products(a), products(b), products(c),
-                                               products(d)};
+        const std::array<Products, 5> terms = {products(sum), products(p[0]), products(p[1]), products(p[2]),
+                                               products(p[3])};
         for (std::size_t i = 0; i < second.size(); ++i) {
             second[i] = second[i] + Double2(v / 20.0) *
                                         (terms[0][i] + terms[1][i] + terms[2][i] + terms[3][i] + terms[4][i]);
         }
-        ++tetrahedra;
     }
 
     std::array<double, 6> secondMoments() const {
@@ -104,36 +102,18 @@ Segment toSegment(const Moments& m, std::uint32_t maximum, const Tetrahedra& tet
                                           mean.y * mean.y, mean.y * mean.z, mean.z * mean.z};
     const std::array<double, 6> second = m.secondMoments();
     for (std::size_t i = 0; i < 6; ++i) segment.covariance[i] = (second[i] / m.volume - square[i]) * unit2;
-    segment.tetrahedra = m.tetrahedra;
     return segment;
 }
 
-// Contacts between labels become contacts between segments, scan units.
-void describeContacts(const std::vector<std::int32_t>& rank, const Frame& frame, Segmentation& result) {
-    std::vector<SegmentContact> described;
-    for (const SegmentContact& contact : result.contacts) {
-        const auto [low, high] = std::minmax(rank[contact.first], rank[contact.second]);
-        if (low < 0) continue;
-        described.push_back({static_cast<std::uint32_t>(low), static_cast<std::uint32_t>(high),
-                             contact.saddleRadius * frame.unit, contact.area * frame.unit * frame.unit});
-    }
-    std::sort(described.begin(), described.end(), [](const SegmentContact& a, const SegmentContact& b) {
-        return std::tie(a.first, a.second) < std::tie(b.first, b.second);
-    });
-    result.contacts = std::move(described);
-}
-
-// Fills result.segments by falling volume and result.tetrahedronSegment to match. Segments
-// whose tetrahedra are all flat to the last digit have no volume and are left out.
+// Fills result.segments, by falling volume, and result.tetrahedronSegment to match. Segments whose
+// tetrahedra are all flat to the last digit have no volume and are left out.
 void describeSegments(const PointCloud& points, SegmentLabels labels, const Frame& frame,
                       Segmentation& result) {
     std::vector<Moments> moments(labels.maxima.size());
     for (std::size_t t = 0; t < result.tetrahedra.size(); ++t) {
         const std::int32_t segment = labels.ofTetrahedron[t];
         if (segment < 0) continue;
-        const auto& v = result.tetrahedra.vertices[t];
-        moments[static_cast<std::size_t>(segment)].add(points[v[0]], points[v[1]], points[v[2]],
-                                                       points[v[3]]);
+        moments[static_cast<std::size_t>(segment)].add(cornersOf(points, result.tetrahedra.vertices[t]));
         ++result.interiorTetrahedra;
     }
     std::vector<std::uint32_t> order;
@@ -155,10 +135,9 @@ void describeSegments(const PointCloud& points, SegmentLabels labels, const Fram
     for (std::int32_t& segment : result.tetrahedronSegment) {
         if (segment >= 0) segment = rank[static_cast<std::size_t>(segment)];
     }
-    describeContacts(rank, frame, result);
 }
 
-// Segment of each site: that of the largest ball among the segmented tetrahedra around it.
+// Segment of each site: that of the tetrahedron at it with the largest ball, of those in a segment.
 std::vector<std::int32_t> labelSites(std::size_t siteCount, const Segmentation& result) {
     std::vector<std::int32_t> labels(siteCount, -1);
     std::vector<double> largest(siteCount, -1.0);
@@ -173,7 +152,7 @@ std::vector<std::int32_t> labelSites(std::size_t siteCount, const Segmentation& 
     return labels;
 }
 
-// Per site 1 when it lies on the convex hull of all.
+// Per site 1 when it lies on the convex hull.
 std::vector<std::uint8_t> onHull(std::size_t siteCount, const Tetrahedra& tetrahedra) {
     std::vector<std::uint8_t> on(siteCount, 0);
     for (std::size_t t = 0; t < tetrahedra.size(); ++t) {
@@ -185,8 +164,7 @@ std::vector<std::uint8_t> onHull(std::size_t siteCount, const Tetrahedra& tetrah
     return on;
 }
 
-// Size of what the interior spans, in the unit of the sites. When all that lies on the hull belongs to the
-// interior, nothing else is needed for it.
+// Size of the interior, in the unit of the sites. When it touches every site on the hull, these suffice.
 Result<double> interiorSize(const PointCloud& sites, const std::vector<std::int32_t>& siteLabels,
                             const Tetrahedra& tetrahedra) {
     const std::vector<std::uint8_t> on = onHull(sites.size(), tetrahedra);
@@ -219,31 +197,27 @@ Result<PreparedPoints> prepare(const PointCloud& points, const SegmentationOptio
     return prepared;
 }
 
-// Sites that are neighbours in space become neighbours in memory: every later stage runs along them.
-void sortAlongCurve(PointCloud& sites, std::vector<std::uint32_t>& siteOfPoint) {
-    const std::vector<std::uint32_t> order = hilbertOrder(sites);
-    PointCloud sorted(sites.size());
+// Puts neighbours in space next to each other in memory, for the sake of all later stages.
+HilbertSortedCloud sortSites(PointCloud sites, std::vector<std::uint32_t>& siteOfPoint) {
+    HilbertSortedCloud sorted(sites);
     std::vector<std::uint32_t> rank(sites.size());
-    for (std::uint32_t i = 0; i < order.size(); ++i) {
-        sorted[i] = sites[order[i]];
-        rank[order[i]] = i;
-    }
+    for (std::uint32_t i = 0; i < rank.size(); ++i) rank[sorted.order()[i]] = i;
     for (std::uint32_t& site : siteOfPoint) {
         if (site != kNoSite) site = rank[site];
     }
-    sites = std::move(sorted);
+    return sorted;
 }
 
-// Per tetrahedron 1 when it is interior; notes in the result how that was found.
+// Per tetrahedron 1 when it is interior; records in the result how it was found.
 Result<std::vector<std::uint8_t>> findInterior(const PointCloud& sites, const std::vector<std::uint8_t>& big,
-                                               const std::vector<double>& scales,
+                                               const std::vector<double>& spacings,
                                                const SegmentationOptions& options, const RunContext& context,
                                                Segmentation& result) {
     if (options.interiorMethod == InteriorMethod::kWalk) {
         result.angleDegrees = options.deepAngleDegrees;
         return interiorTetrahedra(sites, result.tetrahedra, big, options, context);
     }
-    auto interior = adaptiveInterior(sites, result.tetrahedra, big, scales, context);
+    auto interior = adaptiveInterior(sites, result.tetrahedra, big, spacings, context);
     RETURN_IF_ERROR(interior);
     result.interiorSource = interior->source;
     result.angleDegrees = interior->angleDegrees;
@@ -255,12 +229,12 @@ Result<SegmentLabels> findSegments(const PointCloud& sites, const SegmentationOp
                                    const RunContext& context, StageClock& clock, Segmentation& result) {
     const Tetrahedra& tetrahedra = result.tetrahedra;
     RETURN_IF_ERROR(clock.begin("point_scale"));
-    const auto scales = localSpacings(sites, context);
-    RETURN_IF_ERROR(scales);
+    const auto spacings = localSpacings(sites, context);
+    RETURN_IF_ERROR(spacings);
     RETURN_IF_ERROR(clock.begin("interior"));
-    const std::vector<std::uint8_t> big = bigBalls(tetrahedra, *scales, options.bigBallRatio);
+    const std::vector<std::uint8_t> big = bigBalls(tetrahedra, *spacings, options.bigBallRatio);
     result.bigBalls = static_cast<std::uint64_t>(std::count(big.begin(), big.end(), 1));
-    const auto interior = findInterior(sites, big, *scales, options, context, result);
+    const auto interior = findInterior(sites, big, *spacings, options, context, result);
     RETURN_IF_ERROR(interior);
     RETURN_IF_ERROR(clock.begin("flow"));
     const auto flow = flowMasks(sites, tetrahedra, *interior, context);
@@ -270,17 +244,12 @@ Result<SegmentLabels> findSegments(const PointCloud& sites, const SegmentationOp
     RETURN_IF_ERROR(fine);
     result.maxima = fine->maxima.size();
     RETURN_IF_ERROR(clock.begin("merge"));
-    auto merged =
-        options.mergeContrast == 0.0
-            ? Result<SegmentLabels>(mergeSegments(sites, tetrahedra, std::move(*fine), options.mergeRatio))
-            : mergeSegmentsByContrast(sites, tetrahedra, *flow, *fine,
-                                      {options.mergeContrast, options.minSegmentShare, options.maxSegments},
-                                      context);
-    if (!merged) return merged;
-    auto contacts = segmentContacts(sites, tetrahedra, *flow, merged->ofTetrahedron, context);
-    RETURN_IF_ERROR(contacts);
-    result.contacts = std::move(*contacts);
-    return merged;
+    if (options.mergeContrast == 0.0) {
+        return mergeSegments(sites, tetrahedra, std::move(*fine), options.mergeRatio);
+    }
+    return mergeSegmentsByContrast(sites, tetrahedra, *flow, *fine,
+                                   {options.mergeContrast, options.minSegmentShare, options.maxSegments},
+                                   context);
 }
 
 Result<Segmentation> segmentOrThrow(const PointCloud& points, const SegmentationOptions& options,
@@ -290,8 +259,9 @@ Result<Segmentation> segmentOrThrow(const PointCloud& points, const Segmentation
     auto prepared = prepare(points, options, context, clock, result);
     RETURN_IF_ERROR(prepared);
     RETURN_IF_ERROR(clock.begin("delaunay"));
-    sortAlongCurve(prepared->sites, result.siteOfPoint);
-    auto tetrahedra = triangulate(prepared->sites, context, PointOrder::kHilbert);
+    HilbertSortedCloud sorted = sortSites(std::move(prepared->sites), result.siteOfPoint);
+    auto tetrahedra = triangulate(sorted, context);
+    prepared->sites = std::move(sorted).takePoints();
     RETURN_IF_ERROR(tetrahedra);
     result.tetrahedra = std::move(*tetrahedra);
     clock.end();

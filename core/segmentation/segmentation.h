@@ -1,7 +1,8 @@
 // From a noisy point cloud to the segments of the shape's interior: Sections 2 and 3 of
 // Dey and Goswami, "Shape Segmentation and Matching from Noisy Point Clouds" (2004).
-// The stages have a header each: core/preparation/sanitise.h, delaunay.h, point_scale.h,
-// interior.h, flow.h, segments.h; this one runs them in order.
+// Runs the stages in order, each of which has a header: core/preparation/prepare_points.h,
+// core/delaunay/delaunay.h, core/geometry/neighbours.h, interior.h or adaptive_interior.h, flow.h,
+// segments.h, contrast_merging.h.
 #pragma once
 
 #include <array>
@@ -14,12 +15,11 @@
 #include "core/geometry/point.h"
 #include "core/preparation/prepare_points.h"
 #include "core/segmentation/adaptive_interior.h"
-#include "core/segmentation/contacts.h"
 #include "core/segmentation/options.h"
 
 namespace shapedb {
 
-/// One segment: the stable manifold of a maximum of the distance function, after merging.
+/// The stable manifold of a maximum of the distance function, after merging.
 struct Segment {
     double volume = 0.0;         ///< of its tetrahedra, scan units cubed, > 0
     Point3 centroid;             ///< volume-weighted mean of the tetrahedra's centroids (Section 4.1)
@@ -27,7 +27,6 @@ struct Segment {
     Point3 maximum;              ///< centre of that ball
     /// Second central moments of its matter per volume: xx, xy, xz, yy, yz, zz, scan units squared.
     std::array<double, 6> covariance{};
-    std::uint64_t tetrahedra = 0;
 };
 
 struct StageTime {
@@ -39,11 +38,8 @@ struct Segmentation {
     /// By falling volume; equal volumes by centroid. Never empty.
     std::vector<Segment> segments;
 
-    /// Which segments touch (indices into `segments`), scan units; by first, then second index.
-    std::vector<SegmentContact> contacts;
-
-    /// For each input point the index of its segment, -1 when it touches none: of the inner
-    /// tetrahedra around the point, the one with the largest ball decides.
+    /// For each input point the index of its segment, -1 when it touches none: that of the inner
+    /// tetrahedron at the point with the largest ball.
     std::vector<std::int32_t> pointSegment;
 
     /// For each tetrahedron the index of its segment, -1 outside.
@@ -52,24 +48,21 @@ struct Segmentation {
     /// The triangulation, over `sites`.
     Tetrahedra tetrahedra;
 
-    /// The points that were triangulated, scan units: distinct, prepared as the options ask.
-    /// `siteOfPoint` maps each input point to its site, kNoSite when it was left out as an outlier.
+    /// The points that were triangulated, scan units: distinct, prepared according to the options.
+    /// `siteOfPoint` maps each input point to its site, kNoSite for an outlier.
     PointCloud sites;
     std::vector<std::uint32_t> siteOfPoint;
 
     double volume = 0.0;  ///< of all segments together, scan units cubed
-    /// Smallest diagonal of an oriented box around the interior's tetrahedra, scan units.
-    /// An outlier counts only where an interior tetrahedron reaches it; with a fixed deep angle
-    /// several of them can make that happen (docs/algorithm.md).
+    /// Smallest diagonal of an oriented box around the interior's tetrahedra, scan units. Points
+    /// that no interior tetrahedron touches do not count.
     double size = 0.0;
-    /// How the interior was found and how much it deserves trust, in [0, 1]: see
-    /// AdaptiveInterior. InteriorMethod::kWalk does not judge: 1.
     InteriorSource interiorSource = InteriorSource::kWalk;
-    double quality = 1.0;
-    double angleDegrees = 0.0;  ///< deep angle of the walk; 0 when the interior comes from elsewhere
+    double quality = 1.0;       ///< how far the interior can be trusted, [0, 1]: AdaptiveInterior; kWalk: 1
+    double angleDegrees = 0.0;  ///< deep angle of the walk; 0 for other sources
     double noise = 0.0;  ///< estimated standard deviation before smoothing, scan units; 0: not measured
 
-    std::uint64_t duplicates = 0;  ///< input points that repeated an earlier one; see PreparedPoints
+    std::uint64_t duplicates = 0;  ///< input points that repeated another; see PreparedPoints
     std::uint64_t outliers = 0;    ///< input points left out
     std::uint64_t bigBalls = 0;
     std::uint64_t interiorTetrahedra = 0;
@@ -83,11 +76,11 @@ struct Segmentation {
 /// Segments the interior of the shape the points were sampled from.
 ///
 /// Deterministic: the same points in any order give the same segments, bit for bit.
-/// Thread-safe (no shared state). Memory: about 600 bytes a distinct point at the peak.
+/// Thread-safe (no shared state). Memory: about 600 bytes per distinct point at the peak.
 ///
-/// Errors: those of `sanitise` and `triangulate`; kInvalidArgument (options); kNoInterior
-/// when the walk from outside reaches every big ball (an open surface, too much noise; with
-/// InteriorMethod::kAdaptive only when not even the neighbourhood of the points has a volume);
+/// Errors: those of `preparePoints` and `triangulate`; kInvalidArgument (options); kNoInterior
+/// when the walk from outside reaches every big ball (an open surface or too much noise; with
+/// InteriorMethod::kAdaptive only when even a layer around the points has no volume);
 /// kCancelled, kDeadlineExceeded; kOutOfMemory.
 [[nodiscard]] Result<Segmentation> segment(const PointCloud& points, const SegmentationOptions& options,
                                            const RunContext& context = {});

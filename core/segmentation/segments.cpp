@@ -4,12 +4,13 @@
 #include <array>
 #include <cstring>
 #include <limits>
-#include <numeric>
 #include <utility>
 
+#include "core/base/disjoint_sets.h"
 #include "core/base/prefetch.h"
 #include "core/base/radix_sort.h"
 #include "core/base/return_if_error.h"
+#include "core/geometry/tetrahedron.h"
 
 namespace shapedb {
 
@@ -17,17 +18,17 @@ namespace {
 
 constexpr std::size_t kStepsBetweenCheckpoints = 1 << 16;
 
-// Far more than rounding takes from a circumradius.
-constexpr double kMost = 1.001;
+// Exceeds any rounding of a circumradius.
+constexpr double kRoundingMargin = 1.001;
 
-// Numbers that are not negative have the order of their bits.
+// Non-negative numbers are in the order of their bits.
 std::uint64_t orderOf(double number) {
     std::uint64_t bits = 0;
     std::memcpy(&bits, &number, sizeof bits);
     return bits;
 }
 
-// By falling circumradius; equal ones stay in order.
+// Stable: equal circumradii stay in order.
 void sortByFallingRadius(const Tetrahedra& tetrahedra, std::vector<std::uint32_t>& indices) {
     LargeVector<KeyedIndex> keyed;
     keyed.reserve(indices.size());
@@ -36,16 +37,16 @@ void sortByFallingRadius(const Tetrahedra& tetrahedra, std::vector<std::uint32_t
     for (std::size_t i = 0; i < keyed.size(); ++i) indices[i] = keyed[i].index;
 }
 
-// What is in the place of a label while there is none.
+// In place of a label while there is none.
 constexpr std::int32_t kOutside = -1;
 constexpr std::int32_t kUnseen = -2;
-constexpr std::int32_t kOnPath = -3;     // flow has no cycles; if it had, the way would end where it closes
+constexpr std::int32_t kOnPath = -3;     // flow has no cycles; if it had, the path would end where it closes
 constexpr std::int32_t kNoMaximum = -4;  // interior, flows into no maximum
-constexpr std::int32_t kInLayer = -5;    // of growing: gets its label with the layer it waits in
+constexpr std::int32_t kInLayer = -5;    // waits for its label in a layer of growth
 
-// Gives a tetrahedron the label of the strongest maximum that it flows into, directly or not: the least
-// label of the two it may flow into, found before its own. What is left by maxima that claim what flows
-// into them, strongest first, is the same; this way each tetrahedron is looked at once.
+// Gives a tetrahedron the label of the strongest maximum that it flows into, directly or not: the least label
+// of the (at most) two tetrahedra it flows into, which are labelled first. The result is that of maxima
+// claiming what flows into them, strongest first, but each tetrahedron is visited once.
 class Downstream {
   public:
     Downstream(const Tetrahedra& tetrahedra, const std::vector<std::uint8_t>& flow,
@@ -77,7 +78,7 @@ class Downstream {
   private:
     static unsigned lowestBit(unsigned mask) { return static_cast<unsigned>(__builtin_ctz(mask)); }
     std::int32_t labelOf(std::uint32_t t) const { return t == kNoTetrahedron ? kOutside : labels_[t]; }
-    // The least of those that are labels: what is none is negative, so larger without its sign.
+    // The smaller of those that are labels; the others are negative, hence large when taken as unsigned.
     static std::int32_t stronger(std::int32_t a, std::int32_t b) {
         const auto least =
             static_cast<std::int32_t>(std::min(static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b)));
@@ -93,11 +94,11 @@ class Downstream {
 // Label of the labelled neighbour with the largest ball, -1 when there is none.
 std::int32_t labelOfLargestNeighbour(const Tetrahedra& tetrahedra, const SegmentLabels& labels,
                                      std::uint32_t t) {
-    // Without branches: which are labelled, and whose ball is largest, is random.
+    // Without branches, since they would be unpredictable.
     std::int32_t label = -1;
     std::int64_t largest = -1;
     for (const std::uint32_t next : tetrahedra.neighbours[t]) {
-        const std::uint32_t there = next == kNoTetrahedron ? t : next;  // which has none itself
+        const std::uint32_t there = next == kNoTetrahedron ? t : next;  // t has no label
         const std::int32_t other = labels.ofTetrahedron[there];
         const std::int64_t none = other < 0 ? -1 : 0;
         const std::int64_t radius = static_cast<std::int64_t>(orderOf(tetrahedra.circumradii[there])) | none;
@@ -107,15 +108,15 @@ std::int32_t labelOfLargestNeighbour(const Tetrahedra& tetrahedra, const Segment
     return label;
 }
 
-// A tetrahedron and the label it gets.
+// A tetrahedron and its new label.
 struct Labelling {
     std::uint32_t tetrahedron;
     std::int32_t label;
 };
 
-// Gives unlabelled tetrahedra next to labelled ones the label of the neighbour with the largest
-// ball, one layer at a time so that the order of the tetrahedra does not matter. Each layer is
-// found from the one before it: the time is that of one look at every leftover.
+// Gives unlabelled tetrahedra next to labelled ones the label of the neighbour with the largest ball, one
+// layer at a time so that the order of the tetrahedra does not matter. Each layer is found from the one
+// before, so the time is linear in the leftovers.
 class Growth {
   public:
     Growth(const Tetrahedra& tetrahedra, SegmentLabels& labels) : tetrahedra_(tetrahedra), labels_(labels) {}
@@ -131,7 +132,7 @@ class Growth {
     }
 
   private:
-    // The layer is what has a labelled neighbour.
+    // The layer consists of the candidates that have a labelled neighbour.
     void choose(const std::vector<std::uint32_t>& candidates) {
         layer_.clear();
         for (std::size_t i = 0; i < candidates.size(); ++i) {
@@ -144,8 +145,7 @@ class Growth {
         }
     }
 
-    // What is next to the layer, and has no label, follows. Until all of the layer have theirs, nobody looks
-    // at them.
+    // Labels the layer; its unlabelled neighbours are the next candidates.
     void expand() {
         following_.clear();
         for (std::size_t i = 0; i < layer_.size(); ++i)
@@ -176,7 +176,7 @@ class Growth {
     std::vector<std::uint32_t> following_;
 };
 
-// Tetrahedra in reach of no maximum: one segment per connected group, around its largest ball.
+// Leftovers that no label reached: one segment per connected group, around its largest ball.
 void labelIslands(const Tetrahedra& tetrahedra, std::vector<std::uint32_t> leftovers, SegmentLabels& labels) {
     const auto labelled = [&](std::uint32_t t) { return labels.ofTetrahedron[t] >= 0; };
     leftovers.erase(std::remove_if(leftovers.begin(), leftovers.end(), labelled), leftovers.end());
@@ -198,27 +198,6 @@ void labelIslands(const Tetrahedra& tetrahedra, std::vector<std::uint32_t> lefto
         }
     }
 }
-
-// Union by smaller index: the representative is the segment with the largest maximum.
-class DisjointSets {
-  public:
-    explicit DisjointSets(std::size_t count) : parent_(count) {
-        std::iota(parent_.begin(), parent_.end(), 0);
-    }
-    std::int32_t find(std::int32_t i) {
-        while (at(i) != i) i = at(i) = at(at(i));
-        return i;
-    }
-    void unite(std::int32_t a, std::int32_t b) {
-        a = find(a);
-        b = find(b);
-        at(std::max(a, b)) = std::min(a, b);
-    }
-
-  private:
-    std::int32_t& at(std::int32_t i) { return parent_[static_cast<std::size_t>(i)]; }
-    std::vector<std::int32_t> parent_;
-};
 
 }  // namespace
 
@@ -252,20 +231,9 @@ Result<SegmentLabels> stableManifolds(const Tetrahedra& tetrahedra, const std::v
     return labels;
 }
 
-double facetCircumradius(const PointCloud& points, const Tetrahedra& tetrahedra, std::size_t t, int facet) {
-    std::array<Point3, 3> p;
-    for (int k = 1; k < 4; ++k) {
-        p[static_cast<std::size_t>(k - 1)] =
-            points[tetrahedra.vertices[t][static_cast<std::size_t>((facet + k) % 4)]];
-    }
-    const Point3 a = p[1] - p[0];
-    const Point3 b = p[2] - p[0];
-    // R = |a| |b| |a - b| / (2 |a x b|): infinite for three points on a line.
-    return length(a) * length(b) * length(a - b) / (2.0 * length(cross(a, b)));
-}
-
 SegmentLabels mergeSegments(const PointCloud& points, const Tetrahedra& tetrahedra, SegmentLabels labels,
                             double mergeRatio) {
+    // Segments come by falling radius, so a merged set is represented by the one with the largest maximum.
     DisjointSets sets(labels.maxima.size());
     std::vector<double> maximumRadii(labels.maxima.size());
     for (std::size_t s = 0; s < maximumRadii.size(); ++s)
@@ -273,9 +241,9 @@ SegmentLabels mergeSegments(const PointCloud& points, const Tetrahedra& tetrahed
     for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
         const std::int32_t mine = labels.ofTetrahedron[t];
         if (mine < 0) continue;
-        // No circle through three points of a sphere is larger than the sphere: most tetrahedra and facets
-        // need no look at the circle.
-        const double most = kMost * mergeRatio * tetrahedra.circumradii[t];
+        // A facet's circumcircle is no larger than the sphere it lies on, which rules out most tetrahedra
+        // and facets without computing the circle.
+        const double most = kRoundingMargin * mergeRatio * tetrahedra.circumradii[t];
         if (maximumRadii[static_cast<std::size_t>(mine)] > most) continue;
         for (std::size_t facet = 0; facet < 4; ++facet) {
             const std::uint32_t next = tetrahedra.neighbours[t][facet];
@@ -284,22 +252,21 @@ SegmentLabels mergeSegments(const PointCloud& points, const Tetrahedra& tetrahed
             if (static_cast<unsigned>(other < 0) | static_cast<unsigned>(other == mine)) continue;
             const double higher = std::max(maximumRadii[static_cast<std::size_t>(mine)],
                                            maximumRadii[static_cast<std::size_t>(other)]);
-            if (higher > most || sets.find(other) == sets.find(mine)) continue;
-            if (higher <= mergeRatio * facetCircumradius(points, tetrahedra, t, static_cast<int>(facet))) {
-                sets.unite(mine, other);
-            }
+            const auto a = static_cast<std::uint32_t>(mine);
+            const auto b = static_cast<std::uint32_t>(other);
+            if (higher > most || sets.find(a) == sets.find(b)) continue;
+            const double circle = circumradiusOf(facetCorners(points, tetrahedra.vertices[t], facet));
+            if (higher <= mergeRatio * circle) sets.unite(a, b);
         }
     }
     std::vector<std::uint32_t> maxima;
     std::vector<std::int32_t> dense(labels.maxima.size(), -1);
-    for (std::size_t s = 0; s < labels.maxima.size(); ++s) {
-        if (sets.find(static_cast<std::int32_t>(s)) != static_cast<std::int32_t>(s)) continue;
+    for (std::uint32_t s = 0; s < labels.maxima.size(); ++s) {
+        if (!sets.isRepresentative(s)) continue;
         dense[s] = static_cast<std::int32_t>(maxima.size());
         maxima.push_back(labels.maxima[s]);
     }
-    for (std::size_t s = 0; s < dense.size(); ++s) {
-        dense[s] = dense[static_cast<std::size_t>(sets.find(static_cast<std::int32_t>(s)))];
-    }
+    for (std::uint32_t s = 0; s < dense.size(); ++s) dense[s] = dense[sets.find(s)];
     for (std::int32_t& segment : labels.ofTetrahedron) {
         if (segment >= 0) segment = dense[static_cast<std::size_t>(segment)];
     }

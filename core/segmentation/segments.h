@@ -1,4 +1,4 @@
-// Grouping interior tetrahedra into segments: stable manifolds of maxima (Section 3.2) and
+// Grouping interior tetrahedra into segments: the stable manifolds of maxima (Section 3.2), and
 // their merging (Section 3.3).
 #pragma once
 
@@ -12,21 +12,18 @@
 
 namespace shapedb {
 
-/// A partition of the interior: per tetrahedron the segment's index, -1 outside; per segment
-/// the tetrahedron that holds its maximum (its largest Delaunay ball by the order of claiming).
+/// A partition of the interior.
 struct SegmentLabels {
-    std::vector<std::int32_t> ofTetrahedron;
-    std::vector<std::uint32_t> maxima;
+    std::vector<std::int32_t> ofTetrahedron;  ///< per tetrahedron its segment, -1 outside
+    std::vector<std::uint32_t> maxima;        ///< per segment the tetrahedron of its maximum
 };
 
-/// Stable manifolds of the maxima. Maxima are taken by falling circumradius; each claims, depth
-/// first, the unclaimed tetrahedra that flow into what it holds: so a tetrahedron that flows
-/// into two goes to the stronger (the relation ~< of the paper).
+/// Stable manifolds of the maxima, numbered by falling circumradius. A tetrahedron that flows into two
+/// belongs to the stronger one (the relation ~< of the paper).
 ///
-/// The paper leaves open what becomes of interior tetrahedra that only flow out of the interior.
-/// Here they join, layer by layer, the adjacent labelled tetrahedron with the largest ball; those
-/// that hang together with no maximum at all form a segment of their own around their largest
-/// ball. So the segments partition the interior.
+/// The paper leaves open what becomes of interior tetrahedra that flow out of the interior only. Here they
+/// join, layer by layer, the adjacent labelled tetrahedron with the largest ball. Connected groups without
+/// any maximum ("islands") become segments of their own, around their largest ball, and come last.
 ///
 /// Errors: kCancelled, kDeadlineExceeded.
 [[nodiscard]] Result<SegmentLabels> stableManifolds(const Tetrahedra& tetrahedra,
@@ -34,13 +31,9 @@ struct SegmentLabels {
                                                     const std::vector<std::uint8_t>& flow,
                                                     const RunContext& context = {});
 
-/// Circumradius of facet i of tetrahedron t.
-[[nodiscard]] double facetCircumradius(const PointCloud& points, const Tetrahedra& tetrahedra, std::size_t t,
-                                       int facet);
-
-/// Merges every two segments that share a triangle of circumradius r with both maxima at most
-/// mergeRatio * r (the maxima before any merging, literally as published; chains of such pairs
-/// become one segment). Labels of the result are dense, by falling maximum.
+/// Merges every two segments that share a triangle of circumradius r when both maxima are at most
+/// mergeRatio * r. As published, these are the maxima before any merging, and chains of such pairs become one
+/// segment. The result is numbered by falling maximum.
 [[nodiscard]] SegmentLabels mergeSegments(const PointCloud& points, const Tetrahedra& tetrahedra,
                                           SegmentLabels labels, double mergeRatio);
 

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kCellSpacings = 2.0;
 constexpr double kLeastCell = 0.01;  // of the length
-constexpr double kTail = 0.005;      // share of the points beyond either end of the length
+constexpr double kTail = 0.005;      // fraction of the points beyond either end of the length
 constexpr std::size_t kProbes = 512;
 constexpr std::size_t kNearest = 4;
 
@@ -24,7 +24,7 @@ struct Range {
     double length = 0.0;
 };
 
-// What the values span without the tails.
+// The range of the values without the tails.
 Range spanOf(std::vector<double> values) {
     const auto at = [&](double share) {
         const auto n = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1) + 0.5);
@@ -35,7 +35,7 @@ Range spanOf(std::vector<double> values) {
     return {low, at(1.0 - kTail) - low};
 }
 
-// About how far apart neighbouring points are.
+// Typical distance of neighbouring points.
 double spacingOf(const PointCloud& points) {
     const NeighbourIndex index(points);
     std::vector<Neighbour> found;
@@ -50,7 +50,7 @@ double spacingOf(const PointCloud& points) {
     return std::sqrt(*middle);
 }
 
-// The points in the plane of their two longest principal axes.
+// The points, projected onto the plane of their two longest principal axes.
 std::vector<OutlinePoint> projected(const PointCloud& points) {
     const double unit = 1.0 / static_cast<double>(points.size());
     Point3 centre;

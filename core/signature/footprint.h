@@ -1,4 +1,4 @@
-// The outline of a shape as it lies: what a scan of one side shows as well as a scan all around.
+// The outline of a shape as it lies: a scan of one side shows it as well as a scan of all sides.
 #pragma once
 
 #include <array>
@@ -8,16 +8,16 @@
 
 namespace shapedb {
 
-/// A point of the outline, in units of its length: along its long axis, 0 to 1 but for the last
-/// half per cent at either end, and across, signed, from the axis.
+/// A point of the outline, in units of its length: along its long axis, where 0 and 1 leave out half a per
+/// cent at either end, and across, signed, from the axis.
 using OutlinePoint = std::array<double, 2>;
 
-/// The surface seen along the direction in which it extends least, as cells of a square grid, one
-/// point a cell: a cell counts once whether one side of the surface, both, or a fold lies over it.
-/// Cells are two spacings of the points wide, at least a hundredth of the length. Which end is 0
-/// and which side is positive is chance. Empty when the points have no extent.
+/// The surface projected along its shortest principal axis, one point per occupied cell of a square grid: so
+/// it makes no difference whether one side of the surface lies over a cell, or both, or a fold. Cells are two
+/// spacings of the points wide, at least a hundredth of the length. Which end is 0 and which side is positive
+/// is arbitrary. Empty when the points have no extent.
 ///
-/// `surface`: at least 4 points, distinct. Deterministic.
+/// `surface`: at least 4 distinct points. Deterministic.
 [[nodiscard]] std::vector<OutlinePoint> footprint(const PointCloud& surface);
 
 }  // namespace shapedb

@@ -1,5 +1,5 @@
-// Histograms without edges: a value counts for the two bins it lies between, so that a small
-// change of the shape is a small change of the histogram.
+// Histograms with soft bins: each value is shared by the two nearest bins, so that a small change
+// of the shape is a small change of the histogram.
 #pragma once
 
 #include <algorithm>
@@ -12,8 +12,8 @@
 
 namespace shapedb {
 
-/// Where a value falls among n bins over [low, high]: `bin` gets 1 - share, bin + 1 gets share.
-/// Values beyond the ends belong to the end bins. n >= 2.
+/// Where a value falls among n >= 2 bins over [low, high]: `bin` gets 1 - share, bin + 1 gets share. Values
+/// beyond the ends belong to the end bins.
 struct SoftBin {
     std::size_t bin;
     double share;
@@ -40,7 +40,7 @@ class Histogram {
         addInRow(row.bin + 1, column, weight * row.share);
     }
 
-    /// Levels of the bins' shares of the sum. All 0 when nothing was added.
+    /// Writes the level of each bin's share of the sum; 0 when nothing was added.
     void writeLevels(std::uint8_t* out) const {
         double sum = 0.0;
         for (const double b : bins_) sum += b;

@@ -14,9 +14,10 @@ namespace shapedb {
 
 namespace {
 
-constexpr double kFinestCell = 1.0 / 120.0;  // thin shapes would otherwise get cells below their points
+// Thin shapes would otherwise get cells smaller than the spacing of their points.
+constexpr double kFinestCell = 1.0 / 120.0;
 
-constexpr std::size_t kBlock = 16;  // sources that a thread takes at a time
+constexpr std::size_t kBlock = 16;  // sources per task
 
 using Cube = std::array<int, 3>;
 
@@ -30,7 +31,7 @@ std::vector<Cube> cubes(const InteriorView& view) {
     return cube;
 }
 
-// Connected lumps within one cube.
+// Assigns each tetrahedron to a cell: a connected lump within one cube. Returns the number of cells.
 std::size_t labelCells(const InteriorView& view, std::vector<std::uint32_t>& cell) {
     const std::vector<Cube> cube = cubes(view);
     cell.assign(view.volumes.size(), kNoTetrahedron);
@@ -63,7 +64,7 @@ void placeCells(const InteriorView& view, std::size_t count, InnerDistances& res
         result.volumes[c] += view.volumes[t];
     }
     for (std::size_t c = 0; c < count; ++c) {
-        // A cell of nothing but flat tetrahedra has no volume to weigh with; it carries no weight.
+        // A cell of flat tetrahedra only has no volume and carries no weight.
         if (result.volumes[c] > 0.0) result.centres[c] = (1.0 / result.volumes[c]) * result.centres[c];
     }
 }
@@ -73,10 +74,10 @@ struct Edge {
     double length;
 };
 
-// The edges of every cell, one after another.
+// The edges, grouped by cell.
 struct Graph {
     std::vector<Edge> edges;
-    std::vector<std::uint32_t> begin;  // of each cell, and the end
+    std::vector<std::uint32_t> begin;  // of each cell's edges; one more marks the end
 
     std::size_t size() const { return begin.size() - 1; }
 };
@@ -110,12 +111,13 @@ Graph joinCells(const InteriorView& view, const InnerDistances& cells) {
     return graph;
 }
 
-// Shortest ways from one cell to all, by distance in steps of about an edge instead of strictly (Dial,
-// "Shortest-path forest with topological ordering", 1969): within a step a cell may come twice. What comes
-// out is the least sum over all ways, added up from the source, whatever the order.
-class ShortestWays {
+// Shortest paths from one cell to all, with a bucket queue (Dial, "Shortest-path forest with topological
+// ordering", 1969): cells are visited by distance in steps of about an edge, and within a step perhaps more
+// than once. The result, the smallest sum over all paths added up from the source, does not depend on the
+// order.
+class ShortestPaths {
   public:
-    explicit ShortestWays(const Graph& graph) : graph_(graph) {
+    explicit ShortestPaths(const Graph& graph) : graph_(graph) {
         double sum = 0.0;
         for (const Edge& edge : graph.edges) sum += edge.length;
         if (sum > 0.0) stepsPerLength_ = 2.0 * static_cast<double>(graph.edges.size()) / sum;
@@ -129,8 +131,8 @@ class ShortestWays {
             while (!steps_[step].empty()) {
                 const Entry entry = steps_[step].back();
                 steps_[step].pop_back();
-                if (entry.distance > distance[entry.cell]) continue;  // a shorter way was found since
-                lookAround(entry, distance);
+                if (entry.distance > distance[entry.cell]) continue;  // a shorter path was found since
+                relaxEdges(entry, distance);
             }
         }
         return distance;
@@ -142,26 +144,26 @@ class ShortestWays {
         std::uint32_t cell;
     };
 
-    // Not before the step that is looked at: distances only grow.
+    // Never before the current step, since distances only grow.
     void put(Entry entry) {
         const auto step = static_cast<std::size_t>(entry.distance * stepsPerLength_);
         if (step >= steps_.size()) steps_.resize(step + 1);
         steps_[step].push_back(entry);
     }
 
-    void lookAround(const Entry& entry, std::vector<double>& distance) {
+    void relaxEdges(const Entry& entry, std::vector<double>& distance) {
         for (std::uint32_t e = graph_.begin[entry.cell]; e < graph_.begin[entry.cell + 1]; ++e) {
             const Edge& edge = graph_.edges[e];
-            const double way = entry.distance + edge.length;
-            if (way >= distance[edge.to]) continue;
-            distance[edge.to] = way;
-            put({way, edge.to});
+            const double length = entry.distance + edge.length;
+            if (length >= distance[edge.to]) continue;
+            distance[edge.to] = length;
+            put({length, edge.to});
         }
     }
 
     const Graph& graph_;
     double stepsPerLength_ = 1.0;
-    std::vector<std::vector<Entry>> steps_;  // cells to look at, by distance
+    std::vector<std::vector<Entry>> steps_;  // cells to visit, by distance
 };
 
 double meanReached(const InnerDistances& result) {
@@ -174,7 +176,7 @@ double meanReached(const InnerDistances& result) {
             weight += result.volumes[c];
         }
     }
-    // An interior of one cell, or of crumbs that do not touch, has no distances: any unit will do.
+    // An interior of one cell, or of separate crumbs, has no distances: any unit will do.
     return sum > 0.0 && weight > 0.0 ? sum / weight : 1.0;
 }
 
@@ -187,13 +189,13 @@ Result<InnerDistances> innerDistances(const InteriorView& view, const RunContext
     const Graph graph = joinCells(view, result);
     for (std::size_t s = 0; s < InnerDistances::kSources; ++s) {
         const std::size_t sample = s * InteriorView::kSamples / InnerDistances::kSources;
-        result.sources.push_back(result.cellOfTetrahedron[view.innerOwner[sample]]);
+        result.sources.push_back(result.cellOfTetrahedron[view.sampled[sample]]);
     }
     result.distance.resize(result.sources.size());
     const auto done =
         parallelFor(result.sources.size(), kBlock, context, [&](std::size_t from, std::size_t to) {
-            ShortestWays ways(graph);
-            for (std::size_t s = from; s < to; ++s) result.distance[s] = ways.from(result.sources[s]);
+            ShortestPaths paths(graph);
+            for (std::size_t s = from; s < to; ++s) result.distance[s] = paths.from(result.sources[s]);
         });
     RETURN_IF_ERROR(done);
     result.mean = meanReached(result);

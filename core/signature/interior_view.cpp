@@ -2,21 +2,20 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <numeric>
 
 #include <Eigen/Eigenvalues>
 
 #include "core/base/random.h"
+#include "core/geometry/tetrahedron.h"
+#include "core/signature/covariance.h"
 
 namespace shapedb {
 
 namespace {
 
 constexpr std::uint64_t kSeed = 2004;  // the year of the paper; any number does
-
-double tetrahedronVolume(const Point3& a, const Point3& b, const Point3& c, const Point3& d) {
-    return std::abs(dot(b - a, cross(c - a, d - a))) / 6.0;
-}
 
 struct PrincipalFrame {
     Point3 centre;
@@ -35,10 +34,7 @@ PrincipalFrame principalFrame(const Segmentation& segmentation) {
         const double share = segment.volume / segmentation.volume;
         const Point3 d = unit * (segment.centroid - frame.centre);
         const Eigen::Vector3d v(d.x, d.y, d.z);
-        const auto& c = segment.covariance;
-        Eigen::Matrix3d own;
-        own << c[0], c[1], c[2], c[1], c[3], c[4], c[2], c[4], c[5];
-        moments += share * (own * (unit * unit) + v * v.transpose());
+        moments += share * (covarianceMatrix(segment.covariance) * (unit * unit) + v * v.transpose());
     }
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(moments);
     for (int axis = 0; axis < 3; ++axis) {
@@ -68,35 +64,29 @@ void takeTetrahedra(const Segmentation& segmentation, InteriorView& view) {
             const std::uint32_t other = all.neighbours[t][f];
             neighbours[f] = other == kNoTetrahedron ? kNoTetrahedron : index[other];
         }
-        const Point3& a = view.sites[v[0]];
-        const Point3& b = view.sites[v[1]];
-        const Point3& c = view.sites[v[2]];
-        const Point3& d = view.sites[v[3]];
+        const TetrahedronCorners corners = cornersOf(view.sites, v);
         view.vertices.push_back(v);
         view.neighbours.push_back(neighbours);
-        view.volumes.push_back(tetrahedronVolume(a, b, c, d));
-        view.centroids.push_back(0.25 * (a + b + c + d));
+        view.volumes.push_back(std::abs(signedVolume(corners)));
+        view.centroids.push_back(centroidOf(corners));
         view.radii.push_back(std::min(1.0, all.circumradii[t] / segmentation.size));
     }
     view.volume = std::accumulate(view.volumes.begin(), view.volumes.end(), 0.0);
 }
 
-// Stratified by volume along the order of the tetrahedra: less scatter than free draws.
-void drawInner(InteriorView& view, Random& random) {
-    view.inner.reserve(InteriorView::kSamples);
-    view.innerOwner.reserve(InteriorView::kSamples);
+// Stratified by volume along the order of the tetrahedra, which scatters less than independent draws.
+void sampleTetrahedra(InteriorView& view, Random& random) {
+    view.sampled.reserve(InteriorView::kSamples);
     double passed = 0.0;
     std::size_t t = 0;
     for (std::size_t i = 0; i < InteriorView::kSamples; ++i) {
         const double target = (static_cast<double>(i) + random.uniform()) /
                               static_cast<double>(InteriorView::kSamples) * view.volume;
         while (t + 1 < view.volumes.size() && passed + view.volumes[t] < target) passed += view.volumes[t++];
-        std::array<double, 3> cut{random.uniform(), random.uniform(), random.uniform()};
-        std::sort(cut.begin(), cut.end());
-        const auto& v = view.vertices[t];
-        view.inner.push_back(cut[0] * view.sites[v[0]] + (cut[1] - cut[0]) * view.sites[v[1]] +
-                             (cut[2] - cut[1]) * view.sites[v[2]] + (1.0 - cut[2]) * view.sites[v[3]]);
-        view.innerOwner.push_back(static_cast<std::uint32_t>(t));
+        // Three draws are left unused: the random pairs drawn after these, and so the statistics stored in
+        // signatures, depend on where the stream stands.
+        for (int unused = 0; unused < 3; ++unused) random.next();
+        view.sampled.push_back(static_cast<std::uint32_t>(t));
     }
 }
 
@@ -136,7 +126,7 @@ InteriorView interiorView(const Segmentation& segmentation) {
     }
     takeTetrahedra(segmentation, view);
     Random random(kSeed);
-    drawInner(view, random);
+    sampleTetrahedra(view, random);
     takeSurface(view);
     view.meanSurfaceDistance = meanDistance(view.surface, random);
     for (std::size_t t = 0; t < view.volumes.size(); ++t) {

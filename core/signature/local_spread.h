@@ -1,4 +1,4 @@
-// What the surface is like around a point, as seen from a little way off: a rod, a sheet or a body.
+// What the surface around a point looks like at a tenth of the shape's size: a rod, a sheet or a body.
 #pragma once
 
 #include <cstddef>
@@ -8,19 +8,18 @@
 
 namespace shapedb {
 
-/// The standard deviations of the surface within kSpreadReach of a point, along their principal axes,
-/// as shares of the longest: (0, 0) a thin rod, (1, 0) a thin sheet, (1, 1) a ball.
+/// Standard deviations of the surface within kSpreadReach of a point along their principal axes, over the
+/// largest of them: (0, 0) for a thin rod, (1, 0) for a thin sheet, (1, 1) for a ball.
 struct LocalSpread {
     double middle = 0.0;    ///< [0, 1]
     double shortest = 0.0;  ///< [0, middle]
 };
 
-constexpr double kSpreadReach = 0.1;             ///< units of the points: of the shape's size
-constexpr std::size_t kSpreadNeighbours = 4000;  ///< of at most this many points
-constexpr std::size_t kSpreadPlaces = 1000;      ///< at this many, or at all there are
+constexpr double kSpreadReach = 0.1;             ///< in the unit of the points, the shape's size
+constexpr std::size_t kSpreadNeighbours = 4000;  ///< at most this many random points are considered
+constexpr std::size_t kSpreadPlaces = 1000;      ///< of which at most this many as centres
 
-/// At points drawn at random from `surface` (one or more); fewer where points have no neighbours.
-/// Deterministic.
+/// At random points of `surface` (one or more), without those that have no neighbours. Deterministic.
 [[nodiscard]] std::vector<LocalSpread> localSpread(const PointCloud& surface);
 
 }  // namespace shapedb

@@ -5,25 +5,19 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "core/signature/covariance.h"
 #include "core/signature/signature.h"
 
 namespace shapedb {
 
 namespace {
 
-Eigen::Matrix3d covarianceOf(const WeightedPoint& point) {
-    const auto& c = point.covariance;
-    Eigen::Matrix3d m;
-    m << c[0], c[1], c[2], c[1], c[3], c[4], c[2], c[4], c[5];
-    return m;
-}
-
 constexpr double kSmallestSize = -10.0;  // log2(kSmallestLength)
 static_assert(kSmallestLength == 1.0 / 1024.0, "kSmallestSize is its logarithm");
 
 float logLength(double length) { return static_cast<float>(std::log2(std::max(length, kSmallestLength))); }
 
-// To the nearest integer, halves away from zero, as std::lround, which is a call.
+// Rounds halves away from zero, like std::lround, which is not inlined.
 template <typename Integer>
 Integer nearest(double value, double low, double high) {
     const double clamped = std::clamp(value, low, high);
@@ -47,7 +41,7 @@ void setFrame(const std::vector<WeightedPoint>& points, Body& body) {
     for (const WeightedPoint& p : points) {
         const Point3 d = positionOf(p) - body.centre;
         const Eigen::Vector3d v(d.x, d.y, d.z);
-        moments += (p.weight / total) * (covarianceOf(p) + v * v.transpose());
+        moments += (p.weight / total) * (covarianceMatrix(p.covariance) + v * v.transpose());
     }
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(moments);
     const Eigen::Vector3d u = solver.eigenvectors().col(2);
@@ -56,49 +50,50 @@ void setFrame(const std::vector<WeightedPoint>& points, Body& body) {
     body.axes = {{{u[0], u[1], u[2]}, {v[0], v[1], v[2]}, {w[0], w[1], w[2]}}};
 }
 
-SegmentDescriptor partOf(const WeightedPoint& point, const Body& body) {
-    SegmentDescriptor part;
+SegmentDescriptor descriptorOf(const WeightedPoint& point, const Body& body) {
+    SegmentDescriptor segment;
     const Point3 p = rotate(body.axes, positionOf(point) - body.centre);
-    part.position = {static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)};
-    part.share = point.volumeShare;
-    // In closed form: eight digits are enough for steps of three percent, and a server that starts
-    // does this ten million times.
+    segment.position = {static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)};
+    segment.share = point.volumeShare;
+    // The closed form is fast (a starting server does this ten million times), and its eight digits are
+    // plenty for steps of three per cent.
     Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
-    solver.computeDirect(covarianceOf(point), Eigen::EigenvaluesOnly);
+    solver.computeDirect(covarianceMatrix(point.covariance), Eigen::EigenvaluesOnly);
     for (int axis = 0; axis < 3; ++axis) {
-        part.size[static_cast<std::size_t>(axis)] =
+        segment.size[static_cast<std::size_t>(axis)] =
             logLength(std::sqrt(std::max(0.0, solver.eigenvalues()[2 - axis])));
     }
-    // A flat tetrahedron may carry any radius: none larger than the shape means anything.
-    part.size[3] = logLength(std::min(1.0, static_cast<double>(point.maximumRadius)));
-    return unpacked(packed(part));
+    // The ball of a flat tetrahedron may have any radius; beyond the size of the shape it means nothing.
+    segment.size[3] = logLength(std::min(1.0, static_cast<double>(point.maximumRadius)));
+    return unpacked(packed(segment));
 }
 
 }  // namespace
 
-PackedSegmentDescriptor packed(const SegmentDescriptor& part) noexcept {
+PackedSegmentDescriptor packed(const SegmentDescriptor& segment) noexcept {
     PackedSegmentDescriptor result;
     for (std::size_t i = 0; i < 3; ++i) {
-        result.position[i] = nearest<std::int16_t>(part.position[i] * kPositionSteps, -32767.0, 32767.0);
+        result.position[i] = nearest<std::int16_t>(segment.position[i] * kPositionSteps, -32767.0, 32767.0);
     }
-    // Rounded down, so that the shares of a whole do not add up to more; a little room for the float.
-    result.share = nearest<std::uint16_t>(std::floor(part.share * kShareSteps + 0.01), 1.0, kShareSteps);
+    // Rounded down, so that shares do not add up to more than the whole; 0.01 allows for the float's
+    // rounding.
+    result.share = nearest<std::uint16_t>(std::floor(segment.share * kShareSteps + 0.01), 1.0, kShareSteps);
     for (std::size_t i = 0; i < 4; ++i) {
-        result.size[i] = nearest<std::uint8_t>((part.size[i] - kSmallestSize) * kSizeSteps, 0.0, 255.0);
+        result.size[i] = nearest<std::uint8_t>((segment.size[i] - kSmallestSize) * kSizeSteps, 0.0, 255.0);
     }
     return result;
 }
 
-SegmentDescriptor unpacked(const PackedSegmentDescriptor& part) noexcept {
+SegmentDescriptor unpacked(const PackedSegmentDescriptor& segment) noexcept {
     SegmentDescriptor result;
     for (std::size_t i = 0; i < 3; ++i) {
-        result.position[i] = static_cast<float>(part.position[i] / kPositionSteps);
+        result.position[i] = static_cast<float>(segment.position[i] / kPositionSteps);
     }
     result.radius =
         static_cast<float>(length(Point3{result.position[0], result.position[1], result.position[2]}));
-    result.share = static_cast<float>(part.share / kShareSteps);
+    result.share = static_cast<float>(segment.share / kShareSteps);
     for (std::size_t i = 0; i < 4; ++i) {
-        result.size[i] = static_cast<float>(kSmallestSize + part.size[i] / kSizeSteps);
+        result.size[i] = static_cast<float>(kSmallestSize + segment.size[i] / kSizeSteps);
     }
     return result;
 }
@@ -121,7 +116,7 @@ void setBody(const std::vector<WeightedPoint>& points, Body& body) {
     setFrame(points, body);
     body.parts.clear();
     body.parts.reserve(points.size());
-    for (const WeightedPoint& point : points) body.parts.push_back(partOf(point, body));
+    for (const WeightedPoint& point : points) body.parts.push_back(descriptorOf(point, body));
 }
 
 }  // namespace shapedb

@@ -1,5 +1,5 @@
-// The weighted points of a signature as the attributed score compares them: in the frame of the
-// whole body, with the attributes of their segments in logarithms.
+// The segments of a signature as the attributed score compares them: in the frame of the whole body,
+// with sizes as logarithms.
 #pragma once
 
 #include <array>
@@ -14,20 +14,20 @@ namespace shapedb {
 
 struct WeightedPoint;
 
-/// One segment as it is kept: 12 bytes, and all that is scored of it.
+/// One segment as the index keeps it: 12 bytes, all that the attributed score needs.
 struct PackedSegmentDescriptor {
     std::array<std::int16_t, 3> position{};  ///< in steps of 1/kPositionSteps
     std::uint16_t share = 1;                 ///< in steps of 1/kShareSteps, at least 1
     std::array<std::uint8_t, 4> size{};      ///< in steps of 1/kSizeSteps octave above kSmallestLength
 };
 
-/// Finer than the noise of any scan by far.
+/// Far finer than the noise of any scan.
 constexpr double kPositionSteps = 16384.0;
 constexpr double kShareSteps = 65535.0;
 constexpr double kSizeSteps = 24.0;  // up to 10.6 octaves: sizes are below 1
 
-/// One segment as it is compared. Lengths in units of Signature::scale. All numbers are multiples of
-/// the steps of a PackedSegmentDescriptor, so that packing loses nothing.
+/// One segment as it is compared. Lengths in units of Signature::scale. All numbers are multiples of the
+/// steps of a PackedSegmentDescriptor, so packing loses nothing.
 struct SegmentDescriptor {
     std::array<float, 3> position{};  ///< centroid, in the body's frame
     float radius = 0.0f;              ///< distance from the body's centre: length of `position`
@@ -37,29 +37,29 @@ struct SegmentDescriptor {
     std::array<float, 4> size{};
 };
 
-/// Smaller lengths are below the noise of any scanner and count as this.
+/// Smaller lengths count as this: they are below the noise of any scanner.
 constexpr double kSmallestLength = 1.0 / 1024.0;
 
-/// The nearest that can be kept; numbers out of range count as the nearest in range.
-[[nodiscard]] PackedSegmentDescriptor packed(const SegmentDescriptor& part) noexcept;
-/// packed(unpacked(p)) is p again, for a share of at least 1.
-[[nodiscard]] SegmentDescriptor unpacked(const PackedSegmentDescriptor& part) noexcept;
+/// Rounds to the nearest steps; numbers out of range are clamped.
+[[nodiscard]] PackedSegmentDescriptor packed(const SegmentDescriptor& segment) noexcept;
+/// packed(unpacked(p)) == p for a share of at least 1.
+[[nodiscard]] SegmentDescriptor unpacked(const PackedSegmentDescriptor& segment) noexcept;
 
 [[nodiscard]] bool operator==(const PackedSegmentDescriptor& a, const PackedSegmentDescriptor& b) noexcept;
 [[nodiscard]] bool operator==(const SegmentDescriptor& a, const SegmentDescriptor& b) noexcept;
 
-/// The parts of a body and its frame: origin at the centroid of all parts, axes along the principal
-/// axes of their matter together, by falling spread, right-handed. The signs of the axes, and axes
-/// of equal spread, are chance: who compares two bodies must try all.
+/// The segments of a signature and their common frame: origin at their centroid, axes along the principal
+/// axes of their matter, by falling spread, right-handed. Signs of axes, and the order of axes of equal
+/// spread, are arbitrary, so a comparison of two bodies must try all.
 struct Body {
     std::vector<SegmentDescriptor> parts;  ///< in the order of the points
     Point3 centre;                         ///< in the coordinates of WeightedPoint::position
     Matrix3 axes{};                        ///< rows: the frame's axes in those coordinates
 };
 
-/// `points` as in a Signature: at least one, valid. Deterministic.
+/// `points`: at least one, valid, as in a Signature. Deterministic.
 [[nodiscard]] Body bodyOf(const std::vector<WeightedPoint>& points);
-/// The same into a body that may hold anything; what it has allocated is used again.
+/// The same, into an existing body whose memory is reused.
 void setBody(const std::vector<WeightedPoint>& points, Body& body);
 
 }  // namespace shapedb

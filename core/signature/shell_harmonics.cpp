@@ -11,8 +11,8 @@ namespace {
 
 constexpr std::size_t kCoefficients = (kDegrees + 1) * (kDegrees + 1);
 
-// Real spherical harmonics of one direction, normalised so that those of a degree have squares
-// that sum to 1 (addition theorem): index l * l + l + m.
+// Real spherical harmonics of a direction, at index l * l + l + m, normalised so that the squares of each
+// degree sum to 1 (addition theorem).
 void evaluate(const Point3& direction, std::array<double, kCoefficients>& out) {
     const double z = direction.z;
     const double s = std::hypot(direction.x, direction.y);

@@ -1,4 +1,4 @@
-// How a cloud of points spreads over the directions, shell by shell around its centroid:
+// How points are distributed over the directions, shell by shell around their centroid: the
 // rotation-invariant energies of spherical harmonics (Kazhdan, Funkhouser, Rusinkiewicz 2003).
 #pragma once
 
@@ -11,14 +11,14 @@
 namespace shapedb {
 
 constexpr std::size_t kShells = 8;   ///< out to twice the mean radius; farther points count for the last
-constexpr std::size_t kDegrees = 8;  ///< 1 to 8; degree 0 is the radii alone, which others tell
+constexpr std::size_t kDegrees = 8;  ///< 1 to 8; other statistics cover degree 0, the radii alone
 
-/// By shell, then degree: the root of the energy of that degree, scaled so that all points in one
-/// direction of one shell would give 1. In [0, 1].
+/// By shell, then degree: the square root of the energy, scaled so that all points in one direction of one
+/// shell give 1. In [0, 1].
 using ShellEnergies = std::array<double, kShells * kDegrees>;
 
-/// At least one point. `weights` as many, none below 0, their sum above 0; or empty: all equal. All at
-/// one place: all 0.
+/// `points`: at least one; when all are equal, the result is 0. `weights`: one per point, none negative, with
+/// a positive sum; or empty for equal weights.
 [[nodiscard]] ShellEnergies shellHarmonics(const PointCloud& points, const std::vector<double>& weights = {});
 
 }  // namespace shapedb

@@ -10,6 +10,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "core/base/return_if_error.h"
+#include "core/signature/covariance.h"
 
 namespace shapedb {
 
@@ -51,10 +52,8 @@ double pointVolume(const Signature& signature, std::size_t i) {
 }
 
 std::array<double, 3> pointExtents(const Signature& signature, std::size_t i) {
-    const auto& c = signature.points[i].covariance;
-    Eigen::Matrix3d matrix;
-    matrix << c[0], c[1], c[2], c[1], c[3], c[4], c[2], c[4], c[5];
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(matrix, Eigen::EigenvaluesOnly);
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(
+        covarianceMatrix(signature.points[i].covariance), Eigen::EigenvaluesOnly);
     const auto& rising = solver.eigenvalues();
     std::array<double, 3> extents;
     for (int axis = 0; axis < 3; ++axis) {
@@ -85,19 +84,19 @@ Result<Signature> makeSignatureOrThrow(const Segmentation& segmentation, const S
                           static_cast<float>(position.z)};
         point.weight = static_cast<float>(segment.volume * inverse * inverse * inverse);
         point.volumeShare = volumeShareOf(point.weight, signature.scale, signature.volume);
-        // A segment without a maximum may have its largest ball in a flat tetrahedron, of any circumradius.
+        // The largest ball of a segment without a maximum may be that of a flat tetrahedron, of any radius.
         point.maximumRadius = static_cast<float>(
             std::min<double>(segment.maximumRadius * inverse, std::numeric_limits<float>::max()));
         for (std::size_t m = 0; m < 6; ++m) {
             point.covariance[m] = static_cast<float>(segment.covariance[m] * inverse * inverse);
         }
-        // Segments too light for single precision (and lighter ones after them) say nothing.
+        // Too light for single precision, and so are all that follow.
         if (!(point.weight > 0.0f) || !(point.volumeShare > 0.0f)) break;
         signature.points.push_back(point);
     }
     if (signature.points.empty()) {
         return fail(ErrorCode::kNoInterior,
-                    "the interior is too small against the size of the scan to describe");
+                    "the interior is too small for the size of the scan to be described");
     }
     return signature;
 }

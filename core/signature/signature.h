@@ -1,5 +1,5 @@
-// The signature of a shape: its heaviest segments as weighted points (Section 4.1),
-// scaled by the shape's bounding box (Section 4.2).
+// The signature of a shape: its heaviest segments as weighted points (Section 4.1), scaled by the
+// shape's bounding box (Section 4.2).
 #pragma once
 
 #include <array>
@@ -17,24 +17,24 @@
 namespace shapedb {
 
 struct SignatureOptions {
-    /// Heaviest segments kept. The paper: "less than ten". 1 to kMaxSignaturePoints.
+    /// How many of the heaviest segments to keep; the paper says "less than ten". 1 to
+    /// kMaxSignaturePoints.
     std::uint32_t maxPoints = 7;
 
-    /// Also keep what the shape says as a whole (ShapeAttributes). False: points and weights
-    /// alone, as published.
+    /// Also compute ShapeAttributes. False: points and weights alone, as published.
     bool attributes = false;
 };
 
-/// Alignments grow with the fourth power of the points.
+/// The number of alignments to try grows with the fourth power of the points.
 constexpr std::uint32_t kMaxSignaturePoints = 16;
 
 /// Errors: kInvalidArgument naming the field, its value and its range.
 [[nodiscard]] Result<void> validate(const SignatureOptions& options);
 
-/// One weighted point with what its segment knows besides. Lengths are divided by
-/// Signature::scale. Single precision: what is scored is exactly what is stored.
+/// A weighted point, with further measures of its segment. Lengths are divided by Signature::scale. Single
+/// precision, so that what is scored is exactly what is stored.
 struct WeightedPoint {
-    /// Representative point g* minus the heaviest one's: the first point's is (0, 0, 0).
+    /// Representative point g* relative to the heaviest one's, so (0, 0, 0) for the first.
     std::array<float, 3> position{};
     float weight = 0.0f;         ///< volume of the segment / scale^3, > 0
     float volumeShare = 0.0f;    ///< of the whole interior, (0, 1]
@@ -43,11 +43,11 @@ struct WeightedPoint {
     std::array<float, 6> covariance{};
 };
 
-/// What the default profile knows of a shape beyond points and weights.
+/// What the default profile uses beyond points and weights.
 struct ShapeAttributes {
     ShapeStatistics statistics{};
-    std::uint8_t quality = 255;  ///< of the interior, in steps of 1/255: Segmentation::quality
-    Body body;                   ///< of the signature's points; not persisted: `bodyOf`
+    std::uint8_t quality = 255;  ///< Segmentation::quality, in steps of 1/255
+    Body body;                   ///< bodyOf the signature's points; not persisted
 };
 
 struct Signature {
@@ -58,18 +58,18 @@ struct Signature {
     std::optional<ShapeAttributes> attributes;  ///< with SignatureOptions::attributes
 };
 
-/// The share of the whole interior that a weighted point of this weight stands for: in [0, 1], 0 only when
-/// it is below single precision.
+/// The share of the whole interior behind a weighted point of this weight, in [0, 1]; 0 only when it is below
+/// single precision.
 [[nodiscard]] float volumeShareOf(float weight, double scale, double volume) noexcept;
 
-/// True when all numbers that enter a score are the same, bit for bit.
+/// True when all numbers that enter a score are equal.
 [[nodiscard]] bool sameShape(const Signature& a, const Signature& b) noexcept;
 
-/// Scan units: position of point i of the signature.
+/// Position of point i, scan units.
 [[nodiscard]] Point3 pointPosition(const Signature& signature, std::size_t i);
-/// Scan units cubed: volume of the segment behind point i.
+/// Volume of the segment behind point i, scan units cubed.
 [[nodiscard]] double pointVolume(const Signature& signature, std::size_t i);
-/// Scan units: standard deviations of the segment's matter along its principal axes, falling.
+/// Standard deviations of that segment's matter along its principal axes, falling, scan units.
 [[nodiscard]] std::array<double, 3> pointExtents(const Signature& signature, std::size_t i);
 
 /// Errors: kInvalidArgument (options); kNoInterior (no segment heavy enough for single precision);

@@ -15,13 +15,13 @@ namespace {
 
 // Persisted: never change. docs/signature-format.md describes every byte.
 constexpr char kMagic[4] = {'S', 'D', 'B', 'G'};
-constexpr std::uint16_t kPointsOnly = 1;  // version 1
-constexpr std::uint16_t kWithRoots = 2;   // version 2: shares follow from weights; and the statistics
-constexpr std::uint16_t kWithLevels = 3;  // version 3: the statistics as levels, two in a byte
+constexpr std::uint16_t kPointsOnly = 1;  // version 1: points with their volume shares
+constexpr std::uint16_t kWithRoots = 2;   // version 2: statistics, one byte per bin; no volume shares
+constexpr std::uint16_t kWithLevels = 3;  // version 3: statistics as levels, two per byte
 constexpr std::size_t kHeaderBytes = 52;
 constexpr std::size_t kChecksumBytes = 4;
 
-// What the version decides.
+// What differs between versions.
 struct Layout {
     std::size_t pointBytes;
     std::size_t statisticBytes;
@@ -37,18 +37,18 @@ constexpr Layout layoutOf(std::uint16_t version) {
         default: return {48, 0};
     }
 }
-static_assert(kStatisticBins % 2 == 0, "two levels in a byte");
+static_assert(kStatisticBins % 2 == 0, "two levels per byte");
 constexpr std::size_t kLeastBytes = layoutOf(kPointsOnly).size(1);
 
-// No scan that `sanitise` accepts is larger or smaller (scan units): beyond, a motion between two
-// shapes would overflow.
+// Scan units. No scan that `sanitise` accepts exceeds these, beyond which a motion between two shapes would
+// overflow.
 constexpr double kLargestSize = 1e40;
 constexpr double kSmallestSize = 1e-40;
 
-// Weights are single precision: that of the only segment may exceed the volume by its rounding.
+// By this much the weight of a single segment, rounded to a float, may exceed the volume.
 constexpr double kShareRounding = 1e-6;
 
-// CRC-32 (IEEE 802.3, reflected). A server reads a million signatures when it starts.
+// CRC-32 (IEEE 802.3, reflected), by zlib for speed: a starting server reads a million signatures.
 std::uint32_t checksumOf(const char* bytes, std::size_t size) {
     return static_cast<std::uint32_t>(
         crc32(0, reinterpret_cast<const Bytef*>(bytes), static_cast<uInt>(size)));

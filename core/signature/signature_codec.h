@@ -1,5 +1,4 @@
-// The persisted byte form of a signature. docs/signature-format.md describes it; the
-// numbers below are persisted: never change them, add a version.
+// The persisted byte form of a signature: docs/signature-format.md. Never change it; add a version.
 #pragma once
 
 #include <cstddef>
@@ -10,16 +9,14 @@
 
 namespace shapedb {
 
-/// Little-endian on every machine; 56 + 48 bytes a point; with attributes 488 + 44 bytes a point: at most
-/// 1016 bytes with the 12 points of the default profile.
+/// Little-endian on every machine; 56 + 48 bytes per point, with attributes 272 + 44 bytes per point.
 [[nodiscard]] std::string encodeSignature(const Signature& signature);
 
-/// The exact inverse for signatures as makeSignature makes them (with attributes, the volume shares
-/// are not stored: they follow from the weights). Errors: kMalformedSignature (too short or long, wrong
-/// magic, unknown version, checksum, a number out of its range: the message says which).
+/// The exact inverse for signatures from makeSignature. (With attributes, volume shares are not stored, since
+/// they follow from the weights.) Errors: kMalformedSignature for a wrong length, magic, version or checksum,
+/// or a number out of its range (the message says which).
 [[nodiscard]] Result<Signature> decodeSignature(const std::string& bytes);
-/// The same into a signature that may hold anything; what it has allocated is used again. After an error
-/// it holds anything.
+/// The same, into an existing signature whose memory is reused. After an error its contents are unspecified.
 [[nodiscard]] Result<void> decodeSignature(const std::string& bytes, Signature& signature);
 
 }  // namespace shapedb

@@ -40,8 +40,8 @@ std::uint8_t* binsOf(ShapeStatistics& statistics, Statistic statistic) {
     return statistics.data() + layout(statistic).offset;
 }
 
-// Local thickness in octaves of the mean distance between surface points: from 1/32 of it (a
-// sheet) to 1.4 times (no ball that fits is larger).
+// Local thickness, in octaves of the mean distance between surface points: from 1/32 of it (a sheet) to 1.4
+// times (no ball that fits is larger).
 SoftBin thicknessBin(const InteriorView& view, std::size_t t) {
     return softBin(std::log2(view.radii[t] / view.meanSurfaceDistance), -5.0, 0.5, kThicknessBins);
 }
@@ -55,8 +55,8 @@ void thicknessByRadius(const InteriorView& view, std::uint8_t* out) {
     histogram.writeLevels(out);
 }
 
-// Mean inner distance of each cell to the sources it is connected with, in units of the overall
-// mean: about 0.7 in the middle of a body, above 1.5 at the tips of its limbs.
+// Mean inner distance of each cell to the sources in its piece, in units of the overall mean: about 0.7 in
+// the middle of a body, above 1.5 at the tips of its limbs.
 std::vector<double> centrality(const InnerDistances& inner) {
     std::vector<double> result(inner.centres.size(), 0.0);
     for (std::size_t c = 0; c < result.size(); ++c) {
@@ -134,7 +134,7 @@ void spread(const InteriorView& view, std::uint8_t* out) {
     histogram.writeLevels(out);
 }
 
-// Octaves from the long axis of the outline: from a hair, 1/64 of the length, to the corners of a square.
+// The distance from the long axis is in octaves of the length, from 1/64 to the corners of a square.
 void placesInOutline(const std::vector<OutlinePoint>& outline, std::uint8_t* out) {
     Histogram histogram(kOutlinePlaces, kOutlineWidths);
     for (const OutlinePoint& p : outline) {
@@ -190,7 +190,7 @@ Result<ShapeStatistics> shapeStatistics(const InteriorView& view, const RunConte
         placesInOutline(outline, bins(Statistic::kFootprint));
         distancesInOutline(outline, bins(Statistic::kFootprintDistances));
     };
-    // Each writes bins of its own: the same bits on any number of threads.
+    // Each writes its own bins, so the number of threads makes no difference.
     parallelInvoke(inside, lines, rest);
     RETURN_IF_ERROR(insideDone);
     RETURN_IF_ERROR(context.checkpoint());

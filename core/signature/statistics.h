@@ -1,6 +1,6 @@
-// What a shape's interior and surface say as a whole: histograms that no rotation, reflection,
-// translation or scale changes, and that bending changes little. They go beyond the paper, whose
-// points and weights alone are a weak signature; docs/signature.md gives the reasons and figures.
+// Statistics of a shape's interior and surface as a whole: histograms that do not change under
+// rotation, reflection, translation and scaling, and little under bending. They go beyond the paper,
+// whose points and weights alone are a weak signature: docs/signature.md has reasons and figures.
 #pragma once
 
 #include <array>
@@ -16,25 +16,25 @@ namespace shapedb {
 
 /// Persisted order: never change it, add a signature version.
 enum class Statistic : std::uint8_t {
-    kChords,                 ///< straight lines between surface points: length by share inside
+    kChords,                 ///< straight lines between surface points: length by fraction inside
     kThicknessByCentrality,  ///< local thickness (circumradius) by mean inner distance to the rest
     kThicknessByRadius,      ///< local thickness by distance from the centroid
     kBending,                ///< straight distances in units of the mean inner distance
     kInteriorHarmonics,      ///< spherical-harmonic energies of the interior in shells
     kSurfaceDistances,       ///< distances between surface points (D2), in units of the size
     kSurfaceHarmonics,       ///< as the interior's, of the surface points
-    kSpread,                 ///< rod, sheet or body: spread of the surface around its points
+    kSpread,                 ///< whether the surface around its points is like a rod, a sheet or a body
     kFootprint,              ///< the outline: place along it by distance from its long axis
     kFootprintDistances,     ///< distances between points of the outline, in units of its length
 };
 constexpr std::size_t kStatisticKinds = 10;
 
-/// What a scan must show for a statistic of it to hold.
+/// What a scan must show for a statistic to be reliable.
 enum class Evidence : std::uint8_t {
-    kInside,   ///< all of the surface, so that the inside can be told
-    kSurface,  ///< the surface; of one side most of it holds (a chord's share inside hardly depends
-               ///< on how thick a thin shape is taken to be)
-    kOutline,  ///< one side, seen as it lies
+    kInside,   ///< the whole surface, so that the interior is known
+    kSurface,  ///< most of the surface; a scan of one side is roughly enough (the fraction of a chord
+               ///< inside hardly depends on how thick a thin shape is taken to be)
+    kOutline,  ///< one side, seen from above as the shape lies
 };
 
 struct StatisticLayout {
@@ -42,8 +42,8 @@ struct StatisticLayout {
     std::uint16_t offset;  ///< of its first bin
     std::uint16_t count;   ///< bins
     Evidence evidence;
-    /// Above 0: which end comes first is chance, so two shapes are also compared with one's rows in
-    /// reverse; as many rows as this.
+    /// Number of rows when their direction is arbitrary, so that two shapes are also compared with the
+    /// rows of one reversed; else 0.
     std::uint16_t reversibleRows;
 };
 
@@ -61,13 +61,13 @@ constexpr std::array<StatisticLayout, kStatisticKinds> kStatistics{{
 }};
 constexpr std::size_t kStatisticBins = 432;
 
-/// The level (0 to kTopLevel) of each bin, a step of the square root of its share of the whole:
-/// differences of roots weigh a rare bin that is there or not like a small change of a full one
-/// (Hellinger).
+/// The level of each bin, 0 to kTopLevel: the square root of its share of the whole, in steps. Two shapes are
+/// compared by the L1 distance of these roots. (Hellinger's distance is their L2 distance.) Roots make a rare
+/// bin that is there or not matter as much as a small change of a full one.
 using ShapeStatistics = std::array<std::uint8_t, kStatisticBins>;
 
-/// Deterministic, with the same bits on any number of threads: takes up to three of the calling thread's
-/// oneTBB arena. Errors: kCancelled, kDeadlineExceeded.
+/// The same bits on any number of threads; uses up to three of the caller's arena. Errors: kCancelled,
+/// kDeadlineExceeded.
 [[nodiscard]] Result<ShapeStatistics> shapeStatistics(const InteriorView& view,
                                                       const RunContext& context = {});
 

@@ -2,19 +2,20 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+
+#include "core/geometry/box.h"
 
 namespace shapedb {
 
 namespace {
 
-constexpr double kBorder = 1e-9;  // a centre on a common face belongs to one tetrahedron at least
+constexpr double kBorder = 1e-9;  // so that a centre on a common facet belongs to at least one tetrahedron
 
 struct Range {
     std::ptrdiff_t first, last;
 };
 
-// Voxels whose centres may lie between the least and the greatest of four coordinates.
+// The voxels whose centres may lie between the least and the greatest of four coordinates.
 Range centresWithin(double a, double b, double c, double d, double low, double side, std::ptrdiff_t count) {
     const double least = (std::min({a, b, c, d}) - low) / side - 0.5;
     const double greatest = (std::max({a, b, c, d}) - low) / side - 0.5;
@@ -25,32 +26,26 @@ Range centresWithin(double a, double b, double c, double d, double low, double s
 }  // namespace
 
 Voxels::Voxels(const InteriorView& view) {
-    const double infinity = std::numeric_limits<double>::infinity();
-    low_ = {infinity, infinity, infinity};
-    Point3 high{-infinity, -infinity, -infinity};
+    Box box;
     for (const auto& tetrahedron : view.vertices) {
-        for (const std::uint32_t v : tetrahedron) {
-            const Point3& p = view.sites[v];
-            low_ = {std::min(low_.x, p.x), std::min(low_.y, p.y), std::min(low_.z, p.z)};
-            high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-        }
+        for (const std::uint32_t v : tetrahedron) box.add(view.sites[v]);
     }
-    const Point3 extent = high - low_;
+    low_ = box.low;
+    const Point3 extent = box.extent();
     side_ = std::max({extent.x, extent.y, extent.z}) / static_cast<double>(kLongestSide);
     const auto cells = [this](double length) { return static_cast<std::ptrdiff_t>(length / side_) + 1; };
     count_ = {cells(extent.x), cells(extent.y), cells(extent.z)};
     inside_.assign(static_cast<std::size_t>(count_[0] * count_[1] * count_[2]), 0);
-    for (const auto& t : view.vertices) {
-        fill(view.sites[t[0]], view.sites[t[1]], view.sites[t[2]], view.sites[t[3]]);
-    }
+    for (const auto& vertices : view.vertices) fill(cornersOf(view.sites, vertices));
 }
 
-void Voxels::fill(const Point3& a, const Point3& b, const Point3& c, const Point3& d) {
+void Voxels::fill(const TetrahedronCorners& corners) {
+    const auto& [a, b, c, d] = corners;
     const Range x = centresWithin(a.x, b.x, c.x, d.x, low_.x, side_, count_[0]);
     const Range y = centresWithin(a.y, b.y, c.y, d.y, low_.y, side_, count_[1]);
     const Range z = centresWithin(a.z, b.z, c.z, d.z, low_.z, side_, count_[2]);
     if (x.first > x.last || y.first > y.last || z.first > z.last) return;
-    const double six = dot(b - a, cross(c - a, d - a));
+    const double six = sixfoldVolume(corners);
     if (six == 0.0) return;
     // Rows of the inverse of (b - a, c - a, d - a): barycentric coordinates are dot products.
     const Point3 toB = (1.0 / six) * cross(c - a, d - a);

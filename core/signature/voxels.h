@@ -1,4 +1,4 @@
-// The interior on a grid, to ask quickly whether a place is inside.
+// The interior on a grid, for fast tests whether a place is inside.
 #pragma once
 
 #include <array>
@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/geometry/tetrahedron.h"
 #include "core/signature/interior_view.h"
 
 namespace shapedb {
@@ -14,16 +15,16 @@ class Voxels {
   public:
     static constexpr std::size_t kLongestSide = 64;
 
-    /// A voxel is inside when its centre lies in an interior tetrahedron.
+    /// A voxel is inside when its centre lies in an interior tetrahedron. The view must have one.
     explicit Voxels(const InteriorView& view);
 
-    /// Share of the straight line from a to b that lies inside, [0, 1]; by steps of about a voxel.
+    /// Fraction of the straight line from a to b that lies inside, [0, 1], in steps of about a voxel.
     [[nodiscard]] double shareInside(const Point3& a, const Point3& b) const;
 
     [[nodiscard]] bool inside(const Point3& p) const;
 
   private:
-    void fill(const Point3& a, const Point3& b, const Point3& c, const Point3& d);
+    void fill(const TetrahedronCorners& corners);
 
     Point3 low_;
     double side_ = 1.0;

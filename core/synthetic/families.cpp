@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/math.h"
 #include "core/base/random.h"
 #include "core/base/return_if_error.h"
 #include "core/geometry/motion.h"
@@ -13,10 +14,11 @@ namespace shapedb {
 
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
+// Rounds differently from toRadians: a change would alter the shapes that known seeds give.
 constexpr double degrees(double d) { return d * kPi / 180.0; }
 
-// A point at `length` from `from`: `azimuth` from x towards y, `elevation` up from the ground.
+// The point at distance `length` from `from`; `azimuth` turns from x towards y, `elevation` is above the
+// ground.
 Point3 towards(const Point3& from, double length, double azimuth, double elevation) {
     return from + Point3{length * std::cos(elevation) * std::cos(azimuth),
                          length * std::cos(elevation) * std::sin(azimuth), length * std::sin(elevation)};
@@ -416,8 +418,8 @@ constexpr Family kFamilies[] = {
     {"table", "rectangular or round top on four legs", makeTable},
 };
 
-// One stream per family and member (FNV-1a of the name), each step mixed: nothing shifts when
-// families are added, and neighbouring members or seeds have nothing in common.
+// One stream per family (FNV-1a of the name), index and seed: adding families shifts nothing, and
+// neighbouring members and seeds have nothing in common.
 std::uint64_t memberSeed(const std::string& family, std::size_t index, std::uint64_t seed) {
     std::uint64_t hash = 0xcbf29ce484222325ULL;
     for (const char c : family) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3ULL;
@@ -451,11 +453,12 @@ Result<Solid> makeMember(const std::string& family, std::size_t index, std::uint
         }
         names += (names.empty() ? "" : ", ") + std::string(known.name);
     }
-    return fail(ErrorCode::kInvalidArgument, "there is no family \"" + family + "\"; there are " + names);
+    return fail(ErrorCode::kInvalidArgument,
+                "there is no family \"" + family + "\"; known families: " + names);
 }
 
 Result<PointCloud> scanOf(const Solid& solid, const ScanOptions& options) {
-    // Three streams, so that more points or more noise leave the rest of the scan alone.
+    // Three streams, so that the number of points and the noise do not influence the rest.
     Random seeds(options.seed);
     const std::uint64_t pointSeed = seeds.next();
     const std::uint64_t noiseSeed = seeds.next();

@@ -2,18 +2,17 @@
 
 #include <cmath>
 
+#include "core/base/math.h"
 #include "core/synthetic/parts.h"
 
 namespace shapedb {
 
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-
 double ballVolume(double radius) { return 4.0 / 3.0 * kPi * radius * radius * radius; }
 
-// What a rod along the line of two ball centres adds to the balls: the cylinder between the two
-// circles where it leaves them, less the caps of the balls that reach into it.
+// The volume that a rod between the centres of two balls adds to them: the cylinder between the circles where
+// it leaves the balls, less their caps that reach into it.
 double rodBetweenBalls(double rodRadius, double gap, double radiusA, double radiusB) {
     double volume = kPi * rodRadius * rodRadius * gap;
     for (const double radius : {radiusA, radiusB}) {

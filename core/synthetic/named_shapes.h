@@ -1,4 +1,4 @@
-// Solids whose volumes and balls are known exactly, to test segmentation against.
+// Solids whose volume and balls are known exactly, as ground truth for tests of the segmentation.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace shapedb {
 
-/// A ball that a segmentation should find as a segment of its own.
+/// A ball that should become a segment of its own.
 struct KnownBall {
     Point3 centre;
     double radius = 0.0;
@@ -20,8 +20,8 @@ struct KnownBall {
 struct NamedShape {
     std::string name;              ///< snake_case, e.g. "l_shape"
     Solid solid;                   ///< about the origin
-    double volume = 0.0;           ///< of the union, from a closed formula
-    std::vector<KnownBall> balls;  ///< by falling volume; empty when the shape has no such feature
+    double volume = 0.0;           ///< of the union, in closed form
+    std::vector<KnownBall> balls;  ///< by falling volume; may be empty
 };
 
 /// The unit ball: volume 4/3 pi.
@@ -33,8 +33,8 @@ struct NamedShape {
 /// Sides 2, 1.4 and 1.
 [[nodiscard]] NamedShape makeBox();
 
-/// An L of thickness 1 in a square of side 2, height 0.8: three quarters of the square's prism.
-/// Two boxes that share a face, which is not part of the boundary.
+/// An L of height 0.8, three quarters of a square of side 2. Made of two boxes that share a face, which is
+/// not part of the boundary.
 [[nodiscard]] NamedShape makeLShape();
 
 /// Unit balls at x = -1.5 and 1.5 on a rod of radius 0.3.

@@ -6,31 +6,25 @@
 #include <utility>
 
 #include "core/base/random.h"
+#include "core/geometry/box.h"
 
 namespace shapedb {
 
 namespace {
 
-bool isFinite(const Point3& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
-
-// Not sqrt(x*x + ...): that overflows from 1e154 on and vanishes below 1e-162.
+// Not Box::diagonal(): its squares overflow from 1e154 on and vanish below 1e-162.
 double boxDiagonal(const PointCloud& points) {
-    Point3 low = points.front();
-    Point3 high = points.front();
-    for (const Point3& p : points) {
-        low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-        high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-    }
-    return std::hypot(high.x - low.x, high.y - low.y, high.z - low.z);
+    const Point3 extent = boxOf(points).extent();
+    return std::hypot(extent.x, extent.y, extent.z);
 }
 
 }  // namespace
 
 Result<void> addGaussianNoise(PointCloud& points, double shareOfDiagonal, std::uint64_t seed) {
     if (!std::isfinite(shareOfDiagonal) || shareOfDiagonal < 0.0) {
-        return fail(
-            ErrorCode::kInvalidArgument,
-            "noise must be a share of the box diagonal of 0 or more, got " + std::to_string(shareOfDiagonal));
+        return fail(ErrorCode::kInvalidArgument,
+                    "the noise must be 0 or a positive share of the box diagonal, but is " +
+                        std::to_string(shareOfDiagonal));
     }
     for (std::size_t i = 0; i < points.size(); ++i) {
         if (!isFinite(points[i])) {
@@ -65,8 +59,8 @@ PointCloud subsample(const PointCloud& points, std::size_t count, std::uint64_t 
     PointCloud chosen;
     chosen.reserve(count);
     Random random(seed);
-    // Selection sampling (Knuth, algorithm S): each point is taken with probability
-    // still wanted / still to come, which makes all subsets equally likely in one ordered pass.
+    // Selection sampling (Knuth, algorithm S): each point is taken with probability wanted / remaining, which
+    // makes all subsets equally likely.
     for (std::size_t i = 0; i < points.size() && chosen.size() < count; ++i) {
         if (random.below(points.size() - i) < count - chosen.size()) chosen.push_back(points[i]);
     }

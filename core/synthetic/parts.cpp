@@ -17,7 +17,7 @@ SolidPart place(SolidShape shape, const Point3& centre, const Matrix3& axes) {
 
 Matrix3 rotationFromZ(const Point3& to) {
     const Point3 z = (1.0 / length(to)) * to;
-    // Any direction well away from z completes the frame.
+    // Any direction not close to z completes the frame.
     const Point3 other = std::abs(z.x) < 0.6 ? Point3{1.0, 0.0, 0.0} : Point3{0.0, 1.0, 0.0};
     const Point3 across = cross(other, z);
     const Point3 y = (1.0 / length(across)) * across;

@@ -1,4 +1,4 @@
-// Short ways to put primitives where they belong; for the sources of this folder.
+// Shorthands for placing primitives; for the sources of this folder.
 #pragma once
 
 #include "core/synthetic/solid.h"
@@ -8,7 +8,7 @@ namespace shapedb {
 /// A rotation that takes the z axis to the direction of `to` (not zero); the roll is arbitrary.
 [[nodiscard]] Matrix3 rotationFromZ(const Point3& to);
 
-/// Rotations by `angle` radians, counter-clockwise seen from the axis' tip.
+/// Rotations by `angle` radians, counter-clockwise as seen from the tip of the axis.
 [[nodiscard]] Matrix3 rotationAboutX(double angle);
 [[nodiscard]] Matrix3 rotationAboutY(double angle);
 [[nodiscard]] Matrix3 rotationAboutZ(double angle);
@@ -22,7 +22,7 @@ namespace shapedb {
 [[nodiscard]] SolidPart block(const Point3& centre, const Point3& halfSides,
                               const Matrix3& axes = Motion{}.rotation);
 
-/// A capsule between the two ends of its axis, which must differ.
+/// A capsule with the given ends of its axis, which must differ.
 [[nodiscard]] SolidPart rod(const Point3& from, const Point3& to, double radius);
 
 /// A cylinder with flat ends, a pipe when `innerRadius` is above 0.

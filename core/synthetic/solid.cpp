@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "core/base/math.h"
 #include "core/base/random.h"
 #include "core/base/return_if_error.h"
 
@@ -13,9 +14,8 @@ namespace shapedb {
 
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-// How far off the boundary the neighbourhood of a sample is probed, as a share of the diagonal:
-// far above rounding, far below any distance between samples.
+// How far off the boundary samples are probed, as a share of the diagonal: far above rounding, far below any
+// distance between samples.
 constexpr double kProbeShare = 1e-9;
 constexpr std::size_t kTrialsPerPoint = 1000;
 
@@ -87,7 +87,7 @@ double localImplicit(const SolidShape& shape, const Point3& p) {
         });
 }
 
-// The support function: how far the shape reaches from its centre in the unit direction d.
+// The support function: how far the shape extends from its centre in the unit direction d.
 double reach(const SolidShape& shape, const Point3& d) {
     const double across = std::hypot(d.x, d.y);
     return match(
@@ -117,8 +117,7 @@ double thickness(const SolidShape& shape) {
         [](const SolidTorus& s) { return 2.0 * s.tubeRadius; });
 }
 
-// Area for the exact shapes; for ellipsoid and torus the larger area that their samplers fill
-// evenly before they reject (see below).
+// The area; for ellipsoid and torus the larger area that their samplers cover evenly before rejection.
 double envelopeArea(const SolidShape& shape) {
     return match(
         shape, [](const SolidSphere& s) { return 4.0 * kPi * s.radius * s.radius; },
@@ -141,23 +140,16 @@ double envelopeArea(const SolidShape& shape) {
 struct SurfacePoint {
     Point3 position;
     Point3 normal;  // outward, unit length
-    bool kept;      // false: rejected, draw a part anew
+    bool kept;      // false: rejected; start over with a new part
 };
-
-Point3 randomDirection(Random& random) {
-    const double z = random.uniform(-1.0, 1.0);
-    const double angle = random.uniform(0.0, 2.0 * kPi);
-    const double across = std::sqrt(std::max(0.0, 1.0 - z * z));
-    return {across * std::cos(angle), across * std::sin(angle), z};
-}
 
 SurfacePoint drawOn(const SolidSphere& s, Random& random) {
     const Point3 u = randomDirection(random);
     return {s.radius * u, u, true};
 }
 
-// Stretching the unit sphere to the ellipsoid enlarges area by abc |(x/a, y/b, z/c)| at the
-// direction (x, y, z); the largest value, abc / min(a, b, c), makes the envelope.
+// Stretching the unit sphere to the ellipsoid enlarges area by abc |(x/a, y/b, z/c)| in direction (x, y, z).
+// The maximum, abc / min(a, b, c), gives the envelope.
 SurfacePoint drawOn(const SolidEllipsoid& s, Random& random) {
     const Point3& a = s.semiAxes;
     const Point3 u = randomDirection(random);
@@ -167,7 +159,7 @@ SurfacePoint drawOn(const SolidEllipsoid& s, Random& random) {
     return {{a.x * u.x, a.y * u.y, a.z * u.z}, (1.0 / size) * gradient, kept};
 }
 
-// The two round ends make one sphere: a point of it moves to the end it belongs to.
+// The two round ends make one sphere, whose points move to the end they belong to.
 SurfacePoint drawOn(const SolidCapsule& s, Random& random) {
     if (random.uniform() * (s.radius + s.halfLength) < s.radius) {
         const Point3 u = randomDirection(random);
@@ -208,7 +200,7 @@ SurfacePoint drawOn(const SolidBox& s, Random& random) {
     return {{position[0], position[1], position[2]}, {normal[0], normal[1], normal[2]}, true};
 }
 
-// Even in both angles would crowd the inside of the ring, where the area per angle is smallest.
+// Uniform angles alone would crowd the inside of the ring, where the area per angle is smallest.
 SurfacePoint drawOn(const SolidTorus& s, Random& random) {
     const double ring = random.uniform(0.0, 2.0 * kPi);
     const double tube = random.uniform(0.0, 2.0 * kPi);
@@ -219,7 +211,7 @@ SurfacePoint drawOn(const SolidTorus& s, Random& random) {
             std::cos(tube) * u + Point3{0.0, 0.0, std::sin(tube)}, kept};
 }
 
-// A part with what repeated queries need of its placement.
+// A part with its inverse placement, for repeated queries.
 struct PlacedPart {
     const SolidPart* part;
     Motion toLocal;
@@ -239,7 +231,7 @@ bool isOnUnionBoundary(const std::vector<PlacedPart>& parts, std::size_t own, co
     for (std::size_t j = 0; j < parts.size(); ++j) {
         if (j == own) continue;
         if (parts[j].contains(outside)) return false;
-        // Not outside but inside: an earlier part has the same face and draws these points itself.
+        // Inside but not outside: an earlier part has the same face, and these points are its own.
         if (j < own && parts[j].contains(inside)) return false;
     }
     return true;
@@ -257,7 +249,7 @@ Result<void> checkSolid(const Solid& solid) {
         if (!isValidPlacement(solid.parts[i].placement)) {
             return fail(ErrorCode::kInvalidArgument,
                         "part " + std::to_string(i) +
-                            " of the solid is placed by something that is no similarity motion");
+                            " of the solid has a placement that is not a similarity motion");
         }
     }
     return {};
@@ -272,26 +264,16 @@ bool contains(const Solid& solid, const Point3& p) {
                        [&](const SolidPart& part) { return implicitValue(part, p) <= 0.0; });
 }
 
-SolidBounds boundsOf(const Solid& solid) {
-    SolidBounds bounds;
-    for (std::size_t i = 0; i < solid.parts.size(); ++i) {
-        const SolidPart& part = solid.parts[i];
+Box boundsOf(const Solid& solid) {
+    Box bounds;
+    for (const SolidPart& part : solid.parts) {
         const auto& r = part.placement.rotation;
         // Row k of R is the k-th axis of the solid seen from the part's own frame.
         const auto half = [&](std::size_t k) {
             return part.placement.scale * reach(part.shape, {r[k][0], r[k][1], r[k][2]});
         };
         const Point3 extent{half(0), half(1), half(2)};
-        const Point3 low = part.placement.translation - extent;
-        const Point3 high = part.placement.translation + extent;
-        if (i == 0) {
-            bounds = {low, high};
-            continue;
-        }
-        bounds.low = {std::min(bounds.low.x, low.x), std::min(bounds.low.y, low.y),
-                      std::min(bounds.low.z, low.z)};
-        bounds.high = {std::max(bounds.high.x, high.x), std::max(bounds.high.y, high.y),
-                       std::max(bounds.high.z, high.z)};
+        bounds.add({part.placement.translation - extent, part.placement.translation + extent});
     }
     return bounds;
 }
@@ -327,7 +309,7 @@ Result<PointCloud> sampleBoundary(const Solid& solid, std::size_t count, std::ui
     Random random(seed);
     PointCloud points;
     points.reserve(count);
-    // The allowance of a thousand more points keeps luck from deciding at small counts.
+    // A thousand points are added so that small counts do not fail by bad luck.
     const std::size_t trials = kTrialsPerPoint * (count + 1000);
     for (std::size_t trial = 0; trial < trials && points.size() < count; ++trial) {
         const auto at = std::upper_bound(sums.begin(), sums.end(), random.uniform() * total);
@@ -350,9 +332,9 @@ Result<PointCloud> sampleBoundary(const Solid& solid, std::size_t count, std::ui
 double volumeOf(const Solid& solid, std::size_t samples) {
     if (samples == 0 || solid.parts.empty()) return 0.0;
     const std::vector<PlacedPart> parts = placeParts(solid);
-    const SolidBounds bounds = boundsOf(solid);
-    const Point3 side = bounds.high - bounds.low;
-    // The additive recurrence whose steps are powers of 1/g, g^4 = g + 1 (Roberts 2018).
+    const Box bounds = boundsOf(solid);
+    const Point3 side = bounds.extent();
+    // An additive recurrence with powers of 1/g as steps, where g^4 = g + 1 (Roberts 2018).
     constexpr double kG = 1.22074408460575947536;
     const Point3 advance{1.0 / kG, 1.0 / (kG * kG), 1.0 / (kG * kG * kG)};
     const auto fraction = [](double x) { return x - std::floor(x); };

@@ -1,7 +1,7 @@
-// Solids as unions of primitives, and points drawn from their boundary: the material of tests
-// with analytic answers and of the project's own sample collection.
+// Solids as unions of primitives, and points sampled from their boundary: for tests with analytic
+// answers and for the synthetic collection.
 //
-// All functions are pure and may be called from any number of threads at once.
+// All functions are pure and thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -10,13 +10,14 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/geometry/box.h"
 #include "core/geometry/motion.h"
 #include "core/geometry/point.h"
 
 namespace shapedb {
 
-// The primitives, each closed, centred at the origin of its own frame. All lengths are finite and
-// above 0 and in the units of that frame.
+// The primitives: closed sets, centred at the origin of their own frame. All lengths are finite, positive,
+// and in the units of that frame.
 
 /// |p| <= radius.
 struct SolidSphere {
@@ -28,22 +29,22 @@ struct SolidEllipsoid {
     Point3 semiAxes{1.0, 1.0, 1.0};
 };
 
-/// A rod with round ends: all points within `radius` of the segment from (0, 0, -halfLength) to
+/// A rod with round ends: all points within `radius` of the line from (0, 0, -halfLength) to
 /// (0, 0, halfLength).
 struct SolidCapsule {
     double radius = 1.0;
     double halfLength = 1.0;
 };
 
-/// A rod with flat ends about the z axis, |z| <= halfLength; with an inner radius above 0 a pipe
-/// open at both ends. 0 <= innerRadius < radius.
+/// A cylinder about the z axis, |z| <= halfLength; with innerRadius > 0 a pipe open at both ends.
+/// 0 <= innerRadius < radius.
 struct SolidTube {
     double radius = 1.0;
     double halfLength = 1.0;
     double innerRadius = 0.0;
 };
 
-/// |x|, |y|, |z| at most half the side.
+/// |x|, |y|, |z| at most half a side each.
 struct SolidBox {
     Point3 halfSides{1.0, 1.0, 1.0};
 };
@@ -57,61 +58,49 @@ struct SolidTorus {
 
 using SolidShape = std::variant<SolidSphere, SolidEllipsoid, SolidCapsule, SolidTube, SolidBox, SolidTorus>;
 
-/// A primitive and where it is: the placement takes its own frame to that of the solid.
+/// A primitive and its placement, which maps its own frame to that of the solid.
 struct SolidPart {
     SolidShape shape;
     Motion placement;
 };
 
-/// The union of its parts. Plain data; `checkSolid` says whether it is usable.
+/// The union of its parts. Plain data; `checkSolid` validates it.
 struct Solid {
     std::vector<SolidPart> parts;
 };
 
-/// An axis-aligned box, low <= high.
-struct SolidBounds {
-    Point3 low;
-    Point3 high;
-
-    double diagonal() const { return distance(low, high); }
-};
-
-/// Errors: kInvalidArgument, naming the part, when the solid has no parts, or a length, scale or
-/// translation is outside the range its type documents, or a rotation is not orthonormal.
+/// Errors: kInvalidArgument when the solid has no parts, or (naming the part) when a length, scale or
+/// translation is out of range or a rotation is not orthonormal.
 [[nodiscard]] Result<void> checkSolid(const Solid& solid);
 
-/// Negative inside the part, 0 on its boundary, positive outside; the sign is exact up to
-/// rounding, the magnitude is a distance only for sphere, capsule and torus.
+/// Negative inside the part, 0 on its boundary, positive outside, up to rounding. The magnitude is a distance
+/// for sphere, capsule and torus only.
 [[nodiscard]] double implicitValue(const SolidPart& part, const Point3& p);
 
 /// Whether a point lies in the closed union.
 [[nodiscard]] bool contains(const Solid& solid, const Point3& p);
 
-/// The smallest axis-aligned box around the union, exact up to rounding. The solid must have a part.
-[[nodiscard]] SolidBounds boundsOf(const Solid& solid);
+/// The smallest axis-aligned box around the union, up to rounding. The solid must have a part.
+[[nodiscard]] Box boundsOf(const Solid& solid);
 
-/// The smallest full thickness of a part: diameter of a rod or tube, wall of a pipe, smallest
-/// axis of an ellipsoid, smallest side of a box. In the units of the solid.
+/// The smallest thickness of any part: the diameter of a rod or tube, the wall of a pipe, the smallest axis
+/// of an ellipsoid, the smallest side of a box. In the units of the solid.
 [[nodiscard]] double thinnestPart(const Solid& solid);
 
 /// The solid with every part moved.
 [[nodiscard]] Solid movedSolid(const Motion& motion, const Solid& solid);
 
-/// `count` points, independent and uniform by area on the boundary of the union, in random order.
+/// `count` points, independent and uniform by area on the boundary of the union, in random order. Faces where
+/// two parts touch are not part of the boundary; coincident faces count once. (Both are tested 1e-9 diagonals
+/// off the boundary.) Same solid, count and seed: same points.
 ///
-/// A part is drawn by its area and a point uniformly on it (by rejection for ellipsoid and torus);
-/// the point is dropped when the solid goes on just outside of it, and, where the faces of two
-/// parts coincide, when an earlier part has that face too. "Just outside" is 1e-9 of the
-/// diagonal, so faces that touch or coincide count once or not at all, as they should.
-/// Same solid, count and seed: same points.
-///
-/// Errors: those of `checkSolid`; kInvalidArgument when count is 0, or when less than about a
-/// thousandth of the parts' surfaces is on the boundary.
+/// Errors: those of `checkSolid`; kInvalidArgument when count is 0, or when less than about a thousandth of
+/// the parts' surfaces is on the boundary.
 [[nodiscard]] Result<PointCloud> sampleBoundary(const Solid& solid, std::size_t count, std::uint64_t seed);
 
-/// The volume of the union by a quasi-random sequence (Roberts' R3) of `samples` points in the
-/// bounding box. Deterministic; at a million samples the error is below 0.2 % for a solid that
-/// fills a tenth of its box. `samples` 0 gives 0.
+/// The volume of the union, by `samples` quasi-random points (Roberts' R3) in the bounding box.
+/// Deterministic; with a million samples the error is below 0.2 % for a solid that fills a tenth of its box.
+/// 0 samples give 0.
 [[nodiscard]] double volumeOf(const Solid& solid, std::size_t samples);
 
 }  // namespace shapedb

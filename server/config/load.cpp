@@ -20,7 +20,7 @@ namespace {
 
 constexpr const char* kPrefix = "SHAPEDB_";
 constexpr const char* kConfigVariable = "SHAPEDB_CONFIG";
-/// Read by other programs of the project, so not mistakes here.
+/// Used by other programs of the project.
 constexpr const char* kForeignVariables[] = {"SHAPEDB_DATA", "SHAPEDB_SERVER"};
 
 const Setting* findByKey(const std::string& key) {
@@ -158,9 +158,9 @@ Result<CommandLine> parseCommandLine(int argc, const char* const* argv) {
     bool checkConfig = false;
     app.add_option("--config", commandLine.configFile, "Configuration file (TOML) [SHAPEDB_CONFIG]");
     app.add_flag("--check-config", checkConfig,
-                 "Print the effective configuration and where each value comes from, and end");
+                 "Print the effective configuration and where each value comes from, and exit");
     app.set_version_flag("--version", std::string("shapedbd ") + version());
-    // Options write to these; a map's values stay where they are.
+    // Options write to these: the values of a map do not move.
     std::map<std::string, std::string> values;
     std::vector<std::pair<std::string, CLI::Option*>> options;
     const ServerConfig defaults;
@@ -170,7 +170,7 @@ Result<CommandLine> parseCommandLine(int argc, const char* const* argv) {
                                  (shown.empty() ? "empty" : shown) + " [" + setting.environment + "]";
         options.emplace_back(setting.key, app.add_option(setting.flag, values[setting.key], help));
     }
-    app.footer("Flags win over environment variables, these over the file, the file over the defaults.");
+    app.footer("Flags override environment variables, which override the file.");
     try {
         app.parse(argc, argv);
     } catch (const CLI::CallForHelp&) {

@@ -1,4 +1,4 @@
-// From command line, environment and file to one checked configuration.
+// Command line, environment and file become one checked configuration.
 #pragma once
 
 #include <map>
@@ -12,8 +12,8 @@ namespace shapedb::config {
 
 enum class Action {
     kServe,
-    kCheckConfig,  ///< print the effective configuration and end
-    kPrint,        ///< print `text` (help, version) and end with success
+    kCheckConfig,  ///< print the effective configuration and exit
+    kPrint,        ///< print `text` (help, version) and exit
 };
 
 struct CommandLine {
@@ -33,13 +33,12 @@ struct Loaded {
     std::map<std::string, std::string> origins;
 };
 
-/// Defaults, then the file, then the environment, then the flags; each value is checked, also
-/// one that a later source replaces. `environment` holds "NAME=value" strings, as `environ`.
-/// The file is the one of --config or, without it, of SHAPEDB_CONFIG.
+/// Defaults, then file, environment and flags; later ones win, but every value is checked. The file is
+/// that of --config, otherwise of SHAPEDB_CONFIG. `environment` holds "NAME=value" strings, as
+/// `environ`.
 ///
-/// Errors: kFileNotReadable; kMalformedFile (TOML syntax, with the line); kInvalidArgument: an
-/// unknown key, an unknown SHAPEDB_ variable, a value outside its range. The message names the
-/// key and the place.
+/// Errors, naming key and place: kFileNotReadable; kMalformedFile (TOML syntax); kInvalidArgument
+/// (unknown key or SHAPEDB_ variable, value out of range).
 [[nodiscard]] Result<Loaded> load(const CommandLine& commandLine,
                                   const std::vector<std::string>& environment);
 

@@ -1,5 +1,5 @@
-// Everything an operator can set, with its defaults. docs/configuration.md is the page for
-// people; settings.cpp is the one table that names, documents and checks each key.
+// Everything an operator can configure, with its defaults. docs/configuration.md documents it;
+// settings.cpp is the one table that names, describes and checks each key.
 #pragma once
 
 #include <cstdint>
@@ -14,19 +14,20 @@ struct ServerConfig {
     std::string data = "shapedb-data";
 
     struct Ingest {
-        int threads = 0;  ///< segmentation workers; 0: one for each processor
+        int threads = 0;  ///< segmentation workers; 0: one per processor
         std::uint64_t maxQueuedJobs = 10'000;
-        std::uint64_t maxQueuedBytes = std::uint64_t{4} << 30;  ///< points of queued scans, uncompressed
-        int maxAttempts = 2;  ///< starts of one job after which it is quarantined
+        std::uint64_t maxQueuedBytes = std::uint64_t{4}
+                                       << 30;  ///< of the points of queued scans, uncompressed
+        int maxAttempts = 2;                   ///< after so many crashes a scan is quarantined
     } ingest;
 
     struct Limits {
         std::uint64_t maxPoints = 5'000'000;  ///< of one scan
         std::uint32_t maxK = 1'000;           ///< hits of one search
         std::uint32_t maxBatch = 1'000;       ///< queries of one SearchBatch
-        /// Points of all uploads being received at one moment, bytes.
+        /// Of the points of all uploads in progress.
         std::uint64_t maxUploadBytes = std::uint64_t{1} << 30;
-        int stallSeconds = 60;  ///< a client that neither sends nor takes anything so long is cut off
+        int stallSeconds = 60;  ///< after which a client that neither sends nor reads is cut off
     } limits;
 
     struct Store {
@@ -35,11 +36,11 @@ struct ServerConfig {
     } store;
 
     struct Search {
-        int threads = 0;  ///< shared by all searches; 0: one for each processor
+        int threads = 0;  ///< shared by all searches; 0: one per processor
     } search;
 
     struct Rebuild {
-        int threads = 1;  ///< 0: one for each processor
+        int threads = 1;  ///< 0: one per processor
     } rebuild;
 
     struct Log {
@@ -49,7 +50,7 @@ struct ServerConfig {
     } log;
 
     struct Shutdown {
-        int drainSeconds = 10;  ///< how long running calls may take to finish
+        int drainSeconds = 10;  ///< time for running calls to finish
     } shutdown;
 };
 

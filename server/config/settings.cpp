@@ -127,7 +127,7 @@ Setting choice(const std::string& key, std::vector<std::string> names, Field fie
     return setting;
 }
 
-/// True for bytes a path or address may hold.
+/// No control characters.
 bool printable(const std::string& text) {
     return std::none_of(text.begin(), text.end(),
                         [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; });
@@ -135,7 +135,7 @@ bool printable(const std::string& text) {
 
 Setting listenSetting() {
     Setting setting = named("listen", SettingKind::kText, "HOST:PORT",
-                            "Address to serve on. Port 0 picks a free one; IPv6 hosts in brackets.");
+                            "Address to serve on. Port 0 picks a free one; IPv6 hosts need brackets.");
     setting.assign = [](ServerConfig& config, const std::string& text) -> Result<void> {
         const Result<Endpoint> endpoint = parseEndpoint(text);
         RETURN_IF_ERROR(endpoint);
@@ -184,34 +184,34 @@ std::vector<Setting> makeSettings() {
         dataSetting(),
         number(
             "ingest.threads", kInteger, 0, 256, [](C& c) -> int& { return c.ingest.threads; },
-            "Segmentation workers. 0: one for each processor."),
+            "Segmentation workers. 0: one per processor."),
         number(
             "ingest.max_queued_jobs", kInteger, 1, 10'000'000,
             [](C& c) -> std::uint64_t& { return c.ingest.maxQueuedJobs; },
-            "Scans waiting for segmentation at most; more are refused with a retry hint."),
+            "Most scans waiting for segmentation; more are refused with a retry hint."),
         number(
             "ingest.max_queued_bytes", kBytes, kMiB, kTiB,
             [](C& c) -> std::uint64_t& { return c.ingest.maxQueuedBytes; },
-            "Bytes of points waiting for segmentation at most."),
+            "Most bytes of points waiting for segmentation."),
         number(
             "ingest.max_attempts", kInteger, 1, 10, [](C& c) -> int& { return c.ingest.maxAttempts; },
-            "Times one scan may bring the process down before it is set aside as failed."),
+            "Number of times a scan may crash the process before it is set aside as failed."),
         number(
             "limits.max_points", kInteger, 4, 50'000'000,
-            [](C& c) -> std::uint64_t& { return c.limits.maxPoints; }, "Points of one scan at most."),
+            [](C& c) -> std::uint64_t& { return c.limits.maxPoints; }, "Most points in one scan."),
         number(
             "limits.max_k", kInteger, 1, 100'000, [](C& c) -> std::uint32_t& { return c.limits.maxK; },
-            "Hits a search may ask for."),
+            "Most hits a search may ask for."),
         number(
             "limits.max_batch", kInteger, 1, 1'000, [](C& c) -> std::uint32_t& { return c.limits.maxBatch; },
-            "Queries of one SearchBatch at most."),
+            "Most queries in one SearchBatch."),
         number(
             "limits.max_upload_bytes", kBytes, kMiB, kTiB,
             [](C& c) -> std::uint64_t& { return c.limits.maxUploadBytes; },
-            "Bytes of points that all running uploads may hold in memory together."),
+            "Most bytes of points that all running uploads may hold in memory together."),
         number(
             "limits.stall_seconds", kInteger, 1, 86'400, [](C& c) -> int& { return c.limits.stallSeconds; },
-            "A client that neither sends nor takes anything for so long inside a stream is cut off."),
+            "A stream is cut off when its client neither sends nor receives for this many seconds."),
         number(
             "store.readers", kInteger, 1, 64, [](C& c) -> int& { return c.store.readers; },
             "Pooled read connections to the database."),
@@ -220,21 +220,21 @@ std::vector<Setting> makeSettings() {
             "zstd level of stored points. Higher: smaller and slower."),
         number(
             "search.threads", kInteger, 0, 256, [](C& c) -> int& { return c.search.threads; },
-            "Processors all searches share. 0: all."),
+            "Processors shared by all searches. 0: all."),
         number(
             "rebuild.threads", kInteger, 0, 256, [](C& c) -> int& { return c.rebuild.threads; },
             "Processors a rebuild uses. 0: all."),
         choice(
             "log.level", {"trace", "debug", "info", "warn", "error"},
-            [](C& c) -> std::string& { return c.log.level; }, "The least important lines to write."),
+            [](C& c) -> std::string& { return c.log.level; }, "Least important lines to write."),
         choice(
             "log.format", {"text", "json"}, [](C& c) -> std::string& { return c.log.format; },
-            "text for people, json (one object a line) for machines."),
+            "text for people, json (one object per line) for machines."),
         logFileSetting(),
         number(
             "shutdown.drain_seconds", kInteger, 0, 3'600,
             [](C& c) -> int& { return c.shutdown.drainSeconds; },
-            "How long running calls may take to finish after SIGTERM."),
+            "How many seconds running calls may take to finish after SIGTERM."),
     };
 }
 
@@ -288,7 +288,7 @@ Result<Endpoint> parseEndpoint(const std::string& listen) {
     if (bracketed) {
         endpoint.host = endpoint.host.substr(1, endpoint.host.size() - 2);
     } else if (endpoint.host.find(':') != std::string::npos) {
-        return bad("an IPv6 host stands in brackets");
+        return bad("an IPv6 host needs brackets");
     }
     if (endpoint.host.empty()) return bad("there is no host");
     const auto hostByte = [](char c) {

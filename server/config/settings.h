@@ -1,4 +1,4 @@
-// The one table of settings: name in every source, meaning, range, parser and printer.
+// The table of settings: names in all sources, meaning, range, parser and printer.
 #pragma once
 
 #include <functional>
@@ -23,17 +23,16 @@ struct Setting {
     SettingKind kind = SettingKind::kText;
     std::string range;  ///< for people: "1 to 64"
     std::string help;
-    /// Checks and stores. Errors: kInvalidArgument, without the key (the caller knows where
-    /// the text came from and adds it).
+    /// Checks and stores. Errors: kInvalidArgument; the caller adds key and place.
     std::function<Result<void>(ServerConfig&, const std::string& text)> assign;
-    /// As `assign` would read it back.
+    /// In the form that `assign` reads.
     std::function<std::string(const ServerConfig&)> show;
 };
 
-/// Every setting, in the order of the documentation. Immutable.
+/// All settings, in the order of the documentation.
 [[nodiscard]] const std::vector<Setting>& settings();
 
-/// Checks between settings that each are fine alone. Errors: kInvalidArgument naming both keys.
+/// Checks settings against each other. Errors: kInvalidArgument naming both keys.
 [[nodiscard]] Result<void> validateTogether(const ServerConfig& config);
 
 /// Errors: kInvalidArgument: not HOST:PORT, or the port is not 0 to 65535.

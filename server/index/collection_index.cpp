@@ -16,17 +16,16 @@
 namespace shapedb::index {
 namespace {
 
-/// Rows of one read, which become a block: large enough to be cheap, small enough to leave the writer its
-/// turn.
+/// Rows of one read, which become a block: enough to be cheap, few enough not to hold up the writer.
 constexpr std::size_t kLoadBatch = SignatureSet::kBlockSize;
-/// One collection is read again while searches go on: they keep the other processors.
+/// A collection that is read again leaves the other processors to searches.
 constexpr std::size_t kBatchesWhileServing = 1;
 
-/// Two for each processor: one is decoded while the next waits.
+/// Two per processor: one is decoded while the next is waiting.
 std::size_t batchesOfAllProcessors() { return 2 * threadsOfArena(); }
 
-/// The entry of a row, into one that may hold anything; false when the signature is damaged, which is
-/// logged with the shape's key, which the row has not.
+/// Converts a row; `entry` may hold an earlier one. A damaged signature is logged with the shape's key;
+/// then false.
 bool toEntry(store::IndexRow&& row, IndexEntry& entry, store::Store& store, telemetry::Logger& log) {
     if (const auto decoded = decodeSignature(row.signature.bytes, entry.signature); !decoded) {
         auto fields = telemetry::fieldsOf(decoded.error());
@@ -44,7 +43,7 @@ std::shared_ptr<const SignatureBlock> toBlock(std::vector<store::IndexRow>&& row
                                               telemetry::Logger& log) {
     auto block = std::make_shared<SignatureBlock>();
     block->reserve(rows.size());
-    IndexEntry entry;  // one for all: its memory is used again
+    IndexEntry entry;  // one for all rows: reuses its memory
     for (store::IndexRow& row : rows) {
         if (toEntry(std::move(row), entry, store, log)) block->append(entry);
     }
@@ -53,7 +52,7 @@ std::shared_ptr<const SignatureBlock> toBlock(std::vector<store::IndexRow>&& row
 }
 
 Result<ShapeParameters> parametersOf(const store::Collection& collection) {
-    Result<ShapeParameters> parameters = decodeParameters(collection.parameters);
+    Result<ShapeParameters> parameters = store::decodeParameters(collection.parameters);
     if (!parameters) {
         return fail(parameters.error().code,
                     "collection '" + collection.name + "': " + parameters.error().message);
@@ -61,7 +60,7 @@ Result<ShapeParameters> parametersOf(const store::Collection& collection) {
     return parameters;
 }
 
-/// Runs `work`; an allocation that fails becomes an error.
+/// Runs `work`; a failed allocation becomes an error.
 template <typename Work>
 auto guarded(Work&& work) -> decltype(work()) {
     try {
@@ -77,7 +76,7 @@ auto guarded(Work&& work) -> decltype(work()) {
 struct CollectionIndex::Slot {
     std::shared_mutex gate;  ///< shared: storing a signature; exclusive: switching generation
     std::mutex apply;        ///< one update at a time
-    bool stale = false;      ///< under apply: an update failed, the next one reads everything anew
+    bool stale = false;      ///< under apply: an update failed, the next one reads everything again
     std::mutex dirtyMutex;
     std::vector<std::int64_t> dirty;  ///< shapes to read again
     std::mutex pointerMutex;
@@ -107,8 +106,8 @@ CollectionIndex::CollectionIndex(store::Store& store, telemetry::LoggerPtr log)
 
 CollectionIndex::~CollectionIndex() = default;
 
-/// One thread reads from the store while others decode what was read before: decoding takes longer.
-/// At most `batches` are in the making at one moment; 1 takes a single processor.
+/// One thread reads from the store while others decode, which takes longer. At most `batches` are in
+/// progress at a time; 1 uses a single processor.
 Result<SignatureSet> CollectionIndex::readSignatures(std::int64_t collectionId, std::size_t batches,
                                                      const RunContext& context) const {
     namespace flow = oneapi::tbb;
@@ -250,7 +249,7 @@ Result<void> CollectionIndex::refresh(std::int64_t collectionId, std::int64_t sh
     });
 }
 
-/// Applies what is marked; finds nothing when the thread before took our mark along.
+/// Applies the marked shapes; there may be none when the thread before applied ours too.
 Result<void> CollectionIndex::applyDirty(Slot& slot) {
     std::vector<std::int64_t> ids = slot.takeDirty();
     if (ids.empty()) return {};
@@ -267,7 +266,7 @@ Result<void> CollectionIndex::applyDirty(Slot& slot) {
         if (!row && row.error().code != ErrorCode::kNotFound && row.error().code != ErrorCode::kNotReady) {
             return fail(row.error());
         }
-        // Of another generation: a switch is being completed, and its reload brings this shape.
+        // Of another generation: a switch is in progress, and its reload brings this shape.
         if (row && row->generation != before->collection.generation) continue;
         IndexEntry entry;
         if (row && toEntry({id, shape->metadata, std::move(*row)}, entry, store_, *log_)) {
@@ -285,7 +284,7 @@ Result<void> CollectionIndex::applyDirty(Slot& slot) {
 
 Result<void> CollectionIndex::reloadLocked(Slot& slot) {
     slot.stale = true;
-    // What is marked by now will be read. Later marks may or may not be, and are applied after.
+    // What is marked by now will be read; later marks are applied afterwards.
     slot.takeDirty();
     const auto collection = store_.getCollection(slot.current()->collection.name);
     RETURN_IF_ERROR(collection);

@@ -1,9 +1,8 @@
-// The cache that answers searches: for each collection its parameters and all its
-// signatures, as one immutable snapshot that is swapped as a whole.
+// The index that answers searches: for each collection an immutable snapshot of its parameters and
+// signatures, replaced as a whole.
 //
-// The store is the truth. Whoever changes a shape there calls `refresh` afterwards, which
-// reads the truth again: so the order in which threads come here does not matter, and no
-// update can resurrect a shape that was deleted meanwhile.
+// The store is the truth. After a change there, `refresh` reads the shape again: the order of calls
+// does not matter, and no update can bring back a shape that was deleted meanwhile.
 #pragma once
 
 #include <atomic>
@@ -24,7 +23,7 @@
 
 namespace shapedb::index {
 
-/// What a search reads: signatures and the parameters they were made with. Immutable.
+/// What a search reads: signatures, and the parameters that made them. Immutable.
 struct Snapshot {
     store::Collection collection;
     ShapeParameters parameters;  ///< of collection.parameters
@@ -33,20 +32,20 @@ struct Snapshot {
 
 using SnapshotPtr = std::shared_ptr<const Snapshot>;
 
-/// Thread-safe. Readers (`byName`, `byId`, `all`) copy a pointer under a lock nobody holds
-/// longer than that; they never wait for an update. Updates of one collection are applied one
-/// after another; updates that arrive meanwhile are applied together by the next in line.
+/// Thread-safe. Readers (`byName`, `byId`, `all`) only copy a pointer under a short lock and never wait
+/// for updates. Updates of one collection run one after another; those that arrive meanwhile are applied
+/// together by the next.
 ///
-/// Errors common to all functions that read the store: kStorage and the like, as store.h.
+/// Functions that read the store also have its errors (store.h).
 class CollectionIndex {
   public:
     /// Neither is owned; both must outlive the index.
     CollectionIndex(store::Store& store, telemetry::LoggerPtr log);
     ~CollectionIndex();
 
-    /// Reads everything anew, on all processors, and swaps it in at the end (start, restore). Signatures that
-    /// cannot be decoded are logged and left out. Errors: kCancelled, kDeadlineExceeded;
-    /// kDataLoss: parameters of a collection, which is named.
+    /// Reads everything on all processors and replaces the index at the end (start, restore). Damaged
+    /// signatures are logged and left out. Errors: kCancelled, kDeadlineExceeded; kDataLoss (parameters
+    /// of a collection, which is named).
     [[nodiscard]] Result<void> loadAll(const RunContext& context = {});
 
     /// Errors: kNotFound.
@@ -56,33 +55,33 @@ class CollectionIndex {
     /// By name.
     [[nodiscard]] std::vector<SnapshotPtr> all() const;
 
-    /// Adds a collection the store has just created, empty. Errors: kDataLoss (its parameters).
+    /// Adds a collection that was just created, empty. Errors: kDataLoss (its parameters).
     [[nodiscard]] Result<SnapshotPtr> add(const store::Collection& collection);
-    /// Forgets a collection; unknown ids are ignored. Running searches keep their snapshot.
+    /// Removes a collection; ignores unknown ids. Running searches keep their snapshot.
     void remove(std::int64_t collectionId);
 
-    /// Brings one shape up to date with the store. When it returns, searches that start see
-    /// at least what was committed before the call. A collection that is gone is no error.
+    /// Reads one shape again. Searches that start afterwards see at least what was committed before the
+    /// call. No error when the collection is gone.
     [[nodiscard]] Result<void> refresh(std::int64_t collectionId, std::int64_t shapeId);
 
-    /// Reads one collection anew. Errors: kNotFound, kDataLoss.
+    /// Reads one collection again. Errors: kNotFound, kDataLoss.
     [[nodiscard]] Result<void> reload(std::int64_t collectionId);
 
-    /// Calls `commit` if `generation` is the one that serves and keeps it so until `commit`
-    /// returns; false, without calling it, when it is not or the collection is gone. A
-    /// signature made with old parameters can thus never be stored as a new one.
+    /// Calls `commit` if `generation` serves, and keeps it serving until `commit` returns. False, without
+    /// calling it, when another generation serves or the collection is gone. Thus a signature made with
+    /// old parameters is never stored as a new one.
     [[nodiscard]] bool whileGeneration(std::int64_t collectionId, std::int64_t generation,
                                        const std::function<void()>& commit);
 
-    /// Calls `change`, which may switch the collection to its next generation in the store
-    /// and then returns true; reloads the collection before any `whileGeneration` goes on.
-    /// Returns what `change` returned. Errors: those of `change` and of `reload`.
+    /// Calls `change`, which returns true if it switched the collection to its next generation in the
+    /// store; then reloads the collection before any `whileGeneration` continues. Returns what `change`
+    /// returned. Errors: those of `change` and of `reload`.
     [[nodiscard]] Result<bool> switchGeneration(std::int64_t collectionId,
                                                 const std::function<Result<bool>()>& change);
 
     struct Totals {
         std::uint64_t signatures = 0;
-        std::uint64_t bytes = 0;  ///< about
+        std::uint64_t bytes = 0;  ///< approximate
     };
     [[nodiscard]] Totals totals() const;
 
@@ -106,7 +105,7 @@ class CollectionIndex {
 
     store::Store& store_;
     telemetry::LoggerPtr log_;
-    mutable std::mutex mutex_;  ///< guards directory_; held only to look up or to swap
+    mutable std::mutex mutex_;  ///< guards directory_; held only to look up or to replace
     Directory directory_;
 };
 

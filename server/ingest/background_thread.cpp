@@ -9,17 +9,16 @@ namespace shapedb::ingest {
 
 namespace {
 
-/// Linux weighs a thread so much nicer than another with about a tenth. 19 (a weight of a seventieth) would
-/// bring segmentation to a standstill under a steady load of searches.
+/// Linux gives a thread with this difference in niceness about a tenth of the weight. 19 (a seventieth)
+/// would stall segmentation under a steady load of searches.
 constexpr int kNicer = 10;
 
 }  // namespace
 
 void becomeBackgroundThread() noexcept {
-    // On Linux a nice value belongs to a thread; only its own id (not std::thread's) names one.
+    // On Linux niceness belongs to a thread, named by its kernel id.
     const auto self = static_cast<id_t>(::syscall(SYS_gettid));
-    // Relative: an operator may have started the whole server nicer. -1, the sign of an error too, is a
-    // value.
+    // Relative, since the whole server may run with another niceness. -1 may be an error or a value.
     const int now = ::getpriority(PRIO_PROCESS, self);
     static_cast<void>(::setpriority(PRIO_PROCESS, self, now + kNicer));
 }

@@ -5,12 +5,12 @@ namespace shapedb::ingest {
 CrashIsolation::Pass::Pass(CrashIsolation& gate, bool suspect) : gate_(gate), suspect_(suspect) {
     std::unique_lock<std::mutex> lock(gate_.mutex_);
     if (!suspect_) {
-        gate_.changed_.wait(lock, [this] { return !gate_.suspectInside_ && gate_.waitingSuspects_ == 0; });
+        gate_.changed_.wait(lock, [this] { return gate_.isOpen(false); });
         ++gate_.ordinary_;
         return;
     }
     ++gate_.waitingSuspects_;
-    gate_.changed_.wait(lock, [this] { return !gate_.suspectInside_ && gate_.ordinary_ == 0; });
+    gate_.changed_.wait(lock, [this] { return gate_.isOpen(true); });
     --gate_.waitingSuspects_;
     gate_.suspectInside_ = true;
 }
@@ -23,6 +23,15 @@ CrashIsolation::Pass::~Pass() {
         --gate_.ordinary_;
     }
     gate_.changed_.notify_all();
+}
+
+bool CrashIsolation::wouldWait(bool suspect) const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return !isOpen(suspect);
+}
+
+bool CrashIsolation::isOpen(bool suspect) const {
+    return !suspectInside_ && (suspect ? ordinary_ : waitingSuspects_) == 0;
 }
 
 }  // namespace shapedb::ingest

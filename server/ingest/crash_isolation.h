@@ -1,8 +1,8 @@
-// Keeps scans that may have killed the server away from the others.
+// Keeps scans that may have crashed the server apart from the others.
 //
-// When the process dies, every scan in hand is suspected. Segmented one at a time after the
-// restart, the guilty one dies alone, and the others lose the suspicion instead of being set
-// aside with it.
+// When the process dies, every scan in hand is a suspect. After the restart suspects are segmented
+// one at a time: the guilty one dies alone, and the others are cleared instead of quarantined with
+// it.
 #pragma once
 
 #include <condition_variable>
@@ -10,11 +10,11 @@
 
 namespace shapedb::ingest {
 
-/// Either any number of ordinary scans at once, or one suspect. A waiting suspect keeps new
-/// ordinary scans out, so that it gets its turn. Thread-safe.
+/// Admits either any number of ordinary scans, or one suspect. A waiting suspect keeps new ordinary
+/// scans out until it has had its turn. Thread-safe.
 class CrashIsolation {
   public:
-    /// Inside, until destroyed. The constructor waits.
+    /// Admission until destroyed. The constructor waits for it.
     class Pass {
       public:
         Pass(CrashIsolation& gate, bool suspect);
@@ -27,8 +27,13 @@ class CrashIsolation {
         const bool suspect_;
     };
 
+    /// Whether a Pass made now would have to wait.
+    [[nodiscard]] bool wouldWait(bool suspect) const;
+
   private:
-    std::mutex mutex_;
+    [[nodiscard]] bool isOpen(bool suspect) const;
+
+    mutable std::mutex mutex_;
     std::condition_variable changed_;
     int ordinary_ = 0;         ///< inside
     int waitingSuspects_ = 0;  ///< outside

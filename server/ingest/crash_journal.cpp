@@ -12,8 +12,8 @@ CrashJournal::CrashJournal(std::string path, telemetry::LoggerPtr log)
     read();
 }
 
-/// Lines `shape-id points-version deaths in-hand`; anything else ends the reading: a guess at
-/// deaths is worth less than a try.
+/// Lines `shape-id points-version deaths in-hand`; reading ends at anything else: better to try a
+/// scan again than to trust a damaged count.
 void CrashJournal::read() {
     std::ifstream file(path_);
     std::int64_t id = 0;

@@ -1,7 +1,7 @@
 // Which scans a rebuild had in hand when the process died, and how often.
 //
-// Ingest jobs count their attempts in the store; a rebuild has no jobs. Without this file, a
-// scan that kills the server would do so again at every start, when the rebuild goes on.
+// Ingest jobs count their attempts in the store, but a rebuild has no jobs: without this file, a
+// scan that crashes the server would do so again at every start.
 #pragma once
 
 #include <cstdint>
@@ -15,25 +15,25 @@
 
 namespace shapedb::ingest {
 
-/// A small text file, rewritten whole and renamed into place. It survives the death of the
-/// process, which is all it is about; the machine's is nobody's fault. When it cannot be
-/// written, that is logged and the rebuild goes on without. Thread-safe.
+/// A small text file, rewritten and renamed into place. It survives the death of the process; it is
+/// not synced, since a crash of the machine is no scan's fault. If it cannot be written, that is
+/// logged and the rebuild continues without it. Thread-safe.
 class CrashJournal {
   public:
-    /// Reads what a dead process left. An empty path keeps everything in memory.
+    /// Reads what a dead process left. With an empty path everything stays in memory.
     CrashJournal(std::string path, telemetry::LoggerPtr log);
 
-    /// Times the process died with these points in hand.
+    /// How often the process died with these points in hand.
     [[nodiscard]] int deaths(const store::Shape& shape) const;
 
-    /// In hand, until destroyed.
+    /// The scan is in hand until this is destroyed.
     class Entry {
       public:
         Entry(CrashJournal& journal, const store::Shape& shape);
         ~Entry();
         Entry(const Entry&) = delete;
         Entry& operator=(const Entry&) = delete;
-        /// It came to an end, good or bad: no longer suspected.
+        /// The scan was processed, well or badly: it is no suspect.
         void acquit() { acquitted_ = true; }
 
       private:

@@ -3,7 +3,7 @@
 namespace shapedb::ingest {
 namespace {
 
-/// Between two announcements of progress inside a stage.
+/// Between two notifications inside a stage.
 constexpr std::chrono::milliseconds kQuiet{50};
 
 }  // namespace

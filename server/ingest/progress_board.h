@@ -1,6 +1,6 @@
-// Where running segmentations stand, for those who watch or wait.
+// Progress of running segmentations, for callers that watch or wait.
 //
-// The board says that something changed; what a shape's state is, only the store says.
+// The board only tells that something changed; the state of a shape is in the store.
 #pragma once
 
 #include <chrono>
@@ -25,13 +25,13 @@ class ProgressBoard {
         std::uint64_t sequence = 0;    ///< rises with each change of this shape
     };
 
-    /// A worker is at this point of this shape. Watchers hear of a new stage at once, of
-    /// progress inside one at most every 50 ms. `stage` must be static.
+    /// Progress of a worker. Watchers are told of a new stage at once, of progress inside a stage at
+    /// most every 50 ms. `stage` must be static.
     void report(std::int64_t shapeId, const char* stage, std::uint64_t done, std::uint64_t total);
-    /// No worker has the shape any more; its state in the store may have changed.
+    /// No worker has the shape any more, and its state in the store may have changed.
     void settled(std::int64_t shapeId);
 
-    /// Interest in one shape, until destroyed.
+    /// Watches one shape until destroyed.
     class Watch {
       public:
         ~Watch();
@@ -39,7 +39,7 @@ class ProgressBoard {
         Watch& operator=(const Watch&) = delete;
 
         [[nodiscard]] Status status() const;
-        /// Returns when the sequence is no longer `seen`, or at `until`.
+        /// Returns as soon as the sequence differs from `seen`, or at `until`.
         void waitForChange(std::uint64_t seen, Clock::time_point until) const;
 
       private:
@@ -61,7 +61,7 @@ class ProgressBoard {
         std::condition_variable changed;
     };
 
-    /// Drops the entry when neither a worker nor a watcher needs it. Under mutex_.
+    /// Removes the entry when neither a worker nor a watcher needs it. Under mutex_.
     void release(std::map<std::int64_t, std::unique_ptr<Entry>>::iterator entry);
 
     mutable std::mutex mutex_;

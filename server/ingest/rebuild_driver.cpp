@@ -1,23 +1,20 @@
 #include "server/ingest/rebuild_driver.h"
 
 #include <algorithm>
-#include <exception>
-#include <new>
 #include <string>
 #include <utility>
 
 #include "core/base/return_if_error.h"
-#include "core/signature/signature_codec.h"
 #include "server/ingest/background_thread.h"
 #include "server/store/parameters_codec.h"
 
 namespace shapedb::ingest {
 namespace {
 
-/// How often a waiting caller looks at its cancel flag, and at the counts in the store.
+/// How often a waiting caller checks for cancellation, and for new counts in the store.
 constexpr std::chrono::milliseconds kLook{50};
 constexpr std::chrono::milliseconds kCount{200};
-/// Before a pass that found nothing left but could not finish is repeated.
+/// Before another pass when nothing was left but the rebuild could not be finished.
 constexpr std::chrono::milliseconds kAnotherPass{50};
 
 bool sameProgress(const store::Rebuild& a, const store::Rebuild& b) {
@@ -33,13 +30,13 @@ std::vector<telemetry::Field> fieldsOf(const store::Rebuild& rebuild, const Erro
 }  // namespace
 
 RebuildDriver::RebuildDriver(store::Store& store, index::CollectionIndex& index, WorkerPool& pool,
-                             CrashIsolation& suspects, SignaturePipeline describe, telemetry::LoggerPtr log,
+                             CrashIsolation& isolation, SignaturePipeline pipeline, telemetry::LoggerPtr log,
                              RebuildOptions options)
     : store_(store),
       index_(index),
       pool_(pool),
-      suspects_(suspects),
-      describe_(std::move(describe)),
+      isolation_(isolation),
+      pipeline_(std::move(pipeline)),
       log_(std::move(log)),
       options_(std::move(options)),
       journal_(options_.journalPath, log_) {}
@@ -68,7 +65,7 @@ Result<void> RebuildDriver::start() {
 Result<store::Rebuild> RebuildDriver::begin(const store::Collection& collection,
                                             const ShapeParameters& parameters) {
     const std::lock_guard<std::mutex> one(beginMutex_);
-    const std::string text = index::encodeParameters(parameters);
+    const std::string text = store::encodeParameters(parameters);
     const auto running = store_.runningRebuilds();
     RETURN_IF_ERROR(running);
     for (const store::Rebuild& rebuild : *running) {
@@ -176,14 +173,14 @@ void RebuildDriver::run() {
         const ActivePtr active = activate(lock);
         if (!active) continue;
         if (active->cancel) {
-            // Whoever cancelled it waits for the others and clears it.
+            // The thread that cancelled it waits for the others and clears it.
             changed_.wait(lock, [&] { return stopping_ || active_ != active; });
         } else if (!active->batch.empty()) {
             rebuildOne(active, lock);
         } else if (!active->reading && active->inFlight == 0) {
             readBatch(active, lock);
         } else {
-            // The rest of the batch is in other hands, or another thread reads the next one.
+            // Other threads have the rest of the batch, or one reads the next batch.
             changed_.wait(lock, [&] {
                 return stopping_ || active_ != active || active->cancel || !active->batch.empty() ||
                        (!active->reading && active->inFlight == 0);
@@ -192,12 +189,12 @@ void RebuildDriver::run() {
     }
 }
 
-/// The rebuild to work on; null when it had to be dropped.
+/// The rebuild to work on; null when it had to be abandoned.
 RebuildDriver::ActivePtr RebuildDriver::activate(std::unique_lock<std::mutex>& lock) {
     if (active_) return active_;
     const store::Rebuild rebuild = queue_.front();
     queue_.pop_front();
-    const auto parameters = index::decodeParameters(rebuild.parameters);
+    const auto parameters = store::decodeParameters(rebuild.parameters);
     if (parameters) {
         active_ = std::make_shared<Active>();
         active_->rebuild = rebuild;
@@ -216,7 +213,7 @@ void RebuildDriver::retire(const ActivePtr& active) {
     if (active_ == active) active_.reset();
 }
 
-/// Reads the next shapes, or finishes when there are none. Under the lock but for the store.
+/// Reads the next shapes, or finishes when there are none. Unlocks while it uses the store.
 void RebuildDriver::readBatch(const ActivePtr& active, std::unique_lock<std::mutex>& lock) {
     active->reading = true;
     lock.unlock();
@@ -233,7 +230,7 @@ void RebuildDriver::readBatch(const ActivePtr& active, std::unique_lock<std::mut
         active->batch.assign(shapes->begin(), shapes->end());
         active->afterId = shapes->back().id;
     } else if (active->afterId != 0) {
-        active->afterId = 0;  // another pass for what came meanwhile
+        active->afterId = 0;  // another pass for shapes that were added meanwhile
     } else {
         finish(active, lock);
     }
@@ -247,7 +244,7 @@ void RebuildDriver::finish(const ActivePtr& active, std::unique_lock<std::mutex>
     lock.unlock();
     const auto finished =
         index_.switchGeneration(rebuild.collectionId, [&] { return store_.finishRebuild(rebuild.id); });
-    // The store alone knows whether it is done: the reload of the index may have failed after.
+    // Only the store knows whether it is done: the reload of the index may have failed afterwards.
     const auto now = store_.getRebuild(rebuild.id);
     lock.lock();
     const bool over =
@@ -275,13 +272,10 @@ void RebuildDriver::rebuildOne(const ActivePtr& active, std::unique_lock<std::mu
     }
     Result<void> stored;
     try {
-        if (!active->cancel) stored = guarded(*active, shape);
-    } catch (const std::exception& error) {
-        const bool memory = dynamic_cast<const std::bad_alloc*>(&error) != nullptr;
-        stored = store_.putRebuildFailure(active->rebuild.id, shape.id, shape.pointsVersion,
-                                          {memory ? ErrorCode::kOutOfMemory : ErrorCode::kInternal,
-                                           memory ? "not enough memory to segment this scan"
-                                                  : std::string("segmentation threw: ") + error.what()});
+        if (!active->cancel) stored = isolated(*active, shape);
+    } catch (...) {
+        stored =
+            store_.putRebuildFailure(active->rebuild.id, shape.id, shape.pointsVersion, errorOfException());
     }
     lock.lock();
     if (!stored) {
@@ -294,9 +288,8 @@ void RebuildDriver::rebuildOne(const ActivePtr& active, std::unique_lock<std::mu
     changed_.notify_all();
 }
 
-/// A scan that had its part in a death of the process runs alone, and one that had it too often
-/// does not run any more.
-Result<void> RebuildDriver::guarded(Active& active, const store::Shape& shape) {
+/// A scan that was in hand when the process died runs alone; after too many deaths it runs no more.
+Result<void> RebuildDriver::isolated(Active& active, const store::Shape& shape) {
     const int deaths = journal_.deaths(shape);
     if (deaths >= options_.maxAttempts) {
         log_->error("scan set aside: the server died each time it was segmented",
@@ -311,33 +304,29 @@ Result<void> RebuildDriver::guarded(Active& active, const store::Shape& shape) {
         if (stored) entry.acquit();
         return stored;
     }
-    const CrashIsolation::Pass pass(suspects_, deaths > 0);
+    const CrashIsolation::Pass pass(isolation_, deaths > 0);
     CrashJournal::Entry entry(journal_, shape);
     const Result<void> stored = process(active, shape);
     if (stored && !active.cancel) entry.acquit();
     return stored;
 }
 
-/// Errors: of the store; the shape comes again with the next pass.
+/// Errors: of the store; the next pass brings the shape again.
 Result<void> RebuildDriver::process(Active& active, const store::Shape& shape) {
-    const auto points = store_.loadPoints(shape.id);
-    if (!points && points.error().code == ErrorCode::kNotFound) return {};  // deleted meanwhile
-    if (!points && points.error().code != ErrorCode::kDataLoss) return fail(points.error());
     RunContext context;
     context.cancel = &active.cancel;
-    Result<Description> description = fail(ErrorCode::kInternal, "not described");
-    if (points) {
-        onThisThreadAlone([&] { description = describe_(toCloud(*points), active.parameters, context); });
-    } else {
-        description = fail(points.error());
+    PipelineOutcome made = pipeline_.run(store_, shape.id, active.parameters, context);
+    switch (made.kind) {
+        case PipelineOutcome::Kind::kSignature:
+            return store_.putRebuilt(
+                active.rebuild.id,
+                {shape.id, shape.pointsVersion, active.rebuild.targetGeneration, std::move(made.signature)});
+        case PipelineOutcome::Kind::kCancelled: return {};
+        case PipelineOutcome::Kind::kStoreFailed: return fail(made.why);
+        case PipelineOutcome::Kind::kScanFailed: break;
     }
-    if (description) {
-        return store_.putRebuilt(active.rebuild.id,
-                                 {shape.id, shape.pointsVersion, active.rebuild.targetGeneration,
-                                  encodeSignature(description->signature)});
-    }
-    if (description.error().code == ErrorCode::kCancelled) return {};
-    return store_.putRebuildFailure(active.rebuild.id, shape.id, shape.pointsVersion, description.error());
+    if (made.why.code == ErrorCode::kNotFound) return {};  // deleted meanwhile
+    return store_.putRebuildFailure(active.rebuild.id, shape.id, shape.pointsVersion, made.why);
 }
 
 }  // namespace shapedb::ingest

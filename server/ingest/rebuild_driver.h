@@ -1,8 +1,8 @@
-// Re-segments whole collections in the background, into a generation of signatures that
+// Segments whole collections again in the background, into a new generation of signatures that
 // replaces the serving one when it is complete.
 //
-// What is done is in the store, shape by shape: a rebuild goes on where it stood after a
-// restart. Rebuilds run one after another, in the order they were asked for.
+// Progress is in the store, shape by shape: after a restart a rebuild continues where it was.
+// Rebuilds run one after another, in the order of their requests.
 #pragma once
 
 #include <atomic>
@@ -31,13 +31,13 @@ namespace shapedb::ingest {
 
 struct RebuildOptions {
     int threads = 1;          ///< at least 1
-    int maxAttempts = 2;      ///< deaths of the process after which a scan is set aside
-    std::string journalPath;  ///< of the CrashJournal
+    int maxAttempts = 2;      ///< deaths of the process after which a scan is quarantined
+    std::string journalPath;  ///< file of the CrashJournal
     std::size_t batch = 32;   ///< shapes read from the store at once
-    /// While uploads are being segmented, each rebuild thread waits this long before it takes
-    /// its next shape: uploads come first, and the rebuild still ends.
+    /// While uploads are being segmented, each rebuild thread waits this long before its next
+    /// shape: uploads come first, and the rebuild still ends.
     std::chrono::milliseconds yield{100};
-    /// How long it rests after the store failed it.
+    /// How long a thread waits after an error of the store.
     std::chrono::milliseconds backOff{1'000};
 };
 
@@ -46,32 +46,32 @@ class RebuildDriver {
   public:
     /// The references are not owned and must outlive the driver.
     RebuildDriver(store::Store& store, index::CollectionIndex& index, WorkerPool& pool,
-                  CrashIsolation& suspects, SignaturePipeline describe, telemetry::LoggerPtr log,
+                  CrashIsolation& isolation, SignaturePipeline pipeline, telemetry::LoggerPtr log,
                   RebuildOptions options);
     /// As `stop`.
     ~RebuildDriver();
 
-    /// Goes on with what a dead process left running. Call once. Errors: as Store::runningRebuilds.
+    /// Continues what a dead process left running. Call once. Errors: as Store::runningRebuilds.
     [[nodiscard]] Result<void> start();
 
-    /// Starts a rebuild, or finds the running one with the same parameters.
+    /// Starts a rebuild, or returns the running one with the same parameters.
     /// Errors: kNotFound (collection); kRejected: one with other parameters is running.
     [[nodiscard]] Result<store::Rebuild> begin(const store::Collection& collection,
                                                const ShapeParameters& parameters);
 
-    /// Returns the rebuild as soon as its counts or state differ from those of `seen`.
-    /// Errors: kNotFound; kCancelled, kDeadlineExceeded (of the waiting, not of the rebuild).
+    /// Waits until counts or state differ from those of `seen`. Errors: kNotFound; kCancelled,
+    /// kDeadlineExceeded (of the waiting, not of the rebuild).
     [[nodiscard]] Result<store::Rebuild> waitForChange(const store::Rebuild& seen, const RunContext& context);
 
-    /// Stops a rebuild and deletes what it made. Errors: kNotFound: none is running.
+    /// Stops the collection's rebuild and deletes its results. Errors: kNotFound (none is running).
     [[nodiscard]] Result<void> cancel(const store::Collection& collection);
 
-    /// Returns when no thread touches the store.
+    /// Returns when no thread uses the store.
     void pause();
-    /// Goes on with what the store, whose content may be another now, calls running.
+    /// Continues with the rebuilds that the store, which may hold other content now, calls running.
     /// Errors: as Store::runningRebuilds.
     [[nodiscard]] Result<void> resume();
-    /// As `pause`, and ends the threads; what is unfinished goes on at the next start. Idempotent.
+    /// As `pause`, and ends the threads; the next start continues. Idempotent.
     void stop();
 
   private:
@@ -80,7 +80,7 @@ class RebuildDriver {
         ShapeParameters parameters;
         std::deque<store::Shape> batch;
         std::int64_t afterId = 0;
-        int inFlight = 0;      ///< threads with one of its shapes
+        int inFlight = 0;      ///< threads working on one of its shapes
         bool reading = false;  ///< a thread is reading the next batch or finishing
         std::atomic<bool> cancel{false};
     };
@@ -91,7 +91,7 @@ class RebuildDriver {
     void readBatch(const ActivePtr& active, std::unique_lock<std::mutex>& lock);
     void finish(const ActivePtr& active, std::unique_lock<std::mutex>& lock);
     void rebuildOne(const ActivePtr& active, std::unique_lock<std::mutex>& lock);
-    Result<void> guarded(Active& active, const store::Shape& shape);
+    Result<void> isolated(Active& active, const store::Shape& shape);
     Result<void> process(Active& active, const store::Shape& shape);
     void retire(const ActivePtr& active);
     void rest(std::unique_lock<std::mutex>& lock, std::chrono::milliseconds time);
@@ -101,8 +101,8 @@ class RebuildDriver {
     store::Store& store_;
     index::CollectionIndex& index_;
     WorkerPool& pool_;
-    CrashIsolation& suspects_;
-    SignaturePipeline describe_;
+    CrashIsolation& isolation_;
+    SignaturePipeline pipeline_;
     telemetry::LoggerPtr log_;
     RebuildOptions options_;
     CrashJournal journal_;

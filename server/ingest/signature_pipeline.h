@@ -1,26 +1,64 @@
-// The road from points to signature as the server calls it: `shapedb::describe`, or in tests
-// something quicker.
+// From a scan to its signature, as the server runs it: for callers who wait, and in the background
+// for scans in the store.
 #pragma once
 
-#include <cstddef>
+#include <cstdint>
 #include <functional>
+#include <string>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
-#include "core/geometry/point.h"
 #include "core/pipeline.h"
+#include "server/store/store.h"
 
 namespace shapedb::ingest {
 
-/// Must be thread-safe and, as everything in core/, throw nothing.
-using SignaturePipeline =
+/// `shapedb::describe`, or in tests something quicker. Must be thread-safe.
+using Describe =
     std::function<Result<Description>(const PointCloud&, const ShapeParameters&, const RunContext&)>;
 
-/// Packed x y z, as stored and as sent, to points. Throws std::bad_alloc.
-inline PointCloud toCloud(const std::vector<float>& xyz) {
-    PointCloud points;
-    points.reserve(xyz.size() / 3);
-    for (std::size_t i = 0; i + 2 < xyz.size(); i += 3) points.push_back({xyz[i], xyz[i + 1], xyz[i + 2]});
-    return points;
-}
+/// What became of one stored scan.
+struct PipelineOutcome {
+    enum class Kind {
+        kSignature,    ///< `signature` and `seconds` are set
+        kCancelled,    ///< by the context
+        kScanFailed,   ///< `why`: trying again would fail again
+        kStoreFailed,  ///< `why`: the scan is not to blame, a later try may succeed
+    };
+    Kind kind = Kind::kSignature;
+    std::string signature;  ///< encoded
+    double seconds = 0.0;   ///< of the segmentation
+    Error why{ErrorCode::kInternal, ""};
+};
+
+/// Thread-safe. Copies share nothing.
+class SignaturePipeline {
+  public:
+    /// Implicit: a function stands for the pipeline that runs it.
+    template <typename Function, std::enable_if_t<std::is_constructible_v<Describe, Function>, int> = 0>
+    SignaturePipeline(Function&& describe) : describe_(std::forward<Function>(describe)) {}
+
+    /// `points` are packed x y z. Uses the threads of the calling task arena. Errors: those of the
+    /// function; throws what it throws, and std::bad_alloc.
+    [[nodiscard]] Result<Description> describe(const std::vector<float>& points,
+                                               const ShapeParameters& parameters,
+                                               const RunContext& context) const;
+
+    /// Loads a stored scan, describes it on the calling thread alone and encodes its signature.
+    /// Throws nothing: exceptions become kScanFailed.
+    [[nodiscard]] PipelineOutcome run(store::Store& store, std::int64_t shapeId,
+                                      const ShapeParameters& parameters, const RunContext& context) const;
+
+  private:
+    Describe describe_;
+};
+
+/// Errors of the store or the machine, not of the scan: a later try may succeed.
+[[nodiscard]] bool isTransient(ErrorCode code) noexcept;
+
+/// Inside a catch block of a worker: what the exception means for the scan it had in hand.
+/// kOutOfMemory or kInternal.
+[[nodiscard]] Error errorOfException();
 
 }  // namespace shapedb::ingest

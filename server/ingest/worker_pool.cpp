@@ -2,26 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <exception>
-#include <new>
 #include <utility>
 
 #include "core/base/return_if_error.h"
-#include "core/signature/signature_codec.h"
 #include "server/ingest/background_thread.h"
 
 namespace shapedb::ingest {
 namespace {
 
-/// Weight of the newest job in the running mean of their times.
+/// Weight of the newest job in the running mean of job times.
 constexpr double kNewest = 0.1;
 constexpr std::chrono::milliseconds kShortestHint{100};
 constexpr std::chrono::milliseconds kLongestHint{60'000};
-
-/// Errors of the store or the machine: the scan is not to blame, and a later try may succeed.
-bool isTransient(ErrorCode code) {
-    return code == ErrorCode::kStorage || code == ErrorCode::kStorageFull || code == ErrorCode::kUnavailable;
-}
 
 std::vector<telemetry::Field> fieldsOf(const store::Job& job, const Error& error) {
     auto fields = telemetry::fieldsOf(error);
@@ -33,13 +25,13 @@ std::vector<telemetry::Field> fieldsOf(const store::Job& job, const Error& error
 }  // namespace
 
 WorkerPool::WorkerPool(store::Store& store, index::CollectionIndex& index, ProgressBoard& board,
-                       CrashIsolation& suspects, SignaturePipeline describe, telemetry::LoggerPtr log,
+                       CrashIsolation& isolation, SignaturePipeline pipeline, telemetry::LoggerPtr log,
                        WorkerOptions options)
     : store_(store),
       index_(index),
       board_(board),
-      suspects_(suspects),
-      describe_(std::move(describe)),
+      isolation_(isolation),
+      pipeline_(std::move(pipeline)),
       log_(std::move(log)),
       options_(options) {}
 
@@ -135,8 +127,8 @@ std::size_t WorkerPool::running() const {
 
 std::chrono::milliseconds WorkerPool::retryAfter(std::uint64_t jobs) const {
     const std::lock_guard<std::mutex> lock(mutex_);
-    // A tenth of the queue should be gone by then: trying again for each single place that
-    // falls free would keep everybody uploading for nothing.
+    // Wait for a tenth of the queue: if every free place invited everybody, most uploads would be
+    // in vain.
     const double places = std::max(1.0, 0.1 * static_cast<double>(jobs));
     const double milliseconds = 1'000.0 * secondsPerJob_ * places / std::max(1, options_.threads);
     const auto hint = std::chrono::milliseconds(
@@ -161,7 +153,7 @@ void WorkerPool::rest(std::unique_lock<std::mutex>& lock) {
     changed_.wait_for(lock, options_.backOff, [this] { return stopping_ || paused_; });
 }
 
-/// Jobs the store refused to take back stay claimed there; nobody else would ever free them.
+/// Jobs the store refused to take back are still claimed there; nobody else would free them.
 void WorkerPool::retryReleases(std::unique_lock<std::mutex>& lock) {
     const std::vector<store::Job> jobs = std::exchange(unreleased_, {});
     lock.unlock();
@@ -174,8 +166,7 @@ void WorkerPool::retryReleases(std::unique_lock<std::mutex>& lock) {
     unreleased_.insert(unreleased_.end(), still.begin(), still.end());
 }
 
-/// Claims outside the lock. When the store fails it rests, and there is a new signal to look
-/// again.
+/// Claims without the lock. After an error of the store it rests and signals to look again.
 Result<std::optional<store::Job>> WorkerPool::claim(std::unique_lock<std::mutex>& lock) {
     if (!unreleased_.empty()) retryReleases(lock);
     lock.unlock();
@@ -188,7 +179,7 @@ Result<std::optional<store::Job>> WorkerPool::claim(std::unique_lock<std::mutex>
     return job;
 }
 
-/// Blocks until there is a job and this worker may have it; null when the pool stops.
+/// Blocks until there is a job that this worker may have; null when the pool stops.
 std::shared_ptr<WorkerPool::Running> WorkerPool::next(std::optional<CrashIsolation::Pass>& pass) {
     std::unique_lock<std::mutex> lock(mutex_);
     for (;;) {
@@ -201,9 +192,9 @@ std::shared_ptr<WorkerPool::Running> WorkerPool::next(std::optional<CrashIsolati
         const bool probing = probing_;
         ++claiming_;
         lock.unlock();
-        // Before the claim: a claimed job would count as tried if another suspect, of a
-        // rebuild, brought the process down while this one waited for its turn.
-        if (probing) pass.emplace(suspects_, true);
+        // Before the claim: a claimed job would count as tried if a suspect of a rebuild brought the
+        // process down while this one waited for its turn.
+        if (probing) pass.emplace(isolation_, true);
         lock.lock();
         const auto job = claim(lock);
         --claiming_;
@@ -214,10 +205,10 @@ std::shared_ptr<WorkerPool::Running> WorkerPool::next(std::optional<CrashIsolati
         if (job && *job) {
             auto running = std::make_shared<Running>();
             running->job = **job;
-            running->cancel = paused_;  // paused while claiming: goes straight back
+            running->cancel = paused_;  // paused while claiming: straight back
             running_[running->job.id] = running;
             lock.unlock();
-            if (!pass) pass.emplace(suspects_, suspect);
+            if (!pass) pass.emplace(isolation_, suspect);
             return running;
         }
         changed_.wait(lock, [&] { return stopping_ || paused_ || signals_ != seen; });
@@ -230,10 +221,8 @@ void WorkerPool::work(const std::shared_ptr<Running>& running) {
     Outcome outcome = Outcome::kDone;
     try {
         outcome = attempt(*running);
-    } catch (const std::bad_alloc&) {
-        outcome = giveUp(job, {ErrorCode::kOutOfMemory, "not enough memory to segment this scan"});
-    } catch (const std::exception& error) {
-        outcome = giveUp(job, {ErrorCode::kInternal, std::string("segmentation threw: ") + error.what()});
+    } catch (...) {
+        outcome = giveUp(job, errorOfException());
     }
     if (outcome != Outcome::kDone) putBack(job);
     board_.settled(job.shapeId);
@@ -242,7 +231,7 @@ void WorkerPool::work(const std::shared_ptr<Running>& running) {
     std::unique_lock<std::mutex> lock(mutex_);
     if (outcome == Outcome::kDone) secondsPerJob_ += kNewest * (seconds.count() - secondsPerJob_);
     if (outcome == Outcome::kStoreFailed) {
-        // Not counted as running while it rests, so that a drain does not wait for it.
+        // Not counted as running while it rests: a drain does not wait for it.
         running_.erase(job.id);
         changed_.notify_all();
         rest(lock);
@@ -255,49 +244,43 @@ WorkerPool::Outcome WorkerPool::attempt(Running& running) {
     const store::Job& job = running.job;
     const auto collection = index_.byId(job.collectionId);
     if (!collection) {
-        // Deleted, and its jobs with it; or an index that could not be loaded after a restore.
+        // Deleted together with its jobs, or the index could not be loaded after a restore.
         const bool gone = [&] {
             const auto shape = store_.getShapeById(job.shapeId);
             return !shape && shape.error().code == ErrorCode::kNotFound;
         }();
         return gone ? giveUp(job, collection.error()) : Outcome::kStoreFailed;
     }
-    auto points = store_.loadPoints(job.shapeId);
-    if (!points) {
-        if (!isTransient(points.error().code)) return giveUp(job, points.error());
-        log_->error("cannot read the points of a job", fieldsOf(job, points.error()));
-        return Outcome::kStoreFailed;
-    }
     RunContext context;
     context.cancel = &running.cancel;
     context.progress = [this, &job](const char* stage, std::uint64_t done, std::uint64_t total) {
         board_.report(job.shapeId, stage, done, total);
     };
-    context.report("start", 0, 0);
-    const PointCloud cloud = toCloud(*points);
-    std::vector<float>().swap(*points);  // half as much again as the cloud: not kept beside it
-    Result<Description> description = fail(ErrorCode::kInternal, "not described");
-    onThisThreadAlone([&] { description = describe_(cloud, (*collection)->parameters, context); });
-    if (!description) {
-        if (description.error().code == ErrorCode::kCancelled && !running.superseded)
-            return Outcome::kPutBack;
-        return giveUp(job, description.error());
+    PipelineOutcome made = pipeline_.run(store_, job.shapeId, (*collection)->parameters, context);
+    switch (made.kind) {
+        case PipelineOutcome::Kind::kSignature:
+            return commit(running, (*collection)->collection.generation, std::move(made));
+        case PipelineOutcome::Kind::kCancelled:
+            if (!running.superseded) return Outcome::kPutBack;
+            break;
+        case PipelineOutcome::Kind::kScanFailed: break;
+        case PipelineOutcome::Kind::kStoreFailed:
+            log_->error("cannot read the points of a job", fieldsOf(job, made.why));
+            return Outcome::kStoreFailed;
     }
-    return commit(running, **collection, *description);
+    return giveUp(job, made.why);
 }
 
-WorkerPool::Outcome WorkerPool::commit(const Running& running, const index::Snapshot& collection,
-                                       const Description& description) {
+WorkerPool::Outcome WorkerPool::commit(const Running& running, std::int64_t generation,
+                                       PipelineOutcome made) {
     const store::Job& job = running.job;
-    const std::int64_t generation = collection.collection.generation;
-    const store::SignatureRow row{job.shapeId, job.pointsVersion, generation,
-                                  encodeSignature(description.signature)};
+    const store::SignatureRow row{job.shapeId, job.pointsVersion, generation, std::move(made.signature)};
     Result<std::optional<store::Shape>> finished = std::optional<store::Shape>();
     const bool current =
         index_.whileGeneration(job.collectionId, generation, [&] { finished = store_.finishJob(job, row); });
     if (!current) {
-        // A rebuild switched the parameters: once more, with the new ones. Or the index could
-        // not be read, and then there is no hurry.
+        // A rebuild has switched the parameters: again, with the new ones. Or the index could not be
+        // read, and then there is no hurry.
         const auto now = index_.byId(job.collectionId);
         const bool unchanged = now && (*now)->collection.generation == generation;
         return unchanged ? Outcome::kStoreFailed : Outcome::kPutBack;
@@ -314,7 +297,7 @@ WorkerPool::Outcome WorkerPool::commit(const Running& running, const index::Snap
     log_->debug("segmented", {{"shape", job.shapeId},
                               {"key", (*finished)->key},
                               {"points", (*finished)->pointCount},
-                              {"seconds", description.segmentation.totalSeconds}});
+                              {"seconds", made.seconds}});
     return Outcome::kDone;
 }
 

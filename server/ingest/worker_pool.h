@@ -1,8 +1,7 @@
-// The workers that turn stored scans into signatures, one durable job after another.
+// The workers that turn stored scans into signatures.
 //
-// A job is claimed, segmented, and its result committed in the store; then the index is
-// brought up to date and watchers are told. A crash at any point leaves the job in the
-// store, where the next start finds it.
+// A job is claimed, segmented and its result committed in the store; then the index is refreshed
+// and watchers are notified. A crash at any point leaves the job in the store for the next start.
 #pragma once
 
 #include <atomic>
@@ -30,7 +29,7 @@ namespace shapedb::ingest {
 struct WorkerOptions {
     int threads = 1;      ///< at least 1
     int maxAttempts = 2;  ///< as Store::recoverJobs
-    /// How long a worker rests after the store failed it.
+    /// How long a worker waits after an error of the store.
     std::chrono::milliseconds backOff{1'000};
 };
 
@@ -39,38 +38,38 @@ class WorkerPool {
   public:
     /// The references are not owned and must outlive the pool.
     WorkerPool(store::Store& store, index::CollectionIndex& index, ProgressBoard& board,
-               CrashIsolation& suspects, SignaturePipeline describe, telemetry::LoggerPtr log,
+               CrashIsolation& isolation, SignaturePipeline pipeline, telemetry::LoggerPtr log,
                WorkerOptions options);
     /// As `stop`.
     ~WorkerPool();
 
-    /// Queues again what a dead process left running, quarantines what killed it too often,
-    /// and starts the workers. Call once. Errors: as Store::recoverJobs.
+    /// Recovers the jobs of a dead process (Store::recoverJobs) and starts the workers. Call once.
+    /// Errors: as Store::recoverJobs.
     [[nodiscard]] Result<void> start();
 
-    /// A job was queued.
+    /// Call after a job was queued.
     void wake();
 
-    /// The shape was deleted, or its points replaced by those of `newPointsVersion`: a worker
-    /// still busy with older ones stops.
+    /// Call after the shape was deleted, or its points replaced by those of `newPointsVersion`: a
+    /// worker that still has older points stops.
     void supersede(std::int64_t shapeId,
                    std::int64_t newPointsVersion = std::numeric_limits<std::int64_t>::max());
 
-    /// The collection was deleted.
+    /// Call after the collection was deleted.
     void supersedeCollection(std::int64_t collectionId);
 
-    /// Stops claiming, puts running jobs back and returns when no worker touches the store.
+    /// Stops claiming and puts running jobs back; returns when no worker uses the store.
     void pause();
-    /// Goes on after `pause`; what the store then calls running is queued again (after a
-    /// restore those are jobs of another process). Errors: as Store::recoverJobs.
+    /// Continues after `pause` and recovers running jobs: after a restore they are those of another
+    /// process. Errors: as Store::recoverJobs.
     [[nodiscard]] Result<void> resume();
     /// As `pause`, and ends the threads. Idempotent.
     void stop();
 
     [[nodiscard]] std::size_t running() const;
-    /// Jobs that ended in a signature since start.
+    /// Jobs since start that ended in a signature.
     [[nodiscard]] std::uint64_t ingested() const { return ingested_.load(); }
-    /// When a queue of `jobs` will about have room for another one: a hint for refused callers.
+    /// About how long until a full queue of `jobs` has room again: the hint for refused callers.
     [[nodiscard]] std::chrono::milliseconds retryAfter(std::uint64_t jobs) const;
 
   private:
@@ -79,6 +78,7 @@ class WorkerPool {
         std::atomic<bool> cancel{false};
         std::atomic<bool> superseded{false};  ///< set before cancel
     };
+    /// Settled in the store; to be put back; to be put back after a rest.
     enum class Outcome { kDone, kPutBack, kStoreFailed };
 
     static void markSuperseded(Running& running);
@@ -88,7 +88,7 @@ class WorkerPool {
     void retryReleases(std::unique_lock<std::mutex>& lock);
     void work(const std::shared_ptr<Running>& running);
     Outcome attempt(Running& running);
-    Outcome commit(const Running& running, const index::Snapshot& collection, const Description& description);
+    Outcome commit(const Running& running, std::int64_t generation, PipelineOutcome made);
     Outcome giveUp(const store::Job& job, const Error& why);
     void putBack(const store::Job& job);
     void rest(std::unique_lock<std::mutex>& lock);
@@ -97,8 +97,8 @@ class WorkerPool {
     store::Store& store_;
     index::CollectionIndex& index_;
     ProgressBoard& board_;
-    CrashIsolation& suspects_;
-    SignaturePipeline describe_;
+    CrashIsolation& isolation_;
+    SignaturePipeline pipeline_;
     telemetry::LoggerPtr log_;
     WorkerOptions options_;
 
@@ -107,12 +107,12 @@ class WorkerPool {
     std::uint64_t signals_ = 0;  ///< rises when there may be a job
     bool paused_ = false;
     bool stopping_ = false;
-    /// True from the start until a job is seen that no dead process had in hand (older ones
-    /// come first): one job at a time, and alone, so that one that kills dies alone.
+    /// True from the start until the first job that no dead process had in hand (those come first,
+    /// being older): jobs run one at a time and alone, so that a deadly one dies alone.
     bool probing_ = true;
-    int claiming_ = 0;                                          ///< workers inside the store without a job
+    int claiming_ = 0;                                          ///< workers in the store without a job
     std::map<std::int64_t, std::shared_ptr<Running>> running_;  ///< by job id
-    std::vector<store::Job> unreleased_;                        ///< could not be put back yet
+    std::vector<store::Job> unreleased_;                        ///< jobs the store would not take back yet
     double secondsPerJob_ = 1.0;                                ///< running mean
     std::vector<std::thread> threads_;
     std::atomic<std::uint64_t> ingested_{0};

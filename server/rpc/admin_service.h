@@ -1,4 +1,4 @@
-// shapedb.v1.AdminService: validate, convert, call, convert back.
+// shapedb.v1.AdminService over gRPC: validate, convert, call the catalog, convert back.
 #pragma once
 
 #include "server/rpc/services.h"

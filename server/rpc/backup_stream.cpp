@@ -5,7 +5,7 @@
 #include <system_error>
 
 #include "core/base/return_if_error.h"
-#include "server/rpc/limits.h"
+#include "server/catalog/limits.h"
 
 namespace shapedb::rpc {
 namespace {
@@ -35,7 +35,7 @@ Result<void> sendFile(const std::string& path, const RunContext& context,
     for (std::uint64_t sent = 0; sent < static_cast<std::uint64_t>(size);) {
         RETURN_IF_ERROR(context.checkpoint());
         std::string* data = chunk.mutable_data();
-        data->resize(kMaxChunkBytes);
+        data->resize(catalog::kMaxChunkBytes);
         data->resize(std::fread(data->data(), 1, data->size(), file.get()));
         if (data->empty()) return unreadable();
         hash.update(data->data(), data->size());
@@ -75,9 +75,9 @@ Result<void> FileReceiver::add(const v1::BackupChunk& chunk) {
     if (first_) announced_ = chunk.total_bytes();
     first_ = false;
     if (chunk.data().empty() && chunk.sha256().empty()) return malformed("empty message");
-    if (chunk.data().size() > kMaxChunkBytes) {
+    if (chunk.data().size() > catalog::kMaxChunkBytes) {
         return malformed("chunk of " + std::to_string(chunk.data().size()) + " bytes, at most " +
-                         std::to_string(kMaxChunkBytes) + " are allowed");
+                         std::to_string(catalog::kMaxChunkBytes) + " are allowed");
     }
     if (received_ + chunk.data().size() > announced_) {
         return fail(ErrorCode::kCountMismatch,

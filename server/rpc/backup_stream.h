@@ -1,4 +1,4 @@
-// A database file in chunks, out and in.
+// Sends and receives a database file in chunks.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace shapedb::rpc {
 
-/// Sends a file: its size with the first chunk, its SHA-256 alone in the last message.
+/// Sends a file: its size with the first chunk, its SHA-256 in a last message of its own.
 /// Errors: those of `send`; kFileNotReadable, kCancelled, kDeadlineExceeded.
 [[nodiscard]] Result<void> sendFile(const std::string& path, const RunContext& context,
                                     const std::function<Result<void>(const v1::BackupChunk&)>& send);
@@ -25,9 +25,9 @@ class FileReceiver {
     /// Errors: kFileNotWritable.
     [[nodiscard]] static Result<FileReceiver> create(const std::string& path);
 
-    /// Errors: kMalformedStream (no size in the first message, a size later, data or message
-    /// after the checksum, chunk over 1 MiB, empty message), kCountMismatch (more than
-    /// announced), kInvalidArgument (checksum not 32 bytes), kStorageFull, kFileNotWritable.
+    /// Errors: kMalformedStream (no size in the first message, or a size in a later one; a message after
+    /// the checksum; a chunk over 1 MiB; an empty message), kCountMismatch (more than announced),
+    /// kInvalidArgument (checksum not 32 bytes), kStorageFull, kFileNotWritable.
     [[nodiscard]] Result<void> add(const v1::BackupChunk& chunk);
 
     /// Closes the file. Errors: kMalformedStream (no checksum came), kCountMismatch,

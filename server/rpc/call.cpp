@@ -2,8 +2,9 @@
 
 #include <utility>
 
-#include "server/rpc/limits.h"
-#include "server/rpc/request_checks.h"
+#include "core/base/return_if_error.h"
+#include "server/catalog/limits.h"
+#include "server/catalog/request_checks.h"
 #include "server/rpc/status.h"
 
 namespace shapedb::rpc {
@@ -13,7 +14,7 @@ RunContext::Clock::time_point steadyDeadline(const grpc::ServerContext& context)
     using System = std::chrono::system_clock;
     const System::time_point deadline = context.deadline();
     const auto left = deadline - System::now();
-    // gRPC says "never" by a moment centuries away, which a sum with `now` could overflow.
+    // "Never" is a moment centuries away for gRPC; adding it to `now` could overflow.
     if (deadline == System::time_point::max() || left > std::chrono::hours(24 * 365)) {
         return RunContext::Clock::time_point::max();
     }
@@ -58,49 +59,58 @@ Call::Call(const Services& services, grpc::ServerContext& context, const char* r
       peer_(context.peer()),
       began_(std::chrono::steady_clock::now()),
       cancellation_(services.cancellations, context),
-      follower_(services.followers),
-      epoch_(services.restores.epoch()) {
+      follower_(services.admission.followers),
+      epoch_(services.catalog.epoch()) {
     run_.cancel = &cancellation_.flag();
     run_.deadline = steadyDeadline(context);
 }
 
 Call::~Call() {
-    if (admitted_) services_.calls.leave();
+    if (admitted_) services_.admission.calls.leave();
 }
 
 Result<void> Call::admit() {
-    admitted_ = services_.calls.enter();
+    admitted_ = services_.admission.calls.enter();
     if (!admitted_) return fail(ErrorCode::kUnavailable, "the server is shutting down: try again later");
     return {};
 }
 
 Result<void> Call::checkpointWhileFollowing() const {
-    if (services_.calls.draining()) {
+    if (services_.admission.calls.draining()) {
         return fail(ErrorCode::kUnavailable,
-                    "the server is shutting down: the work goes on after its restart");
+                    "the server is shutting down: the work continues after its restart");
     }
     return run_.checkpoint();
 }
 
 Result<index::SnapshotPtr> Call::collection(const std::string& name) {
-    collection_ = collectionNameOrDefault(name);
-    return services_.index.byName(collection_);
+    noteCollection(name);
+    return services_.catalog.collection(name);
 }
+
+Result<catalog::FoundShape> Call::shape(const v1::ShapeRef& ref) {
+    noteKey(ref.key());
+    const auto found = collection(ref.collection());
+    RETURN_IF_ERROR(found);
+    return services_.catalog.findShape(*found, ref.key());
+}
+
+void Call::noteCollection(const std::string& name) { collection_ = catalog::collectionNameOrDefault(name); }
 
 Result<void> Call::becomeFollower() {
     auto taken = follower_.take(1);
-    if (!taken) retryAfter(kBudgetRetry);
+    if (!taken) retryAfter(catalog::kBudgetRetry);
     return taken;
 }
 
 grpc::Status Call::finish(Result<void> result) {
-    if (!expectsRestore_ && services_.restores.epoch() != epoch_) {
-        // Ids looked up before the restore mean other shapes after it.
+    if (!expectsRestore_ && services_.catalog.epoch() != epoch_) {
+        // Ids read before the restore mean other shapes now.
         result = fail(ErrorCode::kUnavailable,
                       "the database was replaced by a backup while the call ran: repeat it");
     }
     if (!result && cancellation_.stalled()) {
-        result = fail(ErrorCode::kCancelled, "the client neither sent nor took anything for " +
+        result = fail(ErrorCode::kCancelled, "the client neither sent nor read anything for " +
                                                  std::to_string(services_.config.limits.stallSeconds) +
                                                  " seconds");
     } else if (!result && result.error().code == ErrorCode::kCancelled &&

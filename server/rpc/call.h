@@ -1,5 +1,5 @@
-// The frame around every handler: admission, cancellation and deadline, one log line, and no
-// exception past this point.
+// The frame around every handler: admission, cancellation and deadline, one log line; no exception
+// leaves it.
 #pragma once
 
 #include <chrono>
@@ -17,6 +17,7 @@
 #include "core/base/error.h"
 #include "core/base/run_context.h"
 #include "server/rpc/services.h"
+#include "shapedb/v1/shape_service.pb.h"
 
 namespace shapedb::rpc {
 
@@ -34,8 +35,8 @@ class Call {
     /// Follows the client's cancellation and deadline.
     [[nodiscard]] const RunContext& run() const { return run_; }
 
-    /// One message of a stream. False at the end of the stream or when the client has gone; a
-    /// client that makes this block for limits.stall_seconds is cut off.
+    /// Reads one message of a stream. False at its end or when the client has gone. A client that makes
+    /// this block for limits.stall_seconds is cut off.
     template <typename Reader, typename Message>
     bool read(Reader& reader, Message* message) {
         cancellation_.beginTransfer();
@@ -43,7 +44,7 @@ class Call {
         cancellation_.endTransfer();
         return good;
     }
-    /// Errors: kCancelled (the client has gone, or was cut off as above).
+    /// Errors: kCancelled (the client has gone or was cut off as above).
     template <typename Writer, typename Message>
     Result<void> write(Writer& writer, const Message& message) {
         cancellation_.beginTransfer();
@@ -53,30 +54,33 @@ class Call {
         return fail(ErrorCode::kCancelled, "the client has gone");
     }
 
-    /// Asks gRPC now: the flag in `run()` follows a moment later.
+    /// Asks gRPC directly; the flag in `run()` follows a moment later.
     [[nodiscard]] bool clientGone() const { return context_.IsCancelled(); }
 
-    /// Errors: kCancelled, kDeadlineExceeded; kUnavailable when the server is draining, for
-    /// calls that would otherwise follow something for long.
+    /// For calls that follow something for long. Errors: kCancelled, kDeadlineExceeded, kUnavailable
+    /// (draining).
     [[nodiscard]] Result<void> checkpointWhileFollowing() const;
 
-    /// The collection named, "default" when empty; noted for the log. Errors: kNotFound.
+    /// The collection, the default one for an empty name; noted for the log. Errors: kNotFound.
     [[nodiscard]] Result<index::SnapshotPtr> collection(const std::string& name);
-    /// What the log line should say besides.
+    /// The shape, with collection and key noted for the log. Errors: as Catalog::findShape.
+    [[nodiscard]] Result<catalog::FoundShape> shape(const v1::ShapeRef& ref);
+    /// Adds a field to the log line.
     void note(telemetry::Field field) { notes_.push_back(std::move(field)); }
     void noteKey(const std::string& key) { note({"key", key}); }
+    void noteCollection(const std::string& name);
     void addPoints(std::uint64_t points, std::uint64_t bytes) {
         points_ += points;
         bytes_ += bytes;
     }
-    /// Takes one of the places for calls that wait; given back with the call. Errors: kQueueFull.
+    /// Takes one of the places for calls that wait, until the call ends. Errors: kQueueFull.
     [[nodiscard]] Result<void> becomeFollower();
-    /// For RESOURCE_EXHAUSTED.
+    /// The retry hint that goes with RESOURCE_EXHAUSTED.
     void retryAfter(std::chrono::milliseconds time) { retryAfter_ = time; }
-    /// A call that replaces the database itself is not surprised by it.
+    /// For the call that replaces the database: a restore does not make it fail.
     void expectRestore() { expectsRestore_ = true; }
 
-    /// Status and log line. Call once, last.
+    /// Makes the status and writes the log line. Call once, last.
     [[nodiscard]] grpc::Status finish(Result<void> result);
 
   private:
@@ -85,10 +89,10 @@ class Call {
     const Services& services_;
     grpc::ServerContext& context_;
     const char* rpc_;
-    const std::string peer_;  ///< asked at once: a cancelled call has none
+    const std::string peer_;  ///< asked at the start: a cancelled call has none
     std::chrono::steady_clock::time_point began_;
     CancelWatcher::Registration cancellation_;
-    Budget::Share follower_;
+    catalog::Budget::Share follower_;
     RunContext run_;
     std::uint64_t epoch_;
     bool admitted_ = false;

@@ -1,6 +1,6 @@
 #include "server/rpc/cancel_watcher.h"
 
-#include "server/rpc/limits.h"
+#include "server/catalog/limits.h"
 
 namespace shapedb::rpc {
 
@@ -21,7 +21,7 @@ void CancelWatcher::run() {
         if (calls_.empty()) {
             changed_.wait(lock, [this] { return stopping_ || !calls_.empty(); });
         } else {
-            changed_.wait_for(lock, kLookForCancellation, [this] { return stopping_; });
+            changed_.wait_for(lock, catalog::kLookForCancellation, [this] { return stopping_; });
         }
         for (Registration* call : calls_) look(*call);
     }

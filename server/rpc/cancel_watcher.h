@@ -1,5 +1,5 @@
-// Turns gRPC's "is this call cancelled?" into the flag that long-running work looks at, and
-// cuts calls whose client neither sends nor takes anything.
+// Turns gRPC's "is this call cancelled?" into a flag for long-running work, and cuts off clients that
+// neither send nor read anything.
 #pragma once
 
 #include <atomic>
@@ -13,15 +13,15 @@
 
 namespace shapedb::rpc {
 
-/// One thread asks gRPC about all running calls in turn (kLookForCancellation): work deep
-/// inside core/ checks a flag and knows nothing of gRPC.
+/// One thread polls gRPC for all running calls (kLookForCancellation), so that core/ only checks a flag
+/// and knows nothing of gRPC.
 ///
 /// Thread-safe. Must outlive its registrations.
 class CancelWatcher {
   public:
     using Clock = std::chrono::steady_clock;
 
-    /// A call blocked in a read or write for longer than `stall` is cancelled.
+    /// Cancels calls that are blocked in a read or write for longer than `stall`.
     explicit CancelWatcher(std::chrono::milliseconds stall);
     ~CancelWatcher();
     CancelWatcher(const CancelWatcher&) = delete;
@@ -35,13 +35,13 @@ class CancelWatcher {
         Registration(const Registration&) = delete;
         Registration& operator=(const Registration&) = delete;
 
-        /// True once the client has gone, cancelled, or passed its deadline.
+        /// True once the client has gone or cancelled, or the deadline has passed.
         [[nodiscard]] const std::atomic<bool>& flag() const { return flag_; }
 
-        /// Between these the call is blocked in a read or write of its stream.
+        /// Called before and after each read or write of a stream.
         void beginTransfer() { blockedSince_ = Clock::now().time_since_epoch().count(); }
         void endTransfer() { blockedSince_ = 0; }
-        /// True when the call was cut because nothing moved.
+        /// True when the call was cancelled for being blocked too long.
         [[nodiscard]] bool stalled() const { return stalled_; }
 
       private:

@@ -1,4 +1,4 @@
-// shapedb.v1.CollectionService: validate, convert, call, convert back.
+// shapedb.v1.CollectionService over gRPC: validate, convert, call the catalog, convert back.
 #pragma once
 
 #include "server/rpc/services.h"

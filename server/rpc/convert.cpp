@@ -15,7 +15,7 @@ tl::unexpected<Error> unknownNumber(const char* field, int value) {
 }  // namespace
 
 void toProto(store::TimestampMs time, google::protobuf::Timestamp* out) {
-    // Rounds towards the past, as Timestamp wants nanos >= 0 before 1970 too.
+    // Rounds towards the past: nanos must not be negative, before 1970 either.
     store::TimestampMs seconds = time / 1'000;
     store::TimestampMs rest = time % 1'000;
     if (rest < 0) seconds -= 1, rest += 1'000;
@@ -116,7 +116,7 @@ Result<ShapeParameters> parametersFrom(pb::Profile profile, const pb::Segmentati
     return parameters;
 }
 
-store::Metadata toMetadata(const google::protobuf::Map<std::string, std::string>& metadata) {
+Metadata toMetadata(const google::protobuf::Map<std::string, std::string>& metadata) {
     return {metadata.begin(), metadata.end()};
 }
 

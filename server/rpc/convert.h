@@ -1,4 +1,4 @@
-// Between the messages of the API and the types of core/ and store/.
+// The one conversion between the messages of the API and the types of core/ and store/.
 #pragma once
 
 #include <optional>
@@ -21,7 +21,7 @@ namespace pb = shapedb::v1;
 using wire::fromProto;
 using wire::toProto;
 
-/// `quality` is that of the signature that serves, if there is one and it says.
+/// `quality`: of the serving signature, as catalog::qualityIn.
 void toProto(const store::Shape& shape, const std::string& collection, std::optional<double> quality,
              pb::Shape* out);
 [[nodiscard]] pb::ShapeState toProto(store::ShapeState state);
@@ -34,15 +34,13 @@ void toProto(store::TimestampMs time, google::protobuf::Timestamp* out);
 /// UNSPECIFIED is upsert. Errors: kInvalidArgument.
 [[nodiscard]] Result<store::PutMode> fromProto(pb::AddMode mode);
 
-/// What a request says about parameters, applied to those it starts from: `current` without a
-/// profile, the profile's defaults with one; then each field that is set.
-/// Errors: kInvalidArgument naming the parameter, its value and its range.
+/// The parameters a request asks for: starts from the profile it names, or from `current`, and
+/// changes each field that is set. Errors: kInvalidArgument (names parameter, value and range).
 [[nodiscard]] Result<ShapeParameters> parametersFrom(pb::Profile profile,
                                                      const pb::SegmentationParameters& segmentation,
                                                      const pb::SignatureParameters& signature,
                                                      const ShapeParameters& current);
 
-/// Metadata of a message as the store keeps it.
-[[nodiscard]] store::Metadata toMetadata(const google::protobuf::Map<std::string, std::string>& metadata);
+[[nodiscard]] Metadata toMetadata(const google::protobuf::Map<std::string, std::string>& metadata);
 
 }  // namespace shapedb::rpc

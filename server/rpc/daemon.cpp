@@ -10,16 +10,15 @@
 #include <grpcpp/health_check_service_interface.h>
 
 #include "core/base/return_if_error.h"
+#include "server/catalog/catalog.h"
 #include "server/config/settings.h"
 #include "server/rpc/admin_service.h"
 #include "server/rpc/collection_service.h"
 #include "server/rpc/limits.h"
-#include "server/rpc/request_checks.h"
 #include "server/rpc/search_service.h"
 #include "server/rpc/services.h"
 #include "server/rpc/shape_service.h"
 #include "server/rpc/temporary_file.h"
-#include "server/store/parameters_codec.h"
 #include "server/store/sqlite/sqlite_store.h"
 
 namespace shapedb::rpc {
@@ -28,13 +27,13 @@ namespace {
 constexpr const char* kDatabaseFile = "shapedb.sqlite";
 constexpr const char* kTemporaryFolder = "tmp";
 constexpr const char* kRebuildJournal = "rebuild.journal";
-/// For calls still running when the drain time is over: long enough to hear of it.
+/// For calls still running when the drain time is over: long enough to learn of it.
 constexpr std::chrono::milliseconds kAfterDrain{200};
 
 Result<std::unique_ptr<store::Store>> openStore(const config::ServerConfig& config) {
     namespace fs = std::filesystem;
     std::error_code error;
-    // Scans are nobody else's business; an existing directory keeps the permissions it has.
+    // Private to its owner; an existing directory keeps its permissions.
     if (fs::create_directories(config.data, error)) {
         fs::permissions(config.data, fs::perms::owner_all, error);
     }
@@ -50,16 +49,20 @@ Result<std::unique_ptr<store::Store>> openStore(const config::ServerConfig& conf
     return store::openSqliteStore(options);
 }
 
-/// The collection requests mean that name none.
-Result<void> ensureDefaultCollection(store::Store& store) {
-    const auto created =
-        store.createCollection(kDefaultCollection, "Used by requests that name no collection.",
-                               index::encodeParameters(parametersOf(Profile::kDefault)));
-    if (!created && created.error().code != ErrorCode::kAlreadyExists) return fail(created.error());
-    return {};
+catalog::CatalogOptions catalogOptions(const config::ServerConfig& config) {
+    catalog::CatalogOptions options;
+    options.maxQueuedJobs = config.ingest.maxQueuedJobs;
+    options.maxQueuedBytes = config.ingest.maxQueuedBytes;
+    options.segmentations = config::threadsOrProcessors(config.search.threads);
+    options.workers.threads = config::threadsOrProcessors(config.ingest.threads);
+    options.workers.maxAttempts = config.ingest.maxAttempts;
+    options.rebuilds.threads = config::threadsOrProcessors(config.rebuild.threads);
+    options.rebuilds.maxAttempts = config.ingest.maxAttempts;
+    options.rebuilds.journalPath = config.data + "/" + kRebuildJournal;
+    return options;
 }
 
-/// Services whose health can be asked for by name.
+/// Names the health service answers for.
 constexpr const char* kServiceNames[] = {"shapedb.v1.ShapeService", "shapedb.v1.SearchService",
                                          "shapedb.v1.CollectionService", "shapedb.v1.AdminService"};
 
@@ -68,34 +71,19 @@ constexpr const char* kServiceNames[] = {"shapedb.v1.ShapeService", "shapedb.v1.
 /// In order of construction; destroyed in reverse.
 struct Daemon::Parts {
     Parts(const config::ServerConfig& configuration, telemetry::LoggerPtr logger,
-          ingest::SignaturePipeline describe, std::unique_ptr<store::Store> opened)
+          ingest::SignaturePipeline pipeline, std::unique_ptr<store::Store> store)
         : config(configuration),
           log(std::move(logger)),
-          store(std::move(opened)),
-          index(*store, log),
-          workers(*store, index, board, suspects, describe, log,
-                  {config::threadsOrProcessors(config.ingest.threads), config.ingest.maxAttempts}),
-          rebuilds(*store, index, workers, suspects, describe, log, rebuildOptions(config)),
+          catalog(std::move(store), std::move(pipeline), log, catalogOptions(config)),
+          admission(config.limits.maxUploadBytes),
           cancellations(std::chrono::seconds(config.limits.stallSeconds)),
-          slots(config::threadsOrProcessors(config.search.threads)),
-          uploads(config.limits.maxUploadBytes, "bytes of points that uploads in progress may hold"),
-          followers(kMaxFollowers, "calls that may wait for shapes and rebuilds"),
           searches(config::threadsOrProcessors(config.search.threads)),
           services{config,
-                   *store,
-                   index,
-                   workers,
-                   rebuilds,
-                   board,
-                   std::move(describe),
-                   log,
+                   catalog,
+                   admission,
                    cancellations,
-                   calls,
-                   restores,
-                   slots,
-                   uploads,
-                   followers,
                    searches,
+                   log,
                    config.data + "/" + kTemporaryFolder,
                    std::chrono::system_clock::now()},
           shapeService(services),
@@ -103,32 +91,15 @@ struct Daemon::Parts {
           collectionService(services),
           adminService(services) {}
 
-    static ingest::RebuildOptions rebuildOptions(const config::ServerConfig& config) {
-        ingest::RebuildOptions options;
-        options.threads = config::threadsOrProcessors(config.rebuild.threads);
-        options.maxAttempts = config.ingest.maxAttempts;
-        options.journalPath = config.data + "/" + kRebuildJournal;
-        return options;
-    }
-
     Result<void> prepare();
     Result<void> listen();
     Result<void> drain();
 
     const config::ServerConfig config;
     telemetry::LoggerPtr log;
-    std::unique_ptr<store::Store> store;
-    index::CollectionIndex index;
-    ingest::ProgressBoard board;
-    ingest::CrashIsolation suspects;
-    ingest::WorkerPool workers;
-    ingest::RebuildDriver rebuilds;
+    catalog::Catalog catalog;
+    catalog::Admission admission;
     CancelWatcher cancellations;
-    CallGate calls;
-    RestoreGate restores;
-    SegmentationSlots slots;
-    Budget uploads;
-    Budget followers;
     SearchRunner searches;
     Services services;
     ShapeServiceHandler shapeService;
@@ -142,16 +113,7 @@ struct Daemon::Parts {
 
 Result<void> Daemon::Parts::prepare() {
     RETURN_IF_ERROR(prepareTemporaryDirectory(services.temporaryDirectory));
-    RETURN_IF_ERROR(ensureDefaultCollection(*store));
-    const auto began = std::chrono::steady_clock::now();
-    RETURN_IF_ERROR(index.loadAll());
-    const auto totals = index.totals();
-    log->info("index loaded",
-              {{"signatures", totals.signatures},
-               {"bytes", totals.bytes},
-               {"seconds", std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count()}});
-    RETURN_IF_ERROR(workers.start());
-    return rebuilds.start();
+    return catalog.start();
 }
 
 Result<void> Daemon::Parts::listen() {
@@ -169,8 +131,8 @@ Result<void> Daemon::Parts::listen() {
     builder.RegisterService(&collectionService);
     builder.RegisterService(&adminService);
     builder.SetMaxReceiveMessageSize(kMaxReceiveBytes);
-    builder.SetMaxSendMessageSize(-1);  // answers are bounded where they are made
-    // Two servers on one port would each get half of the calls.
+    builder.SetMaxSendMessageSize(-1);  // answers are bounded where they are built
+    // With port reuse two servers on one port would each get half of the calls.
     builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
     const auto milliseconds = [](std::chrono::milliseconds time) { return static_cast<int>(time.count()); };
     builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, milliseconds(kKeepaliveTime));
@@ -185,7 +147,7 @@ Result<void> Daemon::Parts::listen() {
     if (!server || port == 0) {
         return fail(ErrorCode::kUnavailable,
                     "cannot listen on " + config.listen +
-                        ": the address is in use, not of this machine, or not permitted");
+                        ": the address is in use, does not belong to this machine, or is not permitted");
     }
     endpoint.port = port;
     for (const char* name : kServiceNames) server->GetHealthCheckService()->SetServingStatus(name, true);
@@ -197,16 +159,14 @@ Result<void> Daemon::Parts::drain() {
     const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(config.shutdown.drainSeconds);
     if (server) {
         server->GetHealthCheckService()->SetServingStatus(false);
-        calls.drain();
-        const bool empty = calls.waitUntilEmpty(until);
+        admission.calls.drain();
+        const bool empty = admission.calls.waitUntilEmpty(until);
         if (!empty) log->warn("drain time is over: cancelling the calls still running");
-        // Streams of health and reflection never end by themselves; they are cut here too.
+        // Also ends health and reflection streams, which never end by themselves.
         server->Shutdown(std::chrono::system_clock::now() + kAfterDrain);
         server->Wait();
     }
-    rebuilds.stop();
-    workers.stop();
-    return store->checkpoint();
+    return catalog.stop();
 }
 
 Daemon::Daemon(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
@@ -218,10 +178,10 @@ Daemon::~Daemon() {
 }
 
 Result<std::unique_ptr<Daemon>> Daemon::start(const config::ServerConfig& config, telemetry::LoggerPtr log,
-                                              ingest::SignaturePipeline describe) {
+                                              ingest::SignaturePipeline pipeline) {
     auto opened = openStore(config);
     RETURN_IF_ERROR(opened);
-    auto parts = std::make_unique<Parts>(config, std::move(log), std::move(describe), std::move(*opened));
+    auto parts = std::make_unique<Parts>(config, std::move(log), std::move(pipeline), std::move(*opened));
     std::unique_ptr<Daemon> daemon(new Daemon(std::move(parts)));
     RETURN_IF_ERROR(daemon->parts_->prepare());
     RETURN_IF_ERROR(daemon->parts_->listen());

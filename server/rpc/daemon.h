@@ -1,5 +1,5 @@
-// The server as a whole: opens the database, loads the index, starts workers and the gRPC
-// server, and takes all of it down again in order.
+// The whole server: opens the database, starts the catalog and the gRPC server, and shuts everything
+// down again.
 #pragma once
 
 #include <memory>
@@ -14,20 +14,20 @@ namespace shapedb::rpc {
 /// Not thread-safe: one thread starts and drains it.
 class Daemon {
   public:
-    /// Serves when it returns. Errors: kFileNotWritable (data directory), those of
-    /// store::openSqliteStore, kUnavailable (the address cannot be listened on).
+    /// Returns once it serves. Errors: kFileNotWritable (data directory), those of
+    /// store::openSqliteStore, kUnavailable (cannot listen on the address).
     [[nodiscard]] static Result<std::unique_ptr<Daemon>> start(const config::ServerConfig& config,
                                                                telemetry::LoggerPtr log,
-                                                               ingest::SignaturePipeline describe);
+                                                               ingest::SignaturePipeline pipeline);
     /// As `drain`.
     ~Daemon();
 
     /// Where it listens: the configured host and the port in use.
     [[nodiscard]] const config::Endpoint& endpoint() const;
 
-    /// Health says NOT_SERVING and new calls are refused; running calls may finish within
-    /// shutdown.drain_seconds and are cancelled then; jobs go back to the queue; the database
-    /// is checkpointed. Idempotent. Errors: of the checkpoint; everything is down all the same.
+    /// Reports NOT_SERVING, refuses new calls, gives running calls shutdown.drain_seconds before it
+    /// cancels them, puts jobs back into the queue and checkpoints the database. Idempotent. Errors: of
+    /// the checkpoint; everything is down nevertheless.
     Result<void> drain();
 
   private:

@@ -1,4 +1,4 @@
-// Searches on a bounded number of processors.
+// Runs searches on a limited number of processors.
 #pragma once
 
 #include <atomic>
@@ -11,7 +11,7 @@
 
 namespace shapedb::rpc {
 
-/// All searches share the processors of one arena, however many calls run. Thread-safe.
+/// All searches share the threads of one arena, however many calls run. Thread-safe.
 class SearchRunner {
   public:
     /// `threads` at least 1.
@@ -28,7 +28,7 @@ class SearchRunner {
                                                              const SearchOptions& options,
                                                              const RunContext& context);
 
-    /// Searches that ended well since start.
+    /// Successful searches since start.
     [[nodiscard]] std::uint64_t count() const { return count_.load(); }
 
   private:

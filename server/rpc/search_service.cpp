@@ -1,20 +1,23 @@
 #include "server/rpc/search_service.h"
 
+#include <memory>
 #include <utility>
 
 #include "core/base/return_if_error.h"
+#include "core/matching/score.h"
+#include "core/matching/scorer.h"
 #include "core/signature/signature_codec.h"
+#include "server/catalog/limits.h"
+#include "server/catalog/request_checks.h"
+#include "server/catalog/scan_upload.h"
 #include "server/rpc/call.h"
 #include "server/rpc/convert.h"
-#include "server/rpc/limits.h"
-#include "server/rpc/point_stream.h"
-#include "server/rpc/request_checks.h"
-#include "server/rpc/shape_lookup.h"
+#include "server/rpc/receive_scan.h"
 
 namespace shapedb::rpc {
 namespace {
 
-/// One request's options, checked, and the snapshot all its queries read.
+/// The checked options of one request, and the snapshot that all its queries read.
 struct Prepared {
     index::SnapshotPtr collection;
     SearchOptions options;
@@ -25,9 +28,9 @@ Result<Prepared> prepare(const Services& services, Call& call, const pb::SearchO
     call.note({"k", std::uint64_t{options.k()}});
     const auto collection = call.collection(options.collection());
     RETURN_IF_ERROR(collection);
-    RETURN_IF_ERROR(checkK(options.k(), services.config));
-    RETURN_IF_ERROR(checkThreshold(options.threshold()));
-    RETURN_IF_ERROR(checkFilterLength(options.filter()));
+    RETURN_IF_ERROR(catalog::checkK(options.k(), services.config.limits.maxK));
+    RETURN_IF_ERROR(catalog::checkThreshold(options.threshold()));
+    RETURN_IF_ERROR(catalog::checkFilterLength(options.filter()));
     Result<Filter> filter = Filter::parse(options.filter());
     RETURN_IF_ERROR(filter);
     Prepared prepared;
@@ -42,18 +45,18 @@ Result<Prepared> prepare(const Services& services, Call& call, const pb::SearchO
     return prepared;
 }
 
-/// Leaves the explanation out where what was scored has been replaced meanwhile.
-Result<void> explainHit(const Services& services, const Prepared& prepared, const Signature& query,
+/// Leaves the explanation out where the scored signature has been replaced meanwhile.
+Result<void> explainHit(const Services& services, const Prepared& prepared, const Scorer& scorer,
                         const SearchHit& hit, pb::Hit* out) {
-    const auto signature = storedSignature(services, *prepared.collection, hit.id);
+    const auto signature = services.catalog.storedSignature(*prepared.collection, hit.id);
     if (!signature && signature.error().code == ErrorCode::kDataLoss) return fail(signature.error());
     if (!signature) return {};
-    const Explanation explanation = explain(query, *signature, prepared.options.score);
+    const Explanation explanation = scorer.explain(*signature);
     if (explanation.score == hit.score) toProto(explanation, out->mutable_explanation());
     return {};
 }
 
-/// Fills `response`; `room` is what the whole answer may still grow by, bytes.
+/// Fills `response`. `room`: how many bytes the whole answer may still grow by.
 Result<void> answer(const Services& services, const Prepared& prepared, const Signature& query,
                     const SearchResult& found, std::size_t& room, pb::SearchResponse* response) {
     response->set_candidates(found.counts.candidates);
@@ -64,23 +67,21 @@ Result<void> answer(const Services& services, const Prepared& prepared, const Si
     if (response->query().has_attributes()) {
         response->mutable_query()->mutable_attributes()->clear_statistics();
     }
+    const std::unique_ptr<const Scorer> scorer = makeScorer(query, prepared.options.score);
     for (const SearchHit& hit : found.hits) {
-        const auto shape = services.store.getShapeById(hit.id);
+        const auto shape = services.catalog.shapeById(hit.id);
         if (!shape && shape.error().code == ErrorCode::kNotFound) continue;  // deleted meanwhile
         RETURN_IF_ERROR(shape);
         pb::Hit* out = response->add_hits();
         toProto(*shape, prepared.collection->collection.name,
-                qualityIn(prepared.collection->signatures, hit.id), out->mutable_shape());
+                catalog::qualityIn(prepared.collection->signatures, hit.id), out->mutable_shape());
         out->set_score(hit.score);
-        if (prepared.explain) {
-            const auto explained = explainHit(services, prepared, query, hit, out);
-            if (!explained) return explained;
-        }
+        if (prepared.explain) RETURN_IF_ERROR(explainHit(services, prepared, *scorer, hit, out));
         const std::size_t bytes = out->ByteSizeLong();
         if (bytes > room) {
             return fail(ErrorCode::kInvalidArgument,
-                        "the answer would pass " + std::to_string(kMaxAnswerBytes) +
-                            " bytes: ask for a smaller k or fewer queries, or set no_explanation");
+                        "the answer would exceed " + std::to_string(catalog::kMaxAnswerBytes) +
+                            " bytes; ask for a smaller k or fewer queries, or set no_explanation");
         }
         room -= bytes;
     }
@@ -102,16 +103,11 @@ struct StoredQuery {
 };
 
 Result<StoredQuery> storedQuery(const Services& services, const Prepared& prepared, const std::string& key) {
-    RETURN_IF_ERROR(checkKey(key));
-    auto shape = services.store.getShape(prepared.collection->collection.id, key);
-    if (!shape && shape.error().code == ErrorCode::kNotFound) {
-        return fail(ErrorCode::kNotFound, "there is no shape '" + key + "' in collection '" +
-                                              prepared.collection->collection.name + "'");
-    }
-    RETURN_IF_ERROR(shape);
-    auto signature = findSignature(services, {prepared.collection, *shape});
+    const auto found = services.catalog.findShape(prepared.collection, key);
+    RETURN_IF_ERROR(found);
+    auto signature = services.catalog.signature(*found);
     RETURN_IF_ERROR(signature);
-    return StoredQuery{std::move(*signature), shape->id};
+    return StoredQuery{std::move(*signature), found->shape.id};
 }
 
 Result<BatchQuery> batchQuery(const Services& services, const Prepared& prepared,
@@ -136,7 +132,7 @@ Result<void> ofQuery(int i, const Error& error) {
     return fail(error.code, "query " + std::to_string(i) + ": " + error.message);
 }
 
-/// All queries are read first and searched at once.
+/// Reads all queries first and searches them together.
 Result<void> searchBatch(const Services& services, const Call& call, const Prepared& prepared,
                          const v1::SearchBatchRequest& request, v1::SearchBatchResponse* response) {
     std::vector<BatchQuery> queries;
@@ -148,7 +144,7 @@ Result<void> searchBatch(const Services& services, const Call& call, const Prepa
     const auto found =
         services.searches.runBatch(queries, prepared.collection->signatures, prepared.options, call.run());
     RETURN_IF_ERROR(found);
-    std::size_t room = kMaxAnswerBytes;
+    std::size_t room = catalog::kMaxAnswerBytes;
     for (int i = 0; i < request.queries_size(); ++i) {
         const auto at = static_cast<std::size_t>(i);
         const auto done =
@@ -170,7 +166,7 @@ grpc::Status SearchServiceHandler::SearchByKey(grpc::ServerContext* context,
         const auto stored = storedQuery(services_, *prepared, request->key());
         RETURN_IF_ERROR(stored);
         if (!request->include_self()) prepared->options.excludeId = stored->id;
-        std::size_t room = kMaxAnswerBytes;
+        std::size_t room = catalog::kMaxAnswerBytes;
         return search(services_, call, *prepared, stored->signature, room, response);
     });
 }
@@ -180,28 +176,26 @@ grpc::Status SearchServiceHandler::SearchByScan(grpc::ServerContext* context,
                                                 v1::SearchResponse* response) {
     return handle(services_, context, "SearchByScan", [&](Call& call) -> Result<void> {
         Prepared prepared;
-        PointReceiver receiver(services_.config.limits.maxPoints, services_.uploads);
+        catalog::ScanUpload upload(services_.config.limits.maxPoints, services_.admission.uploads);
         const auto checkSearchHeader = [&](const v1::SearchByScanHeader& header) -> Result<void> {
             auto checked = prepare(services_, call, header.options());
             RETURN_IF_ERROR(checked);
             prepared = std::move(*checked);
             return {};
         };
-        const auto scan = receiveScan<v1::SearchByScanRequest>(*reader, receiver, call, checkSearchHeader);
-        if (!scan && scan.error().code == ErrorCode::kQueueFull) call.retryAfter(kBudgetRetry);
+        const auto scan = receiveScan<v1::SearchByScanRequest>(*reader, upload, call, checkSearchHeader);
         RETURN_IF_ERROR(scan);
 
         Result<Description> description = fail(ErrorCode::kInternal, "not segmented");
         {
-            SegmentationSlots::Slot slot(services_.slots);
-            RETURN_IF_ERROR(slot.acquire(call.run()));
+            catalog::SegmentationSlots::Slot slot(services_.catalog.segmentationSlots());
             description =
-                services_.describe(ingest::toCloud(scan->xyz), prepared.collection->parameters, call.run());
+                services_.catalog.describe(slot, scan->points(), prepared.collection->parameters, call.run());
         }
         RETURN_IF_ERROR(description);
         toProto(description->segmentation, response->mutable_report());
         response->set_seconds_segment(description->segmentation.totalSeconds);
-        std::size_t room = kMaxAnswerBytes;
+        std::size_t room = catalog::kMaxAnswerBytes;
         return search(services_, call, prepared, description->signature, room, response);
     });
 }
@@ -214,7 +208,7 @@ grpc::Status SearchServiceHandler::SearchBySignature(grpc::ServerContext* contex
         RETURN_IF_ERROR(prepared);
         const auto signature = decodeSignature(request->signature());
         RETURN_IF_ERROR(signature);
-        std::size_t room = kMaxAnswerBytes;
+        std::size_t room = catalog::kMaxAnswerBytes;
         return search(services_, call, *prepared, *signature, room, response);
     });
 }
@@ -225,11 +219,8 @@ grpc::Status SearchServiceHandler::SearchBatch(grpc::ServerContext* context,
     return handle(services_, context, "SearchBatch", [&](Call& call) -> Result<void> {
         const int count = request->queries_size();
         call.note({"queries", std::int64_t{count}});
-        if (count < 1 || static_cast<std::uint32_t>(count) > services_.config.limits.maxBatch) {
-            return fail(ErrorCode::kInvalidArgument, "queries: " + std::to_string(count) +
-                                                         " is outside 1 to " +
-                                                         std::to_string(services_.config.limits.maxBatch));
-        }
+        RETURN_IF_ERROR(
+            catalog::checkBatchSize(static_cast<std::uint64_t>(count), services_.config.limits.maxBatch));
         const auto prepared = prepare(services_, call, request->options());
         RETURN_IF_ERROR(prepared);
         return searchBatch(services_, call, *prepared, *request, response);
@@ -242,9 +233,9 @@ grpc::Status SearchServiceHandler::Compare(grpc::ServerContext* context, const v
         Signature signatures[2];
         const pb::ShapeRef* refs[2] = {&request->query(), &request->other()};
         for (int i = 0; i < 2; ++i) {
-            const auto found = findShape(services_, call, *refs[i]);
+            const auto found = call.shape(*refs[i]);
             auto signature =
-                found ? findSignature(services_, *found) : Result<Signature>(fail(found.error()));
+                found ? services_.catalog.signature(*found) : Result<Signature>(fail(found.error()));
             if (!signature) {
                 return fail(signature.error().code,
                             (i == 0 ? "query: " : "other: ") + signature.error().message);

@@ -6,14 +6,14 @@
 
 #include "core/base/return_if_error.h"
 #include "core/search/filter.h"
+#include "server/catalog/cursor.h"
+#include "server/catalog/limits.h"
+#include "server/catalog/request_checks.h"
+#include "server/catalog/scan_upload.h"
 #include "server/rpc/call.h"
 #include "server/rpc/convert.h"
-#include "server/rpc/cursor.h"
 #include "server/rpc/limits.h"
-#include "server/rpc/point_stream.h"
-#include "server/rpc/request_checks.h"
-#include "server/rpc/scan_check.h"
-#include "server/rpc/shape_lookup.h"
+#include "server/rpc/receive_scan.h"
 
 namespace shapedb::rpc {
 namespace {
@@ -28,27 +28,21 @@ pb::AddShapeResponse::Outcome outcomeOf(store::PutOutcome outcome) {
     return pb::AddShapeResponse::OUTCOME_UNSPECIFIED;
 }
 
-Result<void> checkHeader(const Services& services, Call& call, const pb::AddShapeHeader& header) {
-    call.noteKey(header.key());
-    RETURN_IF_ERROR(checkKey(header.key()));
-    RETURN_IF_ERROR(fromProto(header.mode()));
-    RETURN_IF_ERROR(checkMetadata(toMetadata(header.metadata())));
-    if (header.has_expected_version() && header.expected_version() < 0) {
-        return fail(ErrorCode::kInvalidArgument, "expected_version: must be 0 (the key is free) or more");
-    }
-    RETURN_IF_ERROR(call.collection(header.collection()));
-    if (header.wait()) {
-        RETURN_IF_ERROR(call.becomeFollower());
-    }
-    if (services.restores.restoring()) {
-        return fail(ErrorCode::kUnavailable, "the database is being replaced by a backup: try again later");
-    }
-    return {};
+Result<catalog::ShapeHeader> headerFrom(const pb::AddShapeHeader& message) {
+    catalog::ShapeHeader header;
+    const auto mode = fromProto(message.mode());
+    RETURN_IF_ERROR(mode);
+    header.collection = message.collection();
+    header.key = message.key();
+    header.mode = *mode;
+    if (message.has_expected_version()) header.expectedVersion = message.expected_version();
+    header.metadata = toMetadata(message.metadata());
+    return header;
 }
 
-/// The parts of a request ListShapes and CountShapes share.
+/// The filter of ListShapes and CountShapes.
 Result<store::ShapeFilter> makeFilter(const Call& call, const std::string& text, pb::ShapeState state) {
-    RETURN_IF_ERROR(checkFilterLength(text));
+    RETURN_IF_ERROR(catalog::checkFilterLength(text));
     Result<Filter> filter = Filter::parse(text);
     RETURN_IF_ERROR(filter);
     const auto wanted = fromProto(state);
@@ -57,7 +51,7 @@ Result<store::ShapeFilter> makeFilter(const Call& call, const std::string& text,
     result.state = *wanted;
     const RunContext* run = &call.run();
     const bool all = filter->acceptsAll();
-    // Also how a listing of millions is left when the caller is gone: nothing passes any more.
+    // A cancelled call accepts nothing more, which ends a listing of millions early.
     result.accept = [filter = std::move(*filter), run, all](const store::Shape& shape) {
         return run->checkpoint().has_value() && (all || filter.matches(shape.metadata));
     };
@@ -78,8 +72,8 @@ Result<void> sendSegments(Call& call, Writer& writer, const Description& descrip
         const std::size_t count = std::min(kLabelledChunkPoints, labels.size() - first);
         message.Clear();
         pb::LabelledChunk* chunk = message.mutable_chunk();
-        chunk->mutable_xyz()->resize(count * kPointBytes);
-        std::memcpy(chunk->mutable_xyz()->data(), xyz.data() + 3 * first, count * kPointBytes);
+        chunk->mutable_xyz()->resize(count * catalog::kPointBytes);
+        std::memcpy(chunk->mutable_xyz()->data(), xyz.data() + 3 * first, count * catalog::kPointBytes);
         chunk->mutable_segments()->Add(labels.begin() + static_cast<std::ptrdiff_t>(first),
                                        labels.begin() + static_cast<std::ptrdiff_t>(first + count));
         RETURN_IF_ERROR(call.write(writer, message));
@@ -98,79 +92,54 @@ grpc::Status ShapeServiceHandler::AddShape(grpc::ServerContext* context,
 
 Result<void> ShapeServiceHandler::addShape(Call& call, grpc::ServerReader<v1::AddShapeRequest>& reader,
                                            v1::AddShapeResponse& response) {
-    store::PutResult put;
-    std::string collectionName;
-    bool wait = false;
-    {
-        // The points are given back before any waiting.
-        PointReceiver receiver(services_.config.limits.maxPoints, services_.uploads);
-        v1::AddShapeHeader header;
-        const auto scan = receiveScan<v1::AddShapeRequest>(reader, receiver, call, [&](const auto& received) {
-            header = received;
-            return checkHeader(services_, call, received);
-        });
-        if (!scan && scan.error().code == ErrorCode::kQueueFull) call.retryAfter(kBudgetRetry);
-        RETURN_IF_ERROR(scan);
-        RETURN_IF_ERROR(checkUsable(scan->xyz));
-        RETURN_IF_ERROR(call.run().checkpoint());
-
-        const RestoreGate::Write write(services_.restores);
-        // Again: it may have been deleted, or replaced by a restore, while the points came.
-        const auto collection = call.collection(header.collection());
-        RETURN_IF_ERROR(collection);
-        store::PutRequest request;
-        request.collectionId = (*collection)->collection.id;
-        request.key = header.key();
-        request.mode = *fromProto(header.mode());
-        if (header.has_expected_version()) request.expectedVersion = header.expected_version();
-        request.metadata = toMetadata(header.metadata());
-        request.points = &scan->xyz;
-        request.checksum = scan->checksum;
-        request.maxQueuedJobs = services_.config.ingest.maxQueuedJobs;
-        request.maxQueuedBytes = services_.config.ingest.maxQueuedBytes;
-        const auto stored = services_.store.putShape(request);
-        if (!stored && stored.error().code == ErrorCode::kQueueFull) {
-            const auto depth = services_.store.queueDepth();
-            call.retryAfter(services_.workers.retryAfter(depth ? depth->jobs : 0));
-        }
-        RETURN_IF_ERROR(stored);
-        put = *stored;
-        collectionName = (*collection)->collection.name;
-        wait = header.wait();
+    const auto added = receiveAndPut(call, reader);
+    RETURN_IF_ERROR(added);
+    store::Shape shape = added->added.shape;
+    if (added->wait) {
+        const auto settled = services_.catalog.awaitIngest(shape, [&] { return call.run().checkpoint(); });
+        RETURN_IF_ERROR(settled);
+        shape = *settled;
     }
-    const bool queued =
-        put.outcome == store::PutOutcome::kCreated || put.outcome == store::PutOutcome::kReplaced;
-    if (put.outcome == store::PutOutcome::kReplaced)
-        services_.workers.supersede(put.shape.id, put.shape.pointsVersion);
-    if (queued) services_.workers.wake();
-    if (put.outcome == store::PutOutcome::kReplaced || put.outcome == store::PutOutcome::kMetadataChanged) {
-        const auto refreshed = services_.index.refresh(put.shape.collectionId, put.shape.id);
-        // Stored all the same: the caller must not take this for a refusal.
-        if (!refreshed)
-            services_.log->error("new metadata is not searched yet", telemetry::fieldsOf(refreshed.error()));
-    }
-    if (wait) {
-        const auto settled = followIngest(
-            services_, put.shape.id, [&] { return call.run().checkpoint(); },
-            [](const auto&, const auto&) { return Result<void>(); });
-        if (!settled) {
-            return fail(settled.error().code, settled.error().message + "; the scan of shape '" +
-                                                  put.shape.key + "' had been stored");
-        }
-        put.shape = *settled;
-    }
-    response.set_outcome(outcomeOf(put.outcome));
-    toProto(put.shape, collectionName, servingQuality(services_, put.shape), response.mutable_shape());
+    response.set_outcome(outcomeOf(added->added.outcome));
+    toProto(shape, added->added.collection, services_.catalog.servingQuality(shape),
+            response.mutable_shape());
     return {};
+}
+
+/// The points, and their share of the upload memory, are released when this returns.
+Result<ShapeServiceHandler::Received> ShapeServiceHandler::receiveAndPut(
+    Call& call, grpc::ServerReader<v1::AddShapeRequest>& reader) {
+    catalog::ScanUpload upload(services_.config.limits.maxPoints, services_.admission.uploads);
+    catalog::ShapeHeader header;
+    bool wait = false;
+    const auto takeHeader = [&](const v1::AddShapeHeader& message) -> Result<void> {
+        call.noteKey(message.key());
+        call.noteCollection(message.collection());
+        auto converted = headerFrom(message);
+        RETURN_IF_ERROR(converted);
+        header = std::move(*converted);
+        wait = message.wait();
+        RETURN_IF_ERROR(services_.catalog.admitUpload(header));
+        return wait ? call.becomeFollower() : Result<void>();
+    };
+    auto scan = receiveScan<v1::AddShapeRequest>(reader, upload, call, takeHeader);
+    RETURN_IF_ERROR(scan);
+    RETURN_IF_ERROR(call.run().checkpoint());
+    auto added = services_.catalog.put(header, std::move(*scan));
+    if (!added && added.error().code == ErrorCode::kQueueFull) {
+        call.retryAfter(services_.catalog.retryAfterQueueFull());
+    }
+    RETURN_IF_ERROR(added);
+    return Received{std::move(*added), wait};
 }
 
 grpc::Status ShapeServiceHandler::GetShape(grpc::ServerContext* context, const v1::GetShapeRequest* request,
                                            v1::GetShapeResponse* response) {
     return handle(services_, context, "GetShape", [&](Call& call) -> Result<void> {
-        const auto found = findShape(services_, call, request->shape());
+        const auto found = call.shape(request->shape());
         RETURN_IF_ERROR(found);
-        toProto(found->shape, found->collection->collection.name,
-                qualityIn(found->collection->signatures, found->shape.id), response->mutable_shape());
+        toProto(found->shape, found->collection->collection.name, found->quality(),
+                response->mutable_shape());
         return {};
     });
 }
@@ -181,27 +150,30 @@ grpc::Status ShapeServiceHandler::ListShapes(grpc::ServerContext* context,
     return handle(services_, context, "ListShapes", [&](Call& call) -> Result<void> {
         const auto collection = call.collection(request->collection());
         RETURN_IF_ERROR(collection);
-        RETURN_IF_ERROR(checkPageSize(request->page_size()));
+        RETURN_IF_ERROR(catalog::checkPageSize(request->page_size()));
         const auto filter = makeFilter(call, request->filter(), request->state());
         RETURN_IF_ERROR(filter);
-        const Listing listing{(*collection)->collection.id, request->filter(), request->state()};
-        const auto afterId = decodeCursor(listing, request->cursor());
+        const catalog::Listing listing{(*collection)->collection.id, request->filter(), request->state()};
+        const auto afterId = catalog::decodeCursor(listing, request->cursor());
         RETURN_IF_ERROR(afterId);
 
-        const std::size_t pageSize = request->page_size() == 0 ? kDefaultPageSize : request->page_size();
-        // One more than asked for tells whether there is a next page.
-        const auto shapes = services_.store.listShapes(listing.collectionId, *afterId, pageSize + 1, *filter);
+        const std::size_t pageSize =
+            request->page_size() == 0 ? catalog::kDefaultPageSize : request->page_size();
+        // One more than requested tells whether there is a next page.
+        const auto shapes =
+            services_.catalog.listShapes(listing.collectionId, *afterId, pageSize + 1, *filter);
         RETURN_IF_ERROR(shapes);
         RETURN_IF_ERROR(call.run().checkpoint());
         std::size_t bytes = 0;
         std::size_t sent = 0;
-        for (; sent < std::min(pageSize, shapes->size()) && bytes < kMaxPageBytes; ++sent) {
+        for (; sent < std::min(pageSize, shapes->size()) && bytes < catalog::kMaxPageBytes; ++sent) {
             pb::Shape* shape = response->add_shapes();
             toProto((*shapes)[sent], (*collection)->collection.name,
-                    qualityIn((*collection)->signatures, (*shapes)[sent].id), shape);
+                    catalog::qualityIn((*collection)->signatures, (*shapes)[sent].id), shape);
             bytes += shape->ByteSizeLong();
         }
-        if (sent < shapes->size()) response->set_next_cursor(encodeCursor(listing, (*shapes)[sent - 1].id));
+        if (sent < shapes->size())
+            response->set_next_cursor(catalog::encodeCursor(listing, (*shapes)[sent - 1].id));
         return {};
     });
 }
@@ -214,8 +186,8 @@ grpc::Status ShapeServiceHandler::CountShapes(grpc::ServerContext* context,
         RETURN_IF_ERROR(collection);
         auto filter = makeFilter(call, request->filter(), request->state());
         RETURN_IF_ERROR(filter);
-        if (request->filter().empty()) filter->accept = nullptr;  // the store counts without reading
-        const auto count = services_.store.countShapes((*collection)->collection.id, *filter);
+        if (request->filter().empty()) filter->accept = nullptr;  // counted without reading rows
+        const auto count = services_.catalog.countShapes((*collection)->collection.id, *filter);
         RETURN_IF_ERROR(count);
         RETURN_IF_ERROR(call.run().checkpoint());
         response->set_count(*count);
@@ -227,22 +199,14 @@ grpc::Status ShapeServiceHandler::DeleteShape(grpc::ServerContext* context,
                                               const v1::DeleteShapeRequest* request,
                                               v1::DeleteShapeResponse* response) {
     return handle(services_, context, "DeleteShape", [&](Call& call) -> Result<void> {
-        const RestoreGate::Write write(services_.restores);
         const pb::ShapeRef& ref = request->shape();
         call.noteKey(ref.key());
-        const auto collection = call.collection(ref.collection());
-        RETURN_IF_ERROR(collection);
-        RETURN_IF_ERROR(checkKey(ref.key()));
+        call.noteCollection(ref.collection());
         std::optional<std::int64_t> expected;
         if (request->has_expected_version()) expected = request->expected_version();
-        const auto shape = services_.store.deleteShape((*collection)->collection.id, ref.key(), expected);
-        RETURN_IF_ERROR(shape);
-        services_.workers.supersede(shape->id);
-        services_.board.settled(shape->id);
-        if (const auto refreshed = services_.index.refresh(shape->collectionId, shape->id); !refreshed) {
-            services_.log->error("deleted shape is still searched", telemetry::fieldsOf(refreshed.error()));
-        }
-        toProto(*shape, (*collection)->collection.name, qualityIn((*collection)->signatures, shape->id),
+        const auto deleted = services_.catalog.deleteShape(ref.collection(), ref.key(), expected);
+        RETURN_IF_ERROR(deleted);
+        toProto(deleted->shape, deleted->collection->collection.name, deleted->quality(),
                 response->mutable_shape());
         return {};
     });
@@ -252,7 +216,7 @@ grpc::Status ShapeServiceHandler::WatchIngest(grpc::ServerContext* context,
                                               const v1::WatchIngestRequest* request,
                                               grpc::ServerWriter<v1::IngestEvent>* writer) {
     return handle(services_, context, "WatchIngest", [&](Call& call) -> Result<void> {
-        const auto found = findShape(services_, call, request->shape());
+        const auto found = call.shape(request->shape());
         RETURN_IF_ERROR(found);
         RETURN_IF_ERROR(call.becomeFollower());
         std::string last;
@@ -267,15 +231,15 @@ grpc::Status ShapeServiceHandler::WatchIngest(grpc::ServerContext* context,
             }
             if (shape.failure) toProto(*shape.failure, event.mutable_failure());
             if (shape.state == store::ShapeState::kReady) {
-                if (const auto quality = servingQuality(services_, shape)) event.set_quality(*quality);
+                if (const auto quality = services_.catalog.servingQuality(shape)) event.set_quality(*quality);
             }
             const std::string text = event.SerializeAsString();
             if (text == last) return {};
             last = text;
             return call.write(*writer, event);
         };
-        const auto settled = followIngest(
-            services_, found->shape.id, [&] { return call.checkpointWhileFollowing(); }, tell);
+        const auto settled = services_.catalog.followIngest(
+            found->shape.id, [&] { return call.checkpointWhileFollowing(); }, tell);
         RETURN_IF_ERROR(settled);
         return {};
     });
@@ -285,9 +249,9 @@ grpc::Status ShapeServiceHandler::GetSignature(grpc::ServerContext* context,
                                                const v1::GetSignatureRequest* request,
                                                v1::GetSignatureResponse* response) {
     return handle(services_, context, "GetSignature", [&](Call& call) -> Result<void> {
-        const auto found = findShape(services_, call, request->shape());
+        const auto found = call.shape(request->shape());
         RETURN_IF_ERROR(found);
-        const auto signature = findSignature(services_, *found);
+        const auto signature = services_.catalog.signature(*found);
         RETURN_IF_ERROR(signature);
         toProto(*signature, response->mutable_signature());
         return {};
@@ -298,24 +262,20 @@ grpc::Status ShapeServiceHandler::GetSegments(grpc::ServerContext* context,
                                               const v1::GetSegmentsRequest* request,
                                               grpc::ServerWriter<v1::SegmentedPoints>* writer) {
     return handle(services_, context, "GetSegments", [&](Call& call) -> Result<void> {
-        const auto found = findShape(services_, call, request->shape());
+        const auto found = call.shape(request->shape());
         RETURN_IF_ERROR(found);
-        SegmentationSlots::Slot slot(services_.slots);
-        RETURN_IF_ERROR(slot.acquire(call.run()));
-        const auto points = services_.store.loadPoints(found->shape.id);
-        RETURN_IF_ERROR(points);
-        call.addPoints(points->size() / 3, points->size() * sizeof(float));
-        const auto description =
-            services_.describe(ingest::toCloud(*points), found->collection->parameters, call.run());
-        RETURN_IF_ERROR(description);
-        return sendSegments(call, *writer, *description, *points, false);
+        catalog::SegmentationSlots::Slot slot(services_.catalog.segmentationSlots());
+        const auto scan = services_.catalog.describe(slot, *found, call.run());
+        RETURN_IF_ERROR(scan);
+        call.addPoints(scan->points.size() / 3, scan->points.size() * sizeof(float));
+        return sendSegments(call, *writer, scan->description, scan->points, false);
     });
 }
 
 grpc::Status ShapeServiceHandler::Segment(
     grpc::ServerContext* context, grpc::ServerReaderWriter<v1::SegmentedPoints, v1::SegmentRequest>* stream) {
     return handle(services_, context, "Segment", [&](Call& call) -> Result<void> {
-        PointReceiver receiver(services_.config.limits.maxPoints, services_.uploads);
+        catalog::ScanUpload upload(services_.config.limits.maxPoints, services_.admission.uploads);
         ShapeParameters parameters;
         bool summaryOnly = false;
         const auto checkSegmentHeader = [&](const v1::SegmentHeader& header) -> Result<void> {
@@ -326,14 +286,12 @@ grpc::Status ShapeServiceHandler::Segment(
             summaryOnly = header.summary_only();
             return {};
         };
-        const auto scan = receiveScan<v1::SegmentRequest>(*stream, receiver, call, checkSegmentHeader);
-        if (!scan && scan.error().code == ErrorCode::kQueueFull) call.retryAfter(kBudgetRetry);
+        const auto scan = receiveScan<v1::SegmentRequest>(*stream, upload, call, checkSegmentHeader);
         RETURN_IF_ERROR(scan);
-        SegmentationSlots::Slot slot(services_.slots);
-        RETURN_IF_ERROR(slot.acquire(call.run()));
-        const auto description = services_.describe(ingest::toCloud(scan->xyz), parameters, call.run());
+        catalog::SegmentationSlots::Slot slot(services_.catalog.segmentationSlots());
+        const auto description = services_.catalog.describe(slot, scan->points(), parameters, call.run());
         RETURN_IF_ERROR(description);
-        return sendSegments(call, *stream, *description, scan->xyz, summaryOnly);
+        return sendSegments(call, *stream, *description, scan->points(), summaryOnly);
     });
 }
 

@@ -4,7 +4,7 @@
 
 namespace shapedb::rpc {
 
-// No default label: a new ErrorCode does not compile until it has a place here.
+// No default label: a new ErrorCode must be added here before it compiles.
 grpc::StatusCode statusCodeOf(ErrorCode code) noexcept {
     switch (code) {
         case ErrorCode::kNonFiniteCoordinate:
@@ -48,7 +48,7 @@ grpc::StatusCode statusCodeOf(ErrorCode code) noexcept {
 std::string cutText(const std::string& text, std::size_t limit) {
     if (text.size() <= limit) return text;
     std::size_t end = limit;
-    // Back over the continuation bytes 10xxxxxx of a character cut in two.
+    // Back over continuation bytes (10xxxxxx), so that no character is cut in two.
     while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xc0) == 0x80) --end;
     return text.substr(0, end);
 }

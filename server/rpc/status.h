@@ -1,4 +1,4 @@
-// Errors as a gRPC client sees them.
+// Errors as gRPC clients see them.
 #pragma once
 
 #include <chrono>
@@ -12,16 +12,16 @@
 
 namespace shapedb::rpc {
 
-/// Trailing metadata of every failing call: the stable name of the error.
+/// Trailing metadata of every failed call: the stable name of the error.
 constexpr const char* kErrorNameKey = "shapedb-error";
 /// Trailing metadata of RESOURCE_EXHAUSTED: milliseconds after which to try again.
 constexpr const char* kRetryKey = "grpc-retry-pushback-ms";
 
-/// The one mapping of errors to gRPC codes (docs/api.md has it as a table).
+/// The mapping of errors to gRPC codes (a table in docs/api.md).
 [[nodiscard]] grpc::StatusCode statusCodeOf(ErrorCode code) noexcept;
 
-/// The status of a failing call; adds the trailing metadata. The message is cut to
-/// kMaxErrorMessageBytes at the border of a UTF-8 character.
+/// The status of a failed call; adds the trailing metadata and cuts the message to
+/// kMaxErrorMessageBytes.
 [[nodiscard]] grpc::Status makeStatus(const Error& error, grpc::ServerContext& context,
                                       std::optional<std::chrono::milliseconds> retryAfter = std::nullopt);
 

@@ -12,7 +12,7 @@ namespace shapedb::rpc {
 Result<TemporaryFile> TemporaryFile::create(const std::string& directory) {
     std::string folder = directory + "/XXXXXX";
     if (::mkdtemp(folder.data()) == nullptr) {
-        return fail(ErrorCode::kFileNotWritable, "no temporary file can be made in " + directory + ": " +
+        return fail(ErrorCode::kFileNotWritable, "cannot create a temporary file in " + directory + ": " +
                                                      std::generic_category().message(errno));
     }
     return TemporaryFile(std::move(folder));

@@ -1,4 +1,4 @@
-// A file that is gone when the call that made it is.
+// A file that lives as long as the call that made it.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace shapedb::rpc {
 
-/// A place for one new file, in a folder of its own; all of it is removed when destroyed.
+/// A path for one new file in a folder of its own; both are removed when this is destroyed.
 class TemporaryFile {
   public:
     /// Creates the folder inside `directory`, which must exist. Errors: kFileNotWritable.
@@ -16,7 +16,7 @@ class TemporaryFile {
     TemporaryFile(TemporaryFile&& other) noexcept;
     TemporaryFile& operator=(TemporaryFile&&) = delete;
 
-    /// Of the file, which does not exist yet.
+    /// The file does not exist at first.
     [[nodiscard]] std::string path() const { return folder_ + "/database"; }
 
   private:
@@ -25,7 +25,7 @@ class TemporaryFile {
     std::string folder_;  ///< empty when moved from
 };
 
-/// Creates the directory if missing and removes what a dead process left in it.
+/// Creates the directory if it is missing and removes what a dead process left in it.
 /// Errors: kFileNotWritable.
 [[nodiscard]] Result<void> prepareTemporaryDirectory(const std::string& directory);
 

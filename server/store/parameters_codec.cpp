@@ -9,12 +9,12 @@
 
 #include <nlohmann/json.hpp>
 
-namespace shapedb::index {
+namespace shapedb::store {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Reads the members of one object and, at the end, knows the ones nobody asked for.
+/// Reads the members of one object and finds those that are not parameters.
 class ObjectReader {
   public:
     ObjectReader(const Json& object, std::string prefix) : object_(object), prefix_(std::move(prefix)) {
@@ -95,7 +95,7 @@ tl::unexpected<Error> damaged(const std::string& what) {
     return fail(ErrorCode::kDataLoss, "stored collection parameters: " + what);
 }
 
-/// Refuses doubled keys, of which the library would silently keep the last.
+/// Refuses repeated keys, of which the library would silently keep the last.
 Json parseStrictly(const std::string& text) {
     std::vector<std::set<std::string>> open;
     return Json::parse(text, [&](int, Json::parse_event_t event, Json& parsed) {
@@ -186,4 +186,4 @@ Result<ShapeParameters> decodeParameters(const std::string& text) {
     }
 }
 
-}  // namespace shapedb::index
+}  // namespace shapedb::store

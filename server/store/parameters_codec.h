@@ -1,7 +1,7 @@
-// The text in which a collection's parameters are stored: JSON with every field.
+// The stored form of a collection's parameters: JSON with every field.
 //
-// The names are persisted: never rename one. Text of an older server lacks the fields added since;
-// they take the value that it worked with: off, as in the profile "paper", whatever the profile.
+// The names are persisted: never rename one. Text of an older server lacks later fields; these are
+// off, as in the profile "paper", since that is how the older server worked.
 #pragma once
 
 #include <string>
@@ -9,14 +9,14 @@
 #include "core/base/error.h"
 #include "core/pipeline.h"
 
-namespace shapedb::index {
+namespace shapedb::store {
 
-/// One line, fields in a fixed order, numbers that read back bit for bit: equal parameters
-/// give equal text.
+/// One line with fields in a fixed order and numbers that read back bit for bit: equal parameters give
+/// equal text.
 [[nodiscard]] std::string encodeParameters(const ShapeParameters& parameters);
 
-/// The inverse. Errors: kDataLoss (not JSON, unknown or doubled key, wrong type, value outside its range:
-/// the message names the field): the text came from our own database.
+/// The inverse. Errors: kDataLoss, since the text comes from our own database: not JSON, unknown or
+/// repeated key, wrong type, value out of range (names the field).
 [[nodiscard]] Result<ShapeParameters> decodeParameters(const std::string& text);
 
-}  // namespace shapedb::index
+}  // namespace shapedb::store

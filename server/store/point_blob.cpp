@@ -8,7 +8,7 @@
 #include <zstd.h>
 
 #include "core/base/return_if_error.h"
-#include "server/store/sqlite/connection.h"
+#include "server/store/failure.h"
 
 namespace shapedb::store {
 
@@ -42,7 +42,7 @@ Result<std::vector<float>> decodeRaw(const char* body, std::size_t size, std::ui
 Result<std::vector<float>> decodePlanes(const char* body, std::size_t size, std::uint64_t floatCount) {
     const unsigned long long content = ZSTD_getFrameContentSize(body, size);
     if (content == ZSTD_CONTENTSIZE_ERROR || content == ZSTD_CONTENTSIZE_UNKNOWN) {
-        return damaged("no zstd frame of known size");
+        return damaged("it is no zstd frame of known size");
     }
     if (content / kFloatBytes != floatCount || content % kPointBytes != 0) {
         return damaged("a zstd frame of " + std::to_string(content) + " bytes for " +
@@ -86,12 +86,12 @@ Result<std::string> encodePoints(const std::vector<float>& points, int level) tr
     blob.resize(1 + size);
     return blob;
 } catch (const std::bad_alloc&) {
-    return fail(ErrorCode::kOutOfMemory, "no memory to compress points");
+    return fail(ErrorCode::kOutOfMemory, "not enough memory to compress points");
 }
 
 namespace {
 
-/// Of one step through a plane.
+/// Bytes of a plane handed to zstd at once.
 constexpr std::size_t kPieceBytes = std::size_t{1} << 17;
 
 struct FreeContext {
@@ -99,59 +99,24 @@ struct FreeContext {
 };
 using Compressor = std::unique_ptr<ZSTD_CCtx, FreeContext>;
 
-std::size_t orRaise(std::size_t zstdCode) {
+std::size_t orRaiseZstd(std::size_t zstdCode) {
     if (ZSTD_isError(zstdCode) == 0) return zstdCode;
     raise(ErrorCode::kInternal, std::string("zstd cannot compress points: ") + ZSTD_getErrorName(zstdCode));
 }
 
-}  // namespace
-
-Result<PointEncoding> PointEncoding::plan(const std::vector<float>& points, int level) {
-    PointEncoding encoding;
-    encoding.points_ = &points;
-    encoding.level_ = level;
-    const std::size_t bytes = points.size() * kFloatBytes;
-    if (bytes <= kHeldBytes) {
-        auto blob = encodePoints(points, level);
-        RETURN_IF_ERROR(blob);
-        encoding.blob_ = std::move(*blob);
-        encoding.held_ = true;
-        encoding.size_ = encoding.blob_.size();
-        return encoding;
-    }
-    return guarded("compress points", [&] {
-        const std::uint64_t compressed = encoding.compress([](const void*, std::size_t) {});
-        encoding.format_ = compressed < bytes ? PointFormat::kPlanesZstd : PointFormat::kRaw;
-        encoding.size_ = 1 + std::min<std::uint64_t>(compressed, bytes);
-        return encoding;
-    });
-}
-
-void PointEncoding::write(const Sink& sink) const {
-    if (held_) return sink(blob_.data(), blob_.size());
-    const auto format = static_cast<char>(format_);
-    sink(&format, 1);
-    std::uint64_t written = points_->size() * kFloatBytes;
-    if (format_ == PointFormat::kRaw) {
-        sink(points_->data(), static_cast<std::size_t>(written));
-    } else {
-        written = compress(sink);
-    }
-    // Same library, input and pieces: zstd is deterministic.
-    if (1 + written != size_) raise(ErrorCode::kInternal, "zstd made another size of the same points");
-}
-
-/// The planes one after another through zstd; returns the bytes of the frame.
-std::uint64_t PointEncoding::compress(const Sink& sink) const {
+/// One zstd frame of the planes one after another, in pieces; empty when it is not smaller than the
+/// points. The planes are gathered piece by piece and never in memory as a whole.
+std::vector<std::string> compressPlanes(const std::vector<float>& points, int level) {
     const Compressor context(ZSTD_createCCtx());
     if (!context) throw std::bad_alloc();
-    const std::size_t count = points_->size() / 3;
-    orRaise(ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, level_));
-    orRaise(ZSTD_CCtx_setPledgedSrcSize(context.get(), kPointBytes * count));
-    const auto* bytes = reinterpret_cast<const unsigned char*>(points_->data());
+    const std::size_t count = points.size() / 3;
+    orRaiseZstd(ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, level));
+    orRaiseZstd(ZSTD_CCtx_setPledgedSrcSize(context.get(), kPointBytes * count));
+    const auto* bytes = reinterpret_cast<const unsigned char*>(points.data());
     std::vector<unsigned char> piece(kPieceBytes);
-    std::vector<unsigned char> frame(ZSTD_CStreamOutSize());
-    std::uint64_t written = 0;
+    std::vector<char> buffer(ZSTD_CStreamOutSize());
+    std::vector<std::string> frame;
+    std::size_t made = 0;
     for (std::size_t k = 0; k < kPointBytes; ++k) {
         for (std::size_t first = 0; first < count; first += kPieceBytes) {
             const std::size_t size = std::min(kPieceBytes, count - first);
@@ -159,16 +124,48 @@ std::uint64_t PointEncoding::compress(const Sink& sink) const {
             const bool last = k + 1 == kPointBytes && first + size == count;
             ZSTD_inBuffer in{piece.data(), size, 0};
             for (bool more = true; more;) {
-                ZSTD_outBuffer out{frame.data(), frame.size(), 0};
-                const std::size_t left = orRaise(
+                ZSTD_outBuffer out{buffer.data(), buffer.size(), 0};
+                const std::size_t left = orRaiseZstd(
                     ZSTD_compressStream2(context.get(), &out, &in, last ? ZSTD_e_end : ZSTD_e_continue));
-                if (out.pos > 0) sink(frame.data(), out.pos);
-                written += out.pos;
+                if (out.pos > 0) frame.emplace_back(buffer.data(), out.pos);
+                made += out.pos;
                 more = last ? left != 0 : in.pos < in.size;
             }
+            if (made >= kPointBytes * count) return {};
         }
     }
-    return written;
+    return frame;
+}
+
+}  // namespace
+
+Result<PointEncoding> PointEncoding::encode(const std::vector<float>& points, int level) {
+    PointEncoding encoding;
+    encoding.points_ = &points;
+    const std::size_t bytes = points.size() * kFloatBytes;
+    if (bytes <= kWholeBytes) {
+        auto blob = encodePoints(points, level);
+        RETURN_IF_ERROR(blob);
+        encoding.blob_ = std::move(*blob);
+        encoding.isWhole_ = true;
+        encoding.size_ = encoding.blob_.size();
+        return encoding;
+    }
+    return guarded("compress points", [&] {
+        encoding.frame_ = compressPlanes(points, level);
+        encoding.size_ = 1;
+        for (const std::string& piece : encoding.frame_) encoding.size_ += piece.size();
+        if (encoding.frame_.empty()) encoding.size_ += bytes;
+        return std::move(encoding);
+    });
+}
+
+void PointEncoding::write(const Sink& sink) const {
+    if (isWhole_) return sink(blob_.data(), blob_.size());
+    const auto format = static_cast<char>(frame_.empty() ? PointFormat::kRaw : PointFormat::kPlanesZstd);
+    sink(&format, 1);
+    if (frame_.empty()) return sink(points_->data(), points_->size() * kFloatBytes);
+    for (const std::string& piece : frame_) sink(piece.data(), piece.size());
 }
 
 Result<std::vector<float>> decodePoints(const void* blob, std::size_t size, std::uint64_t floatCount) try {
@@ -182,7 +179,8 @@ Result<std::vector<float>> decodePoints(const void* blob, std::size_t size, std:
                                               std::to_string(static_cast<unsigned char>(bytes[0])) +
                                               ", which this version does not know");
 } catch (const std::bad_alloc&) {
-    return fail(ErrorCode::kOutOfMemory, "no memory for " + std::to_string(floatCount) + " coordinates");
+    return fail(ErrorCode::kOutOfMemory,
+                "not enough memory for " + std::to_string(floatCount) + " coordinates");
 }
 
 }  // namespace shapedb::store

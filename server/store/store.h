@@ -1,18 +1,17 @@
-// What the server keeps on disk, as an interface without SQL.
+// What the server keeps on disk, as an interface without SQL. Nothing outside server/store/ knows
+// which database is behind it.
 //
-// Everything the server has acknowledged is in here before the reply leaves: a scan and
-// its job are one transaction. Nothing outside server/store/ knows which database it is.
+// Acknowledged means durable: a scan and its job are committed in one transaction before the reply
+// leaves.
 //
-// Thread-safety: every member function may be called from any thread. Writes are
-// serialised inside (one writer); reads run beside them and see a consistent state as of
-// their start. Returned objects are copies owned by the caller.
+// Thread-safe. Writes run one after another; reads run beside them and see the state at their
+// start. Returned objects are copies.
 //
-// Errors common to all functions, not repeated below: kStorage (the database cannot be
-// read or written), kStorageFull (no room on the device: nothing of the failed call is
-// stored), kDataLoss (stored bytes are damaged), kOutOfMemory.
+// Errors of every function, not repeated below: kStorage (the database cannot be read or written),
+// kStorageFull (nothing of the failed call is stored), kDataLoss (stored bytes are damaged),
+// kOutOfMemory.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -23,13 +22,9 @@
 #include "core/base/error.h"
 #include "core/base/metadata.h"
 #include "core/base/run_context.h"
+#include "server/store/verified_scan.h"
 
 namespace shapedb::store {
-
-using shapedb::Metadata;
-
-/// SHA-256 of the points as they travel: packed little-endian float32 x y z.
-using Checksum = std::array<std::uint8_t, 32>;
 
 /// Milliseconds since 1970-01-01 UTC.
 using TimestampMs = std::int64_t;
@@ -38,17 +33,16 @@ struct Collection {
     std::int64_t id = 0;  ///< never reused
     std::string name;     ///< unique
     std::string description;
-    /// Segmentation and signature parameters as text; the store does not look inside.
+    /// Segmentation and signature parameters as text (parameters_codec.h); opaque to the store.
     std::string parameters;
-    /// Signatures of one collection that serve queries all carry this number; a finished
-    /// rebuild raises it by one.
+    /// Of the signatures that serve queries; a finished rebuild raises it by one.
     std::int64_t generation = 1;
     TimestampMs createdAt = 0;
 };
 
 /// The numbers are persisted (column shape.state): never renumber.
 enum class ShapeState : int {
-    kPending = 0,  ///< stored, its job is queued or running; an older signature may still serve
+    kPending = 0,  ///< its job is queued or running; an older signature may still serve
     kReady = 1,    ///< the current version has a signature
     kFailed = 2,   ///< the current version cannot be segmented; `failure` says why
 };
@@ -57,14 +51,14 @@ struct Shape {
     std::int64_t id = 0;  ///< never reused; breaks ties in rankings
     std::int64_t collectionId = 0;
     std::string key;                 ///< the client's own id, unique in its collection
-    std::int64_t version = 1;        ///< 1 at first insert, plus 1 on every change of points or metadata
-    std::int64_t pointsVersion = 1;  ///< the version at which the points last changed
+    std::int64_t version = 1;        ///< 1 when inserted, plus 1 with every change of points or metadata
+    std::int64_t pointsVersion = 1;  ///< the version that last changed the points
     ShapeState state = ShapeState::kPending;
     std::uint64_t pointCount = 0;
     Checksum checksum{};
     Metadata metadata;
     TimestampMs createdAt = 0;
-    TimestampMs updatedAt = 0;     ///< when points, metadata, state or failure last changed
+    TimestampMs updatedAt = 0;     ///< last change of points, metadata, state or failure
     std::optional<Error> failure;  ///< set exactly when state is kFailed
 };
 
@@ -75,18 +69,19 @@ enum class PutMode {
 };
 
 struct PutRequest {
+    explicit PutRequest(VerifiedScan verified) : scan(std::move(verified)) {}
+
+    VerifiedScan scan;
     std::int64_t collectionId = 0;
     std::string key;
     PutMode mode = PutMode::kUpsert;
-    /// When set, the shape's version must be this now; 0 demands that the key is free. Holds
-    /// for repeated requests too: who lost a reply reads the shape and compares.
+    /// When set, the shape must have this version now; 0: the key must be free. Holds for repeated
+    /// requests too: a client that lost the reply reads the shape and compares.
     std::optional<std::int64_t> expectedVersion;
     Metadata metadata;
-    const std::vector<float>* points = nullptr;  ///< packed x y z; not owned; size a multiple of 3
-    Checksum checksum{};
-    /// Bounds of the job queue (queued and running) after this scan has joined it, checked in
-    /// the same transaction. 0: no bound. A scan larger than maxQueuedBytes never fits: the
-    /// caller keeps its point limit below. Not looked at when no job is queued.
+    /// Bounds of the job queue (queued and running) with this scan in it, checked in the same
+    /// transaction; 0: no bound. Ignored when no job is queued. A scan larger than maxQueuedBytes
+    /// never fits: the caller keeps its point limit below that.
     std::uint64_t maxQueuedJobs = 0;
     std::uint64_t maxQueuedBytes = 0;
 };
@@ -95,7 +90,7 @@ enum class PutOutcome {
     kCreated,          ///< new key, job queued
     kReplaced,         ///< other points, job queued
     kMetadataChanged,  ///< same points, other metadata: no job
-    kUnchanged,        ///< same points, same metadata: a repeated request; nothing written
+    kUnchanged,        ///< same points and metadata, a repeated request: nothing written
 };
 
 struct PutResult {
@@ -105,11 +100,11 @@ struct PutResult {
 
 struct ShapeFilter {
     std::optional<ShapeState> state;
-    /// Evaluated on each row inside the read; null accepts all. Must not call the store.
+    /// Called for each row inside the read; null accepts all. Must not call the store.
     std::function<bool(const Shape&)> accept;
 };
 
-/// One unit of segmentation work. Claiming raises `attempts` durably before it returns.
+/// One scan to segment. Claiming raises `attempts` durably.
 struct Job {
     std::int64_t id = 0;
     std::int64_t shapeId = 0;
@@ -125,7 +120,6 @@ struct QueueDepth {
     std::uint64_t bytes = 0;  ///< of their points, uncompressed
 };
 
-/// What a finished segmentation leaves behind.
 struct SignatureRow {
     std::int64_t shapeId = 0;
     std::int64_t pointsVersion = 0;
@@ -133,7 +127,7 @@ struct SignatureRow {
     std::string bytes;  ///< core/signature/signature_codec.h
 };
 
-/// What the cache needs of one shape.
+/// What the index needs of one shape.
 struct IndexRow {
     std::int64_t shapeId = 0;
     Metadata metadata;
@@ -183,145 +177,137 @@ class Store {
     [[nodiscard]] virtual Result<Collection> getCollection(const std::string& name) = 0;
     /// By name.
     [[nodiscard]] virtual Result<std::vector<Collection>> listCollections() = 0;
-    /// Deletes the collection and all that is in it, queued jobs included. Errors: kNotFound.
+    /// Deletes the collection with its shapes and jobs. Errors: kNotFound.
     [[nodiscard]] virtual Result<void> deleteCollection(std::int64_t collectionId) = 0;
 
     // Shapes -----------------------------------------------------------------------
 
     /// Stores a scan and queues its job in one transaction; durable when it returns.
     ///
-    /// The same checksum and metadata as stored is kUnchanged, in insert-only mode and for a
-    /// failed shape too. Other metadata alone raise the version and leave state, job and
-    /// signature. Other points make the shape pending and replace its job; the signature of
-    /// the old points serves until finishJob replaces or failJob removes it.
+    /// The same checksum and metadata as stored: kUnchanged, also in insert-only mode and for a
+    /// failed shape. New metadata alone raise the version and leave state, job and signature alone.
+    /// New points make the shape pending and replace its job; the old signature serves until
+    /// finishJob replaces it or failJob removes it.
     ///
-    /// Errors: kNotFound (collection, or update-only), kAlreadyExists, kVersionConflict
-    /// (the message names both versions), kQueueFull, kChecksumMismatch (the points do not
-    /// have `checksum`), kInvalidArgument (points null or not triples); on any error nothing
-    /// is stored.
+    /// Errors (nothing is stored): kNotFound (collection, or the key in update-only mode),
+    /// kAlreadyExists, kVersionConflict (names both versions), kQueueFull.
     [[nodiscard]] virtual Result<PutResult> putShape(const PutRequest& request) = 0;
     /// Errors: kNotFound.
     [[nodiscard]] virtual Result<Shape> getShape(std::int64_t collectionId, const std::string& key) = 0;
     /// Errors: kNotFound.
     [[nodiscard]] virtual Result<Shape> getShapeById(std::int64_t shapeId) = 0;
-    /// Shapes with id > afterId by rising id, at most `limit`: stable under inserts and deletes.
+    /// Shapes with id > afterId, by rising id, at most `limit`: stable under inserts and deletes.
     [[nodiscard]] virtual Result<std::vector<Shape>> listShapes(std::int64_t collectionId,
                                                                 std::int64_t afterId, std::size_t limit,
                                                                 const ShapeFilter& filter) = 0;
     [[nodiscard]] virtual Result<std::uint64_t> countShapes(std::int64_t collectionId,
                                                             const ShapeFilter& filter) = 0;
-    /// Removes the shape, its points, signatures and jobs; returns what it was.
+    /// Removes the shape with its points, signatures and jobs; returns it as it was.
     /// Errors: kNotFound, kVersionConflict.
     [[nodiscard]] virtual Result<Shape> deleteShape(std::int64_t collectionId, const std::string& key,
                                                     std::optional<std::int64_t> expectedVersion) = 0;
-    /// Packed x y z. Verified against the stored checksum. Errors: kNotFound, kDataLoss.
+    /// Packed x y z, compared with the stored checksum. Errors: kNotFound, kDataLoss.
     [[nodiscard]] virtual Result<std::vector<float>> loadPoints(std::int64_t shapeId) = 0;
-    /// The signature that serves now. Errors: kNotFound (no such shape), kNotReady.
+    /// The signature that serves now. Errors: kNotFound (shape), kNotReady.
     [[nodiscard]] virtual Result<SignatureRow> getSignature(std::int64_t shapeId) = 0;
 
     // Jobs -------------------------------------------------------------------------
 
-    // A result counts only when it was made with the collection's present parameters: one of
-    // an older generation (a rebuild finished meanwhile) is dropped and its job goes back to
-    // the queue as if it had not been tried. finishJob takes the generation of the signature,
-    // failJob that of the job.
+    // A result counts only if it was made with the collection's current parameters. One of an older
+    // generation (a rebuild has finished meanwhile) is dropped and its job is queued again as if it
+    // had not been tried. finishJob looks at the generation of the signature, failJob at the job's.
 
-    /// The oldest queued job, now marked running; empty when there is none. A job that was put
-    /// back keeps its age.
+    /// The oldest queued job, now marked running; empty when there is none. A released job keeps its
+    /// place.
     [[nodiscard]] virtual Result<std::optional<Job>> claimJob() = 0;
-    /// Stores the signature, marks the shape ready and drops the job, in one transaction.
-    /// Empty when the shape was deleted, its points replaced, the database restored or the
-    /// collection rebuilt meanwhile: the result is dropped. Otherwise the shape as it is now.
-    /// During a rebuild the shape still needs a result of the target generation: rebuildBatch
-    /// lists it from then on, also below an `afterId` already passed.
-    /// Errors: kInvalidArgument (the signature is of another shape, of other points, or of a
-    /// generation that does not exist yet).
+    /// Stores the signature, marks the shape ready and removes the job, in one transaction. Returns
+    /// the shape as it is now; empty when the result was dropped because the shape was deleted, its
+    /// points replaced, the database restored or the collection rebuilt meanwhile. During a rebuild
+    /// the shape still needs a result of the target generation: rebuildBatch lists it from now on,
+    /// also below an `afterId` already passed.
+    /// Errors: kInvalidArgument (signature of another shape, of other points, or of a generation that
+    /// does not exist yet).
     [[nodiscard]] virtual Result<std::optional<Shape>> finishJob(const Job& job,
                                                                  const SignatureRow& signature) = 0;
-    /// Marks the shape failed, removes its signatures and the job. Empty as in finishJob.
+    /// Marks the shape failed and removes its signatures and the job. Empty as in finishJob.
     [[nodiscard]] virtual Result<std::optional<Shape>> failJob(const Job& job, const Error& why) = 0;
-    /// Puts a claimed job back as if it had not been tried (drain). Nothing happens when it is
-    /// no longer this claim's.
+    /// Puts a claimed job back as if it had not been tried. No effect when the claim is no longer
+    /// valid.
     [[nodiscard]] virtual Result<void> releaseJob(const Job& job) = 0;
-    /// At start: running jobs of a dead process are queued again; those that were tried
-    /// `maxAttempts` times or more are quarantined (as failJob, code kInternal, with the
-    /// reason). Returns the quarantined shapes. Not while workers hold jobs.
+    /// At start: queues the running jobs of a dead process again, but quarantines those tried
+    /// `maxAttempts` times or more (as failJob, kInternal) and returns their shapes. Not while workers
+    /// hold jobs.
     [[nodiscard]] virtual Result<std::vector<Shape>> recoverJobs(int maxAttempts) = 0;
     [[nodiscard]] virtual Result<QueueDepth> queueDepth() = 0;
 
     // Index ------------------------------------------------------------------------
 
-    /// Serving signatures (the collection's generation) with shape id > afterId, by rising
-    /// id, at most `limit`. A pending shape comes with the signature of its older points, when
-    /// it has one. Errors: kNotFound (collection), kDataLoss (the message names the shape).
+    /// Serving signatures with shape id > afterId, by rising id, at most `limit`. A pending shape
+    /// comes with the signature of its older points, if it has one. Errors: kNotFound (collection),
+    /// kDataLoss (names the shape).
     [[nodiscard]] virtual Result<std::vector<IndexRow>> loadIndex(std::int64_t collectionId,
                                                                   std::int64_t afterId,
                                                                   std::size_t limit) = 0;
 
     // Rebuild ----------------------------------------------------------------------
     //
-    // Of the functions that take a rebuild's id, all but getRebuild also fail with kNotFound
-    // and, when it is no longer running, kRejected.
+    // Functions that take a rebuild's id, except getRebuild, also fail with kNotFound, and with
+    // kRejected when it is not running.
 
-    /// Starts re-segmenting the collection with these parameters into the next
-    /// generation; the current one serves until `finishRebuild`. Errors: kNotFound,
-    /// kAlreadyExists (one is running: the message gives its id).
+    /// Starts a rebuild of the collection with these parameters into the next generation; the
+    /// current one serves until `finishRebuild`. Errors: kNotFound, kAlreadyExists (one is running:
+    /// names its id).
     [[nodiscard]] virtual Result<Rebuild> startRebuild(std::int64_t collectionId,
                                                        const std::string& parameters) = 0;
-    /// While it runs the counts are those of now, afterwards those of its end. Errors: kNotFound.
+    /// The counts are current while it runs, and final afterwards. Errors: kNotFound.
     [[nodiscard]] virtual Result<Rebuild> getRebuild(std::int64_t rebuildId) = 0;
-    /// All in state kRunning, also those a dead process left.
+    /// All in state kRunning, including those a dead process left.
     [[nodiscard]] virtual Result<std::vector<Rebuild>> runningRebuilds() = 0;
-    /// Shapes without a result of the target generation for their current points; shapes
-    /// whose own ingest job is still queued or running are left to it. By rising id, at most
-    /// `limit`, id > afterId. Start again from 0 when finishRebuild says that shapes are missing.
+    /// Shapes that still need a result of the target generation, except those with a job of their
+    /// own. With id > afterId, by rising id, at most `limit`. Start again from 0 when finishRebuild
+    /// returns false.
     [[nodiscard]] virtual Result<std::vector<Shape>> rebuildBatch(std::int64_t rebuildId,
                                                                   std::int64_t afterId,
                                                                   std::size_t limit) = 0;
-    /// One shape's result for the target generation: a signature, or why there is none.
-    /// The last one counts. Dropped silently when the shape was deleted or its points replaced
-    /// meanwhile. Errors: kInvalidArgument (signature of another generation).
+    /// One shape's result: a signature, or why there is none. The last one counts. Silently dropped
+    /// when the shape was deleted or its points replaced meanwhile. Errors: kInvalidArgument
+    /// (signature of another generation).
     [[nodiscard]] virtual Result<void> putRebuilt(std::int64_t rebuildId, const SignatureRow& signature) = 0;
     [[nodiscard]] virtual Result<void> putRebuildFailure(std::int64_t rebuildId, std::int64_t shapeId,
                                                          std::int64_t pointsVersion, const Error& why) = 0;
-    /// When every shape without a job has a result: makes the target generation the serving
-    /// one, sets shape states and the collection's parameters, deletes the old signatures, all
-    /// in one transaction, and returns true. False when shapes are missing. A shape with a job
-    /// stays pending and serves nothing until its job, done with the new parameters, ends.
+    /// If every shape without a job has a result: makes the target generation the serving one, sets
+    /// shape states and the collection's parameters and deletes the old signatures in one
+    /// transaction, and returns true. False when results are missing. A shape with a job stays
+    /// pending and serves nothing until that job has run with the new parameters.
     [[nodiscard]] virtual Result<bool> finishRebuild(std::int64_t rebuildId) = 0;
-    /// Ends a running rebuild (state kCancelled or kFailed) and deletes what it made.
+    /// Ends a running rebuild as kCancelled or kFailed and deletes its results.
     /// Errors: kInvalidArgument (another state).
     [[nodiscard]] virtual Result<void> abandonRebuild(std::int64_t rebuildId, RebuildState state) = 0;
 
-    // Care ---------------------------------------------------------------------------
+    // Maintenance --------------------------------------------------------------------
 
-    /// Writes a consistent copy of the whole database to a new file while others go on
-    /// reading and writing: the state as of its start. The file appears under its name when
-    /// complete. Reports the stage "backup" in pages.
-    /// Errors: kAlreadyExists (the file is there), kFileNotWritable, kCancelled,
-    /// kDeadlineExceeded.
+    /// Copies the whole database, as it is now, to a new file while others read and write. The file
+    /// appears under its name when it is complete. Reports the stage "backup" in pages.
+    /// Errors: kAlreadyExists (the file), kFileNotWritable, kCancelled, kDeadlineExceeded.
     [[nodiscard]] virtual Result<void> backup(const std::string& path, const RunContext& context) = 0;
-    /// Replaces the whole content by that of a backup file, atomically: readers see the old
-    /// or the new. The file is checked first in a private copy (format, schema version,
-    /// everything `check` looks at; an older one is migrated there) and left as it is. On any
+    /// Replaces the whole content by that of a backup file, atomically. A private copy of the file is
+    /// migrated if it is older, and must pass `check` first; the file itself is left alone. On any
     /// error the content stays as it was.
     ///
-    /// Ids and generations of collections and shapes come with the file; jobs and rebuilds get
-    /// new ids, jobs come back queued, and ids given out before are not given out again:
-    /// results in flight for the old content are dropped. Everything cached of the old
-    /// content is to be loaded anew. Reports "copy" (bytes), "integrity", "points", "restore"
-    /// (pages).
-    /// Errors: kFileNotReadable, kMalformedFile (the message says what is wrong with it),
-    /// kSchemaTooNew, kCancelled, kDeadlineExceeded.
-    [[nodiscard]] virtual Result<void> restore(const std::string& path, const RunContext& context) = 0;
-    /// Reads everything: database integrity, references, checksums of all points, signature
-    /// presence for ready shapes. One line per problem, two hundred at most; empty when sound.
-    /// Reports the stages "integrity" and "points" (in shapes). Errors: kCancelled,
+    /// Collections and shapes keep their ids and generations; jobs come back queued. Jobs and
+    /// rebuilds get new ids and no id is ever given out twice, so that results still in flight for
+    /// the old content are dropped. The caller reloads whatever it has cached. Reports "copy"
+    /// (bytes), "integrity", "points", "restore" (pages).
+    /// Errors: kFileNotReadable, kMalformedFile (says what is wrong), kSchemaTooNew, kCancelled,
     /// kDeadlineExceeded.
+    [[nodiscard]] virtual Result<void> restore(const std::string& path, const RunContext& context) = 0;
+    /// Reads everything: database integrity, references, all checksums, the rules between tables.
+    /// One line per problem, at most two hundred; empty when sound. Reports the stages "integrity"
+    /// and "points" (in shapes). Errors: kCancelled, kDeadlineExceeded.
     [[nodiscard]] virtual Result<std::vector<std::string>> check(const RunContext& context) = 0;
     [[nodiscard]] virtual Result<StoreStats> stats() = 0;
-    /// Moves the write-ahead log into the database file (at shutdown). Errors: kStorage also
-    /// when a read did not end within the busy timeout.
+    /// Moves the write-ahead log into the database file (at shutdown). Errors: kStorage also when a
+    /// read outlasts the busy timeout.
     [[nodiscard]] virtual Result<void> checkpoint() = 0;
 };
 

@@ -76,7 +76,7 @@ class SpdlogLogger : public Logger {
             std::make_unique<spdlog::pattern_formatter>(pattern, spdlog::pattern_time_type::utc));
         logger_.set_level(spdlogLevel(options.level));
         logger_.flush_on(spdlog::level::trace);
-        logger_.set_error_handler([](const std::string&) {});  // a full disk must not take calls down
+        logger_.set_error_handler([](const std::string&) {});  // a full disk must not make calls fail
     }
 
     void log(Level level, const std::string& message, const std::vector<Field>& fields) override {
@@ -86,7 +86,7 @@ class SpdlogLogger : public Logger {
             logger_.log(wanted, spdlog::string_view_t(json_ ? formatJson(message, fields)
                                                             : formatText(message, fields)));
         } catch (const std::exception&) {
-            // Out of memory while building a line: the line is lost, the call goes on.
+            // Out of memory for the line: it is lost, the call continues.
         }
     }
 
@@ -117,7 +117,7 @@ Result<Level> levelFromName(const std::string& name) {
 
 std::string formatText(const std::string& message, const std::vector<Field>& fields) {
     std::string line;
-    // A message is ours, but may quote a client.
+    // A message may quote a client.
     const std::string safe = jsonString(message);
     line.append(safe, 1, safe.size() - 2);
     for (const Field& field : fields) line += " " + field.name + "=" + show(field.value, false);

@@ -13,17 +13,16 @@ namespace shapedb::telemetry {
 
 enum class Level { kTrace, kDebug, kInfo, kWarn, kError };
 
-/// One named value of a line. Names are lower_case and not repeated in a line; the names
-/// "time", "level" and "message" are taken.
+/// A named value. Names are lower_case and unique in a line; "time", "level" and "message" are
+/// reserved.
 struct Field {
     std::string name;
     std::variant<std::string, std::int64_t, std::uint64_t, double, bool> value;
 };
 
-/// Writes whole lines; a line is never split by another thread's. Values may hold any bytes:
-/// control characters, quotes and invalid UTF-8 are escaped, so a client cannot forge a line.
-///
-/// Thread-safe. Passed around as shared_ptr; there is no global logger.
+/// Writes whole lines, never interleaved. Values may hold any bytes: control characters, quotes and
+/// invalid UTF-8 are escaped, so that no client can forge a line. Thread-safe. There is no global
+/// logger.
 class Logger {
   public:
     virtual ~Logger() = default;
@@ -45,7 +44,7 @@ class Logger {
 
 using LoggerPtr = std::shared_ptr<Logger>;
 
-/// The fields that describe an error: error (its name) and reason (its message).
+/// The fields of an error: error (its name) and reason (its message).
 [[nodiscard]] std::vector<Field> fieldsOf(const Error& error);
 
 struct LogOptions {
@@ -63,8 +62,8 @@ struct LogOptions {
 /// Drops everything.
 [[nodiscard]] LoggerPtr makeSilentLogger();
 
-/// One line without time and level, as `makeLogger` writes it after them: text
-/// `message name=value name="quoted value"`, or the members of a JSON object without braces.
+/// A line without time and level: `message name=value name="quoted value"`, or the members of a JSON
+/// object without braces.
 [[nodiscard]] std::string formatText(const std::string& message, const std::vector<Field>& fields);
 [[nodiscard]] std::string formatJson(const std::string& message, const std::vector<Field>& fields);
 

@@ -4,7 +4,10 @@
 
 #include "tests/server/store/sqlite/store_fixture.h"
 
-namespace shapedb::store {
+namespace shapedb::bench {
+
+using namespace store;
+
 namespace {
 
 FillShape made(std::uint64_t i) {
@@ -17,7 +20,7 @@ SqliteOptions optionsIn(const Folder& folder) {
     return options;
 }
 
-TEST(BulkFill, MakesASoundDatabaseOfReadyShapes) {
+TEST(BulkFill, MakesAValidDatabase) {
     const Folder folder;
     const auto options = optionsIn(folder);
     ASSERT_TRUE(fillDatabase(options, "default", "parameters", 25, made));
@@ -58,4 +61,4 @@ TEST(BulkFill, CanBeStopped) {
 }
 
 }  // namespace
-}  // namespace shapedb::store
+}  // namespace shapedb::bench

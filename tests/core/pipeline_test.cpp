@@ -9,7 +9,7 @@
 namespace shapedb {
 namespace {
 
-TEST(Profile, NamesAndBack) {
+TEST(Profile, NamesRoundTrip) {
     EXPECT_STREQ(profileName(Profile::kPaper), "paper");
     EXPECT_STREQ(profileName(Profile::kDefault), "default");
     EXPECT_EQ(static_cast<int>(Profile::kPaper), 0) << "persisted";
@@ -28,7 +28,7 @@ TEST(Profile, NamesAndBack) {
     }
 }
 
-TEST(Profile, PaperIsThePaper) {
+TEST(Profile, PaperProfileHasThePublishedParameters) {
     const ShapeParameters paper = parametersOf(Profile::kPaper);
     EXPECT_EQ(paper.segmentation.bigBallRatio, 0.5);
     EXPECT_EQ(paper.segmentation.mergeRatio, 1.5);
@@ -38,7 +38,7 @@ TEST(Profile, PaperIsThePaper) {
     EXPECT_GT(parametersOf(Profile::kDefault).segmentation.preparation.decimateTo, 0U);
 }
 
-TEST(Profile, DescribeValidatesSegmentsAndSigns) {
+TEST(Describe, ValidatesThenSegmentsAndMakesTheSignature) {
     const PointCloud points = sampleBoundary(makeDumbbell().solid, 2000, 1).value();
     ShapeParameters parameters = parametersOf(Profile::kPaper);
     const auto description = describe(points, parameters);

@@ -99,7 +99,7 @@ class AdminRpc : public ::testing::Test {
     Client client;
 };
 
-TEST_F(AdminRpc, RebuildRaisesTheGenerationAndKeepsTheAnswers) {
+TEST_F(AdminRpc, RebuildRaisesTheGenerationAndKeepsResults) {
     fill(5);
     const std::string before = signatureOf("3");
     const auto progress = rebuild(rebuildRequest());
@@ -143,13 +143,13 @@ TEST_F(AdminRpc, RebuildWithNewParametersWhileSearching) {
     ShapeParameters parameters = parametersOf(Profile::kPaper);
     parameters.signature.maxPoints = 3;
     EXPECT_EQ(signatureOf("0"), encodeSignature(describe(unpack(dumbbell(1, 1'500)), parameters)->signature));
-    // What is added from now on has them too.
+    // Shapes added from now on have them too.
     ASSERT_TRUE(addAndWait(client, collection, "later", dumbbell(50)).ok());
     EXPECT_EQ(signatureOf("later"), encodeSignature(describe(unpack(dumbbell(50)), parameters)->signature));
 }
 
 TEST_F(AdminRpc, ShapesAddedDuringARebuildGetTheNewParameters) {
-    fill(10, 8'000);
+    fill(10, 4'000);
     pb::RebuildRequest request = rebuildRequest();
     request.mutable_signature()->set_max_points(2);
     request.set_detach(true);
@@ -160,19 +160,19 @@ TEST_F(AdminRpc, ShapesAddedDuringARebuildGetTheNewParameters) {
         ASSERT_TRUE(addAndWait(client, collection, "new " + std::to_string(i), dumbbell(100, 3'000)).ok());
     }
     request.set_detach(false);
-    ASSERT_TRUE(rebuild(request).ok()) << "the same again follows it, or finds it done and does it once more";
+    ASSERT_TRUE(rebuild(request).ok()) << "the same request follows the rebuild, or repeats it if it is done";
     ShapeParameters parameters = parametersOf(Profile::kPaper);
     parameters.signature.maxPoints = 2;
     const auto expected = [&](std::uint64_t seed, std::size_t points) {
         return encodeSignature(describe(unpack(dumbbell(seed, points)), parameters)->signature);
     };
     EXPECT_EQ(listAll(client, collection).size(), 15u);
-    EXPECT_EQ(signatureOf("9"), expected(10, 8'000));
+    EXPECT_EQ(signatureOf("9"), expected(10, 4'000));
     for (int i = 0; i < 5; ++i) EXPECT_EQ(signatureOf("new " + std::to_string(i)), expected(100, 3'000));
 }
 
-TEST_F(AdminRpc, SecondRebuildFollowsOrIsRefused) {
-    fill(6, 20'000);
+TEST_F(AdminRpc, SecondRebuildFollowsTheFirstOrIsRefused) {
+    fill(6, 12'000);
     pb::RebuildRequest request = rebuildRequest();
     request.mutable_signature()->set_max_points(4);
     request.set_detach(true);
@@ -185,11 +185,11 @@ TEST_F(AdminRpc, SecondRebuildFollowsOrIsRefused) {
     request.set_detach(false);
     const auto followed = rebuild(request);
     ASSERT_TRUE(followed.ok()) << followed;
-    EXPECT_EQ(collectionNow().generation(), 2) << "followed, not started again";
+    EXPECT_EQ(collectionNow().generation(), 2) << "followed, not started a second time";
 }
 
 TEST_F(AdminRpc, CancelledRebuildChangesNothing) {
-    fill(4, 30'000);
+    fill(4, 12'000);
     const std::string before = signatureOf("0");
     pb::RebuildRequest request = rebuildRequest();
     request.mutable_signature()->set_max_points(1);
@@ -210,8 +210,8 @@ TEST_F(AdminRpc, CancelledRebuildChangesNothing) {
     ASSERT_TRUE(rebuild(rebuildRequest()).ok()) << "another one can be started";
 }
 
-TEST_F(AdminRpc, RebuildSurvivesTheLossOfItsCall) {
-    fill(5, 20'000);
+TEST_F(AdminRpc, RebuildContinuesWhenItsCallIsLost) {
+    fill(5, 8'000);
     {
         CallContext context;
         const auto reader = client.admin->Rebuild(&context, rebuildRequest());
@@ -223,7 +223,7 @@ TEST_F(AdminRpc, RebuildSurvivesTheLossOfItsCall) {
     EXPECT_TRUE(eventually([&] { return collectionNow().generation() == 2; }));
 }
 
-TEST_F(AdminRpc, RebuildOfEverythingAndOfTheCache) {
+TEST_F(AdminRpc, RebuildsAllCollectionsAndReloadsTheCache) {
     fill(3);
     ASSERT_TRUE(addAndWait(client, "", "in default", dumbbell()).ok());
     const auto all = rebuild(pb::RebuildRequest());
@@ -252,7 +252,7 @@ TEST_F(AdminRpc, RebuildOfEverythingAndOfTheCache) {
     EXPECT_EQ(rebuild(outside).error, "invalid_argument");
 }
 
-TEST_F(AdminRpc, RebuildRecordsWhatCannotBeSegmented) {
+TEST_F(AdminRpc, RebuildRecordsScansThatCannotBeSegmented) {
     fill(2);
     ASSERT_TRUE(addAndWait(client, collection, "open", openSheet()).ok());
     const auto progress = rebuild(rebuildRequest());
@@ -262,7 +262,7 @@ TEST_F(AdminRpc, RebuildRecordsWhatCannotBeSegmented) {
     EXPECT_EQ(getShape(client, collection, "open").value.failure().error(), "no_interior");
 }
 
-TEST_F(AdminRpc, BackupAndRestoreBringBackWhatWasThere) {
+TEST_F(AdminRpc, BackupAndRestoreReproduceTheContent) {
     fill(3);
     const auto saved = backup();
     ASSERT_TRUE(saved.ok()) << saved;
@@ -292,13 +292,13 @@ TEST_F(AdminRpc, BackupAndRestoreBringBackWhatWasThere) {
     gone.set_name("newer");
     EXPECT_EQ(unary(*client.collections, &pb::CollectionService::Stub::GetCollection, gone).error,
               "not_found");
-    // The index was replaced as well, and work goes on.
+    // The index was replaced as well, and work continues.
     EXPECT_EQ(searchByScan(client, searchOptions(collection), dumbbell(9)).value.candidates(), 3u);
     ASSERT_TRUE(addAndWait(client, collection, "after", dumbbell(61)).ok());
     EXPECT_TRUE(check().messages.back().problems().empty());
 }
 
-TEST_F(AdminRpc, RestoreBringsBackUnfinishedWork) {
+TEST_F(AdminRpc, RestoreResumesUnfinishedJobs) {
     // A backup with jobs still queued: they are done after the restore.
     const Scan slow = slowScan(1, 60'000);
     for (int i = 0; i < 4; ++i) {
@@ -319,8 +319,8 @@ TEST_F(AdminRpc, RestoreBringsBackUnfinishedWork) {
     }));
 }
 
-// The ids a call has looked up may mean other shapes after a restore.
-TEST_F(AdminRpc, CallsThatSpanARestoreAreToldToRepeat) {
+// Ids that a call has looked up may mean other shapes after a restore.
+TEST_F(AdminRpc, CallsDuringARestoreMustBeRepeated) {
     const Scan slow = slowScan(1, 150'000);
     ASSERT_TRUE(addShape(client, headerFor(collection, "k", slow), slow).ok());
     const auto saved = backup();
@@ -340,7 +340,7 @@ TEST_F(AdminRpc, CallsThatSpanARestoreAreToldToRepeat) {
         eventually([&] { return getShape(client, collection, "k").value.state() == pb::SHAPE_STATE_READY; }));
 }
 
-TEST_F(AdminRpc, BadBackupsAreRefusedAndChangeNothing) {
+TEST_F(AdminRpc, RefusesBadBackupsAndChangesNothing) {
     fill(2);
     const auto saved = backup();
     ASSERT_TRUE(saved.ok()) << saved;
@@ -397,7 +397,7 @@ TEST_F(AdminRpc, CancelledBackupLeavesNoFile) {
     EXPECT_TRUE(eventually([&] { return std::filesystem::is_empty(folder); }));
 }
 
-TEST_F(AdminRpc, CheckFindsASoundDatabaseSound) {
+TEST_F(AdminRpc, CheckFindsNoProblemInASoundDatabase) {
     fill(3);
     const auto checked = check();
     ASSERT_TRUE(checked.ok()) << checked;

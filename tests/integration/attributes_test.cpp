@@ -34,7 +34,7 @@ class AttributesRpc : public LiveTest {
     std::string recommended;
 };
 
-TEST_F(AttributesRpc, QualityIsToldWhereverAShapeIs) {
+TEST_F(AttributesRpc, ReportsQualityWithEveryShape) {
     const Scan closed = dumbbell(1, 4'000);
     const auto added = addAndWait(client, recommended, "closed", closed);
     ASSERT_TRUE(added.ok()) << added;
@@ -69,15 +69,15 @@ TEST_F(AttributesRpc, QualityIsToldWhereverAShapeIs) {
     EXPECT_EQ(found.value.query().attributes().statistics_size(), 0) << "a query is not repeated in full";
 }
 
-// The paper does not judge: no figure is better than one that means nothing.
-TEST_F(AttributesRpc, ThePaperHasNoAttributes) {
+// The paper profile does not judge interiors: no figure is better than a meaningless one.
+TEST_F(AttributesRpc, PaperProfileHasNoAttributes) {
     const auto added = addAndWait(client, collection, "k", dumbbell());
     ASSERT_TRUE(added.ok()) << added;
     EXPECT_FALSE(added.value.shape().has_quality());
     EXPECT_FALSE(signatureOf(collection, "k").value.signature().has_attributes());
 }
 
-TEST_F(AttributesRpc, SignatureIsTheOneOfTheLibrary) {
+TEST_F(AttributesRpc, SignatureEqualsTheLibrarys) {
     const Scan scan = dumbbell(3, 4'000);
     ASSERT_TRUE(addAndWait(client, recommended, "k", scan).ok());
     const auto expected = describe(unpack(scan), parametersOf(Profile::kDefault));
@@ -108,7 +108,7 @@ TEST_F(AttributesRpc, SignatureIsTheOneOfTheLibrary) {
     EXPECT_NE(summary.report().interior_source(), pb::INTERIOR_SOURCE_UNSPECIFIED);
 }
 
-TEST_F(AttributesRpc, TermsSayWhatTheScoreIsMadeOf) {
+TEST_F(AttributesRpc, TermsAddUpToTheScore) {
     ASSERT_TRUE(addAndWait(client, recommended, "a", dumbbell(1, 4'000)).ok());
     ASSERT_TRUE(addAndWait(client, recommended, "b", familyScan("mug", 1, 1)).ok());
     pb::CompareRequest request;
@@ -143,8 +143,8 @@ TEST_F(AttributesRpc, TermsSayWhatTheScoreIsMadeOf) {
     EXPECT_EQ(found.value.hits(0).explanation().terms_size(), terms.size());
 }
 
-// What is seen from one side is in the whole, and not the other way round.
-TEST_F(AttributesRpc, PartialReachesTheScoreAndItsDirection) {
+// A view from one side is contained in the whole, not the other way round.
+TEST_F(AttributesRpc, PartialOptionChangesTheScoreAndHasADirection) {
     const Scan whole = dumbbell(1, 4'000);
     ASSERT_TRUE(addAndWait(client, recommended, "whole", whole).ok());
     ASSERT_TRUE(addAndWait(client, recommended, "half", fromAbove(whole)).ok());

@@ -1,5 +1,4 @@
-// What bad input gets: for each kind its own error with the right code, nothing stored, and a
-// server that works afterwards.
+// Each kind of bad input gets its own error and code, stores nothing and leaves a working server.
 #include <cmath>
 #include <limits>
 
@@ -13,7 +12,7 @@ using grpc::StatusCode;
 class BadInput : public LiveTest {
   protected:
     void TearDown() override {
-        // Nothing stored by any of the tests, and a good scan still finds its way.
+        // No test stored anything, and a good scan is still accepted.
         pb::CountShapesRequest count;
         count.set_collection(collection);
         const auto counted = unary(*client.shapes, &pb::ShapeService::Stub::CountShapes, count);
@@ -71,8 +70,8 @@ TEST_F(BadInput, InfiniteCoordinateIsRefused) {
     expectScanRefused(scan, "non_finite_coordinate");
 }
 
-// What a coordinate of 1e300 becomes on its way through single precision, and the largest
-// that fits: its extent does not.
+// 1e300 becomes infinite in single precision. The largest finite coordinate fits, but the extent of
+// such a scan does not.
 TEST_F(BadInput, HugeCoordinatesAreRefused) {
     Scan scan = dumbbell();
     scan[0] = static_cast<float>(1e300);
@@ -92,7 +91,7 @@ TEST_F(BadInput, TinyCoordinatesAreRefused) {
 TEST_F(BadInput, FewerThanFourPointsAreRefused) {
     expectScanRefused({0, 0, 0, 1, 0, 0, 0, 1, 0}, "too_few_points");
     expectScanRefused({}, "too_few_points");
-    // Four, but only three distinct.
+    // Four points, only three distinct.
     expectScanRefused({0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 0, 0}, "too_few_points");
 }
 
@@ -121,7 +120,7 @@ TEST_F(BadInput, CoplanarPointsAreRefused) {
     expectScanRefused(scan, "coplanar");
 }
 
-TEST_F(BadInput, ScanWithoutInteriorCannotBeSearchedAndEndsAsFailed) {
+TEST_F(BadInput, ScanWithoutInteriorFailsAndCannotBeSearched) {
     const Scan scan = openSheet();
     expectRefused(searchByScan(client, searchOptions(collection), scan), StatusCode::INVALID_ARGUMENT,
                   "no_interior");
@@ -129,12 +128,12 @@ TEST_F(BadInput, ScanWithoutInteriorCannotBeSearchedAndEndsAsFailed) {
     header.set_profile(pb::PROFILE_PAPER);
     header.set_summary_only(true);
     expectRefused(segmentScan(client, header, scan), StatusCode::INVALID_ARGUMENT, "no_interior");
-    // The recommended method always answers, and says what that is worth.
+    // The recommended method always finds an interior, and reports its quality.
     header.set_profile(pb::PROFILE_DEFAULT);
     const auto adaptive = segmentScan(client, header, scan);
     ASSERT_TRUE(adaptive.ok()) << adaptive;
     EXPECT_LT(adaptive.messages[0].summary().report().quality(), 0.5);
-    // Only the segmentation can tell: stored, and FAILED with the reason.
+    // Only the segmentation finds out: stored, then FAILED with the reason.
     const auto added = addAndWait(client, collection, "open", scan);
     ASSERT_TRUE(added.ok()) << added;
     EXPECT_EQ(added.value.shape().state(), pb::SHAPE_STATE_FAILED);
@@ -152,7 +151,7 @@ TEST_F(BadInput, EmptyStreamIsRefused) {
     expectRefused(sendAddShape(client, {}), StatusCode::INVALID_ARGUMENT, "malformed_stream");
 }
 
-TEST_F(BadInput, MessageWithoutPartIsRefused) {
+TEST_F(BadInput, MessageWithNeitherHeaderNorChunkIsRefused) {
     expectRefused(sendAddShape(client, {pb::AddShapeRequest()}), StatusCode::INVALID_ARGUMENT,
                   "malformed_stream");
 }
@@ -175,7 +174,7 @@ TEST_F(BadInput, ChunkAfterTheEndIsRefused) {
                   StatusCode::INVALID_ARGUMENT, "malformed_stream");
 }
 
-TEST_F(BadInput, ChunkOfHalfAPointIsRefused) {
+TEST_F(BadInput, ChunkThatIsNotWholePointsIsRefused) {
     expectRefused(sendAddShape(client, {header(2'000), chunk(std::string(30, 'x'))}),
                   StatusCode::INVALID_ARGUMENT, "malformed_stream");
     expectRefused(sendAddShape(client, {header(2'000), chunk("")}), StatusCode::INVALID_ARGUMENT,
@@ -211,8 +210,8 @@ TEST_F(BadInput, CountMismatchIsRefused) {
                   StatusCode::INVALID_ARGUMENT, "count_mismatch");
 }
 
-// A header that lies costs nothing: a billion points announced, ten present.
-TEST_F(BadInput, PointLimitIsEnforcedOnWhatIsAnnounced) {
+// A false header costs nothing: a billion points announced, ten sent.
+TEST_F(BadInput, AnnouncedPointsOverTheLimitAreRefused) {
     const std::string ten = bytesOf(dumbbell()).substr(0, 120);
     expectRefused(sendAddShape(client, {header(1'000'000'000), chunk(ten)}), StatusCode::OUT_OF_RANGE,
                   "point_limit_exceeded");

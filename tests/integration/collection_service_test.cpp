@@ -9,7 +9,7 @@ using grpc::StatusCode;
 using CollectionRpc = LiveTest;
 using Stub = pb::CollectionService::Stub;
 
-TEST_F(CollectionRpc, DefaultExistsFromTheFirstStart) {
+TEST_F(CollectionRpc, DefaultCollectionExistsFromTheStart) {
     pb::GetCollectionRequest request;
     request.set_name("default");
     const auto reply = unary(*client.collections, &Stub::GetCollection, request);
@@ -18,7 +18,7 @@ TEST_F(CollectionRpc, DefaultExistsFromTheFirstStart) {
     EXPECT_EQ(reply.value.generation(), 1);
 }
 
-TEST_F(CollectionRpc, ParametersComeBackInFull) {
+TEST_F(CollectionRpc, ReturnsAllParameters) {
     pb::CreateCollectionRequest request;
     request.set_name("with-parameters_1.0");
     request.set_description("Pièces");
@@ -46,8 +46,8 @@ TEST_F(CollectionRpc, ParametersComeBackInFull) {
     EXPECT_GT(got.value.created().seconds(), 1'500'000'000);
 }
 
-// The profile fills in what a request leaves out, and 0 is not left out.
-TEST_F(CollectionRpc, ParametersThatAreNotSetAreTheProfiles) {
+// The profile supplies unset parameters; 0 is a value.
+TEST_F(CollectionRpc, UnsetParametersAreTheProfiles) {
     const SegmentationOptions profile = parametersOf(Profile::kDefault).segmentation;
     pb::CreateCollectionRequest request;
     request.set_name(collection + "-partly");
@@ -74,7 +74,7 @@ TEST_F(CollectionRpc, TakenNameIsRefused) {
     EXPECT_EQ(again.error, "already_exists");
 }
 
-TEST_F(CollectionRpc, ListIsByNameAndCounts) {
+TEST_F(CollectionRpc, ListsByNameWithCounts) {
     ASSERT_TRUE(addAndWait(client, collection, "good", dumbbell()).ok());
     ASSERT_TRUE(addAndWait(client, collection, "open", openSheet()).ok());
     const auto list = unary(*client.collections, &Stub::ListCollections, pb::ListCollectionsRequest());
@@ -93,7 +93,7 @@ TEST_F(CollectionRpc, ListIsByNameAndCounts) {
     EXPECT_TRUE(seen);
 }
 
-TEST_F(CollectionRpc, DeletingNeedsForceWhenItHoldsShapes) {
+TEST_F(CollectionRpc, DeletingANonEmptyCollectionNeedsForce) {
     ASSERT_TRUE(addShape(client, headerFor(collection, "k", slowScan(20)), slowScan(20)).ok());
     pb::DeleteCollectionRequest request;
     request.set_name(collection);
@@ -116,7 +116,7 @@ TEST_F(CollectionRpc, DeletingNeedsAName) {
     EXPECT_EQ(reply.status.error_code(), StatusCode::INVALID_ARGUMENT) << reply;
 }
 
-TEST_F(CollectionRpc, CollectionsDoNotSeeEachOther) {
+TEST_F(CollectionRpc, CollectionsAreIndependent) {
     const std::string other = collection + "-other";
     ASSERT_TRUE(createCollection(client, other).ok());
     ASSERT_TRUE(addAndWait(client, collection, "k", dumbbell(1)).ok());

@@ -1,4 +1,4 @@
-// Ends and beginnings: drain, kill, restart, a full queue, a scan that kills the server.
+// Drain, kill and restart; a full queue; a scan that crashes the server.
 #include <atomic>
 #include <future>
 #include <memory>
@@ -66,7 +66,7 @@ TEST_F(Lifecycle, RestartFindsEverythingAgain) {
     EXPECT_EQ(after.value.hits(0).shape().metadata().at("label"), "d");
 }
 
-TEST_F(Lifecycle, TerminationPutsJobsBackAndTheRestartDoesThem) {
+TEST_F(Lifecycle, TerminationRequeuesJobsForTheRestart) {
     start({"--ingest-threads", "1", "--shutdown-drain-seconds", "1"});
     for (int i = 0; i < 3; ++i) {
         const Scan slow = slowScan(static_cast<std::uint64_t>(i));
@@ -125,7 +125,7 @@ TEST_F(Lifecycle, NewCallsAreRefusedWhileDraining) {
     EXPECT_TRUE(eventually([&] { return stateOf("k") == pb::SHAPE_STATE_READY; }));
 }
 
-TEST_F(Lifecycle, FollowersAreSentAwayAtTheDrain) {
+TEST_F(Lifecycle, DrainEndsCallsThatOnlyFollow) {
     start({"--ingest-threads", "1", "--shutdown-drain-seconds", "20"});
     ASSERT_TRUE(add("k", slowScan(4, 190'000)));
     pb::WatchIngestRequest request;
@@ -140,7 +140,7 @@ TEST_F(Lifecycle, FollowersAreSentAwayAtTheDrain) {
     EXPECT_EQ(server->wait(std::chrono::seconds(5)), 0);
 }
 
-TEST_F(Lifecycle, SecondSignalEndsAtOnce) {
+TEST_F(Lifecycle, SecondSignalStopsAtOnce) {
     start({"--shutdown-drain-seconds", "60"});
     CallContext context;
     pb::AddShapeResponse response;
@@ -158,7 +158,7 @@ TEST_F(Lifecycle, SecondSignalEndsAtOnce) {
 }
 
 // The promise: acknowledged means durable.
-TEST_F(Lifecycle, KillInMidIngestLosesNothingAcknowledged) {
+TEST_F(Lifecycle, KillDuringIngestLosesNothingAcknowledged) {
     start({"--ingest-threads", "2"});
     std::vector<std::string> acknowledged;
     std::mutex mutex;
@@ -179,7 +179,7 @@ TEST_F(Lifecycle, KillInMidIngestLosesNothingAcknowledged) {
     }
     EXPECT_TRUE(eventually([&] {
         const std::lock_guard<std::mutex> lock(mutex);
-        return acknowledged.size() >= 60;
+        return acknowledged.size() >= 40;
     }));
     server->kill();
     stop = true;
@@ -198,8 +198,8 @@ TEST_F(Lifecycle, KillInMidIngestLosesNothingAcknowledged) {
     EXPECT_TRUE(checked.messages.back().problems().empty()) << checked.messages.back().ShortDebugString();
 }
 
-// To the server it is the scan that killed it: it died twice while that one was segmented.
-TEST_F(Lifecycle, ScanThatKillsTheServerTwiceIsSetAside) {
+// To the server this scan looks guilty: it died twice while segmenting it.
+TEST_F(Lifecycle, QuarantinesAScanThatCrashesTheServerTwice) {
     const std::vector<std::string> oneWorker = {"--ingest-threads", "1", "--limits-max-points", "1000000"};
     start(oneWorker);
     ASSERT_TRUE(add("poison", slowScan(5, 400'000)));
@@ -215,15 +215,15 @@ TEST_F(Lifecycle, ScanThatKillsTheServerTwiceIsSetAside) {
     EXPECT_NE(poison.value.failure().message().find("2 times"), std::string::npos)
         << poison.value.ShortDebugString();
     EXPECT_TRUE(eventually([&] { return stateOf("innocent") == pb::SHAPE_STATE_READY; }))
-        << "everything else serves";
-    // Other points under the same key are a new chance.
+        << "everything else still works";
+    // New points under the same key are tried again.
     const auto replaced = addAndWait(*client, "", "poison", dumbbell(2));
     EXPECT_EQ(replaced.value.shape().state(), pb::SHAPE_STATE_READY) << replaced;
 }
 
 TEST_F(Lifecycle, FullQueueRefusesWithAHint) {
     start({"--ingest-threads", "1", "--ingest-max-queued-jobs", "2"});
-    // Beyond the limit of bytes nothing is tested here: the store counts both the same way.
+    // Jobs and bytes are counted the same way.
     ASSERT_TRUE(add("0", slowScan(6)));
     ASSERT_TRUE(add("1", slowScan(7)));
     const auto refused = addShape(*client, headerFor("", "2", dumbbell()), dumbbell());
@@ -233,10 +233,10 @@ TEST_F(Lifecycle, FullQueueRefusesWithAHint) {
     EXPECT_GE(std::stoi(refused.retryAfter), 100);
     EXPECT_LE(std::stoi(refused.retryAfter), 60'000);
     EXPECT_EQ(getShape(*client, "", "2").error, "not_found") << "nothing is stored";
-    EXPECT_TRUE(eventually([&] { return add("2", dumbbell()); })) << "later there is room";
+    EXPECT_TRUE(eventually([&] { return add("2", dumbbell()); })) << "there is room again later";
 }
 
-TEST_F(Lifecycle, FullQueueCountsBytesToo) {
+TEST_F(Lifecycle, FullQueueCountsBytes) {
     start({"--ingest-threads", "1", "--ingest-max-queued-bytes", "2MiB", "--limits-max-points", "170000"});
     ASSERT_TRUE(add("0", slowScan(8, 160'000)));
     const Scan scan = slowScan(9, 30'000);
@@ -244,7 +244,7 @@ TEST_F(Lifecycle, FullQueueCountsBytesToo) {
     EXPECT_TRUE(add("2", dumbbell()));
 }
 
-TEST_F(Lifecycle, UploadsTogetherStayInTheirMemory) {
+TEST_F(Lifecycle, ConcurrentUploadsStayWithinTheirMemory) {
     start({"--limits-max-upload-bytes", "1MiB", "--limits-max-points", "80000"});
     const Scan scan = slowScan(10, 80'000);
     const auto chunks = chunksOf(scan, 60'000);
@@ -253,7 +253,7 @@ TEST_F(Lifecycle, UploadsTogetherStayInTheirMemory) {
     std::unique_ptr<CallContext> context;
     std::unique_ptr<grpc::ClientWriter<pb::AddShapeRequest>> upload;
     Outcome refused;
-    // The second may come before the beginning of the first: then the first is refused, and begins anew.
+    // The second may overtake the first; then the first is refused and starts again.
     ASSERT_TRUE(eventually([&] {
         context = std::make_unique<CallContext>();
         upload = client->shapes->AddShape(&context->get(), &response);
@@ -273,14 +273,14 @@ TEST_F(Lifecycle, UploadsTogetherStayInTheirMemory) {
     EXPECT_TRUE(upload->Write(message));
     upload->WritesDone();
     EXPECT_TRUE(upload->Finish().ok());
-    EXPECT_TRUE(add("second", scan)) << "the memory is given back";
+    EXPECT_TRUE(add("second", scan)) << "the memory is released";
 }
 
-TEST_F(Lifecycle, RestartGoesOnWithARebuild) {
+TEST_F(Lifecycle, RestartContinuesARebuild) {
     start();
     for (int i = 0; i < 6; ++i) {
         ASSERT_TRUE(
-            addAndWait(*client, "", std::to_string(i), slowScan(static_cast<std::uint64_t>(i), 25'000)).ok());
+            addAndWait(*client, "", std::to_string(i), slowScan(static_cast<std::uint64_t>(i), 12'000)).ok());
     }
     pb::RebuildRequest request;
     request.set_collection("default");
@@ -301,7 +301,7 @@ TEST_F(Lifecycle, RestartGoesOnWithARebuild) {
     const auto reader = client->admin->Rebuild(&context, request);
     const auto followed = testing::drain(context, *reader);
     ASSERT_TRUE(followed.ok()) << followed;
-    EXPECT_GT(followed.messages.front().done(), 0u) << "what was done before the kill stays done";
+    EXPECT_GT(followed.messages.front().done(), 0u) << "progress survives the kill";
     pb::GetCollectionRequest get;
     get.set_name("default");
     const auto now = unary(*client->collections, &pb::CollectionService::Stub::GetCollection, get);
@@ -310,8 +310,8 @@ TEST_F(Lifecycle, RestartGoesOnWithARebuild) {
     EXPECT_EQ(now.value.shapes_ready(), 6u);
 }
 
-// A rebuild has no jobs, yet a scan that kills the server cannot keep it from starting for ever.
-TEST_F(Lifecycle, ScanThatKillsTheRebuildTwiceIsSetAside) {
+// A rebuild has no jobs, but a scan that crashes the server must not do so at every start.
+TEST_F(Lifecycle, QuarantinesAScanThatCrashesRebuildsTwice) {
     const std::vector<std::string> arguments = {"--limits-max-points", "1000000"};
     start(arguments);
     const auto poison = addAndWait(*client, "", "poison", slowScan(5, 300'000));
@@ -358,7 +358,7 @@ TEST_F(Lifecycle, StalledUploadIsCutOff) {
     EXPECT_GT(took, std::chrono::milliseconds(700));
     EXPECT_LT(took, std::chrono::seconds(5));
     EXPECT_TRUE(eventually(
-        [&] { return server->log().find("neither sent nor took anything") != std::string::npos; }));
+        [&] { return server->log().find("neither sent nor read anything") != std::string::npos; }));
     EXPECT_TRUE(add("k", dumbbell())) << "the server is unharmed";
 }
 

@@ -62,7 +62,7 @@ class SearchRpc : public LiveTest {
         std::int64_t id;
     };
 
-    /// All pairs, sorted: what the server must return, bit for bit.
+    /// All pairs, sorted: the server must return the same bits.
     std::vector<Expected> bruteForce(const Signature& query, const ScoreOptions& options,
                                      const std::function<bool(const Entry&)>& accept = nullptr) const {
         std::vector<Expected> all;
@@ -113,7 +113,7 @@ TEST_F(SearchRpc, ByKeyEqualsBruteForce) {
     }
 }
 
-TEST_F(SearchRpc, SelfScoresOneAndRanksFirstWhenAskedFor) {
+TEST_F(SearchRpc, SelfMatchScoresOneAndRanksFirst) {
     const auto reply = byKey("mug/1", searchOptions(collection), true);
     ASSERT_TRUE(reply.ok()) << reply;
     EXPECT_EQ(reply.value.hits(0).shape().key(), "mug/1");
@@ -145,7 +145,7 @@ TEST_F(SearchRpc, FilterAndThresholdAreExact) {
     EXPECT_EQ(above.value.hits_size(), 4) << "the threshold itself passes";
 }
 
-TEST_F(SearchRpc, ScoreOptionsReachTheScore) {
+TEST_F(SearchRpc, ScoreOptionsChangeTheScore) {
     for (const bool forbidReflection : {false, true}) {
         for (const bool keepScale : {false, true}) {
             pb::SearchOptions options = searchOptions(collection, 50);
@@ -165,7 +165,7 @@ TEST_F(SearchRpc, ScoreOptionsReachTheScore) {
     }
 }
 
-TEST_F(SearchRpc, ByScanSegmentsTheQueryAsTheLibraryDoes) {
+TEST_F(SearchRpc, ByScanSegmentsTheQueryLikeTheLibrary) {
     const Scan scan = familyScan("hammer", 1, 99);
     const auto reply = searchByScan(client, searchOptions(collection, 50), scan);
     ASSERT_TRUE(reply.ok()) << reply;
@@ -202,7 +202,7 @@ TEST_F(SearchRpc, BySignatureAndBatchAgreeWithByKey) {
     expectHits(both.value.responses(1), bruteForce(entry("dumbbell/2").signature, {}), 7);
 }
 
-TEST_F(SearchRpc, ExplanationSaysWhatTheScoreIsMadeOf) {
+TEST_F(SearchRpc, ExplanationAddsUpToTheScore) {
     const Entry& query = entry("mug/0");
     const auto reply = byKey("mug/0", searchOptions(collection, 3));
     ASSERT_TRUE(reply.ok()) << reply;

@@ -1,4 +1,4 @@
-// ShapeService on a live server: what is put in comes out.
+// ShapeService on a live server.
 #include <future>
 #include <set>
 #include <thread>
@@ -13,7 +13,7 @@ namespace {
 using grpc::StatusCode;
 using ShapeRpc = LiveTest;
 
-TEST_F(ShapeRpc, AddedShapeComesBackInFull) {
+TEST_F(ShapeRpc, ReturnsAnAddedShapeInFull) {
     const Scan scan = dumbbell();
     pb::AddShapeHeader header = headerFor(collection, "ключ/1", scan);
     (*header.mutable_metadata())["label"] = "dumbbell";
@@ -48,7 +48,7 @@ TEST_F(ShapeRpc, EmptyCollectionNameMeansDefault) {
     EXPECT_TRUE(getShape(client, "", "in default").ok());
 }
 
-TEST_F(ShapeRpc, RetriesAndChangesHaveTheirOutcomes) {
+TEST_F(ShapeRpc, RetriesAndChangesReportTheirOutcome) {
     const Scan first = dumbbell(1);
     const Scan second = dumbbell(2);
     const auto add = [&](const Scan& scan, const std::string& label) {
@@ -128,7 +128,7 @@ TEST_F(ShapeRpc, ListingPagesByRisingIdAndFilters) {
         request.set_cursor(page.value.next_cursor());
         ++pages;
         if (pages == 1) {
-            // Deleting what was seen and adding more does not shift the pages that follow.
+            // Deleting listed shapes and adding others does not shift later pages.
             pb::DeleteShapeRequest remove;
             remove.mutable_shape()->set_collection(collection);
             remove.mutable_shape()->set_key("shape 0");
@@ -152,8 +152,8 @@ TEST_F(ShapeRpc, ListingPagesByRisingIdAndFilters) {
     EXPECT_TRUE(one.value.next_cursor().empty());
 }
 
-// Shapes with all the metadata they may have: a page ends before it grows past what clients take.
-TEST_F(ShapeRpc, LongPagesAreCutAndGoOn) {
+// Shapes with as much metadata as allowed: a page ends before it exceeds what clients accept.
+TEST_F(ShapeRpc, LongPagesEndEarlyAndContinue) {
     const Scan scan = dumbbell(1, 500);
     constexpr int kShapes = 60;
     for (int i = 0; i < kShapes; ++i) {
@@ -180,7 +180,7 @@ TEST_F(ShapeRpc, LongPagesAreCutAndGoOn) {
     EXPECT_GE(pages, 2);
 }
 
-TEST_F(ShapeRpc, StateFilterFindsWhatFailed) {
+TEST_F(ShapeRpc, StateFilterFindsFailedShapes) {
     ASSERT_TRUE(addAndWait(client, collection, "good", dumbbell()).ok());
     ASSERT_TRUE(addAndWait(client, collection, "open", openSheet()).ok());
     pb::CountShapesRequest count;
@@ -195,7 +195,7 @@ TEST_F(ShapeRpc, StateFilterFindsWhatFailed) {
     EXPECT_EQ(ready.value.shapes(0).key(), "good");
 }
 
-TEST_F(ShapeRpc, DeletedShapeIsGoneEverywhere) {
+TEST_F(ShapeRpc, DeletedShapeIsFoundNowhere) {
     ASSERT_TRUE(addAndWait(client, collection, "k", dumbbell()).ok());
     pb::DeleteShapeRequest remove;
     remove.mutable_shape()->set_collection(collection);
@@ -213,7 +213,7 @@ TEST_F(ShapeRpc, DeletedShapeIsGoneEverywhere) {
     EXPECT_EQ(search.value.candidates(), 0u);
 }
 
-TEST_F(ShapeRpc, SignatureIsTheOneOfTheLibrary) {
+TEST_F(ShapeRpc, SignatureEqualsTheLibrarys) {
     const Scan scan = dumbbell(3, 4'000);
     ASSERT_TRUE(addAndWait(client, collection, "k", scan).ok());
     pb::GetSignatureRequest request;
@@ -297,7 +297,7 @@ TEST_F(ShapeRpc, SegmentAndGetSegmentsAgreeWithTheLibrary) {
     EXPECT_EQ(join(stored.messages).xyz, labelled.xyz);
 }
 
-TEST_F(ShapeRpc, WatchTellsStagesAndEnds) {
+TEST_F(ShapeRpc, WatchReportsStagesAndEnds) {
     const Scan scan = slowScan(5, 60'000);
     ASSERT_TRUE(addShape(client, headerFor(collection, "k", scan), scan).ok());
     pb::WatchIngestRequest request;
@@ -334,7 +334,7 @@ TEST_F(ShapeRpc, WatchEndsWhenTheShapeIsDeleted) {
     ASSERT_TRUE(unary(*client.shapes, &pb::ShapeService::Stub::DeleteShape, remove).ok());
     const auto rest = testing::drain(context, *reader);
     EXPECT_EQ(rest.error, "not_found") << rest;
-    // The worker drops it: the queue drains long before the scan could have been finished.
+    // The worker stops: the queue is empty long before the scan could have been finished.
     EXPECT_TRUE(eventually([&] { return statsOf(client).running_jobs() == 0; }));
 }
 
@@ -375,7 +375,7 @@ TEST_F(ShapeRpc, DeadlineStopsALongSegmentation) {
     const auto reply = segmentScan(client, header, scan, std::chrono::milliseconds(300));
     EXPECT_EQ(reply.status.error_code(), StatusCode::DEADLINE_EXCEEDED) << reply;
     EXPECT_LT(std::chrono::steady_clock::now() - began, std::chrono::seconds(2));
-    // The server noticed as well: it says so in its log and is free again.
+    // The server noticed too: it logs the end of the call and is free again.
     EXPECT_TRUE(eventually([&] {
         const std::string log = server()->log();
         return log.find("rpc=Segment") != std::string::npos &&

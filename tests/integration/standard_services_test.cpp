@@ -47,7 +47,7 @@ TEST_F(StandardServices, HealthWatchSeesTheDrain) {
     other.signal(SIGTERM);
     ASSERT_TRUE(reader->Read(&response));
     EXPECT_EQ(response.status(), HealthCheckResponse::NOT_SERVING);
-    EXPECT_EQ(other.wait(), 0) << "a watcher does not hold up the end";
+    EXPECT_EQ(other.wait(), 0) << "a health watcher does not delay the shutdown";
 }
 
 TEST_F(StandardServices, ReflectionListsAndDescribesTheServices) {
@@ -114,7 +114,7 @@ TEST_F(StandardServices, EachCallIsOneLogLine) {
     EXPECT_NE(log.find("points=2000 bytes=24000"), std::string::npos) << log;
 }
 
-TEST(Program, PrintsOneLineAndHelps) {
+TEST(Program, PrintsOneLineAndHelp) {
     const TemporaryDirectory directory;
     ServerProcess server(directory.path());
     EXPECT_EQ(server.banner(), "listening on " + server.address() + "\n");
@@ -128,7 +128,7 @@ TEST(Program, PrintsOneLineAndHelps) {
     EXPECT_EQ(version.out.rfind("shapedbd ", 0), 0u);
 }
 
-TEST(Program, CheckConfigTellsWhereValuesComeFrom) {
+TEST(Program, CheckConfigNamesTheOriginOfValues) {
     const TemporaryDirectory directory;
     const std::string file = directory.path() + "/c.toml";
     std::ofstream(file) << "[limits]\nmax_k = 7\nmax_points = 1000\n";

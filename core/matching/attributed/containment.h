@@ -1,9 +1,9 @@
-// How much of one body another contains: for a one-sided scan, or a broken piece, as the query.
+// How much of one body another one contains, for a one-sided scan or a broken piece as the query.
 #pragma once
 
 #include "core/matching/attributed/segment_match.h"
-#include "core/matching/score.h"
-#include "core/signature/segment_descriptor.h"
+#include "core/matching/attributed/segment_span.h"
+#include "core/matching/score_options.h"
 
 namespace shapedb {
 
@@ -11,7 +11,7 @@ namespace shapedb {
 ///   rotation * (x - from) / scale + to
 /// in the piece's frame.
 struct Containment {
-    double share = 0.0;  ///< of the piece's volume that finds its like in the whole, [0, 1]
+    double share = 0.0;  ///< of the piece's volume that has a counterpart in the whole, [0, 1]
     Matrix3 rotation = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};  ///< whole to piece
     bool reflected = false;
     double scale = 1.0;  ///< a length 1 of the piece (its own units) is this long in the whole's
@@ -19,20 +19,20 @@ struct Containment {
     Point3 to;           ///< in the piece's frame
 };
 
-/// The best of all alignments that lay one of the heaviest parts of `piece` on a part of `whole`,
-/// a second one in the direction of a second and a third to its side. Each part of the piece counts
+/// The best of all alignments that put one of the heaviest segments of `piece` on a segment of `whole`,
+/// a second one in the direction of a second and a third to its side. Each segment of the piece counts
 /// its volume times the likeness of sizes and the kernel of the distance to its best counterpart.
-/// `knownScale` > 0 fixes the scale (sizes kept); 0: taken from the parts that are laid on each
-/// other. Not symmetric. `options`: reflection, kernelWidth. Costs about six times a score without.
-[[nodiscard]] Containment containment(const Body& piece, const Body& whole, double knownScale,
+/// `knownScale` > 0 fixes the scale (sizes kept); 0 takes it from the segments that are put on each
+/// other. Not symmetric. `options`: reflection, kernelWidth. Costs about six times SegmentComparison.
+[[nodiscard]] Containment containment(SegmentSpan piece, SegmentSpan whole, double knownScale,
                                       const ScoreOptions& options);
 
 /// Never below containment(...).share.
-[[nodiscard]] double containmentBound(const Body& piece, const Body& whole, double knownScale);
+[[nodiscard]] double containmentBound(SegmentSpan piece, SegmentSpan whole, double knownScale);
 
-/// Which part of the piece (a) lies on which of the whole (b); the gains sum to the share. Distances
+/// Which segment of the piece (a) lies on which of the whole (b); the gains sum to the share. Distances
 /// in the piece's units.
-[[nodiscard]] SegmentPairs containedPairs(const Body& piece, const Body& whole, const Containment& found,
+[[nodiscard]] SegmentPairs containedPairs(SegmentSpan piece, SegmentSpan whole, const Containment& found,
                                           const ScoreOptions& options);
 
 }  // namespace shapedb

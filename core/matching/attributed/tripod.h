@@ -11,17 +11,17 @@ namespace shapedb {
 /// Right-handed, orthonormal.
 using Tripod = std::array<Point3, 3>;
 
-/// Shorter than this, in units of a body's size, a vector has no direction to rely on.
+/// A vector shorter than this, in units of a body's size, has no reliable direction.
 constexpr double kShortestDirection = 1e-3;
 
 /// First axis along `first`, second in the half plane of `second`. False, and `out` undefined, when
-/// either (or what of the second is across the first) is shorter than kShortestDirection.
+/// `first`, or the component of `second` across it, is shorter than kShortestDirection.
 [[nodiscard]] bool tripod(const Point3& first, const Point3& second, Tripod& out);
 
-/// Some unit vector across `direction` (not zero).
+/// Some unit vector perpendicular to `direction`, which must not be zero.
 [[nodiscard]] Point3 anyAcross(const Point3& direction);
 
-/// Takes each axis of `from` to that of `to`; reflected: its third axis to the opposite.
+/// Maps each axis of `from` to that of `to`; reflected: the third axis to the opposite.
 [[nodiscard]] Matrix3 tripodMap(const Tripod& from, const Tripod& to, bool reflected);
 
 }  // namespace shapedb

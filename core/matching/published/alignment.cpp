@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/matching/kernel.h"
+
 namespace shapedb {
 
 namespace {
 
-// Points nearer to the anchor, or to the axis, than this (in units of the common size) give no
-// direction that single precision could be trusted with.
+// Points nearer to the anchor, or to the axis, than this (in units of the common size) give no direction
+// that single precision could be trusted with.
 constexpr double kNoDirection = 1e-6;
 
 // Orthonormal, right-handed: u along the axis, e and f across.
@@ -55,7 +57,7 @@ Cylindrical mirrored(Cylindrical view, std::size_t count) {
     return view;
 }
 
-// The unit complex number that turns b's point l to the direction of a's point k.
+// The unit complex number that turns b's point l into the direction of a's point k.
 struct Roll {
     double re = 1.0;
     double im = 0.0;
@@ -88,15 +90,16 @@ double squaredGap(const Cylindrical& a, std::size_t p, const Cylindrical& b, std
     return dh * dh + dr * dr + di * di;
 }
 
-// Trivial on purpose: the candidates of an alignment live in an array that is not cleared.
+// No default values on purpose: the candidates of an alignment live in an array that is not cleared.
 struct Candidate {
     double gain;
     double squaredDistance;
     std::uint8_t a, b;
 };
 
-// One-to-one matching, greedy by falling gain (equal gains by rising indices). Calls `take` with
-// each pair; returns the sum of gains.
+// One-to-one matching, greedy by falling gain (equal gains by rising indices). Calls `take` with each
+// pair; returns the sum of gains. Where the sum cannot exceed `needed`, returns an upper bound of it
+// without matching anything.
 template <typename SquaredDistance, typename Take>
 double matchGreedily(const AnchoredPoints& a, const AnchoredPoints& b, double width, SquaredDistance between,
                      Take take, double needed = -1.0) {
@@ -138,7 +141,7 @@ double matchGreedily(const AnchoredPoints& a, const AnchoredPoints& b, double wi
     return similarity;
 }
 
-// Above the similarity of every roll about one axis pair: a roll keeps height and radius.
+// An upper bound of the similarity over all rolls about one axis pair: a roll keeps height and radius.
 double axisBound(const AnchoredPoints& a, const Cylindrical& viewA, const AnchoredPoints& b,
                  const Cylindrical& viewB, double width) {
     double sum = 0.0;
@@ -201,13 +204,13 @@ class Search {
     double bestSimilarity_ = 0.0;
 };
 
-// One axis of either side, with what no roll about it can exceed.
+// One axis of either side, and the upper bound over all rolls about them.
 struct AxisPair {
     double bound;
     std::uint8_t i, j;
 };
 
-// What an alignment lays on what.
+// Which points an alignment matches.
 PairList matchesOf(const AnchoredPoints& a, const AnchoredPoints& b, double width,
                    const Alignment& alignment) {
     PairList list;
@@ -215,7 +218,7 @@ PairList matchesOf(const AnchoredPoints& a, const AnchoredPoints& b, double widt
         list.pairs[list.count++] = {pair.a, pair.b, pair.gain, pair.squaredDistance};
     };
     if (alignment.i == 0 || alignment.j == 0) {
-        // Only the anchors are sure to coincide; whatever else comes near is chance, but counts.
+        // Only the anchors are sure to coincide. What else comes near does so by chance, but counts.
         list.similarity = matchGreedily(
             a, b, width,
             [&](std::size_t p, std::size_t q) { return squaredDistance(a.position[p], b.position[q]); },
@@ -241,28 +244,16 @@ bool hasAxis(const AnchoredPoints& points) {
 
 }  // namespace
 
-AnchoredPoints anchoredPoints(const Signature& signature, double factor) {
+AnchoredPoints anchoredPoints(const ShapeRow& shape, double factor) {
     AnchoredPoints points;
-    points.count = signature.points.size();
+    points.count = shape.pointCount;
     for (std::size_t i = 0; i < points.count; ++i) {
-        const WeightedPoint& p = signature.points[i];
+        const PackedPoint& p = shape.points[i];
         points.position[i] = factor * Point3{p.position[0], p.position[1], p.position[2]};
         points.weight[i] = static_cast<double>(p.weight) * factor * factor * factor;
         points.totalWeight += points.weight[i];
     }
     return points;
-}
-
-double kernel(double squaredDistance, double width) {
-    const double t = 1.0 - squaredDistance / (8.0 * width * width);
-    if (t <= 0.0) return 0.0;
-    const double t2 = t * t;
-    return t2 * t2;
-}
-
-double leastGap(double x, double y) {
-    constexpr double kRounding = 1e-14;  // some fifty times that of a rotation
-    return std::max(0.0, std::abs(x - y) - kRounding * (std::abs(x) + std::abs(y)));
 }
 
 BestAlignment bestAlignment(const AnchoredPoints& a, const AnchoredPoints& b, const ScoreOptions& options,

@@ -24,7 +24,7 @@ constexpr char kAllSignatures[] =
     "JOIN shape s ON s.id = g.shape_id";
 constexpr char kShapesTotal[] = "SELECT count(*) FROM shape";
 
-/// Each names a rule the writers keep, and lists the keys that break it.
+/// A rule between tables; the statement lists the keys of shapes that break it.
 struct Rule {
     const char* sql;
     const char* problem;
@@ -83,14 +83,14 @@ class Checker {
         if (problems_.size() == kMaxProblems) problems_.push_back("... and more");
     }
 
-    /// Damage ends a section, not the check.
+    /// Damage ends a section, but not the check.
     template <typename Body>
     void section(Body body) {
         orRaise(context_.checkpoint());
         try {
             body();
         } catch (const Failure& failure) {
-            orRaise(context_.checkpoint());  // SQLite's "interrupted" becomes the caller's reason
+            orRaise(context_.checkpoint());  // reports the caller's reason instead of SQLite's "interrupted"
             if (failure.error.code != ErrorCode::kDataLoss) throw;
             add(failure.error.message);
         }
@@ -128,7 +128,7 @@ class Checker {
                     add("shape " + quoted(query.text(0)) + " has wrong byte counts beside its points");
                 }
             } catch (const Failure& failure) {
-                if (failure.fromSqlite) throw;
+                if (failure.fromDatabase) throw;
                 add(failure.error.message);
             }
         }
@@ -142,7 +142,7 @@ class Checker {
             try {
                 readSignature(connection_, query, 1, query.integer(0));
             } catch (const Failure& failure) {
-                if (failure.fromSqlite) throw;
+                if (failure.fromDatabase) throw;
                 add(failure.error.message);
             }
         }

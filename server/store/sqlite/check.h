@@ -1,4 +1,4 @@
-// The thorough check of a database, used by Store::check and before a restore.
+// The complete check of a database, for Store::check and before a restore.
 #pragma once
 
 #include <string>
@@ -9,9 +9,9 @@
 
 namespace shapedb::store {
 
-/// One line per problem, at most some hundred; empty when sound. Reads everything in one
-/// snapshot. Reports the stages "integrity" and "points" (in shapes). Throws Failure
-/// kCancelled, kDeadlineExceeded, or when it cannot read; damage is a line, not a Failure.
+/// One line per problem, at most two hundred; empty when sound. Reads everything in one snapshot.
+/// Reports the stages "integrity" and "points" (in shapes). Damage is a line, not a Failure; throws
+/// Failure kCancelled, kDeadlineExceeded, or when it cannot read.
 std::vector<std::string> checkDatabase(Connection& connection, const RunContext& context);
 
 }  // namespace shapedb::store

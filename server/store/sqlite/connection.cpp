@@ -13,11 +13,11 @@ constexpr char kBeginRead[] = "BEGIN";
 constexpr char kBeginWrite[] = "BEGIN IMMEDIATE";
 constexpr char kCommit[] = "COMMIT";
 
-// Virtual machine steps between two looks at the caller's wish to stop: some microseconds.
+// Virtual machine steps between two checks for cancellation: a few microseconds.
 constexpr int kProgressSteps = 10000;
 
-// EFBIG: the file size limit of the process; EDQUOT: the user's quota. To the operator
-// they are the same as a full device.
+// EFBIG is the file size limit of the process, EDQUOT the user's quota: to the operator the same
+// as a full device.
 bool isFull(int systemError) {
     return systemError == ENOSPC || systemError == EFBIG || systemError == EDQUOT;
 }
@@ -44,8 +44,8 @@ ErrorCode codeOf(int sqliteCode, bool full) {
     }
 }
 
-/// Whether the database file or its log last failed for want of room. The global errno is of
-/// no use: SQLite has rolled back since.
+/// Whether the last failure of the database file or its log was lack of space. The global errno no
+/// longer tells: SQLite has rolled back since.
 bool filesAreFull(sqlite3* db) {
     int last = 0;
     sqlite3_file_control(db, "main", SQLITE_FCNTL_LAST_ERRNO, &last);
@@ -75,15 +75,15 @@ void Connection::StatementCloser::operator()(sqlite3_stmt* statement) const noex
 
 Connection::Connection(const std::string& path, OpenMode mode, int busyTimeoutMs)
     : busyTimeoutMs_(busyTimeoutMs) {
-    // SQLite would read "file:..." as a URI with options; a path is only ever a path here.
+    // SQLite would read "file:..." as a URI with options.
     const std::string plain = path.rfind("file:", 0) == 0 ? "./" + path : path;
     const int code = sqlite3_open_v2(plain.c_str(), &db_, openFlags(mode) | SQLITE_OPEN_NOMUTEX, nullptr);
     try {
         if (code != SQLITE_OK) raiseLast(code);
         sqlite3_extended_result_codes(db_, 1);
         sqlite3_busy_timeout(db_, busyTimeoutMs);
-        // DEFENSIVE also keeps SQL from writing the schema table directly. A schema is data
-        // of the file: trusted_schema=OFF keeps it from calling functions with side effects.
+        // DEFENSIVE keeps SQL from writing the schema table. The schema comes from the file:
+        // without TRUSTED_SCHEMA it cannot call functions with side effects.
         sqlite3_db_config(db_, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
         sqlite3_db_config(db_, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
         execute("PRAGMA cell_size_check=ON; PRAGMA foreign_keys=ON; PRAGMA synchronous=FULL");
@@ -106,7 +106,7 @@ void Connection::raiseLast(int code) const {
     std::string message = sqlite3_errmsg(db_);
     message += " (SQLite code " + std::to_string(code) + ")";
     const ErrorCode mapped = codeOf(code, full);
-    if (mapped == ErrorCode::kStorageFull) message += "; make room on the device";
+    if (mapped == ErrorCode::kStorageFull) message += "; free some space on the device";
     throw Failure(mapped, std::move(message), true);
 }
 
@@ -133,7 +133,7 @@ std::string Connection::text(const std::string& sql) {
 }
 
 void Connection::rollback() noexcept {
-    // SQLite has rolled back by itself after some failures (disk full, I/O error).
+    // After some failures (disk full, I/O error) SQLite has rolled back already.
     if (sqlite3_get_autocommit(db_) == 0) sqlite3_exec(db_, "ROLLBACK", nullptr, nullptr, nullptr);
 }
 

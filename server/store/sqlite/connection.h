@@ -1,73 +1,25 @@
-// The private layer over the SQLite C API: connection, cached statements, transactions.
+// The private layer over the SQLite C API: connections, cached statements, transactions. Functions
+// throw Failure (server/store/failure.h).
 //
-// Inside server/store/ failures travel as the exception `Failure`; every public function of
-// the store catches it at the border (`guarded`) and returns its Error. That keeps SQL code
-// in straight lines and rolls transactions back on every way out.
-//
-// Thread-safety: a connection and what belongs to it is used by one thread at a time.
+// Thread-safety: a connection and everything that uses it belong to one thread at a time.
 #pragma once
 
 #include <cstdint>
-#include <exception>
 #include <memory>
-#include <new>
 #include <string>
 #include <string_view>
 #include <type_traits>
 #include <unordered_map>
 #include <utility>
 
-#include "core/base/error.h"
 #include "core/base/run_context.h"
+#include "server/store/failure.h"
 
 struct sqlite3;
 struct sqlite3_blob;
 struct sqlite3_stmt;
 
 namespace shapedb::store {
-
-/// Thrown inside the store only. `fromSqlite`: the message is SQLite's and wants the name of
-/// the operation in front.
-struct Failure : std::exception {
-    Failure(ErrorCode code, std::string message, bool fromLibrary = false)
-        : error{code, std::move(message)}, fromSqlite(fromLibrary) {}
-    const char* what() const noexcept override { return error.message.c_str(); }
-
-    Error error;
-    bool fromSqlite;
-};
-
-[[noreturn]] inline void raise(ErrorCode code, std::string message) {
-    throw Failure(code, std::move(message));
-}
-
-/// The value, or the error as a Failure.
-template <typename T>
-T orRaise(Result<T> result) {
-    if (!result) raise(result.error().code, result.error().message);
-    if constexpr (!std::is_void_v<T>) return std::move(*result);
-}
-
-/// Runs the body of a public function and turns every exception into an Error. `operation`
-/// completes "cannot ...".
-template <typename Fn>
-auto guarded(const char* operation, Fn&& body) noexcept -> Result<std::invoke_result_t<Fn>> {
-    try {
-        if constexpr (std::is_void_v<std::invoke_result_t<Fn>>) {
-            body();
-            return {};
-        } else {
-            return body();
-        }
-    } catch (const Failure& failure) {
-        if (!failure.fromSqlite) return fail(failure.error);
-        return fail(failure.error.code, std::string("cannot ") + operation + ": " + failure.error.message);
-    } catch (const std::bad_alloc&) {
-        return fail(ErrorCode::kOutOfMemory, "out of memory");  // fits without allocating
-    } catch (const std::exception& other) {
-        return fail(ErrorCode::kInternal, std::string("cannot ") + operation + ": " + other.what());
-    }
-}
 
 enum class OpenMode {
     kReadOnly,
@@ -78,26 +30,26 @@ enum class OpenMode {
 /// One open database handle with its prepared statements.
 class Connection {
   public:
-    /// Opens `path` (":memory:" for a private one) and sets what every connection needs
-    /// before it reads a byte. Touches no content. Throws Failure.
+    /// Opens `path` (":memory:" for a private database) and configures the connection before it reads a
+    /// byte. Touches no content.
     Connection(const std::string& path, OpenMode mode, int busyTimeoutMs);
     ~Connection();
     Connection(const Connection&) = delete;
     Connection& operator=(const Connection&) = delete;
 
-    /// Runs SQL text that returns no rows the caller wants; several statements are allowed.
+    /// Runs one or more statements and ignores their rows.
     void execute(const std::string& sql);
-    /// First column of the first row of a statement that is not cached (PRAGMA ...).
+    /// First column of the first row; the statement is not cached (PRAGMA ...).
     std::int64_t integer(const std::string& sql);
     std::string text(const std::string& sql);
 
-    /// Ends any transaction without throwing.
+    /// Ends the open transaction, if there is one.
     void rollback() noexcept;
-    /// Rows changed by the last INSERT, UPDATE or DELETE, triggers and cascades not counted.
+    /// Rows changed by the last INSERT, UPDATE or DELETE, without triggers and cascades.
     std::int64_t changes() const noexcept;
     std::int64_t lastInsertId() const noexcept;
-    /// Writes the WAL back and truncates it, waiting for readers at most `waitMs`. Returns
-    /// false when readers kept it from finishing.
+    /// Writes the log back into the database and truncates it. Waits at most `waitMs` for readers; false
+    /// when they kept it from finishing.
     bool truncateWal(int waitMs);
 
     sqlite3* handle() const noexcept { return db_; }
@@ -114,7 +66,7 @@ class Connection {
 
     sqlite3* db_ = nullptr;
     int busyTimeoutMs_ = 0;
-    // By address: the SQL texts are constants (sqlite_sql.h), each prepared once.
+    // By address: the SQL texts are the constants of sql.h, each prepared once.
     std::unordered_map<const char*, StatementPtr> statements_;
 };
 
@@ -129,8 +81,8 @@ struct ZeroBlob {
     std::uint64_t size = 0;
 };
 
-/// One execution of a cached statement. `sql` must be one of the constants of sqlite_sql.h:
-/// its address is the cache key. Two executions of the same text must not overlap.
+/// One execution of a cached statement. `sql` must be a constant of sql.h: its address is the
+/// cache key. Two executions of the same text must not overlap.
 class Query {
   public:
     Query(Connection& connection, const char* sql);
@@ -149,7 +101,7 @@ class Query {
         (bind(++position, values), ...);
     }
 
-    /// True: a row is there. False: finished.
+    /// True: there is a row. False: finished.
     bool step();
     /// For statements without rows.
     void run();
@@ -175,17 +127,17 @@ class Query {
     sqlite3_stmt* statement_;
 };
 
-/// Fills a blob that was inserted as ZeroBlob, from its start to its end, so that it is never in memory
-/// as a whole. Inside the transaction that inserted it.
+/// Fills a blob inserted as ZeroBlob from start to end, so that SQLite never holds it whole. Use it
+/// inside the transaction that inserted the blob.
 class BlobWriter {
   public:
-    /// Names must outlive this. Throws Failure.
+    /// The names must outlive this.
     BlobWriter(Connection& connection, const char* table, const char* column, std::int64_t rowId);
     ~BlobWriter();
     BlobWriter(const BlobWriter&) = delete;
     BlobWriter& operator=(const BlobWriter&) = delete;
 
-    /// Throws Failure, also when the blob is full.
+    /// Throws Failure also when the blob is full.
     void append(const void* data, std::size_t size);
 
   private:
@@ -210,8 +162,7 @@ class Transaction {
     bool open_ = true;
 };
 
-/// While it lives, a statement running on `connection` is interrupted (Failure kCancelled)
-/// when `context` says so.
+/// While it lives, `context` can interrupt a statement that runs on `connection` (Failure kCancelled).
 class Interruptible {
   public:
     Interruptible(Connection& connection, const RunContext& context);
@@ -223,8 +174,8 @@ class Interruptible {
     Connection& connection_;
 };
 
-/// SQLite's backup: all pages of `from` replace those of `to` in one transaction on `to`. Destroyed
-/// before the end, it leaves `to` as it was. Neither connection may be used meanwhile.
+/// SQLite's backup: all pages of `from` replace those of `to` in one transaction. Destroyed early, it
+/// leaves `to` unchanged. Do not use either connection meanwhile.
 class PageCopy {
   public:
     PageCopy(Connection& from, Connection& to);
@@ -232,7 +183,7 @@ class PageCopy {
     PageCopy(const PageCopy&) = delete;
     PageCopy& operator=(const PageCopy&) = delete;
 
-    /// Copies up to `pages`; true when all are there and committed.
+    /// Copies up to `pages`; true when the copy is complete and committed.
     bool step(int pages);
     std::uint64_t donePages() const noexcept;
     std::uint64_t totalPages() const noexcept;
@@ -242,8 +193,8 @@ class PageCopy {
     void* backup_;
 };
 
-/// Copies `stepPages` at a time, calling `between(done, total)` after each step but the last;
-/// when that throws, `to` is as before.
+/// Copies `stepPages` at a time and calls `between(done, total)` after each step but the last; if that
+/// throws, `to` stays unchanged.
 template <typename Between>
 void copyDatabase(Connection& from, Connection& to, int stepPages, Between between) {
     PageCopy copy(from, to);

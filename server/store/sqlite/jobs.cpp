@@ -16,7 +16,7 @@ bool SqliteStore::jobIsCurrent(Connection& connection, const Job& job, std::int6
                                                " for a collection of generation " + std::to_string(serving));
     }
     if (generation == serving) return true;
-    // Made with the parameters of before a rebuild: it could never serve. Once more, then.
+    // Made with the parameters from before a rebuild, it could never serve: queue the job again.
     Query(connection, sql::kReleaseJob, job.id, job.attempts).run();
     return false;
 }

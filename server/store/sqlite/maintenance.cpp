@@ -18,11 +18,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// 1 MB between two looks at the caller's wish to stop.
+/// 1 MiB between two checks for cancellation.
 constexpr int kStepPages = 256;
 constexpr std::size_t kCopyBytes = 1u << 20;
 
-/// Removes a temporary database and what SQLite may put beside it.
+/// Removes a temporary database and the files SQLite may put beside it.
 class TemporaryFile {
   public:
     explicit TemporaryFile(std::string path) : path_(std::move(path)) { remove(); }
@@ -78,7 +78,7 @@ void createPrivate(const std::string& path) {
     if (file.get() < 0) raiseUnwritable(path, errno);
 }
 
-/// Gives the finished file its name, never over another file.
+/// Gives the finished file its name; never replaces another file.
 void publish(const std::string& temporary, const std::string& path) {
     {
         const File file(temporary, O_RDONLY);
@@ -87,7 +87,7 @@ void publish(const std::string& temporary, const std::string& path) {
     if (::renameat2(AT_FDCWD, temporary.c_str(), AT_FDCWD, path.c_str(), RENAME_NOREPLACE) != 0) {
         if (errno == EEXIST)
             raise(ErrorCode::kAlreadyExists, "'" + path + "' already exists; choose a new name");
-        // EINVAL: a file system without that flag.
+        // EINVAL: the file system does not know the flag.
         if (errno != EINVAL) raiseUnwritable(path, errno);
         if (fs::exists(path))
             raise(ErrorCode::kAlreadyExists, "'" + path + "' already exists; choose a new name");
@@ -127,7 +127,7 @@ void copyBytes(const std::string& from, const std::string& to, const RunContext&
     }
 }
 
-/// A file that is part of a running database is not a backup.
+/// A file of a running database is not a backup.
 void requireBackupFile(const std::string& path, const std::string& livePath) {
     std::error_code error;
     if (!fs::exists(path, error)) {
@@ -139,12 +139,12 @@ void requireBackupFile(const std::string& path, const std::string& livePath) {
     const std::uintmax_t wal = fs::file_size(path + "-wal", error);
     if (!error && wal > 0) {
         raise(ErrorCode::kMalformedFile, "'" + path +
-                                             "' is a database in use (its log lies beside it), not a "
+                                             "' is a database in use (its log is beside it), not a "
                                              "backup; make one with the backup command");
     }
 }
 
-/// What is wrong with the copy is wrong with the file the user named.
+/// Reports a problem of the private copy as one of the file the user named.
 template <typename Body>
 void blaming(const std::string& path, Body body) {
     try {
@@ -163,13 +163,13 @@ void blaming(const std::string& path, Body body) {
     }
 }
 
-/// Checks the private copy of a backup and brings it to this program's schema.
+/// Migrates the private copy of a backup and checks it.
 void prepareCopy(Connection& copy, const RunContext& context, std::int64_t nowMs) {
     if (identify(copy) != FileKind::kOurs) raise(ErrorCode::kDataLoss, "it is not a ShapeDB database");
     if (copy.integer("PRAGMA page_size") != kPageSize) {
         raise(ErrorCode::kDataLoss, "its page size is not " + std::to_string(kPageSize));
     }
-    copy.execute("PRAGMA synchronous=OFF");  // a crash only loses the copy
+    copy.execute("PRAGMA synchronous=OFF");  // a crash loses only the copy
     const std::string mode = copy.text("PRAGMA journal_mode=DELETE");
     if (mode != "delete") raise(ErrorCode::kStorage, "cannot change the journal mode of the copy");
     migrate(copy, embeddedMigrations(), nowMs);
@@ -191,9 +191,9 @@ void setLastId(Connection& connection, const std::string& table, std::int64_t id
                        std::to_string(id) + ")");
 }
 
-/// Ids are never reused, across a restore neither: new rows continue past both histories,
-/// and jobs and rebuilds of the file get ids the running server has never handed out, so
-/// that a result still in flight cannot meet a row it was not made for.
+/// Ids are never reused, not even across a restore: new rows continue after both histories, and jobs
+/// and rebuilds of the file get ids that the running server has never given out, so that a result in
+/// flight cannot meet the wrong row.
 void separateIds(Connection& copy, Connection& live) {
     Transaction transaction(copy, Transaction::Kind::kWrite);
     for (const char* table : {"collection", "shape"}) {
@@ -204,7 +204,7 @@ void separateIds(Connection& copy, Connection& live) {
         copy.execute("UPDATE " + table + " SET id = id + " + std::to_string(offset));
         setLastId(copy, table, offset + lastId(copy, table));
     }
-    // Whoever ran these jobs when the backup was made did not die of them.
+    // The server that made the backup did not die of the jobs it was running.
     copy.execute("UPDATE job SET state = 0, attempts = attempts - 1 WHERE state = 1");
     transaction.commit();
 }
@@ -220,16 +220,16 @@ Result<void> SqliteStore::backup(const std::string& path, const RunContext& cont
         const Counted longRead(longReads_);
         {
             Connection source(options_.path, OpenMode::kReadOnly, options_.busyTimeoutMs);
-            // The open snapshot keeps writers from making SQLite start the copy over.
+            // Without an open snapshot every write would make SQLite restart the copy.
             const Transaction snapshot(source, Transaction::Kind::kRead);
             static_cast<void>(source.integer("SELECT count(*) FROM sqlite_schema"));
             Connection target(temporary.path(), OpenMode::kReadWrite, options_.busyTimeoutMs);
-            target.execute("PRAGMA synchronous=OFF");  // made durable as a whole by `publish`
+            target.execute("PRAGMA synchronous=OFF");  // `publish` makes the file durable
             copyDatabase(source, target, kStepPages, [&](std::uint64_t done, std::uint64_t total) {
                 context.report("backup", done, total);
                 orRaise(context.checkpoint());
             });
-            // A file alone, that can be read from a folder one may not write to.
+            // Without a log beside it, the file can be read from a folder that is not writable.
             if (target.text("PRAGMA journal_mode=DELETE") != "delete") {
                 raise(ErrorCode::kStorage, "cannot turn the backup into a single file");
             }

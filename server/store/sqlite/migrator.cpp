@@ -22,7 +22,7 @@ std::string fingerprint(const Migration& migration) {
     return toHex(sha256(text.data(), text.size()));
 }
 
-/// Compares the record with what this program carries; returns how many are applied.
+/// Compares the record with the migrations of this program; returns how many are applied.
 std::size_t verifyRecord(Connection& connection, const std::vector<Migration>& migrations) {
     std::size_t applied = 0;
     Query record(connection, kReadRecord);
@@ -71,14 +71,14 @@ std::map<std::string, std::string> schemaOf(Connection& connection) {
     Query rows(connection, kReadSchema);
     while (rows.step()) {
         std::string name = rows.text(0);
-        // sqlite_sequence, automatic indices, statistics: SQLite's own.
+        // Not SQLite's own: sqlite_sequence, automatic indices, statistics.
         if (name.find(" sqlite_") == std::string::npos) schema.emplace(std::move(name), rows.text(1));
     }
     return schema;
 }
 
-/// A file can carry our marks and other tables, or triggers of its own: refuse it before a
-/// statement meets it.
+/// A file with our marks may still have other tables, or triggers of its own: refuse it before any
+/// statement runs on it.
 void verifySchema(Connection& connection, const std::vector<Migration>& migrations) {
     Connection reference(":memory:", OpenMode::kReadWriteCreate, 0);
     for (const Migration& migration : migrations) apply(reference, migration, 0);

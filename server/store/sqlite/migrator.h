@@ -1,8 +1,8 @@
-// Brings a database file to the schema of this program.
+// Brings a database to the schema of this program.
 //
-// Migrations are the numbered files of migrations/, compiled in. They only go forward, each
-// in its own transaction, and are never edited once released: the database remembers the
-// SHA-256 of every text it has seen.
+// Migrations are the numbered files of migrations/sqlite/, compiled in. They only go forward, each in
+// its own transaction, and are never edited after release: the database records the SHA-256 of each
+// one it has applied.
 #pragma once
 
 #include <cstdint>
@@ -15,16 +15,16 @@ namespace shapedb::store {
 
 /// PRAGMA application_id of every database of ours: "ShDB". Persisted.
 constexpr std::int64_t kApplicationId = 0x53684442;
-/// PRAGMA page_size. Persisted; restore copies pages, so all our files must agree.
+/// PRAGMA page_size. Persisted: restore copies pages, so that all files must agree.
 constexpr std::int64_t kPageSize = 4096;
 
 struct Migration {
     int number;        ///< 1, 2, 3, ...
-    const char* name;  ///< file name without its ending
+    const char* name;  ///< file name without extension
     const char* sql;
 };
 
-/// migrations/*.sql by rising number, without a gap.
+/// By rising number, without gaps.
 const std::vector<Migration>& embeddedMigrations();
 
 enum class FileKind {
@@ -33,17 +33,17 @@ enum class FileKind {
     kForeign,  ///< an SQLite database of something else
 };
 
-/// Reads only. Throws Failure kDataLoss when it is no SQLite database at all.
+/// Writes nothing. Throws Failure kDataLoss when the file is no SQLite database.
 FileKind identify(Connection& connection);
 
 /// PRAGMA user_version: the number of the last migration applied.
 int schemaVersion(Connection& connection);
 
-/// Applies what is missing. Throws Failure:
-/// - kSchemaTooNew: the file has a migration that `migrations` does not;
-/// - kDataLoss: a migration was edited after it had been applied, the record has a gap, or
-///   the tables are not those the applied migrations make.
-/// Everything up to the failed migration stays applied.
+/// Applies missing migrations. Throws Failure:
+/// - kSchemaTooNew: the database has a migration that `migrations` lacks;
+/// - kDataLoss: a migration was edited after it was applied, the record has a gap, or the schema is
+///   not what the migrations make.
+/// Migrations before a failed one stay applied.
 void migrate(Connection& connection, const std::vector<Migration>& migrations, std::int64_t nowMs);
 
 }  // namespace shapedb::store

@@ -12,7 +12,7 @@ ReaderPool::ReaderPool(const std::string& path, int count, int busyTimeoutMs) {
 ReaderPool::Lease ReaderPool::acquire() {
     std::unique_lock<std::mutex> lock(mutex_);
     freed_.wait(lock, [this] { return !free_.empty(); });
-    // The last one given back: its page cache is the warmest.
+    // The last one returned has the warmest page cache.
     std::unique_ptr<Connection> connection = std::move(free_.back());
     free_.pop_back();
     return {*this, std::move(connection)};

@@ -1,4 +1,4 @@
-// The read connections, lent to one thread at a time.
+// Read connections, each lent to one thread at a time.
 #pragma once
 
 #include <condition_variable>

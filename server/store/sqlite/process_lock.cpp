@@ -39,7 +39,7 @@ ProcessLock::ProcessLock(const std::string& databasePath) {
         raise(ErrorCode::kStorage, "database '" + databasePath + "' is in use by process " + owner +
                                        "; stop that server or choose another data folder");
     }
-    // Only for the message above: the lock holds without it, on a full device too.
+    // Only for the message above: the lock holds without it, for example on a full device.
     const std::string pid = std::to_string(getpid()) + "\n";
     if (ftruncate(descriptor_, 0) == 0 && pwrite(descriptor_, pid.data(), pid.size(), 0) < 0) {
         static_cast<void>(ftruncate(descriptor_, 0));

@@ -5,12 +5,11 @@
 
 namespace shapedb::store {
 
-/// Holds an exclusive flock on `path` + ".lock" for its lifetime; the file stays and contains
-/// the owner's process id. The kernel drops the lock with the process, however it ends.
+/// Holds an exclusive flock on the database path + ".lock". The kernel releases it however the process
+/// ends; the file stays and contains the owner's process id.
 class ProcessLock {
   public:
-    /// Throws Failure kStorage: held by another (the message names its process id), or the
-    /// file cannot be created.
+    /// Throws Failure kStorage: another process has it (names its id), or the file cannot be created.
     explicit ProcessLock(const std::string& databasePath);
     ~ProcessLock();
     ProcessLock(const ProcessLock&) = delete;

@@ -1,4 +1,4 @@
-// Rebuilds: a second generation of signatures grows beside the serving one.
+// Rebuilds: a second generation of signatures is built beside the serving one.
 #include "server/store/sqlite/rows.h"
 #include "server/store/sqlite/sqlite_store_impl.h"
 
@@ -8,7 +8,7 @@ namespace {
 
 std::uint64_t count(Query&& query) { return query.step() ? static_cast<std::uint64_t>(query.integer(0)) : 0; }
 
-/// Live figures while it runs, frozen ones afterwards. Throws Failure kNotFound.
+/// Current counts while it runs, final ones afterwards. Throws Failure kNotFound.
 Rebuild requireRebuild(Connection& connection, std::int64_t rebuildId) {
     Rebuild rebuild;
     {

@@ -1,4 +1,4 @@
-// From rows to the structs of store.h, and the small reads several parts share.
+// From rows to the structs of store.h, and small reads that several files share.
 #pragma once
 
 #include <optional>
@@ -14,12 +14,12 @@ namespace shapedb::store {
 inline constexpr int kColumnMetadataName = 12;
 inline constexpr int kColumnMetadataValue = 13;
 
-/// Columns 0 to 11 of the current row; metadata stays empty. Throws Failure kDataLoss for
-/// values no writer of ours leaves.
+/// Columns 0 to 11 of the current row; metadata stays empty. Throws Failure kDataLoss for values that
+/// the store never writes.
 Shape readShape(const Query& query);
 
-/// Groups the rows of a SHAPEDB_SHAPE_COLUMNS statement into shapes: `visit(shape)` is called on each
-/// complete shape; returning false ends the walk.
+/// Groups the rows of a SHAPEDB_SHAPE_COLUMNS statement into shapes and calls `visit(shape)` for each
+/// until it returns false.
 template <typename Visit>
 void forEachShape(Query& query, Visit visit) {
     bool more = query.step();
@@ -42,18 +42,17 @@ Collection requireCollection(Connection& connection, std::int64_t collectionId);
 std::optional<Collection> findCollection(Connection& connection, const std::string& name);
 Collection readCollection(const Query& query);
 
-/// Reads points_version, generation, digest, bytes from `column` on and compares the digest.
-/// Throws Failure kDataLoss, which names the shape.
+/// Reads points_version, generation, digest and bytes from `column` on and verifies the digest. Throws
+/// Failure kDataLoss, naming the shape.
 SignatureRow readSignature(Connection& connection, const Query& query, int column, std::int64_t shapeId);
 
-/// What column signature.digest holds: the first eight bytes of the SHA-256, little-endian.
-/// Persisted.
+/// Column signature.digest: the first eight bytes of the SHA-256, little-endian. Persisted.
 std::int64_t signatureDigest(const std::string& bytes);
 
-/// The row of a kLoadPoints query, decoded and compared with its checksum. Throws Failure.
+/// Decodes the points of a kLoadPoints row and verifies their checksum. Throws Failure.
 std::vector<float> readPoints(const Query& query);
 
-/// How messages name a shape.
+/// A name as it appears in messages.
 std::string quoted(const std::string& key);
 
 }  // namespace shapedb::store

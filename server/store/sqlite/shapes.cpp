@@ -1,7 +1,6 @@
 // Shapes, their points and the signatures that serve.
 #include <algorithm>
 
-#include "common/sha256.h"
 #include "core/base/return_if_error.h"
 #include "server/store/point_blob.h"
 #include "server/store/sqlite/rows.h"
@@ -11,7 +10,7 @@ namespace shapedb::store {
 
 namespace {
 
-// A caller may ask for all there is.
+// A caller may set no limit.
 constexpr std::size_t kMostReserved = 4096;
 
 [[noreturn]] void raiseNoShape(std::int64_t shapeId) {
@@ -39,8 +38,8 @@ void writeMetadata(Connection& connection, std::int64_t shapeId, const Metadata&
 
 void writePoints(Connection& connection, std::int64_t shapeId, const PutRequest& request,
                  const PointEncoding& encoding) {
-    const std::size_t bytes = request.points->size() * sizeof(float);
-    if (const std::string* blob = encoding.held()) {
+    const std::uint64_t bytes = request.scan.bytes();
+    if (const std::string* blob = encoding.whole()) {
         Query(connection, sql::kInsertPoints, shapeId, bytes, blob->size(),
               BlobView{blob->data(), blob->size()})
             .run();
@@ -52,17 +51,6 @@ void writePoints(Connection& connection, std::int64_t shapeId, const PutRequest&
 }
 
 BlobView view(const Checksum& checksum) { return {checksum.data(), checksum.size()}; }
-
-void requireValid(const PutRequest& request) {
-    if (request.points == nullptr || request.points->size() % 3 != 0) {
-        raise(ErrorCode::kInvalidArgument,
-              "the points of shape " + quoted(request.key) + " are not packed x y z");
-    }
-    if (sha256(request.points->data(), request.points->size() * sizeof(float)) != request.checksum) {
-        raise(ErrorCode::kChecksumMismatch, "the points of shape " + quoted(request.key) +
-                                                " do not have the announced checksum; send them again");
-    }
-}
 
 /// The rules of PutMode and expectedVersion for the key as it is now.
 void requireAllowed(const PutRequest& request, const Collection& collection,
@@ -79,7 +67,7 @@ void requireAllowed(const PutRequest& request, const Collection& collection,
 
 void SqliteStore::queueJob(Connection& connection, const PutRequest& request, std::int64_t shapeId,
                            std::int64_t pointsVersion) {
-    const std::uint64_t bytes = request.points->size() * sizeof(float);
+    const std::uint64_t bytes = request.scan.bytes();
     Query tally(connection, sql::kTally);
     if (!tally.step()) raise(ErrorCode::kDataLoss, "the row of table tally is missing");
     const auto jobs = static_cast<std::uint64_t>(tally.integer(0));
@@ -98,8 +86,8 @@ void SqliteStore::queueJob(Connection& connection, const PutRequest& request, st
 
 PutResult SqliteStore::insertShape(Connection& connection, const PutRequest& request,
                                    const PointEncoding& encoding) {
-    Query(connection, sql::kInsertShape, request.collectionId, request.key, request.points->size() / 3,
-          view(request.checksum), now())
+    Query(connection, sql::kInsertShape, request.collectionId, request.key, request.scan.pointCount(),
+          view(request.scan.checksum()), now())
         .run();
     const std::int64_t shapeId = connection.lastInsertId();
     writeMetadata(connection, shapeId, request.metadata);
@@ -111,7 +99,7 @@ PutResult SqliteStore::insertShape(Connection& connection, const PutRequest& req
 PutResult SqliteStore::changeShape(Connection& connection, const PutRequest& request,
                                    const PointEncoding& encoding, const Shape& existing) {
     const std::int64_t shapeId = existing.id;
-    const bool samePoints = existing.checksum == request.checksum;
+    const bool samePoints = existing.checksum == request.scan.checksum();
     if (existing.metadata != request.metadata) {
         Query(connection, sql::kDeleteMetadata, shapeId).run();
         writeMetadata(connection, shapeId, request.metadata);
@@ -120,13 +108,13 @@ PutResult SqliteStore::changeShape(Connection& connection, const PutRequest& req
         Query(connection, sql::kRaiseVersion, shapeId, now()).run();
         return {PutOutcome::kMetadataChanged, *findShapeById(connection, shapeId)};
     }
-    Query(connection, sql::kReplacePointsOfShape, shapeId, request.points->size() / 3, view(request.checksum),
-          now())
+    Query(connection, sql::kReplacePointsOfShape, shapeId, request.scan.pointCount(),
+          view(request.scan.checksum()), now())
         .run();
     Query(connection, sql::kDeletePoints, shapeId).run();
     writePoints(connection, shapeId, request, encoding);
-    // The serving signature stays until the new result arrives; what a running rebuild has
-    // made of the old points is worth nothing.
+    // The serving signature stays until the new result arrives; what a running rebuild made of the
+    // old points is worthless.
     const Collection collection = requireCollection(connection, existing.collectionId);
     Query(connection, sql::kDeleteOtherSignatures, shapeId, collection.generation).run();
     Query(connection, sql::kDeleteRebuildFailuresOfShape, shapeId).run();
@@ -136,18 +124,16 @@ PutResult SqliteStore::changeShape(Connection& connection, const PutRequest& req
 }
 
 Result<PutResult> SqliteStore::putShape(const PutRequest& request) {
-    // Hashing and compressing take the longest and need no lock (a large scan is compressed a second
-    // time under it).
-    const auto encoding = guarded("store the scan", [&] {
-        requireValid(request);
-        return orRaise(PointEncoding::plan(*request.points, options_.pointCompressionLevel));
-    });
+    // Compressing takes longest and needs no write lock.
+    std::unique_lock<std::mutex> largeScan(largeScanMutex_, std::defer_lock);
+    if (request.scan.bytes() > PointEncoding::kWholeBytes) largeScan.lock();
+    const auto encoding = PointEncoding::encode(request.scan.points(), options_.pointCompressionLevel);
     RETURN_IF_ERROR(encoding);
     return write("store the scan", [&](Connection& connection) -> PutResult {
         const Collection collection = requireCollection(connection, request.collectionId);
         const std::optional<Shape> existing = findShape(connection, request.collectionId, request.key);
-        const bool identical =
-            existing && existing->checksum == request.checksum && existing->metadata == request.metadata;
+        const bool identical = existing && existing->checksum == request.scan.checksum() &&
+                               existing->metadata == request.metadata;
         requireAllowed(request, collection, existing, identical);
         if (!existing) return insertShape(connection, request, *encoding);
         if (identical) return {PutOutcome::kUnchanged, *existing};
@@ -173,7 +159,7 @@ Result<Shape> SqliteStore::getShapeById(std::int64_t shapeId) {
 
 namespace {
 
-/// Calls `visit` for accepted shapes by rising id until it returns false.
+/// Calls `visit` for each accepted shape, by rising id, until it returns false.
 template <typename Visit>
 void forEachAccepted(Connection& connection, std::int64_t collectionId, std::int64_t afterId,
                      const ShapeFilter& filter, Visit visit) {

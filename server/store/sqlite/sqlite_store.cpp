@@ -17,12 +17,12 @@ namespace shapedb::store {
 namespace {
 
 constexpr int kWalAutoCheckpointPages = 1000;
-/// Past this size a commit waits for readers to let the log start anew.
+/// Beyond this size a commit waits for readers, so that the log can start from the beginning.
 constexpr std::uint64_t kWalBoundBytes = 64u << 20;
-/// Growth between two such attempts, and how long each waits at most.
+/// Growth between two such attempts, and the longest wait of each.
 constexpr std::uint64_t kWalRetryBytes = 16u << 20;
 constexpr int kWalWaitMs = 500;
-/// The log file is cut to this size after each write-back, so a burst does not stay on disk.
+/// The log file is cut to this size after each write-back: bursts do not keep disk space.
 constexpr std::uint64_t kWalKeepBytes = 16u << 20;
 
 std::uint64_t fileSize(const std::string& path) {
@@ -62,8 +62,8 @@ void syncPath(const std::string& path, int flags) {
     if (!ok) raise(ErrorCode::kStorage, "cannot make '" + path + "' durable: " + std::strerror(why));
 }
 
-/// A new database appears under its name only when complete, so that an empty file there is
-/// always damage and never taken for a fresh start.
+/// A new database gets its name when it is complete: an empty file is always damage, never a fresh
+/// start.
 void createDatabase(const SqliteOptions& options) {
     const std::string fresh = options.path + ".new";
     std::filesystem::remove(fresh);
@@ -90,17 +90,18 @@ void requireUsableFile(const SqliteOptions& options) {
     const std::string wal = options.path + "-wal";
     if (!std::filesystem::exists(options.path)) {
         if (fileSize(wal) > 0) {
-            raise(ErrorCode::kDataLoss, "'" + wal + "' is there but its database '" + options.path +
+            raise(ErrorCode::kDataLoss, "'" + wal + "' exists but its database '" + options.path +
                                             "' is not; put the database back or move the log away");
         }
         createDatabase(options);
     } else if (fileSize(options.path) == 0) {
-        raise(ErrorCode::kDataLoss, "the database '" + options.path +
-                                        "' is empty; put a backup in its place, or remove it to start anew");
+        raise(ErrorCode::kDataLoss,
+              "the database '" + options.path +
+                  "' is empty; replace it by a backup, or remove it to start with an empty database");
     }
 }
 
-/// Opens, checks that it is ours before a byte is written, migrates.
+/// Opens the database, checks that it is ours before writing a byte, and migrates it.
 std::unique_ptr<Connection> openWriter(const SqliteOptions& options) {
     requireUsableFile(options);
     auto writer = std::make_unique<Connection>(options.path, OpenMode::kReadWrite, options.busyTimeoutMs);
@@ -138,7 +139,7 @@ void SqliteStore::boundWal() noexcept {
         return;
     }
     walAttemptAt_ = size + kWalRetryBytes;
-    // The commit is done; a failed write-back changes nothing about it and is tried again.
+    // The commit is done; a failed write-back does not undo it and is tried again.
     static_cast<void>(guarded("write back the log", [&] {
         if (writer_->truncateWal(longReads_ > 0 ? 0 : kWalWaitMs)) walAttemptAt_ = kWalBoundBytes;
     }));
@@ -217,8 +218,7 @@ Result<void> SqliteStore::checkpoint() {
     return guarded("write back the log", [&] {
         const std::lock_guard<std::mutex> lock(writerMutex_);
         if (!writer_->truncateWal(options_.busyTimeoutMs)) {
-            raise(ErrorCode::kStorage,
-                  "cannot write back the log: a read is still going on; try again later");
+            raise(ErrorCode::kStorage, "cannot write back the log: a read is still running; try again later");
         }
         walAttemptAt_ = kWalBoundBytes;
     });

@@ -1,4 +1,4 @@
-// The one implementation of Store: an SQLite database file in WAL mode.
+// Store on SQLite: one database file in WAL mode.
 #pragma once
 
 #include <functional>
@@ -10,7 +10,7 @@
 namespace shapedb::store {
 
 struct SqliteOptions {
-    std::string path;               ///< database file; created when missing (its folder must exist)
+    std::string path;               ///< database file; created when missing, its folder must exist
     int readers = 4;                ///< pooled read connections, 1 to 64
     int busyTimeoutMs = 5000;       ///< how long to wait for another process's lock
     int pointCompressionLevel = 1;  ///< zstd level of stored points, 1 to 19
@@ -18,13 +18,13 @@ struct SqliteOptions {
     std::function<TimestampMs()> now;
 };
 
-/// Opens the database and brings its schema up to date (migrations/, each in its own
-/// transaction). Only one store at a time may have it open: an flock on `path`.lock is held
-/// until the returned store is destroyed. No function may be running then.
+/// Opens the database and applies missing migrations, each in its own transaction. Only one store at
+/// a time may have it open: an flock on `path`.lock is held until the store is destroyed, which no
+/// call may outlive.
 ///
-/// Errors: kStorage (cannot be opened or created; in use: the message names the process),
-/// kStorageFull, kSchemaTooNew, kDataLoss (not a database of ours, damaged, empty, or its log
-/// without it: the message says what to do), kInvalidArgument.
+/// Errors: kStorage (cannot be opened or created; in use: names the process), kStorageFull,
+/// kSchemaTooNew, kDataLoss (not a ShapeDB database, damaged, empty, or only its log is there: says
+/// what to do), kInvalidArgument.
 [[nodiscard]] Result<std::unique_ptr<Store>> openSqliteStore(const SqliteOptions& options);
 
 }  // namespace shapedb::store

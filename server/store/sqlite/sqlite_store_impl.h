@@ -1,7 +1,8 @@
-// The class behind openSqliteStore; its functions are spread over sqlite_*.cpp by subject.
+// The class behind openSqliteStore; its functions are in shapes.cpp, jobs.cpp, rebuild.cpp,
+// maintenance.cpp and sqlite_store.cpp.
 //
-// Lock order: writerMutex_ before the pool's own mutex. A reader is never held while waiting
-// for the writer, so writers never wait for readers nor the other way round.
+// Lock order: largeScanMutex_, writerMutex_, the pool's mutex. Nobody holds a reader while waiting
+// for the writer, so that neither waits for the other.
 #pragma once
 
 #include <atomic>
@@ -105,8 +106,8 @@ class SqliteStore final : public Store {
 
     TimestampMs now() const { return options_.now(); }
 
-    /// After a commit: SQLite writes the log back every thousand pages, but cannot start it
-    /// anew while overlapping reads go on without a gap. Past a bound this waits for one.
+    /// After a commit: SQLite writes the log back every thousand pages, but cannot start it from the
+    /// beginning while reads overlap without a gap. Past a bound this waits for a gap.
     void boundWal() noexcept;
 
     PutResult insertShape(Connection& connection, const PutRequest& request, const PointEncoding& encoding);
@@ -119,11 +120,12 @@ class SqliteStore final : public Store {
 
     SqliteOptions options_;
     ProcessLock lock_;
+    std::mutex largeScanMutex_;  ///< one compressed copy of a large scan at a time, to bound memory
     std::mutex writerMutex_;
     std::unique_ptr<Connection> writer_;
     std::unique_ptr<ReaderPool> readers_;
-    std::uint64_t walAttemptAt_;  ///< size of the log at which to wait for readers; writerMutex_
-    /// Backups and checks hold a snapshot for long: waiting for them would be in vain.
+    std::uint64_t walAttemptAt_;  ///< log size at which to wait for readers; under writerMutex_
+    /// Backups and checks, which hold a snapshot too long to wait for.
     std::atomic<int> longReads_{0};
 };
 

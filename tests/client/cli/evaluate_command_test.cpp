@@ -18,7 +18,7 @@ class EvaluateCommand : public CommandTest {
     static void SetUpTestSuite() {
         samples() = (fs::temp_directory_path() / ("shapedb-evaluate-" + std::to_string(::getpid()))).string();
         const CommandRun run = runCommand(
-            {"sample", samples(), "--count", "3", "--points", "1800", "--families", "human,mug,airplane"});
+            {"sample", samples(), "--count", "3", "--points", "1200", "--families", "human,mug,airplane"});
         ASSERT_EQ(run.exitCode, 0) << run.err;
     }
     static void TearDownTestSuite() { fs::remove_all(samples()); }

@@ -8,8 +8,9 @@
 
 #include <fcntl.h>
 #include <stdlib.h>
-#include <sys/wait.h>
 #include <unistd.h>
+
+#include "common/child_process.h"
 
 namespace shapedb::cli {
 
@@ -17,36 +18,18 @@ namespace fs = std::filesystem;
 
 namespace {
 
-std::vector<char*> pointers(std::vector<std::string>& texts) {
-    std::vector<char*> result;
-    for (std::string& text : texts) result.push_back(text.data());
-    result.push_back(nullptr);
-    return result;
-}
-
-std::vector<std::string> environmentWith(const std::map<std::string, std::string>& own) {
-    std::vector<std::string> all;
-    for (char** entry = environ; *entry != nullptr; ++entry) {
-        if (std::string(*entry).rfind("SHAPEDB_", 0) != 0) all.emplace_back(*entry);
-    }
-    for (const auto& [name, value] : own) all.push_back(name + "=" + value);
-    return all;
-}
-
-pid_t spawn(std::vector<std::string> arguments, const std::map<std::string, std::string>& own,
-            const std::string& outFile, const std::string& errFile) {
-    arguments.insert(arguments.begin(), SHAPEDB_PATH);
-    std::vector<std::string> environment = environmentWith(own);
-    const std::vector<char*> argv = pointers(arguments);
-    const std::vector<char*> envp = pointers(environment);
-    const pid_t child = ::fork();
-    if (child == 0) {
-        ::dup2(::open(outFile.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600), STDOUT_FILENO);
-        ::dup2(::open(errFile.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600), STDERR_FILENO);
-        ::execve(SHAPEDB_PATH, argv.data(), envp.data());
-        ::_exit(127);
-    }
-    return child;
+ChildProcess start(const std::vector<std::string>& arguments,
+                   const std::map<std::string, std::string>& environment, const std::string& outFile,
+                   const std::string& errFile) {
+    const auto create = [](const std::string& file) {
+        return ::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+    };
+    const int out = create(outFile);
+    const int err = create(errFile);
+    auto process = ChildProcess::start(SHAPEDB_PATH, arguments, environment, out, err);
+    ::close(out);
+    ::close(err);
+    return std::move(process).value();
 }
 
 std::string slurp(const std::string& file) {
@@ -79,11 +62,8 @@ nlohmann::json CommandRun::json() const {
 CommandRun runCommand(const std::vector<std::string>& arguments,
                       const std::map<std::string, std::string>& environment) {
     const std::string folder = makeFolder();
-    const pid_t child = spawn(arguments, environment, folder + "/out", folder + "/err");
-    int status = 0;
-    ::waitpid(child, &status, 0);
     CommandRun run;
-    if (WIFEXITED(status)) run.exitCode = WEXITSTATUS(status);
+    run.exitCode = start(arguments, environment, folder + "/out", folder + "/err").wait();
     run.out = slurp(folder + "/out");
     run.err = slurp(folder + "/err");
     fs::remove_all(folder);
@@ -91,7 +71,7 @@ CommandRun runCommand(const std::vector<std::string>& arguments,
 }
 
 int startCommand(const std::vector<std::string>& arguments) {
-    return spawn(arguments, {}, "/dev/null", "/dev/null");
+    return start(arguments, {}, "/dev/null", "/dev/null").release();
 }
 
 CommandTest::CommandTest() : folder_(makeFolder()) {}

@@ -5,6 +5,7 @@
 #include <ostream>
 
 #include "client/io/scan_reader.h"
+#include "core/base/math.h"
 #include "core/pipeline.h"
 #include "core/synthetic/noise.h"
 #include "tests/client/cli/run_command.h"
@@ -53,7 +54,7 @@ TEST_F(SegmentCommand, JsonHasThePromisedKeys) {
 
 TEST_F(SegmentCommand, FindsTheTwoBallsOfADumbbell) {
     const auto document = runCommand({"segment", dumbbell(), "--json", "--profile", "paper"}).json();
-    const double ball = 4.0 / 3.0 * 3.14159265358979;
+    const double ball = 4.0 / 3.0 * kPi;
     for (int i = 0; i < 2; ++i) {
         const auto& point = document["signature"][i];
         EXPECT_NEAR(point["weight"].get<double>(), ball, 0.1 * ball);

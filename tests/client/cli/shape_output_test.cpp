@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/cli/local_result.h"
+#include "core/base/math.h"
 #include "core/base/random.h"
 #include "core/signature/signature.h"
 
@@ -13,7 +14,7 @@ namespace shapedb::cli {
 namespace {
 
 Matrix3 aboutZ(double degrees) {
-    const double angle = degrees * 3.14159265358979323846 / 180.0;
+    const double angle = toRadians(degrees);
     return {
         {{std::cos(angle), -std::sin(angle), 0.0}, {std::sin(angle), std::cos(angle), 0.0}, {0.0, 0.0, 1.0}}};
 }

@@ -9,7 +9,7 @@
 namespace shapedb {
 namespace {
 
-// Every operation on every two of these, in either half, has the bits that one double gives.
+// Every operation is tried on every pair of these, in both halves.
 const std::vector<double> kNumbers = {0.0,   1.0,     -1.0,   0.1,   -3.7,
                                       1e300, -1e-300, 5e-324, 1e308, std::numeric_limits<double>::infinity()};
 
@@ -33,7 +33,7 @@ void compare(const char* what, OfPair ofPair, OfOne ofOne) {
     }
 }
 
-TEST(Double2, RoundsAsOneDoubleDoes) {
+TEST(Double2, EachHalfHasTheBitsOfAPlainDouble) {
     compare(
         "+", [](Double2 a, Double2 b) { return a + b; }, [](double a, double b) { return a + b; });
     compare(
@@ -54,7 +54,7 @@ TEST(Double2, RoundsAsOneDoubleDoes) {
         "abs", [](Double2 a, Double2) { return abs(a); }, [](double a, double) { return std::abs(a); });
 }
 
-TEST(Double2, ComparesEachHalf) {
+TEST(Double2, LessReportsOneBitPerHalf) {
     const double nan = std::numeric_limits<double>::quiet_NaN();
     EXPECT_EQ(less(Double2(1.0, 2.0), Double2(2.0, 1.0)), 1U);
     EXPECT_EQ(less(Double2(2.0, 1.0), Double2(1.0, 2.0)), 2U);

@@ -12,7 +12,7 @@ namespace {
 // kInternal is documented as the last value; the loop covers the whole closed enum.
 constexpr int kCount = static_cast<int>(ErrorCode::kInternal) + 1;
 
-TEST(Error, EveryNameLeadsBackToItsCode) {
+TEST(Error, NamesRoundTripToCodes) {
     for (int i = 0; i < kCount; ++i) {
         const auto code = static_cast<ErrorCode>(i);
         EXPECT_EQ(errorCodeFromName(errorCodeName(code)), code) << errorCodeName(code);
@@ -30,7 +30,7 @@ TEST(Error, NamesAreDistinctSnakeCase) {
 }
 
 // The names are stored in databases and read by scripts: a rename breaks them.
-TEST(Error, StoredNamesStayAsTheyWere) {
+TEST(Error, StoredNamesAreFrozen) {
     EXPECT_STREQ(errorCodeName(ErrorCode::kNonFiniteCoordinate), "non_finite_coordinate");
     EXPECT_STREQ(errorCodeName(ErrorCode::kTooFewPoints), "too_few_points");
     EXPECT_STREQ(errorCodeName(ErrorCode::kCoplanar), "coplanar");
@@ -41,7 +41,7 @@ TEST(Error, StoredNamesStayAsTheyWere) {
     EXPECT_STREQ(errorCodeName(ErrorCode::kInternal), "internal");
 }
 
-TEST(Error, UnknownNameIsInternal) {
+TEST(Error, UnknownNameMapsToInternal) {
     EXPECT_EQ(errorCodeFromName("written_by_a_newer_version"), ErrorCode::kInternal);
     EXPECT_EQ(errorCodeFromName(""), ErrorCode::kInternal);
     EXPECT_EQ(errorCodeFromName("Coplanar"), ErrorCode::kInternal);

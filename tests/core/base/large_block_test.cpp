@@ -9,7 +9,7 @@
 namespace shapedb {
 namespace {
 
-TEST(LargeBlock, HoldsWhatIsWritten) {
+TEST(LargeBlock, KeepsWhatIsWrittenAndThrowsWhenOutOfMemory) {
     for (const std::size_t count :
          {std::size_t{1}, std::size_t{1000}, std::size_t{300000}, std::size_t{20000000}}) {
         const auto block = allocateLarge<std::uint32_t>(count);
@@ -19,15 +19,15 @@ TEST(LargeBlock, HoldsWhatIsWritten) {
     EXPECT_THROW(static_cast<void>(allocateLarge<double>(std::size_t{1} << 58)), std::bad_alloc);
 }
 
-// Sizes around those from which blocks are mapped, and on large pages; parts of odd sizes.
-TEST(LargeBlock, WhatIsSpentMakesVectorsOfAnySize) {
+// Sizes around the limits from which blocks are mapped and use huge pages; vectors of odd sizes.
+TEST(LargeBlock, RecycledPagesServeVectorsOfAnySize) {
     for (const std::size_t megabytes : {0, 1, 3, 8, 9, 31, 64}) {
         auto block = allocateLarge<std::uint64_t>(megabytes * 131072 + 11);
         block[0] = 1;
-        SpentBlock spent(std::move(block));
+        PageRecycler recycler(std::move(block));
         std::vector<LargeVector<std::uint32_t>> vectors;
         for (const std::size_t count : {5, 300000, 2200000, 4500001, 2500000, 9000000}) {
-            vectors.push_back(spent.makeVector<std::uint32_t>(count));
+            vectors.push_back(recycler.makeVector<std::uint32_t>(count));
             ASSERT_EQ(vectors.back().size(), count);
             for (std::size_t i = 0; i < count; ++i) vectors.back()[i] = static_cast<std::uint32_t>(i ^ count);
         }
@@ -38,7 +38,7 @@ TEST(LargeBlock, WhatIsSpentMakesVectorsOfAnySize) {
             }
             EXPECT_EQ(wrong, 0U) << megabytes << " " << vector.size();
         }
-        vectors.front().resize(10000000);  // a vector as any other
+        vectors.front().resize(10000000);  // still an ordinary vector
         EXPECT_EQ(vectors.front()[4], 4U ^ 5U);
     }
 }

@@ -11,7 +11,7 @@
 namespace shapedb {
 namespace {
 
-TEST(Parallel, RangesCoverEveryIndexOnce) {
+TEST(Parallel, RangesCoverEveryIndexExactlyOnce) {
     for (const int threads : {1, 3}) {
         tbb::task_arena arena(threads);
         for (const std::size_t count : {0U, 1U, 99U, 100U, 101U, 12345U}) {
@@ -32,7 +32,7 @@ TEST(Parallel, RangesCoverEveryIndexOnce) {
     }
 }
 
-TEST(Parallel, StopsWhenToldTo) {
+TEST(Parallel, StopsWhenCancelled) {
     std::atomic<bool> cancel{false};
     RunContext context;
     context.cancel = &cancel;
@@ -46,7 +46,7 @@ TEST(Parallel, StopsWhenToldTo) {
     EXPECT_LT(done, 500000U);
 }
 
-TEST(Parallel, KnowsTheThreadsItMayUse) {
+TEST(Parallel, ArenaAndGlobalLimitBoundTheThreadCount) {
     tbb::task_arena arena(3);
     EXPECT_EQ(arena.execute([] { return threadsOfArena(); }),
               std::min<std::size_t>(

@@ -30,7 +30,7 @@ LargeVector<KeyedIndex> randomKeys(std::size_t count, std::uint64_t mask, std::u
     return keyed;
 }
 
-TEST(SortByKey, IsAStableSort) {
+TEST(RadixSort, IsStable) {
     expectStablySorted({});
     expectStablySorted({{7, 0}});
     for (const std::size_t count : {2U, 100U, 5000U}) {
@@ -38,23 +38,22 @@ TEST(SortByKey, IsAStableSort) {
     }
 }
 
-// Digits that all keys share are left out: the lowest, the highest, those between, all of them.
-TEST(SortByKey, OfKeysThatAgreeInSomeDigits) {
+// Digits in which all keys agree are skipped: the lowest, the highest, some between, all of them.
+TEST(RadixSort, SkipsDigitsInWhichAllKeysAgree) {
     for (const std::uint64_t mask : {std::uint64_t{0}, std::uint64_t{0x7ff}, std::uint64_t{3} << 62,
                                      std::uint64_t{0xff0000000000ff}, std::uint64_t{0xff} << 20}) {
         expectStablySorted(randomKeys(3000, mask, mask + 1));
     }
 }
 
-// Each thread has a part of its own.
-TEST(SortByKey, IsStableOnAnyNumberOfThreads) {
+TEST(RadixSort, IsStableOnAnyNumberOfThreads) {
     for (const int threads : {1, 2, 3, 5}) {
         tbb::task_arena arena(threads);
         arena.execute([] { expectStablySorted(randomKeys(400001, std::uint64_t{0xff} << 40 | 0xf, 2)); });
     }
 }
 
-TEST(SortNumbers, SortsThem) {
+TEST(RadixSort, SortsPlainNumbers) {
     Random random(4);
     for (const std::size_t count : {0U, 1U, 2U, 3000U}) {
         LargeVector<std::uint32_t> numbers;

@@ -11,7 +11,7 @@ namespace shapedb {
 namespace {
 
 // The reference stream of SplitMix64 for these seeds, as published with the generator.
-TEST(Random, PublishedStream) {
+TEST(Random, MatchesThePublishedSplitMix64Stream) {
     Random random(1234567);
     const std::array<std::uint64_t, 5> expected = {6457827717110365317ULL, 3203168211198807973ULL,
                                                    9817491932198370423ULL, 4593380528125082431ULL,
@@ -21,7 +21,7 @@ TEST(Random, PublishedStream) {
 }
 
 // A seed written in a document must mean the same numbers in every later version.
-TEST(Random, DerivedValuesStayAsTheyWere) {
+TEST(Random, DerivedValuesAreFrozen) {
     Random uniform(42);
     EXPECT_DOUBLE_EQ(uniform.uniform(), 0.7415648787718233);
     EXPECT_DOUBLE_EQ(uniform.uniform(), 0.1599103928769201);
@@ -35,7 +35,7 @@ TEST(Random, DerivedValuesStayAsTheyWere) {
     for (const std::uint64_t value : {7U, 1U, 2U, 3U, 0U, 8U, 2U, 8U}) EXPECT_EQ(below.below(10), value);
 }
 
-TEST(Random, SameSeedSameStreamOtherSeedOtherStream) {
+TEST(Random, StreamDependsOnTheSeedAlone) {
     Random a(9);
     Random b(9);
     Random c(10);
@@ -77,7 +77,7 @@ TEST(Random, UniformFillsItsCellsEvenly) {
     }
 }
 
-TEST(Random, UniformRangeStaysInside) {
+TEST(Random, UniformStaysInsideItsRange) {
     Random random(5);
     double low = 1e9;
     double high = -1e9;
@@ -92,7 +92,7 @@ TEST(Random, UniformRangeStaysInside) {
     EXPECT_NEAR(high, 5.0, 0.01);
 }
 
-TEST(Random, BelowOneIsZero) {
+TEST(Random, BelowOneIsAlwaysZero) {
     Random random(3);
     for (int i = 0; i < 100; ++i) EXPECT_EQ(random.below(1), 0U);
 }

@@ -15,13 +15,13 @@ namespace {
 using std::chrono::hours;
 using std::chrono::milliseconds;
 
-TEST(RunContext, DefaultNeverStops) {
+TEST(RunContext, DefaultContextNeverStops) {
     const RunContext context;
     EXPECT_TRUE(context.checkpoint());
     context.report("stage", 1, 2);  // reports to nobody
 }
 
-TEST(RunContext, CancelStopsFromAnotherThread) {
+TEST(RunContext, AnotherThreadCanCancel) {
     std::atomic<bool> cancel{false};
     RunContext context;
     context.cancel = &cancel;
@@ -42,7 +42,7 @@ TEST(RunContext, DeadlineStopsOnceItHasPassed) {
     EXPECT_EQ(stopped.error().code, ErrorCode::kDeadlineExceeded);
 }
 
-TEST(RunContext, CancelIsToldBeforeTheDeadline) {
+TEST(RunContext, CancellationTakesPrecedenceOverTheDeadline) {
     const std::atomic<bool> cancel{true};
     RunContext context;
     context.cancel = &cancel;
@@ -50,7 +50,7 @@ TEST(RunContext, CancelIsToldBeforeTheDeadline) {
     EXPECT_EQ(context.checkpoint().error().code, ErrorCode::kCancelled);
 }
 
-TEST(RunContext, ReportReachesTheListener) {
+TEST(RunContext, ReportReachesTheProgressCallback) {
     std::vector<std::tuple<std::string, std::uint64_t, std::uint64_t>> heard;
     RunContext context;
     context.progress = [&](const char* stage, std::uint64_t done, std::uint64_t total) {

@@ -13,7 +13,7 @@
 #include <gtest/gtest.h>
 
 #include "core/base/random.h"
-#include "tests/core/segmentation/small_clouds.h"
+#include "tests/core/segmentation/exact_balls.h"
 
 namespace shapedb {
 namespace {
@@ -47,7 +47,7 @@ ExactNumber hullSixVolumes(const PointCloud& cloud) {
     return sum;
 }
 
-TEST(Delaunay, NoPointLiesInsideAnyBall) {
+TEST(Delaunay, BallsAreEmptyOfPoints) {
     for (const Triangulated& cloud : triangulatedClouds()) {
         std::vector<Kernel::Point_3> points;
         for (const Point3& p : cloud.points) points.push_back(filtered(p));
@@ -62,7 +62,7 @@ TEST(Delaunay, NoPointLiesInsideAnyBall) {
     }
 }
 
-TEST(Delaunay, FillsTheConvexHullExactly) {
+TEST(Delaunay, TetrahedraFillTheConvexHullExactly) {
     for (const Triangulated& cloud : triangulatedClouds()) {
         ExactNumber sum = 0;
         std::size_t notPositive = 0;
@@ -112,7 +112,7 @@ TEST(Delaunay, NeighboursAreSymmetricAndOppositeTheirVertex) {
     }
 }
 
-TEST(Delaunay, FacetsWithoutNeighbourAreThoseOfTheHull) {
+TEST(Delaunay, HullFacetsAreThoseWithoutNeighbour) {
     for (const Triangulated& cloud : triangulatedClouds()) {
         const Tetrahedra& flat = cloud.tetrahedra;
         std::size_t hullFacets = 0;
@@ -145,7 +145,7 @@ TEST(Delaunay, BallsAgreeWithRationalArithmetic) {
             const double radius = std::sqrt(CGAL::to_double(CGAL::squared_distance(centre, p[0])));
             const double off = std::sqrt(
                 CGAL::to_double(CGAL::squared_distance(centre, exact(cloud.tetrahedra.circumcentres[t]))));
-            // Six volumes against the box of the edges at a corner: digits lost.
+            // The digits lost: product of the edges at a corner over six volumes.
             const auto c = cornersOf(cloud, t);
             const double box = distance(c[0], c[1]) * distance(c[0], c[2]) * distance(c[0], c[3]);
             const double loss = box / CGAL::to_double(sixVolumes(p[0], p[1], p[2], p[3]));
@@ -173,7 +173,7 @@ TEST(Delaunay, FlatTetrahedraHaveFiniteAccurateBalls) {
     }
 }
 
-TEST(Delaunay, NamesWhatSpansNoSpace) {
+TEST(Delaunay, RefusesPointsThatSpanNoSpace) {
     const PointCloud three = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
     EXPECT_EQ(triangulate({}).error().code, ErrorCode::kTooFewPoints);
     EXPECT_EQ(triangulate(three).error().code, ErrorCode::kTooFewPoints);
@@ -192,7 +192,7 @@ TEST(Delaunay, RefusesRepeatedPoints) {
               ErrorCode::kInternal);
 }
 
-TEST(Delaunay, StopsWhenToldTo) {
+TEST(Delaunay, StopsWhenCancelledOrLate) {
     PointCloud points;
     Random random(4);
     for (int i = 0; i < 50000; ++i) points.push_back({random.uniform(), random.uniform(), random.uniform()});

@@ -28,7 +28,7 @@ namespace {
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Corners = std::array<std::uint32_t, 4>;
 
-// The reference: CGAL's triangulation, as its tetrahedra with sorted corners, sorted.
+// The reference: the tetrahedra of CGAL's triangulation, corners and tetrahedra sorted.
 std::vector<Corners> byCgal(const PointCloud& points) {
     using Structure = CGAL::Triangulation_data_structure_3<
         CGAL::Triangulation_vertex_base_with_info_3<std::uint32_t, Kernel>,
@@ -58,11 +58,11 @@ std::vector<Corners> sorted(const Vector& unsorted) {
     return tetrahedra;
 }
 
-// So many points are divided between threads.
-const std::size_t kDivided = Division{}.leastPoints;
+// From this many points on, threads share the work.
+const std::size_t kShared = ParallelLimits{}.minPoints;
 
-// Each neighbour has the facet's three corners and this cell behind them.
-bool isJoined(const CellStore& cells, std::uint32_t cell) {
+// Whether each neighbour has the facet's three corners, and this cell behind them.
+bool hasMutualNeighbours(const CellStore& cells, std::uint32_t cell) {
     for (std::uint32_t i = 0; i < 4; ++i) {
         const Cell& next = cells[cells[cell].neighbours[i]];
         const Corners others = next.corners();
@@ -81,35 +81,32 @@ bool isJoined(const CellStore& cells, std::uint32_t cell) {
     return true;
 }
 
-// In the points' own order, straight from the store, so that the number of threads is ours.
-std::vector<Corners> byThreads(const PointCloud& points, std::size_t threads, const Division& division = {}) {
+// Straight from the store, with the points in the given order and exactly this many threads.
+std::vector<Corners> byThreads(const PointCloud& points, std::size_t threads,
+                               const ParallelLimits& limits = {}) {
     LargeVector<Site> sites;
     for (const Point3& p : points) sites.push_back({p.x, p.y, p.z});
     const tbb::global_control allowed(tbb::global_control::max_allowed_parallelism, threads);
     tbb::task_arena arena(static_cast<int>(threads));
     CellStore cells;
     std::vector<Corners> tetrahedra;
-    const auto done = arena.execute([&] { return insertAll(sites, cells, threads, {}, division); });
+    const auto done = arena.execute([&] { return buildTriangulation(sites, cells, threads, {}, limits); });
     EXPECT_TRUE(done) << done.error().message;
     if (!done) return tetrahedra;
-    bool joined = true;
+    bool mutual = true;
     for (std::uint32_t c = 0; c < cells.used(); ++c) {
-        if (cells[c].vertices[0] == kFreeCell) continue;
+        if (cells[c].isFree()) continue;
         const Corners v = cells[c].corners();
-        joined = joined && isJoined(cells, c);
+        mutual = mutual && hasMutualNeighbours(cells, c);
         if (std::all_of(v.begin(), v.end(), [](std::uint32_t i) { return i < kInfinite; })) {
             tetrahedra.push_back(v);
         }
     }
-    EXPECT_TRUE(joined);
+    EXPECT_TRUE(mutual);
     return sorted(std::move(tetrahedra));
 }
 
-PointCloud alongCurve(const PointCloud& points) {
-    PointCloud along;
-    for (const std::uint32_t i : hilbertOrder(points)) along.push_back(points[i]);
-    return along;
-}
+PointCloud sortedCloud(const PointCloud& points) { return HilbertSortedCloud(points).takePoints(); }
 
 PointCloud scanned(const NamedShape& shape, std::size_t count, double noise) {
     PointCloud points = sampleBoundary(shape.solid, count, 3).value();
@@ -117,7 +114,7 @@ PointCloud scanned(const NamedShape& shape, std::size_t count, double noise) {
     return sanitise(points).value().points;
 }
 
-// A cubic grid: every cell's corners on one sphere, every layer in one plane.
+// A cubic grid: the corners of each cube are cospherical, each layer is coplanar.
 PointCloud grid(int side, double step) {
     PointCloud points;
     for (int i = 0; i < side; ++i) {
@@ -128,7 +125,7 @@ PointCloud grid(int side, double step) {
     return points;
 }
 
-// Pairs of points that differ by the last digit of a coordinate, and lines of points.
+// Points that differ in the last digit of a coordinate, and points on a line.
 PointCloud nearlyRepeated() {
     Random random(5);
     PointCloud points;
@@ -142,7 +139,7 @@ PointCloud nearlyRepeated() {
     return sanitise(points).value().points;
 }
 
-// The points of an integer grid on one sphere: cospherical, many of them in common planes.
+// The points of an integer grid on one sphere: cospherical, many of them coplanar.
 PointCloud integerSphere(int squaredRadius) {
     PointCloud points;
     for (int x = -80; x <= 80; ++x) {
@@ -166,7 +163,7 @@ PointCloud inACube(std::size_t count) {
     return points;
 }
 
-TEST(FlatDelaunay, FindsTheTetrahedraOfCgalInSmallClouds) {
+TEST(Triangulation, HasTheTetrahedraOfCgalInSmallClouds) {
     for (const SmallCloud& cloud : smallClouds()) {
         const auto flat = triangulate(cloud.points);
         ASSERT_TRUE(flat) << cloud.name;
@@ -174,7 +171,7 @@ TEST(FlatDelaunay, FindsTheTetrahedraOfCgalInSmallClouds) {
     }
 }
 
-TEST(FlatDelaunay, FindsTheTetrahedraOfCgalInLargerClouds) {
+TEST(Triangulation, HasTheTetrahedraOfCgalInLargerClouds) {
     const std::vector<std::pair<std::string, PointCloud>> clouds = {
         {"uniform", inACube(8000)},
         {"noisy dumbbell", scanned(makeDumbbell(), 12000, 0.003)},
@@ -192,46 +189,46 @@ TEST(FlatDelaunay, FindsTheTetrahedraOfCgalInLargerClouds) {
     }
 }
 
-TEST(FlatDelaunay, AnyNumberOfThreadsFindsTheSameTetrahedra) {
+TEST(Triangulation, HasTheSameTetrahedraForAnyNumberOfThreads) {
     const std::vector<std::pair<std::string, PointCloud>> clouds = {
-        {"uniform", alongCurve(inACube(kDivided))},
-        {"noisy jack", alongCurve(scanned(makeJack(), kDivided + 500, 0.002))},
-        {"clean box", alongCurve(scanned(makeBox(), kDivided + 500, 0.0))},
-        {"grid", alongCurve(grid(37, 0.03125))},
-        // Neighbours in space whose numbers have nothing to do with each other.
-        {"not along a curve", inACube(kDivided)},
+        {"uniform", sortedCloud(inACube(kShared))},
+        {"noisy jack", sortedCloud(scanned(makeJack(), kShared + 500, 0.002))},
+        {"clean box", sortedCloud(scanned(makeBox(), kShared + 500, 0.0))},
+        {"grid", sortedCloud(grid(37, 0.03125))},
+        // Numbers say nothing about where points lie.
+        {"not in Hilbert order", inACube(kShared)},
     };
     for (const auto& [name, points] : clouds) {
-        ASSERT_GE(points.size(), kDivided) << name;
+        ASSERT_GE(points.size(), kShared) << name;
         const auto alone = byThreads(points, 1);
         ASSERT_FALSE(alone.empty()) << name;
-        for (const std::size_t threads : {2, 3, 5})
+        for (const std::size_t threads : {2, 5})
             EXPECT_TRUE(byThreads(points, threads) == alone) << name << threads;
     }
 }
 
-// So many borders that what is left along them is divided once more.
-TEST(FlatDelaunay, ManyThreadsFindWhatOneFinds) {
-    const PointCloud points = alongCurve(inACube(3 * kDivided));
+// So many borders that the points left along them go in parallel again.
+TEST(Triangulation, HasTheSameTetrahedraWithManyBorders) {
+    const PointCloud points = sortedCloud(inACube(3 * kShared));
     EXPECT_TRUE(byThreads(points, 7) == byThreads(points, 1));
 }
 
-// Hardly anything belongs to one thread alone.
-TEST(FlatDelaunay, ThreadsFindTheTetrahedraOfCgalHoweverFewPointsTheyShare) {
+// So few points for each thread that hardly a cell has one owner.
+TEST(Triangulation, ThreadsWithFewPointsFindTheTetrahedraOfCgal) {
     std::vector<std::pair<std::string, PointCloud>> clouds = {
-        {"uniform", alongCurve(inACube(3000))},
-        {"noisy dumbbell", alongCurve(scanned(makeDumbbell(), 4000, 0.003))},
-        {"clean box", alongCurve(scanned(makeBox(), 3000, 0.0))},
-        {"grid", alongCurve(grid(12, 0.0625))},
-        {"nearly repeated", alongCurve(nearlyRepeated())},
-        {"not along a curve", inACube(1000)},
+        {"uniform", sortedCloud(inACube(3000))},
+        {"noisy dumbbell", sortedCloud(scanned(makeDumbbell(), 4000, 0.003))},
+        {"clean box", sortedCloud(scanned(makeBox(), 3000, 0.0))},
+        {"grid", sortedCloud(grid(12, 0.0625))},
+        {"nearly repeated", sortedCloud(nearlyRepeated())},
+        {"not in Hilbert order", inACube(1000)},
     };
-    for (const SmallCloud& cloud : smallClouds()) clouds.emplace_back(cloud.name, alongCurve(cloud.points));
+    for (const SmallCloud& cloud : smallClouds()) clouds.emplace_back(cloud.name, sortedCloud(cloud.points));
     for (const auto& [name, points] : clouds) {
         const auto expected = byCgal(points);
         for (const std::size_t threads : {2, 3, 6}) {
             for (const std::size_t least : {1, 16, 128}) {
-                const Division fine{0, least};
+                const ParallelLimits fine{0, least};
                 EXPECT_TRUE(byThreads(points, threads, fine) == expected)
                     << name << " " << threads << " " << least;
             }
@@ -239,8 +236,8 @@ TEST(FlatDelaunay, ThreadsFindTheTetrahedraOfCgalHoweverFewPointsTheyShare) {
     }
 }
 
-TEST(FlatDelaunay, ResultsHaveTheSameBitsOnAnyNumberOfThreads) {
-    const PointCloud points = scanned(makeDumbbell(), kDivided + 500, 0.001);
+TEST(Triangulation, HasTheSameBitsOnAnyNumberOfThreads) {
+    const PointCloud points = scanned(makeDumbbell(), kShared + 500, 0.001);
     const auto in = [&](int threads) {
         tbb::task_arena arena(threads);
         return arena.execute([&] { return triangulate(points).value(); });
@@ -253,8 +250,8 @@ TEST(FlatDelaunay, ResultsHaveTheSameBitsOnAnyNumberOfThreads) {
     EXPECT_TRUE(one.circumradii == three.circumradii);
 }
 
-TEST(FlatDelaunay, ThreadsStopWhenToldTo) {
-    const PointCloud points = alongCurve(inACube(kDivided));
+TEST(Triangulation, ParallelInsertionStopsWhenCancelled) {
+    const PointCloud points = sortedCloud(inACube(kShared));
     LargeVector<Site> sites;
     for (const Point3& p : points) sites.push_back({p.x, p.y, p.z});
     std::atomic<bool> cancel{false};
@@ -264,21 +261,21 @@ TEST(FlatDelaunay, ThreadsStopWhenToldTo) {
         if (done > points.size() / 2) cancel = true;
     };
     CellStore cells;
-    EXPECT_EQ(insertAll(sites, cells, 2, context).error().code, ErrorCode::kCancelled);
+    EXPECT_EQ(buildTriangulation(sites, cells, 2, context).error().code, ErrorCode::kCancelled);
 }
 
-TEST(FlatDelaunay, ThreadsRefuseRepeatedPoints) {
-    PointCloud points = inACube(kDivided);
+TEST(Triangulation, ParallelInsertionRefusesRepeatedPoints) {
+    PointCloud points = inACube(kShared);
     points.push_back(points[4321]);
     LargeVector<Site> sites;
     for (const std::uint32_t i : hilbertOrder(points))
         sites.push_back({points[i].x, points[i].y, points[i].z});
     CellStore cells;
-    EXPECT_EQ(insertAll(sites, cells, 2, {}).error().code, ErrorCode::kInternal);
+    EXPECT_EQ(buildTriangulation(sites, cells, 2, {}).error().code, ErrorCode::kInternal);
 }
 
-// Two skew lines: every point of one makes a tetrahedron with every two neighbours of the other.
-TEST(FlatDelaunay, GrowsWherePointsHaveManyTetrahedra) {
+// Two skew lines: every two neighbours on one make a tetrahedron with every two neighbours on the other.
+TEST(Triangulation, StoreGrowsWherePointsHaveManyTetrahedra) {
     PointCloud points;
     for (int i = 0; i < 120; ++i) {
         points.push_back({i * 0.0078125, 0.0, 0.0});
@@ -288,29 +285,6 @@ TEST(FlatDelaunay, GrowsWherePointsHaveManyTetrahedra) {
     ASSERT_TRUE(flat);
     EXPECT_GT(flat->size(), 10000U);
     EXPECT_TRUE(sorted(flat->vertices) == byCgal(points));
-}
-
-TEST(CurveOrder, IsAPermutationOfStepsToNeighbours) {
-    const PointCloud points = grid(16, 0.0625);
-    auto order = hilbertOrder(points);
-    double longest = 0.0;
-    double sum = 0.0;
-    for (std::size_t i = 1; i < order.size(); ++i) {
-        const double step = distance(points[order[i - 1]], points[order[i]]);
-        longest = std::max(longest, step);
-        sum += step;
-    }
-    // A Hilbert curve visits a grid of 2^k along each axis from neighbour to neighbour.
-    EXPECT_LE(longest, 2 * 0.0625 + 1e-12);
-    EXPECT_LT(sum, 1.1 * 0.0625 * static_cast<double>(points.size()));
-    std::sort(order.begin(), order.end());
-    for (std::uint32_t i = 0; i < order.size(); ++i) ASSERT_EQ(order[i], i);
-}
-
-TEST(CurveOrder, OfNoneOneAndEqualPoints) {
-    EXPECT_TRUE(hilbertOrder({}).empty());
-    EXPECT_EQ(hilbertOrder({{1, 2, 3}}).size(), 1U);
-    EXPECT_EQ(hilbertOrder({{1, 2, 3}, {1, 2, 3}, {1, 2, 3}}), (std::vector<std::uint32_t>{0, 1, 2}));
 }
 
 }  // namespace

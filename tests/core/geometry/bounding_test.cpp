@@ -23,7 +23,7 @@ PointCloud boxCorners(const Point3& half) {
     return points;
 }
 
-TEST(Bounding, KnownShapesHoweverTurned) {
+TEST(SmallestBoxDiagonal, IsKnownForBoxesInAnyPose) {
     Random random(3);
     for (int turn = 0; turn < 10; ++turn) {
         Motion motion;
@@ -40,7 +40,7 @@ TEST(Bounding, KnownShapesHoweverTurned) {
                 4e-3);
 }
 
-TEST(Bounding, OfFewOrFlatPoints) {
+TEST(SmallestBoxDiagonal, HandlesFewAndFlatPoints) {
     EXPECT_EQ(smallestBoxDiagonal({}).error().code, ErrorCode::kInvalidArgument);
     EXPECT_EQ(*smallestBoxDiagonal({{1, 2, 3}}), 0.0);
     EXPECT_EQ(*smallestBoxDiagonal(PointCloud(5, {1, 2, 3})), 0.0);
@@ -49,7 +49,7 @@ TEST(Bounding, OfFewOrFlatPoints) {
     EXPECT_NEAR(*smallestBoxDiagonal({{0, 0, 0}, {3, 0, 0}, {0, 4, 0}, {3, 4, 0}}), 5.0, 5e-3);
 }
 
-TEST(Bounding, NeverBelowTheWidestPairNorAboveTheAxisAlignedBox) {
+TEST(SmallestBoxDiagonal, LiesBetweenDiameterAndAxisAlignedBox) {
     for (const NamedShape& shape : namedShapes()) {
         const PointCloud points = sampleBoundary(shape.solid, 600, 4).value();
         double widest = 0.0;
@@ -62,7 +62,7 @@ TEST(Bounding, NeverBelowTheWidestPairNorAboveTheAxisAlignedBox) {
     }
 }
 
-TEST(Bounding, ScalesExactlyByPowersOfTwoAndIgnoresOrder) {
+TEST(SmallestBoxDiagonal, ScalesExactlyByPowersOfTwoAndIgnoresOrder) {
     const PointCloud points = sampleBoundary(makeLShape().solid, 500, 5).value();
     PointCloud other(points.rbegin(), points.rend());
     const double diagonal = *smallestBoxDiagonal(points);
@@ -71,9 +71,9 @@ TEST(Bounding, ScalesExactlyByPowersOfTwoAndIgnoresOrder) {
     EXPECT_EQ(*smallestBoxDiagonal(other), 0x1p20 * diagonal);
 }
 
-// The search is over all rotations from fixed starts, so turning the points may change where it
-// ends: by less than the signature may move.
-TEST(Bounding, HardlyMovesUnderRotation) {
+// The search has fixed starts, so rotating the points may change the result, but by less than a signature
+// may move.
+TEST(SmallestBoxDiagonal, HardlyChangesUnderRotation) {
     Random random(7);
     for (const FamilyInfo& family : listFamilies()) {
         ScanOptions options;

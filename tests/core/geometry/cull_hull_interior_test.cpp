@@ -28,7 +28,7 @@ PointCloud hullVertices(const PointCloud& points) {
     return vertices;
 }
 
-TEST(OuterPoints, KeepTheWholeHull) {
+TEST(CullHullInterior, KeepsEveryHullVertex) {
     for (const NamedShape& shape : namedShapes()) {
         for (const double noise : {0.0, 0.01}) {
             PointCloud points = sampleBoundary(shape.solid, 20000, 6).value();
@@ -39,7 +39,7 @@ TEST(OuterPoints, KeepTheWholeHull) {
     }
 }
 
-TEST(OuterPoints, AreFewAndInOrder) {
+TEST(CullHullInterior, DropsMostPointsAndKeepsTheOrder) {
     for (const double thickness : {1.0, 1e-3}) {
         Random random(3);
         PointCloud points;
@@ -54,7 +54,7 @@ TEST(OuterPoints, AreFewAndInOrder) {
     }
 }
 
-TEST(OuterPoints, OfFlatAndSmallCloudsAreAll) {
+TEST(CullHullInterior, KeepsFlatAndSmallCloudsWhole) {
     PointCloud plane;
     for (int i = 0; i < 5000; ++i) plane.push_back({(i % 70) * 0.01, (i / 70) * 0.01, 0.5});
     EXPECT_EQ(cullHullInterior(plane).size(), plane.size());

@@ -30,7 +30,7 @@ TEST(SampleSurface, PointsLieOnTheTriangles) {
     }
 }
 
-TEST(SampleSurface, TrianglesGetTheirShareOfTheArea) {
+TEST(SampleSurface, SamplesTrianglesByArea) {
     constexpr std::size_t kCount = 40000;
     const auto points = sampleSurface(unequalPair(), kCount, 2);
     ASSERT_TRUE(points);
@@ -41,7 +41,7 @@ TEST(SampleSurface, TrianglesGetTheirShareOfTheArea) {
 }
 
 // Cut a right triangle into its four congruent quarters: each gets a quarter of the points.
-TEST(SampleSurface, UniformWithinATriangle) {
+TEST(SampleSurface, IsUniformWithinATriangle) {
     TriangleMesh mesh;
     mesh.vertices = {{0, 0, 0}, {2, 0, 0}, {0, 2, 0}};
     mesh.triangles = {{0, 1, 2}};
@@ -62,7 +62,7 @@ TEST(SampleSurface, UniformWithinATriangle) {
     for (const double n : quarter) EXPECT_NEAR(n, 0.25 * kCount, 5.0 * deviation);
 }
 
-TEST(SampleSurface, SeedDecidesThePoints) {
+TEST(SampleSurface, IsReproducibleBySeed) {
     const auto a = sampleSurface(unequalPair(), 100, 7);
     const auto b = sampleSurface(unequalPair(), 100, 7);
     const auto c = sampleSurface(unequalPair(), 100, 8);

@@ -6,6 +6,8 @@
 
 #include <gtest/gtest.h>
 
+#include "core/base/math.h"
+
 namespace shapedb {
 namespace {
 
@@ -37,7 +39,7 @@ TEST(Motion, DefaultIsTheIdentity) {
     EXPECT_EQ(determinant(Motion{}.rotation), 1.0);
 }
 
-TEST(Motion, LiteralQuarterTurn) {
+TEST(Motion, AppliesAKnownQuarterTurn) {
     Motion motion;  // a quarter turn about z, doubled, moved: x -> y, y -> -x
     motion.scale = 2.0;
     motion.rotation = {{{0, -1, 0}, {1, 0, 0}, {0, 0, 1}}};
@@ -57,7 +59,7 @@ TEST(Motion, ScalesEveryDistanceByItsScale) {
     }
 }
 
-TEST(Motion, InverseUndoesEitherSide) {
+TEST(Motion, InverseUndoesTheMotionFromBothSides) {
     Random random(2);
     for (int i = 0; i < 200; ++i) {
         const Motion motion = randomMotion(random);
@@ -69,7 +71,7 @@ TEST(Motion, InverseUndoesEitherSide) {
     }
 }
 
-TEST(Motion, ComposeIsOneAfterTheOther) {
+TEST(Motion, ComposeAppliesOneAfterTheOther) {
     Random random(3);
     for (int i = 0; i < 200; ++i) {
         const Motion first = randomMotion(random);
@@ -81,7 +83,7 @@ TEST(Motion, ComposeIsOneAfterTheOther) {
     }
 }
 
-TEST(Motion, CloudIsMovedPointByPointInOrder) {
+TEST(Motion, MovesACloudPointByPoint) {
     Random random(4);
     const Motion motion = randomMotion(random);
     PointCloud points;
@@ -122,7 +124,7 @@ TEST(Motion, RandomRotationIsUniform) {
         }
         const double cosine = std::min(1.0, std::max(-1.0, (r[0][0] + r[1][1] + r[2][2] - 1.0) / 2.0));
         const double t = std::acos(cosine);
-        const double u = (t - std::sin(t)) / 3.14159265358979323846;
+        const double u = (t - std::sin(t)) / kPi;
         ++angle[static_cast<std::size_t>(std::min(kCells - 1.0, u * kCells))];
     }
     const auto largestGap = [](const std::array<int, kCells>& counts) {

@@ -31,7 +31,7 @@ std::vector<Neighbour> sortedByDistance(const PointCloud& points, const Point3& 
     return all;
 }
 
-TEST(NeighbourIndex, NearestAreThoseOfASort) {
+TEST(NeighbourIndex, NearestAgreesWithSorting) {
     Random random(3);
     for (const PointCloud& points : clouds()) {
         const NeighbourIndex index(points);
@@ -74,8 +74,8 @@ void expectNearest(const PointCloud& points, const NeighbourIndex& index, const 
     }
 }
 
-// Where the nodes lie follows from the number of points.
-TEST(NeighbourIndex, OfAnyNumberOfPoints) {
+// The layout of the nodes depends on the number of points.
+TEST(NeighbourIndex, WorksForAnyNumberOfPoints) {
     for (std::size_t count = 1; count <= 400; ++count) {
         const PointCloud points = scattered(count, count);
         const NeighbourIndex index(points);
@@ -85,7 +85,7 @@ TEST(NeighbourIndex, OfAnyNumberOfPoints) {
     }
 }
 
-TEST(NeighbourIndex, AnyNumberOfThreadsBuildsTheSame) {
+TEST(NeighbourIndex, IsTheSameForAnyNumberOfThreads) {
     const PointCloud points = scattered(30011, 8);
     std::vector<std::vector<std::uint32_t>> orders;
     for (const int threads : {1, 2, 5}) {
@@ -98,7 +98,7 @@ TEST(NeighbourIndex, AnyNumberOfThreadsBuildsTheSame) {
     EXPECT_EQ(orders[0], orders[2]);
 }
 
-TEST(NeighbourIndex, WithinIsTheWholeBallAndNothingElse) {
+TEST(NeighbourIndex, WithinFindsExactlyThePointsInTheBall) {
     Random random(4);
     for (const PointCloud& points : clouds()) {
         const NeighbourIndex index(points);
@@ -119,7 +119,7 @@ TEST(NeighbourIndex, WithinIsTheWholeBallAndNothingElse) {
     }
 }
 
-TEST(NeighbourIndex, TheOrderHoldsEachPointOnce) {
+TEST(NeighbourIndex, OrderHoldsEachPointOnce) {
     for (const PointCloud& points : clouds()) {
         std::vector<std::uint32_t> order = NeighbourIndex(points).order();
         std::sort(order.begin(), order.end());

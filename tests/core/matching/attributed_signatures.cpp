@@ -1,10 +1,14 @@
 #include "tests/core/matching/attributed_signatures.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <utility>
 
+#include <gtest/gtest.h>
+
+#include "core/matching/score.h"
 #include "core/pipeline.h"
 #include "core/synthetic/families.h"
 #include "tests/core/matching/random_signatures.h"
@@ -89,22 +93,64 @@ Signature turnedAttributed(Signature signature, const Matrix3& rotation) {
     return result;
 }
 
+AttributedPair randomAttributedPair(Random& random, double leastNoise, double mostNoise) {
+    AttributedPair pair;
+    pair.a = randomAttributed(random);
+    const double noise = std::pow(10.0, random.uniform(std::log10(leastNoise), std::log10(mostNoise)));
+    switch (random.below(4)) {
+        case 0: pair.b = disturbedAttributed(pair.a, random, noise); break;
+        case 1:
+            pair.b = turnedAttributed(disturbedAttributed(pair.a, random, noise), randomRotation(random));
+            break;
+        case 2:
+            pair.b = turnedAttributed(disturbedAttributed(pair.a, random, noise), randomReflection(random));
+            break;
+        default: pair.b = randomAttributed(random);
+    }
+    return pair;
+}
+
+void expectSoundScore(const Signature& a, const Signature& b, const ScoreOptions& options) {
+    const double value = score(a, b, options);
+    ASSERT_GT(value, 0.0);
+    ASSERT_LE(value, 1.0);
+    const bool same = sameShape(a, b) && (!options.keepScale || a.scale == b.scale);
+    ASSERT_EQ(value == 1.0, same);
+    ASSERT_TRUE(sameBits(value, score(b, a, options)));
+    const double bound = scoreUpperBound(a, b, options);
+    ASSERT_GE(bound, value);
+    ASSERT_LE(bound, 1.0);
+    ASSERT_GE(scoreUpperBound(b, a, options), value);
+}
+
+namespace {
+
+/// Made once, whichever lists it is in.
+const Signature& scanned(std::size_t family, std::size_t member, std::size_t scan) {
+    static std::map<std::array<std::size_t, 3>, Signature> made;
+    const auto [at, isNew] = made.try_emplace({family, member, scan});
+    if (isNew) {
+        ScanOptions options;
+        options.count = 2000;
+        options.noise = 0.002;
+        options.seed = 1 + scan + 10 * (member + 10 * family);
+        const PointCloud points =
+            scanOf(makeMember(listFamilies()[family].name, member, 1).value(), options).value();
+        at->second = describe(points, parametersOf(Profile::kDefault)).value().signature;
+    }
+    return at->second;
+}
+
+}  // namespace
+
 const std::vector<Scan>& scannedFamilies(std::size_t members, std::size_t scans) {
     static std::map<std::pair<std::size_t, std::size_t>, std::vector<Scan>> made;
     std::vector<Scan>& all = made[{members, scans}];
     if (!all.empty()) return all;
-    std::uint64_t seed = 1;
-    for (const FamilyInfo& family : listFamilies()) {
+    for (std::size_t family = 0; family < listFamilies().size(); ++family) {
         for (std::size_t member = 0; member < members; ++member) {
-            const Solid solid = makeMember(family.name, member, 1).value();
             for (std::size_t scan = 0; scan < scans; ++scan) {
-                ScanOptions options;
-                options.count = 3000;
-                options.noise = 0.002;
-                options.seed = seed++;
-                const PointCloud points = scanOf(solid, options).value();
-                all.push_back({family.name, member,
-                               describe(points, parametersOf(Profile::kDefault)).value().signature});
+                all.push_back({listFamilies()[family].name, member, scanned(family, member, scan)});
             }
         }
     }

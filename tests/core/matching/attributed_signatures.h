@@ -1,4 +1,4 @@
-// Signatures with attributes: random ones of every awkward kind, and those of scans.
+// Signatures with attributes: random ones with every kind of degeneracy, and those of scans.
 #pragma once
 
 #include <string>
@@ -6,6 +6,7 @@
 
 #include "core/base/random.h"
 #include "core/geometry/motion.h"
+#include "core/matching/score_options.h"
 #include "core/signature/signature.h"
 
 namespace shapedb::testing_support {
@@ -14,16 +15,26 @@ namespace shapedb::testing_support {
 /// extent, and random statistics and quality.
 Signature randomAttributed(Random& random, std::size_t maxPoints = 10);
 
-/// The same shape, its parts moved and changed a little (by `noise` of the scale, resp. of
-/// themselves), its statistics too.
+/// The same shape with its points moved a little (by `noise` of the scale) and their sizes and the
+/// statistics changed by about as large a share.
 Signature disturbedAttributed(Signature signature, Random& random, double noise);
 
-/// In another pose: every position and every extent through a rotation or reflection. Statistics
-/// do not know the pose.
+/// In another pose: every position and every extent through a rotation or reflection. Statistics do not
+/// depend on the pose.
 Signature turnedAttributed(Signature signature, const Matrix3& rotation);
 
-/// Anew from the points; after these were changed.
+/// Recomputes the body after the points were changed.
 void updateBody(Signature& signature);
+
+struct AttributedPair {
+    Signature a, b;
+};
+
+/// Unrelated, related (disturbed by `leastNoise` to `mostNoise`) or related in another pose.
+AttributedPair randomAttributedPair(Random& random, double leastNoise = 1e-6, double mostNoise = 0.1);
+
+/// Everything that must hold of the score of a pair, unless partial.
+void expectSoundScore(const Signature& a, const Signature& b, const ScoreOptions& options);
 
 struct Scan {
     std::string family;
@@ -31,8 +42,8 @@ struct Scan {
     Signature signature;
 };
 
-/// With the default profile: `members` of each family, `scans` of each member. Made once a process
-/// for each pair of arguments.
+/// With the default profile: `members` of each family, `scans` of each member. Cached for each pair of
+/// arguments.
 const std::vector<Scan>& scannedFamilies(std::size_t members, std::size_t scans);
 
 }  // namespace shapedb::testing_support

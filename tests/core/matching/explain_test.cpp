@@ -1,11 +1,11 @@
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <iostream>
 #include <set>
 
 #include <gtest/gtest.h>
 
+#include "core/matching/published/published_scorer.h"
 #include "core/matching/score.h"
 #include "core/pipeline.h"
 #include "core/synthetic/families.h"
@@ -19,11 +19,10 @@ using testing_support::describeSignature;
 using testing_support::disturbed;
 using testing_support::randomReflection;
 using testing_support::randomSignature;
+using testing_support::sameBits;
 using testing_support::scoreOptions;
 using testing_support::signatureOf;
 using testing_support::turned;
-
-bool sameBits(double x, double y) { return std::memcmp(&x, &y, sizeof x) == 0; }
 
 void expectOrthonormal(const Matrix3& r, bool reflected) {
     for (std::size_t i = 0; i < 3; ++i) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/matching/published/published_scorer.h"
+
 namespace shapedb::testing_support {
 
 namespace {

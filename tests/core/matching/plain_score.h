@@ -1,11 +1,12 @@
-// The score by its definition, with nothing saved and nothing shared with the code under test:
-// full rotation matrices, every (i, j, k, l, reflection), matching by repeated search.
+// The published score straight from its definition, sharing nothing with the code under test: full rotation
+// matrices, every (i, j, k, l, reflection), matching by repeated search.
 #pragma once
 
 #include <functional>
 #include <string>
 
-#include "core/matching/score.h"
+#include "core/matching/score_options.h"
+#include "core/signature/signature.h"
 
 namespace shapedb::testing_support {
 

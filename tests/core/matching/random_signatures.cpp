@@ -137,6 +137,11 @@ ScoreOptions scoreOptions(bool reflection, bool keepScale, double kernelWidth) {
     return options;
 }
 
+std::array<ScoreOptions, 4> everyOption(double kernelWidth) {
+    return {scoreOptions(true, false, kernelWidth), scoreOptions(false, false, kernelWidth),
+            scoreOptions(true, true, kernelWidth), scoreOptions(false, true, kernelWidth)};
+}
+
 Matrix3 randomReflection(Random& random) {
     Matrix3 r = randomRotation(random);
     for (double& x : r[0]) x = -x;

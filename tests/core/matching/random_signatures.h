@@ -1,11 +1,13 @@
-// Random signatures of every awkward kind, for the tests of matching and search.
+// Random signatures with every kind of degeneracy, for the tests of matching and search.
 #pragma once
 
+#include <array>
+#include <cstring>
 #include <string>
 
 #include "core/base/random.h"
 #include "core/geometry/motion.h"
-#include "core/matching/score.h"
+#include "core/matching/score_options.h"
 #include "core/signature/signature.h"
 
 namespace shapedb::testing_support {
@@ -36,8 +38,12 @@ Signature disturbed(Signature signature, Random& random, double noise);
 /// Every position through a rotation (or reflection), as another pose of the scan would give.
 Signature turned(Signature signature, const Matrix3& rotation);
 
-/// By position, for the tests' many combinations.
 ScoreOptions scoreOptions(bool reflection, bool keepScale, double kernelWidth = 0.1);
+
+/// With and without reflection and keepScale.
+std::array<ScoreOptions, 4> everyOption(double kernelWidth = 0.1);
+
+inline bool sameBits(double x, double y) { return std::memcmp(&x, &y, sizeof x) == 0; }
 
 /// A random orthonormal matrix of determinant -1.
 Matrix3 randomReflection(Random& random);
@@ -45,7 +51,7 @@ Matrix3 randomReflection(Random& random);
 /// From literal numbers; `rows` are x, y, z, weight.
 Signature signatureOf(const std::vector<std::array<double, 4>>& rows);
 
-/// The scored numbers, to find a failing pair again.
+/// The scored numbers, to reproduce a failing pair.
 std::string describeSignature(const Signature& signature);
 
 }  // namespace shapedb::testing_support

@@ -1,15 +1,13 @@
 #include "core/matching/score.h"
 
-#include <array>
 #include <chrono>
 #include <cmath>
-#include <cstring>
 #include <iostream>
 #include <limits>
 
 #include <gtest/gtest.h>
 
-#include "core/matching/published/alignment.h"
+#include "core/matching/published/published_scorer.h"
 #include "tests/core/matching/plain_score.h"
 #include "tests/core/matching/random_signatures.h"
 
@@ -18,22 +16,17 @@ namespace {
 
 using testing_support::describeSignature;
 using testing_support::disturbed;
+using testing_support::everyOption;
 using testing_support::Kind;
 using testing_support::kKindCount;
 using testing_support::Matching;
 using testing_support::plainScore;
 using testing_support::randomReflection;
 using testing_support::randomSignature;
+using testing_support::sameBits;
 using testing_support::scoreOptions;
 using testing_support::signatureOf;
 using testing_support::turned;
-
-bool sameBits(double x, double y) { return std::memcmp(&x, &y, sizeof x) == 0; }
-
-std::array<ScoreOptions, 4> everyOption(double kernelWidth = 0.1) {
-    return {scoreOptions(true, false, kernelWidth), scoreOptions(false, false, kernelWidth),
-            scoreOptions(true, true, kernelWidth), scoreOptions(false, true, kernelWidth)};
-}
 
 ScoreOptions randomOptions(Random& random) {
     ScoreOptions options;
@@ -114,7 +107,7 @@ TEST(Score, GreedyMatchingLosesLittleAgainstTheOptimum) {
     EXPECT_LT(worst, 0.2);
 }
 
-TEST(Score, LiesBetweenZeroAndOneAndIsSymmetricBitForBit) {
+TEST(Score, IsBetweenZeroAndOneAndSymmetricBitForBit) {
     Random random(3);
     for (int round = 0; round < 5000; ++round) {
         const Pair pair = randomPair(random);
@@ -127,7 +120,7 @@ TEST(Score, LiesBetweenZeroAndOneAndIsSymmetricBitForBit) {
     }
 }
 
-TEST(Score, OfASignatureAgainstItselfIsExactlyOne) {
+TEST(Score, IsExactlyOneForTheSameSignature) {
     Random random(4);
     for (int kind = 0; kind < kKindCount; ++kind) {
         for (int round = 0; round < 100; ++round) {
@@ -143,11 +136,10 @@ TEST(Score, OfASignatureAgainstItselfIsExactlyOne) {
     }
 }
 
-TEST(Score, OfACopyInAnotherPoseIsOneUpToSinglePrecision) {
+TEST(Score, IsOneForARotatedCopyUpToSinglePrecision) {
     Random random(5);
     for (int round = 0; round < 1500; ++round) {
-        // Without the tiny ones among the anchor's rivals every kind; with a rival of equal weight
-        // the order of the points, hence the anchor, stays: turned() keeps it.
+        // turned() keeps the order of the points, hence the anchor, even where weights are equal.
         const Signature a = randomSignature(random);
         if (a.points.size() == 1) continue;
         const Signature rotated = turned(a, randomRotation(random));
@@ -161,8 +153,7 @@ TEST(Score, OfACopyInAnotherPoseIsOneUpToSinglePrecision) {
     }
 }
 
-// The poses in which two different shapes were scanned say nothing about how alike they are.
-TEST(Score, OfDifferentShapesDoesNotDependOnTheirPoses) {
+TEST(Score, DoesNotDependOnThePoses) {
     Random random(6);
     for (int round = 0; round < 1500; ++round) {
         const Signature a = randomSignature(random, Kind::kPlain, 7);
@@ -192,15 +183,15 @@ TEST(Score, TellsLeftFromRightOnlyWithoutReflection) {
         Signature shape = randomSignature(random, Kind::kEqualWeight, 7);
         while (shape.points.size() < 6) shape = randomSignature(random, Kind::kEqualWeight, 7);
         const Signature copy = turned(shape, randomReflection(random));
-        const double told = score(shape, copy, scoreOptions(false, false, 0.05));
-        const double untold = score(shape, copy, scoreOptions(true, false, 0.05));
-        EXPECT_LE(told, untold);
-        clearlyBelow += told < 0.95 ? 1 : 0;
+        const double without = score(shape, copy, scoreOptions(false, false, 0.05));
+        const double with = score(shape, copy, scoreOptions(true, false, 0.05));
+        EXPECT_LE(without, with);
+        clearlyBelow += without < 0.95 ? 1 : 0;
     }
     EXPECT_GT(clearlyBelow, 180);
 }
 
-TEST(Score, ReflectionCanOnlyRaiseIt) {
+TEST(Score, ReflectionCanOnlyRaiseTheScore) {
     Random random(8);
     for (int round = 0; round < 2000; ++round) {
         const Pair pair = randomPair(random);
@@ -233,7 +224,7 @@ TEST(Score, KeepScaleComparesSizes) {
     }
 }
 
-TEST(Score, ASinglePointNeverMakesTwoShapesTheSame) {
+TEST(Score, SinglePointScoresAtMostTheCeiling) {
     const Signature ball = signatureOf({{0, 0, 0, 0.1}});
     const Signature almost = signatureOf({{0, 0, 0, 0.1 * (1 + 1e-6)}});
     const Signature half = signatureOf({{0, 0, 0, 0.05}});
@@ -251,7 +242,7 @@ TEST(Score, ASinglePointNeverMakesTwoShapesTheSame) {
     EXPECT_LE(score(ball, larger, scoreOptions(true, true, 0.1)), kDegenerateCeiling);
 }
 
-TEST(Score, ComparesByHandAsWritten) {
+TEST(Score, AgreesWithAnExampleByHand) {
     // Both anchors meet, the arms meet at distance 0.1: kernel (1 - 0.01 / 0.08)^4.
     const Signature a = signatureOf({{0, 0, 0, 0.5}, {0.5, 0, 0, 0.25}});
     const Signature b = signatureOf({{0, 0, 0, 0.5}, {0, 0.6, 0, 0.125}});
@@ -263,7 +254,7 @@ TEST(Score, ComparesByHandAsWritten) {
     EXPECT_NEAR(why.dissimilarity, 1.375 - 2.0 * similarity, 1e-7);
 }
 
-TEST(Score, KernelWidthHasARangeAndTheErrorSaysIt) {
+TEST(Score, RefusesKernelWidthsOutOfRange) {
     const double nan = std::numeric_limits<double>::quiet_NaN();
     const double infinite = std::numeric_limits<double>::infinity();
     for (const double width : {0.0, -0.1, -0.0, 1e-7, 1e-200, 2e6, nan, infinite, -infinite}) {
@@ -278,7 +269,7 @@ TEST(Score, KernelWidthHasARangeAndTheErrorSaysIt) {
     }
 }
 
-TEST(Score, StaysANumberForExtremeNumbers) {
+TEST(Score, StaysFiniteForExtremeNumbers) {
     Random random(10);
     const std::array<double, 5> lengths = {1e-30, 1e-7, 1.0, 1e3, 1e30};
     for (int round = 0; round < 3000; ++round) {
@@ -340,7 +331,7 @@ TEST(ScoreUpperBound, IsNeverBelowTheScore) {
               << ", " << 100 * tight / rounds << " % within 0.05\n";
 }
 
-TEST(ScoreUpperBound, OfUnrelatedShapesRulesMostOut) {
+TEST(ScoreUpperBound, RulesOutMostUnrelatedShapes) {
     // What pruning lives on: at seven points the bound of unrelated shapes is well below 1.
     Random random(12);
     double sum = 0.0;

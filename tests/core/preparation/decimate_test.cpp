@@ -33,63 +33,63 @@ TEST(Decimate, MeetsTheTargetAtAnyDensity) {
     int all = 0;
     for (const PointCloud& points : clouds) {
         for (const std::size_t target : {50, 200, 1000, 5000, 20000, 39000}) {
-            const auto thinned = decimate(points, target);
-            ASSERT_TRUE(thinned);
-            EXPECT_LE(thinned->points.size(), target);
-            EXPECT_GE(thinned->points.size(), target / 2) << target;
-            close += thinned->points.size() >= 0.9 * static_cast<double>(target);
+            const auto decimated = decimate(points, target);
+            ASSERT_TRUE(decimated);
+            EXPECT_LE(decimated->points.size(), target);
+            EXPECT_GE(decimated->points.size(), target / 2) << target;
+            close += decimated->points.size() >= 0.9 * static_cast<double>(target);
             ++all;
         }
     }
     EXPECT_GE(close, all * 8 / 10) << "of " << all;
 }
 
-// The count stops answering to the cell size where nearly every point has a cell of its own.
+// Where nearly every point has a cell of its own, the count hardly depends on the cell size.
 TEST(Decimate, MeetsATargetJustBelowTheNumberOfPoints) {
     for (const std::size_t count : {1000, 40000}) {
         const PointCloud points = filled(count);
-        const auto thinned = decimate(points, count - 1);
-        ASSERT_TRUE(thinned);
-        EXPECT_LT(thinned->points.size(), count);
-        EXPECT_GE(thinned->points.size(), count * 9 / 10);
+        const auto decimated = decimate(points, count - 1);
+        ASSERT_TRUE(decimated);
+        EXPECT_LT(decimated->points.size(), count);
+        EXPECT_GE(decimated->points.size(), count * 9 / 10);
     }
 }
 
 TEST(Decimate, PointsAreTheMeansOfTheirCells) {
     const PointCloud points = surface(makeLShape(), 20000);
-    const auto thinned = decimate(points, 1500).value();
-    ASSERT_EQ(thinned.siteOfPoint.size(), points.size());
-    EXPECT_GT(thinned.cellSize, 0.0);
-    std::vector<Point3> sums(thinned.points.size());
-    std::vector<double> counts(thinned.points.size(), 0.0);
+    const auto decimated = decimate(points, 1500).value();
+    ASSERT_EQ(decimated.siteOfPoint.size(), points.size());
+    EXPECT_GT(decimated.cellSize, 0.0);
+    std::vector<Point3> sums(decimated.points.size());
+    std::vector<double> counts(decimated.points.size(), 0.0);
     std::map<std::array<long, 3>, std::uint32_t> siteOfCell;
     for (std::size_t i = 0; i < points.size(); ++i) {
-        const std::uint32_t site = thinned.siteOfPoint[i];
-        ASSERT_LT(site, thinned.points.size());
+        const std::uint32_t site = decimated.siteOfPoint[i];
+        ASSERT_LT(site, decimated.points.size());
         sums[site] = sums[site] + points[i];
         counts[site] += 1.0;
         const auto index = [&](double v) {
-            return static_cast<long>(std::floor((v + 1.0) / thinned.cellSize));
+            return static_cast<long>(std::floor((v + 1.0) / decimated.cellSize));
         };
         const auto known = siteOfCell.emplace(
             std::array<long, 3>{index(points[i].x), index(points[i].y), index(points[i].z)}, site);
         ASSERT_EQ(known.first->second, site) << "a cell has one mean";
     }
-    EXPECT_EQ(siteOfCell.size(), thinned.points.size());
+    EXPECT_EQ(siteOfCell.size(), decimated.points.size());
     for (std::size_t s = 0; s < sums.size(); ++s) {
         ASSERT_GT(counts[s], 0.0);
-        ASSERT_LT(distance((1.0 / counts[s]) * sums[s], thinned.points[s]), 1e-13);
+        ASSERT_LT(distance((1.0 / counts[s]) * sums[s], decimated.points[s]), 1e-13);
     }
-    EXPECT_TRUE(std::is_sorted(thinned.points.begin(), thinned.points.end(), lexicographicLess));
+    EXPECT_TRUE(std::is_sorted(decimated.points.begin(), decimated.points.end(), lexicographicLess));
 }
 
-TEST(Decimate, SameSortedPointsSameResult) {
+TEST(Decimate, IsDeterministicAndHardlyDependsOnOrder) {
     const PointCloud points = surface(makeJack(), 10000);
     const auto a = decimate(points, 2000).value();
     const auto b = decimate(points, 2000).value();
     EXPECT_TRUE(a.points == b.points);
     EXPECT_EQ(a.siteOfPoint, b.siteOfPoint);
-    // In another order only the sums round differently.
+    // In another order, only the rounding of the sums differs.
     const PointCloud reversed(points.rbegin(), points.rend());
     const auto c = decimate(reversed, 2000).value();
     ASSERT_EQ(c.points.size(), a.points.size());
@@ -109,8 +109,8 @@ TEST(Decimate, LeavesSmallScansAlone) {
     for (std::size_t i = 0; i < points.size(); ++i) EXPECT_EQ(same.points[same.siteOfPoint[i]], points[i]);
 }
 
-TEST(Decimate, TinyTargetsAndCorners) {
-    // All corners of the frame, the far one too, fit one cell if they must.
+TEST(Decimate, HandlesTinyTargetsAndCorners) {
+    // All corners of the frame, including the far one, can share a cell.
     PointCloud corners;
     for (const double x : {-1.0, 1.0}) {
         for (const double y : {-1.0, 1.0}) {
@@ -118,10 +118,10 @@ TEST(Decimate, TinyTargetsAndCorners) {
         }
     }
     for (const std::size_t target : {4, 5, 7}) {
-        const auto thinned = decimate(corners, target);
-        ASSERT_TRUE(thinned);
-        EXPECT_LE(thinned->points.size(), target);
-        EXPECT_GE(thinned->points.size(), 1U);
+        const auto decimated = decimate(corners, target);
+        ASSERT_TRUE(decimated);
+        EXPECT_LE(decimated->points.size(), target);
+        EXPECT_GE(decimated->points.size(), 1U);
     }
     // Clusters finer than the finest cell.
     PointCloud clusters;
@@ -129,7 +129,7 @@ TEST(Decimate, TinyTargetsAndCorners) {
     EXPECT_LE(decimate(clusters, 10)->points.size(), 10U);
 }
 
-TEST(Decimate, RefusesAndStops) {
+TEST(Decimate, RefusesBadTargetsAndCanBeCancelled) {
     for (const std::size_t target : {0, 1, 3}) {
         EXPECT_EQ(decimate(filled(10), target).error().code, ErrorCode::kInvalidArgument);
     }

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/base/math.h"
 #include "core/base/random.h"
 #include "core/geometry/motion.h"
 
@@ -24,7 +25,7 @@ PointCloud noisySphere(double sigma) {
     return points;
 }
 
-double sphereSpacing() { return std::sqrt(4.0 * 3.14159265358979323846 / static_cast<double>(kPoints)); }
+double sphereSpacing() { return std::sqrt(4.0 * kPi / static_cast<double>(kPoints)); }
 
 double radialError(const PointCloud& points) {
     double sum = 0.0;
@@ -59,7 +60,7 @@ TEST(EstimateNoise, DoesNotTakeTheFarSideOfAThinPlateForNoise) {
     EXPECT_NEAR(estimateOf(plate).sigma, 0.004, 0.0015);
 }
 
-TEST(EstimateNoise, StaysWithThePose) {
+TEST(EstimateNoise, DoesNotDependOnThePose) {
     const PointCloud points = noisySphere(0.03);
     Random random(6);
     Motion motion;
@@ -72,7 +73,7 @@ TEST(EstimateNoise, StaysWithThePose) {
     EXPECT_NEAR(there.spacing / here.spacing, 7.0, 1e-6);
 }
 
-TEST(EstimateNoise, TooFewPointsTellNothing) {
+TEST(EstimateNoise, IsZeroForTooFewPoints) {
     EXPECT_EQ(estimateOf({}).sigma, 0.0);
     EXPECT_EQ(estimateOf({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}).sigma, 0.0);
 }
@@ -85,7 +86,7 @@ TEST(Smooth, BringsPointsBackToTheirSurface) {
         ASSERT_TRUE(moved);
         ASSERT_EQ(moved->size(), points.size());
         EXPECT_LT(radialError(*moved), 0.45 * sigma) << sigma;
-        double mean = 0.0;  // no shrinking either
+        double mean = 0.0;  // nor does the sphere shrink
         for (const Point3& p : *moved) mean += length(p) / static_cast<double>(moved->size());
         EXPECT_NEAR(mean, 1.0, 0.1 * sigma) << sigma;
     }

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/base/math.h"
 #include "core/base/random.h"
 #include "core/geometry/motion.h"
 
@@ -32,13 +33,13 @@ std::size_t count(const std::vector<std::uint8_t>& outliers, std::size_t begin, 
                                                outliers.begin() + static_cast<std::ptrdiff_t>(end), 1));
 }
 
-TEST(FindOutliers, ACleanSurfaceHasNearlyNone) {
+TEST(FindOutliers, FindsHardlyAnyOnACleanSurface) {
     Random random(1);
     const PointCloud points = sphere(5000, random);
     EXPECT_LE(count(outliersOf(points), 0, points.size()), 3u);
 }
 
-TEST(FindOutliers, FindsAHazeInTheWholeBox) {
+TEST(FindOutliers, FindsAHazeAroundTheShape) {
     Random random(2);
     PointCloud points = sphere(10000, random);
     const std::size_t clean = points.size();
@@ -47,7 +48,7 @@ TEST(FindOutliers, FindsAHazeInTheWholeBox) {
     }
     const auto outliers = outliersOf(points);
     ASSERT_EQ(outliers.size(), points.size());
-    // Those that happen to lie near the surface are part of it for all anyone can tell.
+    // Those that happen to lie near the surface cannot be told from it.
     std::size_t far = 0;
     for (std::size_t i = clean; i < points.size(); ++i) {
         if (std::abs(length(points[i]) - 1.0) < 0.25) continue;
@@ -58,7 +59,7 @@ TEST(FindOutliers, FindsAHazeInTheWholeBox) {
     EXPECT_LE(count(outliers, 0, clean), 10u);
 }
 
-TEST(FindOutliers, FindsAClusterFarOff) {
+TEST(FindOutliers, FindsASmallDistantCluster) {
     Random random(3);
     PointCloud points = sphere(5000, random);
     for (int i = 0; i < 30; ++i) {
@@ -80,7 +81,7 @@ TEST(FindOutliers, KeepsASparseRegionAndAThinPart) {
     }
     const std::size_t rod = points.size();
     for (int i = 0; i < 400; ++i) {
-        const double angle = random.uniform(0.0, 6.283185307179586);
+        const double angle = random.uniform(0.0, 2.0 * kPi);
         points.push_back({-1.0 - random.uniform(0.0, 2.0), 0.03 * std::cos(angle), 0.03 * std::sin(angle)});
     }
     const auto outliers = outliersOf(points);
@@ -88,14 +89,14 @@ TEST(FindOutliers, KeepsASparseRegionAndAThinPart) {
     EXPECT_LE(count(outliers, rod, points.size()), 3u);
 }
 
-TEST(FindOutliers, KeepsAPartApart) {
+TEST(FindOutliers, KeepsALargerSeparatePart) {
     Random random(5);
     PointCloud points = sphere(5000, random);
     for (const Point3& p : sphere(300, random)) points.push_back({5.0 + 0.2 * p.x, 0.2 * p.y, 0.2 * p.z});
     EXPECT_LE(count(outliersOf(points), 5000, points.size()), 2u);
 }
 
-TEST(FindOutliers, SaysTheSameInAnyPose) {
+TEST(FindOutliers, DoesNotDependOnThePose) {
     Random random(6);
     PointCloud points = sphere(3000, random);
     for (int i = 0; i < 40; ++i) {
@@ -107,7 +108,7 @@ TEST(FindOutliers, SaysTheSameInAnyPose) {
     EXPECT_EQ(outliersOf(points), outliersOf(applyToCloud(motion, points)));
 }
 
-TEST(FindOutliers, AHandfulOfPointsHasNone) {
+TEST(FindOutliers, FindsNoneAmongAHandfulOfPoints) {
     EXPECT_TRUE(outliersOf({}).empty());
     EXPECT_EQ(outliersOf({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 100}}), (std::vector<std::uint8_t>(4, 0)));
 }

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/preparation/sanitise.h"
 #include "core/synthetic/named_shapes.h"
 #include "core/synthetic/noise.h"
 
@@ -35,7 +36,7 @@ Result<PreparedPoints> prepared(const PointCloud& points, const PreparationOptio
     });
 }
 
-TEST(PreparePoints, WithNothingAskedOnlySanitises) {
+TEST(PreparePoints, OnlySanitisesByDefault) {
     const PointCloud points = noisyTorus();
     std::vector<std::string> stages;
     const auto result = prepared(points, PreparationOptions{}, &stages);
@@ -46,7 +47,7 @@ TEST(PreparePoints, WithNothingAskedOnlySanitises) {
     EXPECT_EQ(result->duplicates, 1u);
 }
 
-TEST(PreparePoints, EveryPointHasItsSiteOrIsAnOutlier) {
+TEST(PreparePoints, MapsEveryPointToASiteOrMarksItAsOutlier) {
     const PointCloud points = noisyTorus();
     std::vector<std::string> stages;
     const auto result = prepared(points, everything(), &stages);
@@ -74,7 +75,7 @@ TEST(PreparePoints, EveryPointHasItsSiteOrIsAnOutlier) {
     }
 }
 
-TEST(PreparePoints, StopsWhenToldTo) {
+TEST(PreparePoints, CanBeStoppedAtEachStage) {
     for (const char* last : {"sanitise", "decimate", "outliers", "smooth", "thin"}) {
         const auto result =
             preparePoints(noisyTorus(), everything(), {}, [&](const char* stage) -> Result<void> {

@@ -23,7 +23,7 @@ PointCloud randomPoints(std::size_t count, std::uint64_t seed) {
     return points;
 }
 
-TEST(Sanitise, PutsPointsInTheUnitFrameSorted) {
+TEST(Sanitise, SortsPointsInTheUnitFrame) {
     const PointCloud scan = randomPoints(1000, 1);
     const auto clean = sanitise(scan);
     ASSERT_TRUE(clean);
@@ -62,7 +62,7 @@ TEST(Sanitise, MergesAndCountsDuplicates) {
     EXPECT_EQ(sites.size(), 50U);
 }
 
-TEST(Sanitise, OrderAndPowersOfTwoLeaveNoTrace) {
+TEST(Sanitise, DoesNotDependOnOrderOrPowersOfTwo) {
     const PointCloud scan = randomPoints(300, 3);
     const auto clean = sanitise(scan);
     PointCloud changed(scan.rbegin(), scan.rend());
@@ -106,7 +106,7 @@ TEST(Sanitise, NamesTheFirstBadCoordinate) {
     }
 }
 
-TEST(Sanitise, NamesWhatSpansNoSpace) {
+TEST(Sanitise, RefusesScansWithoutVolume) {
     EXPECT_EQ(sanitise({}).error().code, ErrorCode::kTooFewPoints);
     EXPECT_EQ(sanitise(randomPoints(3, 1)).error().code, ErrorCode::kTooFewPoints);
     EXPECT_EQ(sanitise(PointCloud(9, {1, 2, 3})).error().code, ErrorCode::kAllPointsEqual);
@@ -141,23 +141,6 @@ TEST(Sanitise, FlatnessHasATolerance) {
             EXPECT_TRUE(thin);
         }
     }
-}
-
-TEST(MergeDuplicates, AgreesWithASet) {
-    Random random(7);
-    PointCloud points;
-    for (int i = 0; i < 500; ++i) {
-        points.push_back({static_cast<double>(random.below(4)), static_cast<double>(random.below(4)),
-                          static_cast<double>(random.below(4))});
-    }
-    const auto less = [](const Point3& a, const Point3& b) { return lexicographicLess(a, b); };
-    const std::set<Point3, decltype(less)> expected(points.begin(), points.end(), less);
-    const MergedPoints merged = mergeDuplicates(points);
-    ASSERT_EQ(merged.points.size(), expected.size());
-    EXPECT_TRUE(std::equal(expected.begin(), expected.end(), merged.points.begin()));
-    for (std::size_t i = 0; i < points.size(); ++i)
-        EXPECT_EQ(merged.points[merged.siteOfPoint[i]], points[i]);
-    EXPECT_TRUE(mergeDuplicates({}).points.empty());
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 
 #include "core/base/random.h"
 #include "core/preparation/decimate.h"
+#include "core/preparation/sanitise.h"
 #include "core/synthetic/named_shapes.h"
 
 namespace shapedb {
@@ -51,26 +52,26 @@ TEST(ScanGrid, SitesAreAsSmallAsThoseOfDecimate) {
         const Point3 p = clean.points[clean.siteOfPoint[i]];
         worst = std::max(worst, distance(p, gridded.points[gridded.siteOfPoint[i]]));
     }
-    // Points of a site lie in one cell, or in a small one that reaches beyond it.
+    // The points of a site lie in one cell, or in a small cell that extends beyond it.
     EXPECT_LT(worst, 2.0 * std::sqrt(3.0) * plain.cellSize);
 }
 
-TEST(ScanGrid, TheOrderOfThePointsLeavesNoTrace) {
+TEST(ScanGrid, DoesNotDependOnTheOrderOfThePoints) {
     const PointCloud scan = jack(50000);
     const auto a = gridScan(scan, 500).value().value();
     PointCloud turned(scan.rbegin(), scan.rend());
     const auto b = gridScan(turned, 500).value().value();
     EXPECT_TRUE(a.points == b.points);
     EXPECT_TRUE(std::equal(a.siteOfPoint.begin(), a.siteOfPoint.end(), b.siteOfPoint.rbegin()));
-    // Dense parts first: the grid is coarsened at other moments.
+    // Dense parts first, so that the grid is coarsened at other times.
     std::sort(turned.begin(), turned.end(),
               [](const Point3& p, const Point3& q) { return length(p) < length(q); });
     EXPECT_TRUE(gridScan(turned, 500).value().value().points == a.points);
 }
 
-// Long enough for a stretch to each thread, for the small target. The last is dense, so that its grid alone
-// is the coarsest.
-TEST(ScanGrid, AnyNumberOfThreadsFindsTheSamePoints) {
+// Long enough, for the small target, to give each thread a stretch. The last stretch is dense, so that its
+// grid is the coarsest.
+TEST(ScanGrid, IsTheSameForAnyNumberOfThreads) {
     PointCloud scan = jack(150000);
     const PointCloud dense = sampleBoundary(makeBox().solid, 300000, 5).value();
     for (const Point3& p : dense) scan.push_back(0.3 * p);
@@ -88,7 +89,7 @@ TEST(ScanGrid, AnyNumberOfThreadsFindsTheSamePoints) {
     }
 }
 
-TEST(ScanGrid, FindsAShapeThatIsSmallInItsFrame) {
+TEST(ScanGrid, ResolvesAShapeThatIsSmallInItsFrame) {
     PointCloud scan = jack(50000);
     scan.push_back({3000.0, 2000.0, -1000.0});
     const auto gridded = gridScan(scan, 500).value().value();
@@ -96,7 +97,7 @@ TEST(ScanGrid, FindsAShapeThatIsSmallInItsFrame) {
     EXPECT_GE(gridded.points.size(), 400U);
 }
 
-TEST(ScanGrid, LeavesScansOfFewPlacesToSanitise) {
+TEST(ScanGrid, LeavesScansWithFewDistinctPointsToSanitise) {
     PointCloud scan;
     for (int i = 0; i < 50000; ++i) {
         scan.push_back({(i % 5) * 1.0, (i / 5 % 5) * 1.0, (i / 25 % 5) * 1.0});
@@ -104,7 +105,7 @@ TEST(ScanGrid, LeavesScansOfFewPlacesToSanitise) {
     EXPECT_FALSE(gridScan(scan, 500).value().has_value());
 }
 
-TEST(ScanGrid, NamesBadScans) {
+TEST(ScanGrid, RefusesBadScans) {
     PointCloud scan = jack(20000);
     PointCloud flat = scan;
     for (Point3& p : flat) p.z = 1.0;
@@ -116,7 +117,7 @@ TEST(ScanGrid, NamesBadScans) {
     EXPECT_EQ(gridScan(PointCloud(9000), 500).error().code, ErrorCode::kAllPointsEqual);
 }
 
-TEST(ScanGrid, StopsWhenToldTo) {
+TEST(ScanGrid, CanBeCancelled) {
     const std::atomic<bool> cancel{true};
     RunContext context;
     context.cancel = &cancel;

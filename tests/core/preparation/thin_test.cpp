@@ -38,13 +38,13 @@ TEST(Thin, KeepsPointsApartAndCoversAllOthers) {
     }
 }
 
-TEST(Thin, KeepsWhatIsSparseAlready) {
+TEST(Thin, KeepsSparseCloudsWhole) {
     const PointCloud points = scattered(50);
     EXPECT_EQ(thinned(points, 1e-6).points, points);
     EXPECT_EQ(thinned(points, 0.0).points, points);
 }
 
-TEST(Thin, ChoosesTheSameInAnyPose) {
+TEST(Thin, DoesNotDependOnThePose) {
     const PointCloud points = scattered(1500);
     Random random(2);
     Motion motion;
@@ -53,7 +53,7 @@ TEST(Thin, ChoosesTheSameInAnyPose) {
     EXPECT_EQ(thinned(points, 0.1).siteOfPoint, thinned(applyToCloud(motion, points), 0.1).siteOfPoint);
 }
 
-TEST(Thin, OfNothingIsNothing) { EXPECT_TRUE(thinned({}, 1.0).points.empty()); }
+TEST(Thin, AcceptsAnEmptyCloud) { EXPECT_TRUE(thinned({}, 1.0).points.empty()); }
 
 }  // namespace
 }  // namespace shapedb

@@ -50,7 +50,7 @@ Library makeLibrary() {
     return library;
 }
 
-TEST(Retrieval, FindsItselfFirstAndItsFamilyMostly) {
+TEST(Retrieval, FindsTheShapeItselfFirstAndMostlyItsFamily) {
     const Library library = makeLibrary();
     std::size_t right = 0;
     for (const IndexEntry& entry : library.entries) {

@@ -31,14 +31,13 @@ void expectIs(const SignatureBlock& block, std::size_t row, std::int64_t id, std
     ASSERT_EQ(block.id(row), id);
     ASSERT_EQ(block.metadata(row).at("version"), std::to_string(version)) << "id " << id;
     ASSERT_FALSE(block.attributed(row));
-    Signature signature;
-    block.scored(row, signature);
-    ASSERT_EQ(signature.scale, static_cast<double>(version));
-    ASSERT_EQ(signature.points.size(), 1 + static_cast<std::size_t>(id) % 3);
-    ASSERT_EQ(signature.points.back().weight, static_cast<float>(id));
+    const ShapeRow shape = block.rows()[row];
+    ASSERT_EQ(shape.scale, static_cast<double>(version));
+    ASSERT_EQ(shape.pointCount, 1 + static_cast<std::size_t>(id) % 3);
+    ASSERT_EQ(shape.points[shape.pointCount - 1].weight, static_cast<float>(id));
 }
 
-// The entries as they were last put there, in order, in blocks of legal sizes.
+// The entries as they were last stored, in order, in blocks of legal sizes.
 void expectHolds(const SignatureSet& set, const Model& model) {
     ASSERT_EQ(set.size(), model.size());
     auto expected = model.begin();
@@ -110,7 +109,7 @@ void applyTo(Model& model, const Change& change, std::size_t version) {
     for (const std::int64_t id : change.removed) model.erase(id);
 }
 
-TEST(SignatureSet, BehavesAsAMapUnderRandomChanges) {
+TEST(SignatureSet, EqualsAMapUnderRandomChanges) {
     for (std::uint64_t seed = 1; seed <= 3; ++seed) {
         Random random(seed);
         SignatureSet set;
@@ -133,7 +132,7 @@ TEST(SignatureSet, BehavesAsAMapUnderRandomChanges) {
     }
 }
 
-TEST(SignatureSet, OfBlocksIsASetLikeAnyOther) {
+TEST(SignatureSet, MadeOfBlocksIsASetLikeAnyOther) {
     Model model;
     std::vector<std::shared_ptr<const SignatureBlock>> blocks;
     std::int64_t id = 0;
@@ -159,7 +158,7 @@ TEST(SignatureSet, OfBlocksIsASetLikeAnyOther) {
     EXPECT_EQ(SignatureSet::ofBlocks({}).size(), 0U);
 }
 
-TEST(SignatureSet, IsEmptyAtFirstAndAgain) {
+TEST(SignatureSet, IsEmptyAtFirstAndAfterRemovingAll) {
     const SignatureSet empty;
     EXPECT_EQ(empty.size(), 0u);
     EXPECT_EQ(empty.memoryBytes(), 0u);
@@ -194,7 +193,7 @@ TEST(SignatureSet, DropsABlockThatBecomesEmpty) {
         ASSERT_EQ(without.blocks().size(), 2u);
         EXPECT_EQ(without.size(), 2048u);
         EXPECT_FALSE(without.find(ids.front()));
-        // The range it answered for is open to others again.
+        // Its range of ids is free for others again.
         const SignatureSet back = without.with({entryOf(ids[500])}, {});
         EXPECT_TRUE(back.find(ids[500]));
         EXPECT_EQ(back.size(), 2049u);
@@ -214,13 +213,13 @@ TEST(SignatureSet, SharesTheBlocksAChangeDoesNotTouch) {
     };
     EXPECT_EQ(shared(set.with({entryOf(4097)}, {})), 9u);
     EXPECT_EQ(shared(set.with({}, {4096})), 9u);
-    EXPECT_EQ(shared(set.with({entryOf(1000000)}, {})), 10u) << "full: a new one begins";
+    EXPECT_EQ(shared(set.with({entryOf(1000000)}, {})), 10u) << "the last is full, so a new one begins";
     EXPECT_EQ(shared(set.with({}, {1000000, 3, -5})), 9u);  // 3 may be in the first block
     EXPECT_EQ(shared(set.with({}, {})), 10u);
 }
 
-// Workers finish out of order: late ids must not leave blocks of one entry behind.
-TEST(SignatureSet, StaysInFewBlocksWhateverTheOrderOfArrival) {
+// Workers finish out of order: late ids must not leave blocks of one entry.
+TEST(SignatureSet, StaysInFewBlocksInAnyOrderOfArrival) {
     const std::int64_t count = 8000;
     Random random(5);
     std::vector<std::vector<std::int64_t>> orders(4);
@@ -260,7 +259,7 @@ TEST(SignatureSet, KeepsAShapeInFewBytes) {
     EXPECT_GT(set.memoryBytes() / entries.size(), 256u + sizeof(PackedSegmentDescriptor));
 }
 
-TEST(SignatureSet, CountsTheMemoryOfWhatItHolds) {
+TEST(SignatureSet, CountsItsMemory) {
     IndexEntry entry = entryOf(1);
     const std::size_t before = SignatureSet().with({entry}, {}).memoryBytes();
     entry.metadata["label"] = std::string(2000, 'v');

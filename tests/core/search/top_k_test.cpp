@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cstring>
 #include <limits>
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
+#include "core/matching/score.h"
 #include "tests/core/matching/attributed_signatures.h"
 #include "tests/core/matching/random_signatures.h"
 
@@ -17,8 +17,7 @@ namespace {
 
 using testing_support::disturbed;
 using testing_support::randomSignature;
-
-bool sameBits(double x, double y) { return std::memcmp(&x, &y, sizeof x) == 0; }
+using testing_support::sameBits;
 
 IndexEntry entryOf(std::int64_t id, Signature signature) {
     IndexEntry entry;
@@ -29,7 +28,7 @@ IndexEntry entryOf(std::int64_t id, Signature signature) {
     return entry;
 }
 
-// What was put into a set, in full: the plain reference scores these.
+// A set and its full entries, which the plain reference scores.
 struct Library {
     std::vector<IndexEntry> entries;
     SignatureSet set;
@@ -98,7 +97,7 @@ SearchOptions randomOptions(Random& random, const Library& library) {
     return options;
 }
 
-// Hits as brute force has them, and counts that make sense.
+// The hits of brute force, and consistent counts.
 void expectExact(const Signature& query, const Library& library, const SearchOptions& options) {
     const auto result = topK(query, library.set, options);
     ASSERT_TRUE(result) << result.error().message;
@@ -146,7 +145,7 @@ TEST(TopK, EqualsBruteForceOnScansBitForBit) {
         entries.push_back(entryOf(id++, plain));
     }
     const Library library(std::move(entries));
-    for (int round = 0; round < 150; ++round) {
+    for (int round = 0; round < 60; ++round) {
         SearchOptions options = randomOptions(random, library);
         options.score.partial = round % 4 == 0;
         Signature query = scans[random.below(scans.size())].signature;
@@ -156,7 +155,7 @@ TEST(TopK, EqualsBruteForceOnScansBitForBit) {
     }
 }
 
-// Of several slices, each of which is ruled out by the best of those before.
+// Several slices, each ruled out by the best scores of those before.
 TEST(TopK, EqualsBruteForceOnManyBlocksBitForBit) {
     const auto& scans = testing_support::scannedFamilies(1, 1);
     Random random(12);
@@ -177,7 +176,7 @@ TEST(TopK, EqualsBruteForceOnManyBlocksBitForBit) {
     }
 }
 
-TEST(TopK, OfABatchIsThatOfEachQuery) {
+TEST(TopK, BatchEqualsEachQueryAlone) {
     const auto& scans = testing_support::scannedFamilies(1, 1);
     Random random(13);
     std::vector<IndexEntry> entries;
@@ -204,7 +203,7 @@ TEST(TopK, OfABatchIsThatOfEachQuery) {
     EXPECT_TRUE(topKBatch({}, library.set, options)->empty());
 }
 
-TEST(TopK, OfABatchNamesTheQueryThatFails) {
+TEST(TopK, BatchErrorNamesTheQuery) {
     const auto& scans = testing_support::scannedFamilies(1, 1);
     const Library library({entryOf(1, scans[0].signature)});
     BatchQuery good{scans[0].signature, std::nullopt};
@@ -220,7 +219,7 @@ TEST(TopK, OfABatchNamesTheQueryThatFails) {
 }
 
 // A search cannot compare what a signature does not have.
-TEST(TopK, RefusesPointsAloneWhereSignaturesHaveAttributes) {
+TEST(TopK, RefusesAQueryWithoutAttributesWhereShapesHaveThem) {
     const auto& scans = testing_support::scannedFamilies(1, 1);
     const Library library({entryOf(1, scans[0].signature)});
     Signature query = scans[0].signature;
@@ -231,7 +230,7 @@ TEST(TopK, RefusesPointsAloneWhereSignaturesHaveAttributes) {
     EXPECT_NE(result.error().message.find("attributes"), std::string::npos) << result.error().message;
 }
 
-TEST(TopK, RulesMostScansOutWithoutAligning) {
+TEST(TopK, RulesOutMostScansWithoutAligning) {
     const auto& scans = testing_support::scannedFamilies(1, 1);
     Random random(11);
     std::vector<IndexEntry> entries;
@@ -292,7 +291,7 @@ TEST(TopK, IsTheSameOnAnyNumberOfThreads) {
     }
 }
 
-TEST(TopK, RulesMostOutWithoutScoring) {
+TEST(TopK, RulesOutMostShapesWithoutScoring) {
     Random random(4);
     const Signature query = randomSignature(random, testing_support::Kind::kPlain, 7);
     std::vector<IndexEntry> entries;
@@ -309,7 +308,7 @@ TEST(TopK, RulesMostOutWithoutScoring) {
     EXPECT_LT(result->counts.scored, 500u);
 }
 
-TEST(TopK, OfAnEmptySetIsEmpty) {
+TEST(TopK, FindsNothingInAnEmptySet) {
     Random random(5);
     const auto result = topK(randomSignature(random), SignatureSet(), {});
     ASSERT_TRUE(result);
@@ -347,7 +346,7 @@ TEST(TopK, RefusesOptionsOutOfRange) {
     EXPECT_EQ(topK(query, set, options)->hits.size(), 10u);
 }
 
-TEST(TopK, StopsWhenAsked) {
+TEST(TopK, StopsWhenCancelledOrLate) {
     Random random(7);
     const Signature query = randomSignature(random, testing_support::Kind::kPlain, 7);
     const Library library = randomLibrary(random, query, 2000);
@@ -384,7 +383,7 @@ TEST(TopK, StopsWhenAsked) {
     EXPECT_EQ(result.error().code, ErrorCode::kDeadlineExceeded);
 }
 
-// Signatures of many points take long each: a stop must not wait for the chunk to be done.
+// Signatures of many points take long each: a stop must not wait for the end of the chunk.
 TEST(TopK, StopsInTheMiddleOfAChunk) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 2);
     Random random(8);

@@ -1,4 +1,4 @@
-// The adaptive interior and the preparation before it, through `segment`, on solids of known volume.
+// The adaptive interior, together with the preparation, by `segment` on solids of known volume.
 #include "core/segmentation/adaptive_interior.h"
 
 #include <algorithm>
@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/base/math.h"
 #include "core/base/random.h"
 #include "core/geometry/bounding.h"
 #include "core/geometry/motion.h"
@@ -39,7 +40,7 @@ Segmentation found(const PointCloud& points) {
 
 double sizeOf(const PointCloud& points) { return smallestBoxDiagonal(points).value_or(0.0); }
 
-TEST(AdaptiveInterior, CleanSolidsKeepTheirVolumeAndAreTrusted) {
+TEST(AdaptiveInterior, CleanSolidsKeepTheirVolumeWithHighQuality) {
     for (const NamedShape& shape : namedShapes()) {
         const PointCloud points = sampled(shape);
         const Segmentation s = found(points);
@@ -51,7 +52,7 @@ TEST(AdaptiveInterior, CleanSolidsKeepTheirVolumeAndAreTrusted) {
     }
 }
 
-TEST(AdaptiveInterior, NoiseMovesVolumeAndSizeLittle) {
+TEST(AdaptiveInterior, NoiseHardlyChangesVolumeAndSize) {
     for (const NamedShape& shape : namedShapes()) {
         const PointCloud clean = sampled(shape);
         for (const double noise : {0.005, 0.01}) {
@@ -66,7 +67,7 @@ TEST(AdaptiveInterior, NoiseMovesVolumeAndSizeLittle) {
     }
 }
 
-TEST(AdaptiveInterior, OutliersChangeNothingThatMatters) {
+TEST(AdaptiveInterior, OutliersHardlyChangeTheResult) {
     for (const NamedShape& shape : namedShapes()) {
         const PointCloud clean = sampled(shape);
         PointCloud points = clean;
@@ -85,23 +86,23 @@ TEST(AdaptiveInterior, OutliersChangeNothingThatMatters) {
     }
 }
 
-// What is left when the highest fifth of the points is gone.
+// Without the highest fifth of the points.
 PointCloud withoutCap(PointCloud points) {
     std::sort(points.begin(), points.end(), [](const Point3& a, const Point3& b) { return a.z < b.z; });
     points.resize(points.size() * 4 / 5);
     return points;
 }
 
-TEST(AdaptiveInterior, AMissingCapIsClosed) {
+TEST(AdaptiveInterior, ClosesAMissingCap) {
     // A ball without the fifth of its surface above z = 0.6: the cap of height 0.4 is lost.
     const Segmentation s = found(withoutCap(sampled(makeSphere())));
-    const double cap = 3.14159265358979323846 * 0.4 * 0.4 * (1.0 - 0.4 / 3.0);
+    const double cap = kPi * 0.4 * 0.4 * (1.0 - 0.4 / 3.0);
     EXPECT_NEAR(s.volume / (makeSphere().volume - cap), 1.0, 0.03);
     EXPECT_GT(s.quality, 0.6);
     EXPECT_LT(s.quality, 0.95);
 }
 
-TEST(AdaptiveInterior, OpenSurfacesGetAnAnswerThatIsNotTrusted) {
+TEST(AdaptiveInterior, OpenSurfacesGetAnInteriorOfLowQuality) {
     PointCloud hemisphere;
     for (const Point3& p : sampled(makeSphere())) {
         if (p.z > 0.0) hemisphere.push_back(p);
@@ -124,7 +125,7 @@ TEST(AdaptiveInterior, OpenSurfacesGetAnAnswerThatIsNotTrusted) {
     }
 }
 
-TEST(AdaptiveInterior, PointsInNoOrderAtAllStillGiveAnAnswer) {
+TEST(AdaptiveInterior, RandomPointsStillHaveAnInterior) {
     Random random(22);
     PointCloud cloud;
     for (int i = 0; i < 3000; ++i) cloud.push_back({random.uniform(), random.uniform(), random.uniform()});
@@ -132,7 +133,7 @@ TEST(AdaptiveInterior, PointsInNoOrderAtAllStillGiveAnAnswer) {
     EXPECT_LT(s.quality, 0.5);
     EXPECT_GT(s.volume, 0.0);
     EXPECT_LE(s.volume, 1.0);
-    // From the smallest possible cloud on: a result or the documented error.
+    // From the smallest possible cloud upwards: a result or the documented error.
     for (std::size_t count = 4; count < 40; ++count) {
         const auto few = segment(
             PointCloud(cloud.begin(), cloud.begin() + static_cast<std::ptrdiff_t>(count)), adaptive());
@@ -144,22 +145,22 @@ TEST(AdaptiveInterior, PointsInNoOrderAtAllStillGiveAnAnswer) {
     }
 }
 
-TEST(AdaptiveInterior, SeenFromAboveTwoBarsAreNoPlate) {
+TEST(AdaptiveInterior, DoesNotBridgeTwoBarsSeenFromAbove) {
     // The upper halves of two parallel rods of radius 0.1, 0.6 apart, as a sensor above a table sees them.
     Random random(21);
     PointCloud points;
     for (int i = 0; i < 6000; ++i) {
-        const double angle = random.uniform(0.0, 3.14159265358979323846);
+        const double angle = random.uniform(0.0, kPi);
         const double side = i % 2 == 0 ? -0.3 : 0.3;
         points.push_back({random.uniform(-1.0, 1.0), side + 0.1 * std::cos(angle), 0.1 * std::sin(angle)});
     }
     const Segmentation s = found(points);
-    const double halfRods = 2.0 * 2.0 * 0.5 * 3.14159265358979323846 * 0.01;
+    const double halfRods = 2.0 * 2.0 * 0.5 * kPi * 0.01;
     EXPECT_NEAR(s.volume / halfRods, 1.0, 0.1);
     EXPECT_LT(s.quality, 0.7);
 }
 
-TEST(AdaptiveInterior, AnOpenCupIsNotFilled) {
+TEST(AdaptiveInterior, DoesNotFillAnOpenCup) {
     // Outer ball of radius 1 without its top, inner one of 0.8, and the rim between them.
     Random random(13);
     PointCloud points;
@@ -171,20 +172,18 @@ TEST(AdaptiveInterior, AnOpenCupIsNotFilled) {
         if (p.z < 0.5) points.push_back(p);
     }
     for (int i = 0; i < 600; ++i) {
-        const double angle = random.uniform(0.0, 6.283185307179586);
+        const double angle = random.uniform(0.0, 2.0 * kPi);
         const double r = random.uniform(std::sqrt(0.64 - 0.25), std::sqrt(0.75));
         points.push_back({r * std::cos(angle), r * std::sin(angle), 0.5});
     }
     // Balls cut at z = 0.5: pi h^2 (R - h / 3) with h = R + 0.5.
-    const auto below = [](double r) {
-        return 3.14159265358979323846 * (r + 0.5) * (r + 0.5) * (r - (r + 0.5) / 3.0);
-    };
+    const auto below = [](double r) { return kPi * (r + 0.5) * (r + 0.5) * (r - (r + 0.5) / 3.0); };
     const Segmentation s = found(points);
     EXPECT_NEAR(s.volume / (below(1.0) - below(0.8)), 1.0, 0.05);
     EXPECT_GT(s.quality, 0.8);
 }
 
-TEST(AdaptiveInterior, OrderAndPoseLeaveNoTrace) {
+TEST(AdaptiveInterior, DoesNotDependOnOrderOrPose) {
     PointCloud points = sampled(makeDumbbell(), 5000);
     ASSERT_TRUE(addGaussianNoise(points, 0.005, 3));
     const Segmentation s = found(points);

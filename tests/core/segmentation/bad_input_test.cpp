@@ -1,4 +1,4 @@
-// Every way a scan can be unusable, and how running work is stopped and watched.
+// Every way a scan can be unusable; and how running work is cancelled and observed.
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -35,7 +35,7 @@ void expectError(const PointCloud& points, ErrorCode code, const std::vector<std
     }
 }
 
-TEST(BadInput, NonFiniteCoordinatesAreNamed) {
+TEST(BadInput, NamesNonFiniteCoordinates) {
     PointCloud points = dumbbell(500);
     points[77].y = std::nan("");
     expectError(points, ErrorCode::kNonFiniteCoordinate, {"y", "77", "NaN"});
@@ -44,7 +44,7 @@ TEST(BadInput, NonFiniteCoordinatesAreNamed) {
     expectError(points, ErrorCode::kNonFiniteCoordinate, {"z", "499", "infinite"});
 }
 
-TEST(BadInput, TooFewPoints) {
+TEST(BadInput, RefusesTooFewPoints) {
     PointCloud points;
     for (int i = 0; i < 4; ++i) {
         expectError(points, ErrorCode::kTooFewPoints, {std::to_string(i)});
@@ -54,7 +54,7 @@ TEST(BadInput, TooFewPoints) {
                 {"3 of 5"});
 }
 
-TEST(BadInput, AMillionCopiesOfOnePointAreRefusedAtOnce) {
+TEST(BadInput, RefusesAMillionCopiesOfOnePointAtOnce) {
     const auto start = Clock::now();
     expectError(PointCloud(1000000, Point3{0.1, -7.0, 3e5}), ErrorCode::kAllPointsEqual, {"1000000"});
     EXPECT_LT(secondsSince(start), 5.0);
@@ -70,7 +70,7 @@ TEST(BadInput, AMillionCopiesDoNotHideTheShape) {
     EXPECT_EQ(result->pointSegment.back(), result->pointSegment[5]);
 }
 
-TEST(BadInput, PointsOnALine) {
+TEST(BadInput, RefusesPointsOnALine) {
     Random random(2);
     const Point3 direction{0.3, -0.7, 0.2};
     for (const double scale : {1e-6, 1.0, 1e6}) {
@@ -90,7 +90,7 @@ TEST(BadInput, PointsOnALine) {
     }
 }
 
-TEST(BadInput, PointsInAPlane) {
+TEST(BadInput, RefusesPointsInAPlane) {
     Random random(3);
     for (int turn = 0; turn < 5; ++turn) {
         const Matrix3 rotation = turn == 0 ? Motion{}.rotation : randomRotation(random);
@@ -106,7 +106,7 @@ TEST(BadInput, PointsInAPlane) {
     }
 }
 
-TEST(BadInput, MagnitudesBeyondSinglePrecision) {
+TEST(BadInput, RefusesMagnitudesBeyondSinglePrecision) {
     PointCloud points = dumbbell(500);
     points[3].x = 1e300;
     expectError(points, ErrorCode::kCoordinateOutOfRange, {"x", "3"});
@@ -115,7 +115,7 @@ TEST(BadInput, MagnitudesBeyondSinglePrecision) {
     expectError(points, ErrorCode::kCoordinateOutOfRange, {"smaller"});
 }
 
-TEST(BadInput, TinyDifferencesWithinAShapeAreHarmless) {
+TEST(BadInput, AcceptsTinyDifferencesWithinAShape) {
     // Coordinates of 1e-200 beside ones of 1 must not overflow a circumcentre.
     PointCloud points;
     for (const double z : {-1.0, 1.0}) {
@@ -133,7 +133,7 @@ TEST(BadInput, TinyDifferencesWithinAShapeAreHarmless) {
     }
 }
 
-TEST(BadInput, DuplicatesAreMergedAndCounted) {
+TEST(BadInput, MergesAndCountsDuplicates) {
     const PointCloud once = dumbbell(1500);
     PointCloud thrice = once;
     thrice.insert(thrice.end(), once.rbegin(), once.rend());
@@ -150,7 +150,7 @@ TEST(BadInput, DuplicatesAreMergedAndCounted) {
     }
 }
 
-TEST(BadInput, OptionsOutOfRange) {
+TEST(BadInput, RefusesOptionsOutOfRange) {
     SegmentationOptions options;
     options.deepAngleDegrees = 0.0;
     EXPECT_EQ(segment(dumbbell(500), options).error().code, ErrorCode::kInvalidArgument);
@@ -176,8 +176,8 @@ TEST(BadInput, OpenSheetsAreRefusedOrLeaveSliversOnly) {
     }
 }
 
-// A bowl is not refused: the balls behind its opening are no larger than the opening, nothing
-// says that it is one, and the method closes it with its hull.
+// A bowl is not refused: the balls behind its opening are no larger than the opening, so nothing tells it
+// from a closed surface, and its hull closes it.
 TEST(BadInput, AHemisphereIsClosedByItsHull) {
     Random random(5);
     PointCloud bowl;
@@ -190,7 +190,7 @@ TEST(BadInput, AHemisphereIsClosedByItsHull) {
     EXPECT_NEAR(result->volume, 2.0943951, 0.02 * 2.0943951);
 }
 
-TEST(BadInput, NoBigBallsNoInterior) {
+TEST(BadInput, HasNoInteriorWithoutBigBalls) {
     SegmentationOptions options;
     options.bigBallRatio = 1e6;
     const auto result = segment(dumbbell(500), options);
@@ -199,8 +199,8 @@ TEST(BadInput, NoBigBallsNoInterior) {
     EXPECT_NE(result.error().message.find("big_ball_ratio"), std::string::npos) << "says what to do";
 }
 
-// Cancels when a stage begins, or in the middle of the triangulation: every stage can be left.
-TEST(RunControl, CancellingInEachStageStops) {
+// Cancels as each stage begins, and in the middle of the triangulation.
+TEST(RunControl, CanBeCancelledInEachStage) {
     const PointCloud points = dumbbell(20000);
     SegmentationOptions options;
     options.preparation.decimateTo = 15000;
@@ -221,7 +221,7 @@ TEST(RunControl, CancellingInEachStageStops) {
     }
 }
 
-TEST(RunControl, AFlagSetByAnotherThreadStopsPromptly) {
+TEST(RunControl, StopsPromptlyWhenAnotherThreadCancels) {
     const PointCloud points = dumbbell(200000);
     std::atomic<bool> cancel{false};
     RunContext context;
@@ -242,7 +242,7 @@ TEST(RunControl, AFlagSetByAnotherThreadStopsPromptly) {
         1.0);
 }
 
-TEST(RunControl, ThePassedDeadlineIsNamed) {
+TEST(RunControl, ReportsAPassedDeadline) {
     RunContext context;
     context.deadline = Clock::now() + std::chrono::milliseconds(60);
     const auto start = Clock::now();

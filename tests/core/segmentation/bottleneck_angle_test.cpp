@@ -5,16 +5,15 @@
 
 #include <gtest/gtest.h>
 
+#include "core/base/math.h"
+#include "core/geometry/neighbours.h"
 #include "core/segmentation/interior.h"
-#include "core/segmentation/local_spacing.h"
 #include "tests/core/segmentation/small_clouds.h"
 
 namespace shapedb {
 namespace {
 
-constexpr double kDegree = 3.14159265358979323846 / 180.0;
-
-// The tetrahedra that a plain walk reaches when it passes facets below `angle`, the hull's included.
+// The tetrahedra that a plain walk reaches through facets (also those of the hull) below `angle`.
 std::vector<std::uint8_t> reached(const Triangulated& cloud, const std::vector<std::uint8_t>& big,
                                   double angle) {
     const Tetrahedra& tetrahedra = cloud.tetrahedra;
@@ -34,23 +33,24 @@ std::vector<std::uint8_t> reached(const Triangulated& cloud, const std::vector<s
     return in;
 }
 
-TEST(LeakAngles, AreTheAnglesAtWhichAWalkGetsThrough) {
+TEST(BottleneckAngles, AreTheAnglesAtWhichAWalkGetsThrough) {
     for (const Triangulated& cloud : triangulatedClouds()) {
         const auto big = bigBalls(cloud.tetrahedra, localSpacings(cloud.points).value(), 0.5);
-        const auto leaks = bottleneckAngles(cloud.points, cloud.tetrahedra, big);
-        ASSERT_TRUE(leaks);
+        const auto bottlenecks = bottleneckAngles(cloud.points, cloud.tetrahedra, big);
+        ASSERT_TRUE(bottlenecks);
         for (const double degrees : {3.0, 11.0, 22.0, 37.0, 61.0, 95.0, 140.0}) {
-            const auto walk = reached(cloud, big, degrees * kDegree);
+            const auto walk = reached(cloud, big, toRadians(degrees));
             for (std::size_t t = 0; t < big.size(); ++t) {
-                const double leak = (*leaks)[t];
-                if (std::abs(leak - degrees * kDegree) < 1e-9) continue;  // rounding decides
-                ASSERT_EQ(walk[t] != 0, leak < degrees * kDegree) << cloud.name << " " << t << " " << degrees;
+                const double bottleneck = (*bottlenecks)[t];
+                if (std::abs(bottleneck - toRadians(degrees)) < 1e-9) continue;  // rounding decides
+                ASSERT_EQ(walk[t] != 0, bottleneck < toRadians(degrees))
+                    << cloud.name << " " << t << " " << degrees;
             }
         }
     }
 }
 
-TEST(LeakAngles, FacetsAreJudgedAlikeFromBothSides) {
+TEST(FacetCosine, IsTheSameFromBothSides) {
     for (const Triangulated& cloud : triangulatedClouds()) {
         const Tetrahedra& tetrahedra = cloud.tetrahedra;
         for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
@@ -73,12 +73,12 @@ TEST(LeakAngles, FacetsAreJudgedAlikeFromBothSides) {
     }
 }
 
-TEST(LeakAngles, BallsThatAreNotBigAreNeverReached) {
+TEST(BottleneckAngles, AreInfiniteForBallsThatAreNotBig) {
     const Triangulated& cloud = triangulatedClouds().front();
-    const auto leaks = bottleneckAngles(cloud.points, cloud.tetrahedra,
-                                        std::vector<std::uint8_t>(cloud.tetrahedra.size(), 0));
-    ASSERT_TRUE(leaks);
-    for (const double leak : *leaks) EXPECT_TRUE(std::isinf(leak));
+    const auto bottlenecks = bottleneckAngles(cloud.points, cloud.tetrahedra,
+                                              std::vector<std::uint8_t>(cloud.tetrahedra.size(), 0));
+    ASSERT_TRUE(bottlenecks);
+    for (const double bottleneck : *bottlenecks) EXPECT_TRUE(std::isinf(bottleneck));
 }
 
 }  // namespace

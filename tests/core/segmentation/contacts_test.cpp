@@ -9,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/base/math.h"
 #include "core/base/random.h"
 #include "core/segmentation/flow.h"
 #include "core/segmentation/segmentation.h"
@@ -18,7 +19,7 @@
 namespace shapedb {
 namespace {
 
-// Labels at random, a fifth of the tetrahedra outside.
+// Random labels, with a sixth of the tetrahedra outside.
 std::vector<std::int32_t> randomLabels(std::size_t count, Random& random) {
     std::vector<std::int32_t> labels(count);
     for (auto& label : labels) label = static_cast<std::int32_t>(random.uniform() * 6.0) - 1;
@@ -32,9 +33,9 @@ double nearestOnSegment(const Point3& a, const Point3& b, const Point3& to) {
     return distance(a + at * d, to);
 }
 
-// The way between two circumcentres runs at the same distance from the three corners of the facet,
-// so its narrowest ball is where it comes nearest to one of them.
-TEST(SegmentContacts, ArePairsWithTheWidestWayAndAllSharedArea) {
+// A Voronoi edge has the same distance from all three corners of its facet, so its smallest ball is where it
+// comes nearest to one of them.
+TEST(SegmentContacts, HaveTheWidestPassageAndAllSharedArea) {
     Random random(5);
     std::size_t pairs = 0;
     for (const Triangulated& cloud : triangulatedClouds()) {
@@ -70,7 +71,7 @@ TEST(SegmentContacts, ArePairsWithTheWidestWayAndAllSharedArea) {
     EXPECT_GT(pairs, 50U);
 }
 
-TEST(SegmentContacts, StopWhenToldTo) {
+TEST(SegmentContacts, CanBeCancelled) {
     const Triangulated& cloud = triangulatedClouds().front();
     const std::vector<std::uint8_t> flow(cloud.tetrahedra.size(), 0);
     const std::vector<std::int32_t> labels(cloud.tetrahedra.size(), 0);
@@ -82,22 +83,24 @@ TEST(SegmentContacts, StopWhenToldTo) {
     EXPECT_EQ(contacts.error().code, ErrorCode::kCancelled);
 }
 
-// Between the balls of a dumbbell and its rod the way is as wide as the rod.
-TEST(SegmentContacts, OfADumbbellAreTheEndsOfItsRodInScanUnits) {
-    PointCloud points = sampleBoundary(makeDumbbell().solid, 6000, 3).value();
-    for (Point3& p : points) p = 40.0 * p;
+// Between the balls of a dumbbell and its rod the passage is as wide as the rod.
+TEST(SegmentContacts, AreTheEndsOfADumbbellsRod) {
     SegmentationOptions options;
     options.mergeContrast = 1.3;
-    const Segmentation s = segment(points, options).value();
+    const Segmentation s = segment(sampleBoundary(makeDumbbell().solid, 6000, 3).value(), options).value();
     ASSERT_EQ(s.segments.size(), 3U);
-    ASSERT_EQ(s.contacts.size(), 2U);
+    std::vector<std::uint8_t> inside(s.tetrahedra.size());
+    for (std::size_t t = 0; t < inside.size(); ++t) inside[t] = s.tetrahedronSegment[t] >= 0 ? 1 : 0;
+    const auto flow = flowMasks(s.sites, s.tetrahedra, inside).value();
+    const auto contacts = segmentContacts(s.sites, s.tetrahedra, flow, s.tetrahedronSegment).value();
+    ASSERT_EQ(contacts.size(), 2U);
     for (std::uint32_t ball = 0; ball < 2; ++ball) {
-        EXPECT_EQ(s.contacts[ball].first, ball);
-        EXPECT_EQ(s.contacts[ball].second, 2U);
-        EXPECT_NEAR(s.contacts[ball].saddleRadius, 40.0 * 0.3, 0.15 * 40.0 * 0.3);
-        const double section = std::acos(-1.0) * 144.0;
-        EXPECT_GT(s.contacts[ball].area, 0.7 * section);
-        EXPECT_LT(s.contacts[ball].area, 4.0 * section);
+        EXPECT_EQ(contacts[ball].first, ball);
+        EXPECT_EQ(contacts[ball].second, 2U);
+        EXPECT_NEAR(contacts[ball].saddleRadius, 0.3, 0.15 * 0.3);
+        const double section = kPi * 0.3 * 0.3;
+        EXPECT_GT(contacts[ball].area, 0.7 * section);
+        EXPECT_LT(contacts[ball].area, 4.0 * section);
     }
 }
 

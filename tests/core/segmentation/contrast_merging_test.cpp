@@ -32,15 +32,14 @@ std::size_t countOf(const std::vector<std::uint32_t>& groups) {
     return std::set<std::uint32_t>(groups.begin(), groups.end()).size();
 }
 
-// Segments in a row; the saddleRadius between two is given between their radii.
-SegmentGraph row(const std::vector<double>& radii, const std::vector<double>& passages) {
+// Segments in a row; the saddle radius of two neighbours is given between their radii.
+SegmentGraph row(const std::vector<double>& radii, const std::vector<double>& saddles) {
     SegmentGraph graph{std::vector<double>(radii.size(), 1.0), radii, {}};
-    for (std::uint32_t i = 0; i < passages.size(); ++i)
-        graph.contacts.push_back({i, i + 1, passages[i], 1.0});
+    for (std::uint32_t i = 0; i < saddles.size(); ++i) graph.contacts.push_back({i, i + 1, saddles[i], 1.0});
     return graph;
 }
 
-// Touching at random, radii and volumes over three powers of ten, some apart from all others.
+// Random contacts, radii and volumes over three powers of ten, some segments without contact.
 SegmentGraph randomGraph(Random& random, std::uint32_t count) {
     SegmentGraph graph;
     for (std::uint32_t i = 0; i < count; ++i) {
@@ -57,11 +56,11 @@ SegmentGraph randomGraph(Random& random, std::uint32_t count) {
     return graph;
 }
 
-// What is left of a graph after grouping, computed from scratch.
+// The graph of the groups, computed from scratch.
 struct Left {
     std::vector<double> volumes;
     std::vector<double> radii;
-    std::map<std::pair<std::uint32_t, std::uint32_t>, double> passages;
+    std::map<std::pair<std::uint32_t, std::uint32_t>, double> saddles;
 
     Left(const SegmentGraph& graph, const std::vector<std::uint32_t>& groups)
         : volumes(countOf(groups)), radii(volumes.size()) {
@@ -73,24 +72,24 @@ struct Left {
         for (const SegmentContact& c : graph.contacts) {
             const auto [low, high] = std::minmax(groups[c.first], groups[c.second]);
             if (low == high) continue;
-            double& widest = passages[{low, high}];
+            double& widest = saddles[{low, high}];
             widest = std::max(widest, c.saddleRadius);
         }
     }
     std::set<std::uint32_t> touching() const {
         std::set<std::uint32_t> all;
-        for (const auto& [pair, saddleRadius] : passages) all.insert({pair.first, pair.second});
+        for (const auto& [pair, saddleRadius] : saddles) all.insert({pair.first, pair.second});
         return all;
     }
 };
 
-TEST(MergeByContrast, ALimbOfManyMaximaIsOneGroupApartFromTheBody) {
-    // Body of radius 3; limb of radius 1 whose root is as wide as itself; a hand.
+TEST(MergeByContrast, KeepsALimbOfManyMaximaApartFromTheBody) {
+    // A body of radius 3; a limb of radius 1 with a root as wide as itself; a hand.
     const SegmentGraph graph = row({3.0, 1.02, 0.98, 1.01, 1.0, 1.6}, {0.99, 0.95, 0.94, 0.96, 0.93});
     EXPECT_EQ(merge(graph, kOnlyAlike), (std::vector<std::uint32_t>{0, 1, 1, 1, 1, 2}));
 }
 
-TEST(MergeByContrast, ANeckBetweenEqualsSeparates) {
+TEST(MergeByContrast, ANeckSeparatesEqualSegments) {
     EXPECT_EQ(countOf(merge(row({1.0, 1.0}, {0.7}), kOnlyAlike)), 2U);
     EXPECT_EQ(countOf(merge(row({1.0, 1.0}, {0.8}), kOnlyAlike)), 1U);
 }
@@ -102,13 +101,13 @@ TEST(MergeByContrast, GroupsAreConnectedAndEveryPairLeftIsAboveTheContrast) {
         const SegmentGraph graph = randomGraph(random, 120);
         const auto groups = merge(graph, kOnlyAlike);
         const Left left(graph, groups);
-        for (const auto& [pair, saddleRadius] : left.passages) {
+        for (const auto& [pair, saddleRadius] : left.saddles) {
             const double ra = left.radii[pair.first];
             const double rb = left.radii[pair.second];
             EXPECT_GT(std::max(ra, rb) / std::min({ra, rb, saddleRadius}), 1.3 * (1.0 - 2.1e-3));
             ++pairs;
         }
-        // Connected: growing from the first of each group inside the group reaches all of it.
+        // Connected: growth from the first segment of each group, within the group, reaches all of it.
         std::vector<std::uint32_t> reached(groups.size());
         std::iota(reached.begin(), reached.end(), 0U);
         for (bool changed = true; changed;) {
@@ -124,7 +123,7 @@ TEST(MergeByContrast, GroupsAreConnectedAndEveryPairLeftIsAboveTheContrast) {
     EXPECT_GT(pairs, 1000U);
 }
 
-TEST(MergeByContrast, TheOrderOfSegmentsDoesNotMatter) {
+TEST(MergeByContrast, DoesNotDependOnTheOrderOfSegments) {
     Random random(2);
     for (int trial = 0; trial < 60; ++trial) {
         const SegmentGraph graph = randomGraph(random, 80);
@@ -154,7 +153,7 @@ TEST(MergeByContrast, TheOrderOfSegmentsDoesNotMatter) {
     }
 }
 
-TEST(MergeByContrast, LightGroupsAndGroupsTooManyJoinANeighbour) {
+TEST(MergeByContrast, MergesLightGroupsAndThoseBeyondTheLimit) {
     Random random(3);
     for (int trial = 0; trial < 60; ++trial) {
         const SegmentGraph graph = randomGraph(random, 200);
@@ -167,7 +166,7 @@ TEST(MergeByContrast, LightGroupsAndGroupsTooManyJoinANeighbour) {
         for (const std::uint32_t group : touching) {
             EXPECT_GE(left.volumes[group], 0.02 * total * (1.0 - 1e-9));
         }
-        // Groups are numbered in the order of their first segments.
+        // Groups are numbered by their first segments.
         std::uint32_t next = 0;
         for (const std::uint32_t group : groups) {
             ASSERT_LE(group, next);
@@ -176,15 +175,15 @@ TEST(MergeByContrast, LightGroupsAndGroupsTooManyJoinANeighbour) {
     }
 }
 
-TEST(MergeByContrast, ALightOneJoinsThroughTheWidestPassage) {
+TEST(MergeByContrast, MergesALightGroupThroughTheLargestSaddle) {
     SegmentGraph graph{{10.0, 0.01, 5.0}, {3.0, 0.5, 1.0}, {{0, 1, 0.3, 9.0}, {1, 2, 0.4, 1.0}}};
     EXPECT_EQ(merge(graph, {1.2, 0.01, 0}), (std::vector<std::uint32_t>{0, 1, 1}));
     graph.contacts[0].saddleRadius = 0.45;
     EXPECT_EQ(merge(graph, {1.2, 0.01, 0}), (std::vector<std::uint32_t>{0, 0, 1}));
 }
 
-// Noise leaves dust apart from the shape; it must not cost the shape its limbs.
-TEST(MergeByContrast, LumpsApartStayAndTakeNoPlace) {
+// Noise leaves separate dust, which must not cost the shape its limbs.
+TEST(MergeByContrast, KeepsSeparateLumpsWithoutCountingThem) {
     SegmentGraph graph = row({3.0, 1.0, 0.3}, {0.9, 0.28});
     for (int i = 0; i < 100; ++i) {
         graph.volumes.push_back(1e-9);
@@ -194,14 +193,14 @@ TEST(MergeByContrast, LumpsApartStayAndTakeNoPlace) {
     EXPECT_EQ(countOf(merge(graph, {1.3, 0.004, 2})), 102U);
 }
 
-TEST(MergeByContrast, FlatSegmentsWithoutVolumeAreNoTrouble) {
+TEST(MergeByContrast, AcceptsFlatSegmentsWithoutVolume) {
     SegmentGraph graph = row({1.0, 1.0, 1.0}, {1.0, 0.5});
     graph.volumes = {0.0, 0.0, 0.0};
     EXPECT_EQ(countOf(merge(graph, kOnlyAlike)), 2U);
     EXPECT_TRUE(merge({}, kOnlyAlike).empty());
 }
 
-TEST(MergeByContrast, StopsWhenToldTo) {
+TEST(MergeByContrast, CanBeCancelled) {
     const std::size_t many = 20000;
     const SegmentGraph graph = row(std::vector<double>(many, 1.0), std::vector<double>(many - 1, 1.0));
     const std::atomic<bool> cancel{true};
@@ -212,7 +211,7 @@ TEST(MergeByContrast, StopsWhenToldTo) {
     EXPECT_EQ(groups.error().code, ErrorCode::kCancelled);
 }
 
-TEST(MergeSegmentsByContrast, CoarsensThePartitionAndKeepsThePeaks) {
+TEST(MergeSegmentsByContrast, CoarsensThePartitionAndKeepsTheMaxima) {
     std::size_t mergedAway = 0;
     for (const Triangulated& cloud : triangulatedClouds()) {
         const Tetrahedra& flat = cloud.tetrahedra;
@@ -246,7 +245,7 @@ SegmentationOptions byContrast() {
     return options;
 }
 
-// Parts a person would name: at each sampling, and with a little noise.
+// The parts that a person would name, at several densities and with a little noise.
 TEST(MergeSegmentsByContrast, FindsTheBallsAndRodsOfKnownShapes) {
     const std::map<std::string, std::ptrdiff_t> parts = {{"sphere", 1}, {"dumbbell", 3}, {"jack", 13}};
     for (const NamedShape& shape : namedShapes()) {
@@ -257,7 +256,7 @@ TEST(MergeSegmentsByContrast, FindsTheBallsAndRodsOfKnownShapes) {
                 PointCloud points = sampleBoundary(shape.solid, 6000, seed).value();
                 ASSERT_TRUE(addGaussianNoise(points, noise, seed + 10));
                 const Segmentation s = segment(points, byContrast()).value();
-                // Noise may leave dust apart from the shape: it is light.
+                // Noise may leave separate dust, which is light.
                 const auto heavy =
                     std::count_if(s.segments.begin(), s.segments.end(),
                                   [&](const Segment& part) { return part.volume >= 0.004 * s.volume; });
@@ -271,7 +270,7 @@ TEST(MergeSegmentsByContrast, FindsTheBallsAndRodsOfKnownShapes) {
     }
 }
 
-TEST(SegmentationOptions, MergingByContrastHasItsRanges) {
+TEST(SegmentationOptions, ChecksTheRangesOfContrastMerging) {
     SegmentationOptions good;
     good.mergeContrast = 1.0;
     good.minSegmentShare = 1.0;

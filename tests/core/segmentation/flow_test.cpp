@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "core/geometry/tetrahedron.h"
-#include "tests/core/segmentation/small_clouds.h"
+#include "tests/core/segmentation/exact_balls.h"
 
 namespace shapedb {
 namespace {
@@ -32,7 +32,7 @@ std::vector<std::uint8_t> allMasks(const Triangulated& cloud) {
     return flowMasks(cloud.points, cloud.tetrahedra, all).value();
 }
 
-TEST(Flow, AgreesWithRationalArithmeticForEveryTetrahedron) {
+TEST(FlowMasks, AgreeWithRationalArithmetic) {
     for (const Triangulated& cloud : triangulatedClouds()) {
         const auto masks = allMasks(cloud);
         ASSERT_EQ(masks.size(), cloud.tetrahedra.size());
@@ -42,7 +42,7 @@ TEST(Flow, AgreesWithRationalArithmeticForEveryTetrahedron) {
     }
 }
 
-TEST(Flow, ExactFallbackAgreesWithRationalArithmetic) {
+TEST(ExactFlowMask, AgreesWithRationalArithmetic) {
     for (const Triangulated& cloud : triangulatedClouds()) {
         for (std::size_t t = 0; t < cloud.tetrahedra.size(); ++t) {
             ASSERT_EQ(exactFlowMask(cornersOf(cloud, t)), referenceMask(cloud, t)) << cloud.name;
@@ -50,14 +50,14 @@ TEST(Flow, ExactFallbackAgreesWithRationalArithmetic) {
     }
 }
 
-TEST(Flow, LeavesThroughAtMostTwoFacets) {
+TEST(FlowMasks, LeaveThroughAtMostTwoFacets) {
     for (const Triangulated& cloud : triangulatedClouds()) {
         for (const std::uint8_t mask : allMasks(cloud))
             ASSERT_LE(std::bitset<8>(mask).count(), 2U) << cloud.name;
     }
 }
 
-TEST(Flow, HasNoCycles) {
+TEST(FlowMasks, HaveNoCycles) {
     for (const Triangulated& cloud : triangulatedClouds()) {
         const auto masks = allMasks(cloud);
         const Tetrahedra& flat = cloud.tetrahedra;
@@ -88,7 +88,7 @@ TEST(Flow, HasNoCycles) {
     }
 }
 
-TEST(Flow, NeverLeadsToASmallerBall) {
+TEST(FlowMasks, NeverLeadToASmallerBall) {
     for (const Triangulated& cloud : triangulatedClouds()) {
         const auto masks = allMasks(cloud);
         std::vector<ExactNumber> squared;
@@ -105,7 +105,7 @@ TEST(Flow, NeverLeadsToASmallerBall) {
     }
 }
 
-TEST(Flow, AMaximumHoldsItsOwnCentre) {
+TEST(FlowMasks, AreEmptyWhereATetrahedronHoldsItsCircumcentre) {
     std::size_t maxima = 0;
     for (const Triangulated& cloud : triangulatedClouds()) {
         const auto masks = allMasks(cloud);
@@ -120,7 +120,7 @@ TEST(Flow, AMaximumHoldsItsOwnCentre) {
     EXPECT_GT(maxima, 100U);
 }
 
-TEST(Flow, ComputesOnlyWhatIsWanted) {
+TEST(FlowMasks, AreComputedOnlyWhereWanted) {
     const Triangulated& cloud = triangulatedClouds().front();
     const auto all = allMasks(cloud);
     std::vector<std::uint8_t> wanted(all.size());
@@ -129,7 +129,7 @@ TEST(Flow, ComputesOnlyWhatIsWanted) {
     for (std::size_t t = 0; t < all.size(); ++t) ASSERT_EQ(some[t], wanted[t] ? all[t] : 0);
 }
 
-TEST(Flow, StopsWhenToldTo) {
+TEST(FlowMasks, CanBeCancelled) {
     const Triangulated& cloud = triangulatedClouds().front();
     const std::vector<std::uint8_t> all(cloud.tetrahedra.size(), 1);
     const std::atomic<bool> cancel{true};

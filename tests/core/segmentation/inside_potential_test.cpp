@@ -21,7 +21,7 @@ PointCloud sphere(double radius, std::size_t count, std::uint64_t seed) {
     return points;
 }
 
-// Where each tetrahedron's potential says it is, weighed by volume against where it really is.
+// The share of the volume whose potential has the right sign.
 double shareRight(const PointCloud& points, bool (*isInside)(double radius)) {
     const auto tetrahedra = triangulate(points);
     const auto potential = insidePotential(points, *tetrahedra, findPoles(points, *tetrahedra));
@@ -71,7 +71,7 @@ TEST(InsidePotential, IsNegativeInASphere) {
     EXPECT_GT(shareRight(sphere(1.0, 2000, 1), inside), 0.99);
 }
 
-TEST(InsidePotential, TurnsTwiceForACavity) {
+TEST(InsidePotential, FlipsItsSignTwiceForACavity) {
     PointCloud points = sphere(1.0, 3000, 1);
     for (const Point3& p : sphere(0.6, 1100, 2)) points.push_back(p);
     const auto inside = [](double radius) { return radius > 0.6; };

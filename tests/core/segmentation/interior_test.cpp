@@ -7,14 +7,13 @@
 
 #include <gtest/gtest.h>
 
+#include "core/base/math.h"
 #include "core/base/random.h"
-#include "core/segmentation/local_spacing.h"
-#include "tests/core/segmentation/small_clouds.h"
+#include "core/geometry/neighbours.h"
+#include "tests/core/segmentation/exact_balls.h"
 
 namespace shapedb {
 namespace {
-
-constexpr double kDegree = 3.14159265358979323846 / 180.0;
 
 // Exact centre and squared radius of every ball.
 struct Balls {
@@ -28,7 +27,7 @@ struct Balls {
     std::vector<ExactNumber> squaredRadii;
 };
 
-// Law of cosines, rational until the square root: radians. Near 0 the arc cosine keeps half the
+// Radians, by the law of cosines, rational up to the square root. Near 0 the arc cosine loses half the
 // digits, which the tests allow for.
 double lawOfCosines(const Balls& balls, std::size_t s, std::size_t t) {
     const ExactNumber numerator = balls.squaredRadii[s] + balls.squaredRadii[t] -
@@ -39,7 +38,7 @@ double lawOfCosines(const Balls& balls, std::size_t s, std::size_t t) {
     return std::acos(std::max(-1.0, std::min(1.0, cosine)));
 }
 
-// Whether a hull facet lets the walk in, literally: the ball flows outwards through it and
+// Whether the walk enters through a hull facet, literally: the ball flows outwards through it, and
 // asin(radius of the facet / radius of the ball) is below the limit.
 bool opens(const Triangulated& cloud, const Balls& balls, std::size_t t, std::size_t facet, double limit) {
     const auto p = exactCorners(cloud, t);
@@ -57,21 +56,23 @@ std::vector<std::uint8_t> referenceInterior(const Triangulated& cloud, const Bal
                                             const std::vector<std::uint8_t>& big, double deep, double hull) {
     const auto& neighbours = cloud.tetrahedra.neighbours;
     std::vector<std::uint8_t> outside(big.size(), 0);
-    for (std::size_t t = 0; t < big.size(); ++t) {
-        for (std::size_t i = 0; i < 4; ++i) {
-            if (big[t] && neighbours[t][i] == kNoTetrahedron && opens(cloud, balls, t, i, hull))
+    std::vector<std::uint32_t> reached;
+    for (std::uint32_t t = 0; t < big.size(); ++t) {
+        for (std::size_t i = 0; i < 4 && !outside[t]; ++i) {
+            if (big[t] && neighbours[t][i] == kNoTetrahedron && opens(cloud, balls, t, i, hull)) {
                 outside[t] = 1;
+                reached.push_back(t);
+            }
         }
     }
-    for (bool changed = true; changed;) {
-        changed = false;
-        for (std::size_t t = 0; t < big.size(); ++t) {
-            for (const std::uint32_t next : neighbours[t]) {
-                if (!outside[t] || next == kNoTetrahedron || outside[next] || !big[next]) continue;
-                if (lawOfCosines(balls, t, next) >= deep) continue;
-                outside[next] = 1;
-                changed = true;
-            }
+    while (!reached.empty()) {
+        const std::uint32_t t = reached.back();
+        reached.pop_back();
+        for (const std::uint32_t next : neighbours[t]) {
+            if (next == kNoTetrahedron || outside[next] || !big[next]) continue;
+            if (lawOfCosines(balls, t, next) >= deep) continue;
+            outside[next] = 1;
+            reached.push_back(next);
         }
     }
     std::vector<std::uint8_t> inside(big.size());
@@ -87,15 +88,15 @@ std::size_t countOf(const std::vector<std::uint8_t>& flags) {
     return std::accumulate(flags.begin(), flags.end(), std::size_t{0});
 }
 
-TEST(BigBalls, AreThoseAboveTheScaleOfAnyCorner) {
+TEST(BigBalls, ExceedTheSpacingOfAnyCorner) {
     for (const Triangulated& cloud : triangulatedClouds()) {
-        const auto scales = localSpacings(cloud.points).value();
+        const auto spacings = localSpacings(cloud.points).value();
         for (const double ratio : {0.3, 0.5, 1.0, 2.0}) {
-            const auto big = bigBalls(cloud.tetrahedra, scales, ratio);
+            const auto big = bigBalls(cloud.tetrahedra, spacings, ratio);
             for (std::size_t t = 0; t < big.size(); ++t) {
                 bool expected = false;
                 for (const std::uint32_t v : cloud.tetrahedra.vertices[t]) {
-                    expected = expected || cloud.tetrahedra.circumradii[t] > ratio * scales[v];
+                    expected = expected || cloud.tetrahedra.circumradii[t] > ratio * spacings[v];
                 }
                 ASSERT_EQ(big[t] != 0, expected) << cloud.name;
             }
@@ -103,21 +104,21 @@ TEST(BigBalls, AreThoseAboveTheScaleOfAnyCorner) {
     }
 }
 
-TEST(BigBalls, GrowFewerAsTheRatioGrows) {
+TEST(BigBalls, AreFewerForALargerRatio) {
     for (const Triangulated& cloud : triangulatedClouds()) {
         EXPECT_GE(countOf(bigOf(cloud, 0.5)), countOf(bigOf(cloud, 1.0))) << cloud.name;
         EXPECT_EQ(countOf(bigOf(cloud, 1e-9)), cloud.tetrahedra.size()) << cloud.name;
     }
 }
 
-TEST(IntersectionAngle, KnownPositions) {
+TEST(IntersectionAngle, IsKnownForSimplePositions) {
     // Two unit spheres through the origin, centres on the axes: they meet at a right angle.
-    EXPECT_DOUBLE_EQ(intersectionAngle({1, 0, 0}, {0, 1, 0}, {0, 0, 0}), 90 * kDegree);
-    EXPECT_DOUBLE_EQ(intersectionAngle({1, 0, 0}, {-1, 0, 0}, {0, 0, 0}), 180 * kDegree);
+    EXPECT_DOUBLE_EQ(intersectionAngle({1, 0, 0}, {0, 1, 0}, {0, 0, 0}), kPi / 2);
+    EXPECT_DOUBLE_EQ(intersectionAngle({1, 0, 0}, {-1, 0, 0}, {0, 0, 0}), kPi);
     EXPECT_DOUBLE_EQ(intersectionAngle({1, 0, 0}, {5, 0, 0}, {0, 0, 0}), 0.0);
     EXPECT_DOUBLE_EQ(intersectionAngle({1, 2, 3}, {1, 2, 3}, {0, 2, 3}), 0.0);
     // A huge ball is a half space: the angle is that between its normal and the radius.
-    EXPECT_NEAR(intersectionAngle({0, 0, 1e12}, {1, 0, 1}, {0, 0, 0}), 45 * kDegree, 1e-11);
+    EXPECT_NEAR(intersectionAngle({0, 0, 1e12}, {1, 0, 1}, {0, 0, 0}), kPi / 4, 1e-11);
 }
 
 TEST(IntersectionAngle, AgreesWithTheLawOfCosines) {
@@ -144,9 +145,9 @@ TEST(IntersectionAngle, AgreesWithTheLawOfCosines) {
     EXPECT_GT(compared, 10000U);
 }
 
-// The two differ only where an angle is within rounding of its limit, so the walk lies between
+// Walk and reference may differ where an angle is within rounding of its limit, so the walk must lie between
 // the references for a slightly smaller and a slightly larger angle.
-TEST(Interior, IsTheFixpointOfTheWalk) {
+TEST(InteriorTetrahedra, AreTheFixpointOfTheWalk) {
     std::size_t sharp = 0;
     for (const Triangulated& cloud : triangulatedClouds()) {
         const Balls balls(cloud);
@@ -155,9 +156,9 @@ TEST(Interior, IsTheFixpointOfTheWalk) {
             options.deepAngleDegrees = degrees;
             const auto big = bigOf(cloud, options.bigBallRatio);
             const auto inside = interiorTetrahedra(cloud.points, cloud.tetrahedra, big, options).value();
-            const double hull = options.hullAngleDegrees * kDegree;
-            const auto most = referenceInterior(cloud, balls, big, degrees * kDegree - 1e-5, hull - 1e-7);
-            const auto least = referenceInterior(cloud, balls, big, degrees * kDegree + 1e-5, hull + 1e-7);
+            const double hull = toRadians(options.hullAngleDegrees);
+            const auto most = referenceInterior(cloud, balls, big, toRadians(degrees) - 1e-5, hull - 1e-7);
+            const auto least = referenceInterior(cloud, balls, big, toRadians(degrees) + 1e-5, hull + 1e-7);
             ASSERT_EQ(inside.size(), big.size());
             for (std::size_t t = 0; t < inside.size(); ++t) {
                 ASSERT_LE(inside[t], most[t]) << cloud.name << " at " << degrees;
@@ -169,7 +170,7 @@ TEST(Interior, IsTheFixpointOfTheWalk) {
     EXPECT_GT(sharp, 2 * triangulatedClouds().size()) << "the references must pin the result down";
 }
 
-TEST(Interior, IsEmptyWithoutBigBallsAndShrinksAsTheAngleGrows) {
+TEST(InteriorTetrahedra, AreFewerForALargerAngle) {
     for (const Triangulated& cloud : triangulatedClouds()) {
         SegmentationOptions options;
         const std::vector<std::uint8_t> none(cloud.tetrahedra.size(), 0);
@@ -186,8 +187,8 @@ TEST(Interior, IsEmptyWithoutBigBallsAndShrinksAsTheAngleGrows) {
     }
 }
 
-TEST(Interior, StopsWhenToldTo) {
-    // Enough tetrahedra for the walk to come by a checkpoint.
+TEST(InteriorTetrahedra, CanBeCancelled) {
+    // Enough tetrahedra for the walk to reach a checkpoint.
     Random random(3);
     PointCloud points;
     for (int i = 0; i < 20000; ++i) points.push_back({random.uniform(), random.uniform(), random.uniform()});

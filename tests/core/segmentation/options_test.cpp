@@ -10,7 +10,7 @@
 namespace shapedb {
 namespace {
 
-TEST(SegmentationOptions, DefaultsAreThePapers) {
+TEST(SegmentationOptions, DefaultsAreThoseOfThePaper) {
     const SegmentationOptions options;
     EXPECT_TRUE(validate(options));
     EXPECT_EQ(options.bigBallRatio, 0.5);
@@ -41,7 +41,7 @@ void expectRefused(Field Options::*field, const std::string& name, std::initiali
     }
 }
 
-TEST(SegmentationOptions, EachFieldHasItsRange) {
+TEST(SegmentationOptions, ChecksTheRangeOfEachField) {
     const double nan = std::nan("");
     const double inf = std::numeric_limits<double>::infinity();
     expectRefused(&SegmentationOptions::bigBallRatio, "big_ball_ratio", {0.0, -1.0, nan, inf});
@@ -54,7 +54,7 @@ TEST(SegmentationOptions, EachFieldHasItsRange) {
     expectRefused(&PreparationOptions::thinning, "thinning", {10.1, -1.0, nan, inf});
 }
 
-TEST(SegmentationOptions, EndsOfTheRangesAreAllowed) {
+TEST(SegmentationOptions, AcceptsTheEndsOfRanges) {
     SegmentationOptions options;
     options.bigBallRatio = 1e-300;
     options.deepAngleDegrees = 89.999;

@@ -11,8 +11,8 @@
 
 #include "core/base/random.h"
 #include "core/geometry/bounding.h"
+#include "core/geometry/neighbours.h"
 #include "core/segmentation/interior.h"
-#include "core/segmentation/local_spacing.h"
 #include "core/synthetic/named_shapes.h"
 #include "core/synthetic/noise.h"
 
@@ -51,7 +51,7 @@ class SegmentationOfShape : public testing::Test {
 PointCloud* SegmentationOfShape::points_ = nullptr;
 Segmentation* SegmentationOfShape::result_ = nullptr;
 
-TEST_F(SegmentationOfShape, CountsAndMapsAgree) {
+TEST_F(SegmentationOfShape, CountsAndMapsAreConsistent) {
     const Segmentation& s = *result_;
     EXPECT_EQ(s.duplicates, 1U);
     EXPECT_EQ(s.sites.size(), points_->size() - 1);
@@ -63,18 +63,15 @@ TEST_F(SegmentationOfShape, CountsAndMapsAgree) {
     }
     EXPECT_EQ(s.siteOfPoint.front(), s.siteOfPoint.back());
     std::uint64_t labelled = 0;
-    std::uint64_t inSegments = 0;
     for (const std::int32_t label : s.tetrahedronSegment) labelled += label >= 0;
-    for (const Segment& segment : s.segments) inSegments += segment.tetrahedra;
-    EXPECT_EQ(labelled, inSegments);
     EXPECT_EQ(labelled, s.interiorTetrahedra);
     EXPECT_LE(s.interiorTetrahedra, s.bigBalls);
     EXPECT_LE(s.bigBalls, s.tetrahedra.size());
     EXPECT_GE(s.maxima, 2U);
-    EXPECT_GE(s.maxima, s.segments.size()) << "no interior here hangs together without a maximum";
+    EXPECT_GE(s.maxima, s.segments.size()) << "there are no islands here";
 }
 
-TEST_F(SegmentationOfShape, CirclesAreInScanUnits) {
+TEST_F(SegmentationOfShape, CircumspheresAreInScanUnits) {
     const Segmentation& s = *result_;
     for (std::size_t t = 0; t < s.tetrahedra.size(); ++t) {
         for (const Point3& corner : corners(s, t)) {
@@ -146,7 +143,7 @@ TEST_F(SegmentationOfShape, CovarianceAgreesWithMonteCarlo) {
     }
 }
 
-TEST_F(SegmentationOfShape, APointGoesWithTheLargestInnerBallAroundIt) {
+TEST_F(SegmentationOfShape, PointsBelongToTheLargestInnerBallAtThem) {
     const Segmentation& s = *result_;
     std::vector<std::vector<std::size_t>> around(s.sites.size());
     for (std::size_t t = 0; t < s.tetrahedra.size(); ++t) {
@@ -180,14 +177,14 @@ PointCloud cornersOfInterior(const Segmentation& s) {
     return inner;
 }
 
-TEST_F(SegmentationOfShape, SizeIsTheLeastBoxAroundTheInterior) {
+TEST_F(SegmentationOfShape, SizeIsTheSmallestBoxAroundTheInterior) {
     const Segmentation& s = *result_;
     EXPECT_NEAR(s.size, *smallestBoxDiagonal(cornersOfInterior(s)), 1e-3 * s.size);
     EXPECT_NEAR(s.size, std::sqrt(25.0 + 4.0 + 4.0), 0.02 * s.size);
 }
 
-// Then the hull of the interior is not that of all points.
-TEST(Segmentation, SizeLeavesOutWhatSticksOutOfTheInterior) {
+// When the hull of the interior is not that of all points.
+TEST(Segmentation, SizeIgnoresPointsOutsideTheInterior) {
     PointCloud points = sample(makeDumbbell(), 3000, 0.0, 5);
     for (int i = 0; i < 20; ++i) {
         for (int k = 0; k < 20; ++k) points.push_back({0.01 * k, 0.02 * k, 2.0 + 0.2 * i});
@@ -215,7 +212,7 @@ TEST_F(SegmentationOfShape, StagesAreTimedInOrder) {
     EXPECT_LT(result_->delaunaySeconds, result_->totalSeconds);
 }
 
-TEST(Segmentation, OfTheCornersOfATetrahedronIsThatTetrahedron) {
+TEST(Segmentation, OfFourPointsIsTheirTetrahedron) {
     // No ball is open to the outside, one is big: the whole is one segment.
     const double h = std::sqrt(0.5);
     const auto s = segment({{1, 0, -h}, {-1, 0, -h}, {0, 1, h}, {0, -1, h}}, {});
@@ -240,8 +237,8 @@ TEST(Segmentation, VolumeOfKnownSolidsWithinTwoPercent) {
     }
 }
 
-TEST(Segmentation, VolumeUnderNoiseStaysNear) {
-    // Half a percent of noise eats into the skin; the paper has no figure.
+TEST(Segmentation, VolumeHardlyChangesUnderNoise) {
+    // Noise eats into the skin; the paper has no figure.
     const NamedShape shape = makeDumbbell();
     const auto s = segment(sample(shape, 20000, 0.0025, 1), {});
     ASSERT_TRUE(s);
@@ -278,7 +275,7 @@ TEST(Segmentation, HeaviestSegmentsOfTheJackAreItsBalls) {
     for (const std::uint64_t seed : {1, 2}) expectBallsFirst(makeJack(), seed);
 }
 
-TEST(Segmentation, OfASphereIsOneHeavySegment) {
+TEST(Segmentation, ASphereIsOneHeavySegment) {
     const auto s = segment(sample(makeSphere(), 5000, 0.0, 4), {});
     ASSERT_TRUE(s);
     EXPECT_GT(s->segments[0].volume, 0.95 * s->volume);
@@ -286,7 +283,7 @@ TEST(Segmentation, OfASphereIsOneHeavySegment) {
     EXPECT_NEAR(s->segments[0].maximumRadius, 1.0, 0.01);
 }
 
-TEST(Segmentation, DecimatesWhenAsked) {
+TEST(Segmentation, DecimatesIfEnabled) {
     const PointCloud points = sample(makeDumbbell(), 20000, 0.0, 6);
     SegmentationOptions options;
     options.preparation.decimateTo = 5000;
@@ -295,7 +292,7 @@ TEST(Segmentation, DecimatesWhenAsked) {
     EXPECT_LE(s->sites.size(), 5000U);
     EXPECT_GE(s->sites.size(), 4500U);
     ASSERT_EQ(s->pointSegment.size(), points.size());
-    // A point lies within a cell of its site: 5,000 cells on a surface of 26.
+    // A point is in the same cell as its site; there are 5,000 cells on a surface of area 26.
     for (std::size_t i = 0; i < points.size(); ++i) {
         ASSERT_LT(distance(points[i], s->sites[s->siteOfPoint[i]]), 0.2);
     }

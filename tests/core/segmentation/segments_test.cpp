@@ -12,16 +12,17 @@
 #include <gtest/gtest.h>
 
 #include "core/base/random.h"
+#include "core/geometry/neighbours.h"
+#include "core/geometry/tetrahedron.h"
 #include "core/segmentation/flow.h"
 #include "core/segmentation/interior.h"
-#include "core/segmentation/local_spacing.h"
-#include "tests/core/segmentation/small_clouds.h"
+#include "tests/core/segmentation/exact_balls.h"
 
 namespace shapedb {
 namespace {
 
-// A cloud with an interior: the one the method finds, or random flags, which leave many
-// tetrahedra that flow nowhere inside.
+// A cloud with an interior: the one of the method, or a random one, in which many tetrahedra flow to no
+// maximum.
 struct Case {
     const Triangulated* cloud;
     std::vector<std::uint8_t> interior;
@@ -49,9 +50,9 @@ const std::vector<Case>& cases() {
             made.push_back(std::move(c));
         };
         for (const Triangulated& cloud : triangulatedClouds()) {
-            const auto scales = localSpacings(cloud.points).value();
+            const auto spacings = localSpacings(cloud.points).value();
             add(cloud, interiorTetrahedra(cloud.points, cloud.tetrahedra,
-                                          bigBalls(cloud.tetrahedra, scales, 0.5), SegmentationOptions{})
+                                          bigBalls(cloud.tetrahedra, spacings, 0.5), SegmentationOptions{})
                            .value());
             for (const double share : {0.3, 0.8, 1.0}) {
                 std::vector<std::uint8_t> flags(cloud.tetrahedra.size());
@@ -101,7 +102,7 @@ TEST(StableManifolds, PartitionTheInterior) {
     }
 }
 
-TEST(StableManifolds, FollowTheStrengthOfThePaper) {
+TEST(StableManifolds, BelongToTheStrongestMaximum) {
     std::size_t followed = 0;
     for (const Case& c : cases()) {
         const auto strength = strengths(c);
@@ -127,8 +128,8 @@ TEST(StableManifolds, FollowTheStrengthOfThePaper) {
     EXPECT_GT(followed, 10000U);
 }
 
-// Leftovers join the labelled neighbour with the largest ball, all of a layer at once; what no
-// label reaches becomes islands. Written as rounds over everything.
+// Leftovers join the labelled neighbour with the largest ball, a whole layer at a time; those that no label
+// reaches become islands. The reference goes over all tetrahedra in rounds.
 TEST(StableManifolds, LeftoversJoinLayerByLayer) {
     std::size_t leftovers = 0;
     std::size_t islands = 0;
@@ -159,7 +160,7 @@ TEST(StableManifolds, LeftoversJoinLayerByLayer) {
             if (expected[t] >= 0) {
                 ASSERT_EQ(c.fine.ofTetrahedron[t], expected[t]) << c.cloud->name;
             } else if (c.interior[t]) {
-                // An island: its maximum flows into no maximum and is its largest ball.
+                // An island, around its largest ball, which flows into no maximum.
                 const std::int32_t segment = c.fine.ofTetrahedron[t];
                 ASSERT_LT(strength[c.fine.maxima[static_cast<std::size_t>(segment)]], 0.0);
                 ASSERT_LE(c.flat().circumradii[t], maximumRadius(c, segment));
@@ -171,7 +172,7 @@ TEST(StableManifolds, LeftoversJoinLayerByLayer) {
     EXPECT_GT(islands, 10U);
 }
 
-TEST(StableManifolds, EachIsConnected) {
+TEST(StableManifolds, AreConnected) {
     for (const Case& c : cases()) {
         std::vector<std::uint8_t> seen(c.flat().size(), 0);
         std::size_t reached = 0;
@@ -195,7 +196,7 @@ TEST(StableManifolds, EachIsConnected) {
     }
 }
 
-TEST(StableManifolds, StopWhenToldTo) {
+TEST(StableManifolds, CanBeCancelled) {
     Random random(3);
     PointCloud points;
     for (int i = 0; i < 20000; ++i) points.push_back({random.uniform(), random.uniform(), random.uniform()});
@@ -210,7 +211,7 @@ TEST(StableManifolds, StopWhenToldTo) {
     EXPECT_EQ(labels.error().code, ErrorCode::kCancelled);
 }
 
-TEST(FacetCircumradius, AgreesWithRationalArithmetic) {
+TEST(CircumradiusOf, AgreesWithRationalArithmetic) {
     for (const Triangulated& cloud : triangulatedClouds()) {
         for (std::size_t t = 0; t < cloud.tetrahedra.size(); ++t) {
             const auto p = exactCorners(cloud, t);
@@ -218,7 +219,7 @@ TEST(FacetCircumradius, AgreesWithRationalArithmetic) {
                 const double expected = std::sqrt(
                     CGAL::to_double(CGAL::squared_radius(p[(i + 1) % 4], p[(i + 2) % 4], p[(i + 3) % 4])));
                 const double radius =
-                    facetCircumradius(cloud.points, cloud.tetrahedra, t, static_cast<int>(i));
+                    circumradiusOf(facetCorners(cloud.points, cloud.tetrahedra.vertices[t], i));
                 // Needle triangles lose as many digits as the sine of the angle at a corner has zeros.
                 const auto c = cornersOf(cloud, t);
                 const Point3 u = c[(i + 2) % 4] - c[(i + 1) % 4];
@@ -246,7 +247,7 @@ TEST(MergeSegments, IsTheClosureOfMergeablePairs) {
                     if (low < 0 || low == high) continue;
                     double& radius = widest[{low, high}];
                     radius = std::max(radius,
-                                      facetCircumradius(c.cloud->points, c.flat(), t, static_cast<int>(i)));
+                                      circumradiusOf(facetCorners(c.cloud->points, c.flat().vertices[t], i)));
                 }
             }
             std::vector<std::size_t> group(n);
@@ -290,7 +291,7 @@ TEST(MergeSegments, IsTheClosureOfMergeablePairs) {
     EXPECT_GT(mergedAway, 1000U);
 }
 
-TEST(MergeSegments, PeaksOfMaximaFall) {
+TEST(StableManifolds, ComeByFallingMaximum) {
     for (const Case& c : cases()) {
         const auto strength = strengths(c);
         double last = std::numeric_limits<double>::infinity();

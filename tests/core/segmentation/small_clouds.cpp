@@ -117,11 +117,6 @@ const std::vector<Triangulated>& triangulatedClouds() {
         std::vector<Triangulated> made;
         for (const SmallCloud& cloud : smallClouds()) {
             made.push_back({cloud.name, cloud.points, triangulate(cloud.points).value()});
-            std::vector<ExactPoint> centres;
-            for (std::size_t t = 0; t < made.back().tetrahedra.size(); ++t) {
-                centres.push_back(exactCentre(made.back(), t));
-            }
-            made.back().centres = std::move(centres);
         }
         return made;
     }();
@@ -132,17 +127,6 @@ std::array<Point3, 4> cornersOf(const Triangulated& cloud, std::size_t t) {
     std::array<Point3, 4> corners;
     for (std::size_t i = 0; i < 4; ++i) corners[i] = cloud.points[cloud.tetrahedra.vertices[t][i]];
     return corners;
-}
-
-std::array<ExactPoint, 4> exactCorners(const Triangulated& cloud, std::size_t t) {
-    const auto corners = cornersOf(cloud, t);
-    return {exact(corners[0]), exact(corners[1]), exact(corners[2]), exact(corners[3])};
-}
-
-ExactPoint exactCentre(const Triangulated& cloud, std::size_t t) {
-    if (!cloud.centres.empty()) return cloud.centres[t];
-    const auto p = exactCorners(cloud, t);
-    return CGAL::circumcenter(p[0], p[1], p[2], p[3]);
 }
 
 }  // namespace shapedb

@@ -9,14 +9,11 @@
 #include "core/base/random.h"
 #include "core/delaunay/delaunay.h"
 #include "core/geometry/motion.h"
+#include "core/geometry/tetrahedron.h"
 
 namespace shapedb::testing_support {
 
 namespace {
-
-double sixVolumes(const Point3& a, const Point3& b, const Point3& c, const Point3& d) {
-    return dot(b - a, cross(c - a, d - a));
-}
 
 using Face = std::array<std::uint32_t, 3>;
 
@@ -42,18 +39,10 @@ void joinFaces(InteriorView& view) {
     }
 }
 
-void drawPoints(InteriorView& view) {
-    Random random(77);
+void sample(InteriorView& view) {
     for (std::size_t i = 0; i < InteriorView::kSamples; ++i) {
-        // All tetrahedra are as large as each other.
-        const std::size_t t = i * view.vertices.size() / InteriorView::kSamples;
-        std::array<double, 4> share;
-        for (double& s : share) s = -std::log(1.0 - random.uniform());
-        const double sum = share[0] + share[1] + share[2] + share[3];
-        Point3 p;
-        for (std::size_t v = 0; v < 4; ++v) p = p + (share[v] / sum) * view.sites[view.vertices[t][v]];
-        view.inner.push_back(p);
-        view.innerOwner.push_back(static_cast<std::uint32_t>(t));
+        // All tetrahedra have the same volume.
+        view.sampled.push_back(static_cast<std::uint32_t>(i * view.vertices.size() / InteriorView::kSamples));
     }
     view.surface = view.sites;
     if (view.surface.size() > 400) view.surface.resize(400);
@@ -72,7 +61,7 @@ void measure(InteriorView& view, double side) {
         for (const std::uint32_t site : v) centroid = centroid + 0.25 * view.sites[site];
         view.centroids.push_back(centroid);
         view.volumes.push_back(side * side * side / 6.0);
-        // Any thickness will do; a different one each makes mistaken indices show.
+        // Any thickness will do; with a different one for each, wrong indices show.
         view.radii.push_back(side * random.uniform(0.2, 4.0));
         view.meanRadius += length(centroid) / static_cast<double>(view.vertices.size());
     }
@@ -121,7 +110,7 @@ InteriorView viewOfCubes(const std::vector<Cube>& cubes, double side) {
         return at->second;
     };
     for (const Cube& c : cubes) {
-        // One tetrahedron for each order in which a walk from corner to far corner takes the axes.
+        // One tetrahedron for each order of axes on a path from corner to opposite corner (Kuhn).
         std::array<std::size_t, 3> axes{0, 1, 2};
         do {
             std::array<std::uint32_t, 4> vertices;
@@ -136,8 +125,18 @@ InteriorView viewOfCubes(const std::vector<Cube>& cubes, double side) {
     }
     joinFaces(view);
     measure(view, side);
-    drawPoints(view);
+    sample(view);
     return view;
+}
+
+Point3 randomPointIn(const InteriorView& view, std::size_t t, Random& random) {
+    const auto& vertices = view.vertices[t];
+    std::array<double, 4> share;
+    for (double& s : share) s = -std::log(1.0 - random.uniform());
+    const double sum = share[0] + share[1] + share[2] + share[3];
+    Point3 p;
+    for (std::size_t v = 0; v < 4; ++v) p = p + (share[v] / sum) * view.sites[vertices[v]];
+    return p;
 }
 
 double triangle(double value, double low, double high, std::size_t count, std::size_t bin) {
@@ -154,7 +153,7 @@ std::vector<std::uint8_t> levelsOf(const std::vector<double>& sums) {
     for (const double s : sums) whole += s;
     std::vector<std::uint8_t> bytes;
     for (const double s : sums) {
-        // By way of the nearest of 255 steps of the root, then the nearest of 15 up to the root of a half.
+        // Rounded to 255 steps of the root first, then to 15 steps up to the root of a half.
         const double root = std::floor(255.0 * std::sqrt(s / whole) + 0.5) / 255.0;
         bytes.push_back(
             static_cast<std::uint8_t>(std::min(15.0, std::floor(15.0 * std::sqrt(2.0) * root + 0.5))));
@@ -163,15 +162,13 @@ std::vector<std::uint8_t> levelsOf(const std::vector<double>& sums) {
 }
 
 std::array<double, 4> barycentric(const InteriorView& view, std::size_t t, const Point3& p) {
-    const auto& v = view.vertices[t];
-    std::array<Point3, 4> corner;
-    for (std::size_t i = 0; i < 4; ++i) corner[i] = view.sites[v[i]];
-    const double whole = sixVolumes(corner[0], corner[1], corner[2], corner[3]);
+    const TetrahedronCorners corner = cornersOf(view.sites, view.vertices[t]);
+    const double whole = sixfoldVolume(corner);
     std::array<double, 4> result;
     for (std::size_t i = 0; i < 4; ++i) {
-        std::array<Point3, 4> replaced = corner;
+        TetrahedronCorners replaced = corner;
         replaced[i] = p;
-        result[i] = sixVolumes(replaced[0], replaced[1], replaced[2], replaced[3]) / whole;
+        result[i] = sixfoldVolume(replaced) / whole;
     }
     return result;
 }

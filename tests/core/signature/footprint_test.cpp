@@ -1,4 +1,4 @@
-// The outline of flat things of which it is known, seen from one side and from all sides.
+// Shapes with known outlines, seen from one side and from all sides.
 #include "core/signature/footprint.h"
 
 #include <algorithm>
@@ -15,8 +15,8 @@
 namespace shapedb {
 namespace {
 
-// Points of a spoon as it lies, length about 1: a bowl half as wide as long, and a handle. `sides`: 1,
-// the upper side alone; 2, with the lower one, `thickness` below.
+// Points of a lying spoon of length about 1: a bowl half as wide as long, and a handle. `sides`: 1 for the
+// upper side alone, 2 with the lower one, `thickness` below.
 PointCloud spoon(int sides, double thickness, std::uint64_t seed, std::size_t count = 6000) {
     Random random(seed);
     PointCloud points;
@@ -33,7 +33,7 @@ PointCloud spoon(int sides, double thickness, std::uint64_t seed, std::size_t co
     return points;
 }
 
-// How the outline spreads along its length, from either end the same way round: ten shares.
+// The distribution of the outline along its length, in ten shares, the same from either end.
 std::vector<double> profile(const std::vector<OutlinePoint>& outline) {
     std::vector<double> shares(10, 0.0);
     for (const OutlinePoint& p : outline) {
@@ -50,11 +50,11 @@ double difference(const std::vector<double>& a, const std::vector<double>& b) {
     return sum;
 }
 
-TEST(Footprint, IsTheSameOfOneSideAndOfBoth) {
+TEST(Footprint, IsTheSameFromOneSideAndFromBoth) {
     const auto one = profile(footprint(spoon(1, 0.0, 1)));
     const auto both = profile(footprint(spoon(2, 0.05, 2)));
     EXPECT_LT(difference(one, both), 0.06);
-    // What lies below counts once: twice the points under the bowl alone change nothing.
+    // Each cell counts once: twice the points under the bowl change nothing.
     PointCloud bowlTwice = spoon(1, 0.0, 3);
     const std::size_t once = bowlTwice.size();
     for (std::size_t i = 0; i < once; ++i) {
@@ -78,8 +78,8 @@ TEST(Footprint, DoesNotDependOnThePose) {
     }
 }
 
-// The cells counted a second time, in a map, for points whose axes are known.
-TEST(Footprint, HasOnePointACell) {
+// Counts the cells with a map, for points with known axes.
+TEST(Footprint, HasOnePointPerCell) {
     Random random(6);
     PointCloud points;
     for (int i = 0; i < 5000; ++i) {
@@ -87,7 +87,7 @@ TEST(Footprint, HasOnePointACell) {
     }
     const auto outline = footprint(points);
     ASSERT_FALSE(outline.empty());
-    // A rectangle of 1 by 0.3 in units of its length (but for the tails), evenly filled.
+    // An evenly filled rectangle of 1 by 0.3 in units of its length (apart from the tails).
     double across = 0.0;
     std::size_t beyond = 0;
     for (const OutlinePoint& p : outline) {
@@ -96,7 +96,7 @@ TEST(Footprint, HasOnePointACell) {
     }
     EXPECT_NEAR(across, 0.15, 0.01);
     EXPECT_LE(beyond, outline.size() / 50);
-    // No two in one cell: with 2 by 0.6 in cells of two spacings there are about as many cells.
+    // Hardly two in a cell: 2 by 0.6 holds about as many cells of two spacings.
     std::map<std::pair<long, long>, int> occupied;
     const double cell = std::sqrt(0.3 / static_cast<double>(outline.size()));
     for (const OutlinePoint& p : outline) {
@@ -107,7 +107,7 @@ TEST(Footprint, HasOnePointACell) {
     EXPECT_EQ(outline, footprint(points)) << "deterministic";
 }
 
-TEST(Footprint, OfHardlyAnyPoints) {
+TEST(Footprint, HandlesVeryFewPoints) {
     EXPECT_FALSE(footprint({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}).empty());
     EXPECT_TRUE(footprint({{1, 1, 1}, {1, 1, 1}, {1, 1, 1}, {1, 1, 1}}).empty()) << "no extent";
 }

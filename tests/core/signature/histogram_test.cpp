@@ -45,7 +45,7 @@ TEST(SoftBin, EndsBelongToTheEndBins) {
     }
 }
 
-TEST(Histogram, OfNothingIsAllZero) {
+TEST(Histogram, IsZeroWhenEmpty) {
     const Histogram none(3, 4);
     std::uint8_t bytes[12];
     for (std::uint8_t& b : bytes) b = 99;

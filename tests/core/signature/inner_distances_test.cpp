@@ -19,7 +19,7 @@ using testing_support::horseshoe;
 using testing_support::together;
 using testing_support::viewOfCubes;
 
-// All shortest ways at once (Floyd), from nothing but which tetrahedron belongs to which cell.
+// All shortest paths (Floyd-Warshall), from the cells of the tetrahedra alone.
 std::vector<std::vector<double>> plainDistances(const InteriorView& view, const InnerDistances& inner) {
     const std::size_t n = inner.centres.size();
     std::vector<std::vector<double>> d(n, std::vector<double>(n, InnerDistances::kUnreached));
@@ -68,7 +68,7 @@ void expectShortest(const InteriorView& view, const InnerDistances& inner) {
     EXPECT_NEAR(inner.mean, sum / weight, 1e-9);
 }
 
-TEST(InnerDistances, AreTheShortestOfAllWays) {
+TEST(InnerDistances, AreLengthsOfShortestPaths) {
     for (const auto& cubes : {horseshoe(6, 1, 2), block({0, 0, 0}, {4, 3, 2}),
                               together(block({0, 0, 0}, {2, 2, 2}), block({5, 0, 0}, {8, 2, 2}))}) {
         const InteriorView view = viewOfCubes(cubes, 0.1);
@@ -117,7 +117,7 @@ TEST(InnerDistances, CellsAreConnectedLumpsThatCoverTheInterior) {
     ASSERT_EQ(inner->distance.size(), InnerDistances::kSources);
 }
 
-TEST(InnerDistances, AlongAStraightRodAreStraight) {
+TEST(InnerDistances, AreStraightAlongARod) {
     const InteriorView view = viewOfCubes(block({0, 0, 0}, {60, 4, 4}), 1.0 / 60);
     const auto inner = innerDistances(view);
     ASSERT_TRUE(inner);
@@ -125,18 +125,18 @@ TEST(InnerDistances, AlongAStraightRodAreStraight) {
         for (std::size_t c = 0; c < inner->centres.size(); ++c) {
             const double straight = distance(inner->centres[inner->sources[s]], inner->centres[c]);
             EXPECT_GE(inner->distance[s][c], straight - 1e-12);
-            // Ways go from cell to cell and so in zigzag.
+            // Paths zigzag from cell to cell.
             if (straight > 0.3) {
                 EXPECT_LT(inner->distance[s][c], 1.3 * straight);
             }
         }
     }
-    // Two points drawn from a stick of length 1 lie a third apart.
+    // Two random points of a stick of length 1 are a third apart on average.
     EXPECT_GT(inner->mean, 0.33);
     EXPECT_LT(inner->mean, 0.43);
 }
 
-TEST(InnerDistances, OfAHorseshoeGoAllTheWayRound) {
+TEST(InnerDistances, GoRoundAHorseshoe) {
     const InteriorView view = viewOfCubes(horseshoe(30, 3, 3), 1.0 / 30);
     const auto inner = innerDistances(view);
     ASSERT_TRUE(inner);
@@ -154,7 +154,7 @@ TEST(InnerDistances, OfAHorseshoeGoAllTheWayRound) {
     EXPECT_LT(straightThere, 0.35) << "the tips are near";
 }
 
-TEST(InnerDistances, StopAtTheBordersOfPieces) {
+TEST(InnerDistances, DoNotReachOtherPieces) {
     const auto left = block({0, 0, 0}, {3, 3, 3});
     const InteriorView view = viewOfCubes(together(left, block({5, 0, 0}, {8, 3, 3})), 0.1);
     const auto inner = innerDistances(view);
@@ -176,7 +176,7 @@ TEST(InnerDistances, StopAtTheBordersOfPieces) {
     EXPECT_LT(inner->mean, 0.4) << "of those reached only";
 }
 
-TEST(InnerDistances, OfASingleTetrahedronHaveAUnit) {
+TEST(InnerDistances, HaveAUnitForASingleTetrahedron) {
     InteriorView view = viewOfCubes(block({0, 0, 0}, {1, 1, 1}), 0.5);
     const auto keepOne = [](auto& all) { all.resize(1); };
     keepOne(view.vertices);
@@ -185,14 +185,14 @@ TEST(InnerDistances, OfASingleTetrahedronHaveAUnit) {
     keepOne(view.radii);
     view.neighbours = {{kNoTetrahedron, kNoTetrahedron, kNoTetrahedron, kNoTetrahedron}};
     view.volume = view.volumes.front();
-    std::fill(view.innerOwner.begin(), view.innerOwner.end(), 0U);
+    std::fill(view.sampled.begin(), view.sampled.end(), 0U);
     const auto inner = innerDistances(view);
     ASSERT_TRUE(inner);
     EXPECT_EQ(inner->centres.size(), 1U);
     EXPECT_GT(inner->mean, 0.0);
 }
 
-TEST(InnerDistances, StopWhenAsked) {
+TEST(InnerDistances, CanBeCancelled) {
     const InteriorView view = viewOfCubes(block({0, 0, 0}, {3, 3, 3}), 0.2);
     const std::atomic<bool> cancel{true};
     RunContext context;

@@ -15,14 +15,14 @@
 namespace shapedb {
 namespace {
 
-using testing_support::barycentric;
+using testing_support::randomPointIn;
 
 Segmentation segmented(const NamedShape& shape) {
     const PointCloud points = sampleBoundary(shape.solid, 3000, 2).value();
     return segment(points, parametersOf(Profile::kDefault).segmentation).value();
 }
 
-TEST(InteriorView, HasTheInteriorsFrameAndUnit) {
+TEST(InteriorView, IsInThePrincipalFrameAndUnit) {
     const NamedShape box = makeBox();
     const Segmentation s = segmented(box);
     const InteriorView view = interiorView(s);
@@ -39,8 +39,10 @@ TEST(InteriorView, HasTheInteriorsFrameAndUnit) {
         centre = centre + (view.volumes[t] / view.volume) * view.centroids[t];
     }
     EXPECT_LT(length(centre), 1e-9);
-    for (const Point3& p : view.inner) {
-        const double share = 1.0 / static_cast<double>(view.inner.size());
+    Random random(1);
+    for (const std::uint32_t t : view.sampled) {
+        const Point3 p = randomPointIn(view, t, random);
+        const double share = 1.0 / static_cast<double>(view.sampled.size());
         spread[0] += share * p.x * p.x;
         spread[1] += share * p.y * p.y;
         spread[2] += share * p.z * p.z;
@@ -48,7 +50,7 @@ TEST(InteriorView, HasTheInteriorsFrameAndUnit) {
         mixed[1] += share * p.x * p.z;
         mixed[2] += share * p.y * p.z;
     }
-    // A box of sides 2, 1.4 and 1: a twelfth of the square of each.
+    // The variances of a box: a twelfth of the square of each side.
     const std::array<double, 3> sides{2.0, 1.4, 1.0};
     for (std::size_t axis = 0; axis < 3; ++axis) {
         EXPECT_NEAR(spread[axis] * s.size * s.size * 12.0 / (sides[axis] * sides[axis]), 1.0, 0.12);
@@ -88,16 +90,12 @@ TEST(InteriorView, HoldsTheInteriorTetrahedraOnly) {
     EXPECT_NEAR(view.meanRadius, radius, 1e-12);
 }
 
-TEST(InteriorView, DrawsEvenlyByVolumeAndFromTheSurface) {
+TEST(InteriorView, SamplesEvenlyByVolumeAndListsTheSurface) {
     const Segmentation s = segmented(makeDumbbell());
     const InteriorView view = interiorView(s);
-    ASSERT_EQ(view.inner.size(), InteriorView::kSamples);
-    ASSERT_EQ(view.innerOwner.size(), InteriorView::kSamples);
+    ASSERT_EQ(view.sampled.size(), InteriorView::kSamples);
     std::vector<double> drawn(view.vertices.size(), 0.0);
-    for (std::size_t i = 0; i < view.inner.size(); ++i) {
-        drawn[view.innerOwner[i]] += 1.0;
-        for (const double b : barycentric(view, view.innerOwner[i], view.inner[i])) EXPECT_GE(b, -1e-6);
-    }
+    for (const std::uint32_t t : view.sampled) drawn[t] += 1.0;
     for (std::size_t t = 0; t < drawn.size(); ++t) {
         const double expected = static_cast<double>(InteriorView::kSamples) * view.volumes[t] / view.volume;
         EXPECT_LT(std::abs(drawn[t] - expected), 2.0) << "stratified";
@@ -120,11 +118,12 @@ TEST(InteriorView, DrawsEvenlyByVolumeAndFromTheSurface) {
     EXPECT_NEAR(view.meanSurfaceDistance / (sum / pairs), 1.0, 0.005) << "400,000 draws";
 }
 
-TEST(InteriorView, OfABallHasItsMeans) {
+TEST(InteriorView, HasTheKnownMeansOfABall) {
     const Segmentation s = segmented(makeSphere());
     const InteriorView view = interiorView(s);
     EXPECT_NEAR(view.meanSurfaceDistance * s.size, 4.0 / 3.0, 0.03);
-    // Of the centroids of tetrahedra, which reach from skin to skin: less than the 3/4 of matter.
+    // Less than the 3/4 of solid matter, since tetrahedra reach from skin to skin and only their centroids
+    // count.
     EXPECT_LT(view.meanRadius * s.size, 0.76);
     EXPECT_GT(view.meanRadius * s.size, 0.3);
     double thickness = 0.0;
@@ -139,7 +138,7 @@ TEST(InteriorView, IsDeterministic) {
     const InteriorView a = interiorView(s);
     const InteriorView b = interiorView(s);
     EXPECT_EQ(a.sites, b.sites);
-    EXPECT_EQ(a.inner, b.inner);
+    EXPECT_EQ(a.sampled, b.sampled);
     EXPECT_EQ(a.surface, b.surface);
     EXPECT_EQ(a.meanSurfaceDistance, b.meanSurfaceDistance);
 }

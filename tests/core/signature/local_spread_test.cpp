@@ -40,9 +40,9 @@ TEST(LocalSpread, TellsRodSheetAndBody) {
     EXPECT_GT(body.middle, body.shortest);
 }
 
-// A cloud so small that all of its points are in reach of each other: the spread of all of them,
-// whose axes are those of the coordinates.
-TEST(LocalSpread, IsTheSpreadOfWhatIsInReach) {
+// A cloud so small that all points are within reach of each other, with the coordinate axes as principal
+// axes.
+TEST(LocalSpread, AgreesWithAPlainComputation) {
     PointCloud points;
     for (const double x : {-0.03, 0.03}) {
         for (const double y : {-0.02, 0.02}) {
@@ -57,12 +57,12 @@ TEST(LocalSpread, IsTheSpreadOfWhatIsInReach) {
     }
 }
 
-TEST(LocalSpread, LooksNoFartherThanItsReach) {
-    // Two sheets across each other, farther apart than the reach: each looks like a sheet.
+TEST(LocalSpread, IgnoresPointsBeyondItsReach) {
+    // Two perpendicular sheets, farther apart than the reach: each looks like a sheet.
     PointCloud points = box(0.2, 0.2, 0.001, 1500);
     for (const Point3& p : box(0.2, 0.001, 0.2, 1500)) points.push_back(p + Point3{0.0, 0.5, 0.0});
     for (const LocalSpread& s : localSpread(points)) EXPECT_LT(s.shortest, 0.1);
-    // Alone, a point has no spread.
+    // A single point has no spread.
     EXPECT_TRUE(localSpread({{0, 0, 0}, {1, 0, 0}}).empty());
     EXPECT_EQ(localSpread(box(0.3, 0.3, 0.3, 9000)).size(), kSpreadPlaces);
 }

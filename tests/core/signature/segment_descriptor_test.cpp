@@ -34,12 +34,12 @@ std::vector<WeightedPoint> randomPoints(Random& random, std::size_t count) {
     return points;
 }
 
-// Positions are kept in steps of 1/16384: off by half of one in each of three directions.
+// Positions are kept in steps of 1/16384, so they are off by up to half a step in each direction.
 constexpr double kHalfStep = 0.9 / 16384.0;
 
 Point3 at(const std::array<float, 3>& p) { return {p[0], p[1], p[2]}; }
 
-TEST(Parts, FrameIsRightHandedAndCentred) {
+TEST(Body, FrameIsRightHandedAndCentred) {
     Random random(1);
     for (int round = 0; round < 300; ++round) {
         const auto points = randomPoints(random, 1 + random.below(kMaxSignaturePoints));
@@ -64,7 +64,7 @@ TEST(Parts, FrameIsRightHandedAndCentred) {
     }
 }
 
-TEST(Parts, PackingLosesNothing) {
+TEST(PackedSegmentDescriptor, LosesNothing) {
     Random random(9);
     for (int round = 0; round < 3000; ++round) {
         PackedSegmentDescriptor packedOnce;
@@ -81,8 +81,7 @@ TEST(Parts, PackingLosesNothing) {
     }
 }
 
-// In the frame the moments of all matter are diagonal and fall.
-TEST(Parts, PackingRoundsToTheNearestHalvesAwayFromZero) {
+TEST(PackedSegmentDescriptor, RoundsHalvesAwayFromZero) {
     SegmentDescriptor part;
     part.share = 0.5f;
     const auto step = [&](float position) {
@@ -101,7 +100,8 @@ TEST(Parts, PackingRoundsToTheNearestHalvesAwayFromZero) {
     EXPECT_EQ(step(100.0f), 32767);
 }
 
-TEST(Parts, FrameLiesAlongThePrincipalAxes) {
+// In the frame, the moments of all matter are diagonal and falling.
+TEST(Body, FrameLiesAlongThePrincipalAxes) {
     Random random(2);
     for (int round = 0; round < 200; ++round) {
         const auto points = randomPoints(random, 2 + random.below(10));
@@ -134,7 +134,7 @@ TEST(Parts, FrameLiesAlongThePrincipalAxes) {
     }
 }
 
-TEST(Parts, SizesAreLogarithmsOfExtentsAndPeakRadius) {
+TEST(SegmentDescriptor, SizesAreLogarithmsOfExtentsAndMaximumRadius) {
     WeightedPoint point;
     point.weight = 0.1f;
     point.volumeShare = 1.0f;
@@ -148,7 +148,7 @@ TEST(Parts, SizesAreLogarithmsOfExtentsAndPeakRadius) {
     EXPECT_EQ(part.position, (std::array<float, 3>{}));
     EXPECT_EQ(part.radius, 0.0f);
 
-    // Flat matter, rounding below zero, a maximum in a flat tetrahedron: bounded both ways.
+    // Flat matter, rounded below zero, and a maximum in a flat tetrahedron: both ends are bounded.
     point.covariance = {1e-20f, 0, 0, -1e-9f, 0, 0};
     point.maximumRadius = 1e30f;
     const SegmentDescriptor flat = bodyOf({point}).parts.front();
@@ -159,7 +159,7 @@ TEST(Parts, SizesAreLogarithmsOfExtentsAndPeakRadius) {
     EXPECT_EQ(bodyOf({point}).parts.front().size[3], std::log2(static_cast<float>(kSmallestLength)));
 }
 
-TEST(Parts, SizesAndRadiiDoNotChangeWhenTurned) {
+TEST(SegmentDescriptor, SizesAndRadiiDoNotChangeUnderRotation) {
     Random random(3);
     for (int round = 0; round < 100; ++round) {
         const auto points = randomPoints(random, 1 + random.below(8));

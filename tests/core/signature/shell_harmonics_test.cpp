@@ -35,8 +35,8 @@ double legendre(std::size_t degree, double x) {
     return now;
 }
 
-// By the addition theorem, without any spherical harmonic: the energy of degree l is the sum over all
-// pairs of points of P_l of the angle between them.
+// By the addition theorem, without spherical harmonics: the energy of degree l is the sum over all pairs of
+// points of P_l of the cosine of the angle between them.
 ShellEnergies plainEnergies(const PointCloud& points, const std::vector<double>& weights) {
     double n = 0.0;
     for (const double w : weights) n += w;
@@ -103,8 +103,8 @@ TEST(ShellHarmonics, DoNotChangeUnderMotions) {
     }
 }
 
-TEST(ShellHarmonics, OfOneDirectionAreOne) {
-    // Half the points each way along one axis: one direction for even degrees, nothing for odd ones.
+TEST(ShellHarmonics, AreOneForASingleDirection) {
+    // Half the points in each direction of one axis: a single direction for even degrees, none for odd ones.
     const PointCloud points = {{1, 2, 3}, {-1, -2, -3}};
     const ShellEnergies energies = shellHarmonics(points);
     for (std::size_t degree = 1; degree <= kDegrees; ++degree) {
@@ -112,7 +112,7 @@ TEST(ShellHarmonics, OfOneDirectionAreOne) {
         for (std::size_t shell = 0; shell < kShells; ++shell) sum += energies[shell * kDegrees + degree - 1];
         EXPECT_NEAR(sum, degree % 2 == 0 ? 1.0 : 0.0, 1e-12) << degree;
     }
-    // Nearly all at one spot, which the few far ones balance: near 1 in the last but all shells.
+    // Nearly all points at one place, balanced by a few distant ones.
     PointCloud spot(999, Point3{0, 0, 1});
     spot.push_back({0, 0, -999});
     const ShellEnergies one = shellHarmonics(spot);
@@ -123,7 +123,7 @@ TEST(ShellHarmonics, OfOneDirectionAreOne) {
     }
 }
 
-TEST(ShellHarmonics, OfASphereAreSmall) {
+TEST(ShellHarmonics, AreSmallForASphere) {
     Random random(4);
     PointCloud sphere;
     while (sphere.size() < 20000) {

@@ -86,7 +86,7 @@ void expectSameBody(const Body& a, const Body& b) {
     }
 }
 
-// What is stored today must be readable for ever: these bytes never change.
+// Stored signatures must stay readable: these bytes never change.
 std::string goldenHead(const std::string& version) {
     const std::string head = "53444247" +  // SDBG
                              version +
@@ -121,7 +121,7 @@ TEST(SignatureCodecAttributes, GoldenBytes) {
     EXPECT_FLOAT_EQ(decoded->points[0].volumeShare, 0.5208333f);
 }
 
-// Version 2 kept roots in 255 steps: they are read as the levels a signature made today has.
+// Version 2 kept roots in 255 steps; they are read as today's levels.
 TEST(SignatureCodecAttributes, GoldenBytesOfVersion2) {
     std::string golden = goldenHead("0200");
     for (int i = 0; i < 432; ++i) golden.push_back(static_cast<char>((7 * i + 3) % 256));
@@ -152,7 +152,7 @@ TEST(SignatureCodecAttributes, DecodeIsTheInverse) {
         expectSameBody(decoded->attributes->body, signature.attributes->body);
         EXPECT_EQ(encodeSignature(*decoded), bytes);
 
-        // The same points without attributes are version 1, and stay without.
+        // The same points without attributes are version 1 and stay without.
         Signature plain = signature;
         plain.attributes.reset();
         const std::string older = encodeSignature(plain);
@@ -165,8 +165,8 @@ TEST(SignatureCodecAttributes, DecodeIsTheInverse) {
     }
 }
 
-// A server decodes a million of them into one.
-TEST(SignatureCodecAttributes, WhatASignatureHeldBeforeLeavesNoTrace) {
+// A server decodes a million of them into the same object.
+TEST(SignatureCodecAttributes, DecodingReplacesEarlierContents) {
     Random random(12);
     Signature used;
     for (int i = 0; i < 60; ++i) {
@@ -188,7 +188,7 @@ TEST(SignatureCodecAttributes, WhatASignatureHeldBeforeLeavesNoTrace) {
     }
 }
 
-TEST(SignatureCodecAttributes, DamageIsNoticed) {
+TEST(SignatureCodecAttributes, DetectsDamage) {
     Random random(2);
     const std::string bytes = encodeSignature(randomAttributed(random, 3));
     for (std::size_t i = 0; i < bytes.size(); ++i) {
@@ -203,7 +203,7 @@ TEST(SignatureCodecAttributes, DamageIsNoticed) {
     expectMalformed(bytes + bytes);
 }
 
-TEST(SignatureCodecAttributes, HeaderIsChecked) {
+TEST(SignatureCodecAttributes, ChecksTheHeader) {
     const std::string bytes = encodeSignature(onePoint());  // version 3
     const auto changed = [&](std::size_t at, int value) {
         std::string other = bytes;
@@ -229,7 +229,7 @@ TEST(SignatureCodecAttributes, HeaderIsChecked) {
     for (int count = 2; count <= 16; ++count) expectMalformed(changed(6, count), "do not fit");
 }
 
-TEST(SignatureCodecAttributes, APointIsNoHeavierThanTheWhole) {
+TEST(SignatureCodecAttributes, RefusesAPointHeavierThanTheWhole) {
     Signature signature = onePoint();
     signature.volume = 0.125 * 15.625;  // all of it in the one point
     const auto whole = decodeSignature(encodeSignature(signature));
@@ -241,7 +241,7 @@ TEST(SignatureCodecAttributes, APointIsNoHeavierThanTheWhole) {
     expectMalformed(encodeSignature(signature), "share");
 }
 
-TEST(SignatureCodecAttributes, RandomBytesAreRefused) {
+TEST(SignatureCodecAttributes, RefusesRandomBytes) {
     Random random(3);
     for (int round = 0; round < 2000; ++round) {
         std::string bytes = encodeSignature(onePoint());

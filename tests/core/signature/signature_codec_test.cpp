@@ -34,7 +34,7 @@ std::string hex(const std::string& bytes) {
     return text;
 }
 
-// CRC-32 once more, to forge bytes that only the checks of numbers can refuse.
+// A second CRC-32, to forge bytes that only the range checks can refuse.
 std::string withChecksum(std::string bytes) {
     bytes.resize(bytes.size() - 4);
     std::uint32_t crc = 0xffffffffu;
@@ -56,7 +56,7 @@ void expectMalformed(const std::string& bytes, const std::string& word = "") {
     EXPECT_NE(decoded.error().message.find(word), std::string::npos) << decoded.error().message;
 }
 
-// What is stored today must be readable for ever: these bytes never change.
+// Stored signatures must stay readable: these bytes never change.
 TEST(SignatureCodec, GoldenBytes) {
     const std::string golden =
         "53444247"          // SDBG
@@ -137,7 +137,7 @@ TEST(SignatureCodec, DecodeIsTheInverse) {
     }
 }
 
-TEST(SignatureCodec, EveryDamagedByteIsNoticed) {
+TEST(SignatureCodec, DetectsEveryDamagedByte) {
     const std::string bytes = encodeSignature(twoPoints());
     for (std::size_t i = 0; i < bytes.size(); ++i) {
         for (int bit = 0; bit < 8; ++bit) {
@@ -151,14 +151,14 @@ TEST(SignatureCodec, EveryDamagedByteIsNoticed) {
     }
 }
 
-TEST(SignatureCodec, EveryTruncationAndExtensionIsRefused) {
+TEST(SignatureCodec, RefusesEveryTruncationAndExtension) {
     const std::string bytes = encodeSignature(twoPoints());
     for (std::size_t size = 0; size < bytes.size(); ++size) expectMalformed(bytes.substr(0, size));
     expectMalformed(bytes + '\0');
     expectMalformed(bytes + bytes);
 }
 
-TEST(SignatureCodec, HeaderIsChecked) {
+TEST(SignatureCodec, ChecksTheHeader) {
     const std::string bytes = encodeSignature(twoPoints());
     const auto changed = [&](std::size_t at, char value) {
         std::string other = bytes;
@@ -178,7 +178,7 @@ TEST(SignatureCodec, HeaderIsChecked) {
     expectMalformed(changed(8, 1), "reserved");
 }
 
-TEST(SignatureCodec, BadNumbersAreRefused) {
+TEST(SignatureCodec, RefusesBadNumbers) {
     const auto refused = [](const std::string& word, const std::function<void(Signature&)>& spoil) {
         Signature signature = twoPoints();
         spoil(signature);

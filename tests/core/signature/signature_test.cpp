@@ -25,7 +25,7 @@ Segmentation tenSegments() {
     return s;
 }
 
-TEST(Signature, FieldsAreScaledAndAnchored) {
+TEST(Signature, FieldsAreRelativeToScaleAndHeaviestPoint) {
     const auto signature = makeSignature(tenSegments(), {});
     ASSERT_TRUE(signature);
     EXPECT_EQ(signature->scale, 4.0);
@@ -49,7 +49,7 @@ TEST(Signature, FieldsAreScaledAndAnchored) {
     }
 }
 
-TEST(Signature, KeepsAsManyAsAsked) {
+TEST(Signature, KeepsAsManyPointsAsConfigured) {
     for (const std::uint32_t count : {1U, 2U, 9U, 10U, kMaxSignaturePoints}) {
         const auto signature = makeSignature(tenSegments(), {count});
         ASSERT_TRUE(signature);
@@ -64,7 +64,7 @@ TEST(Signature, KeepsAsManyAsAsked) {
     }
 }
 
-TEST(Signature, OfOneSegment) {
+TEST(Signature, WorksForOneSegment) {
     Segmentation s = tenSegments();
     s.segments.resize(1);
     s.volume = 10.0;
@@ -75,7 +75,7 @@ TEST(Signature, OfOneSegment) {
     EXPECT_EQ(signature->points[0].position, (std::array<float, 3>{}));
 }
 
-TEST(Signature, LeavesOutWhatSinglePrecisionCannotHold) {
+TEST(Signature, OmitsSegmentsTooLightForSinglePrecision) {
     Segmentation s = tenSegments();
     s.segments[3].volume = 1e-60;
     s.segments.resize(4);
@@ -87,7 +87,7 @@ TEST(Signature, LeavesOutWhatSinglePrecisionCannotHold) {
     EXPECT_EQ(makeSignature(Segmentation{}, {}).error().code, ErrorCode::kNoInterior);
 }
 
-TEST(Signature, FlatMatterHasNoImaginaryExtent) {
+TEST(Signature, FlatSegmentsHaveExtentZero) {
     Segmentation s = tenSegments();
     s.segments[0].covariance = {1.0, 0.0, 0.0, -1e-9, 0.0, 0.0};
     const auto extents = pointExtents(*makeSignature(s, {}), 0);
@@ -102,7 +102,7 @@ TEST(Signature, FlatMatterHasNoImaginaryExtent) {
     EXPECT_NEAR(turned[2], 0.5, 1e-6);
 }
 
-TEST(Signature, SameShapeComparesWhatIsScored) {
+TEST(Signature, SameShapeComparesWhatEntersTheScore) {
     const Signature a = makeSignature(tenSegments(), {}).value();
     Signature b = a;
     b.origin = {9, 9, 9};
@@ -118,7 +118,7 @@ TEST(Signature, SameShapeComparesWhatIsScored) {
     EXPECT_FALSE(sameShape(a, b));
 }
 
-TEST(Signature, OfRealShapesIsWellFormed) {
+TEST(Signature, IsWellFormedForSampledShapes) {
     for (const NamedShape& shape : namedShapes()) {
         const auto s = segment(sampleBoundary(shape.solid, 3000, 3).value(), {});
         ASSERT_TRUE(s) << shape.name;

@@ -1,5 +1,4 @@
-// Each statistic against its definition written down a second time, and against shapes of which the
-// answer is known.
+// Each statistic against a second implementation of its definition, and for shapes with known answers.
 #include "core/signature/statistics.h"
 
 #include <atomic>
@@ -31,7 +30,7 @@ using testing_support::viewOfCubes;
 constexpr std::size_t kPlaces = 10;
 constexpr std::size_t kThicknesses = 6;
 
-// What rounding to a level can take from a share of up to a tenth or so.
+// How much rounding to a level can change a share of up to a tenth or so.
 constexpr double kHalfALevel = 0.02;
 
 std::vector<std::uint8_t> binsOf(const ShapeStatistics& statistics, Statistic which) {
@@ -45,7 +44,7 @@ void expectBins(const std::vector<std::uint8_t>& got, const std::vector<std::uin
     for (std::size_t i = 0; i < got.size(); ++i) EXPECT_NEAR(got[i], expected[i], 1) << what << " bin " << i;
 }
 
-// Shares of the whole again: the squares of the bins.
+// Back to shares of the whole: the squares of the roots.
 std::vector<double> sharesOf(const ShapeStatistics& statistics, Statistic which) {
     std::vector<double> shares;
     double sum = 0.0;
@@ -67,7 +66,7 @@ ShapeStatistics ofScan(const Solid& solid) {
     return describe(points, parametersOf(Profile::kDefault)).value().signature.attributes->statistics;
 }
 
-TEST(Statistics, FillTheirBinsWithoutGapOrOverlap) {
+TEST(Statistics, LayoutHasNoGapsOrOverlaps) {
     std::size_t next = 0;
     std::set<std::string> names;
     for (const StatisticLayout& layout : kStatistics) {
@@ -85,7 +84,7 @@ TEST(Statistics, FillTheirBinsWithoutGapOrOverlap) {
                  "footprint distances");
 }
 
-TEST(Statistics, ThicknessByRadiusIsItsDefinition) {
+TEST(Statistics, ThicknessByRadiusMatchesItsDefinition) {
     for (const InteriorView& view : someViews()) {
         std::vector<double> sums(kThicknesses * kPlaces, 0.0);
         for (std::size_t t = 0; t < view.volumes.size(); ++t) {
@@ -105,7 +104,7 @@ TEST(Statistics, ThicknessByRadiusIsItsDefinition) {
     }
 }
 
-TEST(Statistics, ThicknessByCentralityIsItsDefinition) {
+TEST(Statistics, ThicknessByCentralityMatchesItsDefinition) {
     for (const InteriorView& view : someViews()) {
         const InnerDistances inner = innerDistances(view).value();
         std::vector<double> sums(kThicknesses * kPlaces, 0.0);
@@ -118,7 +117,7 @@ TEST(Statistics, ThicknessByCentralityIsItsDefinition) {
                 sum += inner.distance[s][cell];
                 ++reached;
             }
-            // A crumb that no source lies in is as far out as can be.
+            // A separate piece without a source counts as farthest out.
             const double central = reached > 0 ? sum / reached / inner.mean : 1e9;
             const double octaves = std::log2(view.radii[t] / view.meanSurfaceDistance);
             for (std::size_t row = 0; row < kThicknesses; ++row) {
@@ -136,7 +135,7 @@ TEST(Statistics, ThicknessByCentralityIsItsDefinition) {
     }
 }
 
-TEST(Statistics, BendingIsItsDefinition) {
+TEST(Statistics, BendingMatchesItsDefinition) {
     for (const InteriorView& view : someViews()) {
         const InnerDistances inner = innerDistances(view).value();
         std::vector<double> sums(24, 0.0);
@@ -155,7 +154,7 @@ TEST(Statistics, BendingIsItsDefinition) {
     }
 }
 
-TEST(Statistics, SurfaceDistancesAndHarmonicsAreTheirDefinitions) {
+TEST(Statistics, SurfaceDistancesAndHarmonicsMatchTheirDefinitions) {
     for (const InteriorView& view : someViews()) {
         const auto statistics = shapeStatistics(view);
         ASSERT_TRUE(statistics);
@@ -167,7 +166,7 @@ TEST(Statistics, SurfaceDistancesAndHarmonicsAreTheirDefinitions) {
                 for (std::size_t bin = 0; bin < 32; ++bin) sums[bin] += triangle(d, 0.0, 1.0, 32, bin);
             }
         }
-        // Of all pairs, kPairs draws: a level strays by one at most.
+        // kPairs random pairs instead of all: levels differ by at most one.
         const auto drawn = binsOf(*statistics, Statistic::kSurfaceDistances);
         const auto all = levelsOf(sums);
         for (std::size_t bin = 0; bin < drawn.size(); ++bin) {
@@ -189,7 +188,7 @@ TEST(Statistics, SurfaceDistancesAndHarmonicsAreTheirDefinitions) {
     }
 }
 
-TEST(Statistics, SpreadAndFootprintAreTheirDefinitions) {
+TEST(Statistics, SpreadAndFootprintMatchTheirDefinitions) {
     for (const InteriorView& view : someViews()) {
         const auto statistics = shapeStatistics(view);
         ASSERT_TRUE(statistics);
@@ -251,7 +250,7 @@ TEST(Statistics, ChordsAreAsLongAsAllPairsOfSurfacePoints) {
     }
 }
 
-// Share of chords in the bin of those that run inside all the way.
+// Share of the chords that lie inside over their whole length.
 double insideAllTheWay(const ShapeStatistics& statistics) {
     const auto shares = sharesOf(statistics, Statistic::kChords);
     double sum = 0.0;
@@ -268,7 +267,7 @@ TEST(Statistics, ChordsOfConvexShapesStayInside) {
     EXPECT_LT(torus, 0.6);
 }
 
-TEST(Statistics, ABallIsAsThickAsItsRadiusEverywhere) {
+TEST(Statistics, ThicknessOfABallIsItsRadius) {
     // Radius 1, mean surface distance 4/3: log2(3/4) lies between the centres of rows 4 and 5.
     const auto shares = sharesOf(ofScan(makeSphere().solid), Statistic::kThicknessByRadius);
     double thick = 0.0;
@@ -295,14 +294,14 @@ TEST(Statistics, AStraightRodIsLongerThanABentOne) {
     ASSERT_TRUE(straight && bent);
     const double ofStraight = mean(sharesOf(*straight, Statistic::kBending));
     const double ofBent = mean(sharesOf(*bent, Statistic::kBending));
-    // In units of the mean way inside, which for a straight rod is the straight line but for zigzag.
+    // In units of the mean inner distance, which for a straight rod is the straight line apart from zigzag.
     EXPECT_GT(ofStraight, 0.7);
     EXPECT_LT(ofStraight, 1.02);
     EXPECT_LT(ofBent, 0.75 * ofStraight);
 }
 
 TEST(Statistics, BendingAnArmChangesInnerDistancesLess) {
-    // A long rod, straight and as a U: thickness by centrality hardly knows, the harmonics do.
+    // A long rod, straight and as a U: thickness by centrality hardly changes, the harmonics do.
     const auto straight = shapeStatistics(viewOfCubes(block({0, 0, 0}, {43, 2, 2}), 1.0 / 43));
     const auto bent = shapeStatistics(viewOfCubes(horseshoe(20, 2, 3), 1.0 / 20));
     ASSERT_TRUE(straight && bent);
@@ -322,7 +321,7 @@ TEST(Statistics, BendingAnArmChangesInnerDistancesLess) {
     EXPECT_LT(difference(Statistic::kThicknessByCentrality), 0.6 * difference(Statistic::kThicknessByRadius));
 }
 
-TEST(Statistics, StopWhenAsked) {
+TEST(Statistics, CanBeCancelled) {
     const InteriorView view = viewOfCubes(block({0, 0, 0}, {3, 3, 3}), 0.2);
     const std::atomic<bool> cancel{true};
     RunContext context;

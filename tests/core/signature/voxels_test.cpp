@@ -15,9 +15,10 @@ namespace {
 using testing_support::barycentric;
 using testing_support::block;
 using testing_support::horseshoe;
+using testing_support::randomPointIn;
 using testing_support::viewOfCubes;
 
-// Only what Voxels reads: tetrahedra that may well overlap.
+// Only what Voxels reads; the tetrahedra may overlap.
 InteriorView scattered(std::size_t count, std::uint64_t seed) {
     Random random(seed);
     InteriorView view;
@@ -52,7 +53,7 @@ struct Grid {
     }
 };
 
-// Smallest barycentric coordinate in the tetrahedron that holds p deepest: 0 on its border.
+// Largest, over all tetrahedra, of the smallest barycentric coordinate of p: 0 on a border.
 double depth(const InteriorView& view, const Point3& p) {
     double best = -1e9;
     for (std::size_t t = 0; t < view.vertices.size(); ++t) {
@@ -86,7 +87,7 @@ TEST(Voxels, AreInsideWhereTheirCentresAre) {
     }
 }
 
-TEST(Voxels, FlatTetrahedraHoldNothing) {
+TEST(Voxels, AreNotInsideFlatTetrahedra) {
     InteriorView view = scattered(2, 9);
     view.sites[7] = view.sites[6];
     const Voxels voxels(view);
@@ -104,18 +105,18 @@ TEST(Voxels, FlatTetrahedraHoldNothing) {
     }
 }
 
-TEST(Voxels, ShareInsideOfALineIsTheShareOfItsLength) {
+TEST(Voxels, MeasureTheFractionOfALineInside) {
     const InteriorView view = viewOfCubes(horseshoe(12, 3, 4), 0.05);
     const Voxels voxels(view);
     Random random(4);
     double worst = 0.0;
     double sum = 0.0;
-    constexpr int kLines = 300;
+    constexpr int kLines = 150;
     for (int n = 0; n < kLines; ++n) {
-        const Point3 a = view.inner[random.below(view.inner.size())];
-        const Point3 b = view.inner[random.below(view.inner.size())];
+        const Point3 a = randomPointIn(view, random.below(view.vertices.size()), random);
+        const Point3 b = randomPointIn(view, random.below(view.vertices.size()), random);
         int found = 0;
-        constexpr int kSteps = 100;
+        constexpr int kSteps = 50;
         for (int s = 0; s < kSteps; ++s)
             found += depth(view, a + ((s + 0.5) / kSteps) * (b - a)) > 0.0 ? 1 : 0;
         const double error = std::abs(voxels.shareInside(a, b) - found / static_cast<double>(kSteps));
@@ -126,19 +127,19 @@ TEST(Voxels, ShareInsideOfALineIsTheShareOfItsLength) {
     EXPECT_LT(worst, 0.4) << "a line along a face";
 }
 
-TEST(Voxels, LinesOfAConvexSolidAreInside) {
+TEST(Voxels, HoldWholeLinesOfAConvexSolid) {
     const InteriorView view = viewOfCubes(block({0, 0, 0}, {6, 5, 4}), 0.1);
     const Voxels voxels(view);
     Random random(5);
     double sum = 0.0;
     for (int n = 0; n < 500; ++n) {
-        const Point3& a = view.inner[random.below(view.inner.size())];
-        const Point3& b = view.inner[random.below(view.inner.size())];
+        const Point3 a = randomPointIn(view, random.below(view.vertices.size()), random);
+        const Point3 b = randomPointIn(view, random.below(view.vertices.size()), random);
         sum += voxels.shareInside(a, b);
         EXPECT_EQ(voxels.shareInside(a, b), voxels.shareInside(a, b));
     }
     EXPECT_GT(sum / 500, 0.98);
-    // As far again beyond the solid as within it.
+    // Half of it inside, half beyond the solid.
     const Point3 far = 40.0 * view.sites.front();
     EXPECT_LT(voxels.shareInside(20.0 * view.sites.front(), far), 0.01);
     EXPECT_NEAR(voxels.shareInside(Point3{}, 2.0 * view.sites.front()), 0.5, 0.03);

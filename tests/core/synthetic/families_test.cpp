@@ -2,12 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <set>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
+
+#include "core/base/disjoint_sets.h"
 
 namespace shapedb {
 namespace {
@@ -18,30 +19,26 @@ Solid member(const std::string& family, std::size_t index, std::uint64_t seed) {
     return solid ? *solid : Solid{};
 }
 
-// Whether every part can be reached from the first over points that two parts share.
+// Whether every part is connected to the first by points that two parts share.
 bool isConnected(const Solid& solid) {
-    std::vector<std::size_t> root(solid.parts.size());
-    std::iota(root.begin(), root.end(), std::size_t{0});
-    const auto find = [&](std::size_t i) {
-        while (root[i] != i) i = root[i];
-        return i;
-    };
-    for (std::size_t i = 0; i < solid.parts.size(); ++i) {
+    DisjointSets groups(solid.parts.size());
+    for (std::uint32_t i = 0; i < solid.parts.size(); ++i) {
         const auto own = sampleBoundary({{solid.parts[i]}}, 1500, i);
         if (!own) return false;
-        for (std::size_t j = 0; j < solid.parts.size(); ++j) {
+        for (std::uint32_t j = 0; j < solid.parts.size(); ++j) {
             const bool touches = std::any_of(own->begin(), own->end(), [&](const Point3& p) {
                 return implicitValue(solid.parts[j], p) <= 0.0;
             });
-            if (i != j && touches) root[find(i)] = find(j);
+            if (touches) groups.unite(i, j);
         }
     }
-    std::set<std::size_t> roots;
-    for (std::size_t i = 0; i < root.size(); ++i) roots.insert(find(i));
-    return roots.size() == 1;
+    for (std::uint32_t i = 1; i < solid.parts.size(); ++i) {
+        if (groups.find(i) != groups.find(0)) return false;
+    }
+    return true;
 }
 
-TEST(Families, AreNamedSortedAndMany) {
+TEST(Families, AreSortedByName) {
     const auto families = listFamilies();
     EXPECT_GE(families.size(), 8U);
     for (std::size_t i = 0; i < families.size(); ++i) {
@@ -131,7 +128,7 @@ TEST(Scan, NoiseIsAShareOfTheDiagonal) {
     EXPECT_NEAR(sigma, expected, 0.02 * expected);
 }
 
-// The pose is a similarity motion: all distances change by one factor, and handedness stays.
+// The pose is a similarity motion: all distances change by the same factor, and handedness is kept.
 TEST(Scan, RandomPoseIsAMotionOfTheSameScan) {
     const Solid solid = member("hammer", 1, 1);
     std::set<double> scales;

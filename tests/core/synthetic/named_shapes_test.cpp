@@ -15,7 +15,7 @@ TEST(NamedShapes, AreUsableAndDistinct) {
     for (const NamedShape& shape : namedShapes()) {
         EXPECT_TRUE(checkSolid(shape.solid)) << shape.name;
         EXPECT_TRUE(names.insert(shape.name).second);
-        const SolidBounds bounds = boundsOf(shape.solid);
+        const Box bounds = boundsOf(shape.solid);
         EXPECT_GT(thinnestPart(shape.solid), 0.03 * bounds.diagonal()) << shape.name;
         // About the origin.
         EXPECT_LT(length(bounds.low + bounds.high), 1e-12) << shape.name;
@@ -23,7 +23,7 @@ TEST(NamedShapes, AreUsableAndDistinct) {
     EXPECT_EQ(names, (std::set<std::string>{"sphere", "torus", "box", "l_shape", "dumbbell", "jack"}));
 }
 
-TEST(NamedShapes, FormulaAgreesWithCounting) {
+TEST(NamedShapes, VolumesAgreeWithCounting) {
     for (const NamedShape& shape : namedShapes()) {
         EXPECT_NEAR(volumeOf(shape.solid, 1000000), shape.volume, 0.004 * shape.volume) << shape.name;
     }
@@ -48,12 +48,12 @@ TEST(NamedShapes, BallsAreInsideAndTouchedBySamples) {
     }
 }
 
-TEST(NamedShapes, LiteralFacts) {
+TEST(NamedShapes, HaveKnownVolumes) {
     EXPECT_NEAR(makeSphere().volume, 4.18879020478639, 1e-12);
     EXPECT_NEAR(makeTorus().volume, 2.41805, 1e-5);
     EXPECT_NEAR(makeBox().volume, 2.8, 1e-12);
     EXPECT_NEAR(makeLShape().volume, 2.4, 1e-12);
-    // Two balls (8.37758) and one unit of rod of radius 0.3 (0.28274), plus two thin rims.
+    // Two balls (8.37758), one unit of a rod of radius 0.3 (0.28274), and two thin rims.
     EXPECT_NEAR(makeDumbbell().volume, 8.37758 + 0.28274, 0.02);
     EXPECT_GT(makeDumbbell().volume, 8.37758 + 0.28274);
     EXPECT_EQ(makeDumbbell().balls.size(), 2U);

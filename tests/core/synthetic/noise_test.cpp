@@ -45,7 +45,7 @@ TEST(Noise, SigmaIsTheShareOfTheDiagonalOnEveryAxis) {
     EXPECT_NEAR(xy / n, 0.0, 5.0 * sigma * sigma / std::sqrt(n));
 }
 
-TEST(Noise, ShareZeroLeavesEveryBit) {
+TEST(Noise, OfZeroChangesNoBit) {
     PointCloud points = randomPoints(100, 1);
     points.push_back({-0.0, 1e300, 5e-324});
     const PointCloud before = points;
@@ -54,7 +54,7 @@ TEST(Noise, ShareZeroLeavesEveryBit) {
     EXPECT_TRUE(std::signbit(points.back().x));
 }
 
-TEST(Noise, SeedDecidesTheResult) {
+TEST(Noise, IsReproducibleBySeed) {
     const PointCloud clean = randomPoints(100, 1);
     PointCloud a = clean;
     PointCloud b = clean;
@@ -79,7 +79,7 @@ TEST(Noise, RefusesBadSharesAndLeavesThePointsAlone) {
     }
 }
 
-TEST(Noise, NamesANonFinitePoint) {
+TEST(Noise, RefusesANonFinitePoint) {
     PointCloud points = randomPoints(10, 1);
     points[6].z = std::numeric_limits<double>::infinity();
     const auto done = addGaussianNoise(points, 0.01, 1);
@@ -88,7 +88,7 @@ TEST(Noise, NamesANonFinitePoint) {
     EXPECT_NE(done.error().message.find("point 6"), std::string::npos);
 }
 
-TEST(Noise, HugeTinyAndEmptyClouds) {
+TEST(Noise, HandlesHugeTinyAndEmptyClouds) {
     PointCloud huge = {{0, 0, 0}, {1e200, 1e200, 0}};
     ASSERT_TRUE(addGaussianNoise(huge, 0.01, 1));
     EXPECT_NE(huge[0].x, 0.0);
@@ -112,7 +112,7 @@ TEST(Subsample, KeepsOrderAndTakesNoPointTwice) {
     EXPECT_NE(some, subsample(points, 300, 5));
 }
 
-TEST(Subsample, CountAtOrAboveTheSizeReturnsAll) {
+TEST(Subsample, ReturnsAllWhenThereAreNoMore) {
     const PointCloud points = randomPoints(20, 1);
     EXPECT_EQ(subsample(points, 20, 1), points);
     EXPECT_EQ(subsample(points, 2000, 1), points);
@@ -120,9 +120,8 @@ TEST(Subsample, CountAtOrAboveTheSizeReturnsAll) {
     EXPECT_TRUE(subsample({}, 5, 1).empty());
 }
 
-// All ten 2-subsets of five points come up equally often (chi-square, 9 degrees of freedom,
-// 0.1 % level).
-TEST(Subsample, AllSubsetsAreEquallyLikely) {
+// All ten 2-subsets of five points are equally frequent (chi-square, 9 degrees of freedom, 0.1 % level).
+TEST(Subsample, MakesAllSubsetsEquallyLikely) {
     PointCloud points;
     for (int i = 0; i < 5; ++i) points.push_back({static_cast<double>(i), 0, 0});
     std::vector<int> seen(25, 0);

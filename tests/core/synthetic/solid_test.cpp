@@ -10,15 +10,14 @@
 
 #include <gtest/gtest.h>
 
+#include "core/base/math.h"
 #include "core/base/random.h"
 #include "core/synthetic/parts.h"
 
 namespace shapedb {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-
-// Share of points for which `in` holds, against `expected`, at five standard deviations.
+// Expects that `in` holds for a share `expected` of the points, within five standard deviations.
 void expectShare(const PointCloud& points, const std::function<bool(const Point3&)>& in, double expected) {
     const double n = static_cast<double>(points.size());
     const double found = static_cast<double>(std::count_if(points.begin(), points.end(), in)) / n;
@@ -63,10 +62,10 @@ TEST(Solid, SamplesLieOnTheBoundary) {
     }
 }
 
-TEST(Solid, BoundsAreTightAndHoldTheSamples) {
+TEST(Solid, BoundsAreTight) {
     for (const Solid& still : onePrimitiveEach()) {
         const Solid solid = movedSolid(someMotion(still.parts[0].shape.index()), still);
-        const SolidBounds bounds = boundsOf(solid);
+        const Box bounds = boundsOf(solid);
         Point3 low = bounds.high;
         Point3 high = bounds.low;
         for (const Point3& p : sample(solid)) {
@@ -82,8 +81,8 @@ TEST(Solid, BoundsAreTightAndHoldTheSamples) {
     }
 }
 
-// Archimedes: the part of a sphere between two parallel planes has area proportional to the gap.
-TEST(Solid, SphereIsSampledEvenly) {
+// Archimedes: a zone of a sphere has an area proportional to its height.
+TEST(Solid, SamplesASphereUniformly) {
     const PointCloud points = sample({{ball({}, 2.0)}});
     for (const double height : {-1.5, 0.0, 1.0}) {
         expectShare(
@@ -93,7 +92,7 @@ TEST(Solid, SphereIsSampledEvenly) {
     }
 }
 
-TEST(Solid, CylinderCapsuleAndPipeShareTheirAreaRightly) {
+TEST(Solid, SamplesCylindersCapsulesAndPipesByArea) {
     const double r = 0.5;
     const double h = 1.5;
     const double inner = 0.2;
@@ -110,7 +109,7 @@ TEST(Solid, CylinderCapsuleAndPipeShareTheirAreaRightly) {
         pipe, [&](const Point3& p) { return std::hypot(p.x, p.y) < inner + 1e-9; }, 4.0 * inner * h / total);
     expectShare(
         pipe, [&](const Point3& p) { return std::abs(p.z) > h - 1e-9; }, ends / total);
-    // On the flat end, half the area lies inside this radius.
+    // Half the area of a flat end lies inside this radius.
     PointCloud end;
     std::copy_if(pipe.begin(), pipe.end(), std::back_inserter(end),
                  [&](const Point3& p) { return p.z > h - 1e-9; });
@@ -119,7 +118,7 @@ TEST(Solid, CylinderCapsuleAndPipeShareTheirAreaRightly) {
         end, [&](const Point3& p) { return std::hypot(p.x, p.y) < half; }, 0.5);
 }
 
-TEST(Solid, BoxFacesGetTheirShare) {
+TEST(Solid, SamplesBoxFacesByArea) {
     const PointCloud points = sample({{block({}, {1.0, 2.0, 3.0})}});
     const double total = 2.0 * 3.0 + 3.0 * 1.0 + 1.0 * 2.0;
     expectShare(
@@ -131,7 +130,7 @@ TEST(Solid, BoxFacesGetTheirShare) {
 }
 
 // The outer half of a torus has area 2 pi r (pi R + 2 r) of 4 pi^2 R r.
-TEST(Solid, TorusIsSampledEvenly) {
+TEST(Solid, SamplesATorusUniformly) {
     const double ringRadius = 1.0;
     const double tube = 0.5;
     expectShare(
@@ -140,9 +139,9 @@ TEST(Solid, TorusIsSampledEvenly) {
         (kPi * ringRadius + 2.0 * tube) / (2.0 * kPi * ringRadius));
 }
 
-// A spheroid's zone has a closed formula: the area within |z| < t of (1, 1, c), c < 1, is
-// proportional to t sqrt(1 + k t^2) + asinh(sqrt(k) t) / sqrt(k) with k = (1 - c^2) / c^4.
-TEST(Solid, EllipsoidIsSampledEvenly) {
+// The zone |z| < t of the spheroid (1, 1, c), c < 1, has an area proportional to
+// t sqrt(1 + k t^2) + asinh(sqrt(k) t) / sqrt(k) with k = (1 - c^2) / c^4.
+TEST(Solid, SamplesAnEllipsoidUniformly) {
     const double c = 0.3;
     const double k = (1.0 - c * c) / std::pow(c, 4);
     const auto zone = [&](double t) {
@@ -153,13 +152,13 @@ TEST(Solid, EllipsoidIsSampledEvenly) {
         expectShare(
             points, [&](const Point3& p) { return std::abs(p.z) < t; }, zone(t) / zone(c));
     }
-    // Turning the axes must not matter.
+    // The order of the axes must not matter.
     const PointCloud other = sample({{ellipsoid({}, {c, 1.0, 1.0})}});
     expectShare(
         other, [&](const Point3& p) { return std::abs(p.x) < 0.1; }, zone(0.1) / zone(c));
 }
 
-TEST(Solid, UnionDropsWhatIsHidden) {
+TEST(Solid, OmitsHiddenSurfaces) {
     // Two unit balls at distance 1: each loses the cap of height 1/2, a quarter of its area.
     const Solid solid{{ball({-0.5, 0, 0}, 1.0), ball({0.5, 0, 0}, 1.0)}};
     const PointCloud points = sample(solid);
@@ -172,8 +171,8 @@ TEST(Solid, UnionDropsWhatIsHidden) {
         points, [](const Point3& p) { return p.x > 1.0; }, 0.25 / 1.5);
 }
 
-// Two halves of one box, abutting: no point on the shared face, and the whole looks like one box.
-TEST(Solid, TouchingFacesAreNotBoundary) {
+// Two abutting halves of a box look like one box: no point is on the shared face.
+TEST(Solid, OmitsTouchingFaces) {
     const Solid solid{{block({-0.5, 0, 0}, {0.5, 1, 1}), block({0.5, 0, 0}, {0.5, 1, 1})}};
     const PointCloud points = sample(solid);
     for (const Point3& p : points) {
@@ -185,8 +184,8 @@ TEST(Solid, TouchingFacesAreNotBoundary) {
         points, [](const Point3& p) { return p.x < 0.0; }, 0.5);
 }
 
-// Two boxes that overlap with all long faces in common: the overlap is not sampled twice.
-TEST(Solid, CoincidentFacesCountOnce) {
+// Two overlapping boxes with all long faces in common: the overlap is not sampled twice.
+TEST(Solid, CountsCoincidentFacesOnce) {
     const Solid solid{{block({-0.5, 0, 0}, {1.0, 1, 1}), block({0.5, 0, 0}, {1.0, 1, 1})}};
     const PointCloud points = sample(solid);
     const double area = 2.0 * 4.0 + 4.0 * 6.0;
@@ -242,13 +241,13 @@ TEST(Solid, MovedSolidContainsMovedPoints) {
     }
 }
 
-TEST(Solid, SeedDecidesTheSamples) {
+TEST(Solid, IsReproducibleBySeed) {
     const Solid solid{{ball({}, 1.0), rod({0, 0, 0}, {2, 0, 0}, 0.5)}};
     EXPECT_EQ(sample(solid, 100, 1), sample(solid, 100, 1));
     EXPECT_NE(sample(solid, 100, 1), sample(solid, 100, 2));
 }
 
-TEST(Solid, RefusesWhatIsNoSolid) {
+TEST(Solid, RefusesInvalidSolids) {
     const auto expectRefused = [](const Solid& solid, const std::string& part) {
         for (const auto& error : {checkSolid(solid).error(), sampleBoundary(solid, 10, 1).error()}) {
             EXPECT_EQ(error.code, ErrorCode::kInvalidArgument);
@@ -273,8 +272,8 @@ TEST(Solid, RefusesWhatIsNoSolid) {
     EXPECT_EQ(sampleBoundary({{ball({}, 1.0)}}, 0, 1).error().code, ErrorCode::kInvalidArgument);
 }
 
-// One box around ten thousand hidden ones: refused instead of running for ever.
-TEST(Solid, RefusesAHopelessSearch) {
+// A box around ten thousand hidden ones is refused, instead of running for ever.
+TEST(Solid, RefusesASolidWithHardlyAnyBoundary) {
     Solid solid{{block({}, {1.0, 1.0, 1.0})}};
     for (int i = 0; i < 10000; ++i) solid.parts.push_back(block({}, {0.999, 0.999, 0.999}));
     const auto points = sampleBoundary(solid, 1000, 1);

@@ -1,7 +1,6 @@
 #include "tests/integration/support/client.h"
 
 #include <cstring>
-#include <thread>
 
 #include <gtest/gtest.h>
 
@@ -9,8 +8,6 @@
 
 namespace shapedb::testing {
 namespace {
-
-constexpr std::chrono::milliseconds kPoll{10};
 
 std::string trailing(const grpc::ClientContext& context, const char* name) {
     const auto& metadata = context.GetServerTrailingMetadata();
@@ -28,9 +25,9 @@ std::ostream& operator<<(std::ostream& out, const Outcome& outcome) {
 Client::Client(const std::string& address) {
     grpc::ChannelArguments arguments;
     arguments.SetMaxReceiveMessageSize(-1);
-    // Channels of one process share connections otherwise, also with a server that was killed.
+    // Otherwise the channels of a process share connections, even to a server that was killed.
     arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-    // A refused call must be seen, not repeated behind our back.
+    // A refused call must be seen, not silently repeated.
     arguments.SetInt(GRPC_ARG_ENABLE_RETRIES, 0);
     channel = grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
     shapes = pb::ShapeService::NewStub(channel);
@@ -187,15 +184,6 @@ pb::SearchOptions searchOptions(const std::string& collection, std::uint32_t k) 
     options.set_collection(collection);
     options.set_k(k);
     return options;
-}
-
-bool eventually(const std::function<bool()>& condition, std::chrono::milliseconds atMost) {
-    const auto until = std::chrono::steady_clock::now() + atMost;
-    while (!condition()) {
-        if (std::chrono::steady_clock::now() >= until) return false;
-        std::this_thread::sleep_for(kPoll);
-    }
-    return true;
 }
 
 }  // namespace shapedb::testing

@@ -1,4 +1,4 @@
-// A client that only knows the generated stubs, and says what came back in full.
+// A client on the generated stubs that returns everything a call gave back.
 #pragma once
 
 #include <chrono>
@@ -16,6 +16,7 @@
 #include "shapedb/v1/search_service.grpc.pb.h"
 #include "shapedb/v1/shape_service.grpc.pb.h"
 #include "tests/integration/support/scans.h"
+#include "tests/support/eventually.h"
 
 namespace shapedb::testing {
 
@@ -126,9 +127,5 @@ Stream<Response> drain(CallContext& context, grpc::ClientReaderInterface<Respons
 [[nodiscard]] std::vector<pb::Shape> listAll(Client& client, const std::string& collection);
 [[nodiscard]] pb::StatsResponse statsOf(Client& client);
 [[nodiscard]] pb::SearchOptions searchOptions(const std::string& collection, std::uint32_t k = 5);
-
-/// True as soon as `condition` holds, false when it does not within `atMost`.
-[[nodiscard]] bool eventually(const std::function<bool()>& condition,
-                              std::chrono::milliseconds atMost = std::chrono::seconds(60));
 
 }  // namespace shapedb::testing

@@ -1,4 +1,4 @@
-// Scans for the tests: the project's own synthetic shapes as packed floats.
+// Scans of synthetic shapes as packed floats.
 #pragma once
 
 #include <cstdint>
@@ -20,9 +20,9 @@ using Scan = std::vector<float>;
 /// Member `index` of a family of core/synthetic, in a pose of its own.
 [[nodiscard]] Scan familyScan(const std::string& family, std::size_t index, std::uint64_t seed = 1,
                               std::size_t points = 3'000);
-/// A shallow bowl: valid points, but every Delaunay ball is as good as the half space above.
+/// A shallow bowl: valid points without an interior.
 [[nodiscard]] Scan openSheet();
-/// A closed shape of so many points that its segmentation takes a while.
+/// A closed shape with enough points to make its segmentation slow.
 [[nodiscard]] Scan slowScan(std::uint64_t seed = 1, std::size_t points = 150'000);
 
 }  // namespace shapedb::testing

@@ -1,29 +1,18 @@
-// A shapedbd of its own in a data directory of its own.
+// Runs shapedbd for a test, in a temporary directory.
 #pragma once
 
 #include <chrono>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
-#include <sys/types.h>
+#include "common/child_process.h"
+#include "tests/support/temporary_directory.h"
 
 namespace shapedb::testing {
 
-/// A directory that is gone with this object.
-class TemporaryDirectory {
-  public:
-    TemporaryDirectory();
-    ~TemporaryDirectory();
-    TemporaryDirectory(const TemporaryDirectory&) = delete;
-    TemporaryDirectory& operator=(const TemporaryDirectory&) = delete;
-    [[nodiscard]] const std::string& path() const { return path_; }
-
-  private:
-    std::string path_;
-};
-
-/// What a program that ended by itself left behind.
+/// A program that ended by itself.
 struct Finished {
     int exitCode = -1;  ///< -1: ended by a signal
     std::string out;
@@ -34,29 +23,29 @@ struct Finished {
 [[nodiscard]] Finished runServer(const std::vector<std::string>& arguments,
                                  const std::map<std::string, std::string>& environment = {});
 
-/// A running server on a free port of loopback. Killed when destroyed.
+/// A running server on a free port of loopback. Killed when destroyed; a failed test prints its log.
 class ServerProcess {
   public:
-    /// Starts it on `directory` and waits until it listens; fails the test when it does not.
-    ServerProcess(const std::string& directory, const std::vector<std::string>& arguments = {});
+    /// Starts it with the data directory `directory`/data and waits until it listens; fails the test
+    /// when it does not.
+    explicit ServerProcess(const std::string& directory, const std::vector<std::string>& flags = {});
     ~ServerProcess();
     ServerProcess(const ServerProcess&) = delete;
     ServerProcess& operator=(const ServerProcess&) = delete;
 
     [[nodiscard]] const std::string& address() const { return address_; }
-    /// All lines it wrote to standard output before it said where it listens, that one included.
+    /// What it wrote to standard output until it listened.
     [[nodiscard]] const std::string& banner() const { return banner_; }
     void signal(int number) const;
     [[nodiscard]] bool running() const;
-    /// Waits for the end; -1 when a signal ended it or the time is over.
+    /// Its exit code; -1 when a signal ended it or the time is over.
     int wait(std::chrono::seconds atMost = std::chrono::seconds(60));
     /// SIGKILL, and waits.
     void kill();
     [[nodiscard]] std::string log() const;
 
   private:
-    pid_t process_ = -1;
-    int output_ = -1;
+    std::optional<ShapedbdProcess> server_;
     std::string logFile_;
     std::string address_;
     std::string banner_;

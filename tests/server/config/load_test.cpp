@@ -47,7 +47,7 @@ class Load : public ::testing::Test {
     std::string path_;
 };
 
-TEST_F(Load, NothingGivenIsTheDefaults) {
+TEST_F(Load, DefaultsApplyWhenNothingIsGiven) {
     const auto loaded = loadWith({});
     ASSERT_TRUE(loaded);
     EXPECT_EQ(loaded->config.listen, ServerConfig().listen);
@@ -58,7 +58,7 @@ TEST_F(Load, NothingGivenIsTheDefaults) {
 }
 
 // Each level alone, and each against the one below it.
-TEST_F(Load, FlagsWinOverEnvironmentOverFileOverDefaults) {
+TEST_F(Load, FlagsOverrideEnvironmentFileAndDefaults) {
     const std::string& path = file("[limits]\nmax_k = 11\nmax_batch = 12\nmax_points = 13\n");
     const std::string config = "SHAPEDB_CONFIG=" + path;
     const auto loaded =
@@ -74,7 +74,7 @@ TEST_F(Load, FlagsWinOverEnvironmentOverFileOverDefaults) {
     EXPECT_EQ(loaded->origins.at("search.threads"), "default");
 }
 
-TEST_F(Load, ConfigFlagWinsOverItsVariable) {
+TEST_F(Load, ConfigFlagOverridesItsVariable) {
     const std::string& path = file("[limits]\nmax_k = 11\n");
     const auto loaded = loadWith({"--config", path.c_str()}, {"SHAPEDB_CONFIG=/nowhere/at/all"});
     ASSERT_TRUE(loaded) << loaded.error().message;
@@ -122,7 +122,7 @@ TEST_F(Load, EverySettingIsReadFromEverySource) {
     }
 }
 
-TEST_F(Load, DescriptionIsAFileThatMeansTheSame) {
+TEST_F(Load, DescriptionReadsBackAsTheSameConfiguration) {
     const auto loaded = loadWith(
         {"--log-file", "/a \"b\"\\c.log", "--limits-max-k", "9", "--limits-max-upload-bytes", "65MiB"});
     ASSERT_TRUE(loaded) << loaded.error().message;
@@ -135,7 +135,7 @@ TEST_F(Load, DescriptionIsAFileThatMeansTheSame) {
     }
 }
 
-TEST_F(Load, ExampleFileHoldsEveryKeyWithItsDefault) {
+TEST_F(Load, ExampleFileHasEveryKeyWithItsDefault) {
     const auto loaded = loadWith({"--config", SHAPEDB_EXAMPLE_CONFIG});
     ASSERT_TRUE(loaded) << loaded.error().message;
     const ServerConfig defaults;
@@ -188,7 +188,7 @@ TEST_F(Load, ValuesOutsideTheirRangeAreRefusedAtEverySource) {
                   {"environment SHAPEDB_STORE_READERS", "store.readers", "1 to 64"});
     expectRefused(loadWith({"--log-level", "loud"}), ErrorCode::kInvalidArgument,
                   {"flag --log-level", "'loud'", "trace, debug, info, warn, error"});
-    // Also when a stronger source would have replaced it.
+    // Even if another source overrides it.
     expectRefused(loadWith({"--limits-max-k", "5"}, {"SHAPEDB_LIMITS_MAX_K=none"}),
                   ErrorCode::kInvalidArgument, {"SHAPEDB_LIMITS_MAX_K"});
 }
@@ -207,7 +207,7 @@ TEST_F(Load, UnknownFlagsAreRefused) {
     expectRefused(loadWith({"--listen"}), ErrorCode::kInvalidArgument, {"--listen"});
 }
 
-TEST_F(Load, SettingsMustFitEachOther) {
+TEST_F(Load, RefusesSettingsThatContradictEachOther) {
     expectRefused(loadWith({"--limits-max-upload-bytes", "1MiB"}), ErrorCode::kInvalidArgument,
                   {"limits.max_upload_bytes", "limits.max_points"});
     expectRefused(loadWith({"--ingest-max-queued-bytes", "1MiB"}), ErrorCode::kInvalidArgument,
@@ -215,7 +215,7 @@ TEST_F(Load, SettingsMustFitEachOther) {
     EXPECT_TRUE(loadWith({"--limits-max-upload-bytes", "1MiB", "--limits-max-points", "80000"}));
 }
 
-TEST(ParseCommandLine, HelpVersionAndCheck) {
+TEST(ParseCommandLine, ParsesHelpVersionAndCheck) {
     const auto parse = [](std::vector<const char*> arguments) {
         arguments.insert(arguments.begin(), "shapedbd");
         return parseCommandLine(static_cast<int>(arguments.size()), arguments.data());

@@ -40,8 +40,8 @@ TEST(Settings, DefaultsAreValid) {
     EXPECT_TRUE(validateTogether(defaults));
 }
 
-// The page for people says what the table says.
-TEST(Settings, PageListsEachWithDefaultRangeAndHelp) {
+// docs/configuration.md agrees with the table.
+TEST(Settings, DocumentationListsEverySetting) {
     std::ifstream stream(SHAPEDB_CONFIGURATION_PAGE);
     const std::string page((std::istreambuf_iterator<char>(stream)), std::istreambuf_iterator<char>());
     ASSERT_FALSE(page.empty());
@@ -55,7 +55,7 @@ TEST(Settings, PageListsEachWithDefaultRangeAndHelp) {
     }
 }
 
-TEST(Settings, RefusedValuesLeaveTheConfigurationAlone) {
+TEST(Settings, RefusedValuesChangeNothing) {
     for (const Setting& setting : settings()) {
         ServerConfig config;
         const std::string before = setting.show(config);
@@ -100,7 +100,7 @@ TEST(Settings, BytesHaveUnits) {
     EXPECT_EQ(bytes.show(config), "1048577");
 }
 
-TEST(Endpoint, IsParsedAndPrinted) {
+TEST(Endpoint, ParsesAndPrints) {
     const auto v4 = parseEndpoint("127.0.0.1:0");
     ASSERT_TRUE(v4);
     EXPECT_EQ(v4->host, "127.0.0.1");

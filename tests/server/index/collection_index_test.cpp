@@ -22,7 +22,7 @@ class Index : public ::testing::Test {
     }
 
     /// A stored shape with a signature of this volume.
-    store::Shape put(const std::string& key, float volume, store::Metadata metadata = {}) {
+    store::Shape put(const std::string& key, float volume, Metadata metadata = {}) {
         const auto points = taggedPoints(volume);
         const auto shape = store.putShape(putRequest(parts.id, key, points, std::move(metadata)))->shape;
         while (const auto job = *store.claimJob()) {
@@ -36,7 +36,7 @@ class Index : public ::testing::Test {
 
     SnapshotPtr snapshot() { return *index.byName("parts"); }
 
-    /// What the store says, shape by shape.
+    /// The content of the store, shape by shape.
     void expectSameAsStore() {
         const auto rows = *store.loadIndex(parts.id, 0, 1'000'000);
         const SnapshotPtr now = snapshot();
@@ -45,10 +45,8 @@ class Index : public ::testing::Test {
             const auto place = now->signatures.find(row.shapeId);
             ASSERT_TRUE(place) << row.shapeId;
             EXPECT_EQ(place.block->metadata(place.row), row.metadata);
-            Signature cached;
-            place.block->scored(place.row, cached);
-            EXPECT_TRUE(sameShape(cached, decodeSignature(row.signature.bytes).value()));
-            EXPECT_EQ(cached.scale, decodeSignature(row.signature.bytes)->scale);
+            const PackedShape stored(decodeSignature(row.signature.bytes).value());
+            EXPECT_TRUE(sameShape(place.block->rows()[place.row], stored.row(), true));
         }
     }
 
@@ -58,7 +56,7 @@ class Index : public ::testing::Test {
     store::Collection parts;
 };
 
-TEST_F(Index, LoadsAllThatIsStored) {
+TEST_F(Index, LoadsEverythingStored) {
     for (int i = 0; i < 5'000; ++i) put(std::to_string(i), static_cast<float>(i + 1));
     ASSERT_TRUE(index.loadAll());
     EXPECT_EQ(snapshot()->signatures.size(), 5'000u) << "more than one batch";
@@ -79,7 +77,7 @@ TEST_F(Index, LoadsManyBatches) {
     expectSameAsStore();
 }
 
-TEST_F(Index, NamesAndIdsFindTheSame) {
+TEST_F(Index, FindsCollectionsByNameAndById) {
     EXPECT_EQ((*index.byName("parts"))->collection.id, parts.id);
     EXPECT_EQ((*index.byId(parts.id))->collection.name, "parts");
     EXPECT_EQ(snapshot()->parameters.profile, Profile::kPaper);
@@ -96,8 +94,8 @@ TEST_F(Index, NamesAndIdsFindTheSame) {
     EXPECT_FALSE(index.byId(cups.id));
 }
 
-// Deleted and created again before the first deletion got here.
-TEST_F(Index, RemovingKeepsASuccessorOfTheSameName) {
+// Deleted and created again before the first deletion is applied.
+TEST_F(Index, RemovingKeepsANewCollectionOfTheSameName) {
     ASSERT_TRUE(store.deleteCollection(parts.id));
     const auto successor = *store.createCollection("parts", "", paperParameters());
     ASSERT_TRUE(index.add(successor));
@@ -131,9 +129,8 @@ TEST_F(Index, RefreshFollowsTheStore) {
     EXPECT_TRUE(index.refresh(999, a.id)) << "a collection that is gone is no error";
 }
 
-// The order in which threads get here must not matter: a late refresh of a shape that was
-// deleted meanwhile cannot bring it back.
-TEST_F(Index, ConcurrentChangesEndAsTheStoreSays) {
+// The order of threads must not matter: a late refresh cannot bring back a deleted shape.
+TEST_F(Index, EndsAsTheStoreAfterConcurrentChanges) {
     std::vector<std::thread> threads;
     std::atomic<bool> stop{false};
     std::thread reader([&] {
@@ -173,7 +170,7 @@ TEST_F(Index, ConcurrentChangesEndAsTheStoreSays) {
     expectSameAsStore();
 }
 
-TEST_F(Index, FailedReadIsMadeUpForByTheNextUpdate) {
+TEST_F(Index, RecoversFromAFailedReadWithTheNextUpdate) {
     const auto a = put("a", 1.0f);
     const auto b = put("b", 2.0f);
     store.fault = [](const std::string& function) -> std::optional<Error> {
@@ -207,7 +204,7 @@ TEST_F(Index, DamagedParametersNameTheCollection) {
     ASSERT_FALSE(loaded);
     EXPECT_EQ(loaded.error().code, ErrorCode::kDataLoss);
     EXPECT_NE(loaded.error().message.find("broken"), std::string::npos);
-    EXPECT_TRUE(index.byName("parts")) << "the old content serves on";
+    EXPECT_TRUE(index.byName("parts")) << "the old content still serves";
 }
 
 TEST_F(Index, LoadingCanBeCancelled) {
@@ -218,7 +215,7 @@ TEST_F(Index, LoadingCanBeCancelled) {
     EXPECT_EQ(index.loadAll(context).error().code, ErrorCode::kCancelled);
 }
 
-TEST_F(Index, GenerationIsKeptWhileCommitting) {
+TEST_F(Index, KeepsTheGenerationDuringACommit) {
     bool called = false;
     EXPECT_TRUE(index.whileGeneration(parts.id, 1, [&] { called = true; }));
     EXPECT_TRUE(called);
@@ -245,15 +242,13 @@ TEST_F(Index, SwitchingReloadsParametersAndSignaturesTogether) {
     const SnapshotPtr switched = snapshot();
     const auto place = switched->signatures.find(a.id);
     ASSERT_TRUE(place);
-    Signature cached;
-    place.block->scored(place.row, cached);
-    EXPECT_TRUE(sameShape(cached, signatureOf(9.0)));
+    EXPECT_TRUE(sameShape(place.block->rows()[place.row], PackedShape(signatureOf(9.0)).row()));
     EXPECT_FALSE(index.whileGeneration(parts.id, 1, [] { FAIL(); }));
     EXPECT_EQ(index.switchGeneration(999, [] { return Result<bool>(true); }).error().code,
               ErrorCode::kNotFound);
 }
 
-TEST_F(Index, FailedReloadAfterASwitchIsRepeatedBeforeAnythingIsCommitted) {
+TEST_F(Index, RepeatsAFailedReloadBeforeTheNextCommit) {
     const auto a = put("a", 1.0f);
     const auto rebuild = store.startRebuild(parts.id, paperParameters(3));
     ASSERT_TRUE(store.putRebuilt(rebuild->id, {a.id, 1, 2, encodeSignature(signatureOf(9.0))}));

@@ -17,7 +17,7 @@ namespace {
 
 int niceOfThisThread() { return ::getpriority(PRIO_PROCESS, static_cast<id_t>(::syscall(SYS_gettid))); }
 
-TEST(BackgroundThread, LowersOnlyTheThreadThatAsks) {
+TEST(BackgroundThread, LowersOnlyTheCallingThread) {
     const int before = niceOfThisThread();
     int inside = before;
     std::thread thread([&] {
@@ -29,7 +29,7 @@ TEST(BackgroundThread, LowersOnlyTheThreadThatAsks) {
     EXPECT_EQ(niceOfThisThread(), before);
 }
 
-TEST(BackgroundThread, KeepsToItselfWhatWouldSpread) {
+TEST(BackgroundThread, RunsParallelLoopsOnOneThread) {
     std::mutex mutex;
     std::set<std::thread::id> threads;
     onThisThreadAlone([&] {

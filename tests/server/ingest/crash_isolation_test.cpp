@@ -1,17 +1,18 @@
 #include "server/ingest/crash_isolation.h"
 
 #include <atomic>
-#include <chrono>
 #include <memory>
 #include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "tests/server/support/fixtures.h"
+
 namespace shapedb::ingest {
 namespace {
 
-using namespace std::chrono_literals;
+using testing::eventually;
 
 TEST(CrashIsolation, SuspectsAreAlone) {
     CrashIsolation gate;
@@ -35,35 +36,41 @@ TEST(CrashIsolation, SuspectsAreAlone) {
     EXPECT_FALSE(together);
 }
 
-TEST(CrashIsolation, OrdinaryOnesAreTogether) {
-    CrashIsolation gate;
-    const CrashIsolation::Pass first(gate, false);
-    const CrashIsolation::Pass second(gate, false);
-}
-
-TEST(CrashIsolation, WaitingSuspectGetsItsTurn) {
+TEST(CrashIsolation, OrdinaryScansRunTogether) {
     CrashIsolation gate;
     auto first = std::make_unique<CrashIsolation::Pass>(gate, false);
+    std::atomic<bool> secondIn{false};
+    std::thread other([&] {
+        const CrashIsolation::Pass second(gate, false);
+        secondIn = true;
+    });
+    EXPECT_TRUE(eventually([&] { return secondIn.load(); })) << "while the first is still inside";
+    first.reset();
+    other.join();
+}
+
+TEST(CrashIsolation, WaitingSuspectKeepsNewOrdinaryScansOut) {
+    CrashIsolation gate;
+    auto first = std::make_unique<CrashIsolation::Pass>(gate, false);
+    EXPECT_FALSE(gate.wouldWait(false));
+    EXPECT_TRUE(gate.wouldWait(true));
     std::atomic<bool> suspectIn{false};
-    std::atomic<bool> lateIn{false};
+    std::atomic<bool> letSuspectGo{false};
     std::thread suspect([&] {
         const CrashIsolation::Pass pass(gate, true);
         suspectIn = true;
-        std::this_thread::sleep_for(20ms);
-        EXPECT_FALSE(lateIn);
+        eventually([&] { return letSuspectGo.load(); });
     });
-    std::this_thread::sleep_for(20ms);
-    std::thread late([&] {
-        const CrashIsolation::Pass pass(gate, false);
-        EXPECT_TRUE(suspectIn) << "it came after the suspect";
-        lateIn = true;
-    });
-    std::this_thread::sleep_for(20ms);
-    EXPECT_FALSE(lateIn);
+    EXPECT_TRUE(eventually([&] { return gate.wouldWait(false); })) << "the suspect is waiting";
+    EXPECT_FALSE(suspectIn);
     first.reset();
+    EXPECT_TRUE(eventually([&] { return suspectIn.load(); }));
+    EXPECT_TRUE(gate.wouldWait(false));
+    EXPECT_TRUE(gate.wouldWait(true));
+    letSuspectGo = true;
     suspect.join();
-    late.join();
-    EXPECT_TRUE(lateIn);
+    EXPECT_FALSE(gate.wouldWait(false));
+    EXPECT_FALSE(gate.wouldWait(true));
 }
 
 }  // namespace

@@ -24,7 +24,7 @@ class Journal : public ::testing::Test {
         return result;
     }
 
-    /// What the next process finds if this one died now.
+    /// The journal as the next process reads it if this one dies now.
     std::unique_ptr<CrashJournal> afterDeath() { return std::make_unique<CrashJournal>(path, log); }
 
     std::string content() const {
@@ -36,7 +36,7 @@ class Journal : public ::testing::Test {
     std::shared_ptr<testing::RecordingLogger> log = std::make_shared<testing::RecordingLogger>();
 };
 
-TEST_F(Journal, WhatIsInHandAtADeathIsCounted) {
+TEST_F(Journal, CountsScansInHandWhenTheProcessDied) {
     CrashJournal first(path, log);
     EXPECT_EQ(first.deaths(shape(1)), 0);
     const CrashJournal::Entry one(first, shape(1));
@@ -49,7 +49,7 @@ TEST_F(Journal, WhatIsInHandAtADeathIsCounted) {
     EXPECT_EQ(afterDeath()->deaths(shape(1)), 2);
 }
 
-TEST_F(Journal, PuttingDownKeepsTheSuspicionAcquittalEndsIt) {
+TEST_F(Journal, OnlyAcquittalEndsSuspicion) {
     std::ofstream(path) << "1 1 0 1\n2 1 1 0\n";
     CrashJournal journal(path, log);
     EXPECT_EQ(journal.deaths(shape(1)), 1);
@@ -66,7 +66,7 @@ TEST_F(Journal, PuttingDownKeepsTheSuspicionAcquittalEndsIt) {
     EXPECT_EQ(content(), "");
 }
 
-TEST_F(Journal, DamageIsNoSuspicion) {
+TEST_F(Journal, DamagedLinesMakeNoSuspects) {
     std::ofstream(path) << "1 1 1 0\nnonsense 9 9\n2 1 9 0\n";
     EXPECT_EQ(afterDeath()->deaths(shape(1)), 1);
     EXPECT_EQ(afterDeath()->deaths(shape(2)), 0);

@@ -36,11 +36,13 @@ TEST(ProgressBoard, ChangeWakesTheWatcher) {
     ProgressBoard board;
     const auto watch = board.watch(1);
     const auto before = watch->status().sequence;
+    const auto began = ProgressBoard::Clock::now();
     std::thread worker([&] {
-        std::this_thread::sleep_for(20ms);
+        std::this_thread::sleep_for(20ms);  // so that the watcher is most likely waiting
         board.report(1, "flow", 0, 0);
     });
     watch->waitForChange(before, in(10s));
+    EXPECT_LT(ProgressBoard::Clock::now() - began, 5s) << "woken, not timed out";
     worker.join();
     EXPECT_EQ(watch->status().stage, "flow");
     EXPECT_GT(watch->status().sequence, before);

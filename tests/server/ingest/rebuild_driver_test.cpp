@@ -137,7 +137,7 @@ TEST_F(Driver, EmptyCollectionIsDoneAtOnce) {
     ASSERT_TRUE(eventually([&] { return generation() == 2; }));
 }
 
-TEST_F(Driver, RecordsFailuresAndGoesOn) {
+TEST_F(Driver, RecordsFailuresAndContinues) {
     fill(5);
     put("bad", -1.0f);
     pool->wake();
@@ -162,7 +162,7 @@ TEST_F(Driver, ExceptionsBecomeFailures) {
     EXPECT_EQ(store.getShape(parts.id, "2")->failure->code, ErrorCode::kInternal);
 }
 
-TEST_F(Driver, SameParametersFollowOthersAreRefused) {
+TEST_F(Driver, FollowsARebuildWithTheSameParametersOnly) {
     fill(5);
     closed = true;
     start(counting());
@@ -175,7 +175,7 @@ TEST_F(Driver, SameParametersFollowOthersAreRefused) {
     EXPECT_EQ(finished(first).state, store::RebuildState::kDone);
 }
 
-TEST_F(Driver, CancelForgetsThePartialResult) {
+TEST_F(Driver, CancelDropsThePartialResult) {
     fill(10);
     closed = true;
     freeScans = 4;
@@ -207,7 +207,7 @@ TEST_F(Driver, QueuedRebuildCanBeCancelledToo) {
     EXPECT_EQ(finished(first).state, store::RebuildState::kDone);
 }
 
-TEST_F(Driver, StopKeepsWhatIsDoneForTheNextStart) {
+TEST_F(Driver, StopKeepsProgressForTheNextStart) {
     fill(10);
     closed = true;
     freeScans = 6;
@@ -235,13 +235,16 @@ TEST_F(Driver, PauseAndResume) {
     driver->pause();
     const int before = described;
     closed = false;
-    std::this_thread::sleep_for(20ms);
+    // While the driver is paused the pool gets ten scans done.
+    for (int i = 0; i < 10; ++i) put("meanwhile " + std::to_string(i), 1.0f);
+    pool->wake();
+    ASSERT_TRUE(eventually([&] { return store.queueDepth()->jobs == 0; }));
     EXPECT_EQ(described, before);
     ASSERT_TRUE(driver->resume());
     EXPECT_EQ(finished(rebuild).state, store::RebuildState::kDone);
 }
 
-TEST_F(Driver, ShapesThatComeAndGoMeanwhile) {
+TEST_F(Driver, HandlesShapesAddedAndDeletedMeanwhile) {
     fill(10);
     closed = true;
     freeScans = 5;
@@ -262,7 +265,7 @@ TEST_F(Driver, ShapesThatComeAndGoMeanwhile) {
     EXPECT_EQ(cachedVolume(snapshot->signatures, store.getShape(parts.id, "0")->id), 50.0);
 }
 
-TEST_F(Driver, StoreFailuresAreOutlived) {
+TEST_F(Driver, RetriesAfterStoreErrors) {
     fill(12);
     Random random(1);  // called under the store's lock
     store.fault = [&](const std::string& function) -> std::optional<Error> {
@@ -296,8 +299,8 @@ TEST_F(Driver, DeletedCollectionEndsItsRebuild) {
     EXPECT_EQ(finished(*next).state, store::RebuildState::kDone);
 }
 
-// What a process that died twice over one scan leaves: the scan is set aside, the rebuild ends.
-TEST_F(Driver, ScanThatKillsTheRebuildTwiceIsSetAside) {
+// After a process died twice over one scan, that scan is quarantined and the rebuild ends.
+TEST_F(Driver, QuarantinesAScanThatCrashesTheServerTwice) {
     fill(5);
     journal = ::testing::TempDir() + "shapedb-rebuild-journal-" + std::to_string(::getpid());
     const auto guilty = *store.getShape(parts.id, "2");
@@ -318,14 +321,14 @@ TEST_F(Driver, ScanThatKillsTheRebuildTwiceIsSetAside) {
     std::remove(journal.c_str());
 }
 
-TEST_F(Driver, UnreadableParametersAreGivenUp) {
+TEST_F(Driver, AbandonsARebuildWithUnreadableParameters) {
     ASSERT_TRUE(store.startRebuild(parts.id, "not parameters"));
     start();
     ASSERT_TRUE(eventually([&] { return store.runningRebuilds()->empty(); }));
     EXPECT_NE(log->all().find("rebuild given up"), std::string::npos) << log->all();
 }
 
-TEST_F(Driver, WaitingIsCancelledWithoutStoppingTheRebuild) {
+TEST_F(Driver, CancelledWaitDoesNotStopTheRebuild) {
     fill(3);
     closed = true;
     start(counting());

@@ -177,8 +177,15 @@ TEST_F(Pool, PauseStopsAndResumeGoesOn) {
     pool->pause();
     EXPECT_EQ(pool->running(), 0u);
     gate.open();
-    std::this_thread::sleep_for(20ms);
-    EXPECT_EQ(store.queueDepth()->jobs, 5u) << "nothing moves while paused";
+    EXPECT_EQ(store.queueDepth()->jobs, 5u) << "put back";
+    // A second pool takes all the jobs: the paused one had the work and the time, and took none.
+    WorkerPool other(store, index, board, suspects, quickDescribe, log, {});
+    ASSERT_TRUE(other.start());
+    pool->wake();
+    ASSERT_TRUE(eventually([&] { return other.ingested() == 5; }));
+    other.stop();
+    EXPECT_EQ(pool->ingested(), 0u);
+    for (int i = 5; i < 10; ++i) put(std::to_string(i), static_cast<float>(i + 1));
     ASSERT_TRUE(pool->resume());
     ASSERT_TRUE(eventually([&] { return idle(); }));
     EXPECT_EQ(pool->ingested(), 5u);
@@ -204,26 +211,26 @@ TEST_F(Pool, SuspectsRunOneAtATimeAndTheRestTogether) {
     for (int i = 0; i < 3; ++i) ASSERT_TRUE(*store.claimJob());
     for (int i = 0; i < 6; ++i) put("innocent " + std::to_string(i), 2.0f);
     std::atomic<int> inside{0};
-    std::atomic<int> mostWithSuspect{0};
-    std::atomic<int> mostInnocent{0};
-    const auto raise = [](std::atomic<int>& most, int now) {
-        int seen = most.load();
-        while (now > seen && !most.compare_exchange_weak(seen, now)) {
-        }
-    };
+    std::atomic<bool> suspectHadCompany{false};
+    std::atomic<bool> innocentsMet{false};
     start(
         [&](const PointCloud& points, const ShapeParameters& parameters, const RunContext& context) {
             const int now = ++inside;
-            raise(points[0].x == 1.0 ? mostWithSuspect : mostInnocent, now);
-            std::this_thread::sleep_for(20ms);
-            if (points[0].x == 1.0) raise(mostWithSuspect, inside.load());
+            if (points[0].x == 1.0) {
+                // Nobody is inside, and nobody else could come in.
+                if (now > 1 || !suspects.wouldWait(false) || !suspects.wouldWait(true))
+                    suspectHadCompany = true;
+            } else {
+                if (now > 1) innocentsMet = true;
+                eventually([&] { return innocentsMet.load(); });
+            }
             --inside;
             return quickDescribe(points, parameters, context);
         },
         3);
     ASSERT_TRUE(eventually([&] { return idle(); }));
-    EXPECT_EQ(mostWithSuspect, 1);
-    EXPECT_GE(mostInnocent, 2);
+    EXPECT_FALSE(suspectHadCompany);
+    EXPECT_TRUE(innocentsMet);
     EXPECT_EQ(pool->ingested(), 9u);
 }
 
@@ -278,22 +285,49 @@ TEST_F(Pool, ResultOfOldParametersIsNeverStored) {
     EXPECT_EQ(decodeSignature(row->bytes)->scale, 3.0) << "made with the new parameters";
 }
 
-TEST_F(Pool, WatchersHearOfTheEndAfterTheIndexHasIt) {
-    start();
+TEST_F(Pool, WatchersAreToldAfterTheIndexHasTheSignature) {
+    Gate gate;
+    start(through(gate), 1);
     const auto k = put("k", 1.0f);
     const auto watch = board.watch(k.id);
-    while (!settled("k")) {
-        watch->waitForChange(watch->status().sequence, ProgressBoard::Clock::now() + 10ms);
+    ASSERT_TRUE(eventually([&] { return gate.entered() == 1; }));
+    // Refreshing the index reads the signature; no watcher may have been told before.
+    std::atomic<bool> refreshed{false};
+    std::atomic<bool> toldTooEarly{false};
+    store.fault = [&](const std::string& function) -> std::optional<Error> {
+        if (function == "getSignature") {
+            refreshed = true;
+            if (watch->status().stage == "queued") toldTooEarly = true;
+        }
+        return std::nullopt;
+    };
+    gate.open();
+    for (auto status = watch->status(); status.stage != "queued"; status = watch->status()) {
+        watch->waitForChange(status.sequence, ProgressBoard::Clock::now() + 10s);
     }
-    ASSERT_TRUE(eventually([&] { return pool->running() == 0; }));
-    EXPECT_TRUE((*index.byName("parts"))->signatures.find(k.id));
+    EXPECT_TRUE((*index.byName("parts"))->signatures.find(k.id)) << "the moment the watcher is told";
+    EXPECT_TRUE(refreshed);
+    EXPECT_FALSE(toldTooEarly);
+    pool->stop();
 }
 
-TEST_F(Pool, RetryHintGrowsWithTheQueueWithinBounds) {
-    WorkerPool& workers = start();
-    EXPECT_GE(workers.retryAfter(0), 100ms);
-    EXPECT_LE(workers.retryAfter(10), workers.retryAfter(1'000));
-    EXPECT_LE(workers.retryAfter(1'000'000'000), 60s);
+TEST_F(Pool, RetryHintIsProportionalToTheQueueWithinBounds) {
+    const auto& one = start(quickDescribe, 1);
+    const auto hint = one.retryAfter(100);
+    EXPECT_EQ(hint, 10s) << "a tenth of the queue, at a second per job until there are measurements";
+    EXPECT_EQ(one.retryAfter(200), 2 * hint);
+    EXPECT_EQ(one.retryAfter(10), hint / 10);
+    EXPECT_EQ(one.retryAfter(0), one.retryAfter(10)) << "at least one place";
+    EXPECT_EQ(one.retryAfter(1'000'000'000), 60s);
+}
+
+TEST_F(Pool, RetryHintFallsWithMoreThreadsAndFasterJobs) {
+    const auto& four = start(quickDescribe, 4);
+    EXPECT_EQ(four.retryAfter(100), 2500ms);
+    for (int i = 0; i < 20; ++i) put(std::to_string(i), 1.0f);
+    ASSERT_TRUE(eventually([&] { return idle(); }));
+    EXPECT_LT(four.retryAfter(100), 1000ms) << "twenty jobs took far less than a second each";
+    EXPECT_GE(four.retryAfter(0), 100ms);
 }
 
 }  // namespace

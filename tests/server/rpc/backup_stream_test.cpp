@@ -46,7 +46,7 @@ class BackupStream : public ::testing::Test {
     std::string directory;
 };
 
-TEST_F(BackupStream, RoundTrip) {
+TEST_F(BackupStream, ReceivesWhatWasSent) {
     for (const std::size_t size :
          {std::size_t{1}, std::size_t{1} << 20, (std::size_t{1} << 20) + 1, std::size_t{3'500'000}}) {
         const std::string content = noise(size);
@@ -78,7 +78,7 @@ TEST_F(BackupStream, ChecksumMayComeWithTheLastData) {
     EXPECT_TRUE(receiver->finish());
 }
 
-TEST_F(BackupStream, ReceiverThatHasGoneEndsTheSending) {
+TEST_F(BackupStream, StopsSendingWhenTheReceiverHasGone) {
     std::ofstream(directory + "/in", std::ios::binary) << noise(5'000'000);
     int sent = 0;
     const auto result = sendFile(directory + "/in", {}, [&](const v1::BackupChunk&) -> Result<void> {
@@ -91,13 +91,13 @@ TEST_F(BackupStream, ReceiverThatHasGoneEndsTheSending) {
               ErrorCode::kFileNotReadable);
 }
 
-TEST_F(BackupStream, ExistingFileIsNotOverwritten) {
+TEST_F(BackupStream, DoesNotOverwriteAFile) {
     std::ofstream(directory + "/there") << "precious";
     EXPECT_FALSE(FileReceiver::create(directory + "/there"));
     EXPECT_EQ(contentOf(directory + "/there"), "precious");
 }
 
-TEST_F(BackupStream, TemporaryFilesGoWithTheirOwner) {
+TEST_F(BackupStream, TemporaryFileIsRemovedWithItsOwner) {
     std::string path;
     {
         auto file = TemporaryFile::create(directory);
@@ -114,7 +114,7 @@ TEST_F(BackupStream, TemporaryFilesGoWithTheirOwner) {
     EXPECT_FALSE(TemporaryFile::create(directory + "/none"));
 }
 
-TEST_F(BackupStream, PreparingRemovesLeftovers) {
+TEST_F(BackupStream, PreparingTheDirectoryRemovesLeftovers) {
     std::filesystem::create_directories(directory + "/a/b");
     std::ofstream(directory + "/a/b/c") << "x";
     ASSERT_TRUE(prepareTemporaryDirectory(directory));

@@ -7,7 +7,7 @@
 namespace shapedb::rpc {
 namespace {
 
-TEST(ParametersFrom, SetFieldsWinOverTheBase) {
+TEST(ParametersFrom, SetFieldsOverrideTheBase) {
     ShapeParameters current = parametersOf(Profile::kPaper);
     current.segmentation.mergeRatio = 3.0;
     pb::SegmentationParameters segmentation;
@@ -26,7 +26,7 @@ TEST(ParametersFrom, SetFieldsWinOverTheBase) {
     EXPECT_EQ(fresh->segmentation.preparation.decimateTo, 0u) << "set to 0 is not unset";
 }
 
-TEST(ParametersFrom, EveryFieldArrives) {
+TEST(ParametersFrom, ConvertsEveryField) {
     pb::SegmentationParameters segmentation;
     segmentation.set_big_ball_ratio(0.6);
     segmentation.set_deep_angle_degrees(21.0);
@@ -51,7 +51,7 @@ TEST(ParametersFrom, EveryFieldArrives) {
     signature.set_attributes(true);
     const auto parameters = parametersFrom(pb::PROFILE_PAPER, segmentation, signature, {});
     ASSERT_TRUE(parameters);
-    // And back: the collection message says the same.
+    // And back: the collection message has the same values.
     pb::Collection collection;
     toProto(store::Collection(), *parameters, &collection);
     EXPECT_EQ(collection.segmentation().SerializeAsString(), segmentation.SerializeAsString());
@@ -73,7 +73,7 @@ TEST(ParametersFrom, RefusesUnknownProfilesAndBadValues) {
     EXPECT_NE(unknown.error().message.find("interior_method"), std::string::npos);
 }
 
-TEST(ParametersFrom, AMethodLeftUnspecifiedKeepsTheBase) {
+TEST(ParametersFrom, UnspecifiedMethodKeepsTheBase) {
     ShapeParameters current = parametersOf(Profile::kPaper);
     current.segmentation.interiorMethod = InteriorMethod::kAdaptive;
     pb::SegmentationParameters segmentation;
@@ -86,7 +86,7 @@ TEST(ParametersFrom, AMethodLeftUnspecifiedKeepsTheBase) {
               InteriorMethod::kWalk);
 }
 
-TEST(Enums, RoundTripAndRefuseTheUnknown) {
+TEST(Enums, ConvertBothWaysAndRefuseUnknownNumbers) {
     for (const auto state :
          {store::ShapeState::kPending, store::ShapeState::kReady, store::ShapeState::kFailed}) {
         const auto back = fromProto(toProto(state));
@@ -116,7 +116,7 @@ TEST(Timestamps, AreSplitTowardsThePast) {
     EXPECT_EQ(time.nanos(), 0);
 }
 
-TEST(Shapes, AllFieldsArrive) {
+TEST(Shapes, ConvertAllFields) {
     store::Shape shape;
     shape.id = 5;
     shape.key = "k";
@@ -146,7 +146,7 @@ TEST(Shapes, AllFieldsArrive) {
     EXPECT_EQ(message.failure().message(), "why");
 }
 
-TEST(Shapes, QualityIsThatOfTheServingSignature) {
+TEST(Shapes, ReportQualityOfTheServingSignature) {
     pb::Shape plain;
     toProto(store::Shape(), "parts", std::nullopt, &plain);
     EXPECT_FALSE(plain.has_quality()) << "a signature without attributes does not judge";
@@ -155,7 +155,7 @@ TEST(Shapes, QualityIsThatOfTheServingSignature) {
     EXPECT_NEAR(judged.quality(), 0.2, 1e-12);
 }
 
-TEST(Reports, SayWhatWasLeftOutAndHowSureTheInteriorIs) {
+TEST(Reports, ReportOutliersAndInteriorQuality) {
     Segmentation segmentation;
     segmentation.siteOfPoint.resize(10);
     segmentation.sites.resize(6);
@@ -228,7 +228,7 @@ TEST(Signatures, AttributesAreSharesByName) {
     EXPECT_EQ(bin, kStatisticBins);
 }
 
-TEST(Explanations, TermsArrive) {
+TEST(Explanations, KeepTheirTerms) {
     Explanation explanation;
     explanation.terms = {{"chords", 0.5, 0.25}, {"parts", 1.5, 0.75}};
     pb::Explanation message;

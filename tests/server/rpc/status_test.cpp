@@ -76,7 +76,7 @@ const char* nameOf(StatusCode code) {
     return kNames.at(code);
 }
 
-// The page for people says the same.
+// docs/api.md agrees.
 TEST(StatusCodeOf, PageListsEveryErrorWithItsCode) {
     std::ifstream page(SHAPEDB_API_PAGE);
     std::map<std::string, std::string> codes;
@@ -109,7 +109,7 @@ TEST(MakeStatus, CutsLongMessages) {
               2'048u);
 }
 
-TEST(CutText, NeverCutsACharacterInTwo) {
+TEST(CutText, KeepsCharactersWhole) {
     const std::string text = "aé€𝄞";  // 1, 2, 3 and 4 bytes
     const std::map<std::size_t, std::string> expected = {{0, ""},    {1, "a"},   {2, "a"},   {3, "aé"},
                                                          {4, "aé"},  {5, "aé"},  {6, "aé€"}, {7, "aé€"},

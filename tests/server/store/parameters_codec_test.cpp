@@ -4,7 +4,7 @@
 
 #include "core/base/random.h"
 
-namespace shapedb::index {
+namespace shapedb::store {
 namespace {
 
 void expectSame(const ShapeParameters& a, const ShapeParameters& b) {
@@ -25,7 +25,7 @@ void expectSame(const ShapeParameters& a, const ShapeParameters& b) {
     EXPECT_EQ(a.signature.attributes, b.signature.attributes);
 }
 
-// The text is in databases: these names stay.
+// The text is persisted: these names never change.
 TEST(ParametersCodec, TextIsFrozen) {
     EXPECT_EQ(encodeParameters(parametersOf(Profile::kPaper)),
               R"({"profile":"paper","segmentation":{"big_ball_ratio":0.5,"deep_angle_degrees":20.0,)"
@@ -35,9 +35,9 @@ TEST(ParametersCodec, TextIsFrozen) {
               R"("attributes":false}})");
 }
 
-// What servers wrote before the method learnt of noise: their collections go on as they were, though
+// Text written before outliers and smoothing existed: such collections keep working as they did, though
 // the profile of the same name now turns more on.
-TEST(ParametersCodec, TextOfOlderServersMeansWhatItMeant) {
+TEST(ParametersCodec, ReadsTextOfOlderServers) {
     for (const char* name : {"paper", "default"}) {
         const auto decoded =
             decodeParameters(std::string(R"({"profile":")") + name +
@@ -101,7 +101,7 @@ TEST(ParametersCodec, MissingFieldsAreOff) {
     EXPECT_EQ(partly->segmentation.bigBallRatio, 0.5);
 }
 
-TEST(ParametersCodec, EverythingElseIsRefusedByName) {
+TEST(ParametersCodec, RefusesEverythingElseByName) {
     const struct {
         const char* text;
         const char* word;
@@ -139,4 +139,4 @@ TEST(ParametersCodec, EverythingElseIsRefusedByName) {
 }
 
 }  // namespace
-}  // namespace shapedb::index
+}  // namespace shapedb::store

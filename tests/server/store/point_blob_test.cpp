@@ -22,7 +22,7 @@ bool sameBits(const std::vector<float>& a, const std::vector<float>& b) {
     return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), 4 * a.size()) == 0);
 }
 
-/// A smooth surface with noise in the order of a scanner: what the format is made for.
+/// A smooth surface with noise, in scanning order: what the format is made for.
 std::vector<float> scan(std::size_t points) {
     Random random(3);
     std::vector<float> xyz;
@@ -37,7 +37,7 @@ std::vector<float> scan(std::size_t points) {
 }
 
 // The bytes of format 0 are frozen.
-TEST(PointBlob, LiteralRaw) {
+TEST(PointBlob, RawFormatIsPinned) {
     const std::vector<float> points = {1.0f, -2.0f, 0.5f};
     const std::string blob =
         bytes({0x00, 0x00, 0x00, 0x80, 0x3f, 0x00, 0x00, 0x00, 0xc0, 0x00, 0x00, 0x00, 0x3f});
@@ -48,7 +48,7 @@ TEST(PointBlob, LiteralRaw) {
 
 // The bytes of format 1 are frozen: a zstd frame (RFC 8878) with one raw block, written by
 // hand, of the twelve planes of (1, -2, 0.5) and (2, 4, -1).
-TEST(PointBlob, LiteralPlanes) {
+TEST(PointBlob, PlanesFormatIsPinned) {
     const std::string head = bytes({0x01,                    // format
                                     0x28, 0xb5, 0x2f, 0xfd,  // zstd magic
                                     0x20, 0x18,              // single segment, 24 bytes
@@ -74,7 +74,7 @@ TEST(PointBlob, PlanesAreATransposition) {
     EXPECT_EQ(back, in);
 }
 
-TEST(PointBlob, EveryBitComesBack) {
+TEST(PointBlob, KeepsEveryBit) {
     Random random(11);
     for (int round = 0; round < 200; ++round) {
         std::vector<float> points(3 * random.below(300));
@@ -90,7 +90,7 @@ TEST(PointBlob, EveryBitComesBack) {
     }
 }
 
-TEST(PointBlob, PlanesHelp) {
+TEST(PointBlob, PlanesCompressBetter) {
     const std::vector<float> points = scan(20000);
     const std::size_t raw = 4 * points.size();
     std::string plain(ZSTD_compressBound(raw), ' ');
@@ -120,25 +120,25 @@ std::string written(const PointEncoding& encoding) {
     return blob;
 }
 
-// More than a piece, and no whole number of them.
-constexpr std::size_t kLargePoints = PointEncoding::kHeldBytes / 12 + 1'001;
+// More than one piece, and not a whole number of pieces.
+constexpr std::size_t kLargePoints = PointEncoding::kWholeBytes / 12 + 1'001;
 
-TEST(PointEncoding, SmallIsHeldAndTheSame) {
+TEST(PointEncoding, KeepsASmallScanAsOneBlob) {
     const std::vector<float> points = scan(500);
-    const auto encoding = PointEncoding::plan(points, 1);
+    const auto encoding = PointEncoding::encode(points, 1);
     ASSERT_TRUE(encoding);
-    ASSERT_NE(encoding->held(), nullptr);
-    EXPECT_EQ(*encoding->held(), encodePoints(points, 1).value());
-    EXPECT_EQ(written(*encoding), *encoding->held());
-    EXPECT_EQ(encoding->size(), encoding->held()->size());
+    ASSERT_NE(encoding->whole(), nullptr);
+    EXPECT_EQ(*encoding->whole(), encodePoints(points, 1).value());
+    EXPECT_EQ(written(*encoding), *encoding->whole());
+    EXPECT_EQ(encoding->size(), encoding->whole()->size());
 }
 
-TEST(PointEncoding, LargeIsWrittenInPiecesAndComesBack) {
+TEST(PointEncoding, WritesALargeScanInPieces) {
     const std::vector<float> points = scan(kLargePoints);
     for (const int level : {1, 3}) {
-        const auto encoding = PointEncoding::plan(points, level);
+        const auto encoding = PointEncoding::encode(points, level);
         ASSERT_TRUE(encoding);
-        EXPECT_EQ(encoding->held(), nullptr);
+        EXPECT_EQ(encoding->whole(), nullptr);
         const std::string blob = written(*encoding);
         EXPECT_EQ(blob.size(), encoding->size());
         EXPECT_EQ(blob[0], 1);
@@ -149,14 +149,14 @@ TEST(PointEncoding, LargeIsWrittenInPiecesAndComesBack) {
     }
 }
 
-TEST(PointEncoding, LargeIncompressibleStaysRaw) {
+TEST(PointEncoding, KeepsALargeScanRawWhenCompressionDoesNotPay) {
     Random random(5);
     std::vector<float> points(3 * kLargePoints);
     for (float& value : points) {
         const auto bits = static_cast<std::uint32_t>(random.next());
         std::memcpy(&value, &bits, 4);
     }
-    const auto encoding = PointEncoding::plan(points, 1);
+    const auto encoding = PointEncoding::encode(points, 1);
     ASSERT_TRUE(encoding);
     const std::string blob = written(*encoding);
     EXPECT_EQ(blob.size(), 1 + 4 * points.size());
@@ -177,12 +177,12 @@ TEST(PointBlob, DamageIsAnErrorOrHarmless) {
             damaged[random.below(damaged.size())] ^= static_cast<char>(1u << random.below(8));
         }
         const auto decoded = decodePoints(damaged.data(), damaged.size(), points.size());
-        // Content may differ: the checksum in the shape's row decides about that.
+        // The content may differ: the checksum of the shape detects that.
         EXPECT_TRUE(!decoded || decoded->size() == points.size());
     }
 }
 
-TEST(PointBlob, LyingSizesAllocateNothing) {
+TEST(PointBlob, WrongSizesAllocateNothing) {
     const std::vector<float> points = scan(500);
     const std::string blob = encodePoints(points, 1).value();
     for (const std::uint64_t count : {std::uint64_t{0}, std::uint64_t{1499}, std::uint64_t{1501},
@@ -197,7 +197,7 @@ TEST(PointBlob, LyingSizesAllocateNothing) {
     EXPECT_EQ(decodePoints(lie.data(), lie.size(), 1500).error().code, ErrorCode::kDataLoss);
 }
 
-TEST(PointBlob, UnknownFormat) {
+TEST(PointBlob, RefusesUnknownFormats) {
     const std::string blob = bytes({0x02, 0, 0, 0, 0});
     EXPECT_EQ(decodePoints(blob.data(), blob.size(), 1).error().code, ErrorCode::kSchemaTooNew);
     EXPECT_EQ(decodePoints("", 0, 0).error().code, ErrorCode::kDataLoss);

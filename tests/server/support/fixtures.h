@@ -1,12 +1,9 @@
-// Small things several server tests need.
+// Fixtures of the server tests.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
-#include <functional>
 #include <mutex>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -16,10 +13,11 @@
 #include "server/store/parameters_codec.h"
 #include "server/store/store.h"
 #include "server/telemetry/logger.h"
+#include "tests/support/eventually.h"
 
 namespace shapedb::testing {
 
-/// A valid signature whose volume, and weight, says which one it is; up to 1000.
+/// A valid signature that is recognised by its volume (at most 1000) and weight.
 inline Signature signatureOf(double volume) {
     Signature signature;
     signature.points.resize(1);
@@ -31,20 +29,18 @@ inline Signature signatureOf(double volume) {
     return signature;
 }
 
-/// What searches find of a shape made by `signatureOf`: its volume; 0 when it is not there.
+/// The volume of a signature made by `signatureOf`, as searches see it; 0 when it is not there.
 inline double cachedVolume(const SignatureSet& signatures, std::int64_t id) {
     const SignatureSet::Place place = signatures.find(id);
     if (!place) return 0.0;
-    Signature cached;
-    place.block->scored(place.row, cached);
-    return cached.points.at(0).weight * 1024.0;
+    return place.block->rows()[place.row].points[0].weight * 1024.0;
 }
 
-/// Points whose first coordinate is `tag`.
-inline std::vector<float> taggedPoints(float tag) { return {tag, 0, 0, 0, 1, 0, 0, 0, 1, 1, 1, 1}; }
+/// Points in space whose first coordinate is `tag` (flat only for -0.5).
+inline std::vector<float> taggedPoints(float tag) { return {tag, 0, 0, 0, 1, 0, 0, 0, 1, 1, 1, 2}; }
 
-/// A describer that needs no geometry: the signature's volume is the first coordinate, its
-/// scale the parameters' maximum of points. Negative coordinates have no interior.
+/// Describes without geometry: the signature's volume is the first coordinate, its scale the
+/// parameters' maxPoints. A negative first coordinate has no interior.
 inline Result<Description> quickDescribe(const PointCloud& points, const ShapeParameters& parameters,
                                          const RunContext& context) {
     context.report("quick", 0, 0);
@@ -57,12 +53,10 @@ inline Result<Description> quickDescribe(const PointCloud& points, const ShapePa
 }
 
 inline store::PutRequest putRequest(std::int64_t collectionId, const std::string& key,
-                                    const std::vector<float>& points, store::Metadata metadata = {}) {
-    store::PutRequest request;
+                                    const std::vector<float>& points, Metadata metadata = {}) {
+    store::PutRequest request(store::VerifiedScan::verify(points).value());
     request.collectionId = collectionId;
     request.key = key;
-    request.points = &points;
-    request.checksum[0] = static_cast<std::uint8_t>(static_cast<int>(points[0]));
     request.metadata = std::move(metadata);
     return request;
 }
@@ -70,20 +64,10 @@ inline store::PutRequest putRequest(std::int64_t collectionId, const std::string
 inline std::string paperParameters(std::uint32_t maxPoints = 7) {
     ShapeParameters parameters = parametersOf(Profile::kPaper);
     parameters.signature.maxPoints = maxPoints;
-    return index::encodeParameters(parameters);
+    return store::encodeParameters(parameters);
 }
 
-inline bool eventually(const std::function<bool()>& condition,
-                       std::chrono::milliseconds atMost = std::chrono::seconds(10)) {
-    const auto until = std::chrono::steady_clock::now() + atMost;
-    while (!condition()) {
-        if (std::chrono::steady_clock::now() >= until) return false;
-        std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    }
-    return true;
-}
-
-/// Keeps the lines.
+/// Keeps all lines.
 class RecordingLogger : public telemetry::Logger {
   public:
     void log(telemetry::Level, const std::string& message,

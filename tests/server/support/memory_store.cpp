@@ -109,7 +109,7 @@ Result<PutResult> MemoryStore::putShape(const PutRequest& request) {
         Shape* existing = find(request.collectionId, request.key);
         if (existing == nullptr && request.mode == PutMode::kUpdateOnly) return notFound("shape");
         const std::int64_t version = existing != nullptr ? existing->version : 0;
-        const bool samePoints = existing != nullptr && existing->checksum == request.checksum;
+        const bool samePoints = existing != nullptr && existing->checksum == request.scan.checksum();
         const bool same = samePoints && existing->metadata == request.metadata;
         if (request.expectedVersion && *request.expectedVersion != version) {
             return fail(ErrorCode::kVersionConflict, "version is " + std::to_string(version));
@@ -133,11 +133,11 @@ Result<PutResult> MemoryStore::putShape(const PutRequest& request) {
         existing->metadata = request.metadata;
         if (samePoints) return PutResult{PutOutcome::kMetadataChanged, *existing};
         existing->pointsVersion = existing->version;
-        existing->checksum = request.checksum;
-        existing->pointCount = request.points->size() / 3;
+        existing->checksum = request.scan.checksum();
+        existing->pointCount = request.scan.pointCount();
         existing->state = ShapeState::kPending;
         existing->failure.reset();
-        content_.points[existing->id] = *request.points;
+        content_.points[existing->id] = request.scan.points();
         queueJob(*existing);
         return PutResult{version == 0 ? PutOutcome::kCreated : PutOutcome::kReplaced, *existing};
     });

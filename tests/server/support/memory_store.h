@@ -1,5 +1,5 @@
-// The Store contract in maps: a plain second implementation for tests of what stands above
-// it. Not durable; backup and restore copy a whole MemoryStore by name of "file".
+// The Store contract in maps: a plain second implementation for tests of the layers above. Not
+// durable; backup and restore copy the content under the name of the "file".
 #pragma once
 
 #include <functional>
@@ -16,8 +16,8 @@ namespace shapedb::testing {
 
 class MemoryStore : public store::Store {
   public:
-    /// Called at the start of each function with its name; an error it returns is the
-    /// function's. Set before use.
+    /// Called at the start of each function with its name; an error it returns becomes the function's.
+    /// Set before use.
     std::function<std::optional<Error>(const std::string& function)> fault;
 
     Result<store::Collection> createCollection(const std::string& name, const std::string& description,
@@ -71,7 +71,7 @@ class MemoryStore : public store::Store {
         store::Job job;
         bool running = false;
     };
-    /// What a rebuild knows of one shape; an error instead of bytes when it failed.
+    /// A rebuild's result for one shape: bytes, or why there are none.
     struct Rebuilt {
         std::int64_t pointsVersion = 0;
         std::string bytes;

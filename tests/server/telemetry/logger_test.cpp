@@ -15,7 +15,7 @@ namespace {
 // What a client may put into a key to break a line or forge one.
 const std::string kHostile = std::string("a\"b\\c\nlevel=error\t\x01\x7f ") + '\0' + "\xff é";
 
-TEST(FormatText, QuotesWhatIsNotAPlainWord) {
+TEST(FormatText, QuotesValuesThatAreNotPlainWords) {
     EXPECT_EQ(formatText("call", {{"rpc", std::string("AddShape")},
                                   {"key", std::string("two words")},
                                   {"empty", std::string()},
@@ -65,7 +65,7 @@ class LogFile : public ::testing::Test {
     std::string path_ = ::testing::TempDir() + "shapedb-log-" + std::to_string(::getpid());
 };
 
-TEST_F(LogFile, LevelsBelowTheConfiguredOneAreDropped) {
+TEST_F(LogFile, DropsLevelsBelowTheConfiguredOne) {
     const auto log = makeLogger({Level::kWarn, false, path_});
     ASSERT_TRUE(log);
     (*log)->debug("one");
@@ -84,7 +84,7 @@ TEST_F(LogFile, IsAppendedTo) {
     EXPECT_EQ(lines().size(), 2u);
 }
 
-TEST_F(LogFile, ThreadsDoNotBreakLines) {
+TEST_F(LogFile, ThreadsWriteWholeLines) {
     const auto log = makeLogger({Level::kInfo, true, path_});
     ASSERT_TRUE(log);
     std::vector<std::thread> threads;
@@ -109,7 +109,7 @@ TEST(MakeLogger, RefusesAFileItCannotWrite) {
     EXPECT_EQ(log.error().code, ErrorCode::kFileNotWritable);
 }
 
-TEST(LevelFromName, KnowsTheFive) {
+TEST(LevelFromName, KnowsAllLevels) {
     for (const char* name : {"trace", "debug", "info", "warn", "error"})
         EXPECT_TRUE(levelFromName(name)) << name;
     EXPECT_FALSE(levelFromName("Info"));

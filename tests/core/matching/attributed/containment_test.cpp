@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <set>
 #include <string>
 
@@ -20,11 +19,10 @@ using testing_support::describeSignature;
 using testing_support::disturbedAttributed;
 using testing_support::randomAttributed;
 using testing_support::randomReflection;
+using testing_support::sameBits;
 using testing_support::scannedFamilies;
 using testing_support::scoreOptions;
 using testing_support::turnedAttributed;
-
-bool sameBits(double x, double y) { return std::memcmp(&x, &y, sizeof x) == 0; }
 
 const Body& bodyOf(const Signature& signature) { return signature.attributes->body; }
 
@@ -78,7 +76,7 @@ Signature creature() {
     return s;
 }
 
-TEST(Containment, FindsAPieceInItsWholeWhereverItLies) {
+TEST(Containment, FindsAPieceInItsWholeInAnyPose) {
     const Signature whole = creature();
     Random random(1);
     for (int round = 0; round < 60; ++round) {
@@ -111,7 +109,7 @@ TEST(Containment, FindsAPieceInItsWholeWhereverItLies) {
     }
 }
 
-TEST(Containment, OfTheWholeInAPieceIsLess) {
+TEST(Containment, WholeIsNotContainedInItsPiece) {
     const Signature whole = creature();
     const Signature piece = pieceOf(whole, {0, 2, 3}, 0.8);
     const double contained = containment(bodyOf(piece), bodyOf(whole), 0.0, {}).share;
@@ -123,7 +121,7 @@ TEST(Containment, OfTheWholeInAPieceIsLess) {
     EXPECT_GT(score(piece, whole, partialOptions(true, false)), score(piece, whole, {}));
 }
 
-TEST(Containment, MirroredPiecesNeedReflection) {
+TEST(Containment, MirroredPieceNeedsReflection) {
     const Signature whole = creature();
     Random random(2);
     const Signature piece = turnedAttributed(pieceOf(whole, {0, 1, 2, 3, 4}, 0.9), randomReflection(random));
@@ -134,7 +132,7 @@ TEST(Containment, MirroredPiecesNeedReflection) {
     EXPECT_FALSE(without.reflected);
 }
 
-TEST(Containment, IsBoundedAndItsGainsSumToIt) {
+TEST(Containment, BoundHoldsAndGainsSumToTheShare) {
     Random random(3);
     for (int round = 0; round < 1500; ++round) {
         const Signature a = randomAttributed(random);
@@ -186,14 +184,14 @@ void expectSound(const Signature& a, const Signature& b, const ScoreOptions& opt
         const double size = a.scale + length(a.origin) + why.motion.scale * (b.scale + length(b.origin));
         EXPECT_NEAR(distance(pointPosition(a, match.a), moved), match.distance * a.scale,
                     1e-5 * size + 1.3e-4 * (a.scale + why.motion.scale * b.scale))
-            << "parts are kept in steps";
+            << "positions are rounded to steps";
     }
     if (!why.matches.empty()) {
         EXPECT_NEAR(shares, 1.0, 1e-9);
     }
 }
 
-TEST(PartialScore, IsSound) {
+TEST(PartialScore, IsBoundedAndExplainedOnRandomPairs) {
     Random random(4);
     for (int round = 0; round < 600; ++round) {
         Signature a = randomAttributed(random);
@@ -214,14 +212,14 @@ TEST(PartialScore, IsSound) {
     }
 }
 
-TEST(PartialScore, OfScansIsSound) {
+TEST(PartialScore, IsBoundedAndExplainedOnScans) {
     const auto& scans = scannedFamilies(1, 1);
     for (const auto& x : scans) {
         for (const auto& y : scans) expectSound(x.signature, y.signature, partialOptions(true, false));
     }
 }
 
-TEST(PartialScore, StaysANumberForExtremeSizes) {
+TEST(PartialScore, StaysFiniteForExtremeSizes) {
     Random random(5);
     for (int round = 0; round < 300; ++round) {
         Signature a = randomAttributed(random, 5);

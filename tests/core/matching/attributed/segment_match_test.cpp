@@ -3,33 +3,31 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <iostream>
 #include <set>
 #include <utility>
 
 #include <gtest/gtest.h>
 
-#include "core/matching/published/alignment.h"
 #include "tests/core/matching/attributed_signatures.h"
 #include "tests/core/matching/random_signatures.h"
 
 namespace shapedb {
 namespace {
 
-using testing_support::disturbedAttributed;
+using testing_support::AttributedPair;
 using testing_support::randomAttributed;
+using testing_support::randomAttributedPair;
 using testing_support::randomReflection;
+using testing_support::sameBits;
 using testing_support::scannedFamilies;
 using testing_support::turnedAttributed;
-
-bool sameBits(double x, double y) { return std::memcmp(&x, &y, sizeof x) == 0; }
 
 const Body& bodyOf(const Signature& signature) { return signature.attributes->body; }
 
 double shareOf(const Body& body) {
     double sum = 0.0;
-    for (const SegmentDescriptor& part : body.parts) sum += part.share;
+    for (const SegmentDescriptor& segment : body.parts) sum += segment.share;
     return sum;
 }
 
@@ -37,28 +35,7 @@ ScoreOptions optionsOf(bool reflection, double width) {
     return testing_support::scoreOptions(reflection, false, width);
 }
 
-struct Pair {
-    Signature a, b;
-};
-
-Pair randomPair(Random& random) {
-    Pair pair;
-    pair.a = randomAttributed(random);
-    const double noise = std::pow(10.0, random.uniform(-5, -1));
-    switch (random.below(4)) {
-        case 0: pair.b = disturbedAttributed(pair.a, random, noise); break;
-        case 1:
-            pair.b = turnedAttributed(disturbedAttributed(pair.a, random, noise), randomRotation(random));
-            break;
-        case 2:
-            pair.b = turnedAttributed(disturbedAttributed(pair.a, random, noise), randomReflection(random));
-            break;
-        default: pair.b = randomAttributed(random);
-    }
-    return pair;
-}
-
-// Four parts of one size that no motion but the identity lays on themselves.
+// Four segments of one size without any symmetry.
 Signature chiral() {
     Signature signature = testing_support::signatureOf(
         {{0, 0, 0, 0.05}, {0.45, 0, 0, 0.021}, {0, 0.3, 0, 0.02}, {0.1, 0, 0.25, 0.019}});
@@ -70,20 +47,21 @@ Signature chiral() {
     return signature;
 }
 
-TEST(SegmentMatch, OfABodyWithItselfIsAllOfIt) {
+TEST(SegmentMatch, BodyAgreesFullyWithItself) {
     Random random(1);
     for (int round = 0; round < 500; ++round) {
         const Signature a = randomAttributed(random, kMaxSignaturePoints);
         for (const double width : {1e-6, 0.1, 10.0}) {
             for (const bool reflection : {false, true}) {
-                const SegmentMatch match = matchSegments(bodyOf(a), bodyOf(a), optionsOf(reflection, width));
+                const SegmentMatch match =
+                    SegmentComparison(bodyOf(a), bodyOf(a), optionsOf(reflection, width)).match();
                 EXPECT_NEAR(match.agreement, shareOf(bodyOf(a)), 1e-9);
             }
         }
     }
 }
 
-TEST(SegmentMatch, OfABodyInAnotherPoseIsAllOfIt) {
+TEST(SegmentMatch, BodyAgreesFullyWithItsRotatedCopy) {
     Random random(2);
     int good = 0;
     constexpr int kRounds = 300;
@@ -91,21 +69,21 @@ TEST(SegmentMatch, OfABodyInAnotherPoseIsAllOfIt) {
         const Signature a = randomAttributed(random);
         const Signature b =
             turnedAttributed(a, round % 2 == 0 ? randomRotation(random) : randomReflection(random));
-        const SegmentMatch match = matchSegments(bodyOf(a), bodyOf(b), optionsOf(true, 0.1));
+        const SegmentMatch match = SegmentComparison(bodyOf(a), bodyOf(b), optionsOf(true, 0.1)).match();
         good += match.agreement > 0.999 * shareOf(bodyOf(a)) ? 1 : 0;
     }
-    // Frames of equal spread and parts too many to try leave a few; scans have neither.
+    // Frames with equal spreads, or too many segments to try all, leave a few. Scans have neither.
     EXPECT_GT(good, kRounds * 95 / 100);
 }
 
-TEST(SegmentMatch, RecoversAKnownTurn) {
+TEST(SegmentMatch, RecoversAKnownRotation) {
     const Signature a = chiral();
     Random random(3);
     for (int round = 0; round < 200; ++round) {
         const bool mirrored = round % 2 == 1;
         const Matrix3 turn = mirrored ? randomReflection(random) : randomRotation(random);
         const Signature b = turnedAttributed(a, turn);
-        const SegmentMatch match = matchSegments(bodyOf(a), bodyOf(b), optionsOf(true, 0.1));
+        const SegmentMatch match = SegmentComparison(bodyOf(a), bodyOf(b), optionsOf(true, 0.1)).match();
         EXPECT_NEAR(match.agreement, shareOf(bodyOf(a)), 1e-4);
         EXPECT_EQ(match.reflected, mirrored);
         EXPECT_NEAR(determinant(match.rotation), mirrored ? -1.0 : 1.0, 1e-9);
@@ -122,33 +100,35 @@ TEST(SegmentMatch, TellsLeftFromRightOnlyWithoutReflection) {
     Random random(4);
     for (int round = 0; round < 50; ++round) {
         const Signature b = turnedAttributed(a, randomReflection(random));
-        const SegmentMatch with = matchSegments(bodyOf(a), bodyOf(b), optionsOf(true, 0.05));
-        const SegmentMatch without = matchSegments(bodyOf(a), bodyOf(b), optionsOf(false, 0.05));
+        const SegmentMatch with = SegmentComparison(bodyOf(a), bodyOf(b), optionsOf(true, 0.05)).match();
+        const SegmentMatch without = SegmentComparison(bodyOf(a), bodyOf(b), optionsOf(false, 0.05)).match();
         EXPECT_TRUE(with.reflected);
         EXPECT_FALSE(without.reflected);
         EXPECT_LT(without.agreement, with.agreement - 0.02);
     }
 }
 
-TEST(SegmentMatch, ReflectionCanOnlyRaiseIt) {
+TEST(SegmentMatch, ReflectionCanOnlyRaiseTheAgreement) {
     Random random(5);
     for (int round = 0; round < 1500; ++round) {
-        const Pair pair = randomPair(random);
-        const SegmentMatch with = matchSegments(bodyOf(pair.a), bodyOf(pair.b), optionsOf(true, 0.1));
-        const SegmentMatch without = matchSegments(bodyOf(pair.a), bodyOf(pair.b), optionsOf(false, 0.1));
+        const AttributedPair pair = randomAttributedPair(random, 1e-5, 0.1);
+        const SegmentMatch with =
+            SegmentComparison(bodyOf(pair.a), bodyOf(pair.b), optionsOf(true, 0.1)).match();
+        const SegmentMatch without =
+            SegmentComparison(bodyOf(pair.a), bodyOf(pair.b), optionsOf(false, 0.1)).match();
         EXPECT_GE(with.agreement, without.agreement);
         EXPECT_FALSE(without.reflected);
     }
 }
 
-TEST(SegmentMatch, StaysInItsRangeAndPruningChangesNoBit) {
+TEST(SegmentMatch, StaysInRangeAndPruningDoesNotChangeIt) {
     Random random(6);
     for (int round = 0; round < 2000; ++round) {
-        const Pair pair = randomPair(random);
+        const AttributedPair pair = randomAttributedPair(random, 1e-5, 0.1);
         const ScoreOptions options =
             optionsOf(round % 2 == 0, round % 3 == 0 ? std::pow(10.0, random.uniform(-3, 1)) : 0.1);
-        const SegmentMatch fast = matchSegments(bodyOf(pair.a), bodyOf(pair.b), options);
-        const SegmentMatch all = matchSegments(bodyOf(pair.a), bodyOf(pair.b), options, false);
+        const SegmentMatch fast = SegmentComparison(bodyOf(pair.a), bodyOf(pair.b), options).match();
+        const SegmentMatch all = SegmentComparison(bodyOf(pair.a), bodyOf(pair.b), options).match(false);
         EXPECT_TRUE(sameBits(fast.agreement, all.agreement));
         EXPECT_EQ(fast.rotation, all.rotation);
         EXPECT_EQ(fast.reflected, all.reflected);
@@ -164,20 +144,21 @@ TEST(SegmentMatch, StaysInItsRangeAndPruningChangesNoBit) {
     }
 }
 
-TEST(SegmentMatch, ScansPrunedAndNotAreTheSame) {
+TEST(SegmentMatch, PruningDoesNotChangeTheMatchOfScans) {
     const auto& scans = scannedFamilies(2, 1);
     for (const auto& x : scans) {
         for (const auto& y : scans) {
-            const SegmentMatch fast = matchSegments(bodyOf(x.signature), bodyOf(y.signature), {});
-            const SegmentMatch all = matchSegments(bodyOf(x.signature), bodyOf(y.signature), {}, false);
+            const SegmentMatch fast = SegmentComparison(bodyOf(x.signature), bodyOf(y.signature), {}).match();
+            const SegmentMatch all =
+                SegmentComparison(bodyOf(x.signature), bodyOf(y.signature), {}).match(false);
             ASSERT_TRUE(sameBits(fast.agreement, all.agreement));
             ASSERT_EQ(fast.rotation, all.rotation);
         }
     }
 }
 
-// What no alignment changes is decided once: with parts of one size the gain is as the header says.
-TEST(SegmentMatch, GainsAreTheirDefinition) {
+// For segments of one size, the gain as the header defines it.
+TEST(SegmentMatch, AgreementFollowsItsDefinition) {
     Random random(7);
     for (int round = 0; round < 300; ++round) {
         Signature a = randomAttributed(random);
@@ -192,7 +173,7 @@ TEST(SegmentMatch, GainsAreTheirDefinition) {
         const Body& x = bodyOf(a);
         const Body& y = bodyOf(b);
         const ScoreOptions options = optionsOf(true, 0.1);
-        const SegmentMatch match = matchSegments(x, y, options);
+        const SegmentMatch match = SegmentComparison(x, y, options).match();
         const auto gain = [&](const SegmentDescriptor& p, const SegmentDescriptor& q) {
             const Point3 at{p.position[0], p.position[1], p.position[2]};
             const Point3 there = rotate(match.rotation, {q.position[0], q.position[1], q.position[2]});
@@ -219,19 +200,19 @@ TEST(SegmentMatch, GainsAreTheirDefinition) {
     }
 }
 
-// Of each part's counterparts: no turn can be better than the bound, few are better than the match.
-TEST(SegmentMatch, IsAtLeastAsGoodAsTheFrames) {
+TEST(SegmentMatch, IsAtLeastAsGoodAsEveryFrameAlignment) {
     Random random(8);
     for (int round = 0; round < 200; ++round) {
-        const Pair pair = randomPair(random);
+        const AttributedPair pair = randomAttributedPair(random, 1e-5, 0.1);
         const ScoreOptions options = optionsOf(true, 0.1);
-        const SegmentMatch match = matchSegments(bodyOf(pair.a), bodyOf(pair.b), options);
+        const SegmentMatch match = SegmentComparison(bodyOf(pair.a), bodyOf(pair.b), options).match();
         for (int signs = 0; signs < 8; ++signs) {
             SegmentMatch frame;
             for (std::size_t axis = 0; axis < 3; ++axis) {
                 frame.rotation[axis][axis] = ((signs >> axis) & 1) != 0 ? -1.0 : 1.0;
             }
-            const SegmentPairs pairs = segmentPairs(bodyOf(pair.a), bodyOf(pair.b), frame, options);
+            const SegmentPairs pairs =
+                SegmentComparison(bodyOf(pair.a), bodyOf(pair.b), options).pairs(frame);
             double sum = 0.0;
             for (std::size_t i = 0; i < pairs.count; ++i) sum += pairs.pairs[i].gain;
             EXPECT_LE(sum, match.agreement + 1e-12);
@@ -239,7 +220,7 @@ TEST(SegmentMatch, IsAtLeastAsGoodAsTheFrames) {
     }
 }
 
-TEST(SegmentMatch, UnlikePartsDoNotAgree) {
+TEST(SegmentMatch, SegmentsOfDifferentSizesDoNotAgree) {
     Signature a = chiral();
     Signature b = a;
     for (WeightedPoint& p : b.points) {
@@ -247,26 +228,26 @@ TEST(SegmentMatch, UnlikePartsDoNotAgree) {
         p.maximumRadius *= 0.03f;
     }
     testing_support::updateBody(b);
-    const SegmentMatch match = matchSegments(bodyOf(a), bodyOf(b), {});
+    const SegmentMatch match = SegmentComparison(bodyOf(a), bodyOf(b), {}).match();
     EXPECT_EQ(match.agreement, 0.0);
-    EXPECT_EQ(segmentPairs(bodyOf(a), bodyOf(b), match, {}).count, 0U);
+    EXPECT_EQ(SegmentComparison(bodyOf(a), bodyOf(b), {}).pairs(match).count, 0U);
     EXPECT_FALSE(match.reflected);
     // A little thinner is a little less alike.
-    double before = matchSegments(bodyOf(a), bodyOf(a), {}).agreement;
+    double before = SegmentComparison(bodyOf(a), bodyOf(a), {}).match().agreement;
     for (const float factor : {0.8f, 0.6f, 0.4f, 0.2f}) {
         b = a;
         for (WeightedPoint& p : b.points) {
             for (float& c : p.covariance) c *= factor;
         }
         testing_support::updateBody(b);
-        const double now = matchSegments(bodyOf(a), bodyOf(b), {}).agreement;
+        const double now = SegmentComparison(bodyOf(a), bodyOf(b), {}).match().agreement;
         EXPECT_LT(now, before) << factor;
         before = now;
     }
 }
 
-// A limb that points elsewhere still earns the half that its radius is due.
-TEST(SegmentMatch, PoseIsHalfTheGain) {
+// A limb that points elsewhere still gets the half for its radius.
+TEST(SegmentMatch, BentLimbKeepsHalfItsGain) {
     const auto withArm = [](double angle) {
         Signature s = testing_support::signatureOf({{0, 0, 0, 0.9},
                                                     {0.5, 0, 0, 0.03},
@@ -278,8 +259,8 @@ TEST(SegmentMatch, PoseIsHalfTheGain) {
     };
     const Signature down = withArm(1.5707963);
     const Signature up = withArm(-2.5);
-    const double same = matchSegments(bodyOf(down), bodyOf(down), {}).agreement;
-    const double bent = matchSegments(bodyOf(down), bodyOf(up), optionsOf(false, 0.1)).agreement;
+    const double same = SegmentComparison(bodyOf(down), bodyOf(down), {}).match().agreement;
+    const double bent = SegmentComparison(bodyOf(down), bodyOf(up), optionsOf(false, 0.1)).match().agreement;
     const double arm = bodyOf(down).parts.back().share;
     EXPECT_LT(bent, same - 0.2 * arm);
     EXPECT_GT(bent, same - 0.75 * arm - 0.05);
@@ -288,12 +269,12 @@ TEST(SegmentMatch, PoseIsHalfTheGain) {
 TEST(SegmentPairs, GainsSumToTheAgreement) {
     Random random(9);
     for (int round = 0; round < 2000; ++round) {
-        const Pair pair = randomPair(random);
+        const AttributedPair pair = randomAttributedPair(random, 1e-5, 0.1);
         const ScoreOptions options = optionsOf(round % 2 == 0, 0.1);
         const Body& a = bodyOf(pair.a);
         const Body& b = bodyOf(pair.b);
-        const SegmentMatch match = matchSegments(a, b, options);
-        const SegmentPairs pairs = segmentPairs(a, b, match, options);
+        const SegmentMatch match = SegmentComparison(a, b, options).match();
+        const SegmentPairs pairs = SegmentComparison(a, b, options).pairs(match);
         ASSERT_LE(pairs.count, pairs.pairs.size());
         double sum = 0.0;
         std::set<std::pair<int, int>> seen;
@@ -314,17 +295,19 @@ TEST(SegmentPairs, GainsSumToTheAgreement) {
     }
 }
 
-TEST(PartAgreementBound, IsNeverBelowTheAgreement) {
+TEST(SegmentAgreementBound, IsNeverBelowTheAgreement) {
     Random random(10);
     double slack = 0.0;
     constexpr int kRounds = 3000;
     for (int round = 0; round < kRounds; ++round) {
-        const Pair pair = randomPair(random);
+        const AttributedPair pair = randomAttributedPair(random, 1e-5, 0.1);
         for (const bool reflection : {false, true}) {
             for (const double width : {0.1, std::pow(10.0, random.uniform(-6, 2))}) {
                 const ScoreOptions options = optionsOf(reflection, width);
-                const double agreement = matchSegments(bodyOf(pair.a), bodyOf(pair.b), options).agreement;
-                const double bound = segmentAgreementBound(bodyOf(pair.a), bodyOf(pair.b), options);
+                const double agreement =
+                    SegmentComparison(bodyOf(pair.a), bodyOf(pair.b), options).match().agreement;
+                const double bound =
+                    SegmentComparison(bodyOf(pair.a), bodyOf(pair.b), options).agreementBound();
                 ASSERT_GE(bound, std::min(1.0, agreement)) << "width " << width;
                 ASSERT_LE(bound, 1.0);
                 if (width == 0.1 && reflection) slack += (bound - agreement) / kRounds;
@@ -338,9 +321,10 @@ TEST(PartAgreementBound, IsNeverBelowTheAgreement) {
             for (const double width : {0.02, 0.1, 0.5}) {
                 const ScoreOptions options = optionsOf(false, width);
                 ASSERT_GE(
-                    segmentAgreementBound(bodyOf(x.signature), bodyOf(y.signature), options),
-                    std::min(1.0,
-                             matchSegments(bodyOf(x.signature), bodyOf(y.signature), options).agreement));
+                    SegmentComparison(bodyOf(x.signature), bodyOf(y.signature), options).agreementBound(),
+                    std::min(1.0, SegmentComparison(bodyOf(x.signature), bodyOf(y.signature), options)
+                                      .match()
+                                      .agreement));
             }
         }
     }

@@ -1,10 +1,10 @@
 #include "core/matching/published/alignment.h"
 
 #include <cmath>
-#include <cstring>
 
 #include <gtest/gtest.h>
 
+#include "core/matching/kernel.h"
 #include "tests/core/matching/random_signatures.h"
 
 namespace shapedb {
@@ -13,9 +13,12 @@ namespace {
 using testing_support::describeSignature;
 using testing_support::disturbed;
 using testing_support::randomSignature;
+using testing_support::sameBits;
 using testing_support::signatureOf;
 
-bool sameBits(double x, double y) { return std::memcmp(&x, &y, sizeof x) == 0; }
+AnchoredPoints pointsOf(const Signature& signature, double factor) {
+    return anchoredPoints(PackedShape(signature).row(), factor);
+}
 
 void expectSame(const BestAlignment& x, const BestAlignment& y) {
     EXPECT_EQ(x.alignment.i, y.alignment.i);
@@ -34,7 +37,7 @@ void expectSame(const BestAlignment& x, const BestAlignment& y) {
     }
 }
 
-TEST(Alignment, PruningChangesNoBit) {
+TEST(Alignment, PruningDoesNotChangeTheResult) {
     Random random(1);
     for (int round = 0; round < 4000; ++round) {
         const Signature a = randomSignature(random, round % 100 == 0 ? 16 : 7);
@@ -43,8 +46,8 @@ TEST(Alignment, PruningChangesNoBit) {
         options.reflection = round % 2 == 0;
         // Down to widths at which only exact coincidence counts, and bounds are nothing but rounding.
         options.kernelWidth = std::pow(10.0, random.uniform(-6, 1));
-        const AnchoredPoints left = anchoredPoints(a, 1.0);
-        const AnchoredPoints right = anchoredPoints(b, random.uniform(0.2, 1.0));
+        const AnchoredPoints left = pointsOf(a, 1.0);
+        const AnchoredPoints right = pointsOf(b, random.uniform(0.2, 1.0));
         expectSame(bestAlignment(left, right, options, true), bestAlignment(left, right, options, false));
         if (HasFailure()) {
             FAIL() << "width " << options.kernelWidth << "\n"
@@ -54,25 +57,9 @@ TEST(Alignment, PruningChangesNoBit) {
     }
 }
 
-TEST(Alignment, KernelIsOneAtRestAndFallsToNothingAtItsReach) {
-    EXPECT_EQ(kernel(0.0, 0.1), 1.0);
-    EXPECT_EQ(kernel(0.125, 0.125), 0.0);
-    EXPECT_EQ(kernel(0.0801, 0.1), 0.0);
-    EXPECT_EQ(kernel(1e30, 0.1), 0.0);
-    EXPECT_DOUBLE_EQ(kernel(0.04, 0.1), 1.0 / 16.0);
-    double before = 1.0;
-    for (double d = 0.001; d < 0.29; d += 0.001) {
-        const double now = kernel(d * d, 0.1);
-        EXPECT_TRUE(now < before || now == 0.0) << d;
-        // Near the Gaussian it stands for.
-        EXPECT_NEAR(now, std::exp(-d * d / 0.02), 0.1) << d;
-        before = now;
-    }
-}
-
-TEST(Alignment, ScalingAppliesToLengthsAndItsCubeToWeights) {
+TEST(Alignment, ScalesLengthsAndWeightsByTheCube) {
     const Signature signature = signatureOf({{0, 0, 0, 0.5}, {0.5, -0.25, 0.125, 0.25}});
-    const AnchoredPoints points = anchoredPoints(signature, 0.5);
+    const AnchoredPoints points = pointsOf(signature, 0.5);
     ASSERT_EQ(points.count, 2u);
     EXPECT_EQ(points.position[1], (Point3{0.25, -0.125, 0.0625}));
     EXPECT_EQ(points.weight[0], 0.0625);
@@ -80,24 +67,14 @@ TEST(Alignment, ScalingAppliesToLengthsAndItsCubeToWeights) {
     EXPECT_EQ(points.totalWeight, 0.09375);
 }
 
-TEST(Alignment, LeastGapIsBelowTheGapAndNear) {
-    EXPECT_EQ(leastGap(1.0, 1.0), 0.0);
-    EXPECT_EQ(leastGap(0.0, 0.0), 0.0);
-    EXPECT_LT(leastGap(3.0, 1.0), 2.0);
-    EXPECT_GT(leastGap(3.0, 1.0), 2.0 - 1e-12);
-    EXPECT_EQ(leastGap(-1.0, 2.0), leastGap(2.0, -1.0));
-    EXPECT_EQ(leastGap(1.0, 1.0 + 1e-15), 0.0);
-}
-
-// The matching is reproduced from the matrix alone: it is the alignment the pairs were found in.
-TEST(Alignment, RotationIsTheOneTheMatchesWereMeasuredIn) {
+TEST(Alignment, RotationReproducesTheDistancesOfTheMatches) {
     Random random(2);
     int reflected = 0;
     for (int round = 0; round < 2000; ++round) {
         const Signature a = randomSignature(random);
         const Signature b = round % 2 == 0 ? disturbed(a, random, 0.05) : randomSignature(random);
-        const AnchoredPoints left = anchoredPoints(a, 1.0);
-        const AnchoredPoints right = anchoredPoints(b, 1.0);
+        const AnchoredPoints left = pointsOf(a, 1.0);
+        const AnchoredPoints right = pointsOf(b, 1.0);
         const BestAlignment best = bestAlignment(left, right, {});
         const Matrix3 rotation = alignmentRotation(left, right, best.alignment);
         EXPECT_NEAR(determinant(rotation), best.alignment.reflected ? -1.0 : 1.0, 1e-12);

@@ -1,4 +1,4 @@
-// What was acknowledged is there, however the process ended and whatever the disk did since.
+// Whatever was acknowledged survives a killed process; damage of the files is detected.
 #include <atomic>
 #include <chrono>
 #include <csignal>
@@ -36,7 +36,7 @@ class CrashTest : public StoreTest {
     }
 };
 
-TEST_F(CrashTest, KilledInMidWriteKeepsWhatItAcknowledged) {
+TEST_F(CrashTest, KillDuringWritesKeepsEverythingAcknowledged) {
     collection();
     Random random(23);
     for (int round = 0; round < 6; ++round) {
@@ -54,7 +54,7 @@ TEST_F(CrashTest, KilledInMidWriteKeepsWhatItAcknowledged) {
         close(ends[1]);
         int last = -1;
         int number = 0;
-        // The first acknowledgement tells that it is at work; then a random while.
+        // Killed at a random time after the first acknowledgement.
         ASSERT_EQ(read(ends[0], &number, sizeof number), static_cast<ssize_t>(sizeof number));
         last = number;
         std::this_thread::sleep_for(std::chrono::milliseconds(20 + random.below(180)));
@@ -80,7 +80,7 @@ TEST_F(CrashTest, KilledInMidWriteKeepsWhatItAcknowledged) {
     }
 }
 
-/// Opens what is left of a database and uses all of it: an error or right answers.
+/// Opens a damaged database and uses all of it: gets errors or correct answers.
 class DamageTest : public StoreTest {
   protected:
     void SetUp() override {
@@ -140,7 +140,7 @@ class DamageTest : public StoreTest {
     int loaded_ = 0;
 };
 
-TEST_F(DamageTest, FlippedBytes) {
+TEST_F(DamageTest, SurvivesFlippedBytes) {
     Random random(31);
     for (int round = 0; round < 40; ++round) {
         std::string bytes = whole_;
@@ -154,7 +154,7 @@ TEST_F(DamageTest, FlippedBytes) {
     EXPECT_GT(loaded_, 100);
 }
 
-TEST_F(DamageTest, OverwrittenPages) {
+TEST_F(DamageTest, SurvivesOverwrittenPages) {
     Random random(37);
     for (int round = 0; round < 40; ++round) {
         std::string bytes = whole_;
@@ -171,19 +171,19 @@ TEST_F(DamageTest, OverwrittenPages) {
     EXPECT_GT(found_ + refused_, 20);
 }
 
-TEST_F(DamageTest, Truncated) {
+TEST_F(DamageTest, SurvivesTruncation) {
     Random random(41);
     for (int round = 0; round < 40; ++round) {
         const int before = found_ + refused_;
         use(whole_.substr(0, round == 0 ? 0 : random.below(whole_.size() - 4096)));
-        EXPECT_GT(found_ + refused_, before) << "a cut file is noticed";
+        EXPECT_GT(found_ + refused_, before) << "a truncated file is detected";
     }
 }
 
 using ConcurrencyTest = StoreTest;
 
-// Readers beside a writer see whole shapes: points, metadata and checksum of one moment.
-TEST_F(ConcurrencyTest, ReadersBesideWriters) {
+// Readers beside writers see points, metadata and checksum of the same state.
+TEST_F(ConcurrencyTest, ReadersSeeConsistentStatesBesideWriters) {
     const Collection c = collection();
     std::atomic<bool> stop{false};
     std::atomic<int> bad{0};

@@ -1,5 +1,5 @@
 // One small database per schema version, opened and queried by every later version.
-// SHAPEDB_WRITE_GOLDEN=FILE writes the one of the present schema (docs/storage.md).
+// SHAPEDB_WRITE_GOLDEN=FILE writes the one of the current schema (docs/storage.md).
 #include <cstdlib>
 
 #include <zstd.h>
@@ -76,7 +76,7 @@ TEST_F(GoldenTest, Version1OpensAndAnswers) {
     EXPECT_EQ(failed.failure->message, "no closed interior");
     EXPECT_EQ(store_->loadIndex(c.id, 0, 10)->size(), 2u);
 
-    // And it goes on: the interrupted job and the rebuild end.
+    // Work continues: the interrupted job and the rebuild finish.
     ASSERT_TRUE(store_->recoverJobs(2)->empty());
     EXPECT_EQ(store_->queueDepth()->jobs, 1u);
     finishAll();

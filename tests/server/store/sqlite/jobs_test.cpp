@@ -5,7 +5,7 @@ namespace {
 
 using SqliteJobsTest = StoreTest;
 
-TEST_F(SqliteJobsTest, OldestFirstAndReleaseKeepsAge) {
+TEST_F(SqliteJobsTest, ClaimsTheOldestFirstAndReleaseKeepsThePlace) {
     const Collection c = collection();
     EXPECT_FALSE(store_->claimJob().value());
     const Shape a = put(c.id, "a", 1);
@@ -29,7 +29,7 @@ TEST_F(SqliteJobsTest, OldestFirstAndReleaseKeepsAge) {
     EXPECT_EQ(store_->queueDepth()->jobs, 2u);
 }
 
-TEST_F(SqliteJobsTest, FinishMakesReady) {
+TEST_F(SqliteJobsTest, FinishMakesTheShapeReady) {
     const Collection c = collection();
     const Shape shape = put(c.id, "a", 1, {{"label", "cup"}});
     const Job job = claim();
@@ -46,7 +46,7 @@ TEST_F(SqliteJobsTest, FinishMakesReady) {
     expectSound();
 }
 
-TEST_F(SqliteJobsTest, SignaturesAreBytes) {
+TEST_F(SqliteJobsTest, StoresSignaturesAsBytes) {
     const Collection c = collection();
     for (const std::string& bytes : {std::string(), std::string("a\0\xff", 3), std::string(100000, 'x')}) {
         put(c.id, "a", bytes.size() + 50);
@@ -58,7 +58,7 @@ TEST_F(SqliteJobsTest, SignaturesAreBytes) {
     }
 }
 
-TEST_F(SqliteJobsTest, ResultsOfGoneOrReplacedPointsAreDropped) {
+TEST_F(SqliteJobsTest, DropsResultsOfDeletedOrReplacedPoints) {
     const Collection c = collection();
     put(c.id, "a", 1);
     const Job old = claim();
@@ -87,7 +87,7 @@ TEST_F(SqliteJobsTest, WrongSignaturesAreRefused) {
     EXPECT_TRUE(store_->finishJob(job, signatureFor(job)).value());
 }
 
-TEST_F(SqliteJobsTest, JobsThatKillTheServerAreQuarantined) {
+TEST_F(SqliteJobsTest, QuarantinesJobsThatCrashTheServer) {
     const Collection c = collection();
     const Shape bad = put(c.id, "bad", 1);
     finishAll();

@@ -7,7 +7,7 @@
 namespace shapedb::store {
 namespace {
 
-class SqliteCareTest : public StoreTest {
+class SqliteMaintenanceTest : public StoreTest {
   protected:
     void SetUp() override {
         StoreTest::SetUp();
@@ -42,7 +42,7 @@ class SqliteCareTest : public StoreTest {
     std::string backup_ = folder_.file("backup.db");
 };
 
-TEST_F(SqliteCareTest, RestoreBringsBackWhatWasThere) {
+TEST_F(SqliteMaintenanceTest, RestoreReproducesTheContent) {
     const auto before = store_->listShapes(collection_.id, 0, 100, {}).value();
     const auto index = store_->loadIndex(collection_.id, 0, 100).value();
     const std::string file = slurp(backup_);
@@ -73,8 +73,8 @@ TEST_F(SqliteCareTest, RestoreBringsBackWhatWasThere) {
     expectSound();
 }
 
-TEST_F(SqliteCareTest, ResultsInFlightMeetNoRestoredRow) {
-    // Same lineage: after the restore the ids of "later" would come again.
+TEST_F(SqliteMaintenanceTest, DropsResultsInFlightAcrossARestore) {
+    // Same history: without care the ids of "later" would be given out again.
     const Shape later = put(collection_.id, "later", 50);
     finishAll();
     put(collection_.id, "later", 51);
@@ -95,7 +95,7 @@ TEST_F(SqliteCareTest, ResultsInFlightMeetNoRestoredRow) {
     expectSound();
 }
 
-TEST_F(SqliteCareTest, RunningJobsComeBackQueuedAndUntried) {
+TEST_F(SqliteMaintenanceTest, RunningJobsComeBackQueuedAndUntried) {
     claim();
     const std::string path = folder_.file("second.db");
     ASSERT_TRUE(store_->backup(path, {}));
@@ -104,7 +104,7 @@ TEST_F(SqliteCareTest, RunningJobsComeBackQueuedAndUntried) {
     EXPECT_EQ(claim().attempts, 1);
 }
 
-TEST_F(SqliteCareTest, BackupIsOneOrdinaryFile) {
+TEST_F(SqliteMaintenanceTest, BackupIsASingleFile) {
     EXPECT_FAILS(store_->backup(backup_, {}), ErrorCode::kAlreadyExists);
     EXPECT_FAILS(store_->backup(folder_.file("none/x.db"), {}), ErrorCode::kFileNotWritable);
     std::size_t files = 0;
@@ -121,7 +121,7 @@ TEST_F(SqliteCareTest, BackupIsOneOrdinaryFile) {
     EXPECT_TRUE((*opened)->check({})->empty());
 }
 
-TEST_F(SqliteCareTest, RefusesWhatIsNoGoodBackup) {
+TEST_F(SqliteMaintenanceTest, RefusesBadBackups) {
     expectRefused(folder_.file("missing.db"), ErrorCode::kFileNotReadable);
     expectRefused(folder_.file("."), ErrorCode::kFileNotReadable);
     const std::string path = folder_.file("bad.db");
@@ -148,11 +148,11 @@ TEST_F(SqliteCareTest, RefusesWhatIsNoGoodBackup) {
     expectRefused(changed("DELETE FROM signature"), ErrorCode::kMalformedFile);
 }
 
-TEST_F(SqliteCareTest, RefusesAnotherPageSize) {
+TEST_F(SqliteMaintenanceTest, RefusesAnotherPageSize) {
     expectRefused(changed("PRAGMA page_size=8192; VACUUM"), ErrorCode::kMalformedFile);
 }
 
-TEST_F(SqliteCareTest, CancelledLeavesNothing) {
+TEST_F(SqliteMaintenanceTest, CancelledBackupLeavesNothing) {
     // Enough pages for several steps.
     for (int i = 0; i < 8; ++i) {
         const auto big = cloud(200 + i, 20000);
@@ -187,8 +187,8 @@ TEST_F(SqliteCareTest, CancelledLeavesNothing) {
     expectSound();
 }
 
-TEST_F(SqliteCareTest, ReadersSeeTheOldOrTheNew) {
-    // Two contents, told apart by the label of all their shapes, restored in turn.
+TEST_F(SqliteMaintenanceTest, ReadersSeeOldOrNewContent) {
+    // Two contents, restored in turn; the label of their shapes tells which.
     const std::string other = folder_.file("other.db");
     for (int i = 0; i < 6; ++i) put(collection_.id, "k" + std::to_string(i), 10 + i, {{"label", "jug"}});
     ASSERT_TRUE(store_->backup(other, {}));
@@ -222,8 +222,8 @@ TEST_F(SqliteCareTest, ReadersSeeTheOldOrTheNew) {
     expectSound();
 }
 
-TEST_F(SqliteCareTest, BackupBesideWritesIsOneMoment) {
-    // The writer adds pairs; a backup never holds half of what it acknowledged before.
+TEST_F(SqliteMaintenanceTest, BackupBesideWritesIsConsistent) {
+    // A backup has everything that was acknowledged before it started.
     std::atomic<bool> stop{false};
     std::atomic<int> acknowledged{0};
     std::thread writer([&] {
@@ -249,8 +249,8 @@ TEST_F(SqliteCareTest, BackupBesideWritesIsOneMoment) {
     expectSound();
 }
 
-// Each rule of the check, broken on purpose.
-TEST_F(SqliteCareTest, CheckFindsWhatIsBroken) {
+// Breaks each rule of the check.
+TEST_F(SqliteMaintenanceTest, CheckFindsDamage) {
     const std::pair<const char*, const char*> breaks[] = {
         {"UPDATE shape_points SET points = zeroblob(97) WHERE shape_id = 1", "checksum"},
         {"UPDATE shape_points SET points = x'01' WHERE shape_id = 1", "damaged"},

@@ -77,7 +77,7 @@ TEST_F(MigratorTest, RefusesForeignObjects) {
     EXPECT_EQ(refusal({kFirst}), ErrorCode::kDataLoss);
 }
 
-TEST_F(MigratorTest, AFailingMigrationLeavesTheOneBefore) {
+TEST_F(MigratorTest, KeepsEarlierMigrationsWhenOneFails) {
     const Migration broken{2, "0002_broken", "CREATE TABLE b (y INTEGER); INSERT INTO nowhere VALUES (1);"};
     EXPECT_THROW(migrate(*connection_, {kFirst, broken}, 5), Failure);
     EXPECT_EQ(schemaVersion(*connection_), 1);
@@ -86,7 +86,7 @@ TEST_F(MigratorTest, AFailingMigrationLeavesTheOneBefore) {
     EXPECT_EQ(schemaVersion(*connection_), 2);
 }
 
-TEST_F(MigratorTest, TellsForeignFiles) {
+TEST_F(MigratorTest, RecognisesForeignFiles) {
     connection_->execute("CREATE TABLE theirs (x)");
     EXPECT_EQ(identify(*connection_), FileKind::kForeign);
 }

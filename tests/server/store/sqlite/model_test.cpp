@@ -1,5 +1,5 @@
-// The store equals a map: seeded random operations on both, compared as they go, with
-// restarts in between (after leveldb's ModelDB).
+// The store behaves like a map: seeded random operations on both with restarts in between (after
+// leveldb's ModelDB).
 #include <map>
 #include <set>
 
@@ -307,7 +307,7 @@ class ModelTest : public StoreTest, public ::testing::WithParamInterface<int> {
     std::optional<Rebuild> rebuild_;
 };
 
-TEST_P(ModelTest, EqualsAMap) {
+TEST_P(ModelTest, BehavesLikeAMap) {
     random_ = Random(static_cast<std::uint64_t>(GetParam()));
     collection_ = collection();
     for (int step = 0; step < 500 && !HasFatalFailure(); ++step) {

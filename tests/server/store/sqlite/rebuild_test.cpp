@@ -5,7 +5,7 @@ namespace {
 
 class SqliteRebuildTest : public StoreTest {
   protected:
-    /// Results for all that the rebuild still lists.
+    /// Stores results for all shapes that the rebuild still lists.
     void rebuildAll(const Rebuild& rebuild, const std::string& failingKey = "") {
         const auto batch = store_->rebuildBatch(rebuild.id, 0, 1000);
         ASSERT_TRUE(batch) << batch.error().message;
@@ -21,7 +21,7 @@ class SqliteRebuildTest : public StoreTest {
     }
 };
 
-TEST_F(SqliteRebuildTest, OldServesUntilTheFlip) {
+TEST_F(SqliteRebuildTest, OldGenerationServesUntilTheSwitch) {
     const Collection c = collection();
     const Shape a = put(c.id, "a", 1);
     const Shape b = put(c.id, "b", 2);
@@ -79,7 +79,7 @@ TEST_F(SqliteRebuildTest, OldServesUntilTheFlip) {
     expectSound();
 }
 
-TEST_F(SqliteRebuildTest, QueuedShapesDoNotBlockAndServeNothingOld) {
+TEST_F(SqliteRebuildTest, QueuedShapesDoNotBlockTheSwitch) {
     const Collection c = collection();
     const Shape a = put(c.id, "a", 1);
     finishAll();
@@ -92,7 +92,7 @@ TEST_F(SqliteRebuildTest, QueuedShapesDoNotBlockAndServeNothingOld) {
     EXPECT_FAILS(store_->getSignature(a.id), ErrorCode::kNotReady);
     EXPECT_EQ(store_->getShapeById(a.id)->state, ShapeState::kPending);
 
-    // The outdated result is dropped and the job starts over, as if untried.
+    // The outdated result is dropped and the job queued again as if untried.
     EXPECT_FALSE(store_->finishJob(running, signatureFor(running)).value());
     EXPECT_EQ(store_->queueDepth()->jobs, 2u);
     const Job again = claim();
@@ -106,7 +106,7 @@ TEST_F(SqliteRebuildTest, QueuedShapesDoNotBlockAndServeNothingOld) {
     expectSound();
 }
 
-TEST_F(SqliteRebuildTest, OutdatedFailuresAreTriedAgainToo) {
+TEST_F(SqliteRebuildTest, OutdatedFailuresAreTriedAgain) {
     const Collection c = collection();
     put(c.id, "a", 1);
     const Job running = claim();
@@ -128,7 +128,7 @@ TEST_F(SqliteRebuildTest, JobFinishedMeanwhileStillNeedsAResult) {
     rebuildAll(rebuild);
     EXPECT_EQ(store_->getSignature(a.id)->generation, 1);
 
-    // New points take the rebuilt result away again; their job's failure likewise.
+    // New points drop the rebuilt result; so does the failure of their job.
     put(c.id, "a", 2);
     EXPECT_EQ(store_->getRebuild(rebuild.id)->done, 0u);
     ASSERT_TRUE(store_->failJob(claim(), {ErrorCode::kNoInterior, ""}));
@@ -193,7 +193,7 @@ TEST_F(SqliteRebuildTest, AbandonLeavesTheOldGeneration) {
     expectSound();
 }
 
-TEST_F(SqliteRebuildTest, EmptyCollection) {
+TEST_F(SqliteRebuildTest, EmptyCollectionFinishesAtOnce) {
     const Collection c = collection();
     const Rebuild rebuild = store_->startRebuild(c.id, "finer").value();
     EXPECT_TRUE(store_->finishRebuild(rebuild.id).value());

@@ -1,5 +1,7 @@
-// The promises about cost: what must be logarithmic is answered from an index.
+// Query plans: what has to be logarithmic uses an index.
 #include "server/store/sqlite/sql.h"
+
+#include <set>
 
 #include "server/store/sqlite/migrator.h"
 #include "tests/server/store/sqlite/store_fixture.h"
@@ -22,46 +24,25 @@ class SqlitePlanTest : public ::testing::Test {
     Connection connection_{":memory:", OpenMode::kReadWriteCreate, 0};
 };
 
-TEST_F(SqlitePlanTest, NothingHotScansOrSorts) {
-    for (const char* sql : {sql::kCollectionByName,
-                            sql::kCollectionById,
-                            sql::kShapeByKey,
-                            sql::kShapeById,
-                            sql::kListShapes,
-                            sql::kListShapesInState,
-                            sql::kCountShapes,
-                            sql::kCountShapesInState,
-                            sql::kLoadPoints,
-                            sql::kServingSignature,
-                            sql::kPutSignature,
-                            sql::kDeleteSignatures,
-                            sql::kDeleteSignature,
-                            sql::kLoadIndex,
-                            sql::kNextJob,
-                            sql::kStartJob,
-                            sql::kCurrentJob,
-                            sql::kReleaseJob,
-                            sql::kDeleteJob,
-                            sql::kRunningJobs,
-                            sql::kTally,
-                            sql::kRebuildById,
-                            sql::kRunningRebuildOf,
-                            sql::kCountRebuilt,
-                            sql::kCountRebuildFailures,
-                            sql::kRebuildBatch,
-                            sql::kCurrentPoints,
-                            sql::kDeleteRebuildFailuresOfShape,
-                            sql::kSetReadyRebuilt,
-                            sql::kSetFailedRebuilt,
-                            sql::kKeepOneGeneration,
-                            sql::kDropGeneration}) {
-        const std::string lines = plan(sql);
-        EXPECT_EQ(lines.find("SCAN"), std::string::npos) << sql << "\n" << lines;
-        EXPECT_EQ(lines.find("TEMP B-TREE"), std::string::npos) << sql << "\n" << lines;
+/// Few rows, or a total that nobody asks for often.
+bool mayReadAWholeTable(const std::string& name) {
+    static const std::set<std::string> names = {"kListCollections", "kCountCollections", "kRunningRebuilds",
+                                                "kCountStates", "kCountSignatures"};
+    return names.count(name) > 0;
+}
+
+TEST_F(SqlitePlanTest, OnlyNamedStatementsReadWholeTablesOrSort) {
+    for (const sql::Statement& statement : sql::kStatements) {
+        const std::string lines = plan(statement.text);
+        const bool scans = lines.find("SCAN") != std::string::npos;
+        const bool sorts = lines.find("TEMP B-TREE") != std::string::npos;
+        EXPECT_EQ(scans || sorts, mayReadAWholeTable(statement.name))
+            << statement.name << ": " << statement.text << "\n"
+            << lines;
     }
 }
 
-TEST_F(SqlitePlanTest, PagesSeekTheirStart) {
+TEST_F(SqlitePlanTest, PagesStartAtTheirCursor) {
     EXPECT_NE(plan(sql::kListShapes).find("shape_by_collection (collection_id=? AND rowid>?)"),
               std::string::npos)
         << plan(sql::kListShapes);
@@ -77,8 +58,8 @@ TEST_F(SqlitePlanTest, PagesSeekTheirStart) {
     EXPECT_NE(plan(sql::kNextJob).find("job_by_state (state=?)"), std::string::npos) << plan(sql::kNextJob);
 }
 
-// A check that can fail: an index taken away shows.
-TEST_F(SqlitePlanTest, AMissingIndexWouldShow) {
+// The checks above can fail: without its index the statement scans.
+TEST_F(SqlitePlanTest, ADroppedIndexShowsInThePlan) {
     connection_.execute("DROP INDEX job_by_state");
     EXPECT_NE(plan(sql::kNextJob).find("SCAN"), std::string::npos) << plan(sql::kNextJob);
 }

@@ -126,8 +126,8 @@ TEST_F(SqliteStoreTest, TextKeepsEveryByte) {
     EXPECT_EQ(back.metadata, (Metadata{{odd, odd}, {"", ""}}));
 }
 
-/// While it lives, no file of this process may grow past `bytes`: the nearest to a full
-/// device that needs no root.
+/// While it lives, no file of this process may grow beyond `bytes`: imitates a full device without
+/// root.
 class FileSizeLimit {
   public:
     explicit FileSizeLimit(rlim_t bytes) {
@@ -171,7 +171,7 @@ TEST_F(SqliteStoreTest, FullDeviceStoresNothingAndRecovers) {
     EXPECT_FALSE(std::filesystem::exists(folder_.file("too-big.db")));
 }
 
-TEST_F(SqliteStoreTest, TheLogStaysSmall) {
+TEST_F(SqliteStoreTest, WriteAheadLogStaysSmall) {
     const Collection c = collection();
     std::uint64_t largest = 0;
     for (std::uint64_t i = 0; i < 25; ++i) {

@@ -1,7 +1,6 @@
-// What the store tests share: a private folder, a database in it, small clouds.
+// Fixtures of the store tests: a private folder with a database, small clouds.
 #pragma once
 
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -10,11 +9,11 @@
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "common/sha256.h"
 #include "core/base/random.h"
 #include "server/store/sqlite/sqlite_store.h"
+#include "tests/support/temporary_directory.h"
 
 namespace shapedb::store {
 
@@ -29,19 +28,16 @@ inline Checksum checksumOf(const std::vector<float>& points) {
     return sha256(points.data(), points.size() * sizeof(float));
 }
 
-/// The request keeps a pointer to `points`.
 inline PutRequest request(std::int64_t collectionId, const std::string& key, const std::vector<float>& points,
                           Metadata metadata = {}) {
-    PutRequest put;
+    PutRequest put(VerifiedScan::verify(points).value());
     put.collectionId = collectionId;
     put.key = key;
-    put.points = &points;
-    put.checksum = checksumOf(points);
     put.metadata = std::move(metadata);
     return put;
 }
 
-/// A signature that names what it was made of, so that a mix-up shows.
+/// Names what it was made of, so that a mix-up shows.
 inline SignatureRow signatureFor(std::int64_t shapeId, std::int64_t pointsVersion, std::int64_t generation) {
     return {shapeId, pointsVersion, generation,
             "signature of " + std::to_string(shapeId) + "/" + std::to_string(pointsVersion) + "/" +
@@ -68,23 +64,7 @@ inline void spill(const std::string& path, const std::string& bytes) {
     std::ofstream(path, std::ios::binary | std::ios::trunc) << bytes;
 }
 
-class Folder {
-  public:
-    Folder() {
-        std::string pattern = (std::filesystem::temp_directory_path() / "shapedb-store-XXXXXX").string();
-        path_ = mkdtemp(pattern.data());
-    }
-    ~Folder() {
-        std::error_code ignored;
-        std::filesystem::remove_all(path_, ignored);
-    }
-    Folder(const Folder&) = delete;
-    Folder& operator=(const Folder&) = delete;
-    std::string file(const std::string& name) const { return path_ + "/" + name; }
-
-  private:
-    std::string path_;
-};
+using Folder = testing::TemporaryDirectory;
 
 class StoreTest : public ::testing::Test {
   protected:
@@ -119,7 +99,7 @@ class StoreTest : public ::testing::Test {
         EXPECT_TRUE(job && *job);
         return job && *job ? **job : Job{};
     }
-    /// Ends all queued jobs well.
+    /// Finishes all queued jobs with a signature.
     void finishAll() {
         while (true) {
             auto job = store_->claimJob();

@@ -1,0 +1,46 @@
+// Memory for the cells of a triangulation and their cached balls.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+
+#include "core/base/large_block.h"
+#include "core/delaunay/cell.h"
+#include "core/delaunay/delaunay_ball.h"
+
+namespace shapedb {
+
+/// Two arrays, indexed by cell: cells and balls. They are handed out from the front and never shrink; pages
+/// not yet reached take no memory.
+///
+/// Thread-safety: `take` may be called concurrently, `reserve` and the recyclers only while nobody else uses
+/// the store. Different cells may be written by different threads.
+class CellStore {
+  public:
+    /// Makes room for at least `capacity` cells, keeping those in use. Throws std::bad_alloc.
+    void reserve(std::size_t capacity);
+    /// The first of `count` consecutive cells, uninitialised; kNoCell when there is no room.
+    std::uint32_t take(std::uint32_t count);
+
+    Cell& operator[](std::uint32_t i) { return cells_[i]; }
+    const Cell& operator[](std::uint32_t i) const { return cells_[i]; }
+    DelaunayBall& ball(std::uint32_t i) { return balls_[i]; }
+    const DelaunayBall& ball(std::uint32_t i) const { return balls_[i]; }
+
+    std::size_t used() const { return used_.load(std::memory_order_relaxed); }
+    std::size_t capacity() const { return capacity_; }
+
+    /// Give up the balls once no more points go in, and the cells once they have been copied.
+    PageRecycler recycleBalls() { return PageRecycler(std::move(balls_)); }
+    PageRecycler recycleCells() { return PageRecycler(std::move(cells_)); }
+
+  private:
+    LargeBlock<Cell> cells_;
+    LargeBlock<DelaunayBall> balls_;
+    std::atomic<std::size_t> used_{0};
+    std::size_t capacity_ = 0;
+};
+
+}  // namespace shapedb

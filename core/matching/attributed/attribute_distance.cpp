@@ -1,0 +1,167 @@
+#include "core/matching/attributed/attribute_distance.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace shapedb {
+
+namespace {
+
+// What two unrelated shapes differ by: medians over pairs of different synthetic families
+// (`shapedb-bench typical`). It gives every term an equal say, whatever the number of its bins.
+constexpr std::array<double, kStatisticKinds> kTypical{2.17, 3.24, 3.93, 1.10, 4.62,
+                                                       1.27, 4.20, 1.69, 2.95, 0.76};
+constexpr double kTypicalDisagreement = 0.9;
+
+// How much a term counts where the interior is reliable and where it is not: the scan then shows one
+// side of the surface, or thin parts in noise. One side of a surface has the same outline as both, as
+// it lies, and nearly the same distances.
+struct EvidenceWeight {
+    double reliable;
+    double unreliable;
+};
+constexpr EvidenceWeight weightOf(Evidence evidence) {
+    switch (evidence) {
+        case Evidence::kInside: return {1.0, 0.01};
+        case Evidence::kSurface: return {1.0, 0.5};
+        case Evidence::kOutline: return {0.5, 1.0};
+    }
+    return {1.0, 1.0};
+}
+
+// Partial: how much the contained parts count against how much the two look alike. An unreliable
+// interior is cut into other segments than that of the whole.
+constexpr EvidenceWeight kContainedWeight{0.5, 0.25};
+
+// The parts say both which parts there are and where they lie: as much as two statistics.
+constexpr double kPartsWeight = 2.0;
+
+// The distance, in units of what unrelated shapes differ by, at which the score is 0.5.
+constexpr double kHalfWay = 0.5;
+
+double scoreOf(double distance) {
+    const double d = distance / kHalfWay;
+    return 1.0 / (1.0 + d * d);
+}
+
+// An interior of this quality is fully trusted. Below, trust falls fast: a thickness that is off by
+// half makes its histograms useless.
+constexpr double kTrustedQuality = 0.5;
+
+double trust(std::uint8_t qualityA, std::uint8_t qualityB) {
+    const double worse = std::min(qualityA, qualityB) / 255.0;
+    const double share = std::min(1.0, worse / kTrustedQuality);
+    return share * share * share * share;
+}
+
+double between(const EvidenceWeight& weight, double trust) {
+    return trust * weight.reliable + (1.0 - trust) * weight.unreliable;
+}
+
+double termWeight(std::size_t kind, double trust) {
+    return between(weightOf(kStatistics[kind].evidence), trust);
+}
+
+double termDistance(const LevelSums& sums, std::size_t kind) {
+    return sums[kind] * kRootPerLevel / kTypical[kind];
+}
+
+double disagreement(double agreement) { return std::max(0.0, 1.0 - agreement) / kTypicalDisagreement; }
+
+double meanDistance(const AttributeDistance& distance, double agreement) {
+    return (distance.statistics + distance.partsWeight * disagreement(agreement)) / distance.totalWeight;
+}
+
+}  // namespace
+
+std::array<double, kStatisticKinds + 1> typicalDifferences() noexcept {
+    std::array<double, kStatisticKinds + 1> differences{};
+    std::copy(kTypical.begin(), kTypical.end(), differences.begin());
+    differences.back() = kTypicalDisagreement;
+    return differences;
+}
+
+double statisticsDistance(const LevelSums& sums, std::uint8_t qualityA, std::uint8_t qualityB) {
+    const double interior = trust(qualityA, qualityB);
+    double distance = 0.0;
+    for (std::size_t kind = 0; kind < kStatisticKinds; ++kind) {
+        distance += termWeight(kind, interior) * termDistance(sums, kind);
+    }
+    return distance;
+}
+
+AttributeDistance attributeDistance(double statistics, std::uint8_t qualityA, std::uint8_t qualityB,
+                                    double octaves) {
+    const double interior = trust(qualityA, qualityB);
+    AttributeDistance result;
+    result.statistics = statistics;
+    for (std::size_t kind = 0; kind < kStatisticKinds; ++kind) {
+        result.totalWeight += termWeight(kind, interior);
+    }
+    result.partsWeight = kPartsWeight * between(weightOf(Evidence::kInside), interior);
+    result.totalWeight += result.partsWeight;
+    result.containedWeight = between(kContainedWeight, interior);
+    result.scale = octaves;
+    return result;
+}
+
+double attributeScore(const AttributeDistance& distance, double agreement) {
+    return scoreOf(std::hypot(meanDistance(distance, agreement), distance.scale));
+}
+
+double partialScore(const AttributeDistance& distance, double agreement, double share) {
+    return scoreOf((1.0 - distance.containedWeight) * meanDistance(distance, agreement) +
+                   distance.containedWeight * disagreement(share));
+}
+
+LevelWeights levelWeights(std::uint8_t qualityA, std::uint8_t qualityB) {
+    const double interior = trust(qualityA, qualityB);
+    LevelWeights weights;
+    double total = kPartsWeight * between(weightOf(Evidence::kInside), interior);
+    for (std::size_t kind = 0; kind < kStatisticKinds; ++kind) {
+        weights.perLevel[kind] = termWeight(kind, interior) * kRootPerLevel / kTypical[kind];
+        total += termWeight(kind, interior);
+    }
+    for (double& weight : weights.perLevel) weight /= total;
+    weights.partial = 1.0 - between(kContainedWeight, interior);
+    return weights;
+}
+
+double maxDistanceForScore(double score) {
+    // Near 1, a rounding difference in the score is one of 1e-8 in the distance.
+    return score > 0.0 ? kHalfWay * std::sqrt(std::max(0.0, 1.0 / score - 1.0)) * (1.0 + 1e-9) + 1e-7
+                       : INFINITY;
+}
+
+double maxScoreAtDistance(double distance) {
+    // At distance 0 it may be the shape itself.
+    return distance > 0.0 ? std::min(1.0, scoreOf(distance) * (1.0 + 1e-9)) : 1.0;
+}
+
+double octavesBetween(double scaleA, double scaleB) {
+    return std::abs(std::log2(std::max(scaleA, scaleB) / std::min(scaleA, scaleB)));
+}
+
+std::vector<ScoreTerm> scoreTerms(const LevelSums& sums, std::uint8_t qualityA, std::uint8_t qualityB,
+                                  double agreement) {
+    const double interior = trust(qualityA, qualityB);
+    const AttributeDistance distance = attributeDistance(0.0, qualityA, qualityB, 0.0);
+    std::vector<ScoreTerm> terms;
+    for (std::size_t kind = 0; kind < kStatisticKinds; ++kind) {
+        terms.push_back({kStatistics[kind].name, termDistance(sums, kind),
+                         termWeight(kind, interior) / distance.totalWeight});
+    }
+    terms.push_back({"parts", disagreement(agreement), distance.partsWeight / distance.totalWeight});
+    return terms;
+}
+
+std::vector<ScoreTerm> partialTerms(const LevelSums& sums, std::uint8_t qualityA, std::uint8_t qualityB,
+                                    double agreement, double share) {
+    std::vector<ScoreTerm> terms = scoreTerms(sums, qualityA, qualityB, agreement);
+    const double contained = between(kContainedWeight, trust(qualityA, qualityB));
+    for (ScoreTerm& term : terms) term.weight *= 1.0 - contained;
+    terms.push_back({"contained parts", disagreement(share), contained});
+    return terms;
+}
+
+}  // namespace shapedb

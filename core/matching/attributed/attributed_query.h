@@ -1,0 +1,46 @@
+// A query with attributes, prepared to be compared with many shapes.
+#pragma once
+
+#include "core/matching/attributed/attribute_distance.h"
+#include "core/matching/attributed/packed_statistics.h"
+#include "core/matching/attributed/segment_span.h"
+#include "core/matching/shape_row.h"
+
+namespace shapedb {
+
+/// The sums of both halves, by Statistic.
+[[nodiscard]] inline LevelSums joined(const HalfSums& first, const HalfSums& second) {
+    LevelSums sums;
+    for (std::size_t s = 0; s < kKindsPerHalf; ++s) {
+        sums[static_cast<std::size_t>(kFirstHalf[s])] = static_cast<std::uint16_t>(first[s]);
+        sums[static_cast<std::size_t>(kSecondHalf[s])] = static_cast<std::uint16_t>(second[s]);
+    }
+    return sums;
+}
+
+/// Immutable, thread-safe.
+class AttributedQuery {
+  public:
+    explicit AttributedQuery(const Signature& signature)
+        : signature_(signature),
+          packed_(signature),
+          segments_(packed_.row()),
+          difference_(*packed_.row().firstHalf, *packed_.row().secondHalf) {}
+
+    [[nodiscard]] const Signature& signature() const { return signature_; }
+    [[nodiscard]] ShapeRow row() const { return packed_.row(); }
+    [[nodiscard]] const SegmentArray& segments() const { return segments_; }
+    [[nodiscard]] std::uint8_t quality() const { return signature_.attributes->quality; }
+    [[nodiscard]] const StatisticsDifference& difference() const { return difference_; }
+
+    /// Of an attributed shape.
+    [[nodiscard]] LevelSums levelSums(const ShapeRow& shape) const;
+
+  private:
+    Signature signature_;
+    PackedShape packed_;
+    SegmentArray segments_;
+    StatisticsDifference difference_;
+};
+
+}  // namespace shapedb

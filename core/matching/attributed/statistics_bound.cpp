@@ -1,0 +1,64 @@
+#include "core/matching/attributed/statistics_bound.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace shapedb {
+
+namespace {
+
+constexpr std::size_t kQualities = 256;
+constexpr std::size_t kRowsAtOnce = 256;  // their sums fit the first-level cache
+
+double weighted(const HalfSums& sums, const std::array<double, kKindsPerHalf>& weights) {
+    double sum = 0.0;
+    for (std::size_t s = 0; s < kKindsPerHalf; ++s) sum += weights[s] * sums[s];
+    return sum;
+}
+
+}  // namespace
+
+StatisticsBound::StatisticsBound(const AttributedQuery& query, StatisticsRule rule)
+    : query_(query),
+      queryScale_(query.signature().scale),
+      compareSizes_(rule == StatisticsRule::kWholeAndSize),
+      first_(kQualities),
+      second_(kQualities) {
+    for (std::size_t quality = 0; quality < kQualities; ++quality) {
+        const LevelWeights weights = levelWeights(query.quality(), static_cast<std::uint8_t>(quality));
+        const double share = rule == StatisticsRule::kPartial ? weights.partial : 1.0;
+        for (std::size_t s = 0; s < kKindsPerHalf; ++s) {
+            first_[quality][s] = share * weights.perLevel[static_cast<std::size_t>(kFirstHalf[s])];
+            second_[quality][s] = share * weights.perLevel[static_cast<std::size_t>(kSecondHalf[s])];
+        }
+    }
+}
+
+void StatisticsBound::scan(const ShapeRows& rows, const std::vector<std::uint8_t>& wanted, double least,
+                           std::vector<Survivor>& left, ScanCounts& counts) const {
+    if (rows.attributedCount == 0) return;
+    const double farthest = maxDistanceForScore(least);
+    const bool all = rows.attributedCount == rows.count;
+    std::array<HalfSums, kRowsAtOnce> sums;
+    for (std::size_t begin = 0; begin < rows.count; begin += kRowsAtOnce) {
+        const std::size_t count = std::min(kRowsAtOnce, rows.count - begin);
+        query_.difference().first(rows.firstHalves + begin, count, sums.data());
+        for (std::size_t i = 0; i < count; ++i) {
+            const std::size_t row = begin + i;
+            const std::uint8_t quality = rows.qualities[row];
+            double distance = weighted(sums[i], first_[quality]);
+            if (distance > farthest) continue;
+            if ((!wanted.empty() && wanted[row] == 0) || (!all && !rows.attributed(row))) continue;
+            ++counts.afterFirstHalf;
+            const HalfSums rest = query_.difference().second(rows.secondHalves[row]);
+            distance += weighted(rest, second_[quality]);
+            if (compareSizes_) distance = std::hypot(distance, octavesBetween(queryScale_, rows.scales[row]));
+            if (distance > farthest) continue;
+            ++counts.afterStatistics;
+            left.push_back(
+                {maxScoreAtDistance(distance), static_cast<std::uint32_t>(row), joined(sums[i], rest)});
+        }
+    }
+}
+
+}  // namespace shapedb

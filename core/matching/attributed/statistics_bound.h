@@ -1,0 +1,40 @@
+// The first rungs of the ladder of bounds: which rows the statistics alone rule out.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "core/matching/attributed/attributed_query.h"
+#include "core/matching/scorer.h"
+
+namespace shapedb {
+
+/// What of a score the statistics bound.
+enum class StatisticsRule {
+    kWhole,         ///< the mean distance
+    kWholeAndSize,  ///< with the difference of sizes
+    kPartial,       ///< the share of the mean distance beside the contained parts
+};
+
+/// Bounds of many rows against one query. Immutable, thread-safe; `query` must outlive it.
+class StatisticsBound {
+  public:
+    StatisticsBound(const AttributedQuery& query, StatisticsRule rule);
+
+    /// As Scorer::scan, of the attributed rows: those that could score `least` if the rest of them
+    /// agreed fully. Survivor::known are the LevelSums.
+    void scan(const ShapeRows& rows, const std::vector<std::uint8_t>& wanted, double least,
+              std::vector<Survivor>& left, ScanCounts& counts) const;
+
+  private:
+    using HalfWeights = std::array<double, kKindsPerHalf>;
+
+    const AttributedQuery& query_;
+    double queryScale_;
+    bool compareSizes_;
+    std::vector<HalfWeights> first_, second_;  // by the quality of the row
+};
+
+}  // namespace shapedb

@@ -1,0 +1,24 @@
+#!/usr/bin/env bash
+# Everything that is too slow for every change. Runs all lanes, even after one has failed, and says which failed.
+#   scripts/ci/nightly.sh [LANE]...    sanitize, threads, bench, tidy, fuzz, mutate; all by default
+set -uo pipefail
+cd "$(dirname "$0")/../.."
+lanes=("$@")
+[ ${#lanes[@]} -gt 0 ] || lanes=(sanitize threads bench tidy fuzz mutate)
+
+failed=()
+for lane in "${lanes[@]}"; do
+  echo "== $lane"
+  case "$lane" in
+    sanitize) scripts/ci/sanitize.sh address,undefined ;;
+    threads) scripts/ci/sanitize.sh thread ;;
+    bench) scripts/ci/bench.sh ;;
+    tidy) scripts/ci/tidy.sh ;;
+    fuzz) scripts/ci/fuzz.sh 600 ;;
+    # Another part of the mutants each day. Survivors are printed, not failures.
+    mutate) scripts/mutate.sh --seed "$(date +%j)" ;;
+    *) echo "nightly: unknown lane $lane" >&2; exit 2 ;;
+  esac || failed+=("$lane")
+done
+[ ${#failed[@]} -eq 0 ] || { echo "nightly: failed: ${failed[*]}" >&2; exit 1; }
+echo "nightly: all lanes passed"

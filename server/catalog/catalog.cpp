@@ -1,0 +1,209 @@
+// Start and stop, collections, rebuilds, backup and restore; shapes.cpp has the shapes.
+#include "server/catalog/catalog.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/base/return_if_error.h"
+#include "server/catalog/limits.h"
+#include "server/catalog/request_checks.h"
+#include "server/store/parameters_codec.h"
+
+namespace shapedb::catalog {
+
+namespace {
+
+/// Requests that name no collection mean this one.
+Result<void> ensureDefaultCollection(store::Store& store) {
+    const auto created =
+        store.createCollection(kDefaultCollection, "Used by requests that name no collection.",
+                               store::encodeParameters(parametersOf(Profile::kDefault)));
+    if (!created && created.error().code != ErrorCode::kAlreadyExists) return fail(created.error());
+    return {};
+}
+
+}  // namespace
+
+Catalog::Catalog(std::unique_ptr<store::Store> store, ingest::SignaturePipeline pipeline,
+                 telemetry::LoggerPtr log, CatalogOptions options)
+    : log_(std::move(log)),
+      options_(std::move(options)),
+      store_(std::move(store)),
+      pipeline_(std::move(pipeline)),
+      index_(*store_, log_),
+      workers_(*store_, index_, board_, isolation_, pipeline_, log_, options_.workers),
+      rebuilds_(*store_, index_, workers_, isolation_, pipeline_, log_, options_.rebuilds),
+      slots_(options_.segmentations) {}
+
+Catalog::~Catalog() = default;
+
+Result<void> Catalog::start() {
+    RETURN_IF_ERROR(ensureDefaultCollection(*store_));
+    const auto began = std::chrono::steady_clock::now();
+    RETURN_IF_ERROR(index_.loadAll());
+    const auto totals = index_.totals();
+    log_->info(
+        "index loaded",
+        {{"signatures", totals.signatures},
+         {"bytes", totals.bytes},
+         {"seconds", std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count()}});
+    RETURN_IF_ERROR(workers_.start());
+    return rebuilds_.start();
+}
+
+Result<void> Catalog::stop() {
+    rebuilds_.stop();
+    workers_.stop();
+    return store_->checkpoint();
+}
+
+// Collections ----------------------------------------------------------------------------
+
+Result<index::SnapshotPtr> Catalog::collection(const std::string& name) const {
+    return index_.byName(collectionNameOrDefault(name));
+}
+
+std::vector<index::SnapshotPtr> Catalog::collections() const { return index_.all(); }
+
+Result<ShapeCounts> Catalog::countShapes(const index::Snapshot& collection) {
+    const auto count = [&](std::optional<store::ShapeState> state) {
+        return store_->countShapes(collection.collection.id, {state, nullptr});
+    };
+    const auto all = count(std::nullopt);
+    RETURN_IF_ERROR(all);
+    const auto ready = count(store::ShapeState::kReady);
+    RETURN_IF_ERROR(ready);
+    const auto failed = count(store::ShapeState::kFailed);
+    RETURN_IF_ERROR(failed);
+    return ShapeCounts{*all, *ready, *failed};
+}
+
+Result<index::SnapshotPtr> Catalog::createCollection(const std::string& name, const std::string& description,
+                                                     const ShapeParameters& parameters) {
+    RETURN_IF_ERROR(checkCollectionName(name));
+    RETURN_IF_ERROR(checkDescription(description));
+    const RestoreGate::Write write(restores_);
+    const auto created = store_->createCollection(name, description, store::encodeParameters(parameters));
+    RETURN_IF_ERROR(created);
+    return index_.add(*created);
+}
+
+Result<void> Catalog::deleteCollection(const std::string& name, bool force) {
+    RETURN_IF_ERROR(checkCollectionName(name));
+    const RestoreGate::Write write(restores_);
+    const auto found = index_.byName(name);
+    RETURN_IF_ERROR(found);
+    const store::Collection& collection = (*found)->collection;
+    if (!force) {
+        const auto shapes = store_->countShapes(collection.id, {});
+        RETURN_IF_ERROR(shapes);
+        if (*shapes > 0) {
+            return fail(ErrorCode::kRejected, "collection '" + collection.name + "' holds " +
+                                                  std::to_string(*shapes) +
+                                                  " shapes: delete them first, or set force");
+        }
+    }
+    const auto cancelled = rebuilds_.cancel(collection);
+    if (!cancelled && cancelled.error().code != ErrorCode::kNotFound) return cancelled;
+    RETURN_IF_ERROR(store_->deleteCollection(collection.id));
+    index_.remove(collection.id);
+    workers_.supersedeCollection(collection.id);
+    return {};
+}
+
+Result<index::SnapshotPtr> Catalog::reload(const index::Snapshot& collection) {
+    RETURN_IF_ERROR(index_.reload(collection.collection.id));
+    return index_.byId(collection.collection.id);
+}
+
+// Rebuilds -------------------------------------------------------------------------------
+
+Result<store::Rebuild> Catalog::beginRebuild(const index::Snapshot& collection,
+                                             const ShapeParameters& parameters) {
+    const RestoreGate::Write write(restores_);
+    return rebuilds_.begin(collection.collection, parameters);
+}
+
+Result<void> Catalog::cancelRebuild(const std::string& name) {
+    const RestoreGate::Write write(restores_);
+    const auto found = collection(name);
+    RETURN_IF_ERROR(found);
+    return rebuilds_.cancel((*found)->collection);
+}
+
+Result<void> Catalog::followRebuild(const std::string& collection, store::Rebuild rebuild,
+                                    const RunContext& context, const Checkpoint& checkpoint,
+                                    const std::function<Result<void>(const store::Rebuild&)>& onChange) {
+    RunContext briefly = context;
+    for (;;) {
+        RETURN_IF_ERROR(onChange(rebuild));
+        switch (rebuild.state) {
+            case store::RebuildState::kRunning: break;
+            case store::RebuildState::kDone: return {};
+            case store::RebuildState::kCancelled:
+                return fail(ErrorCode::kCancelled,
+                            "the rebuild of collection '" + collection + "' was cancelled");
+            case store::RebuildState::kFailed:
+                return fail(ErrorCode::kInternal,
+                            "the rebuild of collection '" + collection + "' failed: see the log");
+        }
+        for (bool waiting = true; waiting;) {
+            RETURN_IF_ERROR(checkpoint());
+            briefly.deadline = std::min(context.deadline, RunContext::Clock::now() + kProgressInterval);
+            const auto changed = rebuilds_.waitForChange(rebuild, briefly);
+            if (changed) {
+                rebuild = *changed;
+                waiting = false;
+            } else if (changed.error().code != ErrorCode::kDeadlineExceeded) {
+                return fail(changed.error());
+            }
+        }
+    }
+}
+
+// The whole database ---------------------------------------------------------------------
+
+Result<void> Catalog::backup(const std::string& path, const RunContext& context) {
+    return store_->backup(path, context);
+}
+
+Result<std::vector<std::string>> Catalog::check(const RunContext& context) { return store_->check(context); }
+
+Result<void> Catalog::restore(const std::string& path, const RunContext& context) {
+    RETURN_IF_ERROR(restores_.beginRestore());
+    Result<void> restored = restoreExclusively(path, context);
+    restores_.endRestore();
+    return restored;
+}
+
+Result<void> Catalog::restoreExclusively(const std::string& path, const RunContext& context) {
+    const auto exclusive = restores_.exclusive();
+    rebuilds_.pause();
+    workers_.pause();
+    Result<void> restored = store_->restore(path, context);
+    if (restored) {
+        restores_.replaced();
+        restored = index_.loadAll();
+    }
+    // Whatever happened: work continues on what the store holds now.
+    const auto workers = workers_.resume();
+    const auto rebuilds = rebuilds_.resume();
+    if (!restored) return restored;
+    return workers ? rebuilds : workers;
+}
+
+Result<CatalogStats> Catalog::stats() {
+    const auto stored = store_->stats();
+    RETURN_IF_ERROR(stored);
+    const auto depth = store_->queueDepth();
+    RETURN_IF_ERROR(depth);
+    CatalogStats stats;
+    stats.store = *stored;
+    stats.queue = *depth;
+    stats.index = index_.totals();
+    stats.running = workers_.running();
+    stats.ingested = workers_.ingested();
+    return stats;
+}
+
+}  // namespace shapedb::catalog

@@ -1,0 +1,226 @@
+// The shapes and collections of a server: store, index, workers and rebuilds, and every rule about
+// what must happen together when one of them changes.
+//
+// Handlers of any transport validate and convert their messages, call the catalog and convert what
+// it returns. It knows no transport and no database.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/metadata.h"
+#include "core/base/run_context.h"
+#include "server/catalog/gates.h"
+#include "server/index/collection_index.h"
+#include "server/ingest/crash_isolation.h"
+#include "server/ingest/progress_board.h"
+#include "server/ingest/rebuild_driver.h"
+#include "server/ingest/signature_pipeline.h"
+#include "server/ingest/worker_pool.h"
+#include "server/store/store.h"
+#include "server/telemetry/logger.h"
+
+namespace shapedb::catalog {
+
+struct CatalogOptions {
+    std::uint64_t maxQueuedJobs = 0;   ///< as store::PutRequest
+    std::uint64_t maxQueuedBytes = 0;  ///< as store::PutRequest
+    int segmentations = 1;             ///< for callers, at a time
+    ingest::WorkerOptions workers;
+    ingest::RebuildOptions rebuilds;
+};
+
+/// A shape and the collection it was looked up in.
+struct FoundShape {
+    index::SnapshotPtr collection;
+    store::Shape shape;
+
+    /// As `qualityIn` its collection.
+    [[nodiscard]] std::optional<double> quality() const;
+};
+
+/// What a client says about a scan it adds.
+struct ShapeHeader {
+    std::string collection;  ///< empty: the default collection
+    std::string key;
+    store::PutMode mode = store::PutMode::kUpsert;
+    std::optional<std::int64_t> expectedVersion;
+    Metadata metadata;
+};
+
+struct AddedShape {
+    store::PutOutcome outcome = store::PutOutcome::kCreated;
+    store::Shape shape;
+    std::string collection;
+};
+
+/// A stored scan, segmented again.
+struct DescribedScan {
+    std::vector<float> points;  ///< packed, in the order of the upload
+    Description description;
+};
+
+struct ShapeCounts {
+    std::uint64_t all = 0;
+    std::uint64_t ready = 0;
+    std::uint64_t failed = 0;
+};
+
+struct CatalogStats {
+    store::StoreStats store;
+    store::QueueDepth queue;
+    index::CollectionIndex::Totals index;
+    std::uint64_t running = 0;   ///< jobs
+    std::uint64_t ingested = 0;  ///< jobs since start that ended in a signature
+};
+
+/// How well the interior of a shape was determined, in [0, 1]; empty when searches do not find the
+/// shape or its profile does not tell.
+[[nodiscard]] std::optional<double> qualityIn(const SignatureSet& signatures, std::int64_t shapeId);
+
+/// Called again and again while a caller waits; an error ends the waiting and is returned.
+using Checkpoint = std::function<Result<void>()>;
+
+/// Thread-safe between `start` and `stop`, which belong to one thread. Errors of the store (store.h)
+/// are possible everywhere and not repeated.
+class Catalog {
+  public:
+    Catalog(std::unique_ptr<store::Store> store, ingest::SignaturePipeline pipeline, telemetry::LoggerPtr log,
+            CatalogOptions options);
+    /// As `stop`, without the checkpoint.
+    ~Catalog();
+
+    /// Creates the default collection if it is missing, loads the index and starts the workers and
+    /// the rebuilds that a dead process left. Call once.
+    [[nodiscard]] Result<void> start();
+    /// Stops rebuilds and workers (their jobs return to the queue) and checkpoints the store.
+    [[nodiscard]] Result<void> stop();
+
+    // Collections ------------------------------------------------------------------
+
+    /// The default collection for an empty name. Errors: kNotFound.
+    [[nodiscard]] Result<index::SnapshotPtr> collection(const std::string& name) const;
+    /// By name.
+    [[nodiscard]] std::vector<index::SnapshotPtr> collections() const;
+    [[nodiscard]] Result<ShapeCounts> countShapes(const index::Snapshot& collection);
+    /// Errors: kInvalidArgument (name, description), kAlreadyExists.
+    [[nodiscard]] Result<index::SnapshotPtr> createCollection(const std::string& name,
+                                                              const std::string& description,
+                                                              const ShapeParameters& parameters);
+    /// Cancels its rebuild and stops its workers. There is no default name: nobody deletes a
+    /// collection by forgetting to name it. Errors: kInvalidArgument (name), kNotFound; kRejected: it
+    /// has shapes and `force` is not set.
+    [[nodiscard]] Result<void> deleteCollection(const std::string& name, bool force);
+    /// Reads the stored signatures again; nothing is segmented. Errors: kNotFound.
+    [[nodiscard]] Result<index::SnapshotPtr> reload(const index::Snapshot& collection);
+
+    // Shapes -----------------------------------------------------------------------
+
+    /// Errors: kInvalidArgument (key), kNotFound.
+    [[nodiscard]] Result<FoundShape> findShape(const index::SnapshotPtr& collection, const std::string& key);
+    /// Errors: kNotFound.
+    [[nodiscard]] Result<store::Shape> shapeById(std::int64_t shapeId);
+    /// As store::Store.
+    [[nodiscard]] Result<std::vector<store::Shape>> listShapes(std::int64_t collectionId,
+                                                               std::int64_t afterId, std::size_t limit,
+                                                               const store::ShapeFilter& filter);
+    [[nodiscard]] Result<std::uint64_t> countShapes(std::int64_t collectionId,
+                                                    const store::ShapeFilter& filter);
+
+    /// Refuses what `put` would refuse, before the points are sent. Errors: kInvalidArgument (key,
+    /// metadata, expected version), kNotFound (collection), kUnavailable (a restore is running).
+    [[nodiscard]] Result<void> admitUpload(const ShapeHeader& header) const;
+    /// Stores a scan, queues it, stops workers that have older points and makes searches see new
+    /// metadata. Errors: kNotFound (collection), those of store::Store::putShape.
+    [[nodiscard]] Result<AddedShape> put(const ShapeHeader& header, store::VerifiedScan scan);
+    /// After kQueueFull: when to try again.
+    [[nodiscard]] std::chrono::milliseconds retryAfterQueueFull();
+    /// Deletes a shape, stops its worker and removes it from searches. Returns it as it was. Errors:
+    /// kInvalidArgument (key), kNotFound, kVersionConflict.
+    [[nodiscard]] Result<FoundShape> deleteShape(const std::string& collection, const std::string& key,
+                                                 std::optional<std::int64_t> expectedVersion);
+
+    /// Follows a shape until it is no longer pending, and if it is ready, until searches find it. Calls
+    /// `onChange` with its row and its progress, at once and after each change. Returns the final row.
+    /// Errors: kNotFound (deleted meanwhile); those of `onChange` and `checkpoint`.
+    [[nodiscard]] Result<store::Shape> followIngest(
+        std::int64_t shapeId, const Checkpoint& checkpoint,
+        const std::function<Result<void>(const store::Shape&, const ingest::ProgressBoard::Status&)>&
+            onChange);
+    /// `followIngest` for a shape that was just added. Its errors say that the scan was stored.
+    [[nodiscard]] Result<store::Shape> awaitIngest(const store::Shape& added, const Checkpoint& checkpoint);
+
+    /// The signature of a shape that searches of its collection find. Errors: kNotReady, saying whether
+    /// it is pending, why it failed, or that a rebuild is being put in place; kDataLoss.
+    [[nodiscard]] Result<Signature> signature(const FoundShape& found);
+    /// The signature behind a hit, with what the index leaves out. Errors: kNotFound, kNotReady (also:
+    /// of another generation than `searched`), kDataLoss.
+    [[nodiscard]] Result<Signature> storedSignature(const index::Snapshot& searched, std::int64_t shapeId);
+    /// `qualityIn` the shape's collection as it is searched now.
+    [[nodiscard]] std::optional<double> servingQuality(const store::Shape& shape) const;
+
+    // Segmentation for callers -----------------------------------------------------
+
+    [[nodiscard]] SegmentationSlots& segmentationSlots() { return slots_; }
+    /// Segments `points` (packed) once `slot` has been acquired. Errors: those of `describe` and of
+    /// acquiring the slot.
+    [[nodiscard]] Result<Description> describe(SegmentationSlots::Slot& slot,
+                                               const std::vector<float>& points,
+                                               const ShapeParameters& parameters, const RunContext& context);
+    /// The same for a stored scan, with the parameters of its collection; loads it under the slot.
+    [[nodiscard]] Result<DescribedScan> describe(SegmentationSlots::Slot& slot, const FoundShape& found,
+                                                 const RunContext& context);
+
+    // Rebuilds ---------------------------------------------------------------------
+
+    /// Starts a rebuild, or returns the running one with the same parameters. Errors: kNotFound;
+    /// kRejected: one with other parameters is running.
+    [[nodiscard]] Result<store::Rebuild> beginRebuild(const index::Snapshot& collection,
+                                                      const ShapeParameters& parameters);
+    /// Errors: kNotFound (the collection, or none is running).
+    [[nodiscard]] Result<void> cancelRebuild(const std::string& collection);
+    /// Calls `onChange` at once and after each change until the rebuild is done; the rebuild goes on
+    /// whatever happens here. Errors: kCancelled, kInternal (the rebuild was cancelled, has failed),
+    /// kNotFound; those of `onChange` and `checkpoint`; kDeadlineExceeded.
+    [[nodiscard]] Result<void> followRebuild(
+        const std::string& collection, store::Rebuild rebuild, const RunContext& context,
+        const Checkpoint& checkpoint, const std::function<Result<void>(const store::Rebuild&)>& onChange);
+
+    // The whole database -----------------------------------------------------------
+
+    /// As store::Store.
+    [[nodiscard]] Result<void> backup(const std::string& path, const RunContext& context);
+    [[nodiscard]] Result<std::vector<std::string>> check(const RunContext& context);
+    /// Replaces everything by the backup `path` while workers and rebuilds pause, and loads the index.
+    /// Errors: kRejected (another restore is running), those of store::Store::restore.
+    [[nodiscard]] Result<void> restore(const std::string& path, const RunContext& context);
+    /// Rises with each restore: ids read under one epoch mean other shapes under another.
+    [[nodiscard]] std::uint64_t epoch() const { return restores_.epoch(); }
+    [[nodiscard]] Result<CatalogStats> stats();
+
+  private:
+    Result<void> restoreExclusively(const std::string& path, const RunContext& context);
+    /// After a change that the store has acknowledged, which must not be reported as refused.
+    void refreshOrLog(const store::Shape& shape, const char* consequence);
+
+    // In order of construction; destroyed in reverse.
+    telemetry::LoggerPtr log_;
+    CatalogOptions options_;
+    std::unique_ptr<store::Store> store_;
+    ingest::SignaturePipeline pipeline_;
+    index::CollectionIndex index_;
+    ingest::ProgressBoard board_;
+    ingest::CrashIsolation isolation_;
+    ingest::WorkerPool workers_;
+    ingest::RebuildDriver rebuilds_;
+    RestoreGate restores_;
+    SegmentationSlots slots_;
+};
+
+}  // namespace shapedb::catalog

@@ -1,0 +1,73 @@
+#include "server/catalog/gates.h"
+
+#include <string>
+
+#include "core/base/return_if_error.h"
+#include "server/catalog/limits.h"
+
+namespace shapedb::catalog {
+
+bool CallGate::enter() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (draining_) return false;
+    ++calls_;
+    return true;
+}
+
+void CallGate::leave() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (--calls_ == 0) changed_.notify_all();
+}
+
+void CallGate::drain() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    draining_ = true;
+}
+
+bool CallGate::waitUntilEmpty(std::chrono::steady_clock::time_point until) {
+    std::unique_lock<std::mutex> lock(mutex_);
+    return changed_.wait_until(lock, until, [this] { return calls_ == 0; });
+}
+
+Result<void> RestoreGate::beginRestore() {
+    if (restoring_.exchange(true)) {
+        return fail(ErrorCode::kRejected, "another restore is running: wait until it is done");
+    }
+    return {};
+}
+
+SegmentationSlots::Slot::~Slot() {
+    if (!taken_) return;
+    const std::lock_guard<std::mutex> lock(slots_.mutex_);
+    ++slots_.free_;
+    slots_.changed_.notify_one();
+}
+
+Result<void> SegmentationSlots::Slot::acquire(const RunContext& context) {
+    std::unique_lock<std::mutex> lock(slots_.mutex_);
+    while (slots_.free_ == 0) {
+        RETURN_IF_ERROR(context.checkpoint());
+        slots_.changed_.wait_for(lock, kLookForCancellation);
+    }
+    --slots_.free_;
+    taken_ = true;
+    return {};
+}
+
+Result<void> Budget::Share::take(std::uint64_t amount) {
+    std::uint64_t free = budget_.free_.load();
+    do {
+        if (free < amount) {
+            return fail(ErrorCode::kQueueFull, "all of the " + std::to_string(budget_.total_) + " " +
+                                                   budget_.what_ + " are taken: try again later");
+        }
+    } while (!budget_.free_.compare_exchange_weak(free, free - amount));
+    taken_ += amount;
+    return {};
+}
+
+Admission::Admission(std::uint64_t uploadBytes)
+    : uploads(uploadBytes, "bytes of points that uploads in progress may hold"),
+      followers(kMaxFollowers, "calls that may wait for shapes and rebuilds") {}
+
+}  // namespace shapedb::catalog

@@ -1,0 +1,130 @@
+// Admission: which calls may enter, write, compute and hold memory.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <mutex>
+#include <shared_mutex>
+
+#include "core/base/error.h"
+#include "core/base/run_context.h"
+
+namespace shapedb::catalog {
+
+/// Counts running calls; once draining, admits no more. Thread-safe.
+class CallGate {
+  public:
+    /// False when draining; otherwise call `leave` at the end.
+    [[nodiscard]] bool enter();
+    void leave();
+    /// From now on `enter` returns false.
+    void drain();
+    [[nodiscard]] bool draining() const { return draining_.load(); }
+    /// Waits at most until `until`; true when no call is left.
+    [[nodiscard]] bool waitUntilEmpty(std::chrono::steady_clock::time_point until);
+
+  private:
+    std::mutex mutex_;
+    std::condition_variable changed_;
+    int calls_ = 0;
+    std::atomic<bool> draining_{false};
+};
+
+/// Keeps writes apart from restores, which replace the whole database, and lets calls notice that one
+/// happened. Thread-safe.
+class RestoreGate {
+  public:
+    /// Held (shared) from looking up a collection until the write to it is done.
+    class Write {
+      public:
+        explicit Write(RestoreGate& gate) : lock_(gate.mutex_) {}
+
+      private:
+        std::shared_lock<std::shared_mutex> lock_;
+    };
+
+    /// Rises with each restore: ids read under one epoch mean other shapes under another.
+    [[nodiscard]] std::uint64_t epoch() const { return epoch_.load(); }
+
+    /// Errors: kRejected (a restore is running).
+    [[nodiscard]] Result<void> beginRestore();
+    /// Excludes writes; between `beginRestore` and `endRestore`.
+    [[nodiscard]] std::unique_lock<std::shared_mutex> exclusive() {
+        return std::unique_lock<std::shared_mutex>(mutex_);
+    }
+    void replaced() { epoch_.fetch_add(1); }
+    void endRestore() { restoring_ = false; }
+    [[nodiscard]] bool restoring() const { return restoring_.load(); }
+
+  private:
+    std::shared_mutex mutex_;
+    std::atomic<std::uint64_t> epoch_{0};
+    std::atomic<bool> restoring_{false};
+};
+
+/// Limits how many segmentations run for callers at a time; the others wait. Thread-safe.
+class SegmentationSlots {
+  public:
+    explicit SegmentationSlots(int slots) : free_(slots) {}
+
+    /// After `acquire`, one slot until destroyed.
+    class Slot {
+      public:
+        explicit Slot(SegmentationSlots& slots) : slots_(slots) {}
+        ~Slot();
+        Slot(const Slot&) = delete;
+        Slot& operator=(const Slot&) = delete;
+        /// Waits. Errors: kCancelled, kDeadlineExceeded.
+        [[nodiscard]] Result<void> acquire(const RunContext& context);
+
+      private:
+        SegmentationSlots& slots_;
+        bool taken_ = false;
+    };
+
+  private:
+    std::mutex mutex_;
+    std::condition_variable changed_;
+    int free_;
+};
+
+/// An amount that all calls may hold together. Thread-safe.
+class Budget {
+  public:
+    /// `what` completes the message "all of the N ... are taken"; static storage.
+    Budget(std::uint64_t total, const char* what) : total_(total), what_(what), free_(total) {}
+
+    /// One call's share; returned when destroyed.
+    class Share {
+      public:
+        explicit Share(Budget& budget) : budget_(budget) {}
+        ~Share() { budget_.free_.fetch_add(taken_); }
+        Share(const Share&) = delete;
+        Share& operator=(const Share&) = delete;
+        /// Errors: kQueueFull.
+        [[nodiscard]] Result<void> take(std::uint64_t amount);
+
+      private:
+        Budget& budget_;
+        std::uint64_t taken_ = 0;
+    };
+
+  private:
+    const std::uint64_t total_;
+    const char* const what_;
+    std::atomic<std::uint64_t> free_;
+};
+
+/// What every call of every transport passes or draws on.
+struct Admission {
+    /// `uploadBytes`: config limits.max_upload_bytes.
+    explicit Admission(std::uint64_t uploadBytes);
+
+    CallGate calls;
+    Budget uploads;    ///< bytes of points being received
+    Budget followers;  ///< calls that wait for a shape or a rebuild
+};
+
+}  // namespace shapedb::catalog

@@ -1,0 +1,45 @@
+// The limits of the API that are not configurable, whatever the transport. The configurable ones
+// are config::ServerConfig::limits.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+
+namespace shapedb::catalog {
+
+// Names and text (repeated in the comments of proto/).
+constexpr std::size_t kMaxCollectionNameBytes = 128;
+constexpr std::size_t kMaxDescriptionBytes = 1'024;
+constexpr std::size_t kMaxKeyBytes = 512;
+constexpr std::size_t kMaxMetadataEntries = 64;
+constexpr std::size_t kMaxMetadataKeyBytes = 128;
+constexpr std::size_t kMaxMetadataValueBytes = 1'024;
+constexpr std::size_t kMaxFilterBytes = 16'384;
+
+// Scans.
+constexpr std::size_t kPointBytes = 12;  ///< float32 x y z
+constexpr std::uint64_t kMinPoints = 4;
+constexpr std::size_t kMaxChunkBytes = std::size_t{1} << 20;
+
+// Listings and answers.
+constexpr std::uint32_t kDefaultPageSize = 100;
+constexpr std::uint32_t kMaxPageSize = 1'000;
+/// A page ends early rather than exceed this: gRPC clients accept 4 MiB by default.
+constexpr std::size_t kMaxPageBytes = std::size_t{3} << 20;
+/// A larger answer to a search is refused.
+constexpr std::size_t kMaxAnswerBytes = std::size_t{64} << 20;
+
+/// Calls that only wait for a shape or a rebuild: the other threads stay free for work.
+constexpr int kMaxFollowers = 192;
+
+// Waiting inside calls.
+constexpr std::chrono::milliseconds kLookForCancellation{20};
+constexpr std::chrono::milliseconds kProgressInterval{100};  ///< between two progress messages
+/// A caller that waits for a shape reads its row again this often even if no change was reported: it
+/// may have been deleted with its collection.
+constexpr std::chrono::milliseconds kReadStateAgain{1'000};
+/// Retry hint when upload memory or places to wait are used up.
+constexpr std::chrono::milliseconds kBudgetRetry{500};
+
+}  // namespace shapedb::catalog

@@ -1,0 +1,77 @@
+#include "server/catalog/scan_upload.h"
+
+#include <algorithm>
+
+#include "core/base/return_if_error.h"
+#include "server/catalog/limits.h"
+
+namespace shapedb::catalog {
+
+Result<void> ScanUpload::begin(std::uint64_t announced, const std::string& sha256) {
+    if (announced_) return fail(ErrorCode::kMalformedStream, "second header: exactly one must come, first");
+    if (announced < kMinPoints) {
+        return fail(ErrorCode::kTooFewPoints, "point_count: " + std::to_string(announced) +
+                                                  " points, a scan needs at least " +
+                                                  std::to_string(kMinPoints));
+    }
+    if (announced > maxPoints_) {
+        return fail(ErrorCode::kPointLimitExceeded, "point_count: " + std::to_string(announced) +
+                                                        " points, this server takes at most " +
+                                                        std::to_string(maxPoints_) + ": thin the scan out");
+    }
+    if (!sha256.empty()) {
+        store::Checksum& expected = expected_.emplace();
+        if (sha256.size() != expected.size()) {
+            return fail(ErrorCode::kInvalidArgument,
+                        "sha256: " + std::to_string(sha256.size()) + " bytes, must be 32 or empty");
+        }
+        std::copy(sha256.begin(), sha256.end(), expected.begin());
+    }
+    announced_ = announced;
+    verifier_.reserve(announced);
+    return {};
+}
+
+Result<void> ScanUpload::checkChunk(const std::string& xyz) const {
+    const auto malformed = [&](const std::string& what) {
+        return fail(ErrorCode::kMalformedStream,
+                    "chunk after " + std::to_string(points()) + " points: " + what);
+    };
+    if (!announced_)
+        return fail(ErrorCode::kMalformedStream, "chunk before the header: the header comes first");
+    if (xyz.empty()) return malformed("it is empty");
+    if (xyz.size() > kMaxChunkBytes) {
+        return malformed(std::to_string(xyz.size()) + " bytes, at most " + std::to_string(kMaxChunkBytes) +
+                         " are allowed");
+    }
+    if (xyz.size() % kPointBytes != 0) {
+        return malformed(std::to_string(xyz.size()) + " bytes are not a whole number of points of " +
+                         std::to_string(kPointBytes) + " bytes");
+    }
+    if (points() == *announced_) {
+        return malformed("all " + std::to_string(*announced_) + " announced points had already come");
+    }
+    if (points() + xyz.size() / kPointBytes > *announced_) {
+        return fail(ErrorCode::kCountMismatch,
+                    "more points came than the " + std::to_string(*announced_) + " announced in the header");
+    }
+    return {};
+}
+
+Result<void> ScanUpload::add(const std::string& xyz) {
+    RETURN_IF_ERROR(checkChunk(xyz));
+    RETURN_IF_ERROR(share_.take(xyz.size()));
+    return verifier_.append(xyz.data(), xyz.size());
+}
+
+Result<store::VerifiedScan> ScanUpload::finish() {
+    if (!announced_) return fail(ErrorCode::kMalformedStream, "the stream ended before a header came");
+    if (points() != *announced_) {
+        return fail(
+            ErrorCode::kCountMismatch,
+            std::to_string(points()) + " points came, the header announced " + std::to_string(*announced_));
+    }
+    return verifier_.finish(expected_ ? &*expected_ : nullptr);
+}
+
+}  // namespace shapedb::catalog

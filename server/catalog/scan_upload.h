@@ -1,0 +1,48 @@
+// Receives the points of one upload, whatever the transport.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "core/base/error.h"
+#include "server/catalog/gates.h"
+#include "server/store/verified_scan.h"
+
+namespace shapedb::catalog {
+
+/// Takes a header and chunks in the order they arrive. Memory grows with what has arrived, not with
+/// what was announced. One per upload; not thread-safe. After an error only destruction.
+class ScanUpload {
+  public:
+    /// `maxPoints`: config limits.max_points. `budget` (bytes) is not owned; the upload's share is
+    /// returned with this object.
+    ScanUpload(std::uint64_t maxPoints, Budget& budget) : maxPoints_(maxPoints), share_(budget) {}
+
+    /// Errors: kMalformedStream (second header), kTooFewPoints, kPointLimitExceeded,
+    /// kInvalidArgument (sha256 neither empty nor 32 bytes).
+    [[nodiscard]] Result<void> begin(std::uint64_t announced, const std::string& sha256);
+
+    /// Errors: kMalformedStream (before the header; empty, too long or not whole points; after the last
+    /// announced point), kCountMismatch (more points than announced), kNonFiniteCoordinate, kQueueFull
+    /// (memory of all uploads together).
+    [[nodiscard]] Result<void> add(const std::string& xyz);
+
+    /// The stream has ended. Errors: kMalformedStream (no header), kCountMismatch (fewer points than
+    /// announced), those of store::ScanVerifier::finish.
+    [[nodiscard]] Result<store::VerifiedScan> finish();
+
+    [[nodiscard]] std::uint64_t points() const { return verifier_.pointCount(); }
+
+  private:
+    Result<void> checkChunk(const std::string& xyz) const;
+
+    std::uint64_t maxPoints_;
+    Budget::Share share_;
+    std::optional<std::uint64_t> announced_;
+    std::optional<store::Checksum> expected_;
+    store::ScanVerifier verifier_;
+};
+
+}  // namespace shapedb::catalog

@@ -1,0 +1,200 @@
+// Shapes: look up, put, delete, follow, describe.
+#include <utility>
+
+#include "core/base/return_if_error.h"
+#include "core/signature/signature_codec.h"
+#include "server/catalog/catalog.h"
+#include "server/catalog/limits.h"
+#include "server/catalog/request_checks.h"
+
+namespace shapedb::catalog {
+
+// Looking up -----------------------------------------------------------------------------
+
+Result<FoundShape> Catalog::findShape(const index::SnapshotPtr& collection, const std::string& key) {
+    RETURN_IF_ERROR(checkKey(key));
+    auto shape = store_->getShape(collection->collection.id, key);
+    if (!shape && shape.error().code == ErrorCode::kNotFound) {
+        return fail(ErrorCode::kNotFound,
+                    "there is no shape '" + key + "' in collection '" + collection->collection.name + "'");
+    }
+    RETURN_IF_ERROR(shape);
+    return FoundShape{collection, std::move(*shape)};
+}
+
+Result<store::Shape> Catalog::shapeById(std::int64_t shapeId) { return store_->getShapeById(shapeId); }
+
+Result<std::vector<store::Shape>> Catalog::listShapes(std::int64_t collectionId, std::int64_t afterId,
+                                                      std::size_t limit, const store::ShapeFilter& filter) {
+    return store_->listShapes(collectionId, afterId, limit, filter);
+}
+
+Result<std::uint64_t> Catalog::countShapes(std::int64_t collectionId, const store::ShapeFilter& filter) {
+    return store_->countShapes(collectionId, filter);
+}
+
+Result<Signature> Catalog::signature(const FoundShape& found) {
+    if (found.collection->signatures.find(found.shape.id)) {
+        return storedSignature(*found.collection, found.shape.id);
+    }
+    const std::string name = "shape '" + found.shape.key + "' has no signature";
+    if (found.shape.failure) {
+        return fail(ErrorCode::kNotReady, name + ": it cannot be segmented: " + found.shape.failure->message);
+    }
+    return fail(ErrorCode::kNotReady, name + " yet: wait until it is READY (WatchIngest)");
+}
+
+Result<Signature> Catalog::storedSignature(const index::Snapshot& searched, std::int64_t shapeId) {
+    const auto row = store_->getSignature(shapeId);
+    RETURN_IF_ERROR(row);
+    if (row->generation != searched.collection.generation) {
+        return fail(ErrorCode::kNotReady, "a rebuild of collection '" + searched.collection.name +
+                                              "' is being put in place: try again");
+    }
+    auto signature = decodeSignature(row->bytes);
+    if (!signature) {
+        return fail(ErrorCode::kDataLoss, "the signature of shape " + std::to_string(shapeId) +
+                                              " is damaged: " + signature.error().message);
+    }
+    return signature;
+}
+
+std::optional<double> qualityIn(const SignatureSet& signatures, std::int64_t shapeId) {
+    const SignatureSet::Place place = signatures.find(shapeId);
+    if (!place || !place.block->attributed(place.row)) return std::nullopt;
+    return place.block->quality(place.row) / 255.0;
+}
+
+std::optional<double> FoundShape::quality() const { return qualityIn(collection->signatures, shape.id); }
+
+std::optional<double> Catalog::servingQuality(const store::Shape& shape) const {
+    const auto collection = index_.byId(shape.collectionId);
+    return collection ? qualityIn((*collection)->signatures, shape.id) : std::nullopt;
+}
+
+// Changing -------------------------------------------------------------------------------
+
+Result<void> Catalog::admitUpload(const ShapeHeader& header) const {
+    RETURN_IF_ERROR(checkKey(header.key));
+    RETURN_IF_ERROR(checkMetadata(header.metadata));
+    if (header.expectedVersion && *header.expectedVersion < 0) {
+        return fail(ErrorCode::kInvalidArgument, "expected_version: must be 0 (the key is free) or more");
+    }
+    RETURN_IF_ERROR(collection(header.collection));
+    if (restores_.restoring()) {
+        return fail(ErrorCode::kUnavailable, "the database is being replaced by a backup: try again later");
+    }
+    return {};
+}
+
+Result<AddedShape> Catalog::put(const ShapeHeader& header, store::VerifiedScan scan) {
+    const RestoreGate::Write write(restores_);
+    // Looked up under the gate: while the points arrived the collection may have been deleted, or
+    // replaced by a restore.
+    const auto found = collection(header.collection);
+    RETURN_IF_ERROR(found);
+    store::PutRequest request(std::move(scan));
+    request.collectionId = (*found)->collection.id;
+    request.key = header.key;
+    request.mode = header.mode;
+    request.expectedVersion = header.expectedVersion;
+    request.metadata = header.metadata;
+    request.maxQueuedJobs = options_.maxQueuedJobs;
+    request.maxQueuedBytes = options_.maxQueuedBytes;
+    auto put = store_->putShape(request);
+    RETURN_IF_ERROR(put);
+    const store::Shape& shape = put->shape;
+    switch (put->outcome) {
+        case store::PutOutcome::kCreated: workers_.wake(); break;
+        case store::PutOutcome::kReplaced:
+            workers_.supersede(shape.id, shape.pointsVersion);
+            workers_.wake();
+            refreshOrLog(shape, "new metadata is not searched yet");
+            break;
+        case store::PutOutcome::kMetadataChanged:
+            refreshOrLog(shape, "new metadata is not searched yet");
+            break;
+        case store::PutOutcome::kUnchanged: break;
+    }
+    return AddedShape{put->outcome, std::move(put->shape), (*found)->collection.name};
+}
+
+std::chrono::milliseconds Catalog::retryAfterQueueFull() {
+    const auto depth = store_->queueDepth();
+    return workers_.retryAfter(depth ? depth->jobs : 0);
+}
+
+Result<FoundShape> Catalog::deleteShape(const std::string& collectionName, const std::string& key,
+                                        std::optional<std::int64_t> expectedVersion) {
+    const RestoreGate::Write write(restores_);
+    const auto found = collection(collectionName);
+    RETURN_IF_ERROR(found);
+    RETURN_IF_ERROR(checkKey(key));
+    auto shape = store_->deleteShape((*found)->collection.id, key, expectedVersion);
+    RETURN_IF_ERROR(shape);
+    workers_.supersede(shape->id);
+    board_.settled(shape->id);
+    refreshOrLog(*shape, "deleted shape is still searched");
+    return FoundShape{*found, std::move(*shape)};
+}
+
+void Catalog::refreshOrLog(const store::Shape& shape, const char* consequence) {
+    const auto refreshed = index_.refresh(shape.collectionId, shape.id);
+    if (!refreshed) log_->error(consequence, telemetry::fieldsOf(refreshed.error()));
+}
+
+// Following ------------------------------------------------------------------------------
+
+Result<store::Shape> Catalog::followIngest(
+    std::int64_t shapeId, const Checkpoint& checkpoint,
+    const std::function<Result<void>(const store::Shape&, const ingest::ProgressBoard::Status&)>& onChange) {
+    const auto watch = board_.watch(shapeId);
+    for (;;) {
+        // Before the row: whatever happens after this raises the sequence, and the wait returns.
+        const ingest::ProgressBoard::Status status = watch->status();
+        auto shape = store_->getShapeById(shapeId);
+        if (!shape) return shape;
+        if (shape->state == store::ShapeState::kReady) {
+            // The store is a moment ahead of the index: READY must mean that searches find it.
+            RETURN_IF_ERROR(index_.refresh(shape->collectionId, shapeId));
+        }
+        RETURN_IF_ERROR(onChange(*shape, status));
+        if (shape->state != store::ShapeState::kPending) return shape;
+        const auto lookAgain = ingest::ProgressBoard::Clock::now() + kReadStateAgain;
+        while (watch->status().sequence == status.sequence &&
+               ingest::ProgressBoard::Clock::now() < lookAgain) {
+            RETURN_IF_ERROR(checkpoint());
+            watch->waitForChange(status.sequence, ingest::ProgressBoard::Clock::now() + kLookForCancellation);
+        }
+    }
+}
+
+Result<store::Shape> Catalog::awaitIngest(const store::Shape& added, const Checkpoint& checkpoint) {
+    auto settled =
+        followIngest(added.id, checkpoint, [](const auto&, const auto&) { return Result<void>(); });
+    if (!settled) {
+        return fail(settled.error().code,
+                    settled.error().message + "; the scan of shape '" + added.key + "' had been stored");
+    }
+    return settled;
+}
+
+// Segmentation for callers ---------------------------------------------------------------
+
+Result<Description> Catalog::describe(SegmentationSlots::Slot& slot, const std::vector<float>& points,
+                                      const ShapeParameters& parameters, const RunContext& context) {
+    RETURN_IF_ERROR(slot.acquire(context));
+    return pipeline_.describe(points, parameters, context);
+}
+
+Result<DescribedScan> Catalog::describe(SegmentationSlots::Slot& slot, const FoundShape& found,
+                                        const RunContext& context) {
+    RETURN_IF_ERROR(slot.acquire(context));
+    auto points = store_->loadPoints(found.shape.id);
+    RETURN_IF_ERROR(points);
+    auto description = pipeline_.describe(*points, found.collection->parameters, context);
+    RETURN_IF_ERROR(description);
+    return DescribedScan{std::move(*points), std::move(*description)};
+}
+
+}  // namespace shapedb::catalog

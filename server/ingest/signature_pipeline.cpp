@@ -1,0 +1,87 @@
+#include "server/ingest/signature_pipeline.h"
+
+#include <exception>
+#include <new>
+
+#include "core/signature/signature_codec.h"
+#include "server/ingest/background_thread.h"
+
+namespace shapedb::ingest {
+
+namespace {
+
+using Kind = PipelineOutcome::Kind;
+
+PointCloud toCloud(const std::vector<float>& xyz) {
+    PointCloud points;
+    points.reserve(xyz.size() / 3);
+    for (std::size_t i = 0; i + 2 < xyz.size(); i += 3) points.push_back({xyz[i], xyz[i + 1], xyz[i + 2]});
+    return points;
+}
+
+PipelineOutcome failed(Kind kind, Error why) {
+    PipelineOutcome outcome;
+    outcome.kind = kind;
+    outcome.why = std::move(why);
+    return outcome;
+}
+
+PipelineOutcome runOrThrow(const Describe& describe, store::Store& store, std::int64_t shapeId,
+                           const ShapeParameters& parameters, const RunContext& context) {
+    PointCloud cloud;
+    {
+        // The packed points are half as large again as the cloud: not kept beside it.
+        const auto points = store.loadPoints(shapeId);
+        if (!points) {
+            return failed(isTransient(points.error().code) ? Kind::kStoreFailed : Kind::kScanFailed,
+                          points.error());
+        }
+        context.report("start", 0, 0);
+        cloud = toCloud(*points);
+    }
+    Result<Description> description = fail(ErrorCode::kInternal, "not described");
+    onThisThreadAlone([&] { description = describe(cloud, parameters, context); });
+    if (!description) {
+        const bool cancelled = description.error().code == ErrorCode::kCancelled;
+        return failed(cancelled ? Kind::kCancelled : Kind::kScanFailed, description.error());
+    }
+    PipelineOutcome outcome;
+    outcome.signature = encodeSignature(description->signature);
+    outcome.seconds = description->segmentation.totalSeconds;
+    return outcome;
+}
+
+}  // namespace
+
+Result<Description> SignaturePipeline::describe(const std::vector<float>& points,
+                                                const ShapeParameters& parameters,
+                                                const RunContext& context) const {
+    return describe_(toCloud(points), parameters, context);
+}
+
+PipelineOutcome SignaturePipeline::run(store::Store& store, std::int64_t shapeId,
+                                       const ShapeParameters& parameters, const RunContext& context) const {
+    try {
+        return runOrThrow(describe_, store, shapeId, parameters, context);
+    } catch (...) {
+        return failed(Kind::kScanFailed, errorOfException());
+    }
+}
+
+bool isTransient(ErrorCode code) noexcept {
+    return code == ErrorCode::kStorage || code == ErrorCode::kStorageFull || code == ErrorCode::kUnavailable;
+}
+
+Error errorOfException() {
+    try {
+        throw;
+    } catch (const std::bad_alloc&) {
+        return {ErrorCode::kOutOfMemory, "not enough memory to segment this scan"};
+    } catch (const std::exception& error) {
+        return {ErrorCode::kInternal, std::string("segmentation threw: ") + error.what()};
+    } catch (...) {
+        return {ErrorCode::kInternal, "segmentation threw an exception of unknown type"};
+    }
+}
+
+}  // namespace shapedb::ingest

@@ -1,0 +1,39 @@
+// Reads an upload from a gRPC stream: AddShape, SearchByScan and Segment share it.
+#pragma once
+
+#include "core/base/return_if_error.h"
+#include "server/catalog/limits.h"
+#include "server/catalog/scan_upload.h"
+#include "server/rpc/call.h"
+
+namespace shapedb::rpc {
+
+/// `onHeader(header)` checks the other fields of the header as soon as it arrives, so that a hopeless
+/// upload is refused before its points are sent. Sets the retry hint after kQueueFull. Errors: those of
+/// ScanUpload and of `onHeader`; kCancelled, kDeadlineExceeded.
+template <typename Request, typename Reader, typename OnHeader>
+Result<store::VerifiedScan> receiveScan(Reader& reader, catalog::ScanUpload& upload, Call& call,
+                                        OnHeader&& onHeader) {
+    Request request;
+    while (call.read(reader, &request)) {
+        RETURN_IF_ERROR(call.run().checkpoint());
+        Result<void> taken;
+        if (request.has_header()) {
+            taken = upload.begin(request.header().point_count(), request.header().sha256());
+            if (taken) taken = onHeader(request.header());
+        } else if (request.has_chunk()) {
+            const std::string& xyz = request.chunk().xyz();
+            taken = upload.add(xyz);
+            if (taken) call.addPoints(xyz.size() / catalog::kPointBytes, xyz.size());
+        } else {
+            taken = fail(ErrorCode::kMalformedStream, "message with neither header nor chunk");
+        }
+        if (!taken && taken.error().code == ErrorCode::kQueueFull) call.retryAfter(catalog::kBudgetRetry);
+        RETURN_IF_ERROR(taken);
+    }
+    // `Read` also returns false when the client has gone: then the upload is not complete.
+    if (call.clientGone()) return fail(ErrorCode::kCancelled, "the client cancelled the upload");
+    return upload.finish();
+}
+
+}  // namespace shapedb::rpc

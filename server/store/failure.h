@@ -1,0 +1,58 @@
+// How errors travel inside a store: as the exception `Failure`, which `guarded` turns into an
+// Error at the border of every public function. SQL code stays in straight lines, and
+// transactions roll back on every way out.
+#pragma once
+
+#include <exception>
+#include <new>
+#include <string>
+#include <type_traits>
+#include <utility>
+
+#include "core/base/error.h"
+
+namespace shapedb::store {
+
+/// Thrown inside server/store/ only.
+struct Failure : std::exception {
+    Failure(ErrorCode code, std::string message, bool fromLibrary = false)
+        : error{code, std::move(message)}, fromDatabase(fromLibrary) {}
+    const char* what() const noexcept override { return error.message.c_str(); }
+
+    Error error;
+    bool fromDatabase;  ///< the message is the library's and needs the operation in front of it
+};
+
+[[noreturn]] inline void raise(ErrorCode code, std::string message) {
+    throw Failure(code, std::move(message));
+}
+
+/// The value, or the error as a Failure.
+template <typename T>
+T orRaise(Result<T> result) {
+    if (!result) raise(result.error().code, result.error().message);
+    if constexpr (!std::is_void_v<T>) return std::move(*result);
+}
+
+/// Runs the body of a public function and turns every exception into an Error. `operation`
+/// completes "cannot ...".
+template <typename Fn>
+auto guarded(const char* operation, Fn&& body) noexcept -> Result<std::invoke_result_t<Fn>> {
+    try {
+        if constexpr (std::is_void_v<std::invoke_result_t<Fn>>) {
+            body();
+            return {};
+        } else {
+            return body();
+        }
+    } catch (const Failure& failure) {
+        if (!failure.fromDatabase) return fail(failure.error);
+        return fail(failure.error.code, std::string("cannot ") + operation + ": " + failure.error.message);
+    } catch (const std::bad_alloc&) {
+        return fail(ErrorCode::kOutOfMemory, "out of memory");  // fits without allocating
+    } catch (const std::exception& other) {
+        return fail(ErrorCode::kInternal, std::string("cannot ") + operation + ": " + other.what());
+    }
+}
+
+}  // namespace shapedb::store

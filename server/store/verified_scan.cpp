@@ -1,0 +1,101 @@
+#include "server/store/verified_scan.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <new>
+#include <string>
+
+#include "core/base/return_if_error.h"
+#include "core/preparation/sanitise.h"
+
+// What travels and is stored is little-endian and used as it is.
+static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "big-endian machines need a byte swap here");
+static_assert(sizeof(float) == 4, "points travel as 32-bit floats");
+
+namespace shapedb::store {
+
+namespace {
+
+/// Enough that a sample of a real scan spans space.
+constexpr std::size_t kSamplePoints = 256;
+
+}  // namespace
+
+Result<VerifiedScan> VerifiedScan::verify(std::vector<float> xyz) {
+    if (xyz.size() % 3 != 0) {
+        return fail(ErrorCode::kInvalidArgument,
+                    std::to_string(xyz.size()) + " numbers are not packed x y z");
+    }
+    ScanVerifier verifier;
+    verifier.xyz_ = std::move(xyz);
+    RETURN_IF_ERROR(verifier.take(0));
+    return verifier.finish();
+}
+
+void ScanVerifier::reserve(std::uint64_t points) {
+    try {
+        xyz_.reserve(3 * static_cast<std::size_t>(points));
+    } catch (const std::bad_alloc&) {
+        // A machine that does not overcommit: what arrives decides.
+    }
+}
+
+Result<void> ScanVerifier::append(const void* bytes, std::size_t size) {
+    const std::size_t first = xyz_.size();
+    xyz_.resize(first + size / sizeof(float));
+    std::memcpy(xyz_.data() + first, bytes, size);
+    return take(first);
+}
+
+/// Checks and hashes the points from number `first` on.
+Result<void> ScanVerifier::take(std::size_t first) {
+    for (std::size_t point = first / 3; point < xyz_.size() / 3; ++point) {
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            const float value = xyz_[3 * point + axis];
+            if (!std::isfinite(value)) {
+                return fail(ErrorCode::kNonFiniteCoordinate,
+                            "point " + std::to_string(point) + ": " + "xyz"[axis] +
+                                (std::isnan(value) ? " is NaN" : " is infinite or beyond single precision") +
+                                ": drop such points before sending");
+            }
+            if (value < xyz_[3 * extremes_[axis] + axis]) extremes_[axis] = point;
+            if (value > xyz_[3 * extremes_[3 + axis] + axis]) extremes_[3 + axis] = point;
+        }
+    }
+    hash_.update(xyz_.data() + first, (xyz_.size() - first) * sizeof(float));
+    return {};
+}
+
+/// Looks at a sample first: points that span space go on doing so when others join them, and the
+/// points at the extremes decide what is wrong with size or magnitude. Only when the sample is
+/// refused are all points looked at, which takes about 80 bytes a point.
+Result<void> ScanVerifier::checkUsable() const {
+    const std::size_t count = xyz_.size() / 3;
+    const auto pointAt = [&](std::size_t i) { return Point3{xyz_[3 * i], xyz_[3 * i + 1], xyz_[3 * i + 2]}; };
+    if (count > 0) {
+        PointCloud sample;
+        for (const std::size_t i : extremes_) sample.push_back(pointAt(i));
+        const std::size_t step = std::max<std::size_t>(1, count / kSamplePoints);
+        for (std::size_t i = 0; i < count; i += step) sample.push_back(pointAt(i));
+        if (sanitise(sample)) return {};
+    }
+    PointCloud all;
+    all.reserve(count);
+    for (std::size_t i = 0; i < count; ++i) all.push_back(pointAt(i));
+    RETURN_IF_ERROR(sanitise(all));
+    return {};
+}
+
+Result<VerifiedScan> ScanVerifier::finish(const Checksum* expected) {
+    const Checksum checksum = hash_.finish();
+    if (expected != nullptr && *expected != checksum) {
+        return fail(ErrorCode::kChecksumMismatch,
+                    "the points that came have the SHA-256 " + toHex(checksum) +
+                        ", which is not the one in the header: send the scan again");
+    }
+    RETURN_IF_ERROR(checkUsable());
+    return VerifiedScan(std::move(xyz_), checksum);
+}
+
+}  // namespace shapedb::store

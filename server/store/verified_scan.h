@@ -1,0 +1,68 @@
+// A scan that has passed every check: what the server stores and segments.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "common/sha256.h"
+#include "core/base/error.h"
+
+namespace shapedb::store {
+
+/// SHA-256 of the points as they travel: packed little-endian float32 x y z.
+using Checksum = std::array<std::uint8_t, 32>;
+
+/// Packed points and their checksum. That the type exists says: the points are whole triples of
+/// finite numbers, `checksum` is theirs, and they pass `sanitise`. Only ScanVerifier makes one, so
+/// nothing behind it hashes or checks again.
+class VerifiedScan {
+  public:
+    /// For points that are in memory already. Errors: as ScanVerifier; kInvalidArgument (not whole
+    /// triples).
+    [[nodiscard]] static Result<VerifiedScan> verify(std::vector<float> xyz);
+
+    [[nodiscard]] const std::vector<float>& points() const noexcept { return xyz_; }
+    [[nodiscard]] std::uint64_t pointCount() const noexcept { return xyz_.size() / 3; }
+    [[nodiscard]] std::uint64_t bytes() const noexcept { return xyz_.size() * sizeof(float); }
+    [[nodiscard]] const Checksum& checksum() const noexcept { return checksum_; }
+
+  private:
+    friend class ScanVerifier;
+    VerifiedScan(std::vector<float> xyz, const Checksum& checksum)
+        : xyz_(std::move(xyz)), checksum_(checksum) {}
+
+    std::vector<float> xyz_;
+    Checksum checksum_;
+};
+
+/// Checks a scan piece by piece while it arrives. Not thread-safe. After an error only destruction.
+class ScanVerifier {
+  public:
+    /// Reserves address space, so that no growth copies the points; memory is taken by what arrives.
+    void reserve(std::uint64_t points);
+
+    /// Whole points as bytes; `size` is a multiple of 12. Errors: kNonFiniteCoordinate, naming the
+    /// index of the point from 0 and the axis. Throws std::bad_alloc.
+    [[nodiscard]] Result<void> append(const void* bytes, std::size_t size);
+
+    [[nodiscard]] std::uint64_t pointCount() const noexcept { return xyz_.size() / 3; }
+
+    /// `expected` is the checksum the sender announced; null: none. Errors: kChecksumMismatch; those of
+    /// `sanitise`: the points could never be segmented. What only the segmentation can see (no interior)
+    /// is found later.
+    [[nodiscard]] Result<VerifiedScan> finish(const Checksum* expected = nullptr);
+
+  private:
+    friend class VerifiedScan;
+    Result<void> take(std::size_t first);
+    Result<void> checkUsable() const;
+
+    std::vector<float> xyz_;
+    Sha256 hash_;
+    std::array<std::size_t, 6> extremes_{};  ///< points with the lowest x, y, z; with the highest
+};
+
+}  // namespace shapedb::store

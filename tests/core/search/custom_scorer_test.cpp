@@ -1,0 +1,122 @@
+// A search knows no method: any scorer can be plugged in.
+#include <algorithm>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "core/search/top_k.h"
+#include "tests/core/matching/random_signatures.h"
+
+namespace shapedb {
+namespace {
+
+// Compares nothing but the number of points and the scale.
+class SizeScorer final : public Scorer {
+  public:
+    explicit SizeScorer(const Signature& query) : query_(query) {}
+
+    bool compares(const ShapeRow& shape) const override { return shape.pointCount > 0; }
+    double score(const ShapeRow& shape) const override {
+        const double points = static_cast<double>(shape.pointCount) / kMaxSignaturePoints;
+        return std::exp(-std::abs(std::log(shape.scale / query_.row().scale))) * (1.0 - 0.5 * points);
+    }
+    double bound(const ShapeRow& shape) const override {
+        return std::exp(-std::abs(std::log(shape.scale / query_.row().scale)));
+    }
+    Explanation explain(const Signature& shape) const override {
+        Explanation explanation;
+        explanation.score = score(PackedShape(shape).row());
+        return explanation;
+    }
+
+  private:
+    PackedShape query_;
+};
+
+// Hands what its scan found on to the score, and counts rows that are ruled out in between.
+class HandingOnScorer final : public Scorer {
+  public:
+    bool compares(const ShapeRow&) const override { return true; }
+    double score(const ShapeRow& shape) const override { return 1.0 / (1.0 + std::floor(shape.scale)); }
+    double bound(const ShapeRow&) const override { return 1.0; }
+    Explanation explain(const Signature&) const override { return {}; }
+    void scan(const ShapeRows& rows, const std::vector<std::uint8_t>& wanted, double,
+              std::vector<Survivor>& left, ScanCounts&) const override {
+        for (std::uint32_t row = 0; row < rows.count; ++row) {
+            if (wanted.empty() || wanted[row] != 0) left.push_back({1.0, row, {static_cast<std::uint16_t>(rows.scales[row])}});
+        }
+    }
+    std::optional<double> scoreIfReaches(const ShapeRow&, const Survivor& survivor,
+                                         double least) const override {
+        const double value = 1.0 / (1.0 + survivor.known[0]);
+        if (value < least) return std::nullopt;
+        return value;
+    }
+};
+
+std::vector<IndexEntry> randomEntries(Random& random, std::int64_t count) {
+    std::vector<IndexEntry> entries;
+    for (std::int64_t id = 1; id <= count; ++id) {
+        entries.push_back({id, {}, testing_support::randomSignature(random, 8)});
+        entries.back().signature.scale = 10.0 * std::exp(random.normal());
+    }
+    return entries;
+}
+
+std::vector<SearchHit> bruteForce(const Scorer& scorer, const std::vector<IndexEntry>& entries,
+                                  std::size_t k) {
+    std::vector<SearchHit> hits;
+    for (const IndexEntry& entry : entries) {
+        const PackedShape shape(entry.signature);
+        hits.push_back({entry.id, scorer.score(shape.row())});
+    }
+    std::sort(hits.begin(), hits.end(), [](const SearchHit& a, const SearchHit& b) {
+        return a.score != b.score ? a.score > b.score : a.id < b.id;
+    });
+    hits.resize(std::min(k, hits.size()));
+    return hits;
+}
+
+void expectExact(const Scorer& scorer, const std::vector<IndexEntry>& entries, std::size_t k) {
+    SearchOptions options;
+    options.k = k;
+    const auto found = topK(scorer, SignatureSet().with(entries, {}), options);
+    ASSERT_TRUE(found) << found.error().message;
+    const std::vector<SearchHit> expected = bruteForce(scorer, entries, k);
+    ASSERT_EQ(found->hits.size(), expected.size());
+    for (std::size_t i = 0; i < expected.size(); ++i) {
+        EXPECT_EQ(found->hits[i].id, expected[i].id);
+        EXPECT_EQ(found->hits[i].score, expected[i].score);
+    }
+    EXPECT_LE(found->counts.scored, found->counts.filtered);
+}
+
+TEST(CustomScorer, SearchIsExactWithItsDefaultScan) {
+    Random random(1);
+    const std::vector<IndexEntry> entries = randomEntries(random, 3000);
+    for (const std::size_t k : {1, 10, 500, 4000}) {
+        expectExact(SizeScorer(testing_support::randomSignature(random, 8)), entries, k);
+    }
+}
+
+TEST(CustomScorer, SearchHandsBackWhatItsScanFound) {
+    Random random(2);
+    const std::vector<IndexEntry> entries = randomEntries(random, 3000);
+    for (const std::size_t k : {1, 10, 500, 4000}) expectExact(HandingOnScorer(), entries, k);
+}
+
+TEST(CustomScorer, BoundsRuleOutMostShapes) {
+    Random random(3);
+    const std::vector<IndexEntry> entries = randomEntries(random, 5000);
+    SearchOptions options;
+    options.k = 1;
+    const SizeScorer scorer(testing_support::randomSignature(random, 8));
+    const auto found = topK(scorer, SignatureSet().with(entries, {}), options);
+    ASSERT_TRUE(found);
+    EXPECT_LT(found->counts.scored, 4500u);
+    options.k = 0;
+    EXPECT_EQ(topK(scorer, SignatureSet(), options).error().code, ErrorCode::kInvalidArgument);
+}
+
+}  // namespace
+}  // namespace shapedb

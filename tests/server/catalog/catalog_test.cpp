@@ -1,0 +1,156 @@
+#include "server/catalog/catalog.h"
+
+#include <atomic>
+
+#include <gtest/gtest.h>
+
+#include "tests/server/support/fixtures.h"
+#include "tests/server/support/memory_store.h"
+
+namespace shapedb::catalog {
+namespace {
+
+using namespace shapedb::testing;
+
+Result<void> goOn() { return {}; }
+
+class CatalogTest : public ::testing::Test {
+  protected:
+    CatalogTest() {
+        auto owned = std::make_unique<MemoryStore>();
+        owned->fault = [this](const std::string& function) -> std::optional<Error> {
+            if (noJobs && function == "claimJob") return Error{ErrorCode::kStorage, "broken"};
+            return std::nullopt;
+        };
+        CatalogOptions options;
+        options.maxQueuedJobs = 100;
+        options.rebuilds.yield = std::chrono::milliseconds(1);
+        catalog = std::make_unique<Catalog>(std::move(owned), quickDescribe, log, options);
+        EXPECT_TRUE(catalog->start());
+    }
+    ~CatalogTest() override { EXPECT_TRUE(catalog->stop()); }
+
+    Result<AddedShape> put(const std::string& key, float tag, Metadata metadata = {},
+                           const std::string& collection = "") {
+        ShapeHeader header;
+        header.collection = collection;
+        header.key = key;
+        header.metadata = std::move(metadata);
+        return catalog->put(header, store::VerifiedScan::verify(taggedPoints(tag)).value());
+    }
+    store::Shape putAndWait(const std::string& key, float tag) {
+        return catalog->awaitIngest(put(key, tag).value().shape, goOn).value();
+    }
+    double searched(std::int64_t id) { return cachedVolume(catalog->collection("").value()->signatures, id); }
+
+    std::shared_ptr<RecordingLogger> log = std::make_shared<RecordingLogger>();
+    std::atomic<bool> noJobs{false};
+    std::unique_ptr<Catalog> catalog;
+};
+
+TEST_F(CatalogTest, StartCreatesTheDefaultCollection) {
+    EXPECT_EQ(catalog->collection("").value()->collection.name, "default");
+    EXPECT_EQ(catalog->collection("default").value()->collection.name, "default");
+    EXPECT_EQ(catalog->collection("other").error().code, ErrorCode::kNotFound);
+}
+
+TEST_F(CatalogTest, AShapeIsSearchedOnceItIsReady) {
+    const store::Shape shape = putAndWait("cup", 5.0f);
+    EXPECT_EQ(shape.state, store::ShapeState::kReady);
+    EXPECT_EQ(searched(shape.id), 5.0);
+    const auto found = catalog->findShape(catalog->collection("").value(), "cup");
+    ASSERT_TRUE(found);
+    EXPECT_EQ(catalog->signature(*found).value().volume, 5.0);
+}
+
+TEST_F(CatalogTest, NewMetadataIsSearchedAtOnce) {
+    const store::Shape shape = putAndWait("cup", 5.0f);
+    const auto changed = put("cup", 5.0f, {{"label", "cup"}});
+    ASSERT_TRUE(changed);
+    EXPECT_EQ(changed->outcome, store::PutOutcome::kMetadataChanged);
+    const auto snapshot = catalog->collection("").value();
+    const auto place = snapshot->signatures.find(shape.id);
+    ASSERT_TRUE(place);
+    EXPECT_EQ(place.block->metadata(place.row), (Metadata{{"label", "cup"}}));
+}
+
+TEST_F(CatalogTest, ADeletedShapeIsNotSearched) {
+    const store::Shape shape = putAndWait("cup", 5.0f);
+    EXPECT_EQ(catalog->deleteShape("", "cup", 7).error().code, ErrorCode::kVersionConflict);
+    EXPECT_EQ(searched(shape.id), 5.0);
+    EXPECT_EQ(catalog->deleteShape("", "cup", 1).value().shape.id, shape.id);
+    EXPECT_EQ(searched(shape.id), 0.0);
+}
+
+TEST_F(CatalogTest, RefusesAHopelessUploadBeforeItsPoints) {
+    ShapeHeader header;
+    header.key = "cup";
+    EXPECT_TRUE(catalog->admitUpload(header));
+    header.expectedVersion = -1;
+    EXPECT_EQ(catalog->admitUpload(header).error().code, ErrorCode::kInvalidArgument);
+    header.expectedVersion.reset();
+    header.metadata = {{"a b", "no blanks"}};
+    EXPECT_EQ(catalog->admitUpload(header).error().code, ErrorCode::kInvalidArgument);
+    header.metadata.clear();
+    header.collection = "unknown";
+    EXPECT_EQ(catalog->admitUpload(header).error().code, ErrorCode::kNotFound);
+    header.collection.clear();
+    header.key.clear();
+    EXPECT_EQ(catalog->admitUpload(header).error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST_F(CatalogTest, DeletingANonEmptyCollectionNeedsForce) {
+    ASSERT_TRUE(catalog->createCollection("parts", "", parametersOf(Profile::kPaper)));
+    ASSERT_TRUE(put("cup", 5.0f, {}, "parts"));
+    EXPECT_EQ(catalog->deleteCollection("", true).error().code, ErrorCode::kInvalidArgument)
+        << "the default collection must be named";
+    EXPECT_EQ(catalog->deleteCollection("parts", false).error().code, ErrorCode::kRejected);
+    EXPECT_TRUE(catalog->deleteCollection("parts", true));
+    EXPECT_EQ(catalog->collection("parts").error().code, ErrorCode::kNotFound);
+    EXPECT_EQ(put("cup", 5.0f, {}, "parts").error().code, ErrorCode::kNotFound);
+}
+
+TEST_F(CatalogTest, RestoreBringsBackTheOldContentAndRaisesTheEpoch) {
+    const store::Shape before = putAndWait("before", 5.0f);
+    ASSERT_TRUE(catalog->backup("backup", {}));
+    const store::Shape after = putAndWait("after", 6.0f);
+    const auto epoch = catalog->epoch();
+    EXPECT_FALSE(catalog->restore("unknown", {}));
+    EXPECT_EQ(catalog->epoch(), epoch) << "nothing was replaced";
+    ASSERT_TRUE(catalog->restore("backup", {}));
+    EXPECT_GT(catalog->epoch(), epoch);
+    EXPECT_EQ(searched(before.id), 5.0);
+    EXPECT_EQ(searched(after.id), 0.0);
+    EXPECT_EQ(putAndWait("new", 7.0f).state, store::ShapeState::kReady) << "the workers continue";
+}
+
+TEST_F(CatalogTest, ARebuildIsFollowedToItsEnd) {
+    putAndWait("cup", 5.0f);
+    const auto collection = catalog->collection("").value();
+    ShapeParameters parameters = collection->parameters;
+    parameters.signature.maxPoints = 3;
+    const auto rebuild = catalog->beginRebuild(*collection, parameters);
+    ASSERT_TRUE(rebuild) << rebuild.error().message;
+    std::uint64_t done = 0;
+    ASSERT_TRUE(catalog->followRebuild("default", *rebuild, {}, goOn, [&](const store::Rebuild& now) {
+        done = now.done;
+        return Result<void>();
+    }));
+    EXPECT_EQ(done, 1u);
+    EXPECT_EQ(catalog->collection("").value()->parameters.signature.maxPoints, 3u);
+    EXPECT_EQ(catalog->cancelRebuild("").error().code, ErrorCode::kNotFound);
+}
+
+TEST_F(CatalogTest, FollowingEndsWhenTheCallerGivesUp) {
+    noJobs = true;
+    const auto added = put("cup", 5.0f);
+    ASSERT_TRUE(added);
+    const auto waited = catalog->awaitIngest(
+        added->shape, []() -> Result<void> { return fail(ErrorCode::kCancelled, "no longer interested"); });
+    ASSERT_FALSE(waited);
+    EXPECT_EQ(waited.error().code, ErrorCode::kCancelled);
+    EXPECT_NE(waited.error().message.find("'cup' had been stored"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace shapedb::catalog

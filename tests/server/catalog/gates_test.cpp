@@ -1,0 +1,106 @@
+#include "server/catalog/gates.h"
+
+#include <thread>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace shapedb::catalog {
+namespace {
+
+using namespace std::chrono_literals;
+
+TEST(CallGate, RefusesOnceDraining) {
+    CallGate gate;
+    ASSERT_TRUE(gate.enter());
+    EXPECT_FALSE(gate.draining());
+    gate.drain();
+    EXPECT_TRUE(gate.draining());
+    EXPECT_FALSE(gate.enter());
+    EXPECT_FALSE(gate.waitUntilEmpty(std::chrono::steady_clock::now() + 10ms));
+    std::thread call([&] {
+        std::this_thread::sleep_for(10ms);
+        gate.leave();
+    });
+    EXPECT_TRUE(gate.waitUntilEmpty(std::chrono::steady_clock::now() + 10s));
+    call.join();
+}
+
+TEST(SegmentationSlots, LimitsConcurrentHolders) {
+    SegmentationSlots slots(2);
+    std::atomic<int> inside{0};
+    std::atomic<int> most{0};
+    std::vector<std::thread> threads;
+    for (int t = 0; t < 8; ++t) {
+        threads.emplace_back([&] {
+            for (int i = 0; i < 20; ++i) {
+                SegmentationSlots::Slot slot(slots);
+                ASSERT_TRUE(slot.acquire({}));
+                const int now = ++inside;
+                int seen = most.load();
+                while (now > seen && !most.compare_exchange_weak(seen, now)) {
+                }
+                std::this_thread::sleep_for(100us);
+                --inside;
+            }
+        });
+    }
+    for (std::thread& thread : threads) thread.join();
+    EXPECT_EQ(most, 2);
+}
+
+TEST(SegmentationSlots, WaitEndsOnCancelOrDeadline) {
+    SegmentationSlots slots(1);
+    {
+        SegmentationSlots::Slot taken(slots);
+        ASSERT_TRUE(taken.acquire({}));
+        RunContext late;
+        late.deadline = RunContext::Clock::now() + 20ms;
+        SegmentationSlots::Slot second(slots);
+        EXPECT_EQ(second.acquire(late).error().code, ErrorCode::kDeadlineExceeded);
+        std::atomic<bool> cancel{true};
+        RunContext cancelled;
+        cancelled.cancel = &cancel;
+        SegmentationSlots::Slot third(slots);
+        EXPECT_EQ(third.acquire(cancelled).error().code, ErrorCode::kCancelled);
+    }
+    SegmentationSlots::Slot free(slots);
+    RunContext soon;
+    soon.deadline = RunContext::Clock::now() + 10s;
+    EXPECT_TRUE(free.acquire(soon)) << "a caller that gave up holds no slot";
+}
+
+TEST(RestoreGate, AdmitsOneRestoreAndRaisesTheEpoch) {
+    RestoreGate gate;
+    const auto before = gate.epoch();
+    ASSERT_TRUE(gate.beginRestore());
+    EXPECT_TRUE(gate.restoring());
+    EXPECT_EQ(gate.beginRestore().error().code, ErrorCode::kRejected);
+    gate.replaced();
+    gate.endRestore();
+    EXPECT_GT(gate.epoch(), before);
+    EXPECT_TRUE(gate.beginRestore());
+}
+
+TEST(RestoreGate, WaitsForRunningWrites) {
+    RestoreGate gate;
+    std::atomic<bool> writing{false};
+    std::atomic<bool> restoreComes{false};
+    std::thread writer([&] {
+        const RestoreGate::Write write(gate);
+        writing = true;
+        while (!restoreComes) std::this_thread::yield();
+        std::this_thread::sleep_for(10ms);  // time in which a gate that does not wait would let it in
+        writing = false;
+    });
+    while (!writing) std::this_thread::yield();
+    restoreComes = true;
+    {
+        const auto exclusive = gate.exclusive();
+        EXPECT_FALSE(writing);
+    }
+    writer.join();
+}
+
+}  // namespace
+}  // namespace shapedb::catalog

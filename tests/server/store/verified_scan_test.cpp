@@ -1,0 +1,137 @@
+#include "server/store/verified_scan.h"
+
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "core/base/random.h"
+#include "core/preparation/sanitise.h"
+
+namespace shapedb::store {
+namespace {
+
+std::vector<float> cube(std::size_t points, std::uint64_t seed = 1) {
+    Random random(seed);
+    std::vector<float> xyz(3 * points);
+    for (float& value : xyz) value = static_cast<float>(random.uniform(-1.0, 1.0));
+    return xyz;
+}
+
+std::vector<float> flat(std::size_t points) {
+    auto xyz = cube(points);
+    for (std::size_t i = 2; i < xyz.size(); i += 3) xyz[i] = 0.5f;
+    return xyz;
+}
+
+/// What a check of all points says.
+Result<void> sanitiseAll(const std::vector<float>& xyz) {
+    PointCloud points;
+    for (std::size_t i = 0; i < xyz.size(); i += 3) points.push_back({xyz[i], xyz[i + 1], xyz[i + 2]});
+    const auto sanitised = sanitise(points);
+    if (!sanitised) return fail(sanitised.error());
+    return {};
+}
+
+void expectRefusedAsBySanitise(const std::vector<float>& xyz) {
+    const auto verified = VerifiedScan::verify(xyz);
+    const auto all = sanitiseAll(xyz);
+    ASSERT_FALSE(verified);
+    ASSERT_FALSE(all);
+    EXPECT_EQ(verified.error().code, all.error().code);
+    EXPECT_EQ(verified.error().message, all.error().message);
+}
+
+TEST(VerifiedScan, KeepsPointsAndTheirChecksum) {
+    for (const std::size_t count : {std::size_t{4}, std::size_t{100'000}}) {
+        const auto xyz = cube(count);
+        const auto scan = VerifiedScan::verify(xyz);
+        ASSERT_TRUE(scan) << scan.error().message;
+        EXPECT_EQ(scan->points(), xyz);
+        EXPECT_EQ(scan->pointCount(), count);
+        EXPECT_EQ(scan->bytes(), 12 * count);
+        EXPECT_EQ(scan->checksum(), sha256(xyz.data(), 4 * xyz.size()));
+    }
+}
+
+TEST(VerifiedScan, RefusesNumbersThatAreNotTriples) {
+    EXPECT_EQ(VerifiedScan::verify(std::vector<float>(13, 1.0f)).error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST(VerifiedScan, RefusesNonFiniteCoordinates) {
+    auto xyz = cube(10);
+    xyz[7] = std::numeric_limits<float>::quiet_NaN();
+    const auto refused = VerifiedScan::verify(xyz);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::kNonFiniteCoordinate);
+    EXPECT_NE(refused.error().message.find("point 2: y is NaN"), std::string::npos);
+}
+
+TEST(VerifiedScan, RefusesWhatSanitiseRefuses) {
+    expectRefusedAsBySanitise({});
+    expectRefusedAsBySanitise({1, 2, 3});
+    expectRefusedAsBySanitise(flat(5'000));
+    expectRefusedAsBySanitise(std::vector<float>(300, 7.0f));
+    std::vector<float> line;
+    for (int i = 0; i < 1'000; ++i) {
+        for (const int factor : {1, 2, 3}) line.push_back(static_cast<float>(factor * i));
+    }
+    expectRefusedAsBySanitise(line);
+    // Three distinct points, repeated: the message counts all of them.
+    std::vector<float> three;
+    for (int i = 0; i < 1'000; ++i) {
+        for (int axis = 0; axis < 3; ++axis) three.push_back(i % 3 == axis ? 1.0f : 0.0f);
+    }
+    expectRefusedAsBySanitise(three);
+}
+
+TEST(VerifiedScan, FindsOnePointOffThePlaneAnywhere) {
+    for (const std::size_t at : {std::size_t{0}, std::size_t{1}, std::size_t{4'321}, std::size_t{9'999}}) {
+        auto xyz = flat(10'000);
+        xyz[3 * at + 2] = 0.6f;
+        EXPECT_TRUE(VerifiedScan::verify(xyz)) << at;
+    }
+}
+
+TEST(VerifiedScan, FindsOnePointTooFarAwayAnywhere) {
+    for (const std::size_t at : {std::size_t{0}, std::size_t{1}, std::size_t{4'321}, std::size_t{9'999}}) {
+        auto xyz = cube(10'000);
+        xyz[3 * at + 1] = 3.402e38f;
+        expectRefusedAsBySanitise(xyz);
+    }
+}
+
+TEST(ScanVerifier, ComparesTheAnnouncedChecksum) {
+    const auto xyz = cube(100);
+    Checksum expected = sha256(xyz.data(), 4 * xyz.size());
+    for (const bool right : {true, false}) {
+        if (!right) expected[0] ^= 1;
+        ScanVerifier verifier;
+        ASSERT_TRUE(verifier.append(xyz.data(), 4 * xyz.size()));
+        const auto scan = verifier.finish(&expected);
+        ASSERT_EQ(scan.has_value(), right);
+        if (!right) {
+            EXPECT_EQ(scan.error().code, ErrorCode::kChecksumMismatch);
+        }
+    }
+}
+
+TEST(ScanVerifier, PiecesGiveTheSameScan) {
+    const auto xyz = cube(1'000);
+    const auto whole = VerifiedScan::verify(xyz);
+    ASSERT_TRUE(whole);
+    for (const std::size_t points : {std::size_t{1}, std::size_t{7}, std::size_t{1'000}}) {
+        ScanVerifier verifier;
+        for (std::size_t at = 0; at < 1'000; at += points) {
+            const std::size_t count = std::min(points, 1'000 - at);
+            ASSERT_TRUE(verifier.append(xyz.data() + 3 * at, 12 * count));
+        }
+        const auto scan = verifier.finish();
+        ASSERT_TRUE(scan);
+        EXPECT_EQ(scan->points(), whole->points());
+        EXPECT_EQ(scan->checksum(), whole->checksum());
+    }
+}
+
+}  // namespace
+}  // namespace shapedb::store
