@@ -14,6 +14,9 @@ namespace {
 /// Reconnecting keeps pace with RetryPolicy.
 constexpr int kFirstReconnectMs = 100;
 constexpr int kLongestReconnectMs = 2000;
+/// What one attempt may take, until the server's first frame: a busy server or a distant one needs its time.
+/// (gRPC's own name for this is misleading: its minimum for the backoff bounds the attempt, not the wait.)
+constexpr int kConnectTimeoutMs = 5000;
 
 grpc::ChannelArguments channelArguments() {
     grpc::ChannelArguments arguments;
@@ -22,7 +25,7 @@ grpc::ChannelArguments channelArguments() {
     // call.cpp retries, by the server's error names; gRPC must not retry as well.
     arguments.SetInt(GRPC_ARG_ENABLE_RETRIES, 0);
     arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, kFirstReconnectMs);
-    arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, kFirstReconnectMs);
+    arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, kConnectTimeoutMs);
     arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, kLongestReconnectMs);
     // Each Client has its own connection.
     arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
