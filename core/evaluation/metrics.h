@@ -51,8 +51,9 @@ struct ClassMetrics {
 
 struct RetrievalReport {
     std::size_t queries = 0;  ///< all shapes but the `lonely`
-    std::size_t lonely = 0;   ///< alone in their class: no queries, as there is nothing to find, but candidates
-    RetrievalMetrics mean;    ///< over all queries, so large classes weigh more; 0 without queries
+    std::size_t lonely =
+        0;                  ///< alone in their class: no queries, as there is nothing to find, but candidates
+    RetrievalMetrics mean;  ///< over all queries, so large classes weigh more; 0 without queries
     std::vector<ClassMetrics> perClass;      ///< by name, every class that occurs
     std::vector<RetrievalMetrics> perQuery;  ///< by shape index; all 0 for the lonely
 };

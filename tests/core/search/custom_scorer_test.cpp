@@ -43,7 +43,8 @@ class HandingOnScorer final : public Scorer {
     void scan(const ShapeRows& rows, const std::vector<std::uint8_t>& wanted, double,
               std::vector<Survivor>& left, ScanCounts&) const override {
         for (std::uint32_t row = 0; row < rows.count; ++row) {
-            if (wanted.empty() || wanted[row] != 0) left.push_back({1.0, row, {static_cast<std::uint16_t>(rows.scales[row])}});
+            if (wanted.empty() || wanted[row] != 0)
+                left.push_back({1.0, row, {static_cast<std::uint16_t>(rows.scales[row])}});
         }
     }
     std::optional<double> scoreIfReaches(const ShapeRow&, const Survivor& survivor,
