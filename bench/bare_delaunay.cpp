@@ -41,7 +41,7 @@ BareDelaunay bareParallelDelaunay(const PointCloud& points) {
                                                            CGAL::Delaunay_triangulation_cell_base_3<Kernel>,
                                                            CGAL::Parallel_tag>;
     using Triangulation = CGAL::Delaunay_triangulation_3<Kernel, Structure>;
-    constexpr int kLocksPerAxis = 50;  // what CGAL's manual proposes
+    constexpr int kLocksPerAxis = 50;  // as CGAL's manual suggests
     Triangulation::Lock_data_structure locks(CGAL::Bbox_3(-1.0, -1.0, -1.0, 1.0, 1.0, 1.0), kLocksPerAxis);
     Triangulation triangulation(&locks);
     return insertAll(triangulation, points);

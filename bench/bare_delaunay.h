@@ -1,4 +1,4 @@
-// What a segmentation is measured against: CGAL's own triangulation of the same points and nothing else.
+// The baseline of `segment`: CGAL's triangulation of the same points and nothing else.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +8,7 @@
 namespace shapedb::bench {
 
 struct BareDelaunay {
-    double seconds = 0.0;  ///< of this thread, for the range insertion alone
+    double seconds = 0.0;  ///< of this thread, for the range insertion
     double wallSeconds = 0.0;
     std::size_t tetrahedra = 0;
 };

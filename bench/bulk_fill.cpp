@@ -19,7 +19,7 @@ constexpr std::uint64_t kShapesPerCommit = 10'000;
 constexpr std::int64_t kFirstGeneration = 1;
 constexpr int kBusyTimeoutMs = 5'000;
 
-/// What every shape shares.
+/// The same for every shape.
 struct Scan {
     std::vector<float> points = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
     std::string blob = orRaise(encodePoints(points, 1));

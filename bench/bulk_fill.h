@@ -1,5 +1,4 @@
-// Fills a database with shapes that are already described, for measurements at sizes that would
-// take days to upload. The server never calls it.
+// Fills a database with ready-made shapes, for measurements at sizes that would take days to upload.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +13,7 @@ namespace shapedb::bench {
 struct FillShape {
     std::string key;  ///< unique
     Metadata metadata;
-    std::string signature;  ///< core/signature/signature_codec.h; not looked at
+    std::string signature;  ///< as core/signature/signature_codec.h encodes it; not checked
 };
 
 /// Creates the database at `options.path`, or opens it as openSqliteStore does, makes the collection and

@@ -21,9 +21,9 @@ constexpr double kBottom = 42.0;
 constexpr double kLegendLine = 20.0;
 constexpr double kLegendEntry = 150.0;
 constexpr double kMarker = 2.2;
-constexpr std::size_t kMarkersUpTo = 8;  // more points than this are drawn as a line alone
+constexpr std::size_t kMarkersUpTo = 8;  // more points than this are drawn as a line only
 
-// Okabe and Ito (2008): told apart by colour-blind readers too.
+// Okabe and Ito (2008): distinguishable by colour-blind readers too.
 constexpr std::array<const char*, 8> kColours = {"#d55e00", "#e69f00", "#0072b2", "#56b4e9",
                                                  "#009e73", "#000000", "#cc79a7", "#999999"};
 

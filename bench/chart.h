@@ -1,4 +1,4 @@
-// Line charts as SVG, with no library behind them.
+// Line charts as SVG.
 #pragma once
 
 #include <string>
@@ -23,8 +23,8 @@ struct Panel {
     std::vector<Series> series;
 };
 
-/// Panels row by row, `columns` (at least 1) in each row, and below them one legend of all series in
-/// the order they first occur. A complete SVG document; text in any encoding of UTF-8 is escaped.
+/// Panels row by row, `columns` (at least 1) per row; below them a legend of all series in order of first
+/// use. A complete SVG document; text is escaped.
 [[nodiscard]] std::string drawCharts(const std::vector<Panel>& panels, std::size_t columns);
 
 }  // namespace shapedb::bench

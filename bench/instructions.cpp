@@ -23,7 +23,7 @@ namespace {
 
 using nlohmann::json;
 
-/// What glibc and OpenSSL choose functions by, as far as valgrind shows it to them.
+/// What glibc and OpenSSL select functions by, as far as valgrind reports it.
 constexpr std::array<const char*, 6> kInstructionSets = {"avx2", "bmi2", "erms", "fma", "sha_ni", "ssse3"};
 
 std::string processorSets() {

@@ -1,5 +1,5 @@
-// Instruction counts of the jobs (jobs.h) beside those a committed file holds: a slowdown shows on any
-// machine, however busy.
+// Compares the instruction counts of the jobs (jobs.h) with a committed file: slowdowns show even on a busy
+// machine.
 #pragma once
 
 #include <cstdint>
@@ -11,13 +11,13 @@
 
 namespace shapedb::bench {
 
-/// What the counts depend on besides the code.
+/// What else the counts depend on.
 struct CountingEnvironment {
     std::string compiler;
     std::string buildType;
     std::string libc;
     std::string valgrind;
-    /// Of those instruction sets that libraries choose their functions by, the ones there are.
+    /// Instruction sets of the processor that libraries select functions by.
     std::string processor;
 
     /// "compiler g++ 12.2.0, build type Release, ..."
@@ -37,8 +37,8 @@ struct Counts {
 struct JobVerdict {
     enum class Kind {
         kSame,  ///< within the margin
-        kLess,  ///< fewer by more than the margin: the baseline should follow
-        kMore,  ///< more by more than the margin
+        kLess,  ///< fewer by more than the margin: update the baseline
+        kMore,  ///< more, beyond the margin
         kNew,   ///< not in the baseline
         kGone,  ///< only in the baseline
     };
@@ -52,13 +52,13 @@ struct Verdict {
     bool comparable = true;  ///< measured in the baseline's environment
     std::vector<JobVerdict> jobs;
 
-    /// A count has grown, or the baseline does not list the jobs there are, and the counts can be compared.
+    /// The counts are comparable, and one has grown or the baseline lists other jobs.
     [[nodiscard]] bool failed() const;
 };
 
-/// `margin` is a share: 0.03 lets a count grow by 3 %.
+/// `margin` is a fraction: 0.03 lets a count grow by 3 %.
 [[nodiscard]] Verdict compareCounts(const Counts& baseline, const Counts& measured, double margin);
-/// A table, and what to do.
+/// A table and what to do about it.
 [[nodiscard]] std::string verdictText(const Verdict& verdict, const Counts& baseline, const Counts& measured,
                                       double margin);
 

@@ -1,4 +1,4 @@
-// `shapedb-bench instructions`: counts what small fixed jobs take and compares with a committed file;
+// `shapedb-bench instructions`: counts the instructions of small fixed jobs and compares them with a file;
 // `shapedb-bench job` runs one of them, for a profiler.
 #include <filesystem>
 #include <fstream>
@@ -36,7 +36,7 @@ const Job* findJob(const std::string& name) {
     return nullptr;
 }
 
-/// `folder`, or `own` when that is empty; what takes long to make is made where it is missing.
+/// `folder`, or `own` if that is empty; missing inputs are made.
 Result<JobFolder> inputFolder(const WorkDirectory& own, const std::string& folder) {
     JobFolder input{folder.empty() ? own.path() : folder};
     if (!std::filesystem::exists(input.signatures())) {
@@ -112,16 +112,16 @@ void addInstructionsOperation(CLI::App& app, Bench& bench) {
     auto flags = std::make_shared<InstructionFlags>();
     flags->program = thisProgram();
     CLI::App* command = app.add_subcommand(
-        "instructions", "Instructions that small fixed jobs take, beside those in a baseline file");
+        "instructions", "Compares the instruction counts of small fixed jobs with a baseline file");
     command->add_option("BASELINE", flags->baseline, "JSON, as --update writes it")->required();
-    command->add_option("--margin", flags->margin, "Share by which a count may grow")
+    command->add_option("--margin", flags->margin, "Fraction by which a count may grow")
         ->check(CLI::Range(0.0, 10.0))
         ->capture_default_str();
-    command->add_flag("--update", flags->update, "Write what was counted to BASELINE instead of comparing");
+    command->add_flag("--update", flags->update, "Write the counts to BASELINE instead of comparing");
     command->add_option("--valgrind", flags->valgrind, "The program that counts")->capture_default_str();
     command->add_option("--program", flags->program, "The shapedb-bench to count [this one]");
     command->add_option("--folder", flags->folder,
-                        "Where the jobs' files are; what is missing is made [temporary]");
+                        "Folder for the jobs' input files; missing ones are made [temporary]");
     command->callback(
         [flags, &bench] { bench.action = [flags, &bench] { return runInstructions(*flags, bench); }; });
 }
@@ -139,10 +139,10 @@ void addJobOperation(CLI::App& app, Bench& bench) {
         list += "\n" + std::string(job.name) + ": " + job.description;
     }
     CLI::App* command =
-        app.add_subcommand("job", "Runs one of the jobs that `instructions` counts, for a profiler");
+        app.add_subcommand("job", "Runs one of the jobs of `instructions`, for use under a profiler");
     command->add_option("NAME", flags->name, "Which:" + list)->required()->check(CLI::IsMember(names));
     command->add_option("--folder", flags->folder,
-                        "Where its files are; what is missing is made [temporary]");
+                        "Folder for its input files; missing ones are made [temporary]");
     command->callback(
         [flags, &bench] { bench.action = [flags] { return runJob(flags->name, flags->folder); }; });
 }

@@ -1,5 +1,4 @@
-// `shapedb-bench interior`: how well the interior and the size of damaged scans agree with those of
-// the clean scan.
+// `shapedb-bench interior`: compares the interior and size of damaged scans with those of the clean scan.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -50,7 +49,7 @@ constexpr std::array<Condition, 7> kConditions = {{
     {"cap missing", Damage::kCap, 0.0},
 }};
 
-// Points uniform in the box of the cloud, as many as kOutlierShare of it.
+// Adds points uniform in the cloud's box: kOutlierShare of its number.
 void addOutliers(PointCloud& points) {
     Point3 low = points.front();
     Point3 high = low;
@@ -71,7 +70,7 @@ Point3 capDirection() {
     return randomDirection(random);
 }
 
-// Cuts off what lies farthest in a direction.
+// Cuts off the part farthest in a direction.
 void cutCap(PointCloud& points) {
     const Point3 direction = capDirection();
     std::sort(points.begin(), points.end(),
@@ -91,7 +90,7 @@ Result<PointCloud> damaged(PointCloud points, const Condition& condition) {
     return points;
 }
 
-// Of one shape or the mean over a class.
+// Of one shape, or the sum over a class.
 struct Figures {
     double volumeError = 0.0;  // |volume / true volume - 1|, at most 1
     double worst = 0.0;
@@ -115,7 +114,7 @@ struct Figures {
 
 using Row = std::array<Figures, kConditions.size()>;
 
-// Of the interior without what lies beyond the last point that the cut of a cap left.
+// Volume of the interior up to the last point that cutting the cap left.
 double volumeBelow(const Segmentation& whole, const PointCloud& left) {
     const Point3 direction = capDirection();
     const double height = dot(left.back(), direction);
@@ -133,8 +132,8 @@ double volumeBelow(const Segmentation& whole, const PointCloud& left) {
     return sum;
 }
 
-// The truth is what the method as published finds in the clean scan (below the cut, for a missing cap),
-// and the box of the points that are left.
+// The reference is the interior that the published method finds in the clean scan (below the cut, if a cap is
+// missing) and the box of the remaining points.
 Result<Row> measure(const PointCloud& clean, const RunContext& context) {
     SegmentationOptions published = parametersOf(Profile::kPaper).segmentation;
     const auto truth = segment(clean, published, context);

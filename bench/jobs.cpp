@@ -17,7 +17,7 @@
 #include "core/signature/signature_codec.h"
 #include "server/store/sqlite/sqlite_store.h"
 
-// Neither inlined nor cloned nor mangled: callgrind knows it by its name.
+// Not inlined, cloned or mangled: callgrind finds it by name.
 #ifdef __clang__
 #define SHAPEDB_AS_IT_IS __attribute__((noinline))
 #else
@@ -40,7 +40,7 @@ constexpr std::size_t kPlyPoints = 100'000;
 constexpr std::size_t kStoredShapes = 200;
 constexpr std::size_t kStoredPoints = 500;
 constexpr std::size_t kHits = 10;
-/// Different families stand next to each other: few pairs are of the same kind, as in a search.
+/// Neighbours are of different families: few pairs are of the same kind, as in a search.
 constexpr std::size_t kPairStep = 7;
 
 Result<PointCloud> oneScan(std::size_t points) {
@@ -72,7 +72,7 @@ Result<Work> signatureJob(const JobFolder&) {
     });
 }
 
-/// The file is lengths (4 bytes, little-endian) and signatures in turn.
+/// The file alternates lengths (4 bytes, little-endian) and signatures.
 Result<std::vector<Signature>> readSignatures(const JobFolder& folder) {
     std::ifstream file(folder.signatures(), std::ios::binary);
     std::vector<Signature> all;
@@ -96,7 +96,7 @@ Result<Work> scoreJob(const JobFolder& folder) {
         double sum = 0.0;
         for (std::size_t i = 0; i < all.size(); ++i)
             sum += score(all[i], all[(i + kPairStep) % all.size()], {});
-        // Also keeps the compiler from leaving the scores out.
+        // Also keeps the compiler from removing the loop.
         if (!(sum > 0.0)) return fail(ErrorCode::kInternal, "no pair has a score");
         return {};
     });
@@ -121,7 +121,7 @@ Result<Work> topKJob(const JobFolder& folder) {
     });
 }
 
-/// One shape's way through the store.
+/// One shape through the store.
 Result<void> storeOne(store::Store& store, std::int64_t collection, const std::string& key,
                       const std::vector<float>& points, const std::string& signature) {
     auto scan = store::VerifiedScan::verify(points);
@@ -152,7 +152,7 @@ Result<Work> storeJob(const JobFolder& folder) {
     }
     store::SqliteOptions options;
     options.path = folder.path + "/job.sqlite";
-    options.now = [] { return store::TimestampMs{1'700'000'000'000}; };  // the same row each time
+    options.now = [] { return store::TimestampMs{1'700'000'000'000}; };  // the same row every time
     auto opened = store::openSqliteStore(options);
     RETURN_IF_ERROR(opened);
     const std::shared_ptr<store::Store> store = std::move(*opened);
@@ -212,7 +212,7 @@ Result<void> prepareJobs(const JobFolder& folder, unsigned threads) {
 }
 
 Result<void> runCounted(const Work& work) {
-    // Others' instructions would not be counted: callgrind enters the function on this thread.
+    // callgrind counts only the thread that enters the function.
     const tbb::global_control oneThread(tbb::global_control::max_allowed_parallelism, 1);
     Result<void> result;
     const std::function<void()> counted = [&] { result = work(); };

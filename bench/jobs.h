@@ -1,5 +1,5 @@
-// Small fixed jobs whose instructions are counted: enough of each costly part of the program that a
-// change for the worse shows, and no more.
+// Small fixed jobs whose instructions are counted: just enough of each costly part of the program to show a
+// slowdown.
 #pragma once
 
 #include <cstdint>
@@ -21,17 +21,17 @@ struct JobFolder {
 struct Job {
     const char* name;         ///< static storage
     const char* description;  ///< one line for a person
-    /// Everything that is not to be counted; returns what is. The same in each run.
+    /// Does the work that is not counted and returns the work that is. Deterministic.
     std::function<Result<std::function<Result<void>()>>(const JobFolder& folder)> prepare;
 };
 
-/// Names and work are compared between versions: change a job's work under a new name only.
+/// Counts are compared between versions by name: a job with other work needs a new name.
 [[nodiscard]] const std::vector<Job>& jobs();
 
-/// Writes the input that takes long to make. Errors: kFileNotWritable, those of SignatureGenerator.
+/// Writes the inputs that are slow to make. Errors: kFileNotWritable, those of SignatureGenerator.
 [[nodiscard]] Result<void> prepareJobs(const JobFolder& folder, unsigned threads);
 
-/// The function inside which callgrind counts (--toggle-collect): runs `work`, on one thread.
+/// callgrind counts inside this function (--toggle-collect), which runs `work` on one thread.
 constexpr const char* kCountedFunction = "shapedb_bench_counted";
 [[nodiscard]] Result<void> runCounted(const std::function<Result<void>()>& work);
 

@@ -1,5 +1,5 @@
-// `shapedb-bench load`: what the server adds to core's work, how it answers while it is busy, how it
-// starts, and what it needs for a large upload. Each with the limit it is to keep.
+// `shapedb-bench load`: what the server adds to the work of core/, latency under load, start-up and memory of
+// a large upload, each with its limit.
 #include <algorithm>
 #include <array>
 #include <filesystem>
@@ -23,7 +23,7 @@ namespace {
 
 using nlohmann::json;
 
-// What the project promises (docs/benchmarks.md).
+// The limits of docs/benchmarks.md.
 constexpr double kLeastIngestRatio = 0.9;
 constexpr double kMostP99Ratio = 3.0;
 constexpr double kMostStartSeconds = 5.0;
@@ -38,7 +38,7 @@ struct LoadFlags {
     std::string json;
 };
 
-/// One line of the table for people.
+/// One row of the text table.
 struct Line {
     std::string what;
     std::string value;
@@ -168,7 +168,7 @@ std::string table(const std::vector<Line>& lines) {
     return text;
 }
 
-/// Measures one part and adds what it found.
+/// Measures one part and adds its figures.
 template <typename Measure>
 Result<void> add(Measure measure, const LoadSettings& settings, Bench& bench, Report& all) {
     const auto progress = [&](const std::string& what, std::uint64_t done, std::uint64_t total) {

@@ -24,7 +24,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Clients for each worker: enough that a worker never waits for the next scan.
+/// Clients per worker: enough that no worker waits for a scan.
 constexpr unsigned kClientsPerWorker = 2;
 constexpr std::size_t kDistinctQueries = 64;
 constexpr std::size_t kWarmUpQueries = 3;
@@ -34,7 +34,7 @@ constexpr std::uint64_t kBytesPerPoint = 12;
 
 double since(Clock::time_point began) { return std::chrono::duration<double>(Clock::now() - began).count(); }
 
-/// Of this process, all threads.
+/// Processor seconds of this process, all threads.
 double processorSeconds() {
     rusage usage{};
     getrusage(RUSAGE_SELF, &usage);
@@ -57,8 +57,8 @@ Result<ServerProcess> startServer(const LoadSettings& settings, const std::strin
     return ServerProcess::start(settings.server, data, flags);
 }
 
-/// Runs `work(i)` for i = 0, 1, ... on so many threads until it says false or fails; the first
-/// error. `work` must stop soon when `stop` is set.
+/// Runs `work(i)` for i = 0, 1, ... on that many threads until it returns false or fails; returns the first
+/// error. `work` must end soon after `stop` is set.
 class Crew {
   public:
     using Work = std::function<Result<bool>(std::size_t i)>;
@@ -108,7 +108,7 @@ RunContext cancelledBy(const RunContext& context) {
     return plain;
 }
 
-/// All scans described by core alone. Returns seconds.
+/// Describes all scans without a server. Returns seconds.
 Result<double> describeAll(const std::vector<PointCloud>& scans, unsigned threads,
                            const RunContext& context) {
     const ShapeParameters parameters = parametersOf(Profile::kDefault);
@@ -136,7 +136,7 @@ Result<void> addAndWait(const client::Client& client, const std::string& key, co
     return {};
 }
 
-/// All scans through the server. Returns seconds.
+/// Sends all scans through the server. Returns seconds.
 Result<double> uploadAll(const client::Client& client, const std::vector<PointCloud>& scans,
                          const std::string& prefix, unsigned threads, const RunContext& context) {
     const auto began = Clock::now();
@@ -173,7 +173,7 @@ Result<void> storeSignatures(const std::string& data, const SignatureGenerator& 
     return fillDataDirectory(data, generator, count, reporting);
 }
 
-/// Some queries that are not among the `stored`.
+/// Queries that are not among the `stored` shapes.
 std::vector<std::string> makeQueries(const SignatureGenerator& generator, std::uint64_t stored) {
     std::vector<std::string> queries;
     for (std::size_t i = 0; i < kDistinctQueries; ++i)
@@ -181,7 +181,7 @@ std::vector<std::string> makeQueries(const SignatureGenerator& generator, std::u
     return queries;
 }
 
-/// Asks one query after the other; appends the seconds each took.
+/// Runs the queries in turn and appends the seconds each took.
 Result<void> ask(const client::Client& client, const std::vector<std::string>& queries, std::uint32_t k,
                  std::size_t count, double seconds, std::vector<double>& took, const RunContext& context) {
     client::SearchOptions options;
@@ -201,7 +201,7 @@ Latencies latenciesOf(const std::vector<double>& took) {
     return {took.size(), median(took), percentile(took, kTail)};
 }
 
-/// Idle and busy in turn, so that what else the machine does touches both.
+/// Alternates idle and busy, so that other load on the machine affects both.
 Result<LatencyFigures> measureLatencyOf(const LoadSettings& settings, const client::Client& client,
                                         const client::Client& uploader,
                                         const std::vector<std::string>& queries,
@@ -243,7 +243,7 @@ Result<LatencyFigures> measureLatencyOf(const LoadSettings& settings, const clie
         RETURN_IF_ERROR(crew.finish());
         if (!before || !after) return fail((before ? after : before).error());
         described += after->ingested - before->ingested;
-        // What was cut off goes on in the workers; the next round is to find them idle.
+        // Workers finish what was interrupted; the next round must find them idle.
         for (auto left = client.stats(); left && left->queuedJobs > 0; left = client.stats()) {
             RETURN_IF_ERROR(context.checkpoint());
             std::this_thread::sleep_for(std::chrono::milliseconds(50));
@@ -255,7 +255,7 @@ Result<LatencyFigures> measureLatencyOf(const LoadSettings& settings, const clie
     return figures;
 }
 
-/// A cloud of `count` points on a lumpy ball, quickly.
+/// `count` points on a lumpy ball, made quickly.
 Result<PointCloud> makeLargeScan(std::uint64_t count, const LoadSettings& settings,
                                  const RunContext& context) {
     auto scans = makeScans(1, static_cast<std::size_t>(count), settings.seed, 1, context);
@@ -423,7 +423,7 @@ Result<UploadFigures> measureUpload(const LoadSettings& settings, const LoadProg
     RETURN_IF_ERROR(server);
     const auto client = connect(*server);
     RETURN_IF_ERROR(client);
-    // Threads, connections and arenas that every upload needs are not this one's.
+    // Warms up the threads, connections and arenas that any upload needs.
     RETURN_IF_ERROR(addAndWait(*client, "warm-up", small->front(), cancelledBy(context)));
 
     UploadFigures figures;
@@ -436,7 +436,7 @@ Result<UploadFigures> measureUpload(const LoadSettings& settings, const LoadProg
     const auto began = Clock::now();
     const auto added = client->addShape(request, *scan, cancelledBy(context));
     RETURN_IF_ERROR(added);
-    // At once: a worker begins to read the scan again now.
+    // Read at once: a worker is about to load the scan.
     const auto uploaded = server->memory();
     figures.seconds = since(began);
     RETURN_IF_ERROR(uploaded);

@@ -1,4 +1,4 @@
-// Ways to describe a shape and to compare descriptions: ours, and what users would take instead.
+// Methods to describe shapes and compare the descriptions: ours and the alternatives.
 #pragma once
 
 #include <cstdint>
@@ -21,16 +21,16 @@ using Features = std::variant<Histogram, Signature>;
 struct Method {
     std::string name;        ///< as --methods takes it, lower case
     std::string title;       ///< for people
-    std::string comparison;  ///< what tells how alike two features are, e.g. "L1"
+    std::string comparison;  ///< how two features are compared, e.g. "L1"
     /// Deterministic in points and seed unless its documentation says otherwise. Runs on the calling thread
     /// alone; may be called from several at once. Errors: the shape cannot be described; kCancelled.
     std::function<Result<Features>(const PointCloud& points, std::uint64_t seed, const RunContext& context)>
         describe;
-    /// Higher is more alike; finite; symmetric. For a distance: its negative.
+    /// Higher is more alike; finite; symmetric. Distances are negated.
     std::function<double(const Features& a, const Features& b)> score;
 };
 
-/// The profiles of ShapeDB, D2, and what the Point Cloud Library offers if it was built in.
+/// The profiles of ShapeDB, D2, and the descriptors of the Point Cloud Library if built in.
 [[nodiscard]] std::vector<Method> allMethods();
 
 /// Those named, in the order of `allMethods`; all when `names` is empty.

@@ -1,4 +1,4 @@
-// The operations of shapedb-bench. A new one is a source file with its function here, called in
+// The operations of shapedb-bench. To add one, write a source file, declare its function here and call it in
 // program.cpp.
 #pragma once
 
@@ -16,15 +16,14 @@ class App;
 
 namespace shapedb::bench {
 
-/// What an operation gets: where its words go, and how it is stopped.
+/// What an operation is given: the console and how it is cancelled.
 struct Bench {
-    /// Where text for people goes, progress and notes.
     cli::Console& console;
     const std::atomic<bool>& cancel;  ///< set by Ctrl-C
     std::string command;              ///< as the user wrote it, program first
 
-    /// Set by the subcommand the user named; run after the whole command line was read. Its value
-    /// is the exit code.
+    /// Set by the subcommand the user chose; run once the whole command line is read. Returns the exit
+    /// code.
     std::function<Result<int>()> action;
 
     [[nodiscard]] RunContext context() const {

@@ -1,4 +1,4 @@
-// Results into files.
+// Writing results to files.
 #pragma once
 
 #include <string>
@@ -11,14 +11,14 @@
 
 namespace shapedb::bench {
 
-/// Writes `text` to `path`, replacing what is there; whole or not at all.
+/// Writes `text` to `path`, replacing the file atomically.
 /// Errors: kFileNotWritable.
 [[nodiscard]] Result<void> writeText(const std::string& path, std::string_view text);
 
 /// `value` by a printf format for one double, e.g. "%.2f"; at most 63 characters.
 [[nodiscard]] std::string numberText(const char* format, double value);
 
-/// --json FILE|-: to a file, or to standard output instead of the text for people. Empty: nowhere.
+/// --json FILE|-: to a file, or to standard output instead of the readable text. Empty: nowhere.
 /// Call `announceJson` before anything is printed. Errors: kFileNotWritable.
 void announceJson(cli::Console& console, const std::string& target);
 [[nodiscard]] Result<void> writeJson(cli::Console& console, const std::string& target,

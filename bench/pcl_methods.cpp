@@ -25,12 +25,12 @@ using Cloud = pcl::PointCloud<pcl::PointXYZ>;
 
 /// Neighbours within this share of the bounding sphere's diameter give a normal.
 constexpr double kNormalRadius = 0.04;
-/// ESF draws triangles until enough have an area; thinner clouds than this (ratio of standard
-/// deviations) give it none, and it would never end.
+/// ESF draws triangles until enough of them have an area. In clouds thinner than this (ratio of standard
+/// deviations) none has, and it would never end.
 constexpr double kThinnestForEsf = 1e-3;
 
-/// Centred on the mean, because single precision far from the origin would be noise and because VFH
-/// looks from there; scaled so that the farthest point lies at distance 1.
+/// Centred on the mean, for single precision and because VFH takes the origin as its viewpoint; scaled so
+/// that the farthest point is at distance 1.
 Result<Cloud::Ptr> toCloud(const PointCloud& points) {
     if (points.size() < 4) return fail(ErrorCode::kTooFewPoints, "fewer than 4 points");
     Point3 mean;
@@ -99,7 +99,7 @@ Result<Histogram> vfh(const Cloud::Ptr& cloud) {
     estimation.setInputNormals(normals);
     estimation.setIndices(indices);
     estimation.setSearchMethod(tree);
-    // Off by default; on, VFH retrieves better by far, and a peer is to be measured at its best.
+    // Off by default, but VFH retrieves far better with it, and we measure the alternatives at their best.
     estimation.setNormalizeDistance(true);
     estimation.setFillSizeComponent(true);
     pcl::PointCloud<pcl::VFHSignature308> result;
@@ -115,7 +115,7 @@ Result<Histogram> gasd(const Cloud::Ptr& cloud) {
     return histogramOf("GASD", result);
 }
 
-/// PCL reports by exceptions, and they end here.
+/// Turns PCL's exceptions into errors.
 std::function<Result<Histogram>(const PointCloud&, std::uint64_t)> guarded(
     Result<Histogram> (*describe)(const Cloud::Ptr&)) {
     return [describe](const PointCloud& points, std::uint64_t) -> Result<Histogram> {

@@ -11,7 +11,7 @@ namespace shapedb::bench {
 
 namespace {
 
-// VmHWM of this process in bytes, 0 when the system does not tell.
+// VmHWM of this process in bytes, or 0 if unknown.
 std::size_t highWater() {
     std::ifstream status("/proc/self/status");
     for (std::string line; std::getline(status, line);) {
@@ -20,7 +20,7 @@ std::size_t highWater() {
     return 0;
 }
 
-// What the child wrote before it ended; the kernel starts its mark at what it shares with us.
+// Reads what the child wrote. Its mark includes the memory it shares with this process.
 std::size_t highWaterOfChild(const std::function<bool()>& work) {
     int ends[2];
     if (pipe(ends) != 0) return 0;

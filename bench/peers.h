@@ -8,7 +8,7 @@
 
 namespace shapedb::bench {
 
-/// Their names, whether built or not.
+/// Their names, even when not built in.
 [[nodiscard]] inline std::vector<std::string> peerNames() { return {"esf", "vfh", "gasd"}; }
 
 /// Empty when PCL was not built in.

@@ -34,7 +34,7 @@ Result<std::vector<double>> precisionAtRecall(const ScoreMatrix& scores,
         ++queries;
         for (std::size_t i = best.size() - 1; i > 0; --i) best[i - 1] = std::max(best[i - 1], best[i]);
         for (std::size_t level = 1; level <= kRecallLevels; ++level) {
-            // The least number of right candidates that reaches the level, in whole numbers.
+            // The smallest number of right candidates that reaches the level, in integers.
             const std::size_t needed = (level * best.size() + kRecallLevels - 1) / kRecallLevels;
             mean[level - 1] += best[needed - 1];
         }

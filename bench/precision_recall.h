@@ -1,4 +1,4 @@
-// The precision-recall curve of leave-one-out retrieval: more of a ranking than one number tells.
+// The precision-recall curve of leave-one-out retrieval.
 #pragma once
 
 #include <cstddef>
@@ -14,8 +14,8 @@ namespace shapedb::bench {
 inline constexpr std::size_t kRecallLevels = 20;
 
 /// The mean over all queries of the interpolated precision at each recall level: the best precision
-/// at any rank where at least that share of the right candidates has been found. In [0, 1], never
-/// rising. Right is the same label; a shape alone in its class asks nothing; ties break by index.
+/// at any rank where at least that share of the right candidates has been found. In [0, 1],
+/// never rising. Right means the same label; a shape alone in its class is no query; ties break by index.
 /// All 0 without queries.
 ///
 /// Errors: those of `checkScoreMatrix`.

@@ -19,7 +19,7 @@ int finish(cli::Console& console, int exitCode) {
     return exitCode == cli::kOk ? cli::kBadData : exitCode;
 }
 
-/// Without the folder of the program: figures are compared between machines.
+/// Without the program's folder, so that figures of different machines compare.
 std::string commandLine(int argc, const char* const* argv) {
     std::string text = kProgramName;
     for (int i = 1; i < argc; ++i) text += std::string(" ") + argv[i];
@@ -40,7 +40,7 @@ int usageError(cli::Console& console, const CLI::App& app, const CLI::ParseError
 int run(int argc, const char* const* argv, cli::Console& console, const std::atomic<bool>& cancel) {
     try {
         Bench bench{console, cancel, commandLine(argc, argv), {}};
-        CLI::App app("Measures ShapeDB beside what users would take instead.", kProgramName);
+        CLI::App app("Measures ShapeDB beside the alternatives.", kProgramName);
         app.set_version_flag("--version", std::string(kProgramName) + " " SHAPEDB_VERSION);
         app.require_subcommand(1);
         addRetrievalOperation(app, bench);

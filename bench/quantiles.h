@@ -9,7 +9,7 @@
 
 namespace shapedb::bench {
 
-/// Value below which `share` of the values lie (the smallest such value); 0 when there are none.
+/// Smallest value that at least `share` of the values do not exceed; 0 if there are none.
 [[nodiscard]] inline double percentile(std::vector<double> values, double share) {
     if (values.empty()) return 0.0;
     std::sort(values.begin(), values.end());
@@ -19,8 +19,8 @@ namespace shapedb::bench {
 
 [[nodiscard]] inline double median(std::vector<double> values) { return percentile(std::move(values), 0.5); }
 
-/// Median of the ratios of values measured one after the other: a machine that changes its speed from round
-/// to round moves it less than the ratio of medians. Both have as many.
+/// Median of the ratios of values measured right after each other; changes in the machine's speed affect it
+/// less than the ratio of medians. Both must have the same size.
 [[nodiscard]] inline double medianRatio(const std::vector<double>& of, const std::vector<double>& to) {
     std::vector<double> ratios;
     for (std::size_t i = 0; i < of.size(); ++i) ratios.push_back(of[i] / to[i]);

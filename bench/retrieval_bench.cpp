@@ -1,5 +1,4 @@
-// `shapedb-bench retrieval`: our profiles beside the descriptors users would take instead, on the
-// same points in the same run.
+// `shapedb-bench retrieval`: our profiles beside other descriptors, on the same points in the same run.
 #include <cmath>
 #include <memory>
 
@@ -79,13 +78,13 @@ RetrievalSettings settingsOf(const RetrievalFlags& flags) {
     return settings;
 }
 
-/// Names every failure once; says whether a file could not be read.
+/// Reports every failure once; returns whether a file could not be read.
 int reportFailures(cli::Console& console, const std::vector<LevelResult>& levels) {
     bool unreadable = false;
     for (const LevelResult& level : levels) {
         for (const MethodResult& method : level.methods) {
             for (const ScanFailure& failure : method.failures) {
-                // A file that nobody can read is one failure, not one for every method.
+                // An unreadable file is one failure, not one per method.
                 if (failure.unreadable && &method != &level.methods.front()) continue;
                 unreadable = unreadable || failure.unreadable;
                 const std::string who = failure.unreadable ? "" : method.title + ": ";

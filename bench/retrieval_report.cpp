@@ -35,10 +35,10 @@ constexpr std::array<Measure, 5> kMeasures = {{{"nn", "NN", &RetrievalMetrics::n
                                                {"dcg", "DCG", &RetrievalMetrics::dcg},
                                                {"map", "mAP", &RetrievalMetrics::averagePrecision}}};
 
-/// A table before it has a look.
+/// A table before it is formatted.
 struct Grid {
     std::vector<std::string> titles;
-    std::size_t leftColumns = 1;  ///< the first of them hold words, the others numbers
+    std::size_t leftColumns = 1;  ///< these hold words, the others numbers
     std::vector<std::vector<std::string>> rows;
 };
 
@@ -110,7 +110,7 @@ Grid measuresGrid(const LevelResult& level, bool gallery) {
     return grid;
 }
 
-/// One row a query, one column a method: the rank of the right answer and the first hit.
+/// One row per query, one column per method: rank of the right answer and first hit.
 Grid ranksGrid(const LevelResult& level) {
     Grid grid;
     grid.titles = {"query"};
@@ -168,7 +168,7 @@ std::string warnings(const RetrievalReportData& data) {
     return text;
 }
 
-/// `render` turns a grid into the document's form; `heading` a level's title.
+/// `render` formats a table, `heading` the title of a level.
 template <typename Render, typename Heading>
 std::string body(const RetrievalReportData& data, Render render, Heading heading) {
     std::string text;
@@ -223,7 +223,7 @@ json methodJson(const MethodResult& method, const MethodResult* unit, bool galle
     return out;
 }
 
-/// Our recommended profile is what the reader looks for.
+/// Highlights our recommended profile.
 Series seriesOf(const MethodResult& method) {
     Series series;
     series.name = method.title;

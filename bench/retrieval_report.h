@@ -1,4 +1,4 @@
-// What `shapedb-bench retrieval` tells: for people, for documents, for programs, as a picture.
+// The report of `shapedb-bench retrieval` as text, Markdown, JSON and a picture.
 #pragma once
 
 #include <string>
@@ -11,17 +11,17 @@
 
 namespace shapedb::bench {
 
-/// Everything a report is made of.
+/// What a report contains.
 struct RetrievalReportData {
     const RetrievalTask& task;
     const RetrievalSettings& settings;
     const std::vector<LevelResult>& levels;
     Environment environment;
-    std::string peerLibrary;  ///< empty: the peers were not built in, and the report says so
+    std::string peerLibrary;  ///< empty: the peers are not built in, and the report says so
 };
 
-/// Tables with aligned columns. Times are told as multiples of D2's in the same run and level; "-"
-/// where D2 was not measured.
+/// Tables with aligned columns. Times are multiples of D2's in the same run and level; "-" if
+/// D2 was not measured.
 [[nodiscard]] std::string retrievalText(const RetrievalReportData& data);
 
 /// The same tables in Markdown.

@@ -17,11 +17,11 @@ namespace {
 
 using cli::CollectionScan;
 
-/// Below every distance's negative; and one below that for ties against failures.
+/// Lower than any negated distance; and one lower still, for ties with failures.
 constexpr double kFailedScore = std::numeric_limits<double>::lowest();
 constexpr double kBelowFailed = -std::numeric_limits<double>::infinity();
 
-/// What one method made of one scan.
+/// The result of one method for one scan.
 struct Item {
     std::optional<Features> features;
     std::optional<ScanFailure> failure;
@@ -35,7 +35,7 @@ bool endsTheRun(ErrorCode code) {
     return code == ErrorCode::kCancelled || code == ErrorCode::kDeadlineExceeded;
 }
 
-/// About the mean, so that coordinates far from the origin lose no digits.
+/// Relative to the mean, so that coordinates far from the origin lose no digits.
 PointCloud turned(const PointCloud& points, Random& random) {
     const Matrix3 rotation = randomRotation(random);
     Point3 mean;
@@ -47,7 +47,7 @@ PointCloud turned(const PointCloud& points, Random& random) {
     return out;
 }
 
-/// The error that ends the run, if any; whatever else goes wrong is a failure of the scan.
+/// The error that ends the run, if any; other errors are failures of the scan.
 std::optional<Error> describeOne(const CollectionScan& scan, std::size_t index,
                                  const RetrievalSettings& settings, double noise,
                                  const std::vector<Method>& methods, const RunContext& context,
@@ -103,7 +103,7 @@ struct Scored {
     double secondsPerPair = 0.0;
 };
 
-/// The same vector twice: each pair is scored once.
+/// For the same vector twice each pair is scored once.
 Result<Scored> scoreAll(const Method& method, const std::vector<Item>& rows, const std::vector<Item>& columns,
                         unsigned threads, const RunContext& context) {
     const bool symmetric = &rows == &columns;

@@ -1,4 +1,4 @@
-// The work of `shapedb-bench retrieval`: every method on the same points, then the same questions.
+// The work of `shapedb-bench retrieval`: every method gets the same points and the same queries.
 #pragma once
 
 #include <cstddef>
@@ -26,20 +26,20 @@ struct RetrievalTask {
 struct RetrievalSettings {
     cli::ScanFlags scan;                ///< its noise is not used
     std::vector<double> noise = {0.0};  ///< levels, shares of the bounding-box diagonal
-    /// Turn every scan by a random rotation of its own before any method sees it, so that none
-    /// gains from models that are stored upright.
+    /// Rotates every scan at random before any method sees it, so that none profits from models that
+    /// are stored upright.
     bool rotate = true;
-    unsigned threads = 1;  ///< at least 1; each measurement is one thread's
+    unsigned threads = 1;  ///< at least 1; each measurement uses one
 };
 
-/// A scan that a method could not describe: it matches nothing and is ranked last.
+/// A scan that a method could not describe; it matches nothing and ranks last.
 struct ScanFailure {
     std::string path;
     Error error;
-    bool unreadable = false;  ///< no method ever saw its points
+    bool unreadable = false;  ///< no method could read it
 };
 
-/// How one query against a gallery ended.
+/// The result of one query against a gallery.
 struct QueryResult {
     std::string query;     ///< name
     std::size_t rank = 0;  ///< of the first right entry, from 1; 0: none, or not ranked
@@ -66,11 +66,11 @@ struct LevelResult {
 /// `progress(what, done, total)` may be called from any thread.
 using Progress = std::function<void(const std::string& what, std::size_t done, std::size_t total)>;
 
-/// Results by noise level in the order given, methods in the order given. Deterministic in task,
-/// settings and methods but for the times, and for ESF, which PCL draws from its own clock.
+/// Results by noise level in the order given, methods in the order given. Deterministic except
+/// for times and for ESF, which PCL seeds from the clock.
 ///
 /// Noise is added first, exactly as `shapedb evaluate` adds it, then the subset is taken, then the
-/// scan is turned. With a gallery, noise and subset are the queries' alone: the gallery is what a
+/// scan is turned. With a gallery, noise and subset apply to the queries only: the gallery is what a
 /// user has stored.
 ///
 /// Errors: kInvalidArgument (--points), kCancelled, kDeadlineExceeded, kOutOfMemory.

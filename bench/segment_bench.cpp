@@ -1,4 +1,4 @@
-// `shapedb-bench segment`: what a segmentation costs beside the bare Delaunay triangulation of its points.
+// `shapedb-bench segment`: cost of a segmentation beside CGAL's Delaunay triangulation of the same points.
 #include <algorithm>
 #include <chrono>
 #include <functional>
@@ -65,7 +65,7 @@ void note(const std::vector<StageTime>& times, Stages& stages) {
     }
 }
 
-// One profile: on all points, or as users call it.
+// One profile, on all points or as users run it.
 struct Lane {
     std::string profile;
     std::vector<double> seconds;
@@ -89,7 +89,7 @@ struct Figures {
     std::optional<std::size_t> bareMemory;
     std::vector<Lane> undecimated;  // on all points, one thread
     Parallel parallel;
-    std::vector<Lane> whole;  // decimated where the profile does, signature included
+    std::vector<Lane> whole;  // with the profile's decimation, signature included
 };
 
 ShapeParameters parametersNamed(const std::string& name) {
@@ -118,7 +118,7 @@ Result<PointCloud> loadPoints(const Flags& flags, Figures& figures) {
     return scanOf(*solid, options);
 }
 
-// Children first: they must be forked before any thread runs.
+// First: children must be forked before any thread starts.
 void measureMemory(const Flags& flags, const PointCloud& scan, const PointCloud& distinct, Figures& figures) {
     const auto limited = [](const std::function<bool()>& work) {
         return peakMemoryOf([&work] {
@@ -301,7 +301,8 @@ Result<int> runSegment(const Flags& flags, Bench& bench) {
         }
         RETURN_IF_ERROR(measureWhole(*scan, flags.threads, context, figures));
     }
-    // On their own: after seconds on one thread a virtual machine is slow to give the other processors back.
+    // In a loop of their own: after seconds on one thread a virtual machine is slow to give the other
+    // processors back.
     const std::size_t turns = flags.noUndecimated ? 0 : flags.repeat;
     for (std::size_t i = 0; i < turns; ++i) {
         bench.console.progress("parallel", i, turns);
@@ -321,10 +322,11 @@ Result<int> runSegment(const Flags& flags, Bench& bench) {
 void addSegmentOperation(CLI::App& app, Bench& bench) {
     auto flags = std::make_shared<Flags>();
     CLI::App* command = app.add_subcommand(
-        "segment", "Time and memory of a segmentation beside the bare Delaunay triangulation of its points");
+        "segment",
+        "Time and memory of a segmentation beside CGAL's Delaunay triangulation of the same points");
     auto* source = command->add_option_group("source");
     source->add_option("--file", flags->file, "Scan to segment");
-    source->add_option("--points", flags->points, "As many points of a synthetic shape instead")
+    source->add_option("--points", flags->points, "Number of points of a synthetic shape instead")
         ->check(CLI::Range(std::size_t{100}, std::size_t{1000000000}));
     source->require_option(1);
     command->add_option("--noise", flags->noise, "With --points: share of the box diagonal")
@@ -337,12 +339,14 @@ void addSegmentOperation(CLI::App& app, Bench& bench) {
     command->add_option("--repeat", flags->repeat, "Repetitions; medians are reported")
         ->check(CLI::Range(1, 1000))
         ->capture_default_str();
-    command->add_option("--threads", flags->threads, "Of the parallel Delaunay and from points to signature")
+    command
+        ->add_option("--threads", flags->threads,
+                     "Threads for the parallel triangulation and from points to signature")
         ->check(CLI::Range(1, 1024))
         ->capture_default_str();
     command->add_flag("--no-undecimated", flags->noUndecimated,
-                      "Only from points to signature, not all points without decimation");
-    command->add_flag("--cgal-parallel", flags->cgalParallel, "CGAL's parallel insertion too");
+                      "Only from points to signature, not the triangulation of all points");
+    command->add_flag("--cgal-parallel", flags->cgalParallel, "Measure CGAL's parallel insertion too");
     command->add_option("--json", flags->json, "All figures as JSON; '-' is standard output")
         ->type_name("FILE|-");
     command->callback([&bench, flags] {

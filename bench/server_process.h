@@ -1,4 +1,4 @@
-// A shapedbd of its own: a child process, so that its time and memory are not mixed with ours.
+// Runs shapedbd as a child process, so that its time and memory can be told from ours.
 #pragma once
 
 #include <cstdint>
@@ -11,10 +11,10 @@
 
 namespace shapedb::bench {
 
-/// A directory that is gone with this object.
+/// A directory that is deleted with this object.
 class WorkDirectory {
   public:
-    /// Below `parent`; empty: where temporary files go. Errors: kFileNotWritable.
+    /// Below `parent`; empty: the folder for temporary files. Errors: kFileNotWritable.
     [[nodiscard]] static Result<WorkDirectory> create(const std::string& parent);
     ~WorkDirectory();
     WorkDirectory(WorkDirectory&& other) noexcept;
@@ -27,7 +27,7 @@ class WorkDirectory {
     std::string path_;
 };
 
-/// What /proc tells of a process.
+/// From /proc.
 struct MemoryUse {
     std::uint64_t resident = 0;  ///< bytes now
     std::uint64_t peak = 0;      ///< most resident bytes since the start or since `forgetPeak`
@@ -45,7 +45,7 @@ class ServerProcess {
     [[nodiscard]] const std::string& address() const { return server_.address(); }
     /// Errors: kUnavailable: it is gone.
     [[nodiscard]] Result<MemoryUse> memory() const;
-    /// The peak counts from now on. False where the system does not allow it.
+    /// Restarts the peak. False where the system does not allow it.
     bool forgetPeak() const;
     /// Processor time it took so far, all threads, seconds. Errors: as `memory`.
     [[nodiscard]] Result<double> processorSeconds() const;

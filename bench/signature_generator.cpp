@@ -18,8 +18,8 @@ namespace {
 
 constexpr double kNoise = 0.002;
 
-// What makes the spread of distances that of a labelled collection (docs/benchmarks.md): how far a
-// class lies from its first anchor, and a shape from its class.
+// Distances of a class from its first anchor and of a shape from its class, chosen so that distances are
+// distributed as in a labelled collection (docs/benchmarks.md).
 constexpr double kMostOfSecondAnchor = 0.25;
 constexpr double kShapeSpread = 0.34;
 constexpr double kHardSpread = 0.15;
@@ -28,7 +28,7 @@ constexpr double kMostOfThirdAnchor = 0.85;
 constexpr std::size_t kFewestClasses = 19;
 constexpr std::uint64_t kShapesPerCopy = 10;
 
-// Of the parts of a shape against those of its class, for a spread of 1.
+// Differences between the parts of a shape and of its class, for a spread of 1.
 constexpr double kPartsMove = 0.15;
 constexpr double kPartsGrow = 0.6;
 constexpr double kPartsLost = 0.5;
@@ -39,7 +39,7 @@ std::uint64_t mixed(std::uint64_t seed, std::uint64_t stream, std::uint64_t inde
     return random.next();
 }
 
-// Histograms blend as shares: a shape that is t of another has t of its mass in the other's bins.
+// Histograms blend by mass: a shape that is t of another has the share t of its mass in the other's bins.
 void blendStatistics(ShapeStatistics& into, const ShapeStatistics& other, double t) {
     for (std::size_t i = 0; i < into.size(); ++i) {
         into[i] = levelOf((1.0 - t) * shareOfLevel(into[i]) + t * shareOfLevel(other[i]));
@@ -48,7 +48,7 @@ void blendStatistics(ShapeStatistics& into, const ShapeStatistics& other, double
 
 void disturbPoints(std::vector<WeightedPoint>& points, Random& random, double spread) {
     if (points.size() > 1) {
-        // From the lightest: the heaviest, which is the origin, stays.
+        // From the lightest: the heaviest is the origin and stays.
         for (std::size_t i = points.size() - 1; i > 0; --i) {
             if (random.uniform() < kPartsLost * spread)
                 points.erase(points.begin() + static_cast<std::ptrdiff_t>(i));
@@ -74,7 +74,7 @@ void disturbPoints(std::vector<WeightedPoint>& points, Random& random, double sp
     for (WeightedPoint& p : points) p.weight = std::min(p.weight, points.front().weight);
 }
 
-// Volume and shares that go with the weights, where so much of the interior is in the points.
+// Volume and volume shares that fit the weights, with this share of the interior in the points.
 void fitVolume(Signature& signature, double share) {
     const double cube = signature.scale * signature.scale * signature.scale;
     double weights = 0.0;

@@ -1,5 +1,5 @@
-// Signatures of shapes that do not exist, in any number: what a search is measured on. They are
-// drawn so that their scores are spread like those of real shapes; docs/benchmarks.md compares them.
+// Any number of signatures of made-up shapes, to measure searches on. Their scores are distributed like those
+// of real shapes; docs/benchmarks.md compares the two.
 #pragma once
 
 #include <cstddef>
@@ -14,22 +14,22 @@
 namespace shapedb::bench {
 
 enum class Mixture {
-    kPlain,       ///< classes as different, and shapes within them as alike, as in a labelled collection
-    kDuplicates,  ///< every tenth is nearly a copy of another: scans of one object
-    kHard,        ///< all of a few classes, of shapes more alike than usual
+    kPlain,       ///< classes differ, and shapes within them agree, as in a labelled collection
+    kDuplicates,  ///< every tenth is a near copy of another: scans of one object
+    kHard,        ///< few classes of shapes more alike than usual
 };
 [[nodiscard]] const char* name(Mixture mixture) noexcept;
 
 /// Anchors are signatures of scans of the synthetic families (core/synthetic): about 100, with 0.2 %
 /// noise. A class is a blend of two of them; a shape of the class is its blend
-/// with a third, with parts moved, resized, lost and won.
+/// with a third, with parts moved, resized, removed and added.
 ///
 /// Immutable; `make` may be called from any number of threads.
 class SignatureGenerator {
   public:
     struct Options {
         Mixture mixture = Mixture::kPlain;
-        /// Of how many shapes a collection is to be drawn: classes grow with the root of it.
+        /// Size of the collection; the number of classes grows with its square root.
         std::uint64_t expected = 1000;
         std::uint64_t seed = 1;
         std::size_t points = 3000;  ///< of each scan behind an anchor

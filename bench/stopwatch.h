@@ -1,11 +1,11 @@
-// Time a thread spends computing. Other programs on a busy machine stretch the wall clock, not this.
+// Processor time of a thread, which other load on the machine affects less than wall time.
 #pragma once
 
 #include <ctime>
 
 namespace shapedb::bench {
 
-/// Counts the processor time of the thread that made it; must be read by the same thread.
+/// Measures the thread that made it; read it on the same thread.
 class ThreadStopwatch {
   public:
     /// Seconds since construction.

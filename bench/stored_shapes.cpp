@@ -20,7 +20,7 @@ namespace {
 
 constexpr double kScanNoise = 0.005;  // of the diagonal
 
-/// Runs `work(i)` for all i < count, on so many threads. The first error ends it.
+/// Runs `work(i)` for all i < count on that many threads; the first error ends it.
 template <typename Work>
 Result<void> forEach(std::size_t count, unsigned threads, const RunContext& context, Work&& work) {
     std::vector<std::optional<Error>> errors(count);

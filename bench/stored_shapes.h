@@ -1,4 +1,4 @@
-// Databases of a size that nobody uploads for a measurement.
+// Large databases, made without uploading.
 #pragma once
 
 #include <cstdint>

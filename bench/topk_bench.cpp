@@ -1,5 +1,5 @@
-// `shapedb-bench topk`: how long exact search takes among many signatures, beside a flat scan of
-// feature vectors, and whether it is exact.
+// `shapedb-bench topk`: time of exact search among many signatures beside a flat scan of feature vectors, and
+// a check that it is exact.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -34,10 +34,10 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t kRounds = 5;
-constexpr std::size_t kFullCheck = 20000;      // up to so many shapes every score is computed
+constexpr std::size_t kFullCheck = 20000;      // up to this many shapes every score is computed
 constexpr std::size_t kPeerDimension = 640;    // of an ESF descriptor
 constexpr std::size_t kMostForPeer = 2000000;  // 5 GB of vectors
-constexpr std::size_t kPeerQueries = 5;        // a round
+constexpr std::size_t kPeerQueries = 5;        // per round
 constexpr std::size_t kLoadBatch = 8192;
 constexpr std::size_t kPairsForSpread = 4000;
 
@@ -56,7 +56,7 @@ double millisecondsSince(Clock::time_point start) {
     return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-// Runs `work` with as many threads.
+// Runs `work` with that many threads.
 template <typename Work>
 void withThreads(unsigned threads, const Work& work) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
@@ -81,7 +81,7 @@ class TopKRun {
         options_.k = flags_.k;
         RETURN_IF_ERROR(build());
         queries_.signatures.reserve(flags_.queries);
-        // Shapes of the same collection that are not in it.
+        // Shapes of the same distribution that are not in the set.
         for (std::size_t q = 0; q < flags_.queries; ++q) {
             queries_.signatures.push_back(generator_->make(shapes_ + 1 + q));
         }
@@ -119,7 +119,7 @@ class TopKRun {
         return {};
     }
 
-    // How far shapes lie apart, as D of docs/scoring.md: to compare with real collections.
+    // Distances between shapes (D in docs/scoring.md), to compare with real collections.
     nlohmann::json spread() const {
         std::vector<double> within, across;
         Random random(flags_.seed);
@@ -154,7 +154,7 @@ class TopKRun {
         return {};
     }
 
-    // Ours and the peer's take turns, so that what else the machine does hits both.
+    // Ours and the peer's alternate, so that other load on the machine affects both.
     Result<void> measure(nlohmann::json& out) {
         std::unique_ptr<VectorScan> peer =
             flags_.noPeer || shapes_ > kMostForPeer ? nullptr : makeVectorScan(kPeerDimension);
@@ -196,7 +196,7 @@ class TopKRun {
         return {};
     }
 
-    // What each rung of the ladder of bounds leaves, as shares of all candidates.
+    // What each bound leaves, as shares of all candidates.
     void addLadder(nlohmann::json& out) const {
         SearchCounts sum;
         for (const SearchResult& result : queries_.results) {
@@ -213,7 +213,7 @@ class TopKRun {
                        {"parts", share(sum.scored)}};
     }
 
-    // All queries: one after another on one thread, and over all threads at once.
+    // All queries: in turn on one thread, and in parallel on all threads.
     Result<void> measureBatch(nlohmann::json& out) {
         std::vector<double> inside, over;
         std::vector<BatchQuery> batch;
@@ -250,7 +250,7 @@ class TopKRun {
         return {};
     }
 
-    // Against scores of signatures that the set has never held: the generator makes them anew.
+    // Checked against signatures made anew, not read back from the set.
     Result<void> check(nlohmann::json& out) {
         const bool full = shapes_ <= kFullCheck;
         std::vector<std::uint64_t> rows(std::min(shapes_, kFullCheck));

@@ -1,4 +1,4 @@
-// What a flat scan of plain feature vectors takes: the peer of exact search.
+// A flat scan of plain feature vectors: the baseline of exact search.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +17,7 @@ class VectorScan {
     [[nodiscard]] virtual std::vector<long> nearest(const float* query, std::size_t k) const = 0;
 };
 
-/// Null when this build has no peer.
+/// Null if this build has none.
 [[nodiscard]] std::unique_ptr<VectorScan> makeVectorScan(std::size_t dimension);
 /// "FAISS 1.7.3 IndexFlatL2"; empty without.
 [[nodiscard]] std::string vectorScanName();

@@ -8,7 +8,7 @@ namespace shapedb {
 
 namespace {
 
-// Denser scans gain noise, not shape: docs/interior.md has the figures.
+// Denser scans add noise, not shape; docs/interior.md has the figures.
 constexpr std::uint32_t kDefaultDecimation = 20000;
 
 void recommend(ShapeParameters& parameters) {

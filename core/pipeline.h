@@ -1,4 +1,8 @@
-// Named sets of parameters: the method as published, and what we recommend.
+// From points to signature: start reading here.
+//
+// A scan is prepared (core/preparation/), its interior found and divided into segments
+// (core/segmentation/, Sections 2 and 3 of the paper), and the segments become a signature of weighted points
+// (core/signature/, Section 4). Signatures are compared by core/matching/ and searched by core/search/.
 #pragma once
 
 #include <string>
@@ -14,7 +18,7 @@ namespace shapedb {
 /// Errors: kInvalidArgument listing the names.
 [[nodiscard]] Result<Profile> profileFromName(const std::string& name);
 
-/// Everything that decides what signature a scan gets.
+/// All parameters that the signature of a scan depends on.
 struct ShapeParameters {
     Profile profile = Profile::kDefault;
     SegmentationOptions segmentation;
@@ -22,6 +26,7 @@ struct ShapeParameters {
 };
 
 [[nodiscard]] ShapeParameters parametersOf(Profile profile);
+/// Errors: kInvalidArgument naming the field, its value and its range.
 [[nodiscard]] Result<void> validate(const ShapeParameters& parameters);
 
 struct Description {
@@ -29,7 +34,8 @@ struct Description {
     Signature signature;
 };
 
-/// The whole road from points to signature. Errors: those of `segment`.
+/// Points to segmentation and signature. Deterministic. Errors: those of `validate`, `segment` and
+/// `makeSignature`.
 [[nodiscard]] Result<Description> describe(const PointCloud& points, const ShapeParameters& parameters,
                                            const RunContext& context = {});
 

@@ -2,7 +2,7 @@
 # Installs the Debian 12 packages that ShapeDB needs, and only those that are missing.
 #   scripts/install-deps.sh             everything to build, test and check
 #   scripts/install-deps.sh --analysis  that, and clang for scripts/ci/tidy.sh and scripts/ci/fuzz.sh
-#   scripts/install-deps.sh --runtime   only what the built programs load
+#   scripts/install-deps.sh --runtime   only what the programs need to run
 #   scripts/install-deps.sh --bench     everything to build, and the Point Cloud Library and FAISS, which
 #                                       shapedb-bench measures too (preset peers)
 set -euo pipefail

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # From a fresh Debian 12 machine to a first result: installs what is missing, builds, starts a
 # server on loopback, uploads sample scans, rebuilds the index and searches with a new, noisy scan.
-#   scripts/quickstart.sh          stops the server at the end; its data stay in build/quickstart/
+#   scripts/quickstart.sh          stops the server at the end; its data stays in build/quickstart/
 #   scripts/quickstart.sh --keep   leaves the server running
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -42,7 +42,7 @@ step "Make sample scans: 13 families of shapes, noisy, randomly rotated and scal
 run build/bin/shapedb sample "$demo/scans" --count 4 --points 10000 > /dev/null
 ls "$demo/scans" | paste -sd' '
 
-step "Upload and segment them"
+step "Upload and segment"
 run build/bin/shapedb add "$demo/scans" --label-from-folder --wait
 
 step "Rebuild the index from the stored points"

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <string>
+#include <type_traits>
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
@@ -95,7 +96,14 @@ void addNumberFlags(CLI::App& group, client::Parameters& given, const ShapeParam
             help + defaults(parameterIn(standard.segmentation, used), parameterIn(paper.segmentation, used)));
         for (const FormerName& one : kFormerNames) {
             if (name != one.name) continue;
-            group.add_option(flagOf(one.former), given.*member)->group("")->excludes(option);
+            using Value = typename std::decay_t<decltype(given.*member)>::value_type;
+            const std::string former = flagOf(one.former);
+            const auto set = [&given, member, option, former](const Value& value) {
+                // Option::excludes would appear in the help.
+                if (option->count() > 0) throw CLI::ExcludesError(former, option->get_name());
+                given.*member = value;
+            };
+            group.add_option_function<Value>(former, set)->group("");
         }
     });
 }

@@ -170,7 +170,9 @@ std::string preparationText(const client::SegmentationReport& report) {
         steps.emplace_back("the rest averaged and thinned");
         if (steps.size() == 1) steps = {"averaged and thinned"};
     }
-    return formatCount(report.pointsUsed, "point", "points") + " used: " + joined(steps) + "\n";
+    std::string text = formatCount(report.pointsUsed, "point", "points") + " used: ";
+    for (std::size_t i = 0; i < steps.size(); ++i) text += (i > 0 ? ", " : "") + steps[i];
+    return text + "\n";
 }
 
 std::string qualityText(double quality) {
@@ -192,7 +194,8 @@ std::string interiorText(const client::SegmentationReport& report, double scale)
             break;
     }
     if (report.noise > 0.0 && scale > 0.0) {
-        text += ", noise about " + formatPercent(report.noise / scale) + " of the size";
+        const std::string noise = "noise about " + formatPercent(report.noise / scale) + " of the size";
+        text += report.interiorSource == InteriorSource::kWalk ? ", " + noise : " (" + noise + ")";
     }
     return text + "\n" + qualityText(report.quality);
 }

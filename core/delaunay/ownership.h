@@ -13,15 +13,16 @@ namespace shapedb {
 /// shared.
 ///
 /// The rules, which everything in bowyer_watson.cpp keeps while workers run:
-///   1. A worker creates, changes and frees only cells of its own. Shared cells keep their vertices and
-///   balls.
-///   2. It reads or writes a neighbour of a cell only behind a facet of which it owns two vertices.
+///   1. A worker creates and frees cells, and writes vertices, marks and balls, only of its own.
+///   2. It reads or writes a neighbour entry, of its own or a shared cell, only behind a facet of which it
+///      owns two vertices.
 ///
 /// Why that is enough. Two workers cannot both own two of a facet's three vertices, so by rule 2 no neighbour
 /// entry is ever touched by two workers. Every facet of a cell of mine has two vertices of mine, so what lies
-/// behind it is mine or shared, never another worker's; and a shared cell is only read, by rule 1. A new cell
-/// has a facet of the cavity, two vertices of which are mine, and the point inserted, which is mine: it is
-/// mine. docs/delaunay.md has the proof that the outcome is that of inserting one point after another.
+/// behind it is mine or shared, never another worker's; and vertices and balls of shared cells do not change,
+/// by rule 1. A new cell has a facet of the cavity, two vertices of which are mine, and the point inserted,
+/// which is mine: it is mine. docs/delaunay.md proves that the outcome is that of inserting one point after
+/// another.
 struct Ownership {
     const std::uint8_t* workerOf = nullptr;  ///< by vertex
     std::uint8_t worker = 0;

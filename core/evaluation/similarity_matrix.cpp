@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t kLinePixels = 1;
 constexpr std::size_t kMaxCellPixels = 64;
-// The darkness of a shaded score of 0: low scores must differ from an unshaded cell.
+// How dark a score of 0 is: it must differ from an unshaded cell.
 constexpr double kFaintest = 0.12;
 
 struct Colour {
@@ -26,7 +26,7 @@ Colour shade(double score, bool rightClass, bool colourWrongClass) {
     const double light = 255.0 * (1.0 - (kFaintest + (1.0 - kFaintest) * clamped));
     const auto level = static_cast<std::uint8_t>(std::lround(light));
     if (rightClass || !colourWrongClass) return {level, level, level};
-    // Red keeps half of its light even at score 1, so the hue stays visible.
+    // Red keeps half its brightness even at score 1, so that the hue stays visible.
     const auto red = static_cast<std::uint8_t>(std::lround(0.5 * (255.0 + light)));
     return {red, level, level};
 }

@@ -1,6 +1,6 @@
-// The similarity matrix as a picture: Figure 6 of Dey and Goswami (2004). Rows are queries and
-// columns candidates, both grouped by class; in each row only the best few scores are shaded, by
-// their value. Good retrieval shows as dark blocks along the diagonal.
+// The similarity matrix as a picture, as in Figure 6 of Dey and Goswami (2004). Rows are queries and columns
+// candidates, both grouped by class; in each row the few best scores are shaded by their value. Good
+// retrieval shows as dark blocks along the diagonal.
 #pragma once
 
 #include <cstddef>
@@ -26,8 +26,8 @@ struct ClassBand {
     std::size_t pixels = 0;      ///< height of the band: members * cellPixels
 };
 
-/// A raster without labels. Between classes and around the border runs a line one pixel wide, in
-/// kClassLineGrey. The raster is square: a class has the same band in both directions.
+/// A square raster without labels: a class has the same band in both directions. Lines between classes and
+/// around the border are one pixel wide, in kClassLineGrey.
 struct SimilarityRaster {
     std::size_t width = 0;            ///< pixels
     std::size_t height = 0;           ///< pixels
@@ -42,13 +42,12 @@ inline constexpr std::uint8_t kClassLineGrey = 160;
 /// Largest side of a raster, pixels; more than any viewer shows and still below 1 GB.
 inline constexpr std::size_t kMaxRasterPixels = 16384;
 
-/// Draws the scores of `labels.size()` shapes against each other. Within a class shapes keep the
-/// order of the input. Scores are clamped to [0, 1] for shading: 1 is black, 0 a light tone that
-/// can still be seen on the white ground of unshaded cells. The query itself is never among its
-/// best, so the diagonal stays white; ties break by index.
+/// Draws the scores of `labels.size()` shapes against each other. Shapes of a class keep the order of the
+/// input. Scores are clamped to [0, 1] for shading: 1 is black, 0 a light tone that still differs from the
+/// white of unshaded cells. The diagonal stays white: a query is not a candidate. Ties break by index.
 ///
-/// Errors: those of `checkScoreMatrix`; kInvalidArgument also when an option is outside its range
-/// or the picture would be larger than kMaxRasterPixels.
+/// Errors: those of `checkScoreMatrix`; kInvalidArgument when an option is out of range or the picture would
+/// be larger than kMaxRasterPixels.
 [[nodiscard]] Result<SimilarityRaster> drawSimilarityMatrix(const ScoreMatrix& scores,
                                                             const std::vector<std::string>& labels,
                                                             const SimilarityMatrixOptions& options = {});

@@ -51,7 +51,7 @@ void Scorer::scan(const ShapeRows& rows, const std::vector<std::uint8_t>& wanted
         ++counts.afterFirstHalf;
         ++counts.afterStatistics;
         const double most = bound(shape);
-        if (most >= least) left.push_back({row, most, 0.0});
+        if (most >= least) left.push_back({most, row, {}});
     }
 }
 

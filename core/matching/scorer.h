@@ -6,6 +6,7 @@
 // A method is a class derived from Scorer; `makeScorer` is the only place that chooses one.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -21,11 +22,13 @@ namespace shapedb {
 
 /// A row that a scan could not rule out.
 struct Survivor {
-    std::uint32_t row = 0;
+    /// What a scan found out about a row, for the scorer itself in `scoreIfReaches`: whole numbers, so that
+    /// nothing is computed in a scan that only the few rows need that are scored in the end.
+    using Known = std::array<std::uint16_t, 10>;
+
     double bound = 0.0;  ///< its score is no larger
-    /// What the scorer found out about the row, handed back to it in `scoreIfReaches`. Means nothing
-    /// to anyone else.
-    double known = 0.0;
+    std::uint32_t row = 0;
+    Known known{};
 };
 
 /// How many rows each stage of a scan left to the next.

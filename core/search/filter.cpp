@@ -55,8 +55,8 @@ class FilterParser {
                                                      "; write for example label=cup, year>=1990, !draft");
     }
 
-    // The text around the error, fit for one line of an error message: never cut inside a UTF-8
-    // character, control characters as '?'.
+    // The text around the error, on one line: never cut inside a UTF-8 character, control characters
+    // shown as '?'.
     std::string excerpt() const {
         constexpr std::size_t kContext = 40;
         const auto continues = [&](std::size_t i) {

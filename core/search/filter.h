@@ -1,4 +1,4 @@
-// Metadata filters: which shapes a search or a listing considers at all.
+// Metadata filters: which shapes a search or a listing considers.
 #pragma once
 
 #include <map>
@@ -9,12 +9,11 @@
 
 namespace shapedb {
 
-/// Conjunction of terms separated by commas: `key=value`, `key!=value`, `key` (present),
-/// `!key` (absent), and `key<v`, `key<=v`, `key>v`, `key>=v` (numbers). Blanks around keys,
-/// operators and values are ignored; a value with commas, blanks at its ends or operators is
-/// written in double quotes, with \" and \\ inside. A shape without the key never passes a
-/// comparison, except `!=`. An empty text accepts everything. Keys have no blanks, commas, quotes
-/// or operator characters. docs/filters.md has the grammar.
+/// Terms separated by commas, all of which must hold: `key=value`, `key!=value`, `key` (present), `!key`
+/// (absent), and `key<v`, `key<=v`, `key>v`, `key>=v` (numbers). Blanks around keys, operators and values
+/// are ignored. A value with commas, operators, or blanks at its ends is written in double quotes, with \"
+/// and \\ inside. A shape without the key passes no comparison except `!=`. An empty text accepts
+/// everything. Keys have no blanks, commas, quotes or operator characters. Grammar: docs/filters.md.
 ///
 /// Immutable; safe to share between threads.
 class Filter {

@@ -12,14 +12,14 @@ using Updates = std::vector<const IndexEntry*>;
 
 bool idLess(const IndexEntry* a, const IndexEntry* b) { return a->id < b->id; }
 
-// A row of the next set: of an old block, or new.
+// A row of the next set: from an old block, or new.
 struct Source {
     const SignatureBlock* block = nullptr;
     std::size_t row = 0;
     const IndexEntry* entry = nullptr;
 };
 
-// The rows of a block with the changes whose ids fall into its range.
+// The rows of a block after the changes in its range of ids.
 std::vector<Source> applyChanges(const SignatureBlock& block, Updates::const_iterator updatesBegin,
                                  Updates::const_iterator updatesEnd,
                                  const std::vector<std::int64_t>& removed) {
@@ -78,8 +78,8 @@ SignatureSet SignatureSet::with(const std::vector<IndexEntry>& updates,
         next.size_ += block->size();
         next.blocks_.push_back(std::move(block));
     };
-    // Splits what has outgrown a block, evenly: cutting off only the excess would leave a block of
-    // one entry for each id that arrives late.
+    // Splits too many rows for a block evenly: cutting off only the excess would leave a block of one entry
+    // for each id that arrives late.
     const auto keepSplit = [&keep](const std::vector<Source>& rows) {
         const std::size_t parts = (rows.size() + kBlockSize - 1) / kBlockSize;
         for (std::size_t part = 0; part < parts; ++part) {
@@ -89,8 +89,8 @@ SignatureSet SignatureSet::with(const std::vector<IndexEntry>& updates,
     };
     for (std::size_t b = 0; b < blocks_.size(); ++b) {
         const SignatureBlock& block = *blocks_[b];
-        // A block answers for the ids up to the next block's first; the last one for all that follow
-        // as long as it has room.
+        // The range of a block ends at the next block's first id; that of the last block is open as long as
+        // it has room.
         const bool lastAndFull = b + 1 == blocks_.size() && block.size() == kBlockSize;
         auto updatesEnd = sorted.cend();
         if (b + 1 < blocks_.size()) {

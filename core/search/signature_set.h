@@ -1,5 +1,5 @@
-// The cached signatures of one collection: an immutable snapshot that queries read while
-// the next one is prepared.
+// The cached signatures of one collection: an immutable snapshot that queries read while the next one is
+// prepared.
 #pragma once
 
 #include <cstddef>
@@ -11,22 +11,22 @@
 
 namespace shapedb {
 
-/// A persistent set ordered by id. Copies share all blocks; an update copies only the blocks
-/// it touches, so that publishing one ingested shape costs the same in a set of ten and of a
-/// million.
+/// A persistent set ordered by id. Copies share all blocks, and an update copies only the blocks it
+/// touches, so that publishing one shape costs the same in a set of ten and of a million.
 ///
-/// Thread-safety: const members from any thread; a set is never modified once shared.
+/// Thread-safe: all members are const; a set is never modified once shared.
 class SignatureSet {
   public:
     SignatureSet() = default;
 
-    /// Of blocks with rising ids, each block's above those of the one before; empty ones are left out.
+    /// From blocks with rising ids, each block's above those of the block before. Empty blocks are left
+    /// out.
     [[nodiscard]] static SignatureSet ofBlocks(
         const std::vector<std::shared_ptr<const SignatureBlock>>& blocks);
 
-    /// This set with the entries of `updates` inserted or replaced (by id) and those of
-    /// `removedIds` left out (unknown ids are ignored). Neither needs an order; an id must
-    /// not be in both, nor twice in `updates`.
+    /// This set with the entries of `updates` inserted or replaced (by id) and without those of
+    /// `removedIds` (unknown ids are ignored). In any order; an id must not be in both, nor twice in
+    /// `updates`.
     [[nodiscard]] SignatureSet with(const std::vector<IndexEntry>& updates,
                                     std::vector<std::int64_t> removedIds) const;
 
@@ -34,7 +34,7 @@ class SignatureSet {
     /// How many have attributes.
     [[nodiscard]] std::size_t attributedCount() const;
 
-    /// Where a signature lies; valid as long as the set or a copy of it lives.
+    /// Where a signature is; valid while the set or a copy of it lives.
     struct Place {
         const SignatureBlock* block = nullptr;  ///< null: not in the set
         std::size_t row = 0;
@@ -42,10 +42,10 @@ class SignatureSet {
     };
     [[nodiscard]] Place find(std::int64_t id) const;
 
-    /// Bytes held, about.
+    /// Approximate bytes held.
     [[nodiscard]] std::size_t memoryBytes() const;
 
-    /// Blocks of 1 to kBlockSize entries by rising id; for scans.
+    /// Blocks of 1 to kBlockSize entries by rising id.
     static constexpr std::size_t kBlockSize = SignatureBlock::kMostRows;
     [[nodiscard]] const std::vector<std::shared_ptr<const SignatureBlock>>& blocks() const { return blocks_; }
 

@@ -29,12 +29,13 @@ constexpr std::size_t kLargestChunk = 1024;
 // Candidates that one thread takes at a time.
 constexpr std::size_t kGrain = 4;
 
-// A row that the scan of its block left.
+// A row that the scan of its block left. Small, for it is sorted.
 struct Candidate {
-    Survivor survivor;
+    double bound = 0.0;
+    const Survivor* survivor = nullptr;
     const SignatureBlock* block = nullptr;
 
-    std::int64_t id() const { return block->id(survivor.row); }
+    std::int64_t id() const { return block->id(survivor->row); }
 };
 
 struct BlockScan {
@@ -48,7 +49,7 @@ bool ranksBefore(const SearchHit& a, const SearchHit& b) {
 }
 
 bool visitedBefore(const Candidate& a, const Candidate& b) {
-    return a.survivor.bound != b.survivor.bound ? a.survivor.bound > b.survivor.bound : a.id() < b.id();
+    return a.bound != b.bound ? a.bound > b.bound : a.id() < b.id();
 }
 
 Result<void> check(const SearchOptions& options) {
@@ -112,9 +113,9 @@ class Searcher {
         std::size_t slice = kFirstSlice;
         for (std::size_t begin = 0; begin < order_.size();) {
             const std::size_t end = std::min(order_.size(), begin + slice);
-            auto candidates = scanSlice(begin, end);
-            RETURN_IF_ERROR(candidates);
-            RETURN_IF_ERROR(visit(*candidates));
+            const auto scans = scanSlice(begin, end);
+            RETURN_IF_ERROR(scans);
+            RETURN_IF_ERROR(visit(collect(*scans, begin)));
             begin = end;
             slice *= kSliceGrowth;
             blocksDone_ = end;
@@ -154,20 +155,30 @@ class Searcher {
         return scan;
     }
 
-    Result<std::vector<Candidate>> scanSlice(std::size_t begin, std::size_t end) {
-        std::vector<BlockScan> perBlock(end - begin);
+    Result<std::vector<BlockScan>> scanSlice(std::size_t begin, std::size_t end) const {
+        std::vector<BlockScan> scans(end - begin);
         const double least = needed();
-        auto done = parallelUntilStopped(begin, end, 1, context_, [&](std::size_t b) {
-            perBlock[b - begin] = scanBlock(*order_[b], least);
-        });
+        auto done = parallelUntilStopped(
+            begin, end, 1, context_, [&](std::size_t b) { scans[b - begin] = scanBlock(*order_[b], least); });
         RETURN_IF_ERROR(done);
-        std::vector<Candidate> all;
-        for (std::size_t b = begin; b < end; ++b) {
-            const BlockScan& scan = perBlock[b - begin];
-            for (const Survivor& survivor : scan.left) all.push_back({survivor, order_[b]});
+        return scans;
+    }
+
+    // Counts what the scans of the blocks from `begin` left, and puts it in the order of visiting.
+    std::vector<Candidate> collect(const std::vector<BlockScan>& scans, std::size_t begin) {
+        std::size_t left = 0;
+        for (const BlockScan& scan : scans) {
+            left += scan.left.size();
             result_.counts.filtered += scan.filtered;
             result_.counts.afterFirstHalf += scan.counts.afterFirstHalf;
             result_.counts.afterStatistics += scan.counts.afterStatistics;
+        }
+        std::vector<Candidate> all;
+        all.reserve(left);
+        for (std::size_t b = 0; b < scans.size(); ++b) {
+            for (const Survivor& survivor : scans[b].left) {
+                all.push_back({survivor.bound, &survivor, order_[begin + b]});
+            }
         }
         std::sort(all.begin(), all.end(), visitedBefore);
         return all;
@@ -180,8 +191,7 @@ class Searcher {
             const double least = needed();
             // A candidate whose bound equals the k-th score may still win by its smaller id.
             std::size_t end = begin;
-            while (end < candidates.size() && end - begin < chunk &&
-                   candidates[end].survivor.bound >= least) {
+            while (end < candidates.size() && end - begin < chunk && candidates[end].bound >= least) {
                 ++end;
             }
             if (end == begin) break;
@@ -198,8 +208,9 @@ class Searcher {
         std::vector<std::optional<double>> scores(end - begin);
         // A signature of many points takes milliseconds, so every one is preceded by a look at the context.
         auto done = parallelUntilStopped(begin, end, kGrain, context_, [&](std::size_t i) {
-            const auto& [survivor, block] = candidates[i];
-            scores[i - begin] = scorer_.scoreIfReaches(block->rows()[survivor.row], survivor, least);
+            const Candidate& candidate = candidates[i];
+            const ShapeRow shape = candidate.block->rows()[candidate.survivor->row];
+            scores[i - begin] = scorer_.scoreIfReaches(shape, *candidate.survivor, least);
         });
         RETURN_IF_ERROR(done);
         for (std::size_t i = begin; i < end; ++i) {

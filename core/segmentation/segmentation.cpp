@@ -197,7 +197,7 @@ Result<PreparedPoints> prepare(const PointCloud& points, const SegmentationOptio
     return prepared;
 }
 
-// Sites that are neighbours in space become neighbours in memory: every later stage runs along them.
+// Puts neighbours in space next to each other in memory, for the sake of all later stages.
 HilbertSortedCloud sortSites(PointCloud sites, std::vector<std::uint32_t>& siteOfPoint) {
     HilbertSortedCloud sorted(sites);
     std::vector<std::uint32_t> rank(sites.size());

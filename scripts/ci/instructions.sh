@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Counts the instructions of small fixed jobs under callgrind and compares them with the committed
-# baseline, bench/instructions.json: a job that grew by over 3 % fails. Counts depend on the compiler, the C
-# library, valgrind and the processor's instruction sets; elsewhere than where the baseline was made
-# the lane shows them, says that nothing was compared, and passes.
+# Counts the instructions of small fixed jobs under callgrind and compares them with the committed baseline,
+# bench/instructions.json; fails if a job grew by more than 3 %. Counts depend on the compiler, the C library,
+# valgrind and the processor's instruction sets: in another environment than the baseline's the lane shows them,
+# says that nothing was compared, and passes.
 #   scripts/ci/instructions.sh             compare
-#   scripts/ci/instructions.sh --update    write the baseline anew
+#   scripts/ci/instructions.sh --update    write a new baseline
 #   BUILD_DIR=... scripts/ci/instructions.sh [--margin SHARE]
 set -euo pipefail
 cd "$(dirname "$0")/../.."

@@ -1,7 +1,6 @@
 #!/usr/bin/env bash
-# Builds Debian's oneTBB with ThreadSanitizer into build-tbb-thread/ and prints that folder. What an
-# uninstrumented oneTBB does to order its tasks is invisible to the sanitizer, which then reports a race for
-# every two tasks that rightly follow one another.
+# Builds Debian's oneTBB with ThreadSanitizer into build-tbb-thread/ and prints that folder. The sanitizer cannot
+# see how an uninstrumented oneTBB orders its tasks, and reports races between tasks that run one after the other.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 root="$PWD/build-tbb-thread"
@@ -14,7 +13,7 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 chmod 755 "$work"
 mkdir -p "$work/lists/partial"
-# The sources lie where the packages came from.
+# The sources are where the packages came from.
 [ -n "$(apt-cache policy libtbb-dev | grep ' Packages$')" ] || apt-get -q update >&2
 apt-cache policy libtbb-dev |
   awk '$NF == "Packages" { split($3, at, "/"); print "deb-src", $2, at[1], at[2] }' | sort -u > "$work/sources.list"

@@ -195,46 +195,46 @@ std::vector<Setting> makeSettings() {
             "Most bytes of points waiting for segmentation."),
         number(
             "ingest.max_attempts", kInteger, 1, 10, [](C& c) -> int& { return c.ingest.maxAttempts; },
-            "Crashes after which a scan is set aside as failed."),
+            "Number of times a scan may crash the process before it is set aside as failed."),
         number(
             "limits.max_points", kInteger, 4, 50'000'000,
-            [](C& c) -> std::uint64_t& { return c.limits.maxPoints; }, "Most points of a scan."),
+            [](C& c) -> std::uint64_t& { return c.limits.maxPoints; }, "Most points in one scan."),
         number(
             "limits.max_k", kInteger, 1, 100'000, [](C& c) -> std::uint32_t& { return c.limits.maxK; },
-            "Most hits of a search."),
+            "Most hits a search may ask for."),
         number(
             "limits.max_batch", kInteger, 1, 1'000, [](C& c) -> std::uint32_t& { return c.limits.maxBatch; },
-            "Most queries of a SearchBatch."),
+            "Most queries in one SearchBatch."),
         number(
             "limits.max_upload_bytes", kBytes, kMiB, kTiB,
             [](C& c) -> std::uint64_t& { return c.limits.maxUploadBytes; },
-            "Most bytes of points that all uploads in progress hold in memory together."),
+            "Most bytes of points that all running uploads may hold in memory together."),
         number(
             "limits.stall_seconds", kInteger, 1, 86'400, [](C& c) -> int& { return c.limits.stallSeconds; },
-            "After so long a client that neither sends nor reads within a stream is cut off."),
+            "A stream is cut off when its client neither sends nor receives for this many seconds."),
         number(
             "store.readers", kInteger, 1, 64, [](C& c) -> int& { return c.store.readers; },
-            "Read connections to the database."),
+            "Pooled read connections to the database."),
         number(
             "store.compression_level", kInteger, 1, 19, [](C& c) -> int& { return c.store.compressionLevel; },
             "zstd level of stored points. Higher: smaller and slower."),
         number(
             "search.threads", kInteger, 0, 256, [](C& c) -> int& { return c.search.threads; },
-            "Processors that all searches share. 0: all."),
+            "Processors shared by all searches. 0: all."),
         number(
             "rebuild.threads", kInteger, 0, 256, [](C& c) -> int& { return c.rebuild.threads; },
             "Processors a rebuild uses. 0: all."),
         choice(
             "log.level", {"trace", "debug", "info", "warn", "error"},
-            [](C& c) -> std::string& { return c.log.level; }, "Least severe lines to write."),
+            [](C& c) -> std::string& { return c.log.level; }, "Least important lines to write."),
         choice(
             "log.format", {"text", "json"}, [](C& c) -> std::string& { return c.log.format; },
-            "text, or json with one object per line."),
+            "text for people, json (one object per line) for machines."),
         logFileSetting(),
         number(
             "shutdown.drain_seconds", kInteger, 0, 3'600,
             [](C& c) -> int& { return c.shutdown.drainSeconds; },
-            "Time for running calls to finish after SIGTERM."),
+            "How many seconds running calls may take to finish after SIGTERM."),
     };
 }
 

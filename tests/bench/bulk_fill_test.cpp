@@ -20,7 +20,7 @@ SqliteOptions optionsIn(const Folder& folder) {
     return options;
 }
 
-TEST(BulkFill, MakesASoundDatabaseOfReadyShapes) {
+TEST(BulkFill, MakesAValidDatabase) {
     const Folder folder;
     const auto options = optionsIn(folder);
     ASSERT_TRUE(fillDatabase(options, "default", "parameters", 25, made));

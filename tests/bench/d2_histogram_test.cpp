@@ -37,7 +37,7 @@ TEST(D2Histogram, NeitherPoseNorSizeMatters) {
     EXPECT_LT(l1Distance(d2(points), d2(applyToCloud(motion, points))), 1e-3);
 }
 
-TEST(D2Histogram, OfASphereIsTheKnownLine) {
+TEST(D2Histogram, OfASphereIsLinearInDistance) {
     // Chords of a unit sphere have the density d / 2 on [0, 2], mean 4/3.
     Random random(7);
     PointCloud points;
@@ -79,7 +79,7 @@ TEST(D2Histogram, TellsShapesApart) {
     EXPECT_LT(3.0 * l1Distance(cube, otherCube), l1Distance(cube, rod));
 }
 
-TEST(D2Histogram, RefusesWhatHasNoDistances) {
+TEST(D2Histogram, RefusesCloudsWithoutDistances) {
     EXPECT_EQ(d2Histogram({}, 1).error().code, ErrorCode::kTooFewPoints);
     EXPECT_EQ(d2Histogram(PointCloud(50, Point3{1.0, 2.0, 3.0}), 1).error().code, ErrorCode::kAllPointsEqual);
     D2Options options;

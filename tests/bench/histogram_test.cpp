@@ -5,7 +5,7 @@
 namespace shapedb::bench {
 namespace {
 
-TEST(Histogram, DistancesByHand) {
+TEST(Histogram, DistancesOfAWorkedExample) {
     const Histogram a = {0.5F, 0.0F, 0.5F};
     const Histogram b = {0.25F, 0.0F, 0.75F};
     EXPECT_DOUBLE_EQ(l1Distance(a, b), 0.5);

@@ -35,17 +35,17 @@ TEST(Instructions, GrowthBeyondTheMarginFails) {
     EXPECT_NE(text.find("FAILED"), std::string::npos);
 }
 
-TEST(Instructions, FewerPasses) {
+TEST(Instructions, FewerInstructionsPass) {
     const Verdict verdict = compareCounts(counts({{"a", 1'000}}), counts({{"a", 500}}), kMargin);
     EXPECT_FALSE(verdict.failed());
 }
 
-TEST(Instructions, TheBaselineListsAllJobs) {
+TEST(Instructions, FailsUnlessTheBaselineListsExactlyTheJobs) {
     EXPECT_TRUE(compareCounts(counts({}), counts({{"a", 1}}), kMargin).failed());
     EXPECT_TRUE(compareCounts(counts({{"a", 1}}), counts({}), kMargin).failed());
 }
 
-TEST(Instructions, AnotherEnvironmentIsToldAndNotFailed) {
+TEST(Instructions, ADifferentEnvironmentIsReportedAndNotAFailure) {
     const Counts baseline = counts({{"a", 1'000}});
     Counts elsewhere = counts({{"a", 2'000}});
     elsewhere.environment.compiler = "g++ 13.1.0";
@@ -57,7 +57,7 @@ TEST(Instructions, AnotherEnvironmentIsToldAndNotFailed) {
     EXPECT_NE(text.find("g++ 13.1.0"), std::string::npos);
 }
 
-TEST(Instructions, TheFileComesBack) {
+TEST(Instructions, FilesRoundTrip) {
     const Counts written = counts({{"a", 1}, {"b", 123'456'789'012}});
     const auto read = parseCounts(countsText(written));
     ASSERT_TRUE(read);

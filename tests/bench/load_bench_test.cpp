@@ -72,7 +72,7 @@ TEST_F(LoadBench, Latency) {
     EXPECT_GT(figures["p99_ratio"], 0.0);
 }
 
-TEST_F(LoadBench, StartKeepsTheDataItIsTold) {
+TEST_F(LoadBench, StartKeepsAGivenDataDirectory) {
     const std::string data = path("kept");
     const auto made = partOf(load("startup", {{"--start-data", data}}), "startup");
     EXPECT_EQ(made["shapes"], 80);

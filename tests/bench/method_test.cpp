@@ -26,7 +26,7 @@ Features describedBy(const Method& method, const PointCloud& points, std::uint64
     return features ? *features : Features();
 }
 
-TEST(Method, AllAreThereUnderTheirNames) {
+TEST(Method, AllMethodsAreListedByName) {
     auto expected = std::vector<std::string>{"default", "paper"};
     if (!peerLibrary().empty()) {
         for (const std::string& name : peerNames()) expected.push_back(name);
@@ -37,7 +37,7 @@ TEST(Method, AllAreThereUnderTheirNames) {
     EXPECT_THAT(namesOf(*methodsNamed({"d2", "paper"})), ElementsAre("paper", "d2"));
 }
 
-TEST(Method, AnUnknownNameIsRefusedAndTheKnownListed) {
+TEST(Method, AnUnknownNameIsRefusedWithAListOfNames) {
     const auto methods = methodsNamed({"d2", "d3"});
     ASSERT_FALSE(methods);
     EXPECT_EQ(methods.error().code, ErrorCode::kInvalidArgument);
@@ -54,7 +54,7 @@ TEST(Method, APeerThatWasNotBuiltSaysHowToGetIt) {
     EXPECT_THAT(methods.error().message, HasSubstr("SHAPEDB_BENCH_PCL"));
 }
 
-TEST(Method, EveryMethodTellsAnotherShapeFromATurnedScanOfTheSame) {
+TEST(Method, EveryMethodScoresARotatedScanAboveAnotherShape) {
     const PointCloud cube = boxPoints(1.0, 0.9, 0.8, 3000, 1);
     PointCloud sameCube = boxPoints(1.0, 0.9, 0.8, 3000, 2);
     const PointCloud rod = boxPoints(1.0, 0.15, 0.1, 3000, 3);
@@ -89,7 +89,7 @@ TEST(Method, HistogramMethodsRefuseDegenerateClouds) {
     }
 }
 
-TEST(Method, CancellingEndsOurs) {
+TEST(Method, OurMethodsCanBeCancelled) {
     const std::atomic<bool> cancel{true};
     RunContext context;
     context.cancel = &cancel;

@@ -21,7 +21,7 @@ TEST(PrecisionRecall, PerfectRankingHasPrecisionOneEverywhere) {
     EXPECT_THAT(*curve, ::testing::AllOf(::testing::SizeIs(kRecallLevels), ::testing::Each(1.0)));
 }
 
-TEST(PrecisionRecall, ByHand) {
+TEST(PrecisionRecall, AgreesWithAWorkedExample) {
     // Query 0 of class a finds: b, a, a; the two a's ask with the right answers first; b is alone.
     const std::vector<std::string> labels = {"a", "a", "a", "b"};
     const ScoreMatrix scores = {0, 2, 1, 3,  //
@@ -53,7 +53,7 @@ TEST(PrecisionRecall, WithoutQueriesAllIsZero) {
     EXPECT_THAT(*curve, ::testing::Each(0.0));
 }
 
-TEST(PrecisionRecall, RefusesWhatIsNoMatrix) {
+TEST(PrecisionRecall, RefusesScoresThatAreNotAMatrix) {
     EXPECT_FALSE(precisionAtRecall({0.0}, {"a", "b"}));
     EXPECT_FALSE(precisionAtRecall({0.0, std::numeric_limits<double>::quiet_NaN(), 1.0, 0.0}, {"a", "a"}));
 }

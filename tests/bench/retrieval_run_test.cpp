@@ -69,7 +69,7 @@ TEST_F(RetrievalRun, SameForAnyNumberOfThreads) {
     }
 }
 
-TEST_F(RetrievalRun, ScansAreTurnedUnlessToldNotTo) {
+TEST_F(RetrievalRun, ScansAreRotatedUnlessDisabled) {
     // All nine scans ask for themselves: only unturned does the spread along x stay what it was.
     RetrievalTask task = leaveOneOut();
     task.gallery = task.queries;
@@ -103,7 +103,7 @@ TEST_F(RetrievalRun, ScansAreTurnedUnlessToldNotTo) {
     EXPECT_NE(turned, spreadsOf());
 }
 
-TEST_F(RetrievalRun, AScanThatCannotBeDescribedIsFoundLastAndFindsNothing) {
+TEST_F(RetrievalRun, AScanThatCannotBeDescribedRanksLast) {
     // First in the order of files, where a tie would be broken in its favour.
     writePoints("set/cube/0.xyz", PointCloud(50, Point3{1.0, 1.0, 1.0}));
     const auto levels = measured(leaveOneOut(), {}, d2());
@@ -143,7 +143,7 @@ TEST_F(RetrievalRun, QueriesFindTheirCleanTwinInAGallery) {
     EXPECT_LT(result.queries[0].score, 0.0);
 }
 
-TEST_F(RetrievalRun, NoiseIsForTheQueriesNotTheGallery) {
+TEST_F(RetrievalRun, NoiseAppliesToQueriesOnly) {
     RetrievalTask task = leaveOneOut();
     task.gallery = task.queries;
     task.match = cli::Match::kStem;

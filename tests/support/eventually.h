@@ -8,9 +8,9 @@
 namespace shapedb::testing {
 
 /// True as soon as `condition` holds, false when it does not within `atMost`.
-[[nodiscard]] inline bool eventually(const std::function<bool()>& condition,
-                                     std::chrono::milliseconds atMost = std::chrono::seconds(60),
-                                     std::chrono::milliseconds poll = std::chrono::milliseconds(2)) {
+inline bool eventually(const std::function<bool()>& condition,
+                       std::chrono::milliseconds atMost = std::chrono::seconds(60),
+                       std::chrono::milliseconds poll = std::chrono::milliseconds(2)) {
     const auto until = std::chrono::steady_clock::now() + atMost;
     while (!condition()) {
         if (std::chrono::steady_clock::now() >= until) return false;

@@ -13,7 +13,7 @@ namespace shapedb {
 
 /// The L1 distance of each statistic of two shapes, in levels (steps of the square root of a share); of
 /// a reversible statistic the smaller of both orders. By Statistic.
-using LevelSums = std::array<std::uint32_t, kStatisticKinds>;
+using LevelSums = std::array<std::uint16_t, kStatisticKinds>;
 
 /// What two unrelated shapes typically differ by: root distances of the statistics by Statistic, then one
 /// less the agreement of the parts. `shapedb-bench typical` measures them.

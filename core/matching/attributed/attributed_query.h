@@ -8,6 +8,16 @@
 
 namespace shapedb {
 
+/// The sums of both halves, by Statistic.
+[[nodiscard]] inline LevelSums joined(const HalfSums& first, const HalfSums& second) {
+    LevelSums sums;
+    for (std::size_t s = 0; s < kKindsPerHalf; ++s) {
+        sums[static_cast<std::size_t>(kFirstHalf[s])] = static_cast<std::uint16_t>(first[s]);
+        sums[static_cast<std::size_t>(kSecondHalf[s])] = static_cast<std::uint16_t>(second[s]);
+    }
+    return sums;
+}
+
 /// Immutable, thread-safe.
 class AttributedQuery {
   public:
@@ -15,7 +25,7 @@ class AttributedQuery {
         : signature_(signature),
           packed_(signature),
           segments_(packed_.row()),
-          difference_(signature.attributes->statistics) {}
+          difference_(*packed_.row().firstHalf, *packed_.row().secondHalf) {}
 
     [[nodiscard]] const Signature& signature() const { return signature_; }
     [[nodiscard]] ShapeRow row() const { return packed_.row(); }
@@ -32,8 +42,5 @@ class AttributedQuery {
     SegmentArray segments_;
     StatisticsDifference difference_;
 };
-
-/// The sums of both halves by Statistic.
-[[nodiscard]] LevelSums joined(const HalfSums& first, const HalfSums& second);
 
 }  // namespace shapedb

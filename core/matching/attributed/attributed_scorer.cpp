@@ -1,5 +1,7 @@
 #include "core/matching/attributed/attributed_scorer.h"
 
+#include <type_traits>
+
 #include "core/matching/attributed/partial_scorer.h"
 #include "core/matching/attributed/whole_scorer.h"
 
@@ -8,26 +10,24 @@ namespace shapedb {
 AttributedScorer::AttributedScorer(const Signature& query, const ScoreOptions& options, StatisticsRule rule)
     : query_(query), options_(options), rule_(rule) {}
 
-AttributedScorer::Pair::Pair(const AttributedQuery& query, const ShapeRow& row, double statistics,
+AttributedScorer::Pair::Pair(const AttributedQuery& query, const ShapeRow& row, const LevelSums& sums,
                              const ScoreOptions& options)
     : segments(row),
       exchanged(canonicalLess(row, query.row())),
       comparison(exchanged ? segments : query.segments(), exchanged ? query.segments() : segments, options),
-      distance(
-          attributeDistance(statistics, query.quality(), row.quality,
-                            options.keepScale ? octavesBetween(query.signature().scale, row.scale) : 0.0)),
+      distance(attributeDistance(
+          statisticsDistance(sums, query.quality(), row.quality), query.quality(), row.quality,
+          options.keepScale ? octavesBetween(query.signature().scale, row.scale) : 0.0)),
       knownScale(options.keepScale ? query.signature().scale / row.scale : 0.0) {}
 
-double AttributedScorer::statisticsOf(const ShapeRow& shape) const {
-    return statisticsDistance(query_.levelSums(shape), query_.quality(), shape.quality);
-}
+static_assert(std::is_same_v<LevelSums, Survivor::Known>, "a scan hands its sums on");
 
 double AttributedScorer::score(const ShapeRow& shape) const {
-    return isSame(shape) ? 1.0 : scoreOf(Pair(query_, shape, statisticsOf(shape), options_));
+    return isSame(shape) ? 1.0 : scoreOf(Pair(query_, shape, query_.levelSums(shape), options_));
 }
 
 double AttributedScorer::bound(const ShapeRow& shape) const {
-    return isSame(shape) ? 1.0 : boundOf(Pair(query_, shape, statisticsOf(shape), options_));
+    return isSame(shape) ? 1.0 : boundOf(Pair(query_, shape, query_.levelSums(shape), options_));
 }
 
 void AttributedScorer::scan(const ShapeRows& rows, const std::vector<std::uint8_t>& wanted, double least,

@@ -34,7 +34,7 @@ class AttributedScorer : public Scorer {
   protected:
     /// The query and another shape, with what bound, score and explanation share.
     struct Pair {
-        Pair(const AttributedQuery& query, const ShapeRow& row, double statistics,
+        Pair(const AttributedQuery& query, const ShapeRow& row, const LevelSums& sums,
              const ScoreOptions& options);
         Pair(const Pair&) = delete;  // `comparison` keeps views
         Pair& operator=(const Pair&) = delete;
@@ -55,7 +55,6 @@ class AttributedScorer : public Scorer {
     [[nodiscard]] bool isSame(const ShapeRow& shape) const {
         return sameShape(query_.row(), shape, options_.keepScale);
     }
-    [[nodiscard]] double statisticsOf(const ShapeRow& shape) const;
 
   private:
     const AttributedQuery query_;

@@ -37,15 +37,18 @@ constexpr bool fits(const std::array<Statistic, kKindsPerHalf>& half, bool mayRe
 static_assert(fits(kFirstHalf, false) && fits(kSecondHalf, true), "a statistic does not fit its slot");
 
 void packHalf(const std::uint8_t* levels, const std::array<Statistic, kKindsPerHalf>& kinds, HalfRow& row) {
-    row.bytes.fill(0);
+    HalfRow packed;  // a local one may be vectorised: nothing else points to it
     for (std::size_t s = 0; s < kKindsPerHalf; ++s) {
         const StatisticLayout& layout = layoutOf(kinds[s]);
-        for (std::size_t i = 0; i < layout.count; i += 2) {
-            const unsigned low = std::min(levels[layout.offset + i], kTopLevel);
-            const unsigned high = std::min(levels[layout.offset + i + 1], kTopLevel);
-            row.bytes[kSlots[s].offset + i / 2] = static_cast<std::uint8_t>(low | (high << 4));
+        const std::uint8_t* from = levels + layout.offset;
+        std::uint8_t* to = packed.bytes.data() + kSlots[s].offset;
+        for (std::size_t i = 0; i < layout.count / 2u; ++i) {
+            const std::uint8_t low = std::min(from[2 * i], kTopLevel);
+            const std::uint8_t high = std::min(from[2 * i + 1], kTopLevel);
+            to[i] = static_cast<std::uint8_t>(low | (high << 4));
         }
     }
+    row = packed;
 }
 
 void unpackHalf(const HalfRow& row, const std::array<Statistic, kKindsPerHalf>& kinds, std::uint8_t* levels) {
@@ -59,17 +62,17 @@ void unpackHalf(const HalfRow& row, const std::array<Statistic, kKindsPerHalf>& 
     }
 }
 
-ShapeStatistics withRowsReversed(ShapeStatistics levels) {
-    for (const StatisticLayout& layout : kStatistics) {
-        if (layout.reversibleRows == 0) continue;
-        const std::size_t columns = layout.count / layout.reversibleRows;
-        std::uint8_t* bins = levels.data() + layout.offset;
-        for (std::size_t low = 0, high = layout.count - columns; low < high;
-             low += columns, high -= columns) {
-            std::swap_ranges(bins + low, bins + low + columns, bins + high);
-        }
+// The second half with the rows of its reversible statistic in reverse; a row is whole bytes.
+HalfRow withRowsReversed(HalfRow half) {
+    constexpr StatisticLayout kLayout = layoutOf(kSecondHalf[kReversibleSlot]);
+    constexpr std::size_t kRowBytes = kLayout.count / kLayout.reversibleRows / 2;
+    static_assert(kRowBytes * 2 * kLayout.reversibleRows == kLayout.count, "rows are not whole bytes");
+    std::uint8_t* bytes = half.bytes.data() + kSlots[kReversibleSlot].offset;
+    for (std::size_t low = 0, high = kLayout.count / 2 - kRowBytes; low < high;
+         low += kRowBytes, high -= kRowBytes) {
+        std::swap_ranges(bytes + low, bytes + low + kRowBytes, bytes + high);
     }
-    return levels;
+    return half;
 }
 
 std::uint32_t slotSum(const HalfRow& a, const HalfRow& b, std::size_t slot) {
@@ -149,12 +152,11 @@ void unpackStatistics(const HalfRow& first, const HalfRow& second, ShapeStatisti
     unpackHalf(second, kSecondHalf, levels.data());
 }
 
-StatisticsDifference::StatisticsDifference(const ShapeStatistics& query, Instructions use)
-    : wide_(use == Instructions::kBest && processorIsWide()) {
-    HalfRow unused;
-    packStatistics(withRowsReversed(query), unused, reversed_);
-    packStatistics(query, first_, second_);
-}
+StatisticsDifference::StatisticsDifference(const HalfRow& first, const HalfRow& second, Instructions use)
+    : first_(first),
+      second_(second),
+      reversed_(withRowsReversed(second)),
+      wide_(use == Instructions::kBest && processorIsWide()) {}
 
 void StatisticsDifference::first(const HalfRow* rows, std::size_t count, HalfSums* sums) const noexcept {
     if (wide_) return wideSums(first_, rows, count, sums);

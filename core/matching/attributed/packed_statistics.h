@@ -43,10 +43,10 @@ enum class Instructions {
     kPortable,  ///< plain loops
 };
 
-/// A query's statistics, prepared to be compared with many. Immutable, thread-safe.
+/// The packed statistics of a query, prepared to be compared with many. Immutable, thread-safe.
 class StatisticsDifference {
   public:
-    explicit StatisticsDifference(const ShapeStatistics& query, Instructions use = Instructions::kBest);
+    StatisticsDifference(const HalfRow& first, const HalfRow& second, Instructions use = Instructions::kBest);
 
     /// Of each of rows[0, count); in the order of kFirstHalf.
     void first(const HalfRow* rows, std::size_t count, HalfSums* sums) const noexcept;

@@ -23,7 +23,7 @@ Explanation PartialScorer::explain(const Signature& shape) const {
     const PackedShape packed(shape);
     const ShapeRow row = packed.row();
     const LevelSums sums = query().levelSums(row);
-    const Pair pair(query(), row, statisticsDistance(sums, query().quality(), row.quality), options());
+    const Pair pair(query(), row, sums, options());
     const Signature& piece = query().signature();
     const Containment found = containment(query().segments(), pair.segments, pair.knownScale, options());
     const double agreement = pair.comparison.match().agreement;

@@ -55,8 +55,8 @@ void StatisticsBound::scan(const ShapeRows& rows, const std::vector<std::uint8_t
             if (compareSizes_) distance = std::hypot(distance, octavesBetween(queryScale_, rows.scales[row]));
             if (distance > farthest) continue;
             ++counts.afterStatistics;
-            left.push_back({static_cast<std::uint32_t>(row), maxScoreAtDistance(distance),
-                            statisticsDistance(joined(sums[i], rest), query_.quality(), quality)});
+            left.push_back(
+                {maxScoreAtDistance(distance), static_cast<std::uint32_t>(row), joined(sums[i], rest)});
         }
     }
 }

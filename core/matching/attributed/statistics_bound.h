@@ -24,7 +24,7 @@ class StatisticsBound {
     StatisticsBound(const AttributedQuery& query, StatisticsRule rule);
 
     /// As Scorer::scan, of the attributed rows: those that could score `least` if the rest of them
-    /// agreed fully. Survivor::known is AttributeDistance::statistics.
+    /// agreed fully. Survivor::known are the LevelSums.
     void scan(const ShapeRows& rows, const std::vector<std::uint8_t>& wanted, double least,
               std::vector<Survivor>& left, ScanCounts& counts) const;
 

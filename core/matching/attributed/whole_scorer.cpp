@@ -23,7 +23,7 @@ Explanation WholeScorer::explain(const Signature& shape) const {
     const PackedShape packed(shape);
     const ShapeRow row = packed.row();
     const LevelSums sums = query().levelSums(row);
-    const Pair pair(query(), row, statisticsDistance(sums, query().quality(), row.quality), options());
+    const Pair pair(query(), row, sums, options());
     const Signature& a = pair.exchanged ? shape : query().signature();
     const Signature& b = pair.exchanged ? query().signature() : shape;
     const SegmentMatch match = pair.comparison.match();

@@ -110,6 +110,7 @@ TEST(Parameters, FormerFlagNamesStillWorkButAreNotInTheHelp) {
     EXPECT_NE(former.help.find("--thinning"), std::string::npos);
     EXPECT_EQ(former.help.find("--stray-ratio"), std::string::npos);
     EXPECT_EQ(former.help.find("--even-spacing"), std::string::npos);
+    EXPECT_EQ(former.help.find("Excludes"), std::string::npos);
     EXPECT_TRUE(parse({"--outlier-ratio", "4", "--stray-ratio", "3"}).refused) << "one or the other";
 }
 

@@ -125,7 +125,7 @@ TEST(ShapeOutput, PreparationTextAccountsForUnusedPoints) {
     report.duplicates = 1;
     report.pointsUsed = 500;
     EXPECT_EQ(preparationText(report),
-              "500 points used: 10 outliers dropped, 1 duplicate merged and the rest averaged and thinned\n");
+              "500 points used: 10 outliers dropped, 1 duplicate merged, the rest averaged and thinned\n");
     report.outliers = report.duplicates = 0;
     EXPECT_EQ(preparationText(report), "500 points used: averaged and thinned\n");
     report.duplicates = 500;
@@ -163,6 +163,9 @@ TEST(ShapeOutput, InteriorTextNamesSourceNoiseAndQuality) {
               "interior found by walking in from outside (22 degrees), noise about 0.1 % of the size\n"
               "interior quality 0.75 of 1\n");
     report.interiorSource = InteriorSource::kPotential;
+    EXPECT_EQ(interiorText(report, 10.0)
+                  .rfind("interior estimated: the scan is open or noisy (noise about 0.1 %", 0),
+              0u);
     report.noise = 0.0;
     EXPECT_EQ(interiorText(report, 10.0),
               "interior estimated: the scan is open or noisy\ninterior quality 0.75 of 1\n");

@@ -10,6 +10,7 @@
 
 #include "core/base/random.h"
 #include "core/preparation/decimate.h"
+#include "core/preparation/sanitise.h"
 #include "core/synthetic/named_shapes.h"
 
 namespace shapedb {

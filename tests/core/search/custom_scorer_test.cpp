@@ -37,18 +37,18 @@ class SizeScorer final : public Scorer {
 class HandingOnScorer final : public Scorer {
   public:
     bool compares(const ShapeRow&) const override { return true; }
-    double score(const ShapeRow& shape) const override { return 1.0 / (1.0 + shape.scale); }
+    double score(const ShapeRow& shape) const override { return 1.0 / (1.0 + std::floor(shape.scale)); }
     double bound(const ShapeRow&) const override { return 1.0; }
     Explanation explain(const Signature&) const override { return {}; }
     void scan(const ShapeRows& rows, const std::vector<std::uint8_t>& wanted, double,
               std::vector<Survivor>& left, ScanCounts&) const override {
         for (std::uint32_t row = 0; row < rows.count; ++row) {
-            if (wanted.empty() || wanted[row] != 0) left.push_back({row, 1.0, rows.scales[row] + 1.0});
+            if (wanted.empty() || wanted[row] != 0) left.push_back({1.0, row, {static_cast<std::uint16_t>(rows.scales[row])}});
         }
     }
     std::optional<double> scoreIfReaches(const ShapeRow&, const Survivor& survivor,
                                          double least) const override {
-        const double value = 1.0 / survivor.known;
+        const double value = 1.0 / (1.0 + survivor.known[0]);
         if (value < least) return std::nullopt;
         return value;
     }
@@ -58,7 +58,7 @@ std::vector<IndexEntry> randomEntries(Random& random, std::int64_t count) {
     std::vector<IndexEntry> entries;
     for (std::int64_t id = 1; id <= count; ++id) {
         entries.push_back({id, {}, testing_support::randomSignature(random, 8)});
-        entries.back().signature.scale = std::exp(random.normal());
+        entries.back().signature.scale = 10.0 * std::exp(random.normal());
     }
     return entries;
 }

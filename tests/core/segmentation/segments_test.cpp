@@ -13,6 +13,7 @@
 
 #include "core/base/random.h"
 #include "core/geometry/neighbours.h"
+#include "core/geometry/tetrahedron.h"
 #include "core/segmentation/flow.h"
 #include "core/segmentation/interior.h"
 #include "tests/core/segmentation/exact_balls.h"

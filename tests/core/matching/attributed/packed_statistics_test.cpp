@@ -78,8 +78,10 @@ TEST(PackedStatistics, SumsEqualPlainLoops) {
             others[i] = i == 0 ? query : randomLevels(random);
             packStatistics(others[i], first[i], second[i]);
         }
+        HalfRow packedFirst, packedSecond;
+        packStatistics(query, packedFirst, packedSecond);
         for (const Instructions use : {Instructions::kBest, Instructions::kPortable}) {
-            const StatisticsDifference difference(query, use);
+            const StatisticsDifference difference(packedFirst, packedSecond, use);
             std::vector<HalfSums> sums(others.size());
             difference.first(first.data(), first.size(), sums.data());
             for (std::size_t i = 0; i < others.size(); ++i) {
