@@ -17,9 +17,6 @@ namespace shapedb {
 
 namespace {
 
-// Points closer together than the noise add nothing about the surface.
-constexpr double kSpacingPerSigma = 1.0;
-
 // Points that smoothing could not bring back to the surface stand out less than outliers of the raw
 // scan: by this ratio.
 constexpr double kStragglerRatio = 1.7;
@@ -80,7 +77,8 @@ Result<void> smoothNoise(Preparation& work, double reach, const RunContext& cont
 
 Result<void> thinOut(Preparation& work, double multiple, const RunContext& context) {
     const NoiseEstimate& noise = work.prepared.noise;
-    const double spacing = multiple * std::max(noise.spacing, kSpacingPerSigma * noise.sigma);
+    // Points closer together than the noise add nothing about the surface.
+    const double spacing = multiple * std::max(noise.spacing, noise.sigma);
     auto thinned = thin(work.prepared.sites, work.neighbours(), spacing, context);
     RETURN_IF_ERROR(thinned);
     work.replaceSites(std::move(thinned->points), thinned->siteOfPoint);
