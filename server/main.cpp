@@ -14,7 +14,7 @@
 #include "core/pipeline.h"
 #include "server/config/load.h"
 #include "server/config/settings.h"
-#include "server/rpc/daemon.h"
+#include "server/daemon.h"
 #include "server/telemetry/logger.h"
 
 namespace {
@@ -43,7 +43,7 @@ int serve(const config::ServerConfig& config) {
     (*log)->info("starting", {{"version", std::string(config::version())}, {"data", config.data}});
     const auto describeScan = [](const PointCloud& points, const ShapeParameters& parameters,
                                  const RunContext& context) { return describe(points, parameters, context); };
-    auto daemon = rpc::Daemon::start(config, *log, describeScan);
+    auto daemon = Daemon::start(config, *log, describeScan);
     if (!daemon) {
         (*log)->error("cannot start", telemetry::fieldsOf(daemon.error()));
         return kCannotServe;

@@ -7,11 +7,11 @@
 
 #include "core/base/return_if_error.h"
 #include "server/catalog/limits.h"
+#include "server/catalog/temporary_file.h"
 #include "server/config/load.h"
 #include "server/rpc/backup_stream.h"
 #include "server/rpc/call.h"
 #include "server/rpc/convert.h"
-#include "server/rpc/temporary_file.h"
 
 namespace shapedb::rpc {
 namespace {
@@ -122,7 +122,7 @@ grpc::Status AdminServiceHandler::CancelRebuild(grpc::ServerContext* context,
 grpc::Status AdminServiceHandler::Backup(grpc::ServerContext* context, const v1::BackupRequest*,
                                          grpc::ServerWriter<v1::BackupChunk>* writer) {
     return handle(services_, context, "Backup", [&](Call& call) -> Result<void> {
-        const auto file = TemporaryFile::create(services_.temporaryDirectory);
+        const auto file = catalog::TemporaryFile::create(services_.temporaryDirectory);
         RETURN_IF_ERROR(file);
         RETURN_IF_ERROR(services_.catalog.backup(file->path(), call.run()));
         return sendFile(file->path(), call.run(),
@@ -135,7 +135,7 @@ grpc::Status AdminServiceHandler::Restore(grpc::ServerContext* context,
                                           v1::RestoreResponse* response) {
     return handle(services_, context, "Restore", [&](Call& call) -> Result<void> {
         call.expectRestore();
-        const auto file = TemporaryFile::create(services_.temporaryDirectory);
+        const auto file = catalog::TemporaryFile::create(services_.temporaryDirectory);
         RETURN_IF_ERROR(file);
         auto receiver = FileReceiver::create(file->path());
         RETURN_IF_ERROR(receiver);

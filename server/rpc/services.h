@@ -8,7 +8,7 @@
 #include "server/catalog/gates.h"
 #include "server/config/server_config.h"
 #include "server/rpc/cancel_watcher.h"
-#include "server/rpc/search_runner.h"
+#include "server/catalog/search_runner.h"
 #include "server/telemetry/logger.h"
 
 namespace shapedb::rpc {
@@ -19,7 +19,7 @@ struct Services {
     catalog::Catalog& catalog;
     catalog::Admission& admission;
     CancelWatcher& cancellations;
-    SearchRunner& searches;
+    catalog::SearchRunner& searches;
     telemetry::LoggerPtr log;
     std::string temporaryDirectory;  ///< exists; for backup and restore files
     std::chrono::system_clock::time_point started;

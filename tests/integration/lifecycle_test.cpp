@@ -68,11 +68,11 @@ TEST_F(Lifecycle, RestartFindsEverythingAgain) {
 
 TEST_F(Lifecycle, TerminationRequeuesJobsForTheRestart) {
     start({"--ingest-threads", "1", "--shutdown-drain-seconds", "1"});
-    for (int i = 0; i < 3; ++i) {
-        const Scan slow = slowScan(static_cast<std::uint64_t>(i));
-        ASSERT_TRUE(add(std::to_string(i), slow));
-    }
-    ASSERT_TRUE(eventually([&] { return beingSegmented("0"); }));
+    // Made first: on a busy machine the first would be done before the last is made.
+    std::vector<Scan> scans;
+    for (std::uint64_t i = 0; i < 3; ++i) scans.push_back(slowScan(i));
+    for (std::size_t i = 0; i < scans.size(); ++i) ASSERT_TRUE(add(std::to_string(i), scans[i]));
+    ASSERT_TRUE(eventually([&] { return statsOf(*client).running_jobs() > 0; }));
     const auto began = std::chrono::steady_clock::now();
     server->signal(SIGTERM);
     EXPECT_EQ(server->wait(), 0) << server->log();

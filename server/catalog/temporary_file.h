@@ -5,7 +5,7 @@
 
 #include "core/base/error.h"
 
-namespace shapedb::rpc {
+namespace shapedb::catalog {
 
 /// A path for one new file in a folder of its own; both are removed when this is destroyed.
 class TemporaryFile {
@@ -29,4 +29,4 @@ class TemporaryFile {
 /// Errors: kFileNotWritable.
 [[nodiscard]] Result<void> prepareTemporaryDirectory(const std::string& directory);
 
-}  // namespace shapedb::rpc
+}  // namespace shapedb::catalog

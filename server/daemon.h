@@ -1,5 +1,5 @@
-// The whole server: opens the database, starts the catalog and the gRPC server, and shuts everything
-// down again.
+// The whole server: opens the store, starts the catalog and the transports, and shuts everything down
+// again. Which store and which transports there are is decided here and nowhere else.
 #pragma once
 
 #include <memory>
@@ -9,7 +9,7 @@
 #include "server/ingest/signature_pipeline.h"
 #include "server/telemetry/logger.h"
 
-namespace shapedb::rpc {
+namespace shapedb {
 
 /// Not thread-safe: one thread starts and drains it.
 class Daemon {
@@ -37,4 +37,4 @@ class Daemon {
     std::unique_ptr<Parts> parts_;
 };
 
-}  // namespace shapedb::rpc
+}  // namespace shapedb

@@ -9,7 +9,7 @@
 #include "core/base/error.h"
 #include "core/search/top_k.h"
 
-namespace shapedb::rpc {
+namespace shapedb::catalog {
 
 /// All searches share the threads of one arena, however many calls run. Thread-safe.
 class SearchRunner {
@@ -37,4 +37,4 @@ class SearchRunner {
     std::atomic<std::uint64_t> count_{0};
 };
 
-}  // namespace shapedb::rpc
+}  // namespace shapedb::catalog

@@ -1,4 +1,4 @@
-#include "server/rpc/temporary_file.h"
+#include "server/catalog/temporary_file.h"
 
 #include <cerrno>
 #include <filesystem>
@@ -7,7 +7,7 @@
 
 #include <stdlib.h>
 
-namespace shapedb::rpc {
+namespace shapedb::catalog {
 
 Result<TemporaryFile> TemporaryFile::create(const std::string& directory) {
     std::string folder = directory + "/XXXXXX";
@@ -40,4 +40,4 @@ Result<void> prepareTemporaryDirectory(const std::string& directory) {
     return {};
 }
 
-}  // namespace shapedb::rpc
+}  // namespace shapedb::catalog

@@ -1,8 +1,8 @@
-#include "server/rpc/search_runner.h"
+#include "server/catalog/search_runner.h"
 
 #include <oneapi/tbb/task_arena.h>
 
-namespace shapedb::rpc {
+namespace shapedb::catalog {
 
 struct SearchRunner::Arena {
     explicit Arena(int threads) : tasks(threads) {}
@@ -29,4 +29,4 @@ Result<std::vector<SearchResult>> SearchRunner::runBatch(const std::vector<Batch
     return results;
 }
 
-}  // namespace shapedb::rpc
+}  // namespace shapedb::catalog

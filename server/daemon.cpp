@@ -1,0 +1,123 @@
+#include "server/daemon.h"
+
+#include <chrono>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+#include "core/base/return_if_error.h"
+#include "server/catalog/catalog.h"
+#include "server/catalog/gates.h"
+#include "server/catalog/search_runner.h"
+#include "server/catalog/temporary_file.h"
+#include "server/config/settings.h"
+#include "server/rpc/grpc_server.h"
+#include "server/store/sqlite/sqlite_store.h"
+
+namespace shapedb {
+namespace {
+
+constexpr const char* kDatabaseFile = "shapedb.sqlite";
+constexpr const char* kTemporaryFolder = "tmp";
+constexpr const char* kRebuildJournal = "rebuild.journal";
+
+Result<std::unique_ptr<store::Store>> openStore(const config::ServerConfig& config) {
+    namespace fs = std::filesystem;
+    std::error_code error;
+    // Private to its owner; an existing directory keeps its permissions.
+    if (fs::create_directories(config.data, error)) {
+        fs::permissions(config.data, fs::perms::owner_all, error);
+    }
+    if (!error && !fs::is_directory(config.data)) error = std::make_error_code(std::errc::not_a_directory);
+    if (error) {
+        return fail(ErrorCode::kFileNotWritable,
+                    "data directory " + config.data + " cannot be created: " + error.message());
+    }
+    store::SqliteOptions options;
+    options.path = config.data + "/" + kDatabaseFile;
+    options.readers = config.store.readers;
+    options.pointCompressionLevel = config.store.compressionLevel;
+    return store::openSqliteStore(options);
+}
+
+catalog::CatalogOptions catalogOptions(const config::ServerConfig& config) {
+    catalog::CatalogOptions options;
+    options.maxQueuedJobs = config.ingest.maxQueuedJobs;
+    options.maxQueuedBytes = config.ingest.maxQueuedBytes;
+    options.segmentations = config::threadsOrProcessors(config.search.threads);
+    options.workers.threads = config::threadsOrProcessors(config.ingest.threads);
+    options.workers.maxAttempts = config.ingest.maxAttempts;
+    options.rebuilds.threads = config::threadsOrProcessors(config.rebuild.threads);
+    options.rebuilds.maxAttempts = config.ingest.maxAttempts;
+    options.rebuilds.journalPath = config.data + "/" + kRebuildJournal;
+    return options;
+}
+
+}  // namespace
+
+/// In order of construction; destroyed in reverse.
+struct Daemon::Parts {
+    Parts(const config::ServerConfig& configuration, telemetry::LoggerPtr logger,
+          ingest::SignaturePipeline pipeline, std::unique_ptr<store::Store> store)
+        : config(configuration),
+          log(std::move(logger)),
+          catalog(std::move(store), std::move(pipeline), log, catalogOptions(config)),
+          admission(config.limits.maxUploadBytes),
+          searches(config::threadsOrProcessors(config.search.threads)),
+          grpc(config, catalog, admission, searches, log, temporaryDirectory()) {}
+
+    std::string temporaryDirectory() const { return config.data + "/" + kTemporaryFolder; }
+    Result<void> serve();
+    Result<void> drain();
+
+    const config::ServerConfig config;
+    telemetry::LoggerPtr log;
+    catalog::Catalog catalog;
+    catalog::Admission admission;
+    catalog::SearchRunner searches;
+    rpc::GrpcServer grpc;
+    bool drained = false;
+};
+
+Result<void> Daemon::Parts::serve() {
+    RETURN_IF_ERROR(catalog::prepareTemporaryDirectory(temporaryDirectory()));
+    RETURN_IF_ERROR(catalog.start());
+    const auto wanted = config::parseEndpoint(config.listen);
+    RETURN_IF_ERROR(wanted);
+    return grpc.listen(*wanted);
+}
+
+Result<void> Daemon::Parts::drain() {
+    if (std::exchange(drained, true)) return {};
+    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(config.shutdown.drainSeconds);
+    grpc.reportNotServing();
+    admission.calls.drain();
+    const bool empty = admission.calls.waitUntilEmpty(until);
+    if (!empty) log->warn("drain time is over: cancelling the calls still running");
+    grpc.shutDown();
+    return catalog.stop();
+}
+
+Daemon::Daemon(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
+
+Daemon::~Daemon() {
+    if (const auto drained = drain(); !drained) {
+        parts_->log->error("checkpoint at shutdown failed", telemetry::fieldsOf(drained.error()));
+    }
+}
+
+Result<std::unique_ptr<Daemon>> Daemon::start(const config::ServerConfig& config, telemetry::LoggerPtr log,
+                                              ingest::SignaturePipeline pipeline) {
+    auto opened = openStore(config);
+    RETURN_IF_ERROR(opened);
+    auto parts = std::make_unique<Parts>(config, std::move(log), std::move(pipeline), std::move(*opened));
+    std::unique_ptr<Daemon> daemon(new Daemon(std::move(parts)));
+    RETURN_IF_ERROR(daemon->parts_->serve());
+    return daemon;
+}
+
+const config::Endpoint& Daemon::endpoint() const { return parts_->grpc.endpoint(); }
+
+Result<void> Daemon::drain() { return parts_->drain(); }
+
+}  // namespace shapedb

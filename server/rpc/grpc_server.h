@@ -1,0 +1,42 @@
+// The gRPC server: its handlers, its health service, and where it listens.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "core/base/error.h"
+#include "server/catalog/catalog.h"
+#include "server/catalog/gates.h"
+#include "server/catalog/search_runner.h"
+#include "server/config/server_config.h"
+#include "server/telemetry/logger.h"
+
+namespace shapedb::rpc {
+
+/// Not thread-safe: one thread starts it and takes it down.
+class GrpcServer {
+  public:
+    /// What is given by reference must outlive this. `temporaryDirectory` must exist: backup and restore
+    /// put their files there.
+    GrpcServer(const config::ServerConfig& config, catalog::Catalog& catalog, catalog::Admission& admission,
+               catalog::SearchRunner& searches, telemetry::LoggerPtr log, std::string temporaryDirectory);
+    /// As `shutDown`.
+    ~GrpcServer();
+
+    /// Returns once it serves. Call once. Errors: kUnavailable (cannot listen on the address).
+    [[nodiscard]] Result<void> listen(const config::Endpoint& endpoint);
+
+    /// Where it listens: the host asked for and the port in use.
+    [[nodiscard]] const config::Endpoint& endpoint() const;
+
+    /// Health says NOT_SERVING from now on; calls are still answered.
+    void reportNotServing();
+    /// Cancels the calls still running and waits for them. Idempotent.
+    void shutDown();
+
+  private:
+    struct Parts;
+    std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace shapedb::rpc
