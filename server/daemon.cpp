@@ -9,6 +9,7 @@
 #include "server/catalog/catalog.h"
 #include "server/catalog/gates.h"
 #include "server/catalog/search_runner.h"
+#include "server/catalog/searches.h"
 #include "server/catalog/temporary_file.h"
 #include "server/config/settings.h"
 #include "server/rpc/grpc_server.h"
@@ -63,7 +64,8 @@ struct Daemon::Parts {
           log(std::move(logger)),
           catalog(std::move(store), std::move(pipeline), log, catalogOptions(config)),
           admission(config.limits.maxUploadBytes),
-          searches(config::threadsOrProcessors(config.search.threads)),
+          runner(config::threadsOrProcessors(config.search.threads)),
+          searches(catalog, runner, config.limits.maxK),
           grpc(config, catalog, admission, searches, log, temporaryDirectory()) {}
 
     std::string temporaryDirectory() const { return config.data + "/" + kTemporaryFolder; }
@@ -74,7 +76,8 @@ struct Daemon::Parts {
     telemetry::LoggerPtr log;
     catalog::Catalog catalog;
     catalog::Admission admission;
-    catalog::SearchRunner searches;
+    catalog::SearchRunner runner;
+    catalog::Searches searches;
     rpc::GrpcServer grpc;
     bool drained = false;
 };

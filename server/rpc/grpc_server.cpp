@@ -30,7 +30,7 @@ constexpr const char* kServiceNames[] = {"shapedb.v1.ShapeService", "shapedb.v1.
 /// In order of construction; destroyed in reverse.
 struct GrpcServer::Parts {
     Parts(const config::ServerConfig& config, catalog::Catalog& catalog, catalog::Admission& admission,
-          catalog::SearchRunner& searches, telemetry::LoggerPtr log, std::string temporaryDirectory)
+          catalog::Searches& searches, telemetry::LoggerPtr log, std::string temporaryDirectory)
         : cancellations(std::chrono::seconds(config.limits.stallSeconds)),
           services{config,
                    catalog,
@@ -56,8 +56,8 @@ struct GrpcServer::Parts {
 };
 
 GrpcServer::GrpcServer(const config::ServerConfig& config, catalog::Catalog& catalog,
-                       catalog::Admission& admission, catalog::SearchRunner& searches,
-                       telemetry::LoggerPtr log, std::string temporaryDirectory)
+                       catalog::Admission& admission, catalog::Searches& searches, telemetry::LoggerPtr log,
+                       std::string temporaryDirectory)
     : parts_(std::make_unique<Parts>(config, catalog, admission, searches, std::move(log),
                                      std::move(temporaryDirectory))) {}
 

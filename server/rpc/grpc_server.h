@@ -7,7 +7,7 @@
 #include "core/base/error.h"
 #include "server/catalog/catalog.h"
 #include "server/catalog/gates.h"
-#include "server/catalog/search_runner.h"
+#include "server/catalog/searches.h"
 #include "server/config/server_config.h"
 #include "server/telemetry/logger.h"
 
@@ -19,7 +19,7 @@ class GrpcServer {
     /// What is given by reference must outlive this. `temporaryDirectory` must exist: backup and restore
     /// put their files there.
     GrpcServer(const config::ServerConfig& config, catalog::Catalog& catalog, catalog::Admission& admission,
-               catalog::SearchRunner& searches, telemetry::LoggerPtr log, std::string temporaryDirectory);
+               catalog::Searches& searches, telemetry::LoggerPtr log, std::string temporaryDirectory);
     /// As `shutDown`.
     ~GrpcServer();
 

@@ -6,9 +6,9 @@
 
 #include "server/catalog/catalog.h"
 #include "server/catalog/gates.h"
+#include "server/catalog/searches.h"
 #include "server/config/server_config.h"
 #include "server/rpc/cancel_watcher.h"
-#include "server/catalog/search_runner.h"
 #include "server/telemetry/logger.h"
 
 namespace shapedb::rpc {
@@ -19,7 +19,7 @@ struct Services {
     catalog::Catalog& catalog;
     catalog::Admission& admission;
     CancelWatcher& cancellations;
-    catalog::SearchRunner& searches;
+    catalog::Searches& searches;
     telemetry::LoggerPtr log;
     std::string temporaryDirectory;  ///< exists; for backup and restore files
     std::chrono::system_clock::time_point started;

@@ -6,9 +6,7 @@
 
 #include "core/base/return_if_error.h"
 #include "core/search/filter.h"
-#include "server/catalog/cursor.h"
-#include "server/catalog/limits.h"
-#include "server/catalog/request_checks.h"
+#include "server/catalog/listing.h"
 #include "server/catalog/scan_upload.h"
 #include "server/rpc/call.h"
 #include "server/rpc/convert.h"
@@ -38,24 +36,6 @@ Result<catalog::ShapeHeader> headerFrom(const pb::AddShapeHeader& message) {
     if (message.has_expected_version()) header.expectedVersion = message.expected_version();
     header.metadata = toMetadata(message.metadata());
     return header;
-}
-
-/// The filter of ListShapes and CountShapes.
-Result<store::ShapeFilter> makeFilter(const Call& call, const std::string& text, pb::ShapeState state) {
-    RETURN_IF_ERROR(catalog::checkFilterLength(text));
-    Result<Filter> filter = Filter::parse(text);
-    RETURN_IF_ERROR(filter);
-    const auto wanted = fromProto(state);
-    RETURN_IF_ERROR(wanted);
-    store::ShapeFilter result;
-    result.state = *wanted;
-    const RunContext* run = &call.run();
-    const bool all = filter->acceptsAll();
-    // A cancelled call accepts nothing more, which ends a listing of millions early.
-    result.accept = [filter = std::move(*filter), run, all](const store::Shape& shape) {
-        return run->checkpoint().has_value() && (all || filter.matches(shape.metadata));
-    };
-    return result;
 }
 
 /// One summary, then the points in the order they were uploaded, each with its segment.
@@ -150,30 +130,18 @@ grpc::Status ShapeServiceHandler::ListShapes(grpc::ServerContext* context,
     return handle(services_, context, "ListShapes", [&](Call& call) -> Result<void> {
         const auto collection = call.collection(request->collection());
         RETURN_IF_ERROR(collection);
-        RETURN_IF_ERROR(catalog::checkPageSize(request->page_size()));
-        const auto filter = makeFilter(call, request->filter(), request->state());
-        RETURN_IF_ERROR(filter);
-        const catalog::Listing listing{(*collection)->collection.id, request->filter(), request->state()};
-        const auto afterId = catalog::decodeCursor(listing, request->cursor());
-        RETURN_IF_ERROR(afterId);
-
-        const std::size_t pageSize =
-            request->page_size() == 0 ? catalog::kDefaultPageSize : request->page_size();
-        // One more than requested tells whether there is a next page.
-        const auto shapes =
-            services_.catalog.listShapes(listing.collectionId, *afterId, pageSize + 1, *filter);
-        RETURN_IF_ERROR(shapes);
-        RETURN_IF_ERROR(call.run().checkpoint());
-        std::size_t bytes = 0;
-        std::size_t sent = 0;
-        for (; sent < std::min(pageSize, shapes->size()) && bytes < catalog::kMaxPageBytes; ++sent) {
-            pb::Shape* shape = response->add_shapes();
-            toProto((*shapes)[sent], (*collection)->collection.name,
-                    catalog::qualityIn((*collection)->signatures, (*shapes)[sent].id), shape);
-            bytes += shape->ByteSizeLong();
-        }
-        if (sent < shapes->size())
-            response->set_next_cursor(catalog::encodeCursor(listing, (*shapes)[sent - 1].id));
+        const auto state = fromProto(request->state());
+        RETURN_IF_ERROR(state);
+        const catalog::ListRequest wanted{
+            {request->filter(), *state}, request->state(), request->page_size(), request->cursor()};
+        const auto next = catalog::listPage(services_.catalog, **collection, wanted, call.run(),
+                                            [&](const store::Shape& shape, std::optional<double> quality) {
+                                                pb::Shape* out = response->add_shapes();
+                                                toProto(shape, (*collection)->collection.name, quality, out);
+                                                return out->ByteSizeLong();
+                                            });
+        RETURN_IF_ERROR(next);
+        response->set_next_cursor(*next);
         return {};
     });
 }
@@ -184,12 +152,11 @@ grpc::Status ShapeServiceHandler::CountShapes(grpc::ServerContext* context,
     return handle(services_, context, "CountShapes", [&](Call& call) -> Result<void> {
         const auto collection = call.collection(request->collection());
         RETURN_IF_ERROR(collection);
-        auto filter = makeFilter(call, request->filter(), request->state());
-        RETURN_IF_ERROR(filter);
-        if (request->filter().empty()) filter->accept = nullptr;  // counted without reading rows
-        const auto count = services_.catalog.countShapes((*collection)->collection.id, *filter);
+        const auto state = fromProto(request->state());
+        RETURN_IF_ERROR(state);
+        const auto count =
+            catalog::countSelected(services_.catalog, **collection, {request->filter(), *state}, call.run());
         RETURN_IF_ERROR(count);
-        RETURN_IF_ERROR(call.run().checkpoint());
         response->set_count(*count);
         return {};
     });

@@ -145,10 +145,16 @@ TEST_F(Lifecycle, SecondSignalStopsAtOnce) {
     CallContext context;
     pb::AddShapeResponse response;
     const auto upload = client->shapes->AddShape(&context, &response);
+    const Scan scan = slowScan(11, 80'000);
     pb::AddShapeRequest message;
-    *message.mutable_header() = headerFor("", "k", dumbbell());
+    *message.mutable_header() = headerFor("", "k", scan);
     ASSERT_TRUE(upload->Write(message));
-    ASSERT_TRUE(eventually([&] { return statsOf(*client).collections() == 1; }));
+    // More than fits on the way: once it is written, the server has begun to read this call.
+    const auto chunks = chunksOf(scan, 20'000);
+    for (std::size_t i = 0; i + 1 < chunks.size(); ++i) {
+        message.mutable_chunk()->set_xyz(chunks[i]);
+        ASSERT_TRUE(upload->Write(message));
+    }
     server->signal(SIGTERM);
     EXPECT_TRUE(eventually([&] { return getShape(*client, "", "k").error == "unavailable"; }));
     server->signal(SIGTERM);

@@ -1,0 +1,90 @@
+#include "server/catalog/searches.h"
+
+#include <memory>
+#include <utility>
+
+#include "core/base/return_if_error.h"
+#include "core/matching/scorer.h"
+#include "server/catalog/request_checks.h"
+
+namespace shapedb::catalog {
+
+Result<void> AnswerRoom::take(std::size_t bytes) {
+    if (bytes > left_) {
+        return fail(ErrorCode::kInvalidArgument,
+                    "the answer would exceed " + std::to_string(kMaxAnswerBytes) +
+                        " bytes; ask for a smaller k or fewer queries, or set no_explanation");
+    }
+    left_ -= bytes;
+    return {};
+}
+
+Result<PreparedSearch> Searches::prepare(index::SnapshotPtr collection, const SearchRequest& request) const {
+    RETURN_IF_ERROR(checkK(request.k, maxK_));
+    RETURN_IF_ERROR(checkThreshold(request.threshold));
+    RETURN_IF_ERROR(checkFilterLength(request.filter));
+    Result<Filter> filter = Filter::parse(request.filter);
+    RETURN_IF_ERROR(filter);
+    PreparedSearch prepared;
+    prepared.collection = std::move(collection);
+    prepared.options.k = request.k;
+    prepared.options.threshold = request.threshold;
+    prepared.options.filter = std::move(*filter);
+    prepared.options.score = request.score;
+    prepared.explain = request.explain;
+    return prepared;
+}
+
+Result<BatchQuery> Searches::storedQuery(const PreparedSearch& search, const std::string& key) const {
+    const auto found = catalog_.findShape(search.collection, key);
+    RETURN_IF_ERROR(found);
+    auto signature = catalog_.signature(*found);
+    RETURN_IF_ERROR(signature);
+    return BatchQuery{std::move(*signature), found->shape.id};
+}
+
+Result<SearchResult> Searches::run(const PreparedSearch& search, const BatchQuery& query,
+                                   const RunContext& context) const {
+    SearchOptions options = search.options;
+    options.excludeId = query.excludeId;
+    return runner_.run(query.signature, search.collection->signatures, options, context);
+}
+
+Result<std::vector<SearchResult>> Searches::runBatch(const PreparedSearch& search,
+                                                     const std::vector<BatchQuery>& queries,
+                                                     const RunContext& context) const {
+    return runner_.runBatch(queries, search.collection->signatures, search.options, context);
+}
+
+Result<std::optional<Explanation>> Searches::explain(const PreparedSearch& search, const Scorer& scorer,
+                                                     const SearchHit& hit) const {
+    const auto signature = catalog_.storedSignature(*search.collection, hit.id);
+    if (!signature && signature.error().code == ErrorCode::kDataLoss) return fail(signature.error());
+    if (!signature) return std::optional<Explanation>();
+    Explanation explanation = scorer.explain(*signature);
+    if (explanation.score != hit.score) return std::optional<Explanation>();
+    return std::optional<Explanation>(std::move(explanation));
+}
+
+Result<void> Searches::visitHits(const PreparedSearch& search, const Signature& query,
+                                 const SearchResult& found, const Visit& visit) const {
+    const std::unique_ptr<const Scorer> scorer = makeScorer(query, search.options.score);
+    for (const SearchHit& hit : found.hits) {
+        auto shape = catalog_.shapeById(hit.id);
+        if (!shape && shape.error().code == ErrorCode::kNotFound) continue;  // deleted meanwhile
+        RETURN_IF_ERROR(shape);
+        FoundHit out;
+        out.shape = std::move(*shape);
+        out.quality = qualityIn(search.collection->signatures, hit.id);
+        out.score = hit.score;
+        if (search.explain) {
+            auto explanation = explain(search, *scorer, hit);
+            RETURN_IF_ERROR(explanation);
+            out.explanation = std::move(*explanation);
+        }
+        RETURN_IF_ERROR(visit(out));
+    }
+    return {};
+}
+
+}  // namespace shapedb::catalog

@@ -1,0 +1,94 @@
+// The rules of a search, whatever its transport: what a request may ask for, which signature a query
+// has, which hits an answer holds and how large it may be.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/run_context.h"
+#include "core/matching/explanation.h"
+#include "core/search/top_k.h"
+#include "server/catalog/catalog.h"
+#include "server/catalog/limits.h"
+#include "server/catalog/search_runner.h"
+
+namespace shapedb::catalog {
+
+/// What a request asks for, not yet checked.
+struct SearchRequest {
+    std::uint32_t k = 0;
+    double threshold = 0.0;
+    std::string filter;
+    ScoreOptions score;
+    bool explain = true;
+};
+
+/// Checked options, and the snapshot that all queries of the request read.
+struct PreparedSearch {
+    index::SnapshotPtr collection;
+    SearchOptions options;
+    bool explain = true;
+};
+
+struct FoundHit {
+    store::Shape shape;
+    std::optional<double> quality;  ///< as `qualityIn` the collection searched
+    double score = 0.0;
+    std::optional<Explanation> explanation;
+};
+
+/// How many bytes an answer may still grow by. One for each request.
+class AnswerRoom {
+  public:
+    /// Errors: kInvalidArgument, saying how to ask for less.
+    [[nodiscard]] Result<void> take(std::size_t bytes);
+
+  private:
+    std::size_t left_ = kMaxAnswerBytes;
+};
+
+/// Thread-safe. The references must outlive it.
+class Searches {
+  public:
+    Searches(Catalog& catalog, SearchRunner& runner, std::uint32_t maxK)
+        : catalog_(catalog), runner_(runner), maxK_(maxK) {}
+
+    /// Errors: kInvalidArgument (k, threshold), kMalformedFilter.
+    [[nodiscard]] Result<PreparedSearch> prepare(index::SnapshotPtr collection,
+                                                 const SearchRequest& request) const;
+
+    /// A stored shape as a query that does not find itself. Errors: kInvalidArgument (key), kNotFound,
+    /// kNotReady, kDataLoss.
+    [[nodiscard]] Result<BatchQuery> storedQuery(const PreparedSearch& search, const std::string& key) const;
+
+    /// Calls `visit` with each hit, best first, leaving out shapes deleted meanwhile. An explanation is
+    /// missing where the signature scored was replaced meanwhile. Errors: those of topK and of `visit`;
+    /// kDataLoss.
+    using Visit = std::function<Result<void>(const FoundHit&)>;
+    [[nodiscard]] Result<void> visitHits(const PreparedSearch& search, const Signature& query,
+                                         const SearchResult& found, const Visit& visit) const;
+
+    /// As `topK`; `query.excludeId` holds.
+    [[nodiscard]] Result<SearchResult> run(const PreparedSearch& search, const BatchQuery& query,
+                                           const RunContext& context) const;
+    /// As `topKBatch`.
+    [[nodiscard]] Result<std::vector<SearchResult>> runBatch(const PreparedSearch& search,
+                                                             const std::vector<BatchQuery>& queries,
+                                                             const RunContext& context) const;
+    /// Successful searches since start.
+    [[nodiscard]] std::uint64_t count() const { return runner_.count(); }
+
+  private:
+    Result<std::optional<Explanation>> explain(const PreparedSearch& search, const Scorer& scorer,
+                                               const SearchHit& hit) const;
+
+    Catalog& catalog_;
+    SearchRunner& runner_;
+    std::uint32_t maxK_;
+};
+
+}  // namespace shapedb::catalog

@@ -1,0 +1,156 @@
+#include "server/catalog/searches.h"
+
+#include <gtest/gtest.h>
+
+#include "server/catalog/listing.h"
+#include "tests/server/support/fixtures.h"
+#include "tests/server/support/memory_store.h"
+
+namespace shapedb::catalog {
+namespace {
+
+using namespace shapedb::testing;
+
+class SearchesTest : public ::testing::Test {
+  protected:
+    SearchesTest() {
+        CatalogOptions options;
+        options.maxQueuedJobs = 100;
+        catalog = std::make_unique<Catalog>(std::make_unique<MemoryStore>(), quickDescribe,
+                                            std::make_shared<RecordingLogger>(), options);
+        EXPECT_TRUE(catalog->start());
+    }
+    ~SearchesTest() override { EXPECT_TRUE(catalog->stop()); }
+
+    store::Shape putAndWait(const std::string& key, float tag) {
+        ShapeHeader header;
+        header.key = key;
+        const auto added = catalog->put(header, store::VerifiedScan::verify(taggedPoints(tag)).value());
+        return catalog->awaitIngest(added.value().shape, [] { return Result<void>(); }).value();
+    }
+    Searches searches() { return {*catalog, runner, 50}; }
+    Result<PreparedSearch> prepare(const SearchRequest& request) {
+        return searches().prepare(catalog->collection("").value(), request);
+    }
+
+    SearchRunner runner{1};
+    std::unique_ptr<Catalog> catalog;
+};
+
+TEST_F(SearchesTest, RefusesOptionsOutOfRange) {
+    SearchRequest request;
+    EXPECT_EQ(prepare(request).error().code, ErrorCode::kInvalidArgument) << "k is 0";
+    request.k = 51;
+    EXPECT_EQ(prepare(request).error().code, ErrorCode::kInvalidArgument) << "k is above the limit";
+    request.k = 50;
+    request.threshold = 1.5;
+    EXPECT_EQ(prepare(request).error().code, ErrorCode::kInvalidArgument);
+    request.threshold = 0.5;
+    request.filter = "=";
+    EXPECT_EQ(prepare(request).error().code, ErrorCode::kMalformedFilter);
+    request.filter = "label=cup";
+    const auto prepared = prepare(request);
+    ASSERT_TRUE(prepared);
+    EXPECT_EQ(prepared->options.k, 50u);
+    EXPECT_EQ(prepared->options.threshold, 0.5);
+}
+
+TEST_F(SearchesTest, AStoredShapeFindsOthersButNotItself) {
+    const store::Shape cup = putAndWait("cup", 5.0f);
+    const store::Shape jug = putAndWait("jug", 6.0f);
+    SearchRequest request;
+    request.k = 10;
+    const auto prepared = prepare(request);
+    ASSERT_TRUE(prepared);
+    EXPECT_EQ(searches().storedQuery(*prepared, "none").error().code, ErrorCode::kNotFound);
+    auto query = searches().storedQuery(*prepared, "cup");
+    ASSERT_TRUE(query);
+    EXPECT_EQ(query->excludeId, cup.id);
+    const auto found = searches().run(*prepared, *query, {});
+    ASSERT_TRUE(found);
+    ASSERT_EQ(found->hits.size(), 1u);
+    EXPECT_EQ(found->hits[0].id, jug.id);
+    query->excludeId.reset();
+    EXPECT_EQ(searches().run(*prepared, *query, {}).value().hits.size(), 2u);
+    EXPECT_EQ(searches().count(), 2u);
+}
+
+TEST_F(SearchesTest, AnswersExplainHitsAndLeaveOutDeletedShapes) {
+    putAndWait("cup", 5.0f);
+    putAndWait("jug", 6.0f);
+    SearchRequest request;
+    request.k = 10;
+    const auto prepared = prepare(request);
+    const auto query = searches().storedQuery(*prepared, "cup");
+    SearchResult found = searches().run(*prepared, {query->signature, std::nullopt}, {}).value();
+    ASSERT_EQ(found.hits.size(), 2u);
+    const auto keysOf = [&](const SearchResult& result) {
+        std::vector<std::string> keys;
+        EXPECT_TRUE(searches().visitHits(*prepared, query->signature, result, [&](const FoundHit& hit) {
+            EXPECT_TRUE(hit.explanation) << hit.shape.key;
+            EXPECT_EQ(hit.explanation.value_or(Explanation{}).score, hit.score);
+            keys.push_back(hit.shape.key);
+            return Result<void>();
+        }));
+        return keys;
+    };
+    EXPECT_EQ(keysOf(found), (std::vector<std::string>{"cup", "jug"}));
+    found.hits[1].score /= 2.0;  // as if the signature had been replaced after the search
+    EXPECT_TRUE(searches().visitHits(*prepared, query->signature, found, [&](const FoundHit& hit) {
+        EXPECT_EQ(hit.explanation.has_value(), hit.shape.key == "cup");
+        return Result<void>();
+    }));
+    found.hits.pop_back();
+    ASSERT_TRUE(catalog->deleteShape("", "cup", std::nullopt));
+    EXPECT_TRUE(keysOf(found).empty());
+}
+
+TEST(AnswerRoom, RefusesWhatDoesNotFit) {
+    AnswerRoom room;
+    EXPECT_TRUE(room.take(kMaxAnswerBytes - 1));
+    EXPECT_TRUE(room.take(1));
+    EXPECT_EQ(room.take(1).error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST_F(SearchesTest, PagesOfAListingFollowOneAnother) {
+    for (int i = 0; i < 5; ++i) putAndWait("shape " + std::to_string(i), static_cast<float>(i + 1));
+    const auto collection = catalog->collection("").value();
+    ListRequest request;
+    request.pageSize = 2;
+    std::vector<std::string> keys;
+    int pages = 0;
+    do {
+        const auto next = listPage(*catalog, *collection, request, {},
+                                   [&](const store::Shape& shape, std::optional<double>) {
+                                       keys.push_back(shape.key);
+                                       return std::size_t{1};
+                                   });
+        ASSERT_TRUE(next);
+        request.cursor = *next;
+        ++pages;
+    } while (!request.cursor.empty());
+    EXPECT_EQ(pages, 3);
+    EXPECT_EQ(keys, (std::vector<std::string>{"shape 0", "shape 1", "shape 2", "shape 3", "shape 4"}));
+    EXPECT_EQ(countSelected(*catalog, *collection, {}, {}).value(), 5u);
+    EXPECT_EQ(countSelected(*catalog, *collection, {"", store::ShapeState::kFailed}, {}).value(), 0u);
+    request.pageSize = 0;
+    request.cursor = "nonsense";
+    EXPECT_EQ(listPage(*catalog, *collection, request, {}, [](const auto&, auto) { return 0; }).error().code,
+              ErrorCode::kMalformedCursor);
+}
+
+TEST_F(SearchesTest, APageEndsBeforeItGrowsTooLarge) {
+    for (int i = 0; i < 3; ++i) putAndWait("shape " + std::to_string(i), static_cast<float>(i + 1));
+    int shapes = 0;
+    const auto next = listPage(*catalog, *catalog->collection("").value(), {}, {},
+                               [&](const store::Shape&, std::optional<double>) {
+                                   ++shapes;
+                                   return kMaxPageBytes;
+                               });
+    ASSERT_TRUE(next);
+    EXPECT_EQ(shapes, 1);
+    EXPECT_FALSE(next->empty());
+}
+
+}  // namespace
+}  // namespace shapedb::catalog
