@@ -6,9 +6,9 @@
 
 #include "server/catalog/catalog.h"
 #include "server/catalog/gates.h"
+#include "server/catalog/search_runner.h"
 #include "server/config/server_config.h"
 #include "server/rpc/cancel_watcher.h"
-#include "server/catalog/search_runner.h"
 #include "server/telemetry/logger.h"
 
 namespace shapedb::rpc {
