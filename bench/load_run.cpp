@@ -59,19 +59,19 @@ Result<ServerProcess> startServer(const LoadSettings& settings, const std::strin
 
 /// Runs `work(i)` for i = 0, 1, ... on that many threads until it returns false or fails; returns the first
 /// error. `work` must end soon after `stop` is set.
-class Crew {
+class WorkLoop {
   public:
     using Work = std::function<Result<bool>(std::size_t i)>;
 
-    Crew(unsigned threads, std::atomic<bool>& stop, Work work) : stop_(stop), work_(std::move(work)) {
+    WorkLoop(unsigned threads, std::atomic<bool>& stop, Work work) : stop_(stop), work_(std::move(work)) {
         for (unsigned t = 0; t < threads; ++t) threads_.emplace_back([this] { run(); });
     }
-    ~Crew() {
+    ~WorkLoop() {
         stop_ = true;
         static_cast<void>(finish());
     }
-    Crew(const Crew&) = delete;
-    Crew& operator=(const Crew&) = delete;
+    WorkLoop(const WorkLoop&) = delete;
+    WorkLoop& operator=(const WorkLoop&) = delete;
 
     Result<void> finish() {
         for (std::thread& thread : threads_) thread.join();
@@ -114,13 +114,13 @@ Result<double> describeAll(const std::vector<PointCloud>& scans, unsigned thread
     const ShapeParameters parameters = parametersOf(Profile::kDefault);
     const auto began = Clock::now();
     std::atomic<bool> stop{false};
-    Crew crew(threads, stop, [&](std::size_t i) -> Result<bool> {
+    WorkLoop loop(threads, stop, [&](std::size_t i) -> Result<bool> {
         if (i >= scans.size()) return false;
         const auto description = describe(scans[i], parameters, cancelledBy(context));
         RETURN_IF_ERROR(description);
         return true;
     });
-    RETURN_IF_ERROR(crew.finish());
+    RETURN_IF_ERROR(loop.finish());
     return since(began);
 }
 
@@ -141,13 +141,13 @@ Result<double> uploadAll(const client::Client& client, const std::vector<PointCl
                          const std::string& prefix, unsigned threads, const RunContext& context) {
     const auto began = Clock::now();
     std::atomic<bool> stop{false};
-    Crew crew(kClientsPerWorker * threads, stop, [&](std::size_t i) -> Result<bool> {
+    WorkLoop loop(kClientsPerWorker * threads, stop, [&](std::size_t i) -> Result<bool> {
         if (i >= scans.size()) return false;
         const auto added = addAndWait(client, prefix + std::to_string(i), scans[i], cancelledBy(context));
         RETURN_IF_ERROR(added);
         return true;
     });
-    RETURN_IF_ERROR(crew.finish());
+    RETURN_IF_ERROR(loop.finish());
     return since(began);
 }
 
@@ -227,7 +227,7 @@ Result<LatencyFigures> measureLatencyOf(const LoadSettings& settings, const clie
         std::atomic<bool> stop{false};
         RunContext stopped;
         stopped.cancel = &stop;
-        Crew crew(kClientsPerWorker * settings.threads, stop, [&](std::size_t i) -> Result<bool> {
+        WorkLoop loop(kClientsPerWorker * settings.threads, stop, [&](std::size_t i) -> Result<bool> {
             const std::string key = "busy-" + std::to_string(round) + "-" + std::to_string(i);
             const auto added = addAndWait(uploader, key, scans[i % scans.size()], stopped);
             RETURN_IF_ERROR(added);
@@ -240,7 +240,7 @@ Result<LatencyFigures> measureLatencyOf(const LoadSettings& settings, const clie
         busySeconds += since(began);
         const auto after = client.stats();
         stop = true;
-        RETURN_IF_ERROR(crew.finish());
+        RETURN_IF_ERROR(loop.finish());
         if (!before || !after) return fail((before ? after : before).error());
         described += after->ingested - before->ingested;
         // Workers finish what was interrupted; the next round must find them idle.

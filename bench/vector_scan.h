@@ -13,7 +13,7 @@ class VectorScan {
   public:
     virtual ~VectorScan() = default;
     virtual void add(const float* vectors, std::size_t count) = 0;
-    /// The k nearest of one query; ids by rising distance.
+    /// The k nearest of one query; ids in ascending order of distance.
     [[nodiscard]] virtual std::vector<long> nearest(const float* query, std::size_t k) const = 0;
 };
 

@@ -8,7 +8,7 @@ namespace shapedb::client {
 
 namespace {
 
-/// Nothing if the server says not to come back.
+/// Empty if the server forbids a retry.
 std::optional<std::chrono::milliseconds> parsePushback(const std::string& text) {
     std::int64_t value = 0;
     const char* end = text.data() + text.size();

@@ -124,7 +124,7 @@ struct ListRequest {
 };
 
 struct ListPage {
-    std::vector<Shape> shapes;  ///< by rising id
+    std::vector<Shape> shapes;  ///< in ascending order of id
     std::string nextCursor;     ///< empty on the last page
 };
 
@@ -162,7 +162,7 @@ struct ShapeAttributes {
 };
 
 struct Signature {
-    std::vector<WeightedPoint> points;  ///< by falling weight; never empty
+    std::vector<WeightedPoint> points;  ///< in descending order of weight; never empty
     double scale = 0.0;                 ///< diagonal of the bounding box, scan units
     double volume = 0.0;                ///< of the whole interior, scan units cubed
     std::string encoded;                ///< what searchBySignature takes
@@ -180,7 +180,7 @@ struct SegmentationReport {
     std::uint64_t pointsUsed = 0;  ///< without outliers and duplicates, after averaging and thinning
     std::uint64_t duplicates = 0;
     std::uint64_t outliers = 0;  ///< points dropped
-    /// How certain the interior is, [0, 1]. InteriorMethod::kWalk does not judge: always 1.
+    /// How certain the interior is, [0, 1]. InteriorMethod::kWalk does not assess it: always 1.
     double quality = 1.0;
     InteriorSource interiorSource = InteriorSource::kWalk;
     double angleDegrees = 0.0;  ///< deep angle of the walk; 0 for other sources
@@ -240,7 +240,7 @@ struct Explanation {
     double similarity = 0.0;
     double dissimilarity = 0.0;
     Motion motion;                      ///< from coordinates of the hit to those of the query
-    std::vector<SegmentMatch> matches;  ///< by falling share
+    std::vector<SegmentMatch> matches;  ///< in descending order of share
     std::vector<std::uint32_t> unmatchedQuery;
     std::vector<std::uint32_t> unmatchedHit;
     bool degenerate = false;       ///< one of the two is a single segment: any rotation fits
@@ -254,7 +254,7 @@ struct Hit {
 };
 
 struct SearchReply {
-    std::vector<Hit> hits;         ///< by falling score; equal scores by rising id
+    std::vector<Hit> hits;         ///< in descending order of score; ties in ascending order of id
     std::uint64_t candidates = 0;  ///< shapes in the snapshot searched
     std::uint64_t filtered = 0;    ///< of these, how many pass the filter
     std::uint64_t scored = 0;      ///< of these, how many no bound ruled out

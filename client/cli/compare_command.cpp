@@ -52,9 +52,8 @@ Result<client::Comparison> compareFiles(Session& session, const CompareFlags& fl
 
 Result<client::Comparison> compareStored(Session& session, const CompareFlags& flags) {
     if (flags.parameters.any()) {
-        return fail(
-            ErrorCode::kInvalidArgument,
-            "stored shapes use the parameters of their collection; --profile and the like need --files");
+        return fail(ErrorCode::kInvalidArgument,
+                    "stored shapes use the parameters of their collection: these options need --files");
     }
     const auto client = connectToServer(session);
     RETURN_IF_ERROR(client);

@@ -7,7 +7,7 @@ namespace shapedb::cli {
 namespace {
 
 constexpr std::chrono::hours kHeavyDeadline{1};
-/// A full queue is waited for as long as there is time; the server says how long to wait.
+/// Retries a full queue until the deadline; the server says how long to wait.
 constexpr int kPatientAttempts = 1'000'000;
 
 }  // namespace

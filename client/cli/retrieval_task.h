@@ -55,8 +55,8 @@ enum class Match {
 /// Errors: kInvalidArgument for a name that is neither "folder" nor "stem".
 [[nodiscard]] Result<Match> matchFromName(const std::string& name);
 
-/// The ranking of one query: entries by falling score (`scores[g]` of gallery entry g, no NaN), ties by
-/// index, without the query's own file (kFolder) and without unusable entries. The right ones include
+/// The ranking of one query: entries in descending order of score (`scores[g]` of gallery entry g, no NaN),
+/// ties by index, without the query's own file (kFolder) and without unusable entries. The right ones include
 /// unusable ones, so that a shape that could not be described counts as a miss.
 [[nodiscard]] GalleryQuery rankGallery(Match match, const CollectionScan& query,
                                        const std::vector<CollectionScan>& gallery, const double* scores,

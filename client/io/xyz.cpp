@@ -15,7 +15,7 @@ namespace {
 
 bool isSeparator(char c) { return isBlank(c) || c == ',' || c == ';'; }
 
-// The next column: columns are parted by blanks, or one comma or semicolon with blanks around it.
+// The next column: columns are separated by blanks, or one comma or semicolon with blanks around it.
 std::string_view nextColumn(std::string_view& rest) {
     while (!rest.empty() && isBlank(rest.front())) rest.remove_prefix(1);
     std::size_t end = 0;

@@ -71,7 +71,7 @@ void makeCanonical(Cell& cell) {
     }
 }
 
-// How many steps ahead to prefetch what a loop reads, and what it needs to compute that address.
+// As kPrefetchDistance and kPrefetchFarDistance (core/base/prefetch.h), but for the loops of this file.
 constexpr std::size_t kAhead = 12;
 constexpr std::size_t kFarAhead = 24;
 

@@ -17,7 +17,8 @@ namespace shapedb {
 /// number of labels. Higher is better. Infinite values are allowed, NaN is not. Need not be symmetric.
 using ScoreMatrix = std::vector<double>;
 
-/// The candidates by falling score, ties by rising index: the ranking rule of this folder.
+/// The candidates in descending order of score, ties in ascending order of index: the ranking rule of this
+/// folder.
 ///
 /// Errors: kInvalidArgument when a score is NaN (the message names its index).
 [[nodiscard]] Result<std::vector<std::size_t>> rankByScore(const std::vector<double>& scores);

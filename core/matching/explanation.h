@@ -30,10 +30,11 @@ struct Explanation {
     /// pair discounted by its distance; in cubes of the common unit (each signature's own scale, or with
     /// keepScale the larger of the two).
     double similarity = 0.0;
-    double dissimilarity = 0.0;       ///< unmatched weight of both sides; same unit
-    Motion motion;                    ///< scan coordinates of b to scan coordinates of a
-    std::vector<PointMatch> matches;  ///< by falling share; with attributes a point may occur twice
-    std::vector<ScoreTerm> terms;     ///< with attributes: what the score is made of
+    double dissimilarity = 0.0;  ///< unmatched weight of both sides; same unit
+    Motion motion;               ///< scan coordinates of b to scan coordinates of a
+    /// In descending order of share; with attributes a point may occur twice.
+    std::vector<PointMatch> matches;
+    std::vector<ScoreTerm> terms;  ///< with attributes: what the score is made of
     std::vector<std::uint32_t> unmatchedA;
     std::vector<std::uint32_t> unmatchedB;
     bool degenerate = false;  ///< a single-point signature left the rotation open

@@ -59,7 +59,7 @@ class Scorer {
     /// `score` with its reasons, bit for bit: the query is a, `shape` is b.
     [[nodiscard]] virtual Explanation explain(const Signature& shape) const = 0;
 
-    /// Appends to `left`, by rising row, every row that may score `least` or more. `wanted` has one
+    /// Appends to `left`, in ascending order, every row that may score `least` or more. `wanted` has one
     /// value a row, 0 leaves it out; empty: all rows. By default asks each row for its `bound`;
     /// scorers with bounds for many rows at once override it.
     virtual void scan(const ShapeRows& rows, const std::vector<std::uint8_t>& wanted, double least,

@@ -19,7 +19,7 @@ struct IndexEntry {
     Signature signature;
 };
 
-/// Signatures by rising id. Immutable once shared: const members from any thread.
+/// Signatures in ascending order of id. Immutable once shared: const members from any thread.
 class SignatureBlock {
   public:
     /// Rows a block has room for: the ends of their segments are counted in 16 bits.

@@ -45,7 +45,7 @@ class SignatureSet {
     /// Approximate bytes held.
     [[nodiscard]] std::size_t memoryBytes() const;
 
-    /// Blocks of 1 to kBlockSize entries by rising id.
+    /// Blocks of 1 to kBlockSize entries in ascending order of id.
     static constexpr std::size_t kBlockSize = SignatureBlock::kMostRows;
     [[nodiscard]] const std::vector<std::shared_ptr<const SignatureBlock>>& blocks() const { return blocks_; }
 

@@ -36,7 +36,7 @@ struct SearchCounts {
 };
 
 struct SearchResult {
-    std::vector<SearchHit> hits;  ///< by falling score, equal scores by rising id
+    std::vector<SearchHit> hits;  ///< in descending order of score, ties in ascending order of id
     SearchCounts counts;
     double seconds = 0.0;  ///< taken
 };

@@ -1,4 +1,4 @@
-// Where segments touch, and how wide the passage between them is.
+// Where segments touch, and how wide the saddle between them is.
 #pragma once
 
 #include <cstdint>

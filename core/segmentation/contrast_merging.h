@@ -1,4 +1,4 @@
-// Merging segments by contrast: how much thicker a segment is than the passage into it. The paper's
+// Merging segments by contrast: how much thicker a segment is than the saddle into it. The paper's
 // criterion (Section 3.3), but with pairs merged in order of contrast and groups compared as they grow.
 // docs/segments.md has the results.
 #pragma once
@@ -32,10 +32,10 @@ struct ContrastMerging {
 ///
 /// The radius of a group is the geometric mean of its segments' radii, weighted by volume. The contrast of
 /// two groups is the larger of their radii over the smallest of both radii and their saddle radius. Pairs
-/// merge by rising contrast, which is updated as groups grow (once a radius has moved by a thousandth),
-/// until every pair is above `options.contrast`. So a limb of many maxima becomes one group before it is
-/// compared with the body, and a limb much thinner than the body stays separate however wide its root.
-/// Then light groups, and the lightest of too many, join the neighbour with the largest saddle radius;
+/// merge in ascending order of contrast, which is updated as groups grow (once a radius has moved by a
+/// thousandth), until every pair is above `options.contrast`. So a limb of many maxima becomes one group
+/// before it is compared with the body, and a limb much thinner than the body stays separate however wide its
+/// root. Then light groups, and the lightest of too many, join the neighbour with the largest saddle radius;
 /// groups that touch no other stay, however light.
 ///
 /// Errors: kCancelled, kDeadlineExceeded.
@@ -43,7 +43,7 @@ struct ContrastMerging {
                                                                  const ContrastMerging& options,
                                                                  const RunContext& context = {});
 
-/// Measures contacts and volumes and merges; the labels are numbered by falling maximum.
+/// Measures contacts and volumes and merges; the labels are numbered in descending order of maximum.
 /// Errors: kCancelled, kDeadlineExceeded.
 [[nodiscard]] Result<SegmentLabels> mergeSegmentsByContrast(
     const PointCloud& points, const Tetrahedra& tetrahedra, const std::vector<std::uint8_t>& flow,

@@ -7,7 +7,7 @@
 
 namespace shapedb {
 
-/// How the interior of a shape is told from its outside. The names are persisted.
+/// How the interior of a shape is distinguished from its outside. The names are persisted.
 enum class InteriorMethod : int {
     kWalk = 0,      ///< the paper's walk with one fixed angle; finding nothing inside is an error
     kAdaptive = 1,  ///< chosen from the shape itself; always gives an interior, and its quality

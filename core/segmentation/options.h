@@ -45,7 +45,7 @@ struct SegmentationOptions {
     /// limit.
     std::uint32_t maxSegments = 16;
 
-    /// How the interior is told from the outside.
+    /// How the interior is distinguished from the outside.
     InteriorMethod interiorMethod = InteriorMethod::kWalk;
 };
 

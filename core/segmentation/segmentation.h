@@ -35,7 +35,7 @@ struct StageTime {
 };
 
 struct Segmentation {
-    /// By falling volume; equal volumes by centroid. Never empty.
+    /// In descending order of volume; equal volumes by centroid. Never empty.
     std::vector<Segment> segments;
 
     /// For each input point the index of its segment, -1 when it touches none: that of the inner

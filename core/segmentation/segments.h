@@ -18,8 +18,8 @@ struct SegmentLabels {
     std::vector<std::uint32_t> maxima;        ///< per segment the tetrahedron of its maximum
 };
 
-/// Stable manifolds of the maxima, numbered by falling circumradius. A tetrahedron that flows into two
-/// belongs to the stronger one (the relation ~< of the paper).
+/// Stable manifolds of the maxima, numbered in descending order of circumradius. A tetrahedron that flows
+/// into two belongs to the stronger one (the relation ~< of the paper).
 ///
 /// The paper leaves open what becomes of interior tetrahedra that flow out of the interior only. Here they
 /// join, layer by layer, the adjacent labelled tetrahedron with the largest ball. Connected groups without
@@ -33,7 +33,7 @@ struct SegmentLabels {
 
 /// Merges every two segments that share a triangle of circumradius r when both maxima are at most
 /// mergeRatio * r. As published, these are the maxima before any merging, and chains of such pairs become one
-/// segment. The result is numbered by falling maximum.
+/// segment. The result is numbered in descending order of maximum.
 [[nodiscard]] SegmentLabels mergeSegments(const PointCloud& points, const Tetrahedra& tetrahedra,
                                           SegmentLabels labels, double mergeRatio);
 

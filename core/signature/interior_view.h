@@ -9,8 +9,8 @@
 
 namespace shapedb {
 
-/// Coordinates: origin at the centroid of the interior, axes along its principal axes by falling spread (with
-/// arbitrary signs), in units of Segmentation::size.
+/// Coordinates: origin at the centroid of the interior, axes along its principal axes in descending order of
+/// spread (with arbitrary signs), in units of Segmentation::size.
 struct InteriorView {
     PointCloud sites;  ///< all sites of the segmentation
 

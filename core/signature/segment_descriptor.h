@@ -32,8 +32,8 @@ struct SegmentDescriptor {
     std::array<float, 3> position{};  ///< centroid, in the body's frame
     float radius = 0.0f;              ///< distance from the body's centre: length of `position`
     float share = 0.0f;               ///< of the interior's volume, (0, 1]
-    /// Base-2 logarithms: the standard deviations of its matter along its principal axes, falling,
-    /// and its maximum radius. No less than kSmallestLength each.
+    /// Base-2 logarithms: the standard deviations of its matter along its principal axes, in descending
+    /// order, and the radius of its largest ball. No less than kSmallestLength each.
     std::array<float, 4> size{};
 };
 
@@ -49,8 +49,8 @@ constexpr double kSmallestLength = 1.0 / 1024.0;
 [[nodiscard]] bool operator==(const SegmentDescriptor& a, const SegmentDescriptor& b) noexcept;
 
 /// The segments of a signature and their common frame: origin at their centroid, axes along the principal
-/// axes of their matter, by falling spread, right-handed. Signs of axes, and the order of axes of equal
-/// spread, are arbitrary, so a comparison of two bodies must try all.
+/// axes of their matter, in descending order of spread, right-handed. Signs of axes, and the order of axes of
+/// equal spread, are arbitrary, so a comparison of two bodies must try all.
 struct Body {
     std::vector<SegmentDescriptor> parts;  ///< in the order of the points
     Point3 centre;                         ///< in the coordinates of WeightedPoint::position

@@ -51,7 +51,7 @@ struct ShapeAttributes {
 };
 
 struct Signature {
-    std::vector<WeightedPoint> points;  ///< by falling weight; 1 to kMaxSignaturePoints
+    std::vector<WeightedPoint> points;  ///< in descending order of weight; 1 to kMaxSignaturePoints
     double scale = 1.0;                 ///< smallest diagonal of a box around the interior, scan units, > 0
     Point3 origin;                      ///< heaviest representative point, scan units
     double volume = 0.0;                ///< of the whole interior, scan units cubed

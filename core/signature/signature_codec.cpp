@@ -146,7 +146,8 @@ Result<void> checkNumbers(const Signature& signature, std::uint16_t version) {
             return malformed(name() + " outweighs the whole volume");
         if (!(p.volumeShare > 0.0f) || p.volumeShare > 1.0f)
             return malformed(name() + " has a volume share outside (0, 1]");
-        if (!(p.maximumRadius > 0.0f)) return malformed(name() + " has no positive maximum radius");
+        if (!(p.maximumRadius > 0.0f))
+            return malformed(name() + " has a largest ball without a positive radius");
         if (i > 0 && p.weight > signature.points[i - 1].weight)
             return malformed(name() + " is heavier than the one before");
     }

@@ -21,7 +21,7 @@ struct NamedShape {
     std::string name;              ///< snake_case, e.g. "l_shape"
     Solid solid;                   ///< about the origin
     double volume = 0.0;           ///< of the union, in closed form
-    std::vector<KnownBall> balls;  ///< by falling volume; may be empty
+    std::vector<KnownBall> balls;  ///< in descending order of volume; may be empty
 };
 
 /// The unit ball: volume 4/3 pi.

@@ -81,7 +81,7 @@ struct CatalogStats {
 };
 
 /// How well the interior of a shape was determined, in [0, 1]; empty when searches do not find the
-/// shape or its profile does not tell.
+/// shape or its profile does not rate interiors.
 [[nodiscard]] std::optional<double> qualityIn(const SignatureSet& signatures, std::int64_t shapeId);
 
 /// Called again and again while a caller waits; an error ends the waiting and is returned.
@@ -113,9 +113,9 @@ class Catalog {
     [[nodiscard]] Result<index::SnapshotPtr> createCollection(const std::string& name,
                                                               const std::string& description,
                                                               const ShapeParameters& parameters);
-    /// Cancels its rebuild and stops its workers. There is no default name: nobody deletes a
-    /// collection by forgetting to name it. Errors: kInvalidArgument (name), kNotFound; kRejected: it
-    /// has shapes and `force` is not set.
+    /// Cancels its rebuild and stops its workers. There is no default name, so a missing
+    /// name cannot delete one. Errors: kInvalidArgument (name), kNotFound; kRejected: it has shapes and
+    /// `force` is not set.
     [[nodiscard]] Result<void> deleteCollection(const std::string& name, bool force);
     /// Reads the stored signatures again; nothing is segmented. Errors: kNotFound.
     [[nodiscard]] Result<index::SnapshotPtr> reload(const index::Snapshot& collection);

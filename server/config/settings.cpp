@@ -195,7 +195,7 @@ std::vector<Setting> makeSettings() {
             "Most bytes of points waiting for segmentation."),
         number(
             "ingest.max_attempts", kInteger, 1, 10, [](C& c) -> int& { return c.ingest.maxAttempts; },
-            "Number of times a scan may crash the process before it is set aside as failed."),
+            "Number of times a scan may crash the process before it is quarantined (FAILED)."),
         number(
             "limits.max_points", kInteger, 4, 50'000'000,
             [](C& c) -> std::uint64_t& { return c.limits.maxPoints; }, "Most points in one scan."),

@@ -298,7 +298,7 @@ Result<void> RebuildDriver::isolated(Active& active, const store::Shape& shape) 
             active.rebuild.id, shape.id, shape.pointsVersion,
             {ErrorCode::kInternal,
              "the server stopped " + std::to_string(deaths) +
-                 " times while it segmented this scan; it is set aside. Replace its points, "
+                 " times while it segmented this scan; it is quarantined. Replace its points, "
                  "or rebuild the collection, to try again"});
         CrashJournal::Entry entry(journal_, shape);
         if (stored) entry.acquit();

@@ -196,7 +196,7 @@ class Store {
     [[nodiscard]] virtual Result<Shape> getShape(std::int64_t collectionId, const std::string& key) = 0;
     /// Errors: kNotFound.
     [[nodiscard]] virtual Result<Shape> getShapeById(std::int64_t shapeId) = 0;
-    /// Shapes with id > afterId, by rising id, at most `limit`: stable under inserts and deletes.
+    /// Shapes with id > afterId, in ascending order of id, at most `limit`: stable under inserts and deletes.
     [[nodiscard]] virtual Result<std::vector<Shape>> listShapes(std::int64_t collectionId,
                                                                 std::int64_t afterId, std::size_t limit,
                                                                 const ShapeFilter& filter) = 0;
@@ -242,7 +242,7 @@ class Store {
 
     // Index ------------------------------------------------------------------------
 
-    /// Serving signatures with shape id > afterId, by rising id, at most `limit`. A pending shape
+    /// Serving signatures with shape id > afterId, in ascending order of id, at most `limit`. A pending shape
     /// comes with the signature of its older points, if it has one. Errors: kNotFound (collection),
     /// kDataLoss (names the shape).
     [[nodiscard]] virtual Result<std::vector<IndexRow>> loadIndex(std::int64_t collectionId,
@@ -264,8 +264,8 @@ class Store {
     /// All in state kRunning, including those a dead process left.
     [[nodiscard]] virtual Result<std::vector<Rebuild>> runningRebuilds() = 0;
     /// Shapes that still need a result of the target generation, except those with a job of their
-    /// own. With id > afterId, by rising id, at most `limit`. Start again from 0 when finishRebuild
-    /// returns false.
+    /// own. With id > afterId, in ascending order of id, at most `limit`. Start again from 0 when
+    /// finishRebuild returns false.
     [[nodiscard]] virtual Result<std::vector<Shape>> rebuildBatch(std::int64_t rebuildId,
                                                                   std::int64_t afterId,
                                                                   std::size_t limit) = 0;

@@ -37,7 +37,7 @@ void ScanVerifier::reserve(std::uint64_t points) {
     try {
         xyz_.reserve(3 * static_cast<std::size_t>(points));
     } catch (const std::bad_alloc&) {
-        // A machine that does not overcommit: what arrives decides.
+        // A machine that does not overcommit: memory is then taken as points arrive.
     }
 }
 
@@ -67,7 +67,7 @@ Result<void> ScanVerifier::take(std::size_t first) {
     return {};
 }
 
-/// Looks at a sample first: points that span space go on doing so when others join them, and the
+/// Looks at a sample first: adding points cannot flatten a sample that spans space, and the
 /// points at the extremes decide what is wrong with size or magnitude. Only when the sample is
 /// refused are all points looked at, which takes about 80 bytes a point.
 Result<void> ScanVerifier::checkUsable() const {

@@ -69,7 +69,7 @@ TEST(Instructions, FilesRoundTrip) {
     }
 }
 
-/// The whole operation, with a counter that says what a test tells it.
+/// The whole operation, with a stand-in for valgrind that reports the count a test chooses.
 class InstructionsOperation : public BenchTest {
   protected:
     InstructionsOperation() { write("signatures", "already there"); }

@@ -69,7 +69,7 @@ TEST_F(AttributesRpc, ReportsQualityWithEveryShape) {
     EXPECT_EQ(found.value.query().attributes().statistics_size(), 0) << "a query is not repeated in full";
 }
 
-// The paper profile does not judge interiors: no figure is better than a meaningless one.
+// The paper profile does not rate interiors: no figure is better than a meaningless one.
 TEST_F(AttributesRpc, PaperProfileHasNoAttributes) {
     const auto added = addAndWait(client, collection, "k", dumbbell());
     ASSERT_TRUE(added.ok()) << added;

@@ -17,7 +17,7 @@ namespace shapedb {
 [[nodiscard]] Motion pieceMotion(const Signature& piece, const Signature& whole, const Containment& found,
                                  bool keepScale);
 
-/// Adds the pairs by falling share of `total`, the sum of their gains.
+/// Adds the pairs in descending order of share of `total`, the sum of their gains.
 void addMatches(const SegmentPairs& pairs, double total, Explanation& explanation);
 
 }  // namespace shapedb

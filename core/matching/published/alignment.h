@@ -53,8 +53,8 @@ struct BestAlignment {
     PairList matches;
 };
 
-/// The alignment with the largest similarity. Axis pairs are tried by falling bound; of equal ones the
-/// first wins. `prune` stops where no bound can beat the best so far; it does not change the result.
+/// The alignment with the largest similarity. Axis pairs are tried in descending order of bound; of equal
+/// ones the first wins. `prune` stops where no bound can beat the best so far; it does not change the result.
 [[nodiscard]] BestAlignment bestAlignment(const AnchoredPoints& a, const AnchoredPoints& b,
                                           const ScoreOptions& options, bool prune = true);
 

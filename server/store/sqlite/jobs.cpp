@@ -94,7 +94,7 @@ Result<std::vector<Shape>> SqliteStore::recoverJobs(int maxAttempts) {
             const Error why{
                 ErrorCode::kInternal,
                 "the server stopped " + std::to_string(job.attempts) +
-                    " times while it segmented this scan; it is set aside. Replace its points, or "
+                    " times while it segmented this scan; it is quarantined. Replace its points, or "
                     "rebuild the collection, to try again"};
             if (auto shape = markFailed(connection, job.shapeId, why))
                 quarantined.push_back(std::move(*shape));

@@ -24,7 +24,7 @@ struct Migration {
     const char* sql;
 };
 
-/// By rising number, without gaps.
+/// In ascending order of number, without gaps.
 const std::vector<Migration>& embeddedMigrations();
 
 enum class FileKind {

@@ -159,7 +159,7 @@ Result<Shape> SqliteStore::getShapeById(std::int64_t shapeId) {
 
 namespace {
 
-/// Calls `visit` for each accepted shape, by rising id, until it returns false.
+/// Calls `visit` for each accepted shape in ascending order of id, until it returns false.
 template <typename Visit>
 void forEachAccepted(Connection& connection, std::int64_t collectionId, std::int64_t afterId,
                      const ShapeFilter& filter, Visit visit) {

@@ -150,7 +150,7 @@ TEST(Client, DoesNotWaitBeyondTheDeadline) {
     Result<AddReply> reply;
     EXPECT_LT(secondsOf([&] { reply = server.client().addShape({{"", "a"}}, cloud(100), context); }), 3.0);
     ASSERT_FALSE(reply);
-    EXPECT_EQ(reply.error().code, ErrorCode::kQueueFull) << "the reason, not the clock";
+    EXPECT_EQ(reply.error().code, ErrorCode::kQueueFull) << "reports the queue, not the deadline";
 }
 
 TEST(Client, UploadsInChunksWithCountAndChecksum) {

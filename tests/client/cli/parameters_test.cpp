@@ -60,7 +60,7 @@ TEST(Parameters, EachFlagOverridesOnlyItsField) {
 TEST(Parameters, AnyNoticesASingleFlag) {
     ParameterFlags contrast;
     contrast.given.mergeContrast = 0.0;
-    EXPECT_TRUE(contrast.any()) << "0 given is not nothing given";
+    EXPECT_TRUE(contrast.any()) << "an explicit 0 counts as set";
     ParameterFlags interior;
     interior.given.interiorMethod = InteriorMethod::kWalk;
     EXPECT_TRUE(interior.any());

@@ -44,7 +44,7 @@ TEST_F(SegmentCommand, JsonHasThePromisedKeys) {
         ASSERT_EQ(point["position"].size(), 3u);
         ASSERT_EQ(point["extents"].size(), 3u);
         EXPECT_GT(point["peak_radius"].get<double>(), 0.0);
-        EXPECT_LE(point["weight"].get<double>(), last) << "by falling weight";
+        EXPECT_LE(point["weight"].get<double>(), last) << "in descending order of weight";
         last = point["weight"];
         sum += point["volume_share"].get<double>();
     }

@@ -83,7 +83,7 @@ TEST(SegmentContacts, CanBeCancelled) {
     EXPECT_EQ(contacts.error().code, ErrorCode::kCancelled);
 }
 
-// Between the balls of a dumbbell and its rod the passage is as wide as the rod.
+// Between the balls of a dumbbell and its rod the saddle is as wide as the rod.
 TEST(SegmentContacts, AreTheEndsOfADumbbellsRod) {
     SegmentationOptions options;
     options.mergeContrast = 1.3;

@@ -98,7 +98,7 @@ std::string goldenHead(const std::string& version) {
                              "000000000000c03f"          // origin 1, -2, 0.125
                              "0000000000000e40"          // volume 3.75
                              "000000000000000000000000"  // position
-                             "0000003e0000803e"  // weight, maximum radius; the share follows from the weight
+                             "0000003e0000803e"  // weight, radius of its largest ball (share: from weight)
                              "0ad7233c00000000000000000ad7a33c000000008fc2f53c";
     std::string bytes;
     for (std::size_t i = 0; i < head.size(); i += 2) {

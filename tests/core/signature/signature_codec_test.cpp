@@ -73,7 +73,7 @@ TEST(SignatureCodec, GoldenBytes) {
         "00000000"  // position
         "0000003e"
         "0000403f"
-        "0000803e"  // weight, share, maximum radius
+        "0000803e"  // weight, share, radius of its largest ball
         "0ad7233c"
         "00000000"
         "00000000"
@@ -200,7 +200,8 @@ TEST(SignatureCodec, RefusesBadNumbers) {
     refused("heavier", [&](Signature& s) { s.points[1].weight = 0.126f; });
     refused("share", [&](Signature& s) { s.points[0].volumeShare = 1.5f; });
     refused("share", [&](Signature& s) { s.points[1].volumeShare = 0.0f; });
-    refused("maximum radius", [&](Signature& s) { s.points[1].maximumRadius = 0.0f; });
+    refused("largest ball without a positive radius",
+            [&](Signature& s) { s.points[1].maximumRadius = 0.0f; });
     refused("origin", [&](Signature& s) { s.points[0].position[0] = 0.001f; });
     refused("too few", [&](Signature& s) { s.points.clear(); });
     refused("17 points", [&](Signature& s) { s.points.resize(17, s.points[1]); });

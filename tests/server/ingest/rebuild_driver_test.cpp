@@ -26,7 +26,7 @@ class Driver : public ::testing::Test {
         WorkerOptions options;
         options.threads = 1;
         options.backOff = 5ms;
-        pool = std::make_unique<WorkerPool>(store, index, board, suspects, quickDescribe, log, options);
+        pool = std::make_unique<WorkerPool>(store, index, board, isolation, quickDescribe, log, options);
         EXPECT_TRUE(pool->start());
     }
 
@@ -48,8 +48,8 @@ class Driver : public ::testing::Test {
         options.backOff = 5ms;
         options.yield = 1ms;
         options.journalPath = journal;
-        driver =
-            std::make_unique<RebuildDriver>(store, index, *pool, suspects, std::move(describe), log, options);
+        driver = std::make_unique<RebuildDriver>(store, index, *pool, isolation, std::move(describe), log,
+                                                 options);
         EXPECT_TRUE(driver->start());
         return *driver;
     }
@@ -111,7 +111,7 @@ class Driver : public ::testing::Test {
     std::shared_ptr<RecordingLogger> log;
     index::CollectionIndex index;
     ProgressBoard board;
-    CrashIsolation suspects;
+    CrashIsolation isolation;
     store::Collection parts;
     std::unique_ptr<WorkerPool> pool;
     std::unique_ptr<RebuildDriver> driver;

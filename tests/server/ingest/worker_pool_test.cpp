@@ -16,7 +16,7 @@ namespace {
 using namespace shapedb::testing;
 using namespace std::chrono_literals;
 
-/// A describer that stands still inside a scan until told to go on or cancelled.
+/// A pipeline that waits inside a scan until released or cancelled.
 class Gate {
   public:
     Result<Description> describe(const PointCloud& points, const ShapeParameters& parameters,
@@ -47,7 +47,8 @@ class Pool : public ::testing::Test {
         WorkerOptions options;
         options.threads = threads;
         options.backOff = 5ms;
-        pool = std::make_unique<WorkerPool>(store, index, board, suspects, std::move(describe), log, options);
+        pool =
+            std::make_unique<WorkerPool>(store, index, board, isolation, std::move(describe), log, options);
         EXPECT_TRUE(pool->start());
         return *pool;
     }
@@ -73,7 +74,7 @@ class Pool : public ::testing::Test {
     std::shared_ptr<RecordingLogger> log;
     index::CollectionIndex index;
     ProgressBoard board;
-    CrashIsolation suspects;
+    CrashIsolation isolation;
     store::Collection parts;
     std::unique_ptr<WorkerPool> pool;
 };
@@ -179,7 +180,7 @@ TEST_F(Pool, PauseStopsAndResumeGoesOn) {
     gate.open();
     EXPECT_EQ(store.queueDepth()->jobs, 5u) << "put back";
     // A second pool takes all the jobs: the paused one had the work and the time, and took none.
-    WorkerPool other(store, index, board, suspects, quickDescribe, log, {});
+    WorkerPool other(store, index, board, isolation, quickDescribe, log, {});
     ASSERT_TRUE(other.start());
     pool->wake();
     ASSERT_TRUE(eventually([&] { return other.ingested() == 5; }));
@@ -205,7 +206,7 @@ TEST_F(Pool, JobOfADeadProcessIsDoneAgainButNotForEver) {
     EXPECT_EQ(shape("once").state, store::ShapeState::kReady);
 }
 
-// Three scans were in hand when the server died. One by one they show who did it.
+// Three scans were in hand when the server died. Run one at a time, they show which of them was the cause.
 TEST_F(Pool, SuspectsRunOneAtATimeAndTheRestTogether) {
     for (int i = 0; i < 3; ++i) put("suspect " + std::to_string(i), 1.0f);
     for (int i = 0; i < 3; ++i) ASSERT_TRUE(*store.claimJob());
@@ -218,7 +219,7 @@ TEST_F(Pool, SuspectsRunOneAtATimeAndTheRestTogether) {
             const int now = ++inside;
             if (points[0].x == 1.0) {
                 // Nobody is inside, and nobody else could come in.
-                if (now > 1 || !suspects.wouldWait(false) || !suspects.wouldWait(true))
+                if (now > 1 || !isolation.wouldWait(false) || !isolation.wouldWait(true))
                     suspectHadCompany = true;
             } else {
                 if (now > 1) innocentsMet = true;

@@ -149,10 +149,10 @@ TEST(Shapes, ConvertAllFields) {
 TEST(Shapes, ReportQualityOfTheServingSignature) {
     pb::Shape plain;
     toProto(store::Shape(), "parts", std::nullopt, &plain);
-    EXPECT_FALSE(plain.has_quality()) << "a signature without attributes does not judge";
-    pb::Shape judged;
-    toProto(store::Shape(), "parts", 0.2, &judged);
-    EXPECT_NEAR(judged.quality(), 0.2, 1e-12);
+    EXPECT_FALSE(plain.has_quality()) << "a signature without attributes does not rate the interior";
+    pb::Shape rated;
+    toProto(store::Shape(), "parts", 0.2, &rated);
+    EXPECT_NEAR(rated.quality(), 0.2, 1e-12);
 }
 
 TEST(Reports, ReportOutliersAndInteriorQuality) {
