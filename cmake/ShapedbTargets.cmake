@@ -62,11 +62,13 @@ function(shapedb_library name)
   endif()
 endfunction()
 
-# shapedb_test(NAME FOLDERS folder ... [SUPPORT file.cpp ...] LIBS lib ... [PCH header ...] [TIMEOUT seconds] [LABEL name]):
+# shapedb_test(NAME FOLDERS folder ... [SUPPORT file.cpp ...] LIBS lib ... [PCH header ...] [TIMEOUT seconds] [LABEL name]
+#              [SLOW suite ...]):
 # one program of every *_test.cpp in and below the folders, so that no test file can be forgotten. ctest runs it once
-# for each suite. Built with -O1: most of a test's time goes into compiling it.
+# for each suite, those in SLOW first: started last, one of them would run alone. Built with -O1: most of a test's time
+# goes into compiling it.
 function(shapedb_test name)
-  cmake_parse_arguments(ARG "" "TIMEOUT;LABEL" "FOLDERS;SUPPORT;LIBS;PCH" ${ARGN})
+  cmake_parse_arguments(ARG "" "TIMEOUT;LABEL" "FOLDERS;SUPPORT;LIBS;PCH;SLOW" ${ARGN})
   set(patterns)
   foreach(folder ${ARG_FOLDERS})
     list(APPEND patterns ${CMAKE_CURRENT_SOURCE_DIR}/${folder}/*_test.cpp)
@@ -97,8 +99,12 @@ function(shapedb_test name)
             TIMEOUT=${ARG_TIMEOUT} -D LABEL=${ARG_LABEL} -P ${discover}
     VERBATIM)
   set_property(TARGET ${name} APPEND PROPERTY LINK_DEPENDS ${discover})
+  set(slowFirst "")
+  foreach(suite ${ARG_SLOW})
+    string(APPEND slowFirst "  set_tests_properties(${prefix}.${suite} PROPERTIES COST 10)\n")
+  endforeach()
   # Before the first build ctest says that the program is missing instead of passing without it.
   file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/${name}_include.cmake
-       "if(EXISTS \"${suites}\")\n  include(\"${suites}\")\nelse()\n  add_test(${prefix}_NOT_BUILT ${name}_NOT_BUILT)\nendif()\n")
+       "if(EXISTS \"${suites}\")\n  include(\"${suites}\")\n${slowFirst}else()\n  add_test(${prefix}_NOT_BUILT ${name}_NOT_BUILT)\nendif()\n")
   set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES ${CMAKE_CURRENT_BINARY_DIR}/${name}_include.cmake)
 endfunction()

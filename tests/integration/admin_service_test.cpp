@@ -115,7 +115,7 @@ TEST_F(AdminRpc, RebuildRaisesTheGenerationAndKeepsResults) {
 }
 
 TEST_F(AdminRpc, RebuildWithNewParametersWhileSearching) {
-    fill(12);
+    fill(8);
     std::atomic<bool> stop{false};
     auto searching = std::async(std::launch::async, [&] {
         Client own(server.address());
@@ -124,8 +124,8 @@ TEST_F(AdminRpc, RebuildWithNewParametersWhileSearching) {
             const auto found = searchByScan(own, searchOptions(collection, 50), dumbbell(77, 1'000));
             EXPECT_TRUE(found.ok()) << found;
             // All or nothing: the old signatures with 7 points, or the new ones with 3.
-            EXPECT_EQ(found.value.candidates(), 12u);
-            EXPECT_EQ(found.value.hits_size(), 12);
+            EXPECT_EQ(found.value.candidates(), 8u);
+            EXPECT_EQ(found.value.hits_size(), 8);
             ++searches;
         }
         return searches;
@@ -156,8 +156,9 @@ TEST_F(AdminRpc, ShapesAddedDuringARebuildGetTheNewParameters) {
     const auto started = rebuild(request);
     ASSERT_TRUE(started.ok()) << started;
     ASSERT_EQ(started.messages.size(), 1u);
+    const Scan later = dumbbell(100, 3'000);
     for (int i = 0; i < 5; ++i) {
-        ASSERT_TRUE(addAndWait(client, collection, "new " + std::to_string(i), dumbbell(100, 3'000)).ok());
+        ASSERT_TRUE(addAndWait(client, collection, "new " + std::to_string(i), later).ok());
     }
     request.set_detach(false);
     ASSERT_TRUE(rebuild(request).ok()) << "the same request follows the rebuild, or repeats it if it is done";
@@ -168,11 +169,12 @@ TEST_F(AdminRpc, ShapesAddedDuringARebuildGetTheNewParameters) {
     };
     EXPECT_EQ(listAll(client, collection).size(), 15u);
     EXPECT_EQ(signatureOf("9"), expected(10, 4'000));
-    for (int i = 0; i < 5; ++i) EXPECT_EQ(signatureOf("new " + std::to_string(i)), expected(100, 3'000));
+    const std::string added = expected(100, 3'000);
+    for (int i = 0; i < 5; ++i) EXPECT_EQ(signatureOf("new " + std::to_string(i)), added);
 }
 
 TEST_F(AdminRpc, SecondRebuildFollowsTheFirstOrIsRefused) {
-    fill(6, 12'000);
+    fill(4, 9'000);
     pb::RebuildRequest request = rebuildRequest();
     request.mutable_signature()->set_max_points(4);
     request.set_detach(true);
@@ -189,7 +191,7 @@ TEST_F(AdminRpc, SecondRebuildFollowsTheFirstOrIsRefused) {
 }
 
 TEST_F(AdminRpc, CancelledRebuildChangesNothing) {
-    fill(4, 12'000);
+    fill(4, 8'000);
     const std::string before = signatureOf("0");
     pb::RebuildRequest request = rebuildRequest();
     request.mutable_signature()->set_max_points(1);
@@ -211,7 +213,7 @@ TEST_F(AdminRpc, CancelledRebuildChangesNothing) {
 }
 
 TEST_F(AdminRpc, RebuildContinuesWhenItsCallIsLost) {
-    fill(5, 8'000);
+    fill(4, 6'000);
     {
         CallContext context;
         const auto reader = client.admin->Rebuild(&context, rebuildRequest());
@@ -300,7 +302,7 @@ TEST_F(AdminRpc, BackupAndRestoreReproduceTheContent) {
 
 TEST_F(AdminRpc, RestoreResumesUnfinishedJobs) {
     // A backup with jobs still queued: they are done after the restore.
-    const Scan slow = slowScan(1, 60'000);
+    const Scan slow = slowScan(1, 30'000);
     for (int i = 0; i < 4; ++i) {
         ASSERT_TRUE(addShape(client, headerFor(collection, std::to_string(i), slow), slow).ok());
     }
@@ -321,7 +323,7 @@ TEST_F(AdminRpc, RestoreResumesUnfinishedJobs) {
 
 // Ids that a call has looked up may mean other shapes after a restore.
 TEST_F(AdminRpc, CallsDuringARestoreMustBeRepeated) {
-    const Scan slow = slowScan(1, 150'000);
+    const Scan slow = slowScan(1, 100'000);
     ASSERT_TRUE(addShape(client, headerFor(collection, "k", slow), slow).ok());
     const auto saved = backup();
     ASSERT_TRUE(saved.ok()) << saved;

@@ -174,7 +174,7 @@ TEST_F(Lifecycle, KillDuringIngestLosesNothingAcknowledged) {
         uploads.emplace_back([&, t] {
             Client own(server->address());
             for (int i = 0; !stop; ++i) {
-                const Scan scan = dumbbell(static_cast<std::uint64_t>(1'000 * t + i), 1'200);
+                const Scan scan = dumbbell(static_cast<std::uint64_t>(1'000 * t + i), 600);
                 const std::string key = std::to_string(t) + "/" + std::to_string(i);
                 const auto reply = addShape(own, headerFor("", key, scan), scan, std::chrono::seconds(5));
                 if (!reply.ok()) return;
@@ -185,7 +185,7 @@ TEST_F(Lifecycle, KillDuringIngestLosesNothingAcknowledged) {
     }
     EXPECT_TRUE(eventually([&] {
         const std::lock_guard<std::mutex> lock(mutex);
-        return acknowledged.size() >= 40;
+        return acknowledged.size() >= 30;
     }));
     server->kill();
     stop = true;
@@ -208,7 +208,7 @@ TEST_F(Lifecycle, KillDuringIngestLosesNothingAcknowledged) {
 TEST_F(Lifecycle, QuarantinesAScanThatCrashesTheServerTwice) {
     const std::vector<std::string> oneWorker = {"--ingest-threads", "1", "--limits-max-points", "1000000"};
     start(oneWorker);
-    ASSERT_TRUE(add("poison", slowScan(5, 400'000)));
+    ASSERT_TRUE(add("poison", slowScan(5, 250'000)));
     ASSERT_TRUE(add("innocent", dumbbell()));
     for (int death = 0; death < 2; ++death) {
         ASSERT_TRUE(eventually([&] { return beingSegmented("poison"); })) << death;
@@ -286,7 +286,7 @@ TEST_F(Lifecycle, RestartContinuesARebuild) {
     start();
     for (int i = 0; i < 6; ++i) {
         ASSERT_TRUE(
-            addAndWait(*client, "", std::to_string(i), slowScan(static_cast<std::uint64_t>(i), 12'000)).ok());
+            addAndWait(*client, "", std::to_string(i), slowScan(static_cast<std::uint64_t>(i), 8'000)).ok());
     }
     pb::RebuildRequest request;
     request.set_collection("default");
@@ -320,7 +320,7 @@ TEST_F(Lifecycle, RestartContinuesARebuild) {
 TEST_F(Lifecycle, QuarantinesAScanThatCrashesRebuildsTwice) {
     const std::vector<std::string> arguments = {"--limits-max-points", "1000000"};
     start(arguments);
-    const auto poison = addAndWait(*client, "", "poison", slowScan(5, 300'000));
+    const auto poison = addAndWait(*client, "", "poison", slowScan(5, 150'000));
     ASSERT_TRUE(poison.ok()) << poison;
     for (int i = 0; i < 3; ++i) {
         ASSERT_TRUE(addAndWait(*client, "", std::to_string(i), dumbbell(static_cast<std::uint64_t>(i))).ok());

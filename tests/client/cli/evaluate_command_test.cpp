@@ -18,7 +18,7 @@ class EvaluateCommand : public CommandTest {
     static void SetUpTestSuite() {
         samples() = (fs::temp_directory_path() / ("shapedb-evaluate-" + std::to_string(::getpid()))).string();
         const CommandRun run = runCommand(
-            {"sample", samples(), "--count", "3", "--points", "1200", "--families", "human,mug,airplane"});
+            {"sample", samples(), "--count", "3", "--points", "700", "--families", "human,mug,airplane"});
         ASSERT_EQ(run.exitCode, 0) << run.err;
     }
     static void TearDownTestSuite() { fs::remove_all(samples()); }
@@ -78,12 +78,13 @@ TEST_F(EvaluateCommand, MeanIsTheMeanOfEqualClasses) {
 }
 
 TEST_F(EvaluateCommand, MeasuresOnlyChosenClasses) {
-    const auto only = evaluate({samples(), "--classes", "human,mug", "--per-class"});
+    const auto only = evaluate({samples(), "--profile", "paper", "--classes", "human,mug", "--per-class"});
     EXPECT_EQ(only["queries"], 6);
     EXPECT_EQ(only["shapes"], 6);
     EXPECT_FALSE(only["per_class"].contains("airplane"));
     EXPECT_EQ(only["only_classes"], nlohmann::json({"human", "mug"}));
-    const auto except = evaluate({samples(), "--except-classes", "airplane", "--per-class"});
+    const auto except =
+        evaluate({samples(), "--profile", "paper", "--except-classes", "airplane", "--per-class"});
     EXPECT_EQ(only["per_class"], except["per_class"]);
     const auto refused = evaluate({samples(), "--classes", "humans"}, 2);
     EXPECT_NE(refused["error"]["message"].get<std::string>().find("airplane, human, mug"), std::string::npos);
@@ -91,7 +92,7 @@ TEST_F(EvaluateCommand, MeasuresOnlyChosenClasses) {
 }
 
 TEST_F(EvaluateCommand, ResultDoesNotDependOnThreads) {
-    const std::vector<std::string> noisy = {samples(), "--noise", "0.005", "--points", "2000", "--per-class"};
+    const std::vector<std::string> noisy = {samples(), "--noise", "0.005", "--points", "600", "--per-class"};
     const auto with = [&](const char* threads) {
         auto arguments = noisy;
         arguments.insert(arguments.end(), {"--threads", threads});
@@ -100,7 +101,7 @@ TEST_F(EvaluateCommand, ResultDoesNotDependOnThreads) {
     const auto one = with("1");
     EXPECT_EQ(one, with("4"));
     EXPECT_EQ(one["noise"], 0.005);
-    EXPECT_EQ(one["points"], 2000);
+    EXPECT_EQ(one["points"], 600);
 }
 
 TEST_F(EvaluateCommand, NoiseOfAFileDoesNotDependOnTheOthers) {
@@ -128,8 +129,8 @@ TEST_F(EvaluateCommand, UnsegmentableShapesCountAsMisses) {
     for (int i = 0; i < 50; ++i) flat.push_back({0.1 * (i % 7), 0.1 * (i / 7), 0.0});
     // First in the order of files, which would otherwise favour it in a tie at 0.
     writePoints("set/airplane/aaa_flat.xyz", flat);
-    const auto clean = evaluate({samples(), "--per-class"});
-    const auto document = evaluate({path("set"), "--per-class"});
+    const auto clean = evaluate({samples(), "--profile", "paper", "--per-class"});
+    const auto document = evaluate({path("set"), "--profile", "paper", "--per-class"});
     EXPECT_EQ(document["queries"], 10) << "it is a query like the others";
     ASSERT_EQ(document["failures"].size(), 1u);
     EXPECT_EQ(document["failures"][0]["error"], "coplanar");
@@ -142,7 +143,7 @@ TEST_F(EvaluateCommand, UnsegmentableShapesCountAsMisses) {
 TEST_F(EvaluateCommand, UnreadableFilesAreNamedWithExitCodeOne) {
     fs::copy(samples(), path("set"), fs::copy_options::recursive);
     write("set/mug/broken.ply", "ply\nformat ascii 1.0\nelement vertex 10\n");
-    const auto document = evaluate({path("set")}, 1);
+    const auto document = evaluate({path("set"), "--profile", "paper"}, 1);
     EXPECT_EQ(document["queries"], 10);
     ASSERT_EQ(document["failures"].size(), 1u);
     EXPECT_EQ(document["failures"][0]["error"], "malformed_file");
@@ -151,8 +152,8 @@ TEST_F(EvaluateCommand, UnreadableFilesAreNamedWithExitCodeOne) {
 TEST_F(EvaluateCommand, DrawsTheSimilarityMatrix) {
     const std::string png = path("matrix.png");
     const std::string svg = path("matrix.svg");
-    evaluate({samples(), "--confusion", png});
-    evaluate({samples(), "--confusion", svg});
+    evaluate({samples(), "--profile", "paper", "--confusion", png});
+    evaluate({samples(), "--profile", "paper", "--confusion", svg});
     std::string magic(4, '\0');
     std::ifstream(png, std::ios::binary).read(magic.data(), 4);
     EXPECT_EQ(magic, "\x89PNG");
@@ -178,7 +179,7 @@ TEST_F(EvaluateCommand, ClassIsTheFolderBelowTheRoot) {
     fs::create_directories(path("set/cups/of"));
     fs::copy(samples() + "/human", path("set/people/of/one"));
     fs::copy(samples() + "/mug", path("set/cups/of/one"));
-    const auto document = evaluate({path("set"), "--per-class"});
+    const auto document = evaluate({path("set"), "--profile", "paper", "--per-class"});
     ASSERT_EQ(document["per_class"].size(), 2u);
     EXPECT_EQ(document["per_class"]["people"]["queries"], 3);
 }
@@ -201,14 +202,15 @@ TEST_F(EvaluateCommand, GalleryByStemFindsTheCleanScanOfANoisyOne) {
     EXPECT_EQ(document["queries"], 9);
     EXPECT_GT(document["hit_at_1"].get<double>(), 0.5);
     EXPECT_GE(document["hit_at_5"].get<double>(), document["hit_at_1"].get<double>());
-    const auto exact = evaluate({samples(), "--gallery", samples(), "--match", "stem"});
+    const auto exact = evaluate({samples(), "--profile", "paper", "--gallery", samples(), "--match", "stem"});
     EXPECT_EQ(exact["hit_at_1"], 1.0);
     EXPECT_EQ(exact["mrr"], 1.0);
     for (const auto& rank : exact["ranks"]) EXPECT_EQ(rank["right_score"], 1.0);
 }
 
 TEST_F(EvaluateCommand, GalleryReportsQueriesWithoutARightAnswer) {
-    const auto document = evaluate({samples() + "/human", "--gallery", samples() + "/mug"});
+    const auto document =
+        evaluate({samples() + "/human", "--profile", "paper", "--gallery", samples() + "/mug"});
     EXPECT_EQ(document["queries"], 0);
     EXPECT_EQ(document["without_right_answer"], 3);
     EXPECT_EQ(document["mrr"], 0.0);
@@ -219,7 +221,7 @@ TEST_F(EvaluateCommand, GalleryFailuresCountAsMisses) {
     PointCloud flat;
     for (int i = 0; i < 50; ++i) flat.push_back({0.1 * (i % 7), 0.1 * (i / 7), 0.0});
     writePoints("queries/human/flat.xyz", flat);
-    const auto document = evaluate({path("queries"), "--gallery", samples()});
+    const auto document = evaluate({path("queries"), "--profile", "paper", "--gallery", samples()});
     EXPECT_EQ(document["queries"], 1);
     EXPECT_EQ(document["hit_at_5"], 0.0);
     EXPECT_EQ(document["ranks"][0]["rank"], 0);
@@ -227,7 +229,7 @@ TEST_F(EvaluateCommand, GalleryFailuresCountAsMisses) {
 }
 
 TEST_F(EvaluateCommand, TextShowsTheMeasures) {
-    const CommandRun run = runCommand({"evaluate", samples(), "--per-class"});
+    const CommandRun run = runCommand({"evaluate", samples(), "--profile", "paper", "--per-class"});
     ASSERT_EQ(run.exitCode, 0) << run.err;
     for (const char* word : {"NN", "1st tier", "mAP", "human", "mug", "airplane", "9 queries"}) {
         EXPECT_NE(run.out.find(word), std::string::npos) << word << "\n" << run.out;

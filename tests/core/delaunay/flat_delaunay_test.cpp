@@ -126,10 +126,10 @@ PointCloud grid(int side, double step) {
 }
 
 // Points that differ in the last digit of a coordinate, and points on a line.
-PointCloud nearlyRepeated() {
+PointCloud nearlyRepeated(int count = 1500) {
     Random random(5);
     PointCloud points;
-    for (int i = 0; i < 1500; ++i) {
+    for (int i = 0; i < count; ++i) {
         const Point3 p{random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)};
         points.push_back(p);
         points.push_back(p + Point3{kGrid, 0, 0});
@@ -190,37 +190,42 @@ TEST(Triangulation, HasTheTetrahedraOfCgalInLargerClouds) {
 }
 
 TEST(Triangulation, HasTheSameTetrahedraForAnyNumberOfThreads) {
+    // The limits of a large triangulation, scaled to smaller clouds; below once as they are.
+    ParallelLimits limits;
+    limits.minPoints /= 4;
+    limits.minPerThread /= 4;
+    const std::size_t count = limits.minPoints;
     const std::vector<std::pair<std::string, PointCloud>> clouds = {
-        {"uniform", sortedCloud(inACube(kShared))},
-        {"noisy jack", sortedCloud(scanned(makeJack(), kShared + 500, 0.002))},
-        {"clean box", sortedCloud(scanned(makeBox(), kShared + 500, 0.0))},
-        {"grid", sortedCloud(grid(37, 0.03125))},
+        {"uniform", sortedCloud(inACube(count))},
+        {"noisy jack", sortedCloud(scanned(makeJack(), count + 500, 0.002))},
+        {"clean box", sortedCloud(scanned(makeBox(), count + 500, 0.0))},
+        {"grid", sortedCloud(grid(24, 0.03125))},
         // Numbers say nothing about where points lie.
-        {"not in Hilbert order", inACube(kShared)},
+        {"not in Hilbert order", inACube(count)},
     };
     for (const auto& [name, points] : clouds) {
-        ASSERT_GE(points.size(), kShared) << name;
-        const auto alone = byThreads(points, 1);
+        ASSERT_GE(points.size(), count) << name;
+        const auto alone = byThreads(points, 1, limits);
         ASSERT_FALSE(alone.empty()) << name;
         for (const std::size_t threads : {2, 5})
-            EXPECT_TRUE(byThreads(points, threads) == alone) << name << threads;
+            EXPECT_TRUE(byThreads(points, threads, limits) == alone) << name << threads;
     }
 }
 
 // So many borders that the points left along them go in parallel again.
 TEST(Triangulation, HasTheSameTetrahedraWithManyBorders) {
-    const PointCloud points = sortedCloud(inACube(3 * kShared));
+    const PointCloud points = sortedCloud(inACube(2 * kShared));
     EXPECT_TRUE(byThreads(points, 7) == byThreads(points, 1));
 }
 
 // So few points for each thread that hardly a cell has one owner.
 TEST(Triangulation, ThreadsWithFewPointsFindTheTetrahedraOfCgal) {
     std::vector<std::pair<std::string, PointCloud>> clouds = {
-        {"uniform", sortedCloud(inACube(3000))},
-        {"noisy dumbbell", sortedCloud(scanned(makeDumbbell(), 4000, 0.003))},
-        {"clean box", sortedCloud(scanned(makeBox(), 3000, 0.0))},
-        {"grid", sortedCloud(grid(12, 0.0625))},
-        {"nearly repeated", sortedCloud(nearlyRepeated())},
+        {"uniform", sortedCloud(inACube(1500))},
+        {"noisy dumbbell", sortedCloud(scanned(makeDumbbell(), 2000, 0.003))},
+        {"clean box", sortedCloud(scanned(makeBox(), 1500, 0.0))},
+        {"grid", sortedCloud(grid(10, 0.0625))},
+        {"nearly repeated", sortedCloud(nearlyRepeated(500))},
         {"not in Hilbert order", inACube(1000)},
     };
     for (const SmallCloud& cloud : smallClouds()) clouds.emplace_back(cloud.name, sortedCloud(cloud.points));

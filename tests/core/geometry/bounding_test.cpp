@@ -82,7 +82,7 @@ TEST(SmallestBoxDiagonal, HardlyChangesUnderRotation) {
         const PointCloud points = scanOf(makeMember(family.name, 1, 5).value(), options).value();
         double low = INFINITY;
         double high = 0.0;
-        for (int turn = 0; turn < 6; ++turn) {
+        for (int turn = 0; turn < 4; ++turn) {
             Motion motion;
             motion.rotation = randomRotation(random);
             const double diagonal = *smallestBoxDiagonal(applyToCloud(motion, points));

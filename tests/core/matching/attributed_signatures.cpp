@@ -131,7 +131,7 @@ const Signature& scanned(std::size_t family, std::size_t member, std::size_t sca
     const auto [at, isNew] = made.try_emplace({family, member, scan});
     if (isNew) {
         ScanOptions options;
-        options.count = 2000;
+        options.count = 1600;
         options.noise = 0.002;
         options.seed = 1 + scan + 10 * (member + 10 * family);
         const PointCloud points =

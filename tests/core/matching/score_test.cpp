@@ -71,7 +71,7 @@ bool onALine(const Signature& signature) {
 
 TEST(Score, AgreesWithItsDefinition) {
     Random random(1);
-    for (int round = 0; round < 8000; ++round) {
+    for (int round = 0; round < 4000; ++round) {
         const Pair pair = randomPair(random, round % 5 == 0 ? 8 : 6);
         const ScoreOptions options = randomOptions(random);
         const double fast = score(pair.a, pair.b, options);
@@ -310,7 +310,7 @@ TEST(ScoreUpperBound, IsNeverBelowTheScore) {
     double slack = 0.0;
     double share = 0.0;
     int tight = 0;
-    const int rounds = 6000;
+    const int rounds = 3000;
     for (int round = 0; round < rounds; ++round) {
         const Pair pair = randomPair(random);
         const double width = round % 4 == 0 ? std::pow(10.0, random.uniform(-6, 1)) : 0.1;

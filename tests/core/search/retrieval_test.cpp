@@ -22,7 +22,7 @@ struct Library {
 
 Signature scanned(const std::string& family, std::size_t member, std::uint64_t seed) {
     ScanOptions options;
-    options.count = 4000;
+    options.count = 3000;
     options.noise = 0.0025;
     options.seed = seed;
     const PointCloud points = scanOf(makeMember(family, member, 1).value(), options).value();
@@ -50,8 +50,13 @@ Library makeLibrary() {
     return library;
 }
 
+const Library& firstScans() {
+    static const Library library = makeLibrary();
+    return library;
+}
+
 TEST(Retrieval, FindsTheShapeItselfFirstAndMostlyItsFamily) {
-    const Library library = makeLibrary();
+    const Library& library = firstScans();
     std::size_t right = 0;
     for (const IndexEntry& entry : library.entries) {
         SearchOptions options;
@@ -71,11 +76,11 @@ TEST(Retrieval, FindsTheShapeItselfFirstAndMostlyItsFamily) {
     const double nearest = static_cast<double>(right) / static_cast<double>(library.set.size());
     std::cout << "nearest neighbour of the same family: " << nearest << " of " << library.set.size()
               << " scans (chance " << static_cast<double>(kMembers - 1) / (library.set.size() - 1.0) << ")\n";
-    EXPECT_GE(nearest, 0.45);  // measured: 0.58
+    EXPECT_GE(nearest, 0.5);  // measured: 0.67
 }
 
 TEST(Retrieval, FindsTheShapeOfANewScan) {
-    const Library library = makeLibrary();
+    const Library& library = firstScans();
     std::size_t first = 0;
     std::size_t queries = 0;
     for (std::size_t f = 0; f < families().size(); ++f) {
@@ -89,7 +94,7 @@ TEST(Retrieval, FindsTheShapeOfANewScan) {
     }
     const double hits = static_cast<double>(first) / static_cast<double>(queries);
     std::cout << "second scan of a shape finds the first scan at rank 1: " << hits << "\n";
-    EXPECT_GE(hits, 0.6);  // measured: 0.75
+    EXPECT_GE(hits, 0.7);  // measured: 0.88
 }
 
 // The default profile does better than the paper's on the same task.

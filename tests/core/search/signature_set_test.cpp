@@ -110,7 +110,7 @@ void applyTo(Model& model, const Change& change, std::size_t version) {
 }
 
 TEST(SignatureSet, EqualsAMapUnderRandomChanges) {
-    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    for (std::uint64_t seed = 1; seed <= 2; ++seed) {
         Random random(seed);
         SignatureSet set;
         Model model;

@@ -118,7 +118,7 @@ void expectExact(const Signature& query, const Library& library, const SearchOpt
 
 TEST(TopK, EqualsBruteForceBitForBit) {
     Random random(1);
-    for (int round = 0; round < 400; ++round) {
+    for (int round = 0; round < 300; ++round) {
         const Signature query = randomSignature(random, 7);
         const Library library = randomLibrary(random, query, random.below(round % 20 == 0 ? 9000 : 150));
         const SearchOptions options = randomOptions(random, library);
@@ -135,7 +135,7 @@ TEST(TopK, EqualsBruteForceOnScansBitForBit) {
     std::int64_t id = 1;
     for (const auto& scan : scans) {
         entries.push_back(entryOf(id++, scan.signature));
-        for (int copy = 0; copy < 8; ++copy) {
+        for (int copy = 0; copy < 5; ++copy) {
             entries.push_back(entryOf(
                 id++, testing_support::disturbedAttributed(scan.signature, random, random.uniform(0, 0.05))));
         }
@@ -145,7 +145,7 @@ TEST(TopK, EqualsBruteForceOnScansBitForBit) {
         entries.push_back(entryOf(id++, plain));
     }
     const Library library(std::move(entries));
-    for (int round = 0; round < 60; ++round) {
+    for (int round = 0; round < 36; ++round) {
         SearchOptions options = randomOptions(random, library);
         options.score.partial = round % 4 == 0;
         Signature query = scans[random.below(scans.size())].signature;

@@ -27,7 +27,7 @@ SegmentationOptions adaptive() {
     return options;
 }
 
-PointCloud sampled(const NamedShape& shape, std::size_t count = 8000) {
+PointCloud sampled(const NamedShape& shape, std::size_t count = 5000) {
     const auto points = sampleBoundary(shape.solid, count, 1);
     return points ? *points : PointCloud{};
 }

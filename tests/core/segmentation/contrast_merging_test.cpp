@@ -253,7 +253,7 @@ TEST(MergeSegmentsByContrast, FindsTheBallsAndRodsOfKnownShapes) {
         if (wanted == parts.end()) continue;
         for (const double noise : {0.0, 0.0015}) {
             for (const std::uint64_t seed : {1U, 2U}) {
-                PointCloud points = sampleBoundary(shape.solid, 6000, seed).value();
+                PointCloud points = sampleBoundary(shape.solid, 4000, seed).value();
                 ASSERT_TRUE(addGaussianNoise(points, noise, seed + 10));
                 const Segmentation s = segment(points, byContrast()).value();
                 // Noise may leave separate dust, which is light.

@@ -231,7 +231,7 @@ TEST(Segmentation, OfFourPointsIsTheirTetrahedron) {
 
 TEST(Segmentation, VolumeOfKnownSolidsWithinTwoPercent) {
     for (const NamedShape& shape : namedShapes()) {
-        const auto s = segment(sample(shape, 20000, 0.0, 1), {});
+        const auto s = segment(sample(shape, 12000, 0.0, 1), {});
         ASSERT_TRUE(s) << shape.name;
         EXPECT_NEAR(s->volume, shape.volume, 0.02 * shape.volume) << shape.name;
     }
@@ -246,7 +246,7 @@ TEST(Segmentation, VolumeHardlyChangesUnderNoise) {
 }
 
 void expectBallsFirst(const NamedShape& shape, std::uint64_t seed) {
-    const auto s = segment(sample(shape, 20000, 0.0, seed), {});
+    const auto s = segment(sample(shape, 12000, 0.0, seed), {});
     ASSERT_TRUE(s) << shape.name;
     ASSERT_GE(s->segments.size(), shape.balls.size());
     std::set<std::size_t> found;

@@ -77,13 +77,13 @@ std::vector<SmallCloud> makeClouds() {
         clouds.push_back({std::move(name), sanitise(points).value().points});
     };
     for (std::uint64_t seed = 1; seed <= 3; ++seed) {
-        add("uniform " + std::to_string(seed), uniformCube(300, seed));
-        add("sphere " + std::to_string(seed), onSphere(200, seed));
-        add("noisy dumbbell " + std::to_string(seed), noisyShape(makeDumbbell(), 500, 0.004, seed));
-        add("noisy L " + std::to_string(seed), noisyShape(makeLShape(), 400, 0.008, seed));
+        add("uniform " + std::to_string(seed), uniformCube(150, seed));
+        add("sphere " + std::to_string(seed), onSphere(120, seed));
+        add("noisy dumbbell " + std::to_string(seed), noisyShape(makeDumbbell(), 250, 0.004, seed));
+        add("noisy L " + std::to_string(seed), noisyShape(makeLShape(), 200, 0.008, seed));
     }
-    add("clean box", noisyShape(makeBox(), 400, 0.0, 9));
-    add("clean torus", noisyShape(makeTorus(), 500, 0.0, 9));
+    add("clean box", noisyShape(makeBox(), 250, 0.0, 9));
+    add("clean torus", noisyShape(makeTorus(), 300, 0.0, 9));
     add("one tetrahedron", {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}});
     add("cube corners", grid(2, 1.0, {}));
     add("grid", grid(6, 1.0, {}));

@@ -20,7 +20,7 @@
 namespace shapedb {
 namespace {
 
-constexpr std::size_t kPoints = 4000;
+constexpr std::size_t kPoints = 2500;
 
 Signature describeDefault(const PointCloud& points) {
     return describe(points, parametersOf(Profile::kDefault)).value().signature;

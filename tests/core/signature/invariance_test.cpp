@@ -86,7 +86,8 @@ void expectInvariant(const NamedShape& shape, std::size_t count, const PointClou
     ASSERT_EQ(points.size(), count);
     const Signature still = describePaper(points).signature;
     Random random(21);
-    for (int turn = 0; turn < 10; ++turn) {
+    // The smallest, middle and largest scales, each with and without reflection.
+    for (const int turn : {0, 1, 4, 5, 8, 9}) {
         const Motion motion = anyMotion(random, turn);
         const auto moved = describePaper(shuffled(applyToCloud(motion, points), 40U + turn));
         expectMovesLittle(still, moved.signature, motion, shape.name + " motion " + std::to_string(turn));
@@ -101,14 +102,12 @@ void expectInvariantWhenTurned(const NamedShape& shape, std::size_t count) {
     expectInvariant(shape, count, applyToCloud(first, sample(shape, count)), first);
 }
 
-TEST(SignatureInvariance, DumbbellUnderTenMotions) {
-    expectInvariant(makeDumbbell(), 5000, sample(makeDumbbell(), 5000));
+TEST(SignatureInvariance, DumbbellUnderMotions) {
+    expectInvariant(makeDumbbell(), 4000, sample(makeDumbbell(), 4000));
 }
-TEST(SignatureInvariance, JackUnderTenMotions) {
-    expectInvariant(makeJack(), 5000, sample(makeJack(), 5000));
-}
-TEST(SignatureInvariance, LShapeUnderTenMotions) { expectInvariantWhenTurned(makeLShape(), 2000); }
-TEST(SignatureInvariance, BoxUnderTenMotions) { expectInvariantWhenTurned(makeBox(), 2000); }
+TEST(SignatureInvariance, JackUnderMotions) { expectInvariant(makeJack(), 4000, sample(makeJack(), 4000)); }
+TEST(SignatureInvariance, LShapeUnderMotions) { expectInvariantWhenTurned(makeLShape(), 2000); }
+TEST(SignatureInvariance, BoxUnderMotions) { expectInvariantWhenTurned(makeBox(), 2000); }
 
 // Faces in coordinate planes are exactly flat until the scan is rotated. Rounding then covers them with flat
 // tetrahedra, through which the walk enters by the deep angle instead of the hull angle. That adds and
@@ -132,13 +131,13 @@ TEST(SignatureInvariance, ExactlyFlatFacesChangeSliversOnly) {
 
 TEST(SignatureInvariance, PointOrderChangesNoBit) {
     for (const NamedShape& shape : {makeDumbbell(), makeTorus()}) {
-        const PointCloud points = sample(shape, 3000);
+        const PointCloud points = sample(shape, 2000);
         for (const Profile profile : {Profile::kPaper, Profile::kDefault}) {
             ShapeParameters parameters = parametersOf(profile);
-            if (profile == Profile::kDefault) parameters.segmentation.preparation.decimateTo = 2000;
+            if (profile == Profile::kDefault) parameters.segmentation.preparation.decimateTo = 1400;
             const auto reference = describe(points, parameters).value();
             const std::string bytes = encodeSignature(reference.signature);
-            for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+            for (std::uint64_t seed = 1; seed <= 2; ++seed) {
                 const PointCloud other = shuffled(points, seed);
                 const auto result = describe(other, parameters).value();
                 EXPECT_EQ(encodeSignature(result.signature), bytes) << shape.name;
@@ -182,7 +181,7 @@ TEST(SignatureInvariance, PowersOfTwoChangeNoBit) {
 }
 
 TEST(SignatureInvariance, FromTheTiniestToTheHugest) {
-    const PointCloud points = sample(makeDumbbell(), 3000);
+    const PointCloud points = sample(makeDumbbell(), 2000);
     const Signature still = describePaper(points).signature;
     for (const double factor : {1e-30, 1e-12, 1e12, 1e30}) {
         Motion motion;

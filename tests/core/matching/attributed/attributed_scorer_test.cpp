@@ -52,18 +52,21 @@ TEST(AttributedScore, IsSymmetricAndBoundedOnScans) {
     const auto& scans = scannedFamilies(1, 1);
     double score0 = 0.0;
     double bound0 = 0.0;
-    for (const auto& x : scans) {
-        for (const auto& y : scans) {
+    // Each pair once: expectSoundScore compares both orders.
+    for (std::size_t i = 0; i < scans.size(); ++i) {
+        for (std::size_t k = 0; k <= i; ++k) {
+            const auto& x = scans[i];
+            const auto& y = scans[k];
             for (const ScoreOptions& options : everyOption())
                 expectSoundScore(x.signature, y.signature, options);
             expectSoundScore(x.signature, y.signature, scoreOptions(true, false, 0.02));
             if (HasFatalFailure()) FAIL() << x.family << " " << y.family;
-            if (&x == &y) continue;
+            if (i == k) continue;
             score0 += score(x.signature, y.signature, {});
             bound0 += scoreUpperBound(x.signature, y.signature, {});
         }
     }
-    const double pairs = static_cast<double>(scans.size() * (scans.size() - 1));
+    const double pairs = static_cast<double>(scans.size() * (scans.size() - 1) / 2);
     std::cout << "different shapes: mean score " << score0 / pairs << ", bound " << bound0 / pairs << "\n";
     EXPECT_LT(bound0 / pairs, score0 / pairs + 0.15) << "tight enough to prune by";
 }
@@ -176,7 +179,7 @@ TEST(AttributeScore, KeepScaleComparesSizes) {
 
 TEST(AttributedScore, ComparesPointsAndWeightsIfOneSideHasNoAttributes) {
     Random random(12);
-    for (int round = 0; round < 500; ++round) {
+    for (int round = 0; round < 200; ++round) {
         const AttributedPair pair = randomPair(random);
         Signature plainA = pair.a;
         Signature plainB = pair.b;
