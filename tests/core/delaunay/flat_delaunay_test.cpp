@@ -214,7 +214,7 @@ TEST(Triangulation, HasTheSameTetrahedraForAnyNumberOfThreads) {
 
 // So many borders that the points left along them go in parallel again.
 TEST(Triangulation, HasTheSameTetrahedraWithManyBorders) {
-    const PointCloud points = sortedCloud(inACube(2 * kShared));
+    const PointCloud points = sortedCloud(inACube(3 * kShared));
     EXPECT_TRUE(byThreads(points, 7) == byThreads(points, 1));
 }
 
