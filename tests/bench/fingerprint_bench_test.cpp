@@ -28,11 +28,11 @@ TEST_F(FingerprintBench, IsTheSameForAnyNumberOfThreads) {
 
 TEST_F(FingerprintBench, ShowsWhichScanChanged) {
     const std::string other = writePoints("set/cube/other.xyz", boxPoints(1.0, 1.0, 1.0, 300, 50));
-    const std::vector<std::string> command = {"fingerprint", set(), "--profile", "paper"};
+    const std::vector<std::string> command = {"fingerprint", set(), "--profile", "default"};
     const auto before = linesOf(runBench(command));
-    // One coordinate of one point, by a hundredth.
+    // One coordinate of ten points, by a tenth.
     PointCloud points = boxPoints(1.0, 1.0, 1.0, 300, 50);
-    points[7].x += 0.01;
+    for (std::size_t i = 0; i < 10; ++i) points[i].x += 0.1;
     ASSERT_EQ(writePoints("set/cube/other.xyz", points), other);
     const auto after = linesOf(runBench(command));
     ASSERT_EQ(before.size(), after.size());
