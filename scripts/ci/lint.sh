@@ -49,6 +49,16 @@ forbid "$transport" "gRPC or protobuf in a public client header" client/api/clie
 forbid 'server/|bench/' "client/ may not include the server" client
 forbid 'server/|client/|bench/' "common/ may not include client or server" common
 
+# A program that uses the installed client library finds every header that an installed one includes.
+installed=$(sed -n '/^set(installed_core_headers/,/)/p' client/api/CMakeLists.txt | grep -oE '[a-z_/]+\.h' | sed 's#^#core/#')
+installed="$installed client/api/client.h client/api/types.h"
+for header in $(grep -hoE '^#include "[^"]+"' $installed | cut -d'"' -f2 | sort -u); do
+  case " $(echo $installed) " in
+    *" $header "*) ;;
+    *) complain "an installed header includes $header, which client/api/CMakeLists.txt does not install" ;;
+  esac
+done
+
 # Each test program is built from all *_test.cpp below its folders.
 for test in $(git ls-files -- '*_test.cpp'); do
   case "$test" in
