@@ -12,13 +12,6 @@ namespace {
 
 using Kind = PipelineOutcome::Kind;
 
-PointCloud toCloud(const std::vector<float>& xyz) {
-    PointCloud points;
-    points.reserve(xyz.size() / 3);
-    for (std::size_t i = 0; i + 2 < xyz.size(); i += 3) points.push_back({xyz[i], xyz[i + 1], xyz[i + 2]});
-    return points;
-}
-
 PipelineOutcome failed(Kind kind, Error why) {
     PipelineOutcome outcome;
     outcome.kind = kind;
@@ -37,7 +30,7 @@ PipelineOutcome runOrThrow(const Describe& describe, store::Store& store, std::i
                           points.error());
         }
         context.report("start", 0, 0);
-        cloud = toCloud(*points);
+        cloud = store::toCloud(*points);
     }
     Result<Description> description = fail(ErrorCode::kInternal, "not described");
     onThisThreadAlone([&] { description = describe(cloud, parameters, context); });
@@ -56,7 +49,7 @@ PipelineOutcome runOrThrow(const Describe& describe, store::Store& store, std::i
 Result<Description> SignaturePipeline::describe(const std::vector<float>& points,
                                                 const ShapeParameters& parameters,
                                                 const RunContext& context) const {
-    return describe_(toCloud(points), parameters, context);
+    return describe_(store::toCloud(points), parameters, context);
 }
 
 PipelineOutcome SignaturePipeline::run(store::Store& store, std::int64_t shapeId,

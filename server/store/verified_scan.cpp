@@ -20,7 +20,18 @@ namespace {
 /// Enough that a sample of a real scan spans space.
 constexpr std::size_t kSamplePoints = 256;
 
+Point3 pointAt(const std::vector<float>& xyz, std::size_t i) {
+    return {xyz[3 * i], xyz[3 * i + 1], xyz[3 * i + 2]};
+}
+
 }  // namespace
+
+PointCloud toCloud(const std::vector<float>& xyz) {
+    PointCloud points;
+    points.reserve(xyz.size() / 3);
+    for (std::size_t i = 0; i < xyz.size() / 3; ++i) points.push_back(pointAt(xyz, i));
+    return points;
+}
 
 Result<VerifiedScan> VerifiedScan::verify(std::vector<float> xyz) {
     if (xyz.size() % 3 != 0) {
@@ -72,18 +83,14 @@ Result<void> ScanVerifier::take(std::size_t first) {
 /// refused are all points looked at, which takes about 80 bytes a point.
 Result<void> ScanVerifier::checkUsable() const {
     const std::size_t count = xyz_.size() / 3;
-    const auto pointAt = [&](std::size_t i) { return Point3{xyz_[3 * i], xyz_[3 * i + 1], xyz_[3 * i + 2]}; };
     if (count > 0) {
         PointCloud sample;
-        for (const std::size_t i : extremes_) sample.push_back(pointAt(i));
+        for (const std::size_t i : extremes_) sample.push_back(pointAt(xyz_, i));
         const std::size_t step = std::max<std::size_t>(1, count / kSamplePoints);
-        for (std::size_t i = 0; i < count; i += step) sample.push_back(pointAt(i));
+        for (std::size_t i = 0; i < count; i += step) sample.push_back(pointAt(xyz_, i));
         if (sanitise(sample)) return {};
     }
-    PointCloud all;
-    all.reserve(count);
-    for (std::size_t i = 0; i < count; ++i) all.push_back(pointAt(i));
-    RETURN_IF_ERROR(sanitise(all));
+    RETURN_IF_ERROR(sanitise(toCloud(xyz_)));
     return {};
 }
 

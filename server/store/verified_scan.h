@@ -9,11 +9,15 @@
 
 #include "common/sha256.h"
 #include "core/base/error.h"
+#include "core/geometry/point.h"
 
 namespace shapedb::store {
 
 /// SHA-256 of the points as they travel: packed little-endian float32 x y z.
 using Checksum = std::array<std::uint8_t, 32>;
+
+/// Packed x y z as points. Throws std::bad_alloc.
+[[nodiscard]] PointCloud toCloud(const std::vector<float>& xyz);
 
 /// Packed points and their checksum. That the type exists says: the points are whole triples of
 /// finite numbers, `checksum` is theirs, and they pass `sanitise`. Only ScanVerifier makes one, so
