@@ -12,7 +12,7 @@ namespace shapedb::catalog {
 struct Listing {
     std::int64_t collectionId = 0;
     std::string filter;
-    int state = 0;  ///< as the request gives it
+    int state = 0;  ///< 0: all; 1 + the number of a store::ShapeState
 };
 
 /// For the page after the shape with id `afterId`. ASCII: version, id, checksum.

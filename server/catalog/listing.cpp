@@ -10,6 +10,10 @@
 
 namespace shapedb::catalog {
 
+namespace {
+
+/// Errors: kInvalidArgument (length), kMalformedFilter. A cancelled `context`, which must outlive the
+/// result, accepts nothing more: that ends a listing of millions early.
 Result<store::ShapeFilter> makeFilter(const ShapeSelection& selection, const RunContext& context) {
     RETURN_IF_ERROR(checkFilterLength(selection.filter));
     Result<Filter> filter = Filter::parse(selection.filter);
@@ -24,6 +28,13 @@ Result<store::ShapeFilter> makeFilter(const ShapeSelection& selection, const Run
     return result;
 }
 
+/// What a cursor is bound to: 0 for all states.
+int cursorState(const std::optional<store::ShapeState>& state) {
+    return state ? 1 + static_cast<int>(*state) : 0;
+}
+
+}  // namespace
+
 Result<std::string> listPage(
     Catalog& catalog, const index::Snapshot& collection, const ListRequest& request,
     const RunContext& context,
@@ -31,7 +42,8 @@ Result<std::string> listPage(
     RETURN_IF_ERROR(checkPageSize(request.pageSize));
     const auto filter = makeFilter(request.selection, context);
     RETURN_IF_ERROR(filter);
-    const Listing listing{collection.collection.id, request.selection.filter, request.state};
+    const Listing listing{collection.collection.id, request.selection.filter,
+                          cursorState(request.selection.state)};
     const auto afterId = decodeCursor(listing, request.cursor);
     RETURN_IF_ERROR(afterId);
 

@@ -20,14 +20,8 @@ struct ShapeSelection {
     std::optional<store::ShapeState> state;
 };
 
-/// Errors: kInvalidArgument (length), kMalformedFilter. A cancelled `context`, which must outlive the
-/// result, accepts nothing more: that ends a listing of millions early.
-[[nodiscard]] Result<store::ShapeFilter> makeFilter(const ShapeSelection& selection,
-                                                    const RunContext& context);
-
 struct ListRequest {
     ShapeSelection selection;
-    int state = 0;               ///< as the request gives it, for the cursor
     std::uint32_t pageSize = 0;  ///< 0: the default
     std::string cursor;          ///< empty: from the start
 };

@@ -133,7 +133,7 @@ grpc::Status ShapeServiceHandler::ListShapes(grpc::ServerContext* context,
         const auto state = fromProto(request->state());
         RETURN_IF_ERROR(state);
         const catalog::ListRequest wanted{
-            {request->filter(), *state}, request->state(), request->page_size(), request->cursor()};
+            {request->filter(), *state}, request->page_size(), request->cursor()};
         const auto next = catalog::listPage(services_.catalog, **collection, wanted, call.run(),
                                             [&](const store::Shape& shape, std::optional<double> quality) {
                                                 pb::Shape* out = response->add_shapes();
