@@ -17,6 +17,12 @@ namespace shapedb::testing_support {
 
 namespace {
 
+std::uint8_t byteNear(double value) {
+    return static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0, 255.0)));
+}
+
+}  // namespace
+
 std::array<float, 6> turnedCovariance(const std::array<float, 6>& c, const Matrix3& r) {
     const Matrix3 own = {{{c[0], c[1], c[2]}, {c[1], c[3], c[4]}, {c[2], c[4], c[5]}}};
     const auto entry = [&](std::size_t i, std::size_t j) {
@@ -28,12 +34,6 @@ std::array<float, 6> turnedCovariance(const std::array<float, 6>& c, const Matri
     };
     return {entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)};
 }
-
-std::uint8_t byteNear(double value) {
-    return static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0, 255.0)));
-}
-
-}  // namespace
 
 void updateBody(Signature& signature) { signature.attributes->body = bodyOf(signature.points); }
 
@@ -107,6 +107,12 @@ AttributedPair randomAttributedPair(Random& random, double leastNoise, double mo
             break;
         default: pair.b = randomAttributed(random);
     }
+    return pair;
+}
+
+AttributedPair randomSizedPair(Random& random) {
+    AttributedPair pair = randomAttributedPair(random);
+    if (random.below(3) == 0) pair.b.scale = pair.a.scale * random.uniform(0.7, 1.4);
     return pair;
 }
 

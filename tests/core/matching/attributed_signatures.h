@@ -1,6 +1,7 @@
 // Signatures with attributes: random ones with every kind of degeneracy, and those of scans.
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,9 @@ Signature disturbedAttributed(Signature signature, Random& random, double noise)
 /// depend on the pose.
 Signature turnedAttributed(Signature signature, const Matrix3& rotation);
 
+/// A covariance (xx, xy, xz, yy, yz, zz) through a rotation or reflection.
+std::array<float, 6> turnedCovariance(const std::array<float, 6>& c, const Matrix3& r);
+
 /// Recomputes the body after the points were changed.
 void updateBody(Signature& signature);
 
@@ -32,6 +36,9 @@ struct AttributedPair {
 
 /// Unrelated, related (disturbed by `leastNoise` to `mostNoise`) or related in another pose.
 AttributedPair randomAttributedPair(Random& random, double leastNoise = 1e-6, double mostNoise = 0.1);
+
+/// `randomAttributedPair`, sometimes also of another size.
+AttributedPair randomSizedPair(Random& random);
 
 /// Everything that must hold of the score of a pair, unless partial.
 void expectSoundScore(const Signature& a, const Signature& b, const ScoreOptions& options);

@@ -129,6 +129,19 @@ Signature turned(Signature signature, const Matrix3& rotation) {
     return signature;
 }
 
+float makeExtreme(Signature& signature, Random& random, double longest) {
+    const std::array<double, 5> lengths = {1e-30, 1e-7, 1.0, 1e3, longest};
+    const float length = static_cast<float>(lengths[random.below(lengths.size())]);
+    const float weight = static_cast<float>(std::pow(10.0, random.uniform(-30, 30)));
+    for (WeightedPoint& p : signature.points) {
+        for (float& x : p.position) x *= length;
+        p.weight *= weight;
+    }
+    while (!signature.points.empty() && !(signature.points.back().weight > 0.0f)) signature.points.pop_back();
+    signature.scale = std::pow(10.0, random.uniform(-40, 40));
+    return length;
+}
+
 ScoreOptions scoreOptions(bool reflection, bool keepScale, double kernelWidth) {
     ScoreOptions options;
     options.reflection = reflection;

@@ -38,6 +38,10 @@ Signature disturbed(Signature signature, Random& random, double noise);
 /// Every position through a rotation (or reflection), as another pose of the scan would give.
 Signature turned(Signature signature, const Matrix3& rotation);
 
+/// The lengths, weights and scale of a signature times numbers far from 1, lengths by up to `longest`; points
+/// whose weight then vanishes are dropped, perhaps all. Returns what the lengths were multiplied by.
+float makeExtreme(Signature& signature, Random& random, double longest);
+
 ScoreOptions scoreOptions(bool reflection, bool keepScale, double kernelWidth = 0.1);
 
 /// With and without reflection and keepScale.

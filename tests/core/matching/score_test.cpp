@@ -19,6 +19,7 @@ using testing_support::disturbed;
 using testing_support::everyOption;
 using testing_support::Kind;
 using testing_support::kKindCount;
+using testing_support::makeExtreme;
 using testing_support::Matching;
 using testing_support::plainScore;
 using testing_support::randomReflection;
@@ -271,18 +272,10 @@ TEST(Score, RefusesKernelWidthsOutOfRange) {
 
 TEST(Score, StaysFiniteForExtremeNumbers) {
     Random random(10);
-    const std::array<double, 5> lengths = {1e-30, 1e-7, 1.0, 1e3, 1e30};
     for (int round = 0; round < 3000; ++round) {
         const auto extreme = [&] {
             Signature s = randomSignature(random, 5);
-            const float length = static_cast<float>(lengths[random.below(lengths.size())]);
-            const float weight = static_cast<float>(std::pow(10.0, random.uniform(-30, 30)));
-            for (WeightedPoint& p : s.points) {
-                for (float& x : p.position) x *= length;
-                p.weight *= weight;
-            }
-            while (!s.points.empty() && !(s.points.back().weight > 0.0f)) s.points.pop_back();
-            s.scale = std::pow(10.0, random.uniform(-40, 40));
+            makeExtreme(s, random, 1e30);
             return s;
         };
         const Signature a = extreme();

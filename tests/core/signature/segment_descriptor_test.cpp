@@ -7,6 +7,7 @@
 
 #include "core/base/random.h"
 #include "core/signature/signature.h"
+#include "tests/core/matching/attributed_signatures.h"
 
 namespace shapedb {
 namespace {
@@ -168,16 +169,7 @@ TEST(SegmentDescriptor, SizesAndRadiiDoNotChangeUnderRotation) {
         for (WeightedPoint& p : turned) {
             const Point3 q = rotate(r, at(p.position));
             p.position = {static_cast<float>(q.x), static_cast<float>(q.y), static_cast<float>(q.z)};
-            const auto c = p.covariance;
-            const Matrix3 own = {{{c[0], c[1], c[2]}, {c[1], c[3], c[4]}, {c[2], c[4], c[5]}}};
-            const auto entry = [&](std::size_t i, std::size_t j) {
-                double sum = 0.0;
-                for (std::size_t k = 0; k < 3; ++k) {
-                    for (std::size_t l = 0; l < 3; ++l) sum += r[i][k] * own[k][l] * r[j][l];
-                }
-                return static_cast<float>(sum);
-            };
-            p.covariance = {entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)};
+            p.covariance = testing_support::turnedCovariance(p.covariance, r);
         }
         const Body a = bodyOf(points);
         const Body b = bodyOf(turned);

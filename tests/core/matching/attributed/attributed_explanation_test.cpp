@@ -20,16 +20,9 @@ using testing_support::AttributedPair;
 using testing_support::describeSignature;
 using testing_support::everyOption;
 using testing_support::randomAttributed;
-using testing_support::randomAttributedPair;
 using testing_support::randomReflection;
+using testing_support::randomSizedPair;
 using testing_support::sameBits;
-
-// Sometimes also of another size.
-AttributedPair randomPair(Random& random) {
-    AttributedPair pair = randomAttributedPair(random);
-    if (random.below(3) == 0) pair.b.scale = pair.a.scale * random.uniform(0.7, 1.4);
-    return pair;
-}
 
 void expectTermsMakeTheScore(const Signature& a, const Signature& b, const ScoreOptions& options,
                              const Explanation& why) {
@@ -95,7 +88,7 @@ void expectConsistent(const Signature& a, const Signature& b, const ScoreOptions
 TEST(AttributedExplanation, AgreesWithTheScore) {
     Random random(9);
     for (int round = 0; round < 1000; ++round) {
-        AttributedPair pair = randomPair(random);
+        AttributedPair pair = randomSizedPair(random);
         pair.b.scale = pair.a.scale * std::exp(random.uniform(-0.5, 0.5));
         for (const ScoreOptions& options : everyOption()) expectConsistent(pair.a, pair.b, options);
         if (HasFailure()) FAIL() << describeSignature(pair.a) << "\n" << describeSignature(pair.b);
@@ -118,7 +111,7 @@ TEST(AttributedExplanation, AgreesWithTheScoreOfSinglePointShapes) {
 TEST(AttributedExplanation, ReversePairHasTheInverseMotion) {
     Random random(10);
     for (int round = 0; round < 500; ++round) {
-        const AttributedPair pair = randomPair(random);
+        const AttributedPair pair = randomSizedPair(random);
         if (sameShape(pair.a, pair.b)) continue;
         const Explanation forth = explain(pair.a, pair.b, {});
         const Explanation back = explain(pair.b, pair.a, {});

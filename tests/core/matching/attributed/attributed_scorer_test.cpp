@@ -19,25 +19,19 @@ using testing_support::AttributedPair;
 using testing_support::describeSignature;
 using testing_support::everyOption;
 using testing_support::expectSoundScore;
+using testing_support::makeExtreme;
 using testing_support::randomAttributed;
-using testing_support::randomAttributedPair;
 using testing_support::randomReflection;
+using testing_support::randomSizedPair;
 using testing_support::sameBits;
 using testing_support::scannedFamilies;
 using testing_support::scoreOptions;
 using testing_support::turnedAttributed;
 
-// Sometimes also of another size.
-AttributedPair randomPair(Random& random) {
-    AttributedPair pair = randomAttributedPair(random);
-    if (random.below(3) == 0) pair.b.scale = pair.a.scale * random.uniform(0.7, 1.4);
-    return pair;
-}
-
 TEST(AttributedScore, IsSymmetricAndBoundedOnRandomPairs) {
     Random random(1);
     for (int round = 0; round < 4000; ++round) {
-        const AttributedPair pair = randomPair(random);
+        const AttributedPair pair = randomSizedPair(random);
         const double width = round % 4 == 0 ? std::pow(10.0, random.uniform(-6, 2)) : 0.1;
         for (const ScoreOptions& options : everyOption(width)) expectSoundScore(pair.a, pair.b, options);
         if (HasFatalFailure()) {
@@ -147,7 +141,7 @@ TEST(AttributeScore, TellsLeftFromRightOnlyWithoutReflection) {
     EXPECT_LT(score(chiral, other, scoreOptions(false, false)),
               score(chiral, other, scoreOptions(true, false)) - 1e-3);
     for (int round = 0; round < 1000; ++round) {
-        const AttributedPair pair = randomPair(random);
+        const AttributedPair pair = randomSizedPair(random);
         EXPECT_GE(score(pair.a, pair.b, scoreOptions(true, false)),
                   score(pair.a, pair.b, scoreOptions(false, false)));
     }
@@ -156,7 +150,7 @@ TEST(AttributeScore, TellsLeftFromRightOnlyWithoutReflection) {
 TEST(AttributeScore, KeepScaleComparesSizes) {
     Random random(5);
     for (int round = 0; round < 200; ++round) {
-        const AttributedPair pair = randomPair(random);
+        const AttributedPair pair = randomSizedPair(random);
         Signature b = pair.b;
         b.scale = pair.a.scale;
         const double sameSize = score(pair.a, b, scoreOptions(true, true));
@@ -180,7 +174,7 @@ TEST(AttributeScore, KeepScaleComparesSizes) {
 TEST(AttributedScore, ComparesPointsAndWeightsIfOneSideHasNoAttributes) {
     Random random(12);
     for (int round = 0; round < 200; ++round) {
-        const AttributedPair pair = randomPair(random);
+        const AttributedPair pair = randomSizedPair(random);
         Signature plainA = pair.a;
         Signature plainB = pair.b;
         plainA.attributes.reset();
@@ -216,19 +210,13 @@ TEST(AttributedScore, SinglePointShapesAreSymmetricAndBounded) {
 
 TEST(AttributedScore, StaysFiniteForExtremeNumbers) {
     Random random(14);
-    const std::array<double, 5> lengths = {1e-30, 1e-7, 1.0, 1e3, 1e18};
     for (int round = 0; round < 1000; ++round) {
         const auto extreme = [&] {
             Signature s = randomAttributed(random, 5);
-            const float length = static_cast<float>(lengths[random.below(lengths.size())]);
-            const float weight = static_cast<float>(std::pow(10.0, random.uniform(-30, 30)));
+            const float length = makeExtreme(s, random, 1e18);
             for (WeightedPoint& p : s.points) {
-                for (float& x : p.position) x *= length;
                 for (float& x : p.covariance) x *= length * length;
-                p.weight *= weight;
             }
-            while (!s.points.empty() && !(s.points.back().weight > 0.0f)) s.points.pop_back();
-            s.scale = std::pow(10.0, random.uniform(-40, 40));
             if (!s.points.empty()) testing_support::updateBody(s);
             return s;
         };
