@@ -8,4 +8,4 @@ cd "$(dirname "$0")/.."
 scripts/install-deps.sh
 scripts/ci/lint.sh
 scripts/build.sh dev
-ctest --test-dir "${BUILD_DIR:-build}" --output-on-failure --timeout 600 -j "$(nproc)" "$@"
+ctest --test-dir "${BUILD_DIR:-build}" --output-on-failure --no-label-summary --timeout 600 -j "$(nproc)" "$@"
