@@ -23,18 +23,21 @@ double facetCosine(const PointCloud& points, const Tetrahedra& tetrahedra, std::
     const Point3& shared = points[vertices[(facet + 1) % 4]];
     const Point3 here = tetrahedra.circumcentres[tetrahedron] - shared;
     const std::uint32_t next = tetrahedra.neighbours[tetrahedron][facet];
+    // The centre of the infinite ball lies in the direction of the facet's normal.
     const double cosine =
         next == kNoTetrahedron
             ? dot(outwardNormal(points, vertices, facet), here) / tetrahedra.circumradii[tetrahedron]
             : dot(here, tetrahedra.circumcentres[next] - shared) /
                   (tetrahedra.circumradii[tetrahedron] * tetrahedra.circumradii[next]);
+    // Rounding can take it past 1, where acos has no value.
     return std::clamp(cosine, -1.0, 1.0);
 }
 
 Result<std::vector<double>> bottleneckAngles(const PointCloud& points, const Tetrahedra& tetrahedra,
                                              const std::vector<std::uint8_t>& big,
                                              const RunContext& context) {
-    // Dijkstra, with the largest edge of a path as its length. Edges are -cosine, which grows with the angle.
+    // Dijkstra, with the largest edge of a path as its length: like a sum, it never falls as the path goes
+    // on. Edges are -cosine, which grows with the angle, so that acos is taken of the results only.
     using Reached = std::pair<double, std::uint32_t>;
     constexpr double kUnreached = std::numeric_limits<double>::infinity();
     std::vector<double> best(tetrahedra.size(), kUnreached);
@@ -57,6 +60,7 @@ Result<std::vector<double>> bottleneckAngles(const PointCloud& points, const Tet
         }
         const auto [value, t] = queue.top();
         queue.pop();
+        // Left over from before a better path to t was found: the queue has no way to lower an entry.
         if (value > best[t]) continue;
         for (std::size_t facet = 0; facet < 4; ++facet) {
             const std::uint32_t next = tetrahedra.neighbours[t][facet];

@@ -27,6 +27,8 @@ double saddleRadiusAt(const PointCloud& points, const Tetrahedra& tetrahedra,
                       const std::vector<std::uint8_t>& flow, std::uint32_t t, std::size_t facet) {
     const std::uint32_t next = tetrahedra.neighbours[t][facet];
     const double smaller = std::min(tetrahedra.circumradii[t], tetrahedra.circumradii[next]);
+    // Flow through the facet, either way, means that both centres lie on the same side of it. Then the radius
+    // rises or falls all along the edge.
     if (((flow[t] >> facet) & 1u) != 0 || flowsTowards(tetrahedra, flow, next, t)) return smaller;
     return std::min(smaller, circumradiusOf(facetCorners(points, tetrahedra.vertices[t], facet)));
 }

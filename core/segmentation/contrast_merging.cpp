@@ -21,7 +21,8 @@ constexpr std::size_t kStepsBetweenCheckpoints = 4096;
 // A group's pairs are updated when its radius has moved by this share of itself.
 constexpr double kRadiusDrift = 1e-3;
 
-// Weight of a flat segment, as a share of all volume: weights must not be 0.
+// Weight of a flat segment, as a share of all volume. Weights must not be 0, since they divide, and each must
+// change any sum it enters: absorbLight knows outdated entries by their weights.
 constexpr double kLeastWeight = 1e-12;
 
 // The growing groups: radii, weights, and the saddle radii to their neighbours.
@@ -64,8 +65,9 @@ class Groups {
 
     std::uint32_t groupOf(std::uint32_t i) { return sets_.find(i); }
 
-    // Joins two groups that touch. The one with fewer neighbours (or else less weight) goes into the other.
-    // Returns the remaining group, and its new neighbours with their saddle radii.
+    // Joins two groups that touch. The one with fewer neighbours (or else less weight, or else the higher
+    // index) goes into the other, so that few neighbours have to be moved. Returns the remaining group, and
+    // its new neighbours with their saddle radii.
     std::pair<std::uint32_t, Saddles> join(std::uint32_t a, std::uint32_t b) {
         if (std::make_tuple(saddles_[a].size(), weight_[a], b) <
             std::make_tuple(saddles_[b].size(), weight_[b], a)) {
@@ -78,6 +80,8 @@ class Groups {
         sets_.absorb(a, b);
         Saddles moved;
         saddles_[a].erase(b);
+        // The order of a hash map makes no difference here or in the callers: each neighbour is handled apart
+        // from the others, and the queues have a total order.
         for (const auto& [next, saddleRadius] : saddles_[b]) {
             if (next == a) continue;
             saddles_[next].erase(b);
@@ -93,6 +97,8 @@ class Groups {
   private:
     DisjointSets sets_;
     std::vector<double> weight_;
+    // Means are taken of logarithms, since contrasts are ratios; the radii themselves save a call of exp for
+    // every contrast.
     std::vector<double> logRadius_;
     std::vector<double> radius_;
     std::vector<std::unordered_map<std::uint32_t, double>> saddles_;
@@ -110,6 +116,8 @@ struct Candidate {
     }
 };
 
+// Pairs that are most alike merge first. So a limb of many maxima becomes one group before it is compared
+// with the body, and a limb much thinner than the body stays separate however wide its root.
 Result<void> mergeAlike(Groups& groups, double limit, const RunContext& context) {
     std::priority_queue<Candidate> queue;
     const auto consider = [&](std::uint32_t a, std::uint32_t b, double saddleRadius) {
@@ -130,7 +138,11 @@ Result<void> mergeAlike(Groups& groups, double limit, const RunContext& context)
         const Candidate best = queue.top();
         queue.pop();
         if (!groups.isGroup(best.a) || !groups.isGroup(best.b)) continue;
+        // Groups that touch once go on touching, so the entry exists.
         const double saddleRadius = groups.neighbours(best.a).at(best.b);
+        // Entries stay in the queue when groups grow. Where the contrast has risen since, the pair goes back
+        // to wait for its turn. Where it has fallen by more than the drift allows, a newer entry came up
+        // before this.
         if (groups.contrast(best.a, best.b, saddleRadius) > best.contrast) {
             consider(best.a, best.b, saddleRadius);
             continue;
@@ -159,7 +171,8 @@ std::uint32_t widestNeighbour(const Groups& groups, std::uint32_t group) {
 }
 
 Result<void> absorbLight(Groups& groups, const ContrastMerging& options, const RunContext& context) {
-    // Only groups that touch another: a separate lump can join none, and does not count towards the limit.
+    // Only groups that touch another: a separate lump can join none, and does not count towards the limit. A
+    // Candidate is one group here, with its weight as the contrast.
     std::priority_queue<Candidate> lightest;
     for (std::uint32_t i = 0; i < groups.size(); ++i) {
         if (!groups.neighbours(i).empty()) lightest.push({groups.weight(i), i, 0});
@@ -172,8 +185,10 @@ Result<void> absorbLight(Groups& groups, const ContrastMerging& options, const R
         }
         const Candidate light = lightest.top();
         lightest.pop();
+        // Weights only grow, so an entry with another weight is outdated.
         if (!groups.isGroup(light.a) || groups.weight(light.a) != light.contrast) continue;
         const bool tooMany = options.maxSegments > 0 && left > options.maxSegments;
+        // All others are at least as heavy.
         if (light.contrast >= least && !tooMany) break;
         const std::uint32_t joined = groups.join(light.a, widestNeighbour(groups, light.a)).first;
         --left;

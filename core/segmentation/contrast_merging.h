@@ -33,10 +33,8 @@ struct ContrastMerging {
 /// The radius of a group is the geometric mean of its segments' radii, weighted by volume. The contrast of
 /// two groups is the larger of their radii over the smallest of both radii and their saddle radius. Pairs
 /// merge in ascending order of contrast, which is updated as groups grow (once a radius has moved by a
-/// thousandth), until every pair is above `options.contrast`. So a limb of many maxima becomes one group
-/// before it is compared with the body, and a limb much thinner than the body stays separate however wide its
-/// root. Then light groups, and the lightest of too many, join the neighbour with the largest saddle radius;
-/// groups that touch no other stay, however light.
+/// thousandth), until every pair is above `options.contrast`. Then light groups, and the lightest of too
+/// many, join the neighbour with the largest saddle radius; groups that touch no other stay, however light.
 ///
 /// Errors: kCancelled, kDeadlineExceeded.
 [[nodiscard]] Result<std::vector<std::uint32_t>> mergeByContrast(const SegmentGraph& graph,

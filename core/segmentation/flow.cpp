@@ -41,12 +41,14 @@ FlowMasks approximateFlowMasks(const Vec3x2& a, const Vec3x2& b, const Vec3x2& c
     const Double2 size = toA * toB * toC;
     const Vec3x2 g =
         (Double2(0.5) / sixVolumes) * (squaredLength(a) * bc + squaredLength(b) * ca + squaredLength(c) * ab);
+    // Barycentric coordinates times the six-fold volume: where that is positive, the signs are the same.
     const Double2 second = dot(g, bc);
     const Double2 third = dot(g, ca);
     const Double2 fourth = dot(g, ab);
     const std::array<Double2, 4> coordinates = {sixVolumes - second - third - fourth, second, third, fourth};
     const Double2 reach = lengthAtMost(g) * (lengthAtMost(bc) + toA * (toB + toC)) + sixVolumes;
     const Double2 margin = Double2(kRounding) * reach * (size / sixVolumes);
+    // Fails for a volume that rounding made zero or negative, too: nothing above means anything then.
     FlowMasks masks{{0, 0}, less(Double2(kLeastShare) * size, sixVolumes)};
     for (unsigned i = 0; i < 4; ++i) {
         masks.sure &= less(margin, abs(coordinates[i]));
@@ -57,7 +59,8 @@ FlowMasks approximateFlowMasks(const Vec3x2& a, const Vec3x2& b, const Vec3x2& c
     return masks;
 }
 
-// Computes the masks of two tetrahedra, which may be the same.
+// Computes the masks of two tetrahedra, which may be the same. Two neighbours that each took the other for
+// downstream would make a cycle, so what rounding leaves open is decided exactly.
 void maskTwo(const PointCloud& points, const Tetrahedra& tetrahedra, const std::array<std::uint32_t, 2>& two,
              std::vector<std::uint8_t>& masks) {
     const auto& v = tetrahedra.vertices[two[0]];

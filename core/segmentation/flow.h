@@ -13,8 +13,7 @@ namespace shapedb {
 
 /// Per tetrahedron a mask whose bit i is set when it flows through facet i: when its circumcentre lies
 /// strictly beyond that facet's plane. At most two bits are set; none at a maximum, whose circumcentre lies
-/// in its own tetrahedron. Exact, so the flow has no cycles: what double precision cannot decide is decided
-/// with rational numbers. Tetrahedra without `wanted` get 0.
+/// in its own tetrahedron. Exact, so the flow has no cycles. Tetrahedra without `wanted` get 0.
 ///
 /// Precondition: coordinates in [-1, 1], as `sanitise` returns them. Errors: kCancelled, kDeadlineExceeded.
 [[nodiscard]] Result<std::vector<std::uint8_t>> flowMasks(const PointCloud& points,

@@ -44,6 +44,7 @@ std::vector<Bond> collectBonds(const PointCloud& points, const Tetrahedra& tetra
     for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
         for (std::size_t facet = 0; facet < 4; ++facet) {
             const std::uint32_t next = tetrahedra.neighbours[t][facet];
+            // Each facet once, from the tetrahedron with the lower index.
             if (next != kNoTetrahedron && next < t) continue;
             const double cosine = facetCosine(points, tetrahedra, t, facet);
             bonds.push_back({t, next, std::exp(kBondDecay * (cosine - 1.0))});
@@ -56,6 +57,10 @@ std::vector<Bond> collectBonds(const PointCloud& points, const Tetrahedra& tetra
     return bonds;
 }
 
+// The quadratic form of Kolluri and others is the sum of |s| (x_a - sign(s) x_b)^2 over all bonds of strength
+// s. With the outside held fixed, its minimum solves a linear system instead of an eigenvalue problem: |s|
+// goes to the diagonal and -s beside it. The matrix is symmetric and diagonally dominant and, with the
+// anchor, positive definite, as conjugate gradients require.
 System assemble(std::size_t unknowns, const std::vector<Bond>& bonds) {
     System system;
     system.begin.assign(unknowns + 1, 0);
@@ -95,7 +100,8 @@ void multiply(const System& system, const std::vector<double>& x, std::vector<do
     }
 }
 
-// Conjugate gradients, preconditioned by the diagonal.
+// Conjugate gradients, preconditioned by the diagonal. On one thread, since sums added up in another order
+// would have other bits.
 Result<std::vector<double>> solve(const System& system, const RunContext& context) {
     const std::size_t n = system.diagonal.size();
     std::vector<double> x(n, 0.0);
@@ -154,6 +160,7 @@ std::vector<Poles> findPoles(const PointCloud& points, const Tetrahedra& tetrahe
                 first = t;
         }
     }
+    // On the hull the half space outside is larger than any ball.
     for (std::size_t p = 0; p < points.size(); ++p) {
         if (onHull[p]) {
             poles[p].first = kNoTetrahedron;
@@ -166,6 +173,8 @@ std::vector<Poles> findPoles(const PointCloud& points, const Tetrahedra& tetrahe
             std::uint32_t& second = poles[corner].second;
             if (second != kNoTetrahedron && tetrahedra.circumradii[t] <= tetrahedra.circumradii[second])
                 continue;
+            // Needs the final directions outwards, hence a pass of its own. Of equal balls the first counts,
+            // as above.
             if (dot(outwards[corner], tetrahedra.circumcentres[t] - points[corner]) < 0.0) second = t;
         }
     }

@@ -28,8 +28,6 @@ struct Poles {
 /// cavity flips the sign twice.
 ///
 /// After Kolluri, Shewchuk and O'Brien, "Spectral Surface Reconstruction from Noisy Point Clouds" (2004).
-/// With the outside held fixed, the minimum of their quadratic form solves a linear system instead of an
-/// eigenvalue problem; we use conjugate gradients.
 ///
 /// Errors: kCancelled, kDeadlineExceeded.
 [[nodiscard]] Result<std::vector<double>> insidePotential(const PointCloud& points,

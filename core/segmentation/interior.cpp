@@ -20,6 +20,8 @@ bool opensToOutside(const PointCloud& points, const Tetrahedra& tetrahedra, std:
     const TriangleCorners corners = facetCorners(points, tetrahedra.vertices[t], facet);
     const Point3 apex = points[tetrahedra.vertices[t][facet]];
     const Point3 normal = cross(corners[1] - corners[0], corners[2] - corners[0]);
+    // facetCorners turns one way or the other, depending on the facet, so the apex tells which side is
+    // inside.
     const double inwards = dot(normal, apex - corners[0]) >= 0.0 ? 1.0 : -1.0;
     const Point3 toCentre = tetrahedra.circumcentres[t] - corners[0];
     // sin(angle) = r_facet / r_ball, so cos(angle) = distance of the centre from the plane / r_ball.
@@ -34,6 +36,7 @@ std::vector<std::uint8_t> bigBalls(const Tetrahedra& tetrahedra, const std::vect
     std::vector<std::uint8_t> big(tetrahedra.size());
     for (std::size_t t = 0; t < tetrahedra.size(); ++t) {
         const auto& v = tetrahedra.vertices[t];
+        // We read the paper's "any of p_i" as "at least one of them", so the smallest spacing decides.
         const double smallest = std::min({spacings[v[0]], spacings[v[1]], spacings[v[2]], spacings[v[3]]});
         big[t] = tetrahedra.circumradii[t] > bigBallRatio * smallest ? 1 : 0;
     }
@@ -67,7 +70,7 @@ class DeepAngle {
     }
 
   private:
-    // Rounding moves the squares by less, since no angle is near 0 or 90 degrees.
+    // Rounding moves the squares by less unless the angle is within 1e-4 degrees of 90.
     static constexpr double kCosineSlack = 1e-9;
     double angle_;
     double squaredCosine_;
@@ -95,6 +98,7 @@ Result<void> walkFrom(std::vector<std::uint32_t> layer, const PointCloud& points
             const std::uint32_t t = layer[i];
             for (std::size_t facet = 0; facet < 4; ++facet) {
                 const std::uint32_t next = tetrahedra.neighbours[t][facet];
+                // Not inside: reached before, or not big. So small balls stop the walk.
                 if (next == kNoTetrahedron || !inside[next]) continue;
                 const Point3& shared = points[tetrahedra.vertices[t][(facet + 1) % 4]];
                 if (!deep.between(tetrahedra.circumcentres[t], tetrahedra.circumcentres[next], shared))
@@ -116,6 +120,7 @@ Result<std::vector<std::uint8_t>> interiorTetrahedra(const PointCloud& points, c
                                                      const RunContext& context) {
     const DeepAngle deep(toRadians(options.deepAngleDegrees));
     const double cosHullAngle = std::cos(toRadians(options.hullAngleDegrees));
+    // A ball that is not big counts as outside, and the walk takes away from the others what it reaches.
     std::vector<std::uint8_t> inside = big;
     std::vector<std::uint32_t> layer;
     for (std::size_t t = 0; t < tetrahedra.size(); ++t) {

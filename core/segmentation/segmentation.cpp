@@ -44,6 +44,7 @@ class StageClock {
         return context_.checkpoint();
     }
     void end() {
+        // A stage that has ended keeps its time.
         if (!stages_.empty() && stages_.back().seconds == 0.0) stages_.back().seconds = secondsSince(begun_);
     }
     double lastSeconds() const { return stages_.back().seconds; }
@@ -64,6 +65,7 @@ struct Moments {
     std::array<Double2, 3> second = {0.0, 0.0, 0.0};  // xx, xy, xz, yy, yz, zz
 
     void add(const TetrahedronCorners& p) {
+        // Rounding may give a flat tetrahedron a negative volume.
         const double v = std::max(0.0, signedVolume(p));
         const Point3 sum = p[0] + p[1] + p[2] + p[3];
         volume += v;
@@ -164,7 +166,8 @@ std::vector<std::uint8_t> onHull(std::size_t siteCount, const Tetrahedra& tetrah
     return on;
 }
 
-// Size of the interior, in the unit of the sites. When it touches every site on the hull, these suffice.
+// Size of the interior, in the unit of the sites. When it touches every site on the hull, these suffice: they
+// have the same hull as all of them, so the same boxes hold them.
 Result<double> interiorSize(const PointCloud& sites, const std::vector<std::int32_t>& siteLabels,
                             const Tetrahedra& tetrahedra) {
     const std::vector<std::uint8_t> on = onHull(sites.size(), tetrahedra);
@@ -286,6 +289,7 @@ Result<Segmentation> segmentOrThrow(const PointCloud& points, const Segmentation
     for (const std::uint32_t site : result.siteOfPoint) {
         result.pointSegment.push_back(site == kNoSite ? -1 : siteLabels[site]);
     }
+    // All of the above is in the unit frame.
     toScanUnits(prepared->frame, std::move(prepared->sites), result);
     clock.end();
     result.totalSeconds = clock.totalSeconds();

@@ -57,8 +57,10 @@ class Downstream {
         path_.clear();
         for (;;) {
             const auto& neighbours = tetrahedra_.neighbours[t];
+            // Not 0, since a maximum has its label from the start.
             const unsigned way = flow_[t];
             const std::uint32_t first = neighbours[lowestBit(way)];
+            // The same as the first where only one bit is set.
             const std::uint32_t second = neighbours[lowestBit(way & (way - 1) ? way & (way - 1) : way)];
             const std::int32_t a = labelOf(first);
             const std::int32_t b = labelOf(second);
@@ -88,6 +90,7 @@ class Downstream {
     const Tetrahedra& tetrahedra_;
     const std::vector<std::uint8_t>& flow_;
     std::vector<std::int32_t>& labels_;
+    // Instead of recursion: a path can be too long for the call stack.
     std::vector<std::uint32_t> path_;
 };
 
@@ -102,6 +105,7 @@ std::int32_t labelOfLargestNeighbour(const Tetrahedra& tetrahedra, const Segment
         const std::int32_t other = labels.ofTetrahedron[there];
         const std::int64_t none = other < 0 ? -1 : 0;
         const std::int64_t radius = static_cast<std::int64_t>(orderOf(tetrahedra.circumradii[there])) | none;
+        // Of equal balls the first counts. The order of facets is canonical (delaunay.h).
         label = radius > largest ? other : label;
         largest = radius > largest ? radius : largest;
     }
@@ -148,6 +152,7 @@ class Growth {
     // Labels the layer; its unlabelled neighbours are the next candidates.
     void expand() {
         following_.clear();
+        // All labels first: no tetrahedron of this layer may become a candidate for the next.
         for (std::size_t i = 0; i < layer_.size(); ++i)
             labels_.ofTetrahedron[layer_[i].tetrahedron] = layer_[i].label;
         for (std::size_t i = 0; i < layer_.size(); ++i) {
@@ -176,7 +181,8 @@ class Growth {
     std::vector<std::uint32_t> following_;
 };
 
-// Leftovers that no label reached: one segment per connected group, around its largest ball.
+// Leftovers that no label reached: one segment per connected group, around its largest ball, which is the
+// first of the group to come up.
 void labelIslands(const Tetrahedra& tetrahedra, std::vector<std::uint32_t> leftovers, SegmentLabels& labels) {
     const auto labelled = [&](std::uint32_t t) { return labels.ofTetrahedron[t] >= 0; };
     leftovers.erase(std::remove_if(leftovers.begin(), leftovers.end(), labelled), leftovers.end());
@@ -254,6 +260,7 @@ SegmentLabels mergeSegments(const PointCloud& points, const Tetrahedra& tetrahed
                                            maximumRadii[static_cast<std::size_t>(other)]);
             const auto a = static_cast<std::uint32_t>(mine);
             const auto b = static_cast<std::uint32_t>(other);
+            // Segments in one set already need no circle.
             if (higher > most || sets.find(a) == sets.find(b)) continue;
             const double circle = circumradiusOf(facetCorners(points, tetrahedra.vertices[t], facet));
             if (higher <= mergeRatio * circle) sets.unite(a, b);
