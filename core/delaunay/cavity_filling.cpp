@@ -45,8 +45,7 @@ bool BowyerWatson::takeNewCells() {
 //
 // Pre:  takeNewCells returned true.
 // Post: a new cell has the vertices of its inner cell, with the inserted one instead of the vertex opposite
-// the
-//       facet; the orientation stays positive, since p is on the same side of the facet. It and the outer
+//       the facet; the orientation stays positive, since p is on the same side of the facet. It and the outer
 //       cell are neighbours. Its other three neighbours are not set. The cells of the cavity are as they
 //       were.
 //
@@ -256,8 +255,7 @@ void BowyerWatson::computeBalls(const Site& p) {
 
 // Pre:  findCavity returned true.
 // Post: if true, the site is a vertex of the triangulation, the cells of the cavity are free, and `hint_` is
-// a
-//       new cell. If false, the store is full and the triangulation is unchanged, the cavity still marked.
+//       a new cell. If false, the store is full and the triangulation is unchanged, the cavity still marked.
 template <bool kSerial>
 bool BowyerWatson::fillCavity(std::uint32_t vertex) {
     if (!takeNewCells()) return false;

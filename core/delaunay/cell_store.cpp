@@ -18,6 +18,8 @@ void CellStore::reserve(std::size_t capacity) {
 std::uint32_t CellStore::take(std::uint32_t count) {
     const std::size_t first = used_.fetch_add(count, std::memory_order_relaxed);
     if (first + count <= capacity_) return static_cast<std::uint32_t>(first);
+    // Until this is undone, other claims may fail although there is room, which only postpones their points.
+    // No cell is given out twice: a claim that fails leaves the count above the capacity.
     used_.fetch_sub(count, std::memory_order_relaxed);
     return kNoCell;
 }

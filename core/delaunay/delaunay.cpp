@@ -121,6 +121,7 @@ Result<LargeVector<std::uint32_t>> sortedCells(CellStore& cells, std::size_t sit
     LowestVertices lowest(parts, siteCount);
     auto done = parallelForParts(cells.used(), parts, context,
                                  [&](std::size_t part, std::size_t from, std::size_t to) {
+                                     // The memory is uninitialised, and cleared here by all threads at once.
                                      lowest.clear(part);
                                      for (std::size_t c = from; c < to; ++c) {
                                          Cell& cell = cells[static_cast<std::uint32_t>(c)];
@@ -134,6 +135,7 @@ Result<LargeVector<std::uint32_t>> sortedCells(CellStore& cells, std::size_t sit
     RETURN_IF_ERROR(done);
     const LargeVector<std::uint32_t> begin = lowest.toPlaces();
     LargeVector<std::uint32_t> sorted(begin.back());
+    // The same parts as above: each fills the places that it counted.
     done = parallelForParts(cells.used(), parts, context,
                             [&](std::size_t part, std::size_t from, std::size_t to) {
                                 for (std::size_t c = from; c < to; ++c) {
@@ -175,6 +177,7 @@ Result<Tetrahedra> flatten(CellStore& cells, const std::vector<std::uint32_t>& o
     const LargeVector<std::uint32_t>& cellOf = *sorted;
     Tetrahedra flat;
     {
+        // 32 bytes a tetrahedron, like the balls whose pages these take over.
         PageRecycler balls = cells.recycleBalls();
         flat.vertices = balls.makeVector<Corners>(cellOf.size());
         flat.neighbours = balls.makeVector<Corners>(cellOf.size());
@@ -209,6 +212,7 @@ void computeTwoBalls(const PointCloud& points, Tetrahedra& flat, std::size_t t, 
         centre = Vec3x2((tooFlat & 1u) != 0 ? exactCircumcentre(cornersOf(points, v)) : centre.low(),
                         (tooFlat & 2u) != 0 ? exactCircumcentre(cornersOf(points, w)) : centre.high());
     }
+    // From the centre as rounded, to be consistent with it.
     const Double2 radius = length(centre - first);
     flat.circumcentres[t] = centre.low();
     flat.circumcentres[u] = centre.high();
@@ -218,6 +222,7 @@ void computeTwoBalls(const PointCloud& points, Tetrahedra& flat, std::size_t t, 
 
 Result<void> computeBalls(const PointCloud& points, Tetrahedra& flat, PageRecycler pages,
                           const RunContext& context) {
+    // 32 bytes a tetrahedron, like the cells.
     flat.circumcentres = pages.makeVector<Point3>(flat.size());
     flat.circumradii = pages.makeVector<double>(flat.size());
     return parallelFor(flat.size(), kBlock, context, [&](std::size_t from, std::size_t to) {
@@ -243,6 +248,7 @@ Result<Tetrahedra> triangulateInOrder(const PointCloud& points, const std::vecto
     });
     RETURN_IF_ERROR(placed);
     if (auto done = buildTriangulation(sites, cells, threadsOfArena(), context); !done) {
+        // A flat cloud is turned down before insertion, which is what finds duplicates.
         if (done.error().code == ErrorCode::kCollinear || done.error().code == ErrorCode::kCoplanar) {
             RETURN_IF_ERROR(checkDistinct(points));
         }

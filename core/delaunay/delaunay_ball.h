@@ -39,7 +39,7 @@ struct Offset {
 }
 
 /// What ballsContain compares is off by less than a fifth of this share of the squares compared; the proof is
-/// at ballsThrough.
+/// in ballsThrough.
 constexpr double kBallMargin = 1e-8;
 
 /// What two balls say about a point, bit 0 for the first and bit 1 for the second.
@@ -78,20 +78,16 @@ struct Offsets2 {
 
 /// Two balls: each has p, and the three points at its offsets from p, on its sphere. A ball that would not be
 /// accurate enough gets kNoBall as its radius.
-///
-/// Proof of the margin. Let u = 2^-53, a, b, c the offsets from p, R the radius and S = |a| |b| |c|.
-///  - A cross product is off by at most 6 u |b| |c|, so the determinant by 12 u S, and the centre as seen
-///  from p,
-///    since no offset is longer than 2 R, by (40 u S / det + 12 u S / det) R. `accurate` demands S / det <
-///    1e5, which makes that 6e-10 R.
-///  - Adding p rounds each coordinate of the centre by u times its size. `accurate` demands R > 1e-6 max
-///  |p_i|,
-///    so that size is at most about 1e6 R, and the centre moves by 2e-10 R.
-///  - A centre off by d moves what ballsContain compares, for a point q, by at most 2 |p - q| d, less than
-///  2e-9
-///    of the sum of the squares: a fifth of kBallMargin.
-/// The bound on the determinant itself keeps all of this clear of underflow.
 inline void ballsThrough(const Site& p, const Offsets2& w, DelaunayBall& first, DelaunayBall& second) {
+    // Proof of the margin. Let u = 2^-53, a, b, c the offsets from p, R the radius and S = |a| |b| |c|.
+    //  - A cross product is off by at most 6 u |b| |c|, so the determinant by 12 u S, and the centre as seen
+    //    from p, since no offset is longer than 2 R, by (40 u S / det + 12 u S / det) R. `accurate` demands
+    //    S / det < 1e5, which makes that 6e-10 R.
+    //  - Adding p rounds each coordinate of the centre by u times its size. `accurate` demands
+    //    R > 1e-6 max |p_i|, so that size is at most about 1e6 R, and the centre moves by 2e-10 R.
+    //  - A centre off by d moves what ballsContain compares, for a point q, by at most 2 |p - q| d, less than
+    //    2e-9 of the sum of the squares: a fifth of kBallMargin.
+    // The bound on the determinant itself keeps all of this clear of underflow.
     constexpr double kMinSquaredFlatness = 1e-10;
     constexpr double kMinSquaredDeterminant = 1e-200;
     constexpr double kMinSquaredNearness = 1e-12;

@@ -18,6 +18,7 @@ namespace {
 // Cells to reserve for each point. A scan has six or seven; where there are more, the store grows.
 constexpr std::size_t kCellsPerPoint = 8;
 constexpr std::size_t kSpareCells = 4096;
+// Below kNoCell and kFreeCell.
 constexpr std::size_t kMaxCells = 0xfffffff0u;
 
 // After each round there are 2^kRoundShift times as many points as before it.
@@ -141,6 +142,7 @@ Result<void> Builder::makeFirstCells(const std::vector<std::uint32_t>& order) {
     first_ = {order[0], order[b], order[c], order[d]};
     if (orientation(site(0), site(b), site(c), site(d)) < 0) std::swap(first_[0], first_[1]);
     done_ = 4;
+    // There is room: kSpareCells.
     const std::uint32_t inner = cells_.take(5);
     for (std::uint32_t i = 0; i < 5; ++i) cells_.ball(inner + i).squaredRadius = kNoBall;
     cells_[inner] = {first_, {inner + 1, inner + 2, inner + 3, inner + 4}};
@@ -185,6 +187,7 @@ Result<void> Builder::insertSerially(const std::vector<std::uint32_t>& list) {
                 return fail(ErrorCode::kOutOfMemory,
                             "the Delaunay triangulation needs more than 4e9 tetrahedra");
             }
+            // By half, so that all copying together is linear.
             cells_.reserve(std::min(kMaxCells, cells_.capacity() + cells_.capacity() / 2));
             outcome = inserter.insert(list[i]);
         }
@@ -204,12 +207,14 @@ std::uint32_t Builder::anyCell() const {
 
 // Inserts what the workers can insert independently of each other; the rest stays in `list`.
 Result<void> Builder::insertInParallel(std::vector<std::uint32_t>& list) {
+    // Workers cannot grow the store, because that moves the cells from under the others.
     cells_.reserve(std::min(kMaxCells, cells_.used() + kCellsPerPoint * list.size() + kSpareCells));
     RETURN_IF_ERROR(parallel_.insert(list, free_));
     for (int side = 0; side < 2 && list.size() >= threads_ * limits_.minPerThread / kPendingFraction;
          ++side) {
         RETURN_IF_ERROR(parallel_.insertPending(list, free_));
     }
+    // The cell of the last walk may be gone.
     last_ = anyCell();
     return {};
 }

@@ -49,7 +49,10 @@ LargeVector<KeyedIndex> keysOf(const PointCloud& points) {
     }
     const double extent = std::max({high.x - low.x, high.y - low.y, high.z - low.z});
     const double last = (1u << kBits) - 1;
+    // The extent of finite points may overflow. Then all of them lie in one step, in the order of their
+    // indices.
     const double steps = extent > 0.0 && std::isfinite(extent) ? last / extent : 0.0;
+    // Rounding may take the farthest point a step too far.
     const auto step = [=](double v) { return static_cast<std::uint32_t>(std::min(last, v * steps)); };
     LargeVector<KeyedIndex> keyed(points.size());
     // Cannot fail: the default context never cancels.

@@ -1,8 +1,7 @@
 // A parallel round has three phases. Only the second inserts.
 //
 //   1. Alone: choose slabs, write down which worker owns each site (and thereby each cell), mark the cells
-//   whose
-//      vertices all have one owner, collect start cells.
+//      whose vertices all have one owner, collect start cells.
 //   2. Side by side: each worker runs through the whole list and inserts its own sites. Ownership does not
 //      change in this phase; ownership.h says why workers do not disturb each other.
 //   3. Alone: gather what the workers postponed and the cells they no longer use.
@@ -44,7 +43,7 @@ struct ParallelInsertion::Worker {
 // ---- Phase 1: who owns what ------------------------------------------------------------------------------
 
 // Slabs with equal numbers of sites of the list, across the axis along which these extend farthest, among
-// those not cut yet.
+// those not cut yet: the longer the axis, the smaller the borders.
 ParallelInsertion::Slabs ParallelInsertion::makeSlabs(const std::vector<std::uint32_t>& list) const {
     const std::size_t step = std::max<std::size_t>(1, list.size() / kSample);
     Slabs slabs;
@@ -101,7 +100,8 @@ Result<void> ParallelInsertion::markSolelyOwned() {
     });
 }
 
-// Gives each worker a few start cells for each slot, from an even sample of the store.
+// Gives each worker its start cells, from an even sample of the store: about four cells for each slot, of
+// which the last stays.
 // Pre: assignOwners. Post: every start cell is in use and owned by its worker.
 void ParallelInsertion::addStarts(std::vector<Worker>& workers) const {
     const std::size_t step = std::max<std::size_t>(1, cells_.used() / (4 * StartCells::kSlots));
@@ -147,6 +147,7 @@ void ParallelInsertion::work(const std::vector<std::uint32_t>& list, Worker& wor
         if (++count % kInsertsBetweenCheckpoints == 0) {
             done_ += kInsertsBetweenCheckpoints;
             if (auto go = context_.checkpoint(); !go) {
+                // The free cells are not handed back, for after an error the triangulation is of no use.
                 worker.error = go.error();
                 return;
             }

@@ -13,9 +13,9 @@
 
 namespace shapedb {
 
-/// Cuts space into one slab for each worker, across its longest side, so that borders are small. Each worker
-/// inserts the sites of its slab and obeys the rules of Ownership; sites whose cavities reach across a border
-/// stay behind. Borders move from round to round, so that workers finish at about the same time.
+/// Cuts space into one slab for each worker. Each worker inserts the sites of its slab and obeys the rules of
+/// Ownership; sites whose cavities reach across a border stay behind. Borders move from round to round, so
+/// that workers finish at about the same time.
 ///
 /// The clock decides where borders lie, and so which sites stay behind and where cells lie in the store. The
 /// set of cells does not depend on any of that.

@@ -38,9 +38,11 @@ inline double min3(double a, double b, double c) { return std::min(std::min(a, b
 [[nodiscard]] int perturbedSideOfSphere(const Site& a, const Site& b, const Site& c, const Site& d,
                                         const Site& p);
 
-/// The sign of det(b - a, c - a, d - a): 1, 0 or -1. The error bounds here and below are those of CGAL's
-/// semi-static filters (Melquiond and Pion, "Formally certified floating-point filters for homogeneous
-/// geometric predicates", 2007). They hold for exactly this order of operations.
+// The error bounds of both filters are those of CGAL's semi-static ones (Melquiond and Pion, "Formally
+// certified floating-point filters for homogeneous geometric predicates", 2007). They hold for exactly this
+// order of operations.
+
+/// The sign of det(b - a, c - a, d - a): 1, 0 or -1.
 [[nodiscard]] inline int orientation(const Site& a, const Site& b, const Site& c, const Site& d) {
     const double bx = b.x - a.x, by = b.y - a.y, bz = b.z - a.z;
     const double cx = c.x - a.x, cy = c.y - a.y, cz = c.z - a.z;
