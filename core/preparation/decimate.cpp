@@ -37,7 +37,8 @@ std::vector<CellAndPoint> sortedByCell(const PointCloud& points, double cell) {
     return keyed;
 }
 
-// Number of occupied cells, by a hash table with linear probing.
+// Number of occupied cells, by a hash table with linear probing: the search for a cell size needs it many
+// times, and sorting all points each time would be slower.
 std::size_t countCells(const PointCloud& points, double cell) {
     constexpr std::uint64_t kFree = ~std::uint64_t{0};
     std::vector<std::uint64_t> table(1 << 12, kFree);
@@ -65,6 +66,7 @@ std::size_t countCells(const PointCloud& points, double cell) {
 }
 
 DecimatedPoints averageCells(const PointCloud& points, const std::vector<CellAndPoint>& keyed, double cell) {
+    // Within a cell the points come by index, so sums have a fixed order.
     PointCloud means;
     std::vector<std::uint32_t> cellOfPoint(points.size());
     for (std::size_t begin = 0; begin < keyed.size();) {
@@ -77,6 +79,7 @@ DecimatedPoints averageCells(const PointCloud& points, const std::vector<CellAnd
         means.push_back((1.0 / static_cast<double>(end - begin)) * sum);
         begin = end;
     }
+    // Puts the means in lexicographic order; on a common border of two cells they may be equal.
     MergedPoints merged = mergeDuplicates(means);
     for (std::uint32_t& site : cellOfPoint) site = merged.siteOfPoint[site];
     return {std::move(merged.points), std::move(cellOfPoint), cell};
@@ -109,6 +112,7 @@ Result<DecimatedPoints> decimateOrThrow(const PointCloud& points, std::size_t ta
         // hardly depends on the size and such steps creep, so after a few every other one bisects.
         const double guess = cell * std::sqrt(share / 0.96);
         const bool bisect = step >= kSecantSteps && step % 2 == 0;
+        // Bisects the logarithm: cell sizes span six decades.
         cell = !bisect && guess > fine && guess < coarse ? guess : std::sqrt(fine * coarse);
     }
     return averageCells(points, sortedByCell(points, bestCell), bestCell);

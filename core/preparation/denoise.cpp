@@ -140,6 +140,7 @@ double heightOfFit(const std::vector<Eigen::Vector3d>& offsets, const std::vecto
     Eigen::Matrix<double, 6, 6> normalMatrix = Eigen::Matrix<double, 6, 6>::Zero();
     Eigen::Matrix<double, 6, 1> right = Eigen::Matrix<double, 6, 1>::Zero();
     for (std::size_t i = 0; i < offsets.size(); ++i) {
+        // In units of the reach, so that the pivots below can be compared.
         const double u = offsets[i].dot(frame.axes.col(1)) / reach;
         const double v = offsets[i].dot(frame.axes.col(2)) / reach;
         Eigen::Matrix<double, 6, 1> row;
@@ -149,6 +150,7 @@ double heightOfFit(const std::vector<Eigen::Vector3d>& offsets, const std::vecto
     }
     const Eigen::LDLT<Eigen::Matrix<double, 6, 6>> factors(normalMatrix);
     const auto pivots = factors.vectorD();
+    // Neighbours that lie along a line, say, do not determine a quadric.
     if (!(pivots.minCoeff() > 1e-4 * pivots.maxCoeff())) return planeHeight;
     return factors.solve(right)[0];
 }
@@ -164,6 +166,7 @@ Point3 projected(const PointCloud& points, std::uint32_t at, const std::vector<N
     Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
     for (const Neighbour& n : found) {
         const Eigen::Vector3d d = toEigen(points[n.point] - points[at]);
+        // The weight is 0 at the reach, so it makes no difference whether a neighbour there is found.
         const double share = 1.0 - n.squaredDistance / (reach * reach);
         const double w = share * share;
         offsets.push_back(d);

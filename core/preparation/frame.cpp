@@ -57,6 +57,7 @@ Result<Frame> frameOf(const PointCloud& scan) {
                     "the whole scan is smaller than 1.2e-38 units; choose a smaller unit of length");
     }
     int exponent = 0;
+    // The half extent is less than 2^exponent, so that coordinates are in [-1, 1].
     std::frexp(halfExtent, &exponent);
     return Frame{0.5 * box.high + 0.5 * box.low, std::ldexp(1.0, exponent)};
 }

@@ -96,6 +96,7 @@ void markSmallGroups(const PointCloud& points, const Surroundings& around,
         }
     }
     std::vector<std::uint32_t> size(points.size(), 0);
+    // An outlier is joined to nothing: it neither bridges two groups nor makes one large.
     for (std::uint32_t i = 0; i < points.size(); ++i) ++size[groups.find(i)];
     const double small = kSmallGroupShare * static_cast<double>(points.size());
     for (std::uint32_t i = 0; i < points.size(); ++i) {

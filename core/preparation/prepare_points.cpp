@@ -44,6 +44,7 @@ struct Preparation {
     // `siteOfSite`: old site -> new site.
     void replaceSites(PointCloud sites, const std::vector<std::uint32_t>& siteOfSite) {
         follow(prepared.siteOfPoint, siteOfSite);
+        // The index still holds.
         if (sites == prepared.sites) return;
         index.reset();
         prepared.sites = std::move(sites);

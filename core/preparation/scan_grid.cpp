@@ -360,6 +360,7 @@ Result<std::optional<GriddedScan>> gridScanOrThrow(const PointCloud& scan, std::
     RETURN_IF_ERROR(checkNotFlat(means));
     const auto large = decimate(means, target, context);
     RETURN_IF_ERROR(large);
+    // decimate took every small cell for one point. The sums weigh each with the number of its points.
     std::vector<Sum> sums(large->points.size());
     for (std::size_t c = 0; c < small.size(); ++c) sums[large->siteOfPoint[c]].add(small[c].sum);
     PointCloud weighted;
@@ -368,6 +369,7 @@ Result<std::optional<GriddedScan>> gridScanOrThrow(const PointCloud& scan, std::
     MergedPoints merged = mergeDuplicates(weighted);
     std::vector<std::uint32_t> siteOfCell(small.size());
     for (std::size_t c = 0; c < small.size(); ++c) {
+        // siteOfPoint still has the numbers from before sorting.
         siteOfCell[c] = merged.siteOfPoint[large->siteOfPoint[sorted[c]]];
     }
     renumber(siteOfPoint, 0, scan.size(), siteOfCell);

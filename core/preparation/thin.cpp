@@ -26,6 +26,7 @@ Result<ThinnedPoints> thinOrThrow(const PointCloud& points, const NeighbourIndex
         if (standIn[next.point] != kUndecided) continue;
         index.within(points[next.point], spacing, found);
         for (const Neighbour& n : found) {
+            // A point left out may lie within reach of several that are kept: the nearest stands for it.
             if (n.squaredDistance >= nearest[n.point]) continue;
             nearest[n.point] = n.squaredDistance;
             standIn[n.point] = next.point;

@@ -43,6 +43,7 @@ double spacingOf(const PointCloud& points) {
     const std::size_t step = std::max<std::size_t>(1, points.size() / kProbes);
     for (std::size_t i = 0; i < points.size(); i += step) {
         index.nearest(points[i], kNearest + 1, found);
+        // The first is the point itself.
         for (std::size_t n = 1; n < found.size(); ++n) squared.push_back(found[n].squaredDistance);
     }
     const auto middle = squared.begin() + static_cast<std::ptrdiff_t>(squared.size() / 2);
@@ -81,6 +82,7 @@ std::vector<OutlinePoint> oneACell(const std::vector<OutlinePoint>& points, doub
     std::vector<std::pair<Key, OutlinePoint>> sorted;
     sorted.reserve(points.size());
     for (const OutlinePoint& p : points) sorted.push_back({keyOf(p), p});
+    // By place within the cell, too, so that its sum does not depend on the order of the points.
     std::sort(sorted.begin(), sorted.end());
     std::vector<OutlinePoint> cells;
     for (std::size_t begin = 0; begin < sorted.size();) {
@@ -97,7 +99,8 @@ std::vector<OutlinePoint> oneACell(const std::vector<OutlinePoint>& points, doub
     return cells;
 }
 
-// Along and across the principal axes of the cells themselves.
+// Along and across the principal axes of the cells themselves: those of the points depend on how many points
+// lie over each cell.
 void turnToAxes(std::vector<OutlinePoint>& cells) {
     const double unit = 1.0 / static_cast<double>(cells.size());
     OutlinePoint centre{};

@@ -89,6 +89,7 @@ Graph joinCells(const InteriorView& view, const InnerDistances& cells) {
         for (const std::uint32_t next : view.neighbours[t]) {
             if (next == kNoTetrahedron) continue;
             const std::uint32_t b = cells.cellOfTetrahedron[next];
+            // A cell without volume has no centre to measure from.
             if (a < b && cells.volumes[a] > 0.0 && cells.volumes[b] > 0.0) pairs.emplace_back(a, b);
         }
     }
@@ -188,6 +189,7 @@ Result<InnerDistances> innerDistances(const InteriorView& view, const RunContext
     placeCells(view, count, result);
     const Graph graph = joinCells(view, result);
     for (std::size_t s = 0; s < InnerDistances::kSources; ++s) {
+        // Samples are stratified, and every n-th of them still is.
         const std::size_t sample = s * InteriorView::kSamples / InnerDistances::kSources;
         result.sources.push_back(result.cellOfTetrahedron[view.sampled[sample]]);
     }

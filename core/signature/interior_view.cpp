@@ -28,6 +28,7 @@ PrincipalFrame principalFrame(const Segmentation& segmentation) {
     for (const Segment& segment : segmentation.segments) {
         frame.centre = frame.centre + (segment.volume / segmentation.volume) * segment.centroid;
     }
+    // The moments of the whole are those within the segments and those of the segments' centroids.
     Eigen::Matrix3d moments = Eigen::Matrix3d::Zero();
     const double unit = 1.0 / segmentation.size;
     for (const Segment& segment : segmentation.segments) {
@@ -69,6 +70,7 @@ void takeTetrahedra(const Segmentation& segmentation, InteriorView& view) {
         view.neighbours.push_back(neighbours);
         view.volumes.push_back(std::abs(signedVolume(corners)));
         view.centroids.push_back(centroidOf(corners));
+        // The ball of a flat tetrahedron may be of any size.
         view.radii.push_back(std::min(1.0, all.circumradii[t] / segmentation.size));
     }
     view.volume = std::accumulate(view.volumes.begin(), view.volumes.end(), 0.0);

@@ -16,6 +16,8 @@ namespace {
 
 constexpr std::uint64_t kSeed = 10;
 
+// The beginning of a random permutation of the points: so any of them that come first are a random choice,
+// too.
 PointCloud drawn(const PointCloud& points, std::size_t count) {
     PointCloud result = points;
     Random random(kSeed);

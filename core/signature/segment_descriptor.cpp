@@ -46,6 +46,7 @@ void setFrame(const std::vector<WeightedPoint>& points, Body& body) {
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(moments);
     const Eigen::Vector3d u = solver.eigenvectors().col(2);
     const Eigen::Vector3d v = solver.eigenvectors().col(1);
+    // Right-handed, whatever signs the solver chose.
     const Eigen::Vector3d w = u.cross(v);
     body.axes = {{{u[0], u[1], u[2]}, {v[0], v[1], v[2]}, {w[0], w[1], w[2]}}};
 }
@@ -65,6 +66,7 @@ SegmentDescriptor descriptorOf(const WeightedPoint& point, const Body& body) {
     }
     // The ball of a flat tetrahedron may have any radius; beyond the size of the shape it means nothing.
     segment.size[3] = logLength(std::min(1.0, static_cast<double>(point.maximumRadius)));
+    // To the steps at once, so that a new signature scores as one from the index does.
     return unpacked(packed(segment));
 }
 

@@ -16,6 +16,7 @@ constexpr std::size_t kCoefficients = (kDegrees + 1) * (kDegrees + 1);
 void evaluate(const Point3& direction, std::array<double, kCoefficients>& out) {
     const double z = direction.z;
     const double s = std::hypot(direction.x, direction.y);
+    // At the poles any azimuth will do: all terms that depend on it have s as a factor.
     const double cosine = s > 0.0 ? direction.x / s : 1.0;
     const double sine = s > 0.0 ? direction.y / s : 0.0;
     // p[l][m]: associated Legendre functions with the factor sqrt((l - m)! / (l + m)!).

@@ -27,6 +27,7 @@ float volumeShareOf(float weight, double scale, double volume) noexcept {
 
 bool sameShape(const Signature& a, const Signature& b) noexcept {
     if (a.attributes.has_value() != b.attributes.has_value()) return false;
+    // With attributes, the points themselves enter no score.
     if (a.attributes) {
         return a.attributes->quality == b.attributes->quality &&
                a.attributes->statistics == b.attributes->statistics &&

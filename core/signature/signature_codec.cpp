@@ -81,6 +81,7 @@ class Reader {
     Unsigned takeUnsigned() {
         Unsigned value = 0;
         for (std::size_t i = 0; i < sizeof(Unsigned); ++i) {
+            // Shifts instead of a copy: the same on machines of either byte order.
             value = static_cast<Unsigned>(
                 value | (static_cast<Unsigned>(static_cast<unsigned char>(at_[i])) << (8 * i)));
         }
@@ -141,6 +142,7 @@ Result<void> checkNumbers(const Signature& signature, std::uint16_t version) {
         const auto name = [i] { return "point " + std::to_string(i); };
         if (!allFinite(p)) return malformed(name() + " has a number that is not finite");
         if (!(p.weight > 0.0f)) return malformed(name() + " has no positive weight");
+        // The volume share, computed from these, is cut off at 1 and would hide it.
         const double cube = signature.scale * signature.scale * signature.scale;
         if (version != kPointsOnly && p.weight * cube > signature.volume * (1.0 + kShareRounding))
             return malformed(name() + " outweighs the whole volume");

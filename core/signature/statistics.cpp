@@ -30,6 +30,7 @@ constexpr std::size_t kOutlinePlaces = 10;
 constexpr std::size_t kOutlineWidths = 4;
 constexpr std::size_t kOutlineDistances = 20;
 constexpr std::size_t kChords = 100000;
+// Every statistic starts a stream of its own, so none depends on which others were computed before it.
 constexpr std::uint64_t kSeed = 145;
 
 const StatisticLayout& layout(Statistic statistic) {
@@ -67,6 +68,7 @@ std::vector<double> centrality(const InnerDistances& inner) {
             sum += row[c];
             count += 1.0;
         }
+        // A piece without a source counts as far from everything, like the tips of limbs.
         result[c] = count > 0.0 ? sum / count / inner.mean : 2.0;
     }
     return result;
@@ -138,6 +140,7 @@ void spread(const InteriorView& view, std::uint8_t* out) {
 void placesInOutline(const std::vector<OutlinePoint>& outline, std::uint8_t* out) {
     Histogram histogram(kOutlinePlaces, kOutlineWidths);
     for (const OutlinePoint& p : outline) {
+        // The limit keeps points on the axis finite; it is far below the first bin.
         const double across = std::log2(std::max(std::abs(p[1]), 1e-4));
         histogram.add(softBin(p[0], 0.0, 1.0, kOutlinePlaces), softBin(across, -6.0, -0.5, kOutlineWidths),
                       1.0);
@@ -184,6 +187,7 @@ Result<ShapeStatistics> shapeStatistics(const InteriorView& view, const RunConte
         thicknessByRadius(view, bins(Statistic::kThicknessByRadius));
         harmonics(view.centroids, view.volumes, bins(Statistic::kInteriorHarmonics));
         harmonics(view.surface, {}, bins(Statistic::kSurfaceHarmonics));
+        // Reported at the end.
         if (!context.checkpoint()) return;
         spread(view, bins(Statistic::kSpread));
         const std::vector<OutlinePoint> outline = footprint(view.surface);

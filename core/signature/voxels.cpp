@@ -33,6 +33,7 @@ Voxels::Voxels(const InteriorView& view) {
     low_ = box.low;
     const Point3 extent = box.extent();
     side_ = std::max({extent.x, extent.y, extent.z}) / static_cast<double>(kLongestSide);
+    // One more for what lies on the far end.
     const auto cells = [this](double length) { return static_cast<std::ptrdiff_t>(length / side_) + 1; };
     count_ = {cells(extent.x), cells(extent.y), cells(extent.z)};
     inside_.assign(static_cast<std::size_t>(count_[0] * count_[1] * count_[2]), 0);
