@@ -28,9 +28,8 @@ namespace shapedb {
 /// Symmetric bit for bit unless partial.
 [[nodiscard]] double score(const Signature& a, const Signature& b, const ScoreOptions& options);
 
-/// Never below `score` of the same arguments, and cheaper: a motion about the anchor keeps distances
-/// from it, so each point can at best meet a point of the other at its own distance. With attributes
-/// everything but the alignment is exact.
+/// Never below `score` of the same arguments, and cheaper. With attributes everything but the alignment is
+/// exact.
 [[nodiscard]] double scoreUpperBound(const Signature& a, const Signature& b, const ScoreOptions& options);
 
 /// `score` with its reasons; the same bits.

@@ -15,6 +15,7 @@ bool isBlank(char c) { return c == ' ' || c == '\t'; }
 bool isOperator(char c) { return c == '=' || c == '!' || c == '<' || c == '>'; }
 
 bool parseNumber(const std::string& text, double& value) {
+    // Unlike strtod, from_chars does not depend on the locale.
     const char* end = text.data() + text.size();
     const auto [stop, error] = std::from_chars(text.data(), end, value);
     return error == std::errc() && stop == end && std::isfinite(value);
@@ -111,6 +112,7 @@ class FilterParser {
             op = meaning;
             return true;
         };
+        // Longer ones first: < is also the beginning of <=.
         return take("!=", Operator::kNotEqual) || take("<=", Operator::kLessEqual) ||
                take(">=", Operator::kGreaterEqual) || take("=", Operator::kEqual) ||
                take("<", Operator::kLess) || take(">", Operator::kGreater);

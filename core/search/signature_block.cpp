@@ -43,6 +43,8 @@ void SignatureBlock::appendMetadata(const Metadata& metadata) {
 }
 
 void SignatureBlock::appendStatistics(const HalfRow& first, const HalfRow& second) {
+    // Rows without attributes that came before have zeros. Until the first one with attributes, there are no
+    // statistics at all.
     first_.resize(ids_.size() - 1);
     second_.resize(ids_.size() - 1);
     first_.push_back(first);

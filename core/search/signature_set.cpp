@@ -101,6 +101,8 @@ SignatureSet SignatureSet::with(const std::vector<IndexEntry>& updates,
         const auto removedFrom = std::lower_bound(removedIds.begin(), removedIds.end(), block.id(0));
         const bool removes = removedFrom != removedIds.end() && *removedFrom <= block.id(block.size() - 1);
         const bool follow = update != updatesEnd && (*update)->id > block.id(block.size() - 1);
+        // Ids rise as shapes are added, so this is the usual case: the full block is shared and a new one
+        // begun.
         if (lastAndFull && follow && !removes) {
             keep(blocks_[b]);
             keepSplit(applyChanges({}, update, updatesEnd, {}));

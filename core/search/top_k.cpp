@@ -89,6 +89,9 @@ Result<void> parallelUntilStopped(std::size_t begin, std::size_t end, std::size_
     return context.checkpoint();
 }
 
+// Climbs the scorer's ladder of bounds (for attributed shapes from the statistics, 256 bytes each, to the
+// full score), each rung only for the candidates that the one before left. A small share of the snapshot
+// comes first: its best scores then rule out most of the rest.
 class Searcher {
   public:
     Searcher(const Scorer& scorer, const SignatureSet& set, const SearchOptions& options,
@@ -134,6 +137,7 @@ class Searcher {
         const bool excludes = options_.excludeId && block.id(0) <= *options_.excludeId &&
                               *options_.excludeId <= block.id(block.size() - 1);
         if (options_.filter.acceptsAll() && !excludes) return {};
+        // Rows share metadata, so the filter is asked once for each that occurs.
         constexpr std::uint8_t kUnknown = 2;
         std::vector<std::uint8_t> passes(block.metadataCount(), kUnknown);
         std::vector<std::uint8_t> wanted(block.size());
@@ -157,6 +161,8 @@ class Searcher {
 
     Result<std::vector<BlockScan>> scanSlice(std::size_t begin, std::size_t end) const {
         std::vector<BlockScan> scans(end - begin);
+        // The same for the whole slice, so that what its blocks leave does not depend on which is scanned
+        // first.
         const double least = needed();
         auto done = parallelUntilStopped(
             begin, end, 1, context_, [&](std::size_t b) { scans[b - begin] = scanBlock(*order_[b], least); });
@@ -177,6 +183,7 @@ class Searcher {
         all.reserve(left);
         for (std::size_t b = 0; b < scans.size(); ++b) {
             for (const Survivor& survivor : scans[b].left) {
+                // Points into `scans`, which live until all candidates have been visited.
                 all.push_back({survivor.bound, &survivor, order_[begin + b]});
             }
         }

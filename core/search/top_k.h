@@ -41,10 +41,7 @@ struct SearchResult {
     double seconds = 0.0;  ///< taken
 };
 
-/// Climbs the scorer's ladder of bounds (for attributed shapes from the statistics, 256 bytes each, to the
-/// full score), each rung only for the candidates that the one before left. A small share of the snapshot
-/// comes first; its best scores then rule out most of the rest. Uses the calling thread's oneTBB arena.
-/// The counts may vary with the number of threads, the hits never do.
+/// Uses the calling thread's oneTBB arena. The counts may vary with the number of threads, the hits never do.
 ///
 /// Errors: kInvalidArgument (k, threshold, kernel width; a query with points and weights alone where
 /// signatures have attributes), kCancelled, kDeadlineExceeded, kOutOfMemory.

@@ -98,6 +98,7 @@ class Search {
         keepBest(trial);
         for (std::size_t i = 0; i < leaders; ++i) {
             for (std::size_t k = 0; k < leaders; ++k) {
+                // With two leaders none is left to show the side: any side will do.
                 if (i != p && k != p && (i != k || leaders == 2)) turn(trial, q, i, k);
             }
         }

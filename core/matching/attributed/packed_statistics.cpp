@@ -98,11 +98,13 @@ __attribute__((target("avx2"))) inline __m256i differences(const std::uint8_t* a
     const __m256i x = _mm256_load_si256(reinterpret_cast<const __m256i*>(a));
     const __m256i y = _mm256_load_si256(reinterpret_cast<const __m256i*>(b));
     const __m256i low = _mm256_sad_epu8(_mm256_and_si256(x, mask), _mm256_and_si256(y, mask));
+    // There is no shift of bytes; the mask takes away what came from the next one.
     const __m256i high = _mm256_sad_epu8(_mm256_and_si256(_mm256_srli_epi16(x, 4), mask),
                                          _mm256_and_si256(_mm256_srli_epi16(y, 4), mask));
     return _mm256_add_epi64(low, high);
 }
 
+// The sum of all four. It is at most 64 times 15, so the lower half of each is enough.
 __attribute__((target("avx2"))) inline std::uint32_t whole(__m256i partial) {
     const __m128i halves =
         _mm_add_epi32(_mm256_castsi256_si128(partial), _mm256_extracti128_si256(partial, 1));

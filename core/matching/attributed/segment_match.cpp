@@ -94,6 +94,8 @@ class SegmentComparison::Search {
 
   private:
     bool alike(std::size_t i, std::size_t j) const {
+        // What the pair would be worth if it were equal in size and radius, with the larger share: so unequal
+        // shares make segments unlike.
         const double most = 0.5 * static_cast<double>(std::max(pair_.a_[i].share, pair_.b_[j].share));
         return pair_.worth_[i][j] * pair_.radially_[i][j] >= kAlikeEnough * most;
     }

@@ -24,6 +24,7 @@ StatisticsBound::StatisticsBound(const AttributedQuery& query, StatisticsRule ru
       compareSizes_(rule == StatisticsRule::kWholeAndSize),
       first_(kQualities),
       second_(kQualities) {
+    // Weights depend on both qualities. A table of all that a row may have saves computing them for each row.
     for (std::size_t quality = 0; quality < kQualities; ++quality) {
         const LevelWeights weights = levelWeights(query.quality(), static_cast<std::uint8_t>(quality));
         const double share = rule == StatisticsRule::kPartial ? weights.partial : 1.0;
@@ -47,6 +48,8 @@ void StatisticsBound::scan(const ShapeRows& rows, const std::vector<std::uint8_t
             const std::size_t row = begin + i;
             const std::uint8_t quality = rows.qualities[row];
             double distance = weighted(sums[i], first_[quality]);
+            // Before anything else is looked at, since it rules out most rows. Rows without attributes have
+            // zeros as statistics; they are dropped below.
             if (distance > farthest) continue;
             if ((!wanted.empty() && wanted[row] == 0) || (!all && !rows.attributed(row))) continue;
             ++counts.afterFirstHalf;

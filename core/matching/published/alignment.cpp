@@ -119,6 +119,7 @@ double matchGreedily(const AnchoredPoints& a, const AnchoredPoints& b, double wi
         }
         most += bestOfPoint;
     }
+    // In a one-to-one matching, no point of a gains more than with its best of b.
     if (most * kBoundMargin <= needed) return most;
     std::sort(candidates.begin(), candidates.begin() + static_cast<std::ptrdiff_t>(count),
               [](const Candidate& x, const Candidate& y) {
@@ -279,6 +280,8 @@ BestAlignment bestAlignment(const AnchoredPoints& a, const AnchoredPoints& b, co
                   return x.i != y.i ? x.i < y.i : x.j < y.j;
               });
     for (std::size_t c = 0; c < count; ++c) {
+        // Bounds fall from here on, and of equal similarities the first wins. The bound holds for the
+        // mirrored view as well, whose heights and radii are the same.
         if (prune && axes[c].bound <= search.bestSimilarity()) break;
         Alignment alignment;
         alignment.i = axes[c].i;

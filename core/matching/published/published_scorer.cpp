@@ -24,7 +24,8 @@ struct CommonScale {
     AnchoredPoints a, b;
 };
 
-// The most each point of one side could gain, whatever the motion.
+// The most each point of one side could gain: a motion about the anchor keeps distances from it, so at best a
+// point meets one of the other side at its own distance.
 double similarityBound(const AnchoredPoints& a, const AnchoredPoints& b, double width) {
     double sum = 0.0;
     std::array<double, kMaxSignaturePoints> radiusB;
@@ -67,6 +68,7 @@ class PublishedScorer : public Scorer {
         const ShapeRow query = query_.row();
         if (sameShape(query, shape, options_.keepScale)) return 1.0;
         const CommonScale scaled(query, shape, options_);
+        // Pairs are one to one, so the points of either side bound the sum.
         const double most = std::min(similarityBound(scaled.a, scaled.b, options_.kernelWidth),
                                      similarityBound(scaled.b, scaled.a, options_.kernelWidth)) *
                             kBoundMargin;
@@ -133,6 +135,7 @@ class PublishedWholeScorer final : public PublishedScorer {
         return std::clamp(similarity / whole, 0.0, 1.0);  // against rounding
     }
     double leastWhole(double most, const AnchoredPoints& a, const AnchoredPoints& b) const override {
+        // The score rises with the similarity, and is cut off at 1.
         return std::max(most, a.totalWeight + b.totalWeight - most);
     }
     bool exchanges(const ShapeRow& query, const ShapeRow& shape) const override {
