@@ -149,6 +149,7 @@ Result<void> Catalog::followRebuild(const std::string& collection, store::Rebuil
         }
         for (bool waiting = true; waiting;) {
             RETURN_IF_ERROR(checkpoint());
+            // In short pieces, so that the caller is asked in between.
             briefly.deadline = std::min(context.deadline, RunContext::Clock::now() + kProgressInterval);
             const auto changed = rebuilds_.waitForChange(rebuild, briefly);
             if (changed) {

@@ -12,8 +12,8 @@ namespace shapedb::catalog {
 
 namespace {
 
-/// Errors: kInvalidArgument (length), kMalformedFilter. A cancelled `context`, which must outlive the
-/// result, accepts nothing more: that ends a listing of millions early.
+/// Errors: kInvalidArgument (length), kMalformedFilter. A cancelled `context`, which must outlive the result,
+/// accepts nothing more, so that no more shapes are gathered.
 Result<store::ShapeFilter> makeFilter(const ShapeSelection& selection, const RunContext& context) {
     RETURN_IF_ERROR(checkFilterLength(selection.filter));
     Result<Filter> filter = Filter::parse(selection.filter);

@@ -38,6 +38,7 @@ std::size_t characterLength(const std::string& text, std::size_t at) noexcept {
         code = (code << 6) | (byte(at + i) & 0x3fu);
     }
     const bool surrogate = code >= 0xd800 && code <= 0xdfff;
+    // Overlong forms would give one key several spellings.
     return code < smallest || surrogate || code > 0x10ffff ? 0 : length;
 }
 

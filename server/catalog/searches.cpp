@@ -62,6 +62,7 @@ Result<std::optional<Explanation>> Searches::explain(const PreparedSearch& searc
     if (!signature && signature.error().code == ErrorCode::kDataLoss) return fail(signature.error());
     if (!signature) return std::optional<Explanation>();
     Explanation explanation = scorer.explain(*signature);
+    // The shape has got another signature since the search.
     if (explanation.score != hit.score) return std::optional<Explanation>();
     return std::optional<Explanation>(std::move(explanation));
 }

@@ -107,6 +107,7 @@ Result<AddedShape> Catalog::put(const ShapeHeader& header, store::VerifiedScan s
     switch (put->outcome) {
         case store::PutOutcome::kCreated: workers_.wake(); break;
         case store::PutOutcome::kReplaced:
+            // The old signature serves until the new one is there, but with the new metadata.
             workers_.supersede(shape.id, shape.pointsVersion);
             workers_.wake();
             refreshOrLog(shape, "new metadata is not searched yet");
@@ -133,6 +134,7 @@ Result<FoundShape> Catalog::deleteShape(const std::string& collectionName, const
     auto shape = store_->deleteShape((*found)->collection.id, key, expectedVersion);
     RETURN_IF_ERROR(shape);
     workers_.supersede(shape->id);
+    // Wakes those who follow it, to find that it is gone.
     board_.settled(shape->id);
     refreshOrLog(*shape, "deleted shape is still searched");
     return FoundShape{*found, std::move(*shape)};

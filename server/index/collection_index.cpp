@@ -180,6 +180,7 @@ Result<void> CollectionIndex::loadAllUnguarded(const RunContext& context) {
         insert(next, std::move(slot));
     }
     const std::lock_guard<std::mutex> lock(mutex_);
+    // The old directory is freed with `next`, after the lock has been released.
     std::swap(directory_, next);
     return {};
 }
@@ -228,6 +229,7 @@ Result<SnapshotPtr> CollectionIndex::add(const store::Collection& collection) {
 }
 
 void CollectionIndex::remove(std::int64_t collectionId) {
+    // Declared before the lock, so that a large snapshot is freed after it.
     SlotPtr removed;
     const std::lock_guard<std::mutex> lock(mutex_);
     const auto found = directory_.byId.find(collectionId);
@@ -243,6 +245,7 @@ Result<void> CollectionIndex::refresh(std::int64_t collectionId, std::int64_t sh
     const SlotPtr slot = find(collectionId);
     if (!slot) return {};
     return guarded([&] {
+        // Before waiting for the lock: whoever gets it next applies all marks at once.
         slot->mark({shapeId});
         const std::lock_guard<std::mutex> lock(slot->apply);
         return slot->stale ? reloadLocked(*slot) : applyDirty(*slot);
@@ -310,6 +313,7 @@ bool CollectionIndex::whileGeneration(std::int64_t collectionId, std::int64_t ge
     if (!slot) return false;
     const std::shared_lock<std::shared_mutex> gate(slot->gate);
     {
+        // Released before `commit`, which may take long. The gate alone keeps the generation.
         const std::lock_guard<std::mutex> lock(slot->apply);
         if (slot->stale && !guarded([&] { return reloadLocked(*slot); })) return false;
     }

@@ -23,7 +23,8 @@ void CrashJournal::read() {
     while (file >> id >> version >> deaths >> inHand) states_[{id, version}].deaths = deaths + inHand;
 }
 
-/// Under mutex_.
+/// Under mutex_. Renamed into place, so that a death in between leaves the old file whole. Not synced, since
+/// a crash of the machine is no scan's fault.
 void CrashJournal::write() {
     if (path_.empty()) return;
     std::ostringstream text;
@@ -62,6 +63,7 @@ CrashJournal::Entry::~Entry() {
     const std::lock_guard<std::mutex> lock(journal_.mutex_);
     State& state = journal_.states_[key_];
     state.inHand = false;
+    // A scan with deaths stays on record until it is acquitted.
     if (acquitted_ || state.deaths == 0) journal_.states_.erase(key_);
     journal_.write();
 }

@@ -15,9 +15,8 @@
 
 namespace shapedb::ingest {
 
-/// A small text file, rewritten and renamed into place. It survives the death of the process; it is
-/// not synced, since a crash of the machine is no scan's fault. If it cannot be written, that is
-/// logged and the rebuild continues without it. Thread-safe.
+/// A small text file. It survives the death of the process, not a crash of the machine. If it cannot be
+/// written, that is logged and the rebuild continues without it. Thread-safe.
 class CrashJournal {
   public:
     /// Reads what a dead process left. With an empty path everything stays in memory.

@@ -30,6 +30,7 @@ void ProgressBoard::settled(std::int64_t shapeId) {
     if (found == entries_.end()) return;
     Entry& entry = *found->second;
     entry.running = false;
+    // The sequence goes on: watchers compare it with the last one they saw.
     const std::uint64_t sequence = entry.status.sequence + 1;
     entry.status = Status();
     entry.status.sequence = sequence;

@@ -300,6 +300,7 @@ Result<void> RebuildDriver::isolated(Active& active, const store::Shape& shape) 
              "the server stopped " + std::to_string(deaths) +
                  " times while it segmented this scan; it is quarantined. Replace its points, "
                  "or rebuild the collection, to try again"});
+        // Made only to be acquitted, which takes the deaths off the record.
         CrashJournal::Entry entry(journal_, shape);
         if (stored) entry.acquit();
         return stored;

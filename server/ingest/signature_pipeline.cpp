@@ -23,7 +23,7 @@ PipelineOutcome runOrThrow(const Describe& describe, store::Store& store, std::i
                            const ShapeParameters& parameters, const RunContext& context) {
     PointCloud cloud;
     {
-        // The packed points are half as large again as the cloud: not kept beside it.
+        // The packed points are half as large as the cloud: not kept beside it.
         const auto points = store.loadPoints(shapeId);
         if (!points) {
             return failed(isTransient(points.error().code) ? Kind::kStoreFailed : Kind::kScanFailed,

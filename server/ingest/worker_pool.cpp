@@ -98,6 +98,7 @@ void WorkerPool::pause() {
 Result<void> WorkerPool::resume() {
     {
         const std::lock_guard<std::mutex> lock(mutex_);
+        // recover() puts back all claimed jobs, these among them.
         unreleased_.clear();
     }
     const Result<void> recovered = recover();

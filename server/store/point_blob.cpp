@@ -59,6 +59,8 @@ Result<std::vector<float>> decodePlanes(const char* body, std::size_t size, std:
 
 }  // namespace
 
+// Neighbouring points of a scan share sign, exponent and leading digits, so some planes hardly vary and
+// compress well.
 void bytesToPlanes(const unsigned char* in, unsigned char* out, std::size_t pointCount) {
     for (std::size_t k = 0; k < kPointBytes; ++k) {
         for (std::size_t i = 0; i < pointCount; ++i) out[k * pointCount + i] = in[kPointBytes * i + k];
@@ -111,6 +113,7 @@ std::vector<std::string> compressPlanes(const std::vector<float>& points, int le
     if (!context) throw std::bad_alloc();
     const std::size_t count = points.size() / 3;
     orRaiseZstd(ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, level));
+    // Writes the size into the frame's header, where decodePlanes expects it.
     orRaiseZstd(ZSTD_CCtx_setPledgedSrcSize(context.get(), kPointBytes * count));
     const auto* bytes = reinterpret_cast<const unsigned char*>(points.data());
     std::vector<unsigned char> piece(kPieceBytes);
@@ -131,6 +134,7 @@ std::vector<std::string> compressPlanes(const std::vector<float>& points, int le
                 made += out.pos;
                 more = last ? left != 0 : in.pos < in.size;
             }
+            // Not smaller: no need to go on.
             if (made >= kPointBytes * count) return {};
         }
     }

@@ -59,10 +59,9 @@ class PointEncoding {
 [[nodiscard]] Result<std::vector<float>> decodePoints(const void* blob, std::size_t size,
                                                       std::uint64_t floatCount);
 
-/// The regrouping alone, exposed for tests: byte k (0 to 11) of point i moves from 12 i + k to
-/// k * pointCount + i, so that each byte of x, y and z forms a plane. Neighbouring scan points share
-/// sign, exponent and leading digits, so that some planes hardly vary. `in` and `out` hold
-/// 12 * pointCount bytes and do not overlap.
+/// The regrouping alone, exposed for tests: byte k (0 to 11) of point i moves from 12 i + k to k * pointCount
+/// + i, so that each byte of x, y and z forms a plane. `in` and `out` hold 12 * pointCount bytes and do not
+/// overlap.
 void bytesToPlanes(const unsigned char* in, unsigned char* out, std::size_t pointCount);
 void planesToBytes(const unsigned char* in, unsigned char* out, std::size_t pointCount);
 

@@ -10,6 +10,7 @@ namespace shapedb::store {
 namespace {
 
 constexpr char kBeginRead[] = "BEGIN";
+// Takes the write lock at once. A transaction that reads first may be refused it later.
 constexpr char kBeginWrite[] = "BEGIN IMMEDIATE";
 constexpr char kCommit[] = "COMMIT";
 
@@ -165,6 +166,7 @@ Query::Query(Connection& connection, const char* sql)
     : connection_(connection), statement_(connection.prepared(sql)) {}
 
 Query::~Query() {
+    // A statement left before its last row would keep its read open.
     sqlite3_reset(statement_);
     sqlite3_clear_bindings(statement_);
 }
@@ -174,6 +176,7 @@ void Query::check(int code) const {
 }
 
 void Query::bind(int position, const std::string& value) {
+    // SQLite copies it (TRANSIENT): it may be a temporary of the caller.
     check(
         sqlite3_bind_text64(statement_, position, value.data(), value.size(), SQLITE_TRANSIENT, SQLITE_UTF8));
 }
@@ -209,6 +212,7 @@ std::int64_t Query::integer(int column) const { return sqlite3_column_int64(stat
 bool Query::isNull(int column) const { return sqlite3_column_type(statement_, column) == SQLITE_NULL; }
 
 std::string Query::text(int column) const {
+    // The text first: fetching it may convert it, and then it has another size.
     const auto* data = reinterpret_cast<const char*>(sqlite3_column_text(statement_, column));
     const int size = sqlite3_column_bytes(statement_, column);
     if (data == nullptr && sqlite3_errcode(connection_.db_) == SQLITE_NOMEM) throw std::bad_alloc();
@@ -231,6 +235,7 @@ Transaction::~Transaction() {
 }
 
 void Transaction::commit() {
+    // When this throws, the transaction is still open and the destructor rolls it back.
     Query(connection_, kCommit).run();
     open_ = false;
 }

@@ -74,6 +74,7 @@ Result<std::optional<Shape>> SqliteStore::failJob(const Job& job, const Error& w
 
 Result<void> SqliteStore::releaseJob(const Job& job) {
     return write("put the job back", [&](Connection& connection) {
+        // A claim after a recovery has more attempts: that one is not ours to put back.
         Query(connection, sql::kReleaseJob, job.id, job.attempts).run();
     });
 }
@@ -84,6 +85,7 @@ Result<std::vector<Shape>> SqliteStore::recoverJobs(int maxAttempts) {
             std::int64_t shapeId;
             std::int64_t attempts;
         };
+        // All first, because markFailed deletes from the table that is read here.
         std::vector<Lost> lost;
         {
             Query query(connection, sql::kRunningJobs, maxAttempts);

@@ -78,7 +78,8 @@ void createPrivate(const std::string& path) {
     if (file.get() < 0) raiseUnwritable(path, errno);
 }
 
-/// Gives the finished file its name; never replaces another file.
+/// Gives the finished file its name; never replaces another file. First the content is made durable, then the
+/// name: after a crash there is a whole file or none.
 void publish(const std::string& temporary, const std::string& path) {
     {
         const File file(temporary, O_RDONLY);
@@ -201,6 +202,7 @@ void separateIds(Connection& copy, Connection& live) {
     }
     for (const std::string table : {"job", "rebuild"}) {
         const std::int64_t offset = std::max(lastId(copy, table), lastId(live, table));
+        // The offset is no less than any id, so that no row moves to an id that another still has.
         copy.execute("UPDATE " + table + " SET id = id + " + std::to_string(offset));
         setLastId(copy, table, offset + lastId(copy, table));
     }
@@ -249,6 +251,7 @@ Result<void> SqliteStore::restore(const std::string& path, const RunContext& con
                 std::make_unique<Connection>(temporary.path(), OpenMode::kReadWrite, options_.busyTimeoutMs);
             prepareCopy(*copy, context, now());
         });
+        // Until the end: no id may be given out between reading the last ones and replacing the tables.
         const std::lock_guard<std::mutex> lock(writerMutex_);
         separateIds(*copy, *writer_);
         copyDatabase(*copy, *writer_, kStepPages, [&](std::uint64_t done, std::uint64_t total) {

@@ -62,6 +62,7 @@ void apply(Connection& connection, const Migration& migration, std::int64_t nowM
     Query(connection, kWriteRecord, migration.number, std::string(migration.name), fingerprint(migration),
           nowMs)
         .run();
+    // Part of the transaction, like the rest.
     connection.execute("PRAGMA user_version=" + std::to_string(migration.number));
     transaction.commit();
 }
@@ -77,8 +78,8 @@ std::map<std::string, std::string> schemaOf(Connection& connection) {
     return schema;
 }
 
-/// A file with our marks may still have other tables, or triggers of its own: refuse it before any
-/// statement runs on it.
+/// A file with our marks may still have other tables, or triggers of its own: refuse it before the store uses
+/// it.
 void verifySchema(Connection& connection, const std::vector<Migration>& migrations) {
     Connection reference(":memory:", OpenMode::kReadWriteCreate, 0);
     for (const Migration& migration : migrations) apply(reference, migration, 0);

@@ -25,6 +25,7 @@ std::string readOwner(int descriptor) {
 
 ProcessLock::ProcessLock(const std::string& databasePath) {
     const std::string path = databasePath + ".lock";
+    // O_CLOEXEC: a child that inherited the descriptor would hold the lock after our end.
     descriptor_ = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
     if (descriptor_ < 0) {
         const ErrorCode code = errno == ENOSPC ? ErrorCode::kStorageFull : ErrorCode::kStorage;

@@ -26,6 +26,7 @@ Rebuild requireRebuild(Connection& connection, std::int64_t rebuildId) {
         rebuild.startedAt = query.integer(8);
         rebuild.finishedAt = query.integer(9);
     }
+    // Counted each time: shapes come and go while a rebuild runs.
     if (rebuild.state == RebuildState::kRunning) {
         rebuild.failed = count(Query(connection, sql::kCountRebuildFailures, rebuildId));
         rebuild.done = rebuild.failed + count(Query(connection, sql::kCountRebuilt, rebuild.collectionId,
@@ -153,6 +154,7 @@ Result<bool> SqliteStore::finishRebuild(std::int64_t rebuildId) {
         const Rebuild rebuild = requireRunning(connection, rebuildId);
         const std::int64_t collectionId = rebuild.collectionId;
         const std::int64_t generation = rebuild.targetGeneration;
+        // Asked again within the transaction: a shape may have come since the caller found none left.
         if (Query(connection, sql::kRebuildBatch, collectionId, 0, generation, rebuildId).step())
             return false;
         Query(connection, sql::kSetReadyRebuilt, collectionId, generation, now()).run();

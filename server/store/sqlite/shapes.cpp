@@ -68,6 +68,7 @@ void requireAllowed(const PutRequest& request, const Collection& collection,
 void SqliteStore::queueJob(Connection& connection, const PutRequest& request, std::int64_t shapeId,
                            std::int64_t pointsVersion) {
     const std::uint64_t bytes = request.scan.bytes();
+    // In the transaction of the upload, so that two cannot take the same last place.
     Query tally(connection, sql::kTally);
     if (!tally.step()) raise(ErrorCode::kDataLoss, "the row of table tally is missing");
     const auto jobs = static_cast<std::uint64_t>(tally.integer(0));

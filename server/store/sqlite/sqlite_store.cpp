@@ -75,6 +75,7 @@ void createDatabase(const SqliteOptions& options) {
     close(descriptor);
     {
         Connection connection(fresh, OpenMode::kReadWrite, options.busyTimeoutMs);
+        // Only an empty file takes it.
         connection.execute("PRAGMA page_size=" + std::to_string(kPageSize));
         migrate(connection, embeddedMigrations(), options.now());
     }
@@ -125,6 +126,8 @@ std::unique_ptr<Connection> openWriter(const SqliteOptions& options) {
 
 }  // namespace
 
+// In this order: nothing touches the file before it is locked, and readers, which are read-only, need a file
+// that has its log and its tables.
 SqliteStore::SqliteStore(const SqliteOptions& options)
     : options_(completed(options)),
       lock_(options_.path),
@@ -132,6 +135,8 @@ SqliteStore::SqliteStore(const SqliteOptions& options)
       readers_(std::make_unique<ReaderPool>(options_.path, options_.readers, options_.busyTimeoutMs)),
       walAttemptAt_(kWalBoundBytes) {}
 
+// SQLite writes the log back every thousand pages, but cannot start it from the beginning while reads overlap
+// without a gap. Past a bound this waits for a gap: not long, and not again before the log has grown further.
 void SqliteStore::boundWal() noexcept {
     const std::uint64_t size = fileSize(options_.path + "-wal");
     if (size < walAttemptAt_) {

@@ -106,8 +106,7 @@ class SqliteStore final : public Store {
 
     TimestampMs now() const { return options_.now(); }
 
-    /// After a commit: SQLite writes the log back every thousand pages, but cannot start it from the
-    /// beginning while reads overlap without a gap. Past a bound this waits for a gap.
+    /// After a commit: keeps the write-ahead log from growing without bound. Under writerMutex_.
     void boundWal() noexcept;
 
     PutResult insertShape(Connection& connection, const PutRequest& request, const PointEncoding& encoding);
