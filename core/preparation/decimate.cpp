@@ -96,6 +96,7 @@ Result<DecimatedPoints> decimateOrThrow(const PointCloud& points, std::size_t ta
     double fine = kMinCell;
     double coarse = kMaxCell;
     double cell = std::clamp(2.0 / std::sqrt(static_cast<double>(target)), fine, coarse);
+    // One cell holds everything, so there is always a size that meets the target.
     double bestCell = coarse;
     for (int step = 0; step < kMaxSteps; ++step) {
         RETURN_IF_ERROR(context.checkpoint());

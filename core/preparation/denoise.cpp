@@ -81,6 +81,7 @@ void measureSpread(const PointCloud& points, std::uint32_t centre, const std::ve
     Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
     std::size_t next = 0;
     for (std::size_t s = 0; s < spreads.sizes; ++s) {
+        // Nearest first, so each size adds to the sums of the one before.
         for (; next < kNeighbourhoods[s]; ++next) {
             const Eigen::Vector3d d = toEigen(points[found[next].point] - points[centre]);
             first += d;
@@ -180,6 +181,7 @@ Point3 projected(const PointCloud& points, std::uint32_t at, const std::vector<N
     Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
     solver.computeDirect(second / sum - frame.mean * frame.mean.transpose());
     frame.axes = solver.eigenvectors();
+    // However bad the fit, no point moves farther than noise is likely to have moved it.
     const double height = std::clamp(heightOfFit(offsets, weights, frame, reach), -limit, limit);
     const Eigen::Vector3d move = height * frame.axes.col(0);
     return points[at] + Point3{move.x(), move.y(), move.z()};

@@ -103,6 +103,7 @@ Result<PreparedPoints> sanitiseAndDecimate(const PointCloud& points, std::size_t
             return prepared;
         }
     }
+    // A small scan, or one with so many repeated points that gridScan declined.
     auto clean = sanitise(points);
     RETURN_IF_ERROR(clean);
     prepared.sites = std::move(clean->points);

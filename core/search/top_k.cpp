@@ -120,6 +120,7 @@ class Searcher {
             RETURN_IF_ERROR(scans);
             RETURN_IF_ERROR(visit(collect(*scans, begin)));
             begin = end;
+            // The k-th score changes less and less, so later slices can be larger.
             slice *= kSliceGrowth;
             blocksDone_ = end;
         }

@@ -39,6 +39,7 @@ FlowMasks approximateFlowMasks(const Vec3x2& a, const Vec3x2& b, const Vec3x2& c
     const Double2 sixVolumes = dot(a, bc);
     const Double2 toA = lengthAtMost(a), toB = lengthAtMost(b), toC = lengthAtMost(c);
     const Double2 size = toA * toB * toC;
+    // The circumcentre, seen from the first corner.
     const Vec3x2 g =
         (Double2(0.5) / sixVolumes) * (squaredLength(a) * bc + squaredLength(b) * ca + squaredLength(c) * ab);
     // Barycentric coordinates times the six-fold volume: where that is positive, the signs are the same.

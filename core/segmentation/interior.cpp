@@ -64,6 +64,7 @@ class DeepAngle {
         // The angle is below 90 degrees, so its cosine is positive.
         const double squared = product > 0.0 ? product * product : 0.0;
         const double limit = squaredCosine_ * squaredLength(a) * squaredLength(b);
+        // Without a division or a square root; close calls take the angle itself.
         if (squared > (1.0 + kCosineSlack) * limit) return true;
         if (squared < (1.0 - kCosineSlack) * limit) return false;
         return intersectionAngle(centreA, centreB, shared) < angle_;

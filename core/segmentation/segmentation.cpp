@@ -126,6 +126,7 @@ void describeSegments(const PointCloud& points, SegmentLabels labels, const Fram
         if (moments[a].volume != moments[b].volume) return moments[a].volume > moments[b].volume;
         return lexicographicLess(moments[a].first, moments[b].first);
     });
+    // Tetrahedra of segments without volume end up in none.
     std::vector<std::int32_t> rank(moments.size(), -1);
     for (std::size_t i = 0; i < order.size(); ++i) {
         const std::uint32_t s = order[i];

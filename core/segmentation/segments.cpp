@@ -218,6 +218,7 @@ Result<SegmentLabels> stableManifolds(const Tetrahedra& tetrahedra, const std::v
     }
     sortByFallingRadius(tetrahedra, labels.maxima);
     for (std::size_t i = 0; i < labels.maxima.size(); ++i) {
+        // Labels are ranks by falling radius: the smaller label is that of the stronger maximum.
         labels.ofTetrahedron[labels.maxima[i]] = static_cast<std::int32_t>(i);
     }
     std::size_t steps = 0;
@@ -273,6 +274,7 @@ SegmentLabels mergeSegments(const PointCloud& points, const Tetrahedra& tetrahed
         dense[s] = static_cast<std::int32_t>(maxima.size());
         maxima.push_back(labels.maxima[s]);
     }
+    // A representative is the smallest of its set, so its entry is there and stays as it is.
     for (std::uint32_t s = 0; s < dense.size(); ++s) dense[s] = dense[sets.find(s)];
     for (std::int32_t& segment : labels.ofTetrahedron) {
         if (segment >= 0) segment = dense[static_cast<std::size_t>(segment)];

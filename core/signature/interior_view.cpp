@@ -47,6 +47,7 @@ PrincipalFrame principalFrame(const Segmentation& segmentation) {
 
 void takeTetrahedra(const Segmentation& segmentation, InteriorView& view) {
     const Tetrahedra& all = segmentation.tetrahedra;
+    // All numbers first, since a neighbour may come later.
     std::vector<std::uint32_t> index(all.size(), kNoTetrahedron);
     std::uint32_t count = 0;
     for (std::size_t t = 0; t < all.size(); ++t) {

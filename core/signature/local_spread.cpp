@@ -16,8 +16,7 @@ namespace {
 
 constexpr std::uint64_t kSeed = 10;
 
-// The beginning of a random permutation of the points: so any of them that come first are a random choice,
-// too.
+// The first points of a random permutation, so the first few of these are a random choice as well.
 PointCloud drawn(const PointCloud& points, std::size_t count) {
     PointCloud result = points;
     Random random(kSeed);

@@ -26,6 +26,7 @@ void evaluate(const Point3& direction, std::array<double, kCoefficients>& out) {
         const double k = static_cast<double>(m);
         p[m][m] = std::sqrt((2.0 * k - 1.0) / (2.0 * k)) * s * p[m - 1][m - 1];
     }
+    // The three-term recursion of Legendre functions in l, for the scaled ones.
     for (std::size_t m = 0; m < kDegrees; ++m) {
         p[m + 1][m] = std::sqrt(2.0 * static_cast<double>(m) + 1.0) * z * p[m][m];
         for (std::size_t l = m + 2; l <= kDegrees; ++l) {

@@ -30,6 +30,7 @@ Point3 placeOf(const SegmentDescriptor& segment) {
     return {segment.position[0], segment.position[1], segment.position[2]};
 }
 
+// Less than 1 where the signature leaves out light segments.
 double totalShare(const SegmentSpan& body) {
     double sum = 0.0;
     for (const SegmentDescriptor& segment : body) sum += segment.share;

@@ -109,6 +109,7 @@ class SegmentComparison::Search {
 
     void tryRotation(const Matrix3& rotation, bool reflected) {
         if (reflected && !pair_.reflection_) return;
+        // Only a better one would be taken, and there is none.
         if (prune_ && best_.agreement >= pair_.most_) return;
         const double agreement = pair_.agreementUnder(rotation);
         if (agreement > best_.agreement) best_ = {agreement, rotation, reflected};

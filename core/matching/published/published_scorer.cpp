@@ -67,6 +67,7 @@ class PublishedScorer : public Scorer {
     double bound(const ShapeRow& shape) const final {
         const ShapeRow query = query_.row();
         if (sameShape(query, shape, options_.keepScale)) return 1.0;
+        // Not exchanged: a bound need not have the same bits both ways.
         const CommonScale scaled(query, shape, options_);
         // Pairs are one to one, so the points of either side bound the sum.
         const double most = std::min(similarityBound(scaled.a, scaled.b, options_.kernelWidth),
