@@ -275,6 +275,7 @@ Result<void> CollectionIndex::applyDirty(Slot& slot) {
         if (row && toEntry({id, shape->metadata, std::move(*row)}, entry, store_, *log_)) {
             updates.push_back(std::move(entry));
         } else {
+            // Deleted, not segmented yet, failed or damaged: not searched.
             removed.push_back(id);
         }
     }

@@ -89,6 +89,7 @@ Result<store::Rebuild> RebuildDriver::begin(const store::Collection& collection,
 Result<store::Rebuild> RebuildDriver::waitForChange(const store::Rebuild& seen, const RunContext& context) {
     for (auto nextCount = RunContext::Clock::now();;) {
         RETURN_IF_ERROR(context.checkpoint());
+        // Counts are in the store, where nothing announces a change of them.
         if (RunContext::Clock::now() >= nextCount) {
             auto now = store_.getRebuild(seen.id);
             if (!now || !sameProgress(*now, seen)) return now;

@@ -189,6 +189,7 @@ std::shared_ptr<WorkerPool::Running> WorkerPool::next(std::optional<CrashIsolati
         };
         changed_.wait(lock, [&] { return stopping_ || mayClaim(); });
         if (stopping_) return nullptr;
+        // Before the claim: a job that is queued in between raises it, and the wait below ends at once.
         const std::uint64_t seen = signals_;
         const bool probing = probing_;
         ++claiming_;
@@ -223,6 +224,7 @@ void WorkerPool::work(const std::shared_ptr<Running>& running) {
     try {
         outcome = attempt(*running);
     } catch (...) {
+        // An exception that left the thread would end the process.
         outcome = giveUp(job, errorOfException());
     }
     if (outcome != Outcome::kDone) putBack(job);
@@ -312,6 +314,7 @@ WorkerPool::Outcome WorkerPool::giveUp(const store::Job& job, const Error& why) 
     auto fields = fieldsOf(job, why);
     fields.push_back({"key", (*failed)->key});
     log_->warn("scan cannot be segmented", fields);
+    // A signature of older points no longer serves.
     if (const auto refreshed = index_.refresh(job.collectionId, job.shapeId); !refreshed) {
         log_->error("failed scan is still searched", fieldsOf(job, refreshed.error()));
     }

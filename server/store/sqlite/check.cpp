@@ -128,6 +128,7 @@ class Checker {
                     add("shape " + quoted(query.text(0)) + " has wrong byte counts beside its points");
                 }
             } catch (const Failure& failure) {
+                // One damaged scan is a problem to list; a failing database ends the section.
                 if (failure.fromDatabase) throw;
                 add(failure.error.message);
             }

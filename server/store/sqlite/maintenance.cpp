@@ -244,6 +244,7 @@ Result<void> SqliteStore::restore(const std::string& path, const RunContext& con
     return guarded("restore the backup", [&] {
         requireBackupFile(path, options_.path);
         const TemporaryFile temporary(options_.path + ".restore");
+        // The file that the user named stays as it is; migrations change the copy.
         copyBytes(path, temporary.path(), context);
         std::unique_ptr<Connection> copy;
         blaming(path, [&] {
