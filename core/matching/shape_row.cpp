@@ -23,6 +23,7 @@ bool canonicalLessAttributed(const ShapeRow& a, const ShapeRow& b) {
         if (p.size != q.size) return p.size < q.size;
     }
     if (a.quality != b.quality) return a.quality < b.quality;
+    // By the levels, not the packed bytes: the order must not depend on how they are packed.
     return statisticsOf(a) < statisticsOf(b);
 }
 

@@ -38,6 +38,7 @@ Catalog::Catalog(std::unique_ptr<store::Store> store, ingest::SignaturePipeline 
 Catalog::~Catalog() = default;
 
 Result<void> Catalog::start() {
+    // First, so that the index loads it with the others.
     RETURN_IF_ERROR(ensureDefaultCollection(*store_));
     const auto began = std::chrono::steady_clock::now();
     RETURN_IF_ERROR(index_.loadAll());
@@ -105,6 +106,7 @@ Result<void> Catalog::deleteCollection(const std::string& name, bool force) {
     }
     const auto cancelled = rebuilds_.cancel(collection);
     if (!cancelled && cancelled.error().code != ErrorCode::kNotFound) return cancelled;
+    // The store first, which may refuse; the index and the workers follow.
     RETURN_IF_ERROR(store_->deleteCollection(collection.id));
     index_.remove(collection.id);
     workers_.supersedeCollection(collection.id);

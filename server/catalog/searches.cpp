@@ -60,6 +60,7 @@ Result<std::optional<Explanation>> Searches::explain(const PreparedSearch& searc
                                                      const SearchHit& hit) const {
     const auto signature = catalog_.storedSignature(*search.collection, hit.id);
     if (!signature && signature.error().code == ErrorCode::kDataLoss) return fail(signature.error());
+    // Deleted or replaced since the search, or not readable now: a hit without reasons.
     if (!signature) return std::optional<Explanation>();
     Explanation explanation = scorer.explain(*signature);
     // The shape has got another signature since the search.

@@ -66,6 +66,7 @@ double termDistance(const LevelSums& sums, std::size_t kind) {
     return sums[kind] * kRootPerLevel / kTypical[kind];
 }
 
+// Rounding may take an agreement past 1.
 double disagreement(double agreement) { return std::max(0.0, 1.0 - agreement) / kTypicalDisagreement; }
 
 double meanDistance(const AttributeDistance& distance, double agreement) {
@@ -117,6 +118,8 @@ double partialScore(const AttributeDistance& distance, double agreement, double 
 LevelWeights levelWeights(std::uint8_t qualityA, std::uint8_t qualityB) {
     const double interior = trust(qualityA, qualityB);
     LevelWeights weights;
+    // The total of attributeDistance. That it is summed in another order is within the margin of
+    // maxDistanceForScore.
     double total = kPartsWeight * between(weightOf(Evidence::kInside), interior);
     for (std::size_t kind = 0; kind < kStatisticKinds; ++kind) {
         weights.perLevel[kind] = termWeight(kind, interior) * kRootPerLevel / kTypical[kind];

@@ -96,6 +96,7 @@ class Search {
         if (hopeless(0.0, 0)) return;
         trial.from = placeOf(whole_[q]);
         trial.to = placeOf(piece_[p]);
+        // Not turned: all there is to try for a piece of one segment.
         keepBest(trial);
         for (std::size_t i = 0; i < leaders; ++i) {
             for (std::size_t k = 0; k < leaders; ++k) {

@@ -171,6 +171,7 @@ class Search {
             tryRoll(alignment, viewA, viewB, Roll{});
             return;
         }
+        // From 1: the anchor lies on the axis.
         for (std::size_t k = 1; k < a_.count; ++k) {
             if (!givesRoll(viewA, k)) continue;
             for (std::size_t l = 1; l < b_.count; ++l) {

@@ -32,6 +32,7 @@ ErrorCode codeOf(int sqliteCode, bool full) {
         case SQLITE_NOMEM: return ErrorCode::kOutOfMemory;
         case SQLITE_INTERRUPT: return ErrorCode::kCancelled;
         case SQLITE_TOOBIG: return ErrorCode::kInvalidArgument;
+        // The store checks before it writes, so a broken constraint is its own mistake.
         case SQLITE_CONSTRAINT:
         case SQLITE_MISUSE:
         case SQLITE_RANGE:

@@ -24,6 +24,7 @@ bool SqliteStore::jobIsCurrent(Connection& connection, const Job& job, std::int6
 std::optional<Shape> SqliteStore::markFailed(Connection& connection, std::int64_t shapeId, const Error& why) {
     Query(connection, sql::kSetFailed, shapeId, now(), std::string(errorCodeName(why.code)), why.message)
         .run();
+    // Also what a running rebuild made; its next pass finds the shape again.
     Query(connection, sql::kDeleteSignatures, shapeId).run();
     Query(connection, sql::kDeleteJob, shapeId).run();
     return findShapeById(connection, shapeId);

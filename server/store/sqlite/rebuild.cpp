@@ -157,6 +157,7 @@ Result<bool> SqliteStore::finishRebuild(std::int64_t rebuildId) {
         // Asked again within the transaction: a shape may have come since the caller found none left.
         if (Query(connection, sql::kRebuildBatch, collectionId, 0, generation, rebuildId).step())
             return false;
+        // A shape with a job stays pending: the job brings a signature of the new generation.
         Query(connection, sql::kSetReadyRebuilt, collectionId, generation, now()).run();
         Query(connection, sql::kSetFailedRebuilt, rebuildId, now()).run();
         Query(connection, sql::kSetGeneration, collectionId, generation, rebuild.parameters).run();
