@@ -109,6 +109,8 @@ std::uint32_t BowyerWatson::locate(std::uint32_t vertex, const Site& p) const {
     // Sites come along the Hilbert curve, so the last one is mostly a few cells away.
     std::uint32_t found = hint_ != kNoCell ? walk<kSerial>(hint_, p) : kNoCell;
     if (found != kNoCell) return found;
+    // The cells a worker may cross can fall into several pieces that no walk connects, for instance the two
+    // legs of a chair in one slab. Vertices with close numbers mostly lie in the same piece.
     starts_->visitNear(vertex, [&](std::uint32_t start) {
         if (cells_[start].isFree() || !owns<kSerial>(start)) return false;
         found = walk<kSerial>(start, p);

@@ -10,8 +10,6 @@
 namespace shapedb {
 
 /// Some cells of one worker, by position along the Hilbert curve: one for each 1/4096 of the vertex numbers.
-/// The cells a worker may cross can fall into several pieces that no walk connects, for instance the two legs
-/// of a chair in one slab; vertices with close numbers mostly lie in the same piece.
 ///
 /// A cell may have been freed or reused since it was added; whoever visits it has to check.
 class StartCells {

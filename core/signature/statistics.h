@@ -62,8 +62,7 @@ constexpr std::array<StatisticLayout, kStatisticKinds> kStatistics{{
 constexpr std::size_t kStatisticBins = 432;
 
 /// The level of each bin, 0 to kTopLevel: the square root of its share of the whole, in steps. Two shapes are
-/// compared by the L1 distance of these roots. (Hellinger's distance is their L2 distance.) Roots make a rare
-/// bin that is there or not matter as much as a small change of a full one.
+/// compared by the L1 distance of these roots.
 using ShapeStatistics = std::array<std::uint8_t, kStatisticBins>;
 
 /// The same bits on any number of threads; uses up to three of the caller's arena. Errors: kCancelled,

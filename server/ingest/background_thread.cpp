@@ -24,6 +24,7 @@ void becomeBackgroundThread() noexcept {
 }
 
 void onThisThreadAlone(const std::function<void()>& work) {
+    // The threads of the pool are not background threads, and the other workers keep the processors busy.
     oneapi::tbb::task_arena alone(1);
     alone.execute(work);
 }

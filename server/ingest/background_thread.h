@@ -9,8 +9,7 @@ namespace shapedb::ingest {
 /// call it gets about a tenth of a processor both want, and all of it otherwise. Best effort.
 void becomeBackgroundThread() noexcept;
 
-/// Runs `work` on the calling thread alone, including its parallel loops: the threads of the pool are
-/// not background threads, and the other workers keep the processors busy.
+/// Runs `work` on the calling thread alone, including its parallel loops.
 void onThisThreadAlone(const std::function<void()>& work);
 
 }  // namespace shapedb::ingest

@@ -14,7 +14,8 @@ namespace shapedb {
 
 namespace {
 
-// Where a half keeps its five statistics: three of up to 64 levels, two of up to 32.
+// Where a half keeps its five statistics: three of up to 64 levels, two of up to 32. So the differences of a
+// whole statistic are summed in one or two machine instructions.
 struct Slot {
     std::size_t offset;
     std::size_t bytes;
@@ -75,6 +76,8 @@ HalfRow withRowsReversed(HalfRow half) {
     return half;
 }
 
+// The L1 distance of levels, which are square roots of shares (Hellinger's distance is the L2 distance of the
+// roots). Roots make a rare bin that is there or not matter as much as a small change of a full one.
 std::uint32_t slotSum(const HalfRow& a, const HalfRow& b, std::size_t slot) {
     std::uint32_t sum = 0;
     for (std::size_t i = kSlots[slot].offset; i < kSlots[slot].offset + kSlots[slot].bytes; ++i) {

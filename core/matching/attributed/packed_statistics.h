@@ -1,6 +1,5 @@
-// Statistics as a search reads them: two levels in a byte, arranged so that the differences of a whole
-// statistic are summed in one or two machine instructions. They lie in two halves, and the second is
-// only read where the first does not rule a shape out.
+// Statistics as a search reads them: two levels in a byte, in two halves, the second of which is only read
+// where the first does not rule a shape out.
 #pragma once
 
 #include <array>
