@@ -24,6 +24,7 @@
 #include "client/cli/exit_code.h"
 #include "core/base/random.h"
 #include "core/base/return_if_error.h"
+#include "core/matching/attributed/statistics_bound.h"
 #include "core/matching/score.h"
 #include "core/search/top_k.h"
 
@@ -201,15 +202,14 @@ class TopKRun {
         SearchCounts sum;
         for (const SearchResult& result : queries_.results) {
             sum.filtered += result.counts.filtered;
-            sum.afterFirstHalf += result.counts.afterFirstHalf;
-            sum.afterStatistics += result.counts.afterStatistics;
+            sum.scans += result.counts.scans;
             sum.scored += result.counts.scored;
         }
         const auto share = [&](std::uint64_t left) {
             return sum.filtered == 0 ? 0.0 : static_cast<double>(left) / static_cast<double>(sum.filtered);
         };
-        out["left"] = {{"first_half_of_statistics", share(sum.afterFirstHalf)},
-                       {"statistics", share(sum.afterStatistics)},
+        out["left"] = {{"first_half_of_statistics", share(sum.scans.left[kFirstHalfStage])},
+                       {"statistics", share(sum.scans.left[kStatisticsStage])},
                        {"parts", share(sum.scored)}};
     }
 

@@ -18,9 +18,7 @@ class MixedScorer final : public Scorer {
     bool compares(const ShapeRow& shape) const override { return of(shape).compares(shape); }
     double score(const ShapeRow& shape) const override { return of(shape).score(shape); }
     double bound(const ShapeRow& shape) const override { return of(shape).bound(shape); }
-    Explanation explain(const Signature& shape) const override {
-        return (shape.attributes ? *attributed_ : *published_).explain(shape);
-    }
+    Explanation explain(const ShapeRow& shape) const override { return of(shape).explain(shape); }
 
     void scan(const ShapeRows& rows, const std::vector<std::uint8_t>& wanted, double least,
               std::vector<Survivor>& left, ScanCounts& counts) const override {
@@ -48,8 +46,7 @@ void Scorer::scan(const ShapeRows& rows, const std::vector<std::uint8_t>& wanted
         if (!wanted.empty() && wanted[row] == 0) continue;
         const ShapeRow shape = rows[row];
         if (!compares(shape)) continue;
-        ++counts.afterFirstHalf;
-        ++counts.afterStatistics;
+        for (std::uint64_t& stage : counts.left) ++stage;
         const double most = bound(shape);
         if (most >= least) left.push_back({most, row, {}});
     }

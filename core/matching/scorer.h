@@ -9,8 +9,10 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <memory>
 #include <optional>
+#include <type_traits>
 #include <vector>
 
 #include "core/matching/explanation.h"
@@ -20,25 +22,53 @@
 
 namespace shapedb {
 
+/// What a scan found out about a row, handed on to `scoreIfReaches`. Only the scorer that wrote it knows
+/// what it is: any value of at most kMostBytes that may be copied as bytes.
+class Findings {
+  public:
+    static constexpr std::size_t kMostBytes = 20;
+
+    Findings() = default;
+    template <typename T>
+    explicit Findings(const T& value) {
+        static_assert(std::is_trivially_copyable_v<T> && sizeof(T) <= kMostBytes);
+        std::memcpy(bytes_.data(), &value, sizeof(T));
+    }
+
+    /// `T` as it was written.
+    template <typename T>
+    [[nodiscard]] T as() const {
+        static_assert(std::is_trivially_copyable_v<T> && sizeof(T) <= kMostBytes);
+        T value;
+        std::memcpy(&value, bytes_.data(), sizeof(T));
+        return value;
+    }
+
+  private:
+    std::array<std::byte, kMostBytes> bytes_{};
+};
+
 /// A row that a scan could not rule out.
 struct Survivor {
-    /// What a scan found out about a row, for the scorer itself in `scoreIfReaches`: whole numbers, so that
-    /// nothing is computed in a scan that only the few rows need that are scored in the end.
-    using Known = std::array<std::uint16_t, 10>;
-
     double bound = 0.0;  ///< its score is no larger
     std::uint32_t row = 0;
-    Known known{};
+    Findings findings;
 };
 
-/// How many rows each stage of a scan left to the next.
+/// How many rows each stage of a scan left to the next. Each scorer names its own stages; one that it
+/// does not have leaves all rows that it compares.
 struct ScanCounts {
-    std::uint64_t afterFirstHalf = 0;
-    std::uint64_t afterStatistics = 0;
+    static constexpr std::size_t kMostStages = 2;
+    std::array<std::uint64_t, kMostStages> left{};
+
+    ScanCounts& operator+=(const ScanCounts& other) {
+        for (std::size_t stage = 0; stage < kMostStages; ++stage) left[stage] += other.left[stage];
+        return *this;
+    }
 };
 
-/// Scores shapes against one query. Immutable: all members may be called from any thread. Only `scan`
-/// (once a call) and `explain` allocate.
+/// Scores shapes against one query: made once, it serves a whole search and the explanations of its hits.
+/// Immutable: all members may be called from any thread. Only `scan` (once a call) and `explain` allocate.
 class Scorer {
   public:
     Scorer() = default;
@@ -56,8 +86,9 @@ class Scorer {
     /// Never below `score`, at most 1, and much cheaper.
     [[nodiscard]] virtual double bound(const ShapeRow& shape) const = 0;
 
-    /// `score` with its reasons, bit for bit: the query is a, `shape` is b.
-    [[nodiscard]] virtual Explanation explain(const Signature& shape) const = 0;
+    /// `score` with its reasons, bit for bit: the query is a, `shape` is b, which must have its points and
+    /// its placement, as the row of a PackedShape has.
+    [[nodiscard]] virtual Explanation explain(const ShapeRow& shape) const = 0;
 
     /// Appends to `left`, in ascending order, every row that may score `least` or more. `wanted` has one
     /// value a row, 0 leaves it out; empty: all rows. By default asks each row for its `bound`;
@@ -73,6 +104,9 @@ class Scorer {
     /// As above for a signature with all its points.
     [[nodiscard]] double score(const Signature& shape) const { return score(PackedShape(shape).row()); }
     [[nodiscard]] double bound(const Signature& shape) const { return bound(PackedShape(shape).row()); }
+    [[nodiscard]] Explanation explain(const Signature& shape) const {
+        return explain(PackedShape(shape).row());
+    }
 };
 
 /// The scorer of a query: with attributes it compares these where the other shape has them too, and

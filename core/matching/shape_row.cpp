@@ -49,8 +49,12 @@ PackedShape::PackedShape(const Signature& signature)
     for (std::size_t i = 0; i < pointCount_; ++i) {
         points_[i] = {signature.points[i].position, signature.points[i].weight};
     }
+    placement_.origin = signature.origin;
     if (!signature.attributes) return;
-    const auto& segments = signature.attributes->body.parts;
+    const Body& body = signature.attributes->body;
+    placement_.centre = body.centre;
+    placement_.axes = body.axes;
+    const auto& segments = body.parts;
     segmentCount_ = segments.size();
     for (std::size_t i = 0; i < segmentCount_; ++i) segments_[i] = packed(segments[i]);
     packStatistics(signature.attributes->statistics, firstHalf_, secondHalf_);
@@ -62,6 +66,7 @@ ShapeRow PackedShape::row() const {
     shape.scale = scale_;
     shape.points = points_.data();
     shape.pointCount = pointCount_;
+    shape.placement = &placement_;
     if (segmentCount_ == 0) return shape;
     shape.segments = segments_.data();
     shape.segmentCount = segmentCount_;

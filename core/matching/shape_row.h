@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "core/geometry/motion.h"
+#include "core/geometry/point.h"
 #include "core/matching/attributed/packed_statistics.h"
 #include "core/signature/signature.h"
 
@@ -16,8 +18,17 @@ struct PackedPoint {
     float weight = 0.0f;
 };
 
+/// Where a shape lies in its scan. Enters no score, but the motion of an explanation.
+struct Placement {
+    Point3 origin;  ///< Signature::origin
+    // Of attributed shapes the frame of the body (Body).
+    Point3 centre;
+    Matrix3 axes{};
+};
+
 /// The scored numbers of one shape: a view, to be copied freely while its owner lives. An attributed
-/// shape has segments, statistics and a quality. Its points may be missing: cached rows leave them out.
+/// shape has segments, statistics and a quality. The rows of a search leave out what no score reads: the
+/// points of attributed shapes and all placements. A PackedShape has both.
 struct ShapeRow {
     double scale = 1.0;
     const PackedPoint* points = nullptr;
@@ -27,6 +38,7 @@ struct ShapeRow {
     const HalfRow* firstHalf = nullptr;   ///< of the statistics; null without attributes
     const HalfRow* secondHalf = nullptr;  ///< likewise
     std::uint8_t quality = 0;             ///< of the interior, in steps of 1/255
+    const Placement* placement = nullptr;
 
     [[nodiscard]] bool attributed() const { return segmentCount > 0; }
 };
@@ -57,7 +69,8 @@ struct ShapeRows {
     }
 };
 
-/// The scored numbers of one signature, packed without loss. Holds all of it inline: no allocation.
+/// The scored numbers of one signature, packed without loss, and its placement. Holds all of it inline: no
+/// allocation.
 class PackedShape {
   public:
     /// `signature` valid: as made by makeSignature or decodeSignature.
@@ -71,6 +84,7 @@ class PackedShape {
     std::size_t pointCount_ = 0;
     std::size_t segmentCount_ = 0;
     std::uint8_t quality_ = 0;
+    Placement placement_;
     HalfRow firstHalf_, secondHalf_;
     std::array<PackedPoint, kMaxSignaturePoints> points_;
     std::array<PackedSegmentDescriptor, kMaxSignaturePoints> segments_;

@@ -7,6 +7,7 @@
 #include <new>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -177,8 +178,7 @@ class Searcher {
         for (const BlockScan& scan : scans) {
             left += scan.left.size();
             result_.counts.filtered += scan.filtered;
-            result_.counts.afterFirstHalf += scan.counts.afterFirstHalf;
-            result_.counts.afterStatistics += scan.counts.afterStatistics;
+            result_.counts.scans += scan.counts;
         }
         std::vector<Candidate> all;
         all.reserve(left);
@@ -251,7 +251,10 @@ Result<SearchResult> topK(const Signature& query, const SignatureSet& set, const
                           const RunContext& context) {
     RETURN_IF_ERROR(check(query, set, options));
     try {
-        return topK(*makeScorer(query, options.score), set, options, context);
+        std::shared_ptr<const Scorer> scorer = makeScorer(query, options.score);
+        auto result = topK(*scorer, set, options, context);
+        if (result) result->scorer = std::move(scorer);
+        return result;
     } catch (const std::bad_alloc&) {
         return outOfMemory(set);
     }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -28,17 +29,18 @@ struct SearchHit {
 
 /// How many candidates each stage of a search left to the next.
 struct SearchCounts {
-    std::uint64_t candidates = 0;       ///< in the snapshot
-    std::uint64_t filtered = 0;         ///< of these, passed filter and exclusion
-    std::uint64_t afterFirstHalf = 0;   ///< of these, not ruled out by the first half of their statistics
-    std::uint64_t afterStatistics = 0;  ///< nor by all statistics
-    std::uint64_t scored = 0;           ///< nor by their parts: scored in full
+    std::uint64_t candidates = 0;  ///< in the snapshot
+    std::uint64_t filtered = 0;    ///< of these, passed filter and exclusion
+    ScanCounts scans;              ///< of these, left by each stage of the scorer's scans
+    std::uint64_t scored = 0;      ///< nor ruled out one by one: scored in full
 };
 
 struct SearchResult {
     std::vector<SearchHit> hits;  ///< in descending order of score, ties in ascending order of id
     SearchCounts counts;
     double seconds = 0.0;  ///< taken
+    /// What scored the hits, to explain them; null when the caller gave the scorer.
+    std::shared_ptr<const Scorer> scorer;
 };
 
 /// Uses the calling thread's oneTBB arena. The counts may vary with the number of threads, the hits never do.

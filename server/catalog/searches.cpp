@@ -1,6 +1,5 @@
 #include "server/catalog/searches.h"
 
-#include <memory>
 #include <utility>
 
 #include "core/base/return_if_error.h"
@@ -68,9 +67,8 @@ Result<std::optional<Explanation>> Searches::explain(const PreparedSearch& searc
     return std::optional<Explanation>(std::move(explanation));
 }
 
-Result<void> Searches::visitHits(const PreparedSearch& search, const Signature& query,
-                                 const SearchResult& found, const Visit& visit) const {
-    const std::unique_ptr<const Scorer> scorer = makeScorer(query, search.options.score);
+Result<void> Searches::visitHits(const PreparedSearch& search, const SearchResult& found,
+                                 const Visit& visit) const {
     for (const SearchHit& hit : found.hits) {
         auto shape = catalog_.shapeById(hit.id);
         if (!shape && shape.error().code == ErrorCode::kNotFound) continue;  // deleted meanwhile
@@ -80,7 +78,7 @@ Result<void> Searches::visitHits(const PreparedSearch& search, const Signature& 
         out.quality = qualityIn(search.collection->signatures, hit.id);
         out.score = hit.score;
         if (search.explain) {
-            auto explanation = explain(search, *scorer, hit);
+            auto explanation = explain(search, *found.scorer, hit);
             RETURN_IF_ERROR(explanation);
             out.explanation = std::move(*explanation);
         }

@@ -66,11 +66,11 @@ class Searches {
     [[nodiscard]] Result<BatchQuery> storedQuery(const PreparedSearch& search, const std::string& key) const;
 
     /// Calls `visit` with each hit, best first, leaving out shapes deleted meanwhile. An explanation is
-    /// missing where the signature scored was replaced meanwhile. Errors: those of topK and of `visit`;
-    /// kDataLoss.
+    /// missing where the signature scored was replaced meanwhile. `found` by `run` or `runBatch`. Errors:
+    /// those of topK and of `visit`; kDataLoss.
     using Visit = std::function<Result<void>(const FoundHit&)>;
-    [[nodiscard]] Result<void> visitHits(const PreparedSearch& search, const Signature& query,
-                                         const SearchResult& found, const Visit& visit) const;
+    [[nodiscard]] Result<void> visitHits(const PreparedSearch& search, const SearchResult& found,
+                                         const Visit& visit) const;
 
     /// As `topK`; `query.excludeId` holds.
     [[nodiscard]] Result<SearchResult> run(const PreparedSearch& search, const BatchQuery& query,

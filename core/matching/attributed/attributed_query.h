@@ -22,22 +22,21 @@ namespace shapedb {
 class AttributedQuery {
   public:
     explicit AttributedQuery(const Signature& signature)
-        : signature_(signature),
-          packed_(signature),
+        : packed_(signature),
           segments_(packed_.row()),
           difference_(*packed_.row().firstHalf, *packed_.row().secondHalf) {}
 
-    [[nodiscard]] const Signature& signature() const { return signature_; }
+    /// With points and placement.
     [[nodiscard]] ShapeRow row() const { return packed_.row(); }
     [[nodiscard]] const SegmentArray& segments() const { return segments_; }
-    [[nodiscard]] std::uint8_t quality() const { return signature_.attributes->quality; }
+    [[nodiscard]] std::uint8_t quality() const { return packed_.row().quality; }
+    [[nodiscard]] double scale() const { return packed_.row().scale; }
     [[nodiscard]] const StatisticsDifference& difference() const { return difference_; }
 
     /// Of an attributed shape.
     [[nodiscard]] LevelSums levelSums(const ShapeRow& shape) const;
 
   private:
-    Signature signature_;
     PackedShape packed_;
     SegmentArray segments_;
     StatisticsDifference difference_;

@@ -1,7 +1,5 @@
 #include "core/matching/attributed/attributed_scorer.h"
 
-#include <type_traits>
-
 #include "core/matching/attributed/partial_scorer.h"
 #include "core/matching/attributed/whole_scorer.h"
 
@@ -15,12 +13,10 @@ AttributedScorer::Pair::Pair(const AttributedQuery& query, const ShapeRow& row, 
     : segments(row),
       exchanged(canonicalLess(row, query.row())),
       comparison(exchanged ? segments : query.segments(), exchanged ? query.segments() : segments, options),
-      distance(attributeDistance(
-          statisticsDistance(sums, query.quality(), row.quality), query.quality(), row.quality,
-          options.keepScale ? octavesBetween(query.signature().scale, row.scale) : 0.0)),
-      knownScale(options.keepScale ? query.signature().scale / row.scale : 0.0) {}
-
-static_assert(std::is_same_v<LevelSums, Survivor::Known>, "a scan hands its sums on");
+      distance(attributeDistance(statisticsDistance(sums, query.quality(), row.quality), query.quality(),
+                                 row.quality,
+                                 options.keepScale ? octavesBetween(query.scale(), row.scale) : 0.0)),
+      knownScale(options.keepScale ? query.scale() / row.scale : 0.0) {}
 
 double AttributedScorer::score(const ShapeRow& shape) const {
     return isSame(shape) ? 1.0 : scoreOf(Pair(query_, shape, query_.levelSums(shape), options_));
@@ -39,7 +35,7 @@ void AttributedScorer::scan(const ShapeRows& rows, const std::vector<std::uint8_
 std::optional<double> AttributedScorer::scoreIfReaches(const ShapeRow& shape, const Survivor& survivor,
                                                        double least) const {
     if (isSame(shape)) return 1.0;
-    const Pair pair(query_, shape, survivor.known, options_);
+    const Pair pair(query_, shape, survivor.findings.as<LevelSums>(), options_);
     if (boundOf(pair) < least) return std::nullopt;
     return scoreOf(pair);
 }

@@ -9,14 +9,14 @@ namespace shapedb {
 namespace {
 
 // A point of the body's frame in scan coordinates.
-Point3 inScan(const Signature& of, const Point3& inFrame) {
-    const Body& body = of.attributes->body;
+Point3 inScan(const ShapeRow& of, const Point3& inFrame) {
+    const Placement& body = *of.placement;
     Point3 p = body.centre;
     for (std::size_t axis = 0; axis < 3; ++axis) {
         p = p +
             coordinate(inFrame, axis) * Point3{body.axes[axis][0], body.axes[axis][1], body.axes[axis][2]};
     }
-    return of.origin + of.scale * p;
+    return body.origin + of.scale * p;
 }
 
 // transposed(to) * rotation * from
@@ -38,25 +38,25 @@ Matrix3 betweenFrames(const Matrix3& to, const Matrix3& rotation, const Matrix3&
 
 }  // namespace
 
-Motion bodyMotion(const Signature& a, const Signature& b, const Matrix3& rotation, bool reflected,
+Motion bodyMotion(const ShapeRow& a, const ShapeRow& b, const Matrix3& rotation, bool reflected,
                   bool keepScale) {
-    const Body& from = b.attributes->body;
-    const Body& to = a.attributes->body;
+    const Placement& from = *b.placement;
+    const Placement& to = *a.placement;
     Motion motion;
     motion.scale = keepScale ? 1.0 : a.scale / b.scale;
     motion.reflected = reflected;
     motion.rotation = betweenFrames(to.axes, rotation, from.axes);
-    const Point3 centreA = a.origin + a.scale * to.centre;
-    const Point3 centreB = b.origin + b.scale * from.centre;
+    const Point3 centreA = to.origin + a.scale * to.centre;
+    const Point3 centreB = from.origin + b.scale * from.centre;
     motion.translation = centreA - motion.scale * rotate(motion.rotation, centreB);
     return motion;
 }
 
-Motion pieceMotion(const Signature& piece, const Signature& whole, const Containment& found, bool keepScale) {
+Motion pieceMotion(const ShapeRow& piece, const ShapeRow& whole, const Containment& found, bool keepScale) {
     Motion motion;
     motion.scale = keepScale ? 1.0 : piece.scale / whole.scale / found.scale;
     motion.reflected = found.reflected;
-    motion.rotation = betweenFrames(piece.attributes->body.axes, found.rotation, whole.attributes->body.axes);
+    motion.rotation = betweenFrames(piece.placement->axes, found.rotation, whole.placement->axes);
     motion.translation =
         inScan(piece, found.to) - motion.scale * rotate(motion.rotation, inScan(whole, found.from));
     return motion;

@@ -19,23 +19,21 @@ double PartialScorer::boundOf(const Pair& pair) const {
     return belowOne(partialScore(pair.distance, pair.comparison.agreementBound(), share));
 }
 
-Explanation PartialScorer::explain(const Signature& shape) const {
-    const PackedShape packed(shape);
-    const ShapeRow row = packed.row();
-    const LevelSums sums = query().levelSums(row);
-    const Pair pair(query(), row, sums, options());
-    const Signature& piece = query().signature();
+Explanation PartialScorer::explain(const ShapeRow& shape) const {
+    const LevelSums sums = query().levelSums(shape);
+    const Pair pair(query(), shape, sums, options());
+    const ShapeRow piece = query().row();
     const Containment found = containment(query().segments(), pair.segments, pair.knownScale, options());
     const double agreement = pair.comparison.match().agreement;
     Explanation result;
-    result.score = isSame(row) ? 1.0 : belowOne(partialScore(pair.distance, agreement, found.share));
+    result.score = isSame(shape) ? 1.0 : belowOne(partialScore(pair.distance, agreement, found.share));
     result.similarity = found.share;
     result.dissimilarity = 1.0 - found.share;
-    result.degenerate = piece.points.size() == 1 || shape.points.size() == 1;
+    result.degenerate = piece.pointCount == 1 || shape.pointCount == 1;
     result.motion = pieceMotion(piece, shape, found, options().keepScale);
-    result.terms = partialTerms(sums, query().quality(), row.quality, agreement, found.share);
+    result.terms = partialTerms(sums, query().quality(), shape.quality, agreement, found.share);
     addMatches(containedPairs(query().segments(), pair.segments, found, options()), found.share, result);
-    listUnmatched(result, piece.points.size(), shape.points.size());
+    listUnmatched(result, piece.pointCount, shape.pointCount);
     return result;
 }
 

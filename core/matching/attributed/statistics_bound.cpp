@@ -20,7 +20,7 @@ double weighted(const HalfSums& sums, const std::array<double, kKindsPerHalf>& w
 
 StatisticsBound::StatisticsBound(const AttributedQuery& query, StatisticsRule rule)
     : query_(query),
-      queryScale_(query.signature().scale),
+      queryScale_(query.scale()),
       compareSizes_(rule == StatisticsRule::kWholeAndSize),
       first_(kQualities),
       second_(kQualities) {
@@ -52,14 +52,14 @@ void StatisticsBound::scan(const ShapeRows& rows, const std::vector<std::uint8_t
             // zeros as statistics; they are dropped below.
             if (distance > farthest) continue;
             if ((!wanted.empty() && wanted[row] == 0) || (!all && !rows.attributed(row))) continue;
-            ++counts.afterFirstHalf;
+            ++counts.left[kFirstHalfStage];
             const HalfSums rest = query_.difference().second(rows.secondHalves[row]);
             distance += weighted(rest, second_[quality]);
             if (compareSizes_) distance = std::hypot(distance, octavesBetween(queryScale_, rows.scales[row]));
             if (distance > farthest) continue;
-            ++counts.afterStatistics;
-            left.push_back(
-                {maxScoreAtDistance(distance), static_cast<std::uint32_t>(row), joined(sums[i], rest)});
+            ++counts.left[kStatisticsStage];
+            left.push_back({maxScoreAtDistance(distance), static_cast<std::uint32_t>(row),
+                            Findings(joined(sums[i], rest))});
         }
     }
 }

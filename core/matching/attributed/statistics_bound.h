@@ -18,13 +18,19 @@ enum class StatisticsRule {
     kPartial,       ///< the share of the mean distance beside the contained parts
 };
 
+/// The stages of a scan, as ScanCounts count them: what they leave is not ruled out by
+enum StatisticsStage : std::size_t {
+    kFirstHalfStage = 0,   ///< the first half of its statistics
+    kStatisticsStage = 1,  ///< all of them
+};
+
 /// Bounds of many rows against one query. Immutable, thread-safe; `query` must outlive it.
 class StatisticsBound {
   public:
     StatisticsBound(const AttributedQuery& query, StatisticsRule rule);
 
     /// As Scorer::scan, of the attributed rows: those that could score `least` if the rest of them
-    /// agreed fully. Survivor::known are the LevelSums.
+    /// agreed fully. Survivor::findings are the LevelSums.
     void scan(const ShapeRows& rows, const std::vector<std::uint8_t>& wanted, double least,
               std::vector<Survivor>& left, ScanCounts& counts) const;
 

@@ -19,23 +19,21 @@ double WholeScorer::boundOf(const Pair& pair) const {
     return belowOne(attributeScore(pair.distance, pair.comparison.agreementBound()));
 }
 
-Explanation WholeScorer::explain(const Signature& shape) const {
-    const PackedShape packed(shape);
-    const ShapeRow row = packed.row();
-    const LevelSums sums = query().levelSums(row);
-    const Pair pair(query(), row, sums, options());
-    const Signature& a = pair.exchanged ? shape : query().signature();
-    const Signature& b = pair.exchanged ? query().signature() : shape;
+Explanation WholeScorer::explain(const ShapeRow& shape) const {
+    const LevelSums sums = query().levelSums(shape);
+    const Pair pair(query(), shape, sums, options());
+    const ShapeRow a = pair.exchanged ? shape : query().row();
+    const ShapeRow b = pair.exchanged ? query().row() : shape;
     const SegmentMatch match = pair.comparison.match();
     Explanation result;
-    result.score = isSame(row) ? 1.0 : belowOne(attributeScore(pair.distance, match.agreement));
+    result.score = isSame(shape) ? 1.0 : belowOne(attributeScore(pair.distance, match.agreement));
     result.similarity = match.agreement;
     result.dissimilarity = std::max(0.0, 1.0 - match.agreement);
-    result.degenerate = a.points.size() == 1 || b.points.size() == 1;
+    result.degenerate = a.pointCount == 1 || b.pointCount == 1;
     result.motion = bodyMotion(a, b, match.rotation, match.reflected, options().keepScale);
-    result.terms = scoreTerms(sums, query().quality(), row.quality, match.agreement);
+    result.terms = scoreTerms(sums, query().quality(), shape.quality, match.agreement);
     addMatches(pair.comparison.pairs(match), match.agreement, result);
-    listUnmatched(result, a.points.size(), b.points.size());
+    listUnmatched(result, a.pointCount, b.pointCount);
     // Each side's distances are in its own units.
     return pair.exchanged ? exchanged(std::move(result), 1.0) : result;
 }

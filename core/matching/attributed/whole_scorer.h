@@ -8,7 +8,7 @@ namespace shapedb {
 class WholeScorer final : public AttributedScorer {
   public:
     WholeScorer(const Signature& query, const ScoreOptions& options);
-    [[nodiscard]] Explanation explain(const Signature& shape) const override;
+    [[nodiscard]] Explanation explain(const ShapeRow& shape) const override;
 
   protected:
     [[nodiscard]] double scoreOf(const Pair& pair) const override;

@@ -50,8 +50,7 @@ double underCeiling(double score, const ShapeRow& a, const ShapeRow& b) {
 
 class PublishedScorer : public Scorer {
   public:
-    PublishedScorer(const Signature& query, const ScoreOptions& options)
-        : signature_(query), query_(query), options_(options) {}
+    PublishedScorer(const Signature& query, const ScoreOptions& options) : query_(query), options_(options) {}
 
     bool compares(const ShapeRow& shape) const final { return shape.pointCount > 0; }
 
@@ -77,14 +76,12 @@ class PublishedScorer : public Scorer {
         return underCeiling(value, query, shape);
     }
 
-    Explanation explain(const Signature& shape) const final {
-        const PackedShape packed(shape);
+    Explanation explain(const ShapeRow& shape) const final {
         const ShapeRow query = query_.row();
-        const ShapeRow other = packed.row();
-        if (!exchanges(query, other)) return explain(signature_, query, shape, other);
+        if (!exchanges(query, shape)) return explain(query, shape);
         // Distances come in units of b's scale.
-        return exchanged(explain(shape, other, signature_, query),
-                         inCommonUnit(other, query, options_) / inCommonUnit(query, other, options_));
+        return exchanged(explain(shape, query),
+                         inCommonUnit(shape, query, options_) / inCommonUnit(query, shape, options_));
     }
 
   protected:
@@ -96,32 +93,31 @@ class PublishedScorer : public Scorer {
     virtual bool exchanges(const ShapeRow& query, const ShapeRow& shape) const = 0;
 
   private:
-    Explanation explain(const Signature& a, const ShapeRow& rowA, const Signature& b,
-                        const ShapeRow& rowB) const {
-        const CommonScale scaled(rowA, rowB, options_);
+    Explanation explain(const ShapeRow& a, const ShapeRow& b) const {
+        const CommonScale scaled(a, b, options_);
         const BestAlignment best = bestAlignment(scaled.a, scaled.b, options_);
         const double similarity = best.matches.similarity;
         Explanation result;
-        result.score = sameShape(rowA, rowB, options_.keepScale)
+        result.score = sameShape(a, b, options_.keepScale)
                            ? 1.0
-                           : underCeiling(ratio(similarity, scaled.a, scaled.b), rowA, rowB);
+                           : underCeiling(ratio(similarity, scaled.a, scaled.b), a, b);
         result.similarity = similarity;
         result.dissimilarity = std::max(0.0, scaled.a.totalWeight + scaled.b.totalWeight - 2.0 * similarity);
-        result.degenerate = isDegenerate(rowA, rowB);
+        result.degenerate = isDegenerate(a, b);
         result.motion.scale = options_.keepScale ? 1.0 : a.scale / b.scale;
         result.motion.rotation = alignmentRotation(scaled.a, scaled.b, best.alignment);
         result.motion.reflected = best.alignment.reflected;
-        result.motion.translation = a.origin - result.motion.scale * rotate(result.motion.rotation, b.origin);
+        result.motion.translation =
+            a.placement->origin - result.motion.scale * rotate(result.motion.rotation, b.placement->origin);
         for (std::size_t i = 0; i < best.matches.count; ++i) {
             const PairList::Pair& pair = best.matches.pairs[i];
             result.matches.push_back({pair.a, pair.b, pair.gain / similarity,
-                                      std::sqrt(pair.squaredDistance) / inCommonUnit(rowA, rowB, options_)});
+                                      std::sqrt(pair.squaredDistance) / inCommonUnit(a, b, options_)});
         }
-        listUnmatched(result, a.points.size(), b.points.size());
+        listUnmatched(result, a.pointCount, b.pointCount);
         return result;
     }
 
-    const Signature signature_;
     const PackedShape query_;
     const ScoreOptions options_;
 };

@@ -101,8 +101,8 @@ void expectScanIsExact(const Signature& query, double least, Random& random) {
         std::vector<Survivor> left;
         ScanCounts counts;
         scorer->scan(rows, wanted, least, left, counts);
-        ASSERT_EQ(counts.afterStatistics >= left.size(), true);
-        ASSERT_GE(counts.afterFirstHalf, counts.afterStatistics);
+        ASSERT_GE(counts.left[1], left.size());
+        ASSERT_GE(counts.left[0], counts.left[1]);
         std::vector<bool> isLeft(shapes.size(), false);
         for (const Survivor& survivor : left) {
             ASSERT_EQ(wanted[survivor.row], 1);
@@ -155,7 +155,7 @@ TEST(Scorer, PublishedScorerLeavesOutRowsWithoutPoints) {
     scorer->scan(block.rows(), {}, 0.0, left, counts);
     ASSERT_EQ(left.size(), 1u);
     EXPECT_EQ(left[0].row, 1u);
-    EXPECT_EQ(counts.afterStatistics, 1u);
+    EXPECT_EQ(counts.left.back(), 1u);
 }
 
 TEST(Scorer, MayBeSharedByThreads) {

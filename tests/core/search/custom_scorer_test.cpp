@@ -23,9 +23,9 @@ class SizeScorer final : public Scorer {
     double bound(const ShapeRow& shape) const override {
         return std::exp(-std::abs(std::log(shape.scale / query_.row().scale)));
     }
-    Explanation explain(const Signature& shape) const override {
+    Explanation explain(const ShapeRow& shape) const override {
         Explanation explanation;
-        explanation.score = score(PackedShape(shape).row());
+        explanation.score = score(shape);
         return explanation;
     }
 
@@ -39,17 +39,16 @@ class HandingOnScorer final : public Scorer {
     bool compares(const ShapeRow&) const override { return true; }
     double score(const ShapeRow& shape) const override { return 1.0 / (1.0 + std::floor(shape.scale)); }
     double bound(const ShapeRow&) const override { return 1.0; }
-    Explanation explain(const Signature&) const override { return {}; }
+    Explanation explain(const ShapeRow&) const override { return {}; }
     void scan(const ShapeRows& rows, const std::vector<std::uint8_t>& wanted, double,
               std::vector<Survivor>& left, ScanCounts&) const override {
         for (std::uint32_t row = 0; row < rows.count; ++row) {
-            if (wanted.empty() || wanted[row] != 0)
-                left.push_back({1.0, row, {static_cast<std::uint16_t>(rows.scales[row])}});
+            if (wanted.empty() || wanted[row] != 0) left.push_back({1.0, row, Findings(rows.scales[row])});
         }
     }
     std::optional<double> scoreIfReaches(const ShapeRow&, const Survivor& survivor,
                                          double least) const override {
-        const double value = 1.0 / (1.0 + survivor.known[0]);
+        const double value = 1.0 / (1.0 + std::floor(survivor.findings.as<double>()));
         if (value < least) return std::nullopt;
         return value;
     }

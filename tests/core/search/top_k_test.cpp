@@ -110,9 +110,9 @@ void expectExact(const Signature& query, const Library& library, const SearchOpt
     const SearchCounts& counts = result->counts;
     EXPECT_EQ(counts.candidates, library.entries.size());
     EXPECT_EQ(counts.filtered, passing);
-    EXPECT_LE(counts.afterFirstHalf, passing);
-    EXPECT_LE(counts.afterStatistics, counts.afterFirstHalf);
-    EXPECT_LE(counts.scored, counts.afterStatistics);
+    EXPECT_LE(counts.scans.left[0], passing);
+    EXPECT_LE(counts.scans.left[1], counts.scans.left[0]);
+    EXPECT_LE(counts.scored, counts.scans.left[1]);
     EXPECT_GE(counts.scored, result->hits.size());
 }
 
