@@ -1,5 +1,6 @@
 #include "server/catalog/gates.h"
 
+#include <future>
 #include <thread>
 #include <vector>
 
@@ -84,22 +85,23 @@ TEST(RestoreGate, AdmitsOneRestoreAndRaisesTheEpoch) {
 
 TEST(RestoreGate, WaitsForRunningWrites) {
     RestoreGate gate;
-    std::atomic<bool> writing{false};
-    std::atomic<bool> restoreComes{false};
-    std::thread writer([&] {
-        const RestoreGate::Write write(gate);
-        writing = true;
-        while (!restoreComes) std::this_thread::yield();
-        std::this_thread::sleep_for(10ms);  // time in which a gate that does not wait would let it in
-        writing = false;
-    });
-    while (!writing) std::this_thread::yield();
-    restoreComes = true;
+    std::unique_lock<std::shared_mutex> restore = gate.exclusive();
+    restore.unlock();
+    // On a thread of its own: no thread may try a lock that it holds shared.
+    const auto wouldWait = [&] {
+        return std::async(std::launch::async,
+                          [&] {
+                              if (!restore.try_lock()) return true;
+                              restore.unlock();
+                              return false;
+                          })
+            .get();
+    };
     {
-        const auto exclusive = gate.exclusive();
-        EXPECT_FALSE(writing);
+        const RestoreGate::Write write(gate);
+        EXPECT_TRUE(wouldWait());
     }
-    writer.join();
+    EXPECT_TRUE(gate.exclusive().owns_lock()) << "and ends when the write is done";
 }
 
 }  // namespace
