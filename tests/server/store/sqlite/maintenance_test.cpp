@@ -136,10 +136,11 @@ TEST_F(SqliteMaintenanceTest, RefusesBadBackups) {
     expectRefused(path, ErrorCode::kMalformedFile);
     expectRefused(folder_.file("shapes.db"), ErrorCode::kMalformedFile);
     expectRefused(changed("PRAGMA application_id=1"), ErrorCode::kMalformedFile);
-    expectRefused(changed("PRAGMA user_version=2"), ErrorCode::kSchemaTooNew);
-    expectRefused(
-        changed("INSERT INTO schema_migration VALUES (2, '0002_future', '', 0); PRAGMA user_version=2"),
-        ErrorCode::kSchemaTooNew);
+    const std::string next = std::to_string(embeddedMigrations().size() + 1);
+    expectRefused(changed("PRAGMA user_version=" + next), ErrorCode::kSchemaTooNew);
+    expectRefused(changed("INSERT INTO schema_migration VALUES (" + next +
+                          ", 'future', '', 0); PRAGMA user_version=" + next),
+                  ErrorCode::kSchemaTooNew);
     expectRefused(changed("UPDATE schema_migration SET sha256 = 'x'"), ErrorCode::kMalformedFile);
     expectRefused(changed("DROP INDEX job_by_state"), ErrorCode::kMalformedFile);
     expectRefused(changed("CREATE TABLE more (x)"), ErrorCode::kMalformedFile);

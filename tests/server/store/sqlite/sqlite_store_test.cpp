@@ -5,6 +5,7 @@
 
 #include <sys/resource.h>
 
+#include "server/store/sqlite/migrator.h"
 #include "tests/server/store/sqlite/store_fixture.h"
 
 namespace shapedb::store {
@@ -58,7 +59,7 @@ TEST_F(SqliteStoreTest, StatsCountEverything) {
     EXPECT_LT(stats.storedPointBytes, stats.pointBytes);
     EXPECT_GT(stats.databaseBytes, 0u);
     EXPECT_GT(stats.walBytes, 0u);
-    EXPECT_EQ(stats.schemaVersion, 1);
+    EXPECT_EQ(stats.schemaVersion, static_cast<int>(embeddedMigrations().size()));
     ASSERT_TRUE(store_->checkpoint());
     EXPECT_EQ(store_->stats()->walBytes, 0u);
 }
