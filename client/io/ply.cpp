@@ -261,10 +261,9 @@ class PlyBody {
         for (std::uint64_t i = 0; i < element.count; ++i) {
             if (!record.begin()) return fail(record.error(element, i, ""));
             for (std::size_t j = 0; j < element.properties.size(); ++j) {
-                const auto done =
-                    j != indices ? skipProperty(file_, record, element, i, element.properties[j])
-                    : strips     ? readIndices<TriangleStrip>(record, element, i, element.properties[j])
-                                 : readIndices<PolygonFan>(record, element, i, element.properties[j]);
+                auto done = j != indices ? skipProperty(file_, record, element, i, element.properties[j])
+                            : strips ? readIndices<TriangleStrip>(record, element, i, element.properties[j])
+                                     : readIndices<PolygonFan>(record, element, i, element.properties[j]);
                 if (!done) return done;
             }
             RETURN_IF_ERROR(endRecord(record, element, i));
