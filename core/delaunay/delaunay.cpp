@@ -71,10 +71,6 @@ void makeCanonical(Cell& cell) {
     }
 }
 
-// As kPrefetchDistance and kPrefetchFarDistance (core/base/prefetch.h), but for the loops of this file.
-constexpr std::size_t kAhead = 12;
-constexpr std::size_t kFarAhead = 24;
-
 constexpr std::size_t kBlock = 8192;  // points, cells or tetrahedra that a thread handles at a time
 // Parts of the store with fewer cells are not worth counters of their own.
 constexpr std::size_t kMinPart = std::size_t{1} << 18;
@@ -152,7 +148,7 @@ Result<LargeVector<std::uint32_t>> sortedCells(CellStore& cells, std::size_t sit
         for (std::size_t v = from; v < to; ++v) {
             group.clear();
             for (std::uint32_t i = begin[v]; i < begin[v + 1]; ++i) {
-                if (i + kFarAhead < begin[to]) prefetch(&cells[sorted[i + kFarAhead]]);
+                if (i + kPrefetchFarDistance < begin[to]) prefetch(&cells[sorted[i + kPrefetchFarDistance]]);
                 const Corners& corners = cells[sorted[i]].vertices;
                 group.emplace_back(std::uint64_t{corners[1]} << 32 | corners[2], sorted[i]);
             }
@@ -184,9 +180,10 @@ Result<Tetrahedra> flatten(CellStore& cells, const std::vector<std::uint32_t>& o
     }
     auto done = parallelFor(cellOf.size(), kBlock, context, [&](std::size_t from, std::size_t to) {
         for (std::size_t t = from; t < to; ++t) {
-            if (t + kFarAhead < to) {
-                prefetch(&cells[cellOf[t + kFarAhead]]);
-                for (const std::uint32_t next : cells[cellOf[t + kAhead]].neighbours) prefetch(&place[next]);
+            if (t + kPrefetchFarDistance < to) {
+                prefetch(&cells[cellOf[t + kPrefetchFarDistance]]);
+                for (const std::uint32_t next : cells[cellOf[t + kPrefetchDistance]].neighbours)
+                    prefetch(&place[next]);
             }
             const Cell& cell = cells[cellOf[t]];
             for (std::size_t i = 0; i < 4; ++i) {
