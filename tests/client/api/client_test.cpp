@@ -13,6 +13,7 @@
 #include "client/api/packing.h"
 #include "common/sha256.h"
 #include "tests/client/api/fake_server.h"
+#include "tests/support/eventually.h"
 
 namespace shapedb::client {
 namespace {
@@ -31,6 +32,14 @@ double secondsOf(const std::function<void()>& work) {
     const auto start = std::chrono::steady_clock::now();
     work();
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// Every call: the queue is full, come back in `pushback` milliseconds; negative: do not.
+Answer queueFull(const std::string& pushback) {
+    return [pushback](grpc::ServerContext& context, int) {
+        context.AddTrailingMetadata("grpc-retry-pushback-ms", pushback);
+        return namedError(context, grpc::StatusCode::RESOURCE_EXHAUSTED, "queue_full", "the queue is full");
+    };
 }
 
 std::string digestOf(const std::string& bytes) {
@@ -129,10 +138,7 @@ TEST(Client, RetryCountRestartsForAnotherReason) {
 
 TEST(Client, NegativePushbackEndsTheRetries) {
     FakeServer server;
-    server.shapes.answer = [](grpc::ServerContext& context, int) {
-        context.AddTrailingMetadata("grpc-retry-pushback-ms", "-1");
-        return namedError(context, grpc::StatusCode::RESOURCE_EXHAUSTED, "queue_full", "the queue is full");
-    };
+    server.shapes.answer = queueFull("-1");
     const auto reply = server.client().addShape({{"", "a"}}, cloud(100));
     ASSERT_FALSE(reply);
     EXPECT_EQ(reply.error().code, ErrorCode::kQueueFull);
@@ -141,10 +147,7 @@ TEST(Client, NegativePushbackEndsTheRetries) {
 
 TEST(Client, DoesNotWaitBeyondTheDeadline) {
     FakeServer server;
-    server.shapes.answer = [](grpc::ServerContext& context, int) {
-        context.AddTrailingMetadata("grpc-retry-pushback-ms", "60000");
-        return namedError(context, grpc::StatusCode::RESOURCE_EXHAUSTED, "queue_full", "the queue is full");
-    };
+    server.shapes.answer = queueFull("60000");
     RunContext context;
     context.deadline = RunContext::Clock::now() + std::chrono::seconds(5);
     Result<AddReply> reply;
@@ -243,7 +246,7 @@ TEST(Client, CancellingEndsARunningCall) {
     RunContext context;
     context.cancel = &cancel;
     std::thread later([&] {
-        std::this_thread::sleep_for(milliseconds(150));
+        EXPECT_TRUE(testing::eventually([&] { return server.shapes.calls > 0; }));
         cancel = true;
     });
     Result<Shape> shape;
@@ -259,15 +262,12 @@ TEST(Client, CancellingEndsARunningCall) {
 
 TEST(Client, CancellingEndsTheWaitBetweenAttempts) {
     FakeServer server;
-    server.shapes.answer = [](grpc::ServerContext& context, int) {
-        context.AddTrailingMetadata("grpc-retry-pushback-ms", "30000");
-        return namedError(context, grpc::StatusCode::RESOURCE_EXHAUSTED, "queue_full", "full");
-    };
+    server.shapes.answer = queueFull("30000");
     std::atomic<bool> cancel{false};
     RunContext context;
     context.cancel = &cancel;
     std::thread later([&] {
-        std::this_thread::sleep_for(milliseconds(150));
+        EXPECT_TRUE(testing::eventually([&] { return server.shapes.calls > 0; }));
         cancel = true;
     });
     Result<AddReply> reply;

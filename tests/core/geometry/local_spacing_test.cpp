@@ -10,10 +10,13 @@
 #include "core/base/random.h"
 #include "core/delaunay/hilbert_order.h"
 #include "core/geometry/neighbours.h"
+#include "tests/core/geometry/random_points.h"
 #include "tests/core/segmentation/small_clouds.h"
 
 namespace shapedb {
 namespace {
+
+using testing_support::randomPoints;
 
 // From all pairs; summed from the nearest on.
 double meanOfThreeNearest(const PointCloud& points, std::size_t of) {
@@ -39,15 +42,6 @@ PointCloud alongCurve(const PointCloud& points) {
     PointCloud sorted;
     for (const std::uint32_t i : hilbertOrder(points)) sorted.push_back(points[i]);
     return sorted;
-}
-
-PointCloud randomPoints(std::size_t count, std::uint64_t seed) {
-    Random random(seed);
-    PointCloud points;
-    for (std::size_t i = 0; i < count; ++i) {
-        points.push_back({random.uniform(), random.uniform(), random.uniform()});
-    }
-    return points;
 }
 
 // Spacings that differ by four orders of magnitude.

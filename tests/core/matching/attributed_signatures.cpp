@@ -116,6 +116,20 @@ AttributedPair randomSizedPair(Random& random) {
     return pair;
 }
 
+void forSinglePointPairs(
+    const std::function<void(const Signature& a, const Signature& b, const ScoreOptions& options)>& check) {
+    Random random(13);
+    for (int round = 0; round < 200; ++round) {
+        const Signature a = randomAttributed(random, 1);
+        const Signature b = randomAttributed(random, 1);
+        const Signature c = randomAttributed(random, 5);
+        for (const ScoreOptions& options : everyOption()) {
+            check(a, b, options);
+            check(a, c, options);
+        }
+    }
+}
+
 void expectSoundScore(const Signature& a, const Signature& b, const ScoreOptions& options) {
     const double value = score(a, b, options);
     ASSERT_GT(value, 0.0);

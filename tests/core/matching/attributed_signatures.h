@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -39,6 +40,10 @@ AttributedPair randomAttributedPair(Random& random, double leastNoise = 1e-6, do
 
 /// `randomAttributedPair`, sometimes also of another size.
 AttributedPair randomSizedPair(Random& random);
+
+/// Calls `check` with random pairs of which one or both have a single point, with every option.
+void forSinglePointPairs(
+    const std::function<void(const Signature& a, const Signature& b, const ScoreOptions& options)>& check);
 
 /// Everything that must hold of the score of a pair, unless partial.
 void expectSoundScore(const Signature& a, const Signature& b, const ScoreOptions& options);

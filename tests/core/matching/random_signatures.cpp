@@ -4,6 +4,10 @@
 #include <cmath>
 #include <sstream>
 
+#include <gtest/gtest.h>
+
+#include "core/matching/score.h"
+
 namespace shapedb::testing_support {
 
 namespace {
@@ -171,6 +175,25 @@ Signature signatureOf(const std::vector<std::array<double, 4>>& rows) {
     }
     finish(signature);
     return signature;
+}
+
+void expectFiniteScores(const Signature& a, const Signature& b) {
+    for (const double width : {kMinKernelWidth, 0.1, kMaxKernelWidth}) {
+        for (const ScoreOptions& options : everyOption(width)) {
+            const double value = score(a, b, options);
+            EXPECT_GE(value, 0.0) << describeSignature(a) << "\n" << describeSignature(b);
+            if (a.attributes && b.attributes) {
+                EXPECT_GT(value, 0.0);
+            }
+            EXPECT_LE(value, scoreUpperBound(a, b, options));
+            EXPECT_LE(scoreUpperBound(a, b, options), 1.0);
+            const Explanation why = explain(a, b, options);
+            EXPECT_TRUE(sameBits(why.score, value));
+            for (const PointMatch& match : why.matches) {
+                EXPECT_TRUE(std::isfinite(match.share) && std::isfinite(match.distance));
+            }
+        }
+    }
 }
 
 std::string describeSignature(const Signature& signature) {

@@ -55,6 +55,10 @@ Matrix3 randomReflection(Random& random);
 /// From literal numbers; `rows` are x, y, z, weight.
 Signature signatureOf(const std::vector<std::array<double, 4>>& rows);
 
+/// With every option and the least and largest kernel widths, scores, bounds and explanations of a pair of
+/// extreme shapes are numbers in their ranges.
+void expectFiniteScores(const Signature& a, const Signature& b);
+
 /// The scored numbers, to reproduce a failing pair.
 std::string describeSignature(const Signature& signature);
 

@@ -17,6 +17,7 @@ namespace {
 using testing_support::describeSignature;
 using testing_support::disturbed;
 using testing_support::everyOption;
+using testing_support::expectFiniteScores;
 using testing_support::Kind;
 using testing_support::kKindCount;
 using testing_support::makeExtreme;
@@ -281,20 +282,7 @@ TEST(Score, StaysFiniteForExtremeNumbers) {
         const Signature a = extreme();
         const Signature b = extreme();
         if (a.points.empty() || b.points.empty()) continue;
-        for (const double width : {kMinKernelWidth, 0.1, kMaxKernelWidth}) {
-            for (const ScoreOptions& options : everyOption(width)) {
-                const double value = score(a, b, options);
-                EXPECT_GE(value, 0.0) << describeSignature(a) << "\n" << describeSignature(b);
-                EXPECT_LE(value, 1.0);
-                EXPECT_LE(value, scoreUpperBound(a, b, options));
-                EXPECT_LE(scoreUpperBound(a, b, options), 1.0);
-                const Explanation why = explain(a, b, options);
-                EXPECT_TRUE(sameBits(why.score, value));
-                for (const PointMatch& match : why.matches) {
-                    EXPECT_TRUE(std::isfinite(match.share) && std::isfinite(match.distance));
-                }
-            }
-        }
+        expectFiniteScores(a, b);
     }
 }
 

@@ -10,17 +10,13 @@
 #include <gtest/gtest.h>
 
 #include "core/base/random.h"
+#include "tests/core/geometry/random_points.h"
 
 namespace shapedb {
 namespace {
 
 PointCloud randomPoints(std::size_t count, std::uint64_t seed) {
-    Random random(seed);
-    PointCloud points;
-    for (std::size_t i = 0; i < count; ++i) {
-        points.push_back({random.uniform(-1, 5), random.uniform(2, 3), random.uniform(-9, 0)});
-    }
-    return points;
+    return testing_support::randomPoints(count, seed, {-1, 2, -9}, {5, 3, 0});
 }
 
 TEST(Sanitise, SortsPointsInTheUnitFrame) {

@@ -16,34 +16,18 @@
 #include "core/signature/signature_codec.h"
 #include "core/synthetic/families.h"
 #include "core/synthetic/named_shapes.h"
+#include "tests/core/signature/moved_scans.h"
 
 namespace shapedb {
 namespace {
+
+using testing_support::anyMotion;
+using testing_support::shuffled;
 
 constexpr std::size_t kPoints = 2500;
 
 Signature describeDefault(const PointCloud& points) {
     return describe(points, parametersOf(Profile::kDefault)).value().signature;
-}
-
-PointCloud shuffled(PointCloud points, std::uint64_t seed) {
-    Random random(seed);
-    for (std::size_t i = points.size(); i > 1; --i) std::swap(points[i - 1], points[random.below(i)]);
-    return points;
-}
-
-Motion anyMotion(Random& random, int turn, int turns) {
-    Motion motion;
-    motion.rotation = randomRotation(random);
-    motion.scale = std::pow(10.0, -6.0 + 12.0 * turn / (turns - 1));
-    motion.reflected = turn % 2 == 1;
-    if (motion.reflected) {
-        for (auto& row : motion.rotation) row[2] = -row[2];
-    }
-    const double reach = 30.0 * motion.scale;
-    motion.translation = {random.uniform(-reach, reach), random.uniform(-reach, reach),
-                          random.uniform(-reach, reach)};
-    return motion;
 }
 
 // Mean difference of a bin, [0, 1], of each statistic.

@@ -14,37 +14,20 @@
 #include "core/pipeline.h"
 #include "core/signature/signature_codec.h"
 #include "core/synthetic/named_shapes.h"
+#include "tests/core/signature/moved_scans.h"
 
 namespace shapedb {
 namespace {
+
+using testing_support::anyMotion;
+using testing_support::shuffled;
 
 PointCloud sample(const NamedShape& shape, std::size_t count) {
     return sampleBoundary(shape.solid, count, 1).value();
 }
 
-PointCloud shuffled(PointCloud points, std::uint64_t seed) {
-    Random random(seed);
-    for (std::size_t i = points.size(); i > 1; --i) std::swap(points[i - 1], points[random.below(i)]);
-    return points;
-}
-
 Description describePaper(const PointCloud& points) {
     return describe(points, parametersOf(Profile::kPaper)).value();
-}
-
-// Rotation or reflection, scale 1e-6 to 1e6, a translation of up to ten diameters.
-Motion anyMotion(Random& random, int turn) {
-    Motion motion;
-    motion.rotation = randomRotation(random);
-    motion.scale = std::pow(10.0, -6.0 + 12.0 * turn / 9.0);
-    motion.reflected = turn % 2 == 1;
-    if (motion.reflected) {
-        for (auto& row : motion.rotation) row[2] = -row[2];
-    }
-    const double reach = 30.0 * motion.scale;
-    motion.translation = {random.uniform(-reach, reach), random.uniform(-reach, reach),
-                          random.uniform(-reach, reach)};
-    return motion;
 }
 
 // Compares positions (moved back, in units of the size) and relative weights.
@@ -88,7 +71,7 @@ void expectInvariant(const NamedShape& shape, std::size_t count, const PointClou
     Random random(21);
     // The smallest, middle and largest scales, each with and without reflection.
     for (const int turn : {0, 1, 4, 5, 8, 9}) {
-        const Motion motion = anyMotion(random, turn);
+        const Motion motion = anyMotion(random, turn, 10);
         const auto moved = describePaper(shuffled(applyToCloud(motion, points), 40U + turn));
         expectMovesLittle(still, moved.signature, motion, shape.name + " motion " + std::to_string(turn));
         expectBallsFirst(shape, moved.segmentation, compose(motion, first));
@@ -117,7 +100,7 @@ TEST(SignatureInvariance, ExactlyFlatFacesChangeSliversOnly) {
         const PointCloud points = sample(shape, 4000);
         const Signature flat = describePaper(points).signature;
         Random random(22);
-        const Motion motion = anyMotion(random, 6);
+        const Motion motion = anyMotion(random, 6, 10);
         const Signature turned = describePaper(applyToCloud(motion, points)).signature;
         for (std::size_t i = 0; i < flat.points.size(); ++i) {
             if (flat.points[i].volumeShare < 1e-3f) break;

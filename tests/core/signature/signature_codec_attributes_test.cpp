@@ -9,9 +9,13 @@
 #include "core/pipeline.h"
 #include "core/signature/signature_codec.h"
 #include "core/synthetic/families.h"
+#include "tests/core/signature/forged_bytes.h"
 
 namespace shapedb {
 namespace {
+
+using testing_support::expectMalformed;
+using testing_support::withChecksum;
 
 Signature onePoint() {
     Signature signature;
@@ -51,27 +55,6 @@ Signature randomAttributed(Random& random, std::size_t count) {
     for (std::uint8_t& bin : attributes.statistics) bin = static_cast<std::uint8_t>(random.below(16));
     attributes.body = bodyOf(signature.points);
     return signature;
-}
-
-// By the bytes alone, most significant bit last; so that only the checks of numbers can refuse.
-std::string withChecksum(std::string bytes) {
-    bytes.resize(bytes.size() - 4);
-    std::uint32_t crc = 0xffffffffu;
-    for (const char c : bytes) {
-        for (int bit = 0; bit < 8; ++bit) {
-            const std::uint32_t in = (static_cast<unsigned char>(c) >> bit) & 1u;
-            crc = ((crc ^ in) & 1u) != 0 ? (crc >> 1) ^ 0xedb88320u : crc >> 1;
-        }
-    }
-    for (int i = 0; i < 4; ++i) bytes.push_back(static_cast<char>((~crc >> (8 * i)) & 0xffu));
-    return bytes;
-}
-
-void expectMalformed(const std::string& bytes, const std::string& word = "") {
-    const auto decoded = decodeSignature(bytes);
-    ASSERT_FALSE(decoded) << word;
-    EXPECT_EQ(decoded.error().code, ErrorCode::kMalformedSignature);
-    EXPECT_NE(decoded.error().message.find(word), std::string::npos) << decoded.error().message;
 }
 
 void expectSameBody(const Body& a, const Body& b) {

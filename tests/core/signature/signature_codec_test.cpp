@@ -8,9 +8,13 @@
 #include <gtest/gtest.h>
 
 #include "core/base/random.h"
+#include "tests/core/signature/forged_bytes.h"
 
 namespace shapedb {
 namespace {
+
+using testing_support::expectMalformed;
+using testing_support::withChecksum;
 
 Signature twoPoints() {
     Signature signature;
@@ -32,28 +36,6 @@ std::string hex(const std::string& bytes) {
         text += "0123456789abcdef"[byte & 15];
     }
     return text;
-}
-
-// A second CRC-32, to forge bytes that only the range checks can refuse.
-std::string withChecksum(std::string bytes) {
-    bytes.resize(bytes.size() - 4);
-    std::uint32_t crc = 0xffffffffu;
-    for (const char c : bytes) {
-        for (int bit = 0; bit < 8; ++bit) {
-            const std::uint32_t in = (static_cast<unsigned char>(c) >> bit) & 1u;
-            crc = ((crc ^ in) & 1u) != 0 ? (crc >> 1) ^ 0xedb88320u : crc >> 1;
-        }
-    }
-    crc = ~crc;
-    for (int i = 0; i < 4; ++i) bytes.push_back(static_cast<char>((crc >> (8 * i)) & 0xffu));
-    return bytes;
-}
-
-void expectMalformed(const std::string& bytes, const std::string& word = "") {
-    const auto decoded = decodeSignature(bytes);
-    ASSERT_FALSE(decoded) << word;
-    EXPECT_EQ(decoded.error().code, ErrorCode::kMalformedSignature);
-    EXPECT_NE(decoded.error().message.find(word), std::string::npos) << decoded.error().message;
 }
 
 // Stored signatures must stay readable: these bytes never change.

@@ -8,17 +8,13 @@
 #include <gtest/gtest.h>
 
 #include "core/base/random.h"
+#include "tests/core/geometry/random_points.h"
 
 namespace shapedb {
 namespace {
 
 PointCloud randomPoints(std::size_t count, std::uint64_t seed) {
-    Random random(seed);
-    PointCloud points;
-    for (std::size_t i = 0; i < count; ++i) {
-        points.push_back({random.uniform(-1, 5), random.uniform(2, 3), random.uniform()});
-    }
-    return points;
+    return testing_support::randomPoints(count, seed, {-1, 2, 0}, {5, 3, 1});
 }
 
 TEST(Noise, SigmaIsTheShareOfTheDiagonalOnEveryAxis) {

@@ -18,6 +18,7 @@ namespace {
 using testing_support::AttributedPair;
 using testing_support::describeSignature;
 using testing_support::everyOption;
+using testing_support::expectFiniteScores;
 using testing_support::expectSoundScore;
 using testing_support::makeExtreme;
 using testing_support::randomAttributed;
@@ -195,17 +196,7 @@ TEST(AttributedScore, ComparesPointsAndWeightsIfOneSideHasNoAttributes) {
 }
 
 TEST(AttributedScore, SinglePointShapesAreSymmetricAndBounded) {
-    Random random(13);
-    for (int round = 0; round < 200; ++round) {
-        const Signature a = randomAttributed(random, 1);
-        const Signature b = randomAttributed(random, 1);
-        const Signature c = randomAttributed(random, 5);
-        for (const ScoreOptions& options : everyOption()) {
-            expectSoundScore(a, b, options);
-            expectSoundScore(a, c, options);
-        }
-        EXPECT_TRUE(explain(a, c, {}).degenerate);
-    }
+    testing_support::forSinglePointPairs(expectSoundScore);
 }
 
 TEST(AttributedScore, StaysFiniteForExtremeNumbers) {
@@ -223,19 +214,7 @@ TEST(AttributedScore, StaysFiniteForExtremeNumbers) {
         const Signature a = extreme();
         const Signature b = extreme();
         if (a.points.empty() || b.points.empty()) continue;
-        for (const double width : {kMinKernelWidth, 0.1, kMaxKernelWidth}) {
-            for (const ScoreOptions& options : everyOption(width)) {
-                const double value = score(a, b, options);
-                EXPECT_GT(value, 0.0);
-                EXPECT_LE(value, 1.0);
-                EXPECT_GE(scoreUpperBound(a, b, options), value);
-                const Explanation why = explain(a, b, options);
-                EXPECT_TRUE(sameBits(why.score, value));
-                for (const PointMatch& match : why.matches) {
-                    EXPECT_TRUE(std::isfinite(match.share) && std::isfinite(match.distance));
-                }
-            }
-        }
+        expectFiniteScores(a, b);
     }
 }
 
