@@ -34,7 +34,11 @@ class AttributedQuery {
     [[nodiscard]] const StatisticsDifference& difference() const { return difference_; }
 
     /// Of an attributed shape.
-    [[nodiscard]] LevelSums levelSums(const ShapeRow& shape) const;
+    [[nodiscard]] LevelSums levelSums(const ShapeRow& shape) const {
+        HalfSums first;
+        difference_.first(shape.firstHalf, 1, &first);
+        return joined(first, difference_.second(*shape.secondHalf));
+    }
 
   private:
     PackedShape packed_;
