@@ -15,6 +15,9 @@ namespace shapedb {
 /// close to each other or to a common plane the points lie.
 constexpr double kGrid = 0x1p-52;
 
+/// Points closer than this to a common line or plane span no volume. Units of the unit frame.
+constexpr double kFlatnessTolerance = 1e-6;
+
 struct SanitisedPoints {
     /// In the unit frame (|coordinate| <= 1, multiples of kGrid), distinct, in lexicographic order: so
     /// nothing computed from them depends on the order of the input.
@@ -29,5 +32,9 @@ struct SanitisedPoints {
 /// Errors: those of `frameOf`; kTooFewPoints (fewer than 4 distinct); kCollinear, kCoplanar (within
 /// kFlatnessTolerance); kOutOfMemory.
 [[nodiscard]] Result<SanitisedPoints> sanitise(const PointCloud& scan);
+
+/// Whether points span a volume; a check of `sanitise`. `points`: at least one, in the unit frame, not all
+/// equal. Errors: kCollinear, kCoplanar.
+[[nodiscard]] Result<void> checkNotFlat(const PointCloud& points);
 
 }  // namespace shapedb

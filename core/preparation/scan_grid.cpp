@@ -14,7 +14,7 @@
 #include "core/geometry/merge_duplicates.h"
 #include "core/geometry/morton.h"
 #include "core/preparation/decimate.h"
-#include "core/preparation/flatness.h"
+#include "core/preparation/sanitise.h"
 
 namespace shapedb {
 
