@@ -1,8 +1,10 @@
 #include "client/api/client.h"
 
+#include <algorithm>
+#include <string>
+
 #include <grpcpp/grpcpp.h>
 
-#include "client/api/address.h"
 #include "client/api/call.h"
 #include "client/api/retry.h"
 #include "core/base/return_if_error.h"
@@ -30,6 +32,25 @@ grpc::ChannelArguments channelArguments() {
     // Each Client has its own connection.
     arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
     return arguments;
+}
+
+/// "localhost" -> "localhost:7878", "::1" -> "[::1]:7878". Addresses with a port, or with a scheme of their
+/// own
+/// ("unix:/path", "dns:///host:1"), stay as they are.
+std::string withDefaultPort(const std::string& address) {
+    const std::string port = ":" + std::to_string(kDefaultPort);
+    if (address.find('/') != std::string::npos || address.rfind("unix:", 0) == 0 ||
+        address.rfind("unix-abstract:", 0) == 0) {
+        return address;
+    }
+    if (!address.empty() && address.front() == '[') {
+        return address.back() == ']' ? address + port : address;
+    }
+    switch (std::count(address.begin(), address.end(), ':')) {
+        case 0: return address + port;
+        case 1: return address;
+        default: return "[" + address + "]" + port;  // a bare IPv6 address
+    }
 }
 
 }  // namespace

@@ -1,11 +1,13 @@
 // Scans as they are sent: packed little-endian float32.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <string>
 
 #include "core/base/error.h"
+#include "core/base/run_context.h"
 #include "core/geometry/point.h"
 
 namespace shapedb::client {
@@ -29,6 +31,21 @@ struct PackedPoints {
 /// Errors: kTooFewPoints (none); kNonFiniteCoordinate; kCoordinateOutOfRange (beyond the largest float32, or
 /// the whole scan too small for one). The message names the first such point.
 [[nodiscard]] Result<PackedPoints> packPoints(const PointCloud& points);
+
+/// Writes `header`, then the points in chunks. Stops early if the server has already answered; the status of
+/// the call then says why. `Request` has the oneof {header, chunk}.
+template <typename Request, typename Stream>
+void writeScan(Stream& stream, const Request& header, const PackedPoints& points, const RunContext& context) {
+    if (!stream.Write(header)) return;
+    for (std::size_t at = 0; at < points.bytes.size(); at += kChunkBytes) {
+        const std::size_t size = std::min(kChunkBytes, points.bytes.size() - at);
+        Request message;
+        message.mutable_chunk()->set_xyz(points.bytes.data() + at, size);
+        if (!stream.Write(message)) return;
+        context.report("upload", at + size, points.bytes.size());
+    }
+    stream.WritesDone();
+}
 
 /// Appends to `points`. Errors: kMalformedStream (not a multiple of kPointBytes).
 [[nodiscard]] Result<void> unpackPoints(const std::string& bytes, PointCloud& points);

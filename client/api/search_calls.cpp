@@ -3,7 +3,6 @@
 #include "client/api/client.h"
 #include "client/api/convert.h"
 #include "client/api/packing.h"
-#include "client/api/upload.h"
 #include "core/base/return_if_error.h"
 
 namespace shapedb::client {

@@ -55,7 +55,18 @@ TEST(Client, OptionsAreValidated) {
     options = {};
     options.retry.maxAttempts = 0;
     EXPECT_EQ(Client::connect(options).error().code, ErrorCode::kInvalidArgument);
-    EXPECT_EQ(Client::connect({"localhost"})->address(), "localhost:7878");
+}
+
+TEST(Client, AddsTheDefaultPortToItsAddress) {
+    const auto addressOf = [](const std::string& given) { return Client::connect({given})->address(); };
+    EXPECT_EQ(addressOf("localhost"), "localhost:7878");
+    EXPECT_EQ(addressOf("10.0.0.1"), "10.0.0.1:7878");
+    EXPECT_EQ(addressOf("::1"), "[::1]:7878");
+    EXPECT_EQ(addressOf("[fe80::2]"), "[fe80::2]:7878");
+    for (const char* complete : {"localhost:1", "10.0.0.1:80", "[::1]:9", "unix:/run/shapedb.sock",
+                                 "unix:shapedb.sock", "dns:///host:5"}) {
+        EXPECT_EQ(addressOf(complete), complete);
+    }
 }
 
 TEST(Client, ErrorsCarryTheServersNameAndMessage) {
