@@ -44,12 +44,15 @@ if(SHAPEDB_BUILD_FUZZ)
   add_compile_options(-fsanitize=fuzzer-no-link)
 endif()
 
-# shapedb_library(NAME SOURCES a.cpp ... [PUBLIC lib ...] [PRIVATE lib ...] [PCH header ...] [FAST | SMALL])
-#   FAST   -O3: measured to be worth it
-#   SMALL  -O1: runs once a command, compiles slowly
-#   PCH    headers parsed once for the whole target
+# shapedb_library(NAME SOURCES a.cpp ... [PUBLIC lib ...] [PRIVATE lib ...] [PCH header ... | PCH_OF target] [UNITY n]
+#                 [FAST | SMALL])
+#   FAST    -O3: measured to be worth it
+#   SMALL   -O1: runs once a command, compiles slowly
+#   PCH     headers parsed once for the whole target. Not CLI11: each source would compile its global validators (3 s)
+#   PCH_OF  the same, shared with a target of the same flags
+#   UNITY   this many sources are compiled as one: worth it where a header-only library is most of the work
 function(shapedb_library name)
-  cmake_parse_arguments(ARG "FAST;SMALL" "" "SOURCES;PUBLIC;PRIVATE;PCH" ${ARGN})
+  cmake_parse_arguments(ARG "FAST;SMALL" "PCH_OF;UNITY" "SOURCES;PUBLIC;PRIVATE;PCH" ${ARGN})
   add_library(${name} STATIC ${ARG_SOURCES})
   target_link_libraries(${name} PUBLIC shapedb_options ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
   if(ARG_FAST)
@@ -59,16 +62,22 @@ function(shapedb_library name)
   endif()
   if(ARG_PCH)
     target_precompile_headers(${name} PRIVATE ${ARG_PCH})
+  elseif(ARG_PCH_OF)
+    target_precompile_headers(${name} REUSE_FROM ${ARG_PCH_OF})
+  endif()
+  if(ARG_UNITY)
+    set_target_properties(${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE ${ARG_UNITY})
   endif()
 endfunction()
 
 # shapedb_test(NAME FOLDERS folder ... [SUPPORT file.cpp ...] LIBS lib ... [PCH header ...] [TIMEOUT seconds] [LABEL name]
-#              [SLOW suite ...]):
+#              [SLOW suite ...] [TOGETHER suite ...] [COMPUTE]):
 # one program of every *_test.cpp in and below the folders, so that no test file can be forgotten. ctest runs it once
-# for each suite, those in SLOW first: started last, one of them would run alone. Built with -O1: most of a test's time
-# goes into compiling it.
+# for each suite, those in SLOW first: started last, one of them would run alone. Suites in TOGETHER share expensive
+# inputs: they run in one process, before those in SLOW. Built with -O0, for most of a test's time goes into compiling
+# it; with -O1 where references COMPUTE much.
 function(shapedb_test name)
-  cmake_parse_arguments(ARG "" "TIMEOUT;LABEL" "FOLDERS;SUPPORT;LIBS;PCH;SLOW" ${ARGN})
+  cmake_parse_arguments(ARG "COMPUTE" "TIMEOUT;LABEL" "FOLDERS;SUPPORT;LIBS;PCH;SLOW;TOGETHER" ${ARGN})
   set(patterns)
   foreach(folder ${ARG_FOLDERS})
     list(APPEND patterns ${CMAKE_CURRENT_SOURCE_DIR}/${folder}/*_test.cpp)
@@ -76,7 +85,11 @@ function(shapedb_test name)
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${patterns})
   add_executable(${name} ${sources} ${ARG_SUPPORT})
   target_link_libraries(${name} PRIVATE shapedb_options ${ARG_LIBS} GTest::gmock GTest::gtest_main)
-  target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O1>)
+  if(ARG_COMPUTE)
+    target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O1>)
+  else()
+    target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O0>)
+  endif()
   target_precompile_headers(${name} PRIVATE <gmock/gmock.h> <gtest/gtest.h> <algorithm> <array> <atomic> <chrono> <cmath>
                             <functional> <map> <memory> <optional> <string> <thread> <vector> "${PROJECT_SOURCE_DIR}/core/base/error.h"
                             ${ARG_PCH})
@@ -93,10 +106,11 @@ function(shapedb_test name)
   string(REGEX REPLACE "^shapedb_|_test$" "" prefix ${name})
   set(suites ${CMAKE_CURRENT_BINARY_DIR}/${name}_suites.cmake)
   set(discover ${PROJECT_SOURCE_DIR}/cmake/discover_suites.cmake)
+  list(JOIN ARG_TOGETHER "," together)
   add_custom_command(
     TARGET ${name} POST_BUILD
     COMMAND ${CMAKE_COMMAND} -D PROGRAM=$<TARGET_FILE:${name}> -D PREFIX=${prefix} -D OUTPUT=${suites} -D
-            TIMEOUT=${ARG_TIMEOUT} -D LABEL=${ARG_LABEL} -P ${discover}
+            TIMEOUT=${ARG_TIMEOUT} -D LABEL=${ARG_LABEL} -D TOGETHER=${together} -P ${discover}
     VERBATIM)
   set_property(TARGET ${name} APPEND PROPERTY LINK_DEPENDS ${discover})
   set(slowFirst "")

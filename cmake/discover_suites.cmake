@@ -1,6 +1,9 @@
 # Run after a test program is linked (see shapedb_test): writes what ctest runs, one test for each suite. A process
-# for each test would make expensive inputs again for every test that shares them.
-#   cmake -D PROGRAM=path -D PREFIX=core -D OUTPUT=file -D TIMEOUT=seconds -D LABEL=name -P discover_suites.cmake
+# for each test would make expensive inputs again for every test that shares them. For the same reason the suites of
+# TOGETHER run in one process, as one test that is named after all of them.
+#   cmake -D PROGRAM=path -D PREFIX=core -D OUTPUT=file -D TIMEOUT=seconds -D LABEL=name -D TOGETHER=A,B,C
+#         -P discover_suites.cmake
+cmake_minimum_required(VERSION 3.25)
 execute_process(COMMAND ${PROGRAM} --gtest_list_tests OUTPUT_VARIABLE listing RESULT_VARIABLE failed)
 if(failed)
   message(FATAL_ERROR "${PROGRAM} cannot list its tests: ${failed}")
@@ -10,11 +13,31 @@ if(NOT suites)
   message(FATAL_ERROR "${PROGRAM} has no tests")
 endif()
 set(content "")
+function(add_entry name filter cost)
+  set(test "[=[${PREFIX}.${name}]=]")
+  set(content
+      "${content}add_test(${test} [=[${PROGRAM}]=] \"--gtest_filter=${filter}\")
+set_tests_properties(${test} PROPERTIES TIMEOUT ${TIMEOUT} LABELS [=[${LABEL}]=] COST ${cost})\n" PARENT_SCOPE)
+endfunction()
+string(REPLACE "," ";" together "${TOGETHER}")
+set(joined "")
 foreach(suite ${suites})
   string(STRIP "${suite}" suite)
-  set(test "${PREFIX}.${suite}")
-  string(REGEX REPLACE "\\.$" "" test "${test}")
-  string(APPEND content "add_test([=[${test}]=] [=[${PROGRAM}]=] \"--gtest_filter=${suite}*\")\n"
-         "set_tests_properties([=[${test}]=] PROPERTIES TIMEOUT ${TIMEOUT} LABELS [=[${LABEL}]=])\n")
+  string(REGEX REPLACE "\\.$" "" name "${suite}")
+  if(name IN_LIST together)
+    list(APPEND joined ${name})
+  else()
+    add_entry("${name}" "${suite}*" 0)
+  endif()
 endforeach()
+list(LENGTH joined found)
+list(LENGTH together expected)
+if(NOT found EQUAL expected)
+  message(FATAL_ERROR "${PROGRAM} has only the suites '${joined}' of '${together}', which are to run together")
+endif()
+if(joined)
+  list(JOIN joined "_" name)
+  list(JOIN joined ".*:" filter)
+  add_entry("${name}" "${filter}.*" 20)
+endif()
 file(WRITE ${OUTPUT} "${content}")

@@ -24,7 +24,7 @@ struct CollectionFlags {
     bool force = false;
 };
 
-json toJson(const client::Collection& collection) {
+json collectionJson(const client::Collection& collection) {
     return {{"name", collection.name},
             {"description", collection.description},
             {"generation", collection.generation},
@@ -34,7 +34,7 @@ json toJson(const client::Collection& collection) {
             {"parameters", cli::toJson(collection.parameters)}};
 }
 
-std::string toText(const std::vector<client::Collection>& collections) {
+std::string collectionsText(const std::vector<client::Collection>& collections) {
     if (collections.empty()) return "no collections\n";
     const auto right = Table::Align::kRight;
     Table table({{"collection"},
@@ -54,8 +54,8 @@ std::string toText(const std::vector<client::Collection>& collections) {
 
 CommandResult show(Session& session, const Result<client::Collection>& collection) {
     RETURN_IF_ERROR(collection);
-    session.console().document(toJson(*collection));
-    session.console().text(toText({*collection}));
+    session.console().document(collectionJson(*collection));
+    session.console().text(collectionsText({*collection}));
     return kOk;
 }
 
@@ -78,9 +78,9 @@ CommandResult runList(Session& session, const CollectionFlags&) {
     const auto collections = client->listCollections(session.context());
     RETURN_IF_ERROR(collections);
     json list = json::array();
-    for (const client::Collection& one : *collections) list.push_back(toJson(one));
+    for (const client::Collection& one : *collections) list.push_back(collectionJson(one));
     session.console().document({{"collections", list}});
-    session.console().text(toText(*collections));
+    session.console().text(collectionsText(*collections));
     return kOk;
 }
 

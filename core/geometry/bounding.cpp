@@ -6,15 +6,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <exception>
-#include <iterator>
 #include <new>
 #include <string>
 #include <vector>
 
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/convex_hull_3.h>
-
 #include "core/base/random.h"
+#include "core/geometry/convex_hull.h"
 #include "core/geometry/cull_hull_interior.h"
 #include "core/geometry/motion.h"
 #include "core/geometry/vec3x2.h"
@@ -22,8 +19,6 @@
 namespace shapedb {
 
 namespace {
-
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 
 // The search: descents from many random rotations, coarse ones on an outline of the hull, then fine
 // ones from the best of them on all its vertices.
@@ -43,19 +38,6 @@ constexpr int kTriesPerStep = 24;
 
 // The outline: the farthest hull vertex in each of this many directions.
 constexpr int kCoarseDirections = 1500;
-
-PointCloud hullVertices(const PointCloud& points) {
-    std::vector<Kernel::Point_3> copies;
-    for (const Point3& p : cullHullInterior(points)) copies.emplace_back(p.x, p.y, p.z);
-    std::vector<Kernel::Point_3> extreme;
-    CGAL::extreme_points_3(copies, std::back_inserter(extreme));
-    PointCloud vertices;
-    vertices.reserve(extreme.size());
-    for (const auto& p : extreme) vertices.push_back({p.x(), p.y(), p.z()});
-    // CGAL's order depends on the order of the input; the result must not.
-    std::sort(vertices.begin(), vertices.end(), lexicographicLess);
-    return vertices;
-}
 
 // The range of the points along each edge of a box.
 struct Extent {
@@ -229,7 +211,7 @@ double leastSquaredDiagonal(const PointCloud& vertices) {
 Result<double> smallestBoxDiagonal(const PointCloud& points) {
     if (points.empty()) return fail(ErrorCode::kInvalidArgument, "no points to bound");
     try {
-        return std::sqrt(leastSquaredDiagonal(hullVertices(points)));
+        return std::sqrt(leastSquaredDiagonal(convexHullVertices(cullHullInterior(points))));
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::kOutOfMemory, "not enough memory to bound the points");
     } catch (const std::exception& e) {

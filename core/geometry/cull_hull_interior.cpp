@@ -8,15 +8,12 @@
 #include <limits>
 #include <vector>
 
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/Surface_mesh.h>
-#include <CGAL/convex_hull_3.h>
+#include "core/geometry/box.h"
+#include "core/geometry/convex_hull.h"
 
 namespace shapedb {
 
 namespace {
-
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 
 // With fewer points the hull itself is no dearer.
 constexpr std::size_t kWorthwhile = 2000;
@@ -38,7 +35,7 @@ Point3 direction(int i) {
     return {across * std::cos(angle), across * std::sin(angle), z};
 }
 
-std::vector<Kernel::Point_3> extremePoints(const PointCloud& points) {
+PointCloud extremePoints(const PointCloud& points) {
     std::array<double, kDirections> farthest;
     std::array<std::size_t, kDirections> at{};
     std::array<Point3, kDirections> directions;
@@ -54,8 +51,8 @@ std::vector<Kernel::Point_3> extremePoints(const PointCloud& points) {
             at[i] = p;
         }
     }
-    std::vector<Kernel::Point_3> extreme;
-    for (const std::size_t p : at) extreme.emplace_back(points[p].x, points[p].y, points[p].z);
+    PointCloud extreme;
+    for (const std::size_t p : at) extreme.push_back(points[p]);
     return extreme;
 }
 
@@ -74,22 +71,16 @@ struct Body {
 };
 
 // Has no faces when the points span no volume.
-Body spannedBy(const std::vector<Kernel::Point_3>& extreme) {
+Body spannedBy(const PointCloud& extreme) {
     Body body;
-    const CGAL::Bbox_3 box = CGAL::bbox_3(extreme.begin(), extreme.end());
-    body.stretch = {1.0 / (box.xmax() - box.xmin()), 1.0 / (box.ymax() - box.ymin()),
-                    1.0 / (box.zmax() - box.zmin())};
+    const Point3 extent = boxOf(extreme).extent();
+    body.stretch = {1.0 / extent.x, 1.0 / extent.y, 1.0 / extent.z};
     if (!std::isfinite(squaredLength(body.stretch))) return body;
-    for (const auto& p : extreme) body.centre = body.centre + Point3{p.x(), p.y(), p.z()};
+    for (const Point3& p : extreme) body.centre = body.centre + p;
     body.centre = (1.0 / static_cast<double>(extreme.size())) * body.centre;
-    CGAL::Surface_mesh<Kernel::Point_3> hull;
-    CGAL::convex_hull_3(extreme.begin(), extreme.end(), hull);
-    for (const auto face : hull.faces()) {
-        std::vector<Point3> corners;
-        for (const auto v : CGAL::vertices_around_face(hull.halfedge(face), hull)) {
-            const auto& p = hull.point(v);
-            corners.push_back(body.toBody({p.x(), p.y(), p.z()}));
-        }
+    for (const TriangleCorners& face : convexHullFaces(extreme)) {
+        TriangleCorners corners;
+        for (std::size_t i = 0; i < 3; ++i) corners[i] = body.toBody(face[i]);
         const Point3 normal = cross(corners[1] - corners[0], corners[2] - corners[0]);
         const double height = dot(normal, corners[0]);
         // A face this close to the centre: the body is too flat to use.

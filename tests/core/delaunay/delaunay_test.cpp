@@ -8,11 +8,10 @@
 #include <string>
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/Surface_mesh.h>
-#include <CGAL/convex_hull_3.h>
 #include <gtest/gtest.h>
 
 #include "core/base/random.h"
+#include "core/geometry/convex_hull.h"
 #include "tests/core/segmentation/exact_balls.h"
 
 namespace shapedb {
@@ -28,21 +27,10 @@ ExactNumber sixVolumes(const ExactPoint& a, const ExactPoint& b, const ExactPoin
 
 // Six times the volume of the convex hull, from its surface alone.
 ExactNumber hullSixVolumes(const PointCloud& cloud) {
-    std::vector<Kernel::Point_3> points;
-    for (const Point3& p : cloud) points.push_back(filtered(p));
-    CGAL::Surface_mesh<Kernel::Point_3> hull;
-    CGAL::convex_hull_3(points.begin(), points.end(), hull);
     ExactNumber sum = 0;
     const ExactPoint origin(0, 0, 0);
-    for (const auto face : hull.faces()) {
-        std::vector<ExactPoint> corners;
-        for (const auto v : CGAL::vertices_around_face(hull.halfedge(face), hull)) {
-            const auto& p = hull.point(v);
-            corners.emplace_back(p.x(), p.y(), p.z());
-        }
-        for (std::size_t i = 2; i < corners.size(); ++i) {
-            sum += sixVolumes(origin, corners[0], corners[i - 1], corners[i]);
-        }
+    for (const TriangleCorners& face : convexHullFaces(cloud)) {
+        sum += sixVolumes(origin, exact(face[0]), exact(face[1]), exact(face[2]));
     }
     return sum;
 }

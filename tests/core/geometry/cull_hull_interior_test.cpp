@@ -1,32 +1,17 @@
 #include "core/geometry/cull_hull_interior.h"
 
 #include <algorithm>
-#include <iterator>
 #include <vector>
 
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/convex_hull_3.h>
 #include <gtest/gtest.h>
 
 #include "core/base/random.h"
+#include "core/geometry/convex_hull.h"
 #include "core/synthetic/named_shapes.h"
 #include "core/synthetic/noise.h"
 
 namespace shapedb {
 namespace {
-
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-
-PointCloud hullVertices(const PointCloud& points) {
-    std::vector<Kernel::Point_3> copies;
-    for (const Point3& p : points) copies.emplace_back(p.x, p.y, p.z);
-    std::vector<Kernel::Point_3> extreme;
-    CGAL::extreme_points_3(copies, std::back_inserter(extreme));
-    PointCloud vertices;
-    for (const auto& p : extreme) vertices.push_back({p.x(), p.y(), p.z()});
-    std::sort(vertices.begin(), vertices.end(), lexicographicLess);
-    return vertices;
-}
 
 TEST(CullHullInterior, KeepsEveryHullVertex) {
     for (const NamedShape& shape : namedShapes()) {
@@ -34,7 +19,7 @@ TEST(CullHullInterior, KeepsEveryHullVertex) {
             PointCloud points = sampleBoundary(shape.solid, 20000, 6).value();
             ASSERT_TRUE(addGaussianNoise(points, noise, 6));
             const PointCloud outer = cullHullInterior(points);
-            EXPECT_TRUE(hullVertices(outer) == hullVertices(points)) << shape.name << noise;
+            EXPECT_TRUE(convexHullVertices(outer) == convexHullVertices(points)) << shape.name << noise;
         }
     }
 }
