@@ -22,10 +22,9 @@ struct AdaptiveInterior {
     double quality = 0.0;
 };
 
-/// Compares the interiors left by walks at several angles and that of `insidePotential` by two measures
+/// Compares the interiors left by walks at all angles and that of `insidePotential` by two measures
 /// of their boundary: how much of it bridges gaps wider than the sampling, and how many points it leaves
-/// on one side. Of those nearly as good as the best, takes the walk nearest to 22 degrees (docs/interior.md,
-/// section 2), else the potential.
+/// on one side. Prefers walks, and angles near 22 degrees (docs/interior.md, section 2).
 ///
 /// Errors: kCancelled, kDeadlineExceeded. An empty interior is not an error.
 [[nodiscard]] Result<AdaptiveInterior> adaptiveInterior(const PointCloud& points,
