@@ -4,11 +4,14 @@
 #include <array>
 #include <cmath>
 #include <iostream>
+#include <numeric>
 #include <set>
 #include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
+#include "core/matching/attributed/tripod.h"
 #include "tests/core/matching/attributed_signatures.h"
 #include "tests/core/matching/random_signatures.h"
 
@@ -218,6 +221,45 @@ TEST(SegmentMatch, IsAtLeastAsGoodAsEveryFrameAlignment) {
             EXPECT_LE(sum, match.agreement + 1e-12);
         }
     }
+}
+
+TEST(SegmentMatch, IsAtLeastAsGoodAsEveryAlignmentOfTheOutlyingSegments) {
+    Random random(12);
+    int compared = 0;
+    for (int round = 0; round < 300; ++round) {
+        const Signature a = randomAttributed(random, kMaxSignaturePoints);
+        const Signature b = turnedAttributed(a, randomRotation(random));
+        const Body& x = bodyOf(a);
+        const Body& y = bodyOf(b);
+        const ScoreOptions options = optionsOf(false, 0.1);
+        const SegmentMatch match = SegmentComparison(x, y, options).match();
+        std::vector<std::size_t> order(x.parts.size());
+        std::iota(order.begin(), order.end(), std::size_t{0});
+        const auto leverage = [&](std::size_t i) { return x.parts[i].share * x.parts[i].radius; };
+        std::stable_sort(order.begin(), order.end(),
+                         [&](std::size_t i, std::size_t k) { return leverage(i) > leverage(k); });
+        const auto at = [](const SegmentDescriptor& s) {
+            return Point3{s.position[0], s.position[1], s.position[2]};
+        };
+        for (std::size_t n = 0; n < std::min<std::size_t>(3, order.size()); ++n) {
+            for (std::size_t m = 0; m < std::min<std::size_t>(3, order.size()); ++m) {
+                const std::size_t i = order[n];
+                const std::size_t k = order[m];
+                Tripod to;
+                Tripod from;
+                if (i == k || !tripod(at(x.parts[i]), at(x.parts[k]), to)) continue;
+                if (!tripod(at(y.parts[i]), at(y.parts[k]), from)) continue;
+                SegmentMatch aligned;
+                aligned.rotation = tripodMap(from, to, false);
+                const SegmentPairs pairs = SegmentComparison(x, y, options).pairs(aligned);
+                double sum = 0.0;
+                for (std::size_t p = 0; p < pairs.count; ++p) sum += pairs.pairs[p].gain;
+                EXPECT_LE(sum, match.agreement + 1e-9);
+                ++compared;
+            }
+        }
+    }
+    EXPECT_GT(compared, 500);
 }
 
 TEST(SegmentMatch, SegmentsOfDifferentSizesDoNotAgree) {

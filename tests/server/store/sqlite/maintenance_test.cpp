@@ -1,5 +1,10 @@
+#include <algorithm>
 #include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include "server/store/sqlite/migrator.h"
 #include "tests/server/store/sqlite/store_fixture.h"
@@ -151,6 +156,28 @@ TEST_F(SqliteMaintenanceTest, RefusesBadBackups) {
 
 TEST_F(SqliteMaintenanceTest, RefusesAnotherPageSize) {
     expectRefused(changed("PRAGMA page_size=8192; VACUUM"), ErrorCode::kMalformedFile);
+}
+
+TEST_F(SqliteMaintenanceTest, RestoreReportsHowMuchOfTheFileItHasCopied) {
+    for (int i = 0; i < 8; ++i) {
+        const auto big = cloud(200 + i, 20000);
+        ASSERT_TRUE(store_->putShape(request(collection_.id, "big" + std::to_string(i), big)));
+    }
+    const std::string large = folder_.file("large.db");
+    ASSERT_TRUE(store_->backup(large, {}));
+    const std::uint64_t size = std::filesystem::file_size(large);
+    std::vector<std::uint64_t> copied;
+    RunContext context;
+    context.progress = [&](const std::string& stage, std::uint64_t done, std::uint64_t total) {
+        if (stage != "copy") return;
+        EXPECT_EQ(total, size);
+        copied.push_back(done);
+    };
+    ASSERT_TRUE(store_->restore(large, context));
+    ASSERT_GT(copied.size(), 2u) << "the file is to be longer than one piece";
+    EXPECT_TRUE(std::is_sorted(copied.begin(), copied.end()));
+    EXPECT_EQ(copied.front(), 0u);
+    EXPECT_EQ(copied.back(), size);
 }
 
 TEST_F(SqliteMaintenanceTest, CancelledBackupLeavesNothing) {

@@ -72,6 +72,7 @@ TEST_F(SqliteRebuildTest, OldGenerationServesUntilTheSwitch) {
     EXPECT_EQ(done.state, RebuildState::kDone);
     EXPECT_EQ(done.done, 3u);
     EXPECT_EQ(done.failed, 1u);
+    EXPECT_EQ(done.total, 3u);
     EXPECT_GT(done.finishedAt, done.startedAt);
     EXPECT_TRUE(store_->runningRebuilds()->empty());
     EXPECT_FAILS(store_->finishRebuild(started.id), ErrorCode::kRejected);
