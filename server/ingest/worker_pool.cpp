@@ -68,7 +68,7 @@ void WorkerPool::wake() {
 
 void WorkerPool::supersede(std::int64_t shapeId, std::int64_t newPointsVersion) {
     const std::lock_guard<std::mutex> lock(mutex_);
-    for (const auto& [id, running] : running_) {
+    for (const auto& running : running_) {
         if (running->job.shapeId == shapeId && running->job.pointsVersion < newPointsVersion) {
             markSuperseded(*running);
         }
@@ -77,7 +77,7 @@ void WorkerPool::supersede(std::int64_t shapeId, std::int64_t newPointsVersion) 
 
 void WorkerPool::supersedeCollection(std::int64_t collectionId) {
     const std::lock_guard<std::mutex> lock(mutex_);
-    for (const auto& [id, running] : running_) {
+    for (const auto& running : running_) {
         if (running->job.collectionId == collectionId) markSuperseded(*running);
     }
 }
@@ -90,7 +90,7 @@ void WorkerPool::markSuperseded(Running& running) {
 void WorkerPool::pause() {
     std::unique_lock<std::mutex> lock(mutex_);
     paused_ = true;
-    for (const auto& [id, running] : running_) running->cancel = true;
+    for (const auto& running : running_) running->cancel = true;
     changed_.notify_all();
     changed_.wait(lock, [this] { return running_.empty() && claiming_ == 0; });
 }
@@ -142,10 +142,14 @@ void WorkerPool::run() {
         std::optional<CrashIsolation::Pass> pass;
         const std::shared_ptr<Running> running = next(pass);
         if (!running) return;
-        work(running);
+        const Outcome outcome = work(*running);
         pass.reset();
-        const std::lock_guard<std::mutex> lock(mutex_);
-        running_.erase(running->job.id);
+        std::unique_lock<std::mutex> lock(mutex_);
+        running_.erase(running);
+        changed_.notify_all();
+        // No longer counted as running: a drain does not wait for the rest.
+        if (outcome == Outcome::kStoreFailed) rest(lock);
+        if (outcome != Outcome::kDone) ++signals_;
         changed_.notify_all();
     }
 }
@@ -208,7 +212,7 @@ std::shared_ptr<WorkerPool::Running> WorkerPool::next(std::optional<CrashIsolati
             auto running = std::make_shared<Running>();
             running->job = **job;
             running->cancel = paused_;  // paused while claiming: straight back
-            running_[running->job.id] = running;
+            running_.insert(running);
             lock.unlock();
             if (!pass) pass.emplace(isolation_, suspect);
             return running;
@@ -217,30 +221,26 @@ std::shared_ptr<WorkerPool::Running> WorkerPool::next(std::optional<CrashIsolati
     }
 }
 
-void WorkerPool::work(const std::shared_ptr<Running>& running) {
+WorkerPool::Outcome WorkerPool::work(Running& running) {
     const auto began = std::chrono::steady_clock::now();
-    const store::Job& job = running->job;
+    const store::Job& job = running.job;
     Outcome outcome = Outcome::kDone;
     try {
-        outcome = attempt(*running);
+        outcome = attempt(running);
     } catch (...) {
         // An exception that left the thread would end the process.
         outcome = giveUp(job, errorOfException());
     }
-    if (outcome != Outcome::kDone) putBack(job);
+    // Before it is put back: what is reported from then on is of the next worker.
     board_.settled(job.shapeId);
-
-    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - began;
-    std::unique_lock<std::mutex> lock(mutex_);
-    if (outcome == Outcome::kDone) secondsPerJob_ += kNewest * (seconds.count() - secondsPerJob_);
-    if (outcome == Outcome::kStoreFailed) {
-        // Not counted as running while it rests: a drain does not wait for it.
-        running_.erase(job.id);
-        changed_.notify_all();
-        rest(lock);
+    if (outcome != Outcome::kDone) {
+        putBack(job);
+        return outcome;
     }
-    if (outcome != Outcome::kDone) ++signals_;
-    changed_.notify_all();
+    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - began;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    secondsPerJob_ += kNewest * (seconds.count() - secondsPerJob_);
+    return outcome;
 }
 
 WorkerPool::Outcome WorkerPool::attempt(Running& running) {

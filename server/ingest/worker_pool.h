@@ -9,10 +9,10 @@
 #include <condition_variable>
 #include <cstdint>
 #include <limits>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <thread>
 #include <vector>
 
@@ -86,7 +86,7 @@ class WorkerPool {
     std::shared_ptr<Running> next(std::optional<CrashIsolation::Pass>& pass);
     Result<std::optional<store::Job>> claim(std::unique_lock<std::mutex>& lock);
     void retryReleases(std::unique_lock<std::mutex>& lock);
-    void work(const std::shared_ptr<Running>& running);
+    Outcome work(Running& running);
     Outcome attempt(Running& running);
     Outcome commit(const Running& running, std::int64_t generation, PipelineOutcome made);
     Outcome giveUp(const store::Job& job, const Error& why);
@@ -110,10 +110,12 @@ class WorkerPool {
     /// True from the start until the first job that no dead process had in hand (those come first,
     /// being older): jobs run one at a time and alone, so that a deadly one dies alone.
     bool probing_ = true;
-    int claiming_ = 0;                                          ///< workers in the store without a job
-    std::map<std::int64_t, std::shared_ptr<Running>> running_;  ///< by job id
-    std::vector<store::Job> unreleased_;                        ///< jobs the store would not take back yet
-    double secondsPerJob_ = 1.0;                                ///< running mean
+    int claiming_ = 0;  ///< workers in the store without a job
+    /// One for each worker that has a scan in hand. Not by job: a job that was put back may be with its next
+    /// worker before the last one has left.
+    std::set<std::shared_ptr<Running>> running_;
+    std::vector<store::Job> unreleased_;  ///< jobs the store would not take back yet
+    double secondsPerJob_ = 1.0;          ///< running mean
     std::vector<std::thread> threads_;
     std::atomic<std::uint64_t> ingested_{0};
 };

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <condition_variable>
 #include <mutex>
+#include <thread>
 
 #include <gtest/gtest.h>
 
@@ -46,7 +47,7 @@ class Pool : public ::testing::Test {
     WorkerPool& start(SignaturePipeline describe = quickDescribe, int threads = 2) {
         WorkerOptions options;
         options.threads = threads;
-        options.backOff = 5ms;
+        options.backOff = backOff;
         pool =
             std::make_unique<WorkerPool>(store, index, board, isolation, std::move(describe), log, options);
         EXPECT_TRUE(pool->start());
@@ -76,6 +77,7 @@ class Pool : public ::testing::Test {
     ProgressBoard board;
     CrashIsolation isolation;
     store::Collection parts;
+    std::chrono::milliseconds backOff{5};
     std::unique_ptr<WorkerPool> pool;
 };
 
@@ -255,6 +257,53 @@ TEST_F(Pool, StoreFailuresAreOutlived) {
                   i % 5 == 0 ? store::ShapeState::kFailed : store::ShapeState::kReady);
     }
     EXPECT_EQ((*index.byName("parts"))->signatures.size(), 24u);
+}
+
+// The worker that could not store a result rests while another has the job again.
+TEST_F(Pool, ARestingWorkerDoesNotHideTheNextOneWithItsJob) {
+    const auto x = put("x", 1.0f);
+    put("y", 2.0f);
+    std::atomic<bool> failOnce{true};
+    std::atomic<bool> yMayEnd{false};
+    std::atomic<bool> xMayEnd{false};
+    std::atomic<int> visitsOfX{0};
+    std::atomic<int> visitsOfY{0};
+    std::atomic<int> left{0};
+    store.fault = [&](const std::string& function) -> std::optional<Error> {
+        if (function == "finishJob" && failOnce.exchange(false)) return Error{ErrorCode::kStorage, "once"};
+        return std::nullopt;
+    };
+    backOff = 300ms;
+    start([&](const PointCloud& points, const ShapeParameters& parameters, const RunContext& context) {
+        if (points[0].x != 1.0) {
+            ++visitsOfY;
+            eventually([&] { return yMayEnd.load(); });
+        } else if (++visitsOfX == 1) {
+            eventually([&] { return visitsOfY > 0; });  // the other worker is busy
+        } else {
+            eventually([&] { return xMayEnd.load(); });
+            ++left;
+        }
+        return quickDescribe(points, parameters, context);
+    });
+    ASSERT_TRUE(eventually([&] { return log->all().find("cannot store a signature") != std::string::npos; }));
+    yMayEnd = true;  // its worker takes x
+    ASSERT_TRUE(eventually([&] { return settled("y") && visitsOfX == 2; }));
+    std::this_thread::sleep_for(2 * backOff);
+    EXPECT_EQ(pool->running(), 1u) << "the rest of the first worker is over, x is still in hand";
+    pool->supersede(x.id);
+    std::atomic<bool> paused{false};
+    std::thread pausing([&] {
+        pool->pause();
+        paused = true;
+    });
+    std::this_thread::sleep_for(20ms);
+    EXPECT_FALSE(paused) << "while a worker has x in hand";
+    EXPECT_EQ(left, 0);
+    xMayEnd = true;
+    pausing.join();
+    EXPECT_EQ(left, 1);
+    EXPECT_EQ(shape("x").state, store::ShapeState::kFailed) << "its worker was told that x is superseded";
 }
 
 TEST_F(Pool, DamagedPointsFailTheShape) {
