@@ -44,6 +44,7 @@ Result<void> WorkerPool::recover() {
         log_->error(
             "scan set aside: the server died each time it was segmented",
             {{"shape", shape.id}, {"key", shape.key}, {"attempts", std::int64_t{options_.maxAttempts}}});
+        stopSearching(shape);
         board_.settled(shape.id);
     }
     return {};
@@ -314,11 +315,17 @@ WorkerPool::Outcome WorkerPool::giveUp(const store::Job& job, const Error& why) 
     auto fields = fieldsOf(job, why);
     fields.push_back({"key", (*failed)->key});
     log_->warn("scan cannot be segmented", fields);
-    // A signature of older points no longer serves.
-    if (const auto refreshed = index_.refresh(job.collectionId, job.shapeId); !refreshed) {
-        log_->error("failed scan is still searched", fieldsOf(job, refreshed.error()));
-    }
+    stopSearching(**failed);
     return Outcome::kDone;
+}
+
+/// A signature of older points no longer serves.
+void WorkerPool::stopSearching(const store::Shape& failed) {
+    const auto refreshed = index_.refresh(failed.collectionId, failed.id);
+    if (refreshed) return;
+    auto fields = telemetry::fieldsOf(refreshed.error());
+    fields.push_back({"shape", failed.id});
+    log_->error("failed scan is still searched", fields);
 }
 
 void WorkerPool::putBack(const store::Job& job) {

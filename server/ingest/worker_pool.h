@@ -43,7 +43,8 @@ class WorkerPool {
     /// As `stop`.
     ~WorkerPool();
 
-    /// Recovers the jobs of a dead process (Store::recoverJobs) and starts the workers. Call once.
+    /// Recovers the jobs of a dead process (Store::recoverJobs) and starts the workers. Scans set aside
+    /// leave the index, which must be loaded. Call once.
     /// Errors: as Store::recoverJobs.
     [[nodiscard]] Result<void> start();
 
@@ -90,6 +91,7 @@ class WorkerPool {
     Outcome attempt(Running& running);
     Outcome commit(const Running& running, std::int64_t generation, PipelineOutcome made);
     Outcome giveUp(const store::Job& job, const Error& why);
+    void stopSearching(const store::Shape& failed);
     void putBack(const store::Job& job);
     void rest(std::unique_lock<std::mutex>& lock);
     Result<void> recover();

@@ -208,6 +208,23 @@ TEST_F(Pool, JobOfADeadProcessIsDoneAgainButNotForEver) {
     EXPECT_EQ(shape("once").state, store::ShapeState::kReady);
 }
 
+TEST_F(Pool, AScanSetAsideAtStartIsNotSearchedByItsOlderPoints) {
+    start();
+    const auto k = put("k", 1.0f);
+    ASSERT_TRUE(eventually([&] { return settled("k"); }));
+    pool.reset();
+    put("k", 2.0f);
+    ASSERT_TRUE(*store.claimJob());
+    ASSERT_TRUE(store.recoverJobs(2));
+    ASSERT_TRUE(*store.claimJob());  // second death
+    ASSERT_TRUE(index.loadAll());    // as a server does before it starts its workers
+    ASSERT_TRUE((*index.byName("parts"))->signatures.find(k.id));
+    start();
+    EXPECT_EQ(shape("k").state, store::ShapeState::kFailed);
+    EXPECT_EQ(store.getSignature(k.id).error().code, ErrorCode::kNotReady);
+    EXPECT_FALSE((*index.byName("parts"))->signatures.find(k.id));
+}
+
 // Three scans were in hand when the server died. Run one at a time, they show which of them was the cause.
 TEST_F(Pool, SuspectsRunOneAtATimeAndTheRestTogether) {
     for (int i = 0; i < 3; ++i) put("suspect " + std::to_string(i), 1.0f);

@@ -243,11 +243,15 @@ Result<std::optional<Shape>> MemoryStore::failJob(const Job& job, const Error& w
     return guarded("failJob", [&]() -> Result<std::optional<Shape>> {
         Shape* shape = settle(job);
         if (shape == nullptr) return std::optional<Shape>();
-        shape->state = ShapeState::kFailed;
-        shape->failure = why;
-        content_.signatures.erase(shape->id);
+        markFailed(*shape, why);
         return std::optional<Shape>(*shape);
     });
+}
+
+void MemoryStore::markFailed(Shape& shape, const Error& why) {
+    shape.state = ShapeState::kFailed;
+    shape.failure = why;
+    content_.signatures.erase(shape.id);
 }
 
 Result<void> MemoryStore::releaseJob(const Job& job) {
@@ -269,8 +273,7 @@ Result<std::vector<Shape>> MemoryStore::recoverJobs(int maxAttempts) {
             queued.running = false;
             if (queued.job.attempts < maxAttempts) continue;
             if (Shape* shape = settle(Job(queued.job))) {
-                shape->state = ShapeState::kFailed;
-                shape->failure = Error{ErrorCode::kInternal, "the server died while it was segmented"};
+                markFailed(*shape, {ErrorCode::kInternal, "the server died while it was segmented"});
                 quarantined.push_back(*shape);
             }
         }

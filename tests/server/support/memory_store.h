@@ -102,6 +102,7 @@ class MemoryStore : public store::Store {
     void removeShape(std::int64_t shapeId);
     /// The shape if the job is still its current one; the job is dropped in any case.
     store::Shape* settle(const store::Job& job);
+    void markFailed(store::Shape& shape, const Error& why);
     bool hasJob(std::int64_t shapeId) const;
     void count(store::Rebuild& rebuild) const;
 
