@@ -12,18 +12,18 @@ namespace shapedb::catalog {
 
 namespace {
 
-/// Errors: kInvalidArgument (length), kMalformedFilter. A cancelled `context`, which must outlive the result,
-/// accepts nothing more, so that no more shapes are gathered.
+/// Errors: kInvalidArgument (length), kMalformedFilter.
 Result<store::ShapeFilter> makeFilter(const ShapeSelection& selection, const RunContext& context) {
     RETURN_IF_ERROR(checkFilterLength(selection.filter));
     Result<Filter> filter = Filter::parse(selection.filter);
     RETURN_IF_ERROR(filter);
     store::ShapeFilter result;
     result.state = selection.state;
-    const RunContext* run = &context;
-    const bool all = filter->acceptsAll();
-    result.accept = [filter = std::move(*filter), run, all](const store::Shape& shape) {
-        return run->checkpoint().has_value() && (all || filter.matches(shape.metadata));
+    result.context = context;
+    // With no `accept` the store counts without reading rows.
+    if (filter->acceptsAll()) return result;
+    result.accept = [filter = std::move(*filter)](const store::Shape& shape) {
+        return filter.matches(shape.metadata);
     };
     return result;
 }
@@ -51,7 +51,6 @@ Result<std::string> listPage(
     // One more than requested tells whether there is a next page.
     const auto shapes = catalog.listShapes(listing.collectionId, *afterId, pageSize + 1, *filter);
     RETURN_IF_ERROR(shapes);
-    RETURN_IF_ERROR(context.checkpoint());
     std::size_t bytes = 0;
     std::size_t sent = 0;
     for (; sent < std::min(pageSize, shapes->size()) && bytes < kMaxPageBytes; ++sent) {
@@ -63,13 +62,9 @@ Result<std::string> listPage(
 
 Result<std::uint64_t> countSelected(Catalog& catalog, const index::Snapshot& collection,
                                     const ShapeSelection& selection, const RunContext& context) {
-    auto filter = makeFilter(selection, context);
+    const auto filter = makeFilter(selection, context);
     RETURN_IF_ERROR(filter);
-    if (selection.filter.empty()) filter->accept = nullptr;  // counted without reading rows
-    const auto count = catalog.countShapes(collection.collection.id, *filter);
-    RETURN_IF_ERROR(count);
-    RETURN_IF_ERROR(context.checkpoint());
-    return count;
+    return catalog.countShapes(collection.collection.id, *filter);
 }
 
 }  // namespace shapedb::catalog

@@ -102,6 +102,8 @@ struct ShapeFilter {
     std::optional<ShapeState> state;
     /// Called for each row inside the read; null accepts all. Must not call the store.
     std::function<bool(const Shape&)> accept;
+    /// Looked at before each row: a read that nobody waits for ends there.
+    RunContext context{};
 };
 
 /// One scan to segment. Claiming raises `attempts` durably.
@@ -197,9 +199,11 @@ class Store {
     /// Errors: kNotFound.
     [[nodiscard]] virtual Result<Shape> getShapeById(std::int64_t shapeId) = 0;
     /// Shapes with id > afterId, in ascending order of id, at most `limit`: stable under inserts and deletes.
+    /// Errors: kCancelled, kDeadlineExceeded (filter.context).
     [[nodiscard]] virtual Result<std::vector<Shape>> listShapes(std::int64_t collectionId,
                                                                 std::int64_t afterId, std::size_t limit,
                                                                 const ShapeFilter& filter) = 0;
+    /// Errors: kCancelled, kDeadlineExceeded (filter.context).
     [[nodiscard]] virtual Result<std::uint64_t> countShapes(std::int64_t collectionId,
                                                             const ShapeFilter& filter) = 0;
     /// Removes the shape with its points, signatures and jobs; returns it as it was.

@@ -160,7 +160,8 @@ Result<Shape> SqliteStore::getShapeById(std::int64_t shapeId) {
 
 namespace {
 
-/// Calls `visit` for each accepted shape in ascending order of id, until it returns false.
+/// Calls `visit` for each accepted shape in ascending order of id, until it returns false. Throws Failure
+/// when the filter's context says so.
 template <typename Visit>
 void forEachAccepted(Connection& connection, std::int64_t collectionId, std::int64_t afterId,
                      const ShapeFilter& filter, Visit visit) {
@@ -171,6 +172,7 @@ void forEachAccepted(Connection& connection, std::int64_t collectionId, std::int
         query.bindAll(collectionId, afterId);
     }
     forEachShape(query, [&](Shape&& shape) {
+        orRaise(filter.context.checkpoint());
         if (filter.accept && !filter.accept(shape)) return true;
         return visit(std::move(shape));
     });

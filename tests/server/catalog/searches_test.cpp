@@ -1,5 +1,7 @@
 #include "server/catalog/searches.h"
 
+#include <atomic>
+
 #include <gtest/gtest.h>
 
 #include "server/catalog/listing.h"
@@ -137,6 +139,20 @@ TEST_F(SearchesTest, PagesOfAListingFollowOneAnother) {
     request.cursor = "nonsense";
     EXPECT_EQ(listPage(*catalog, *collection, request, {}, [](const auto&, auto) { return 0; }).error().code,
               ErrorCode::kMalformedCursor);
+}
+
+TEST_F(SearchesTest, ACancelledListingEndsWithoutAPage) {
+    putAndWait("cup", 5.0f);
+    const std::atomic<bool> cancel{true};
+    RunContext cancelled;
+    cancelled.cancel = &cancel;
+    const auto collection = catalog->collection("").value();
+    const auto next = listPage(*catalog, *collection, {}, cancelled, [](const auto&, auto) { return 0; });
+    ASSERT_FALSE(next);
+    EXPECT_EQ(next.error().code, ErrorCode::kCancelled);
+    const auto count = countSelected(*catalog, *collection, {"label=cup", std::nullopt}, cancelled);
+    ASSERT_FALSE(count);
+    EXPECT_EQ(count.error().code, ErrorCode::kCancelled);
 }
 
 TEST_F(SearchesTest, APageEndsBeforeItGrowsTooLarge) {

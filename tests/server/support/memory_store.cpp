@@ -161,21 +161,27 @@ Result<Shape> MemoryStore::getShapeById(std::int64_t shapeId) {
 
 Result<std::vector<Shape>> MemoryStore::listShapes(std::int64_t collectionId, std::int64_t afterId,
                                                    std::size_t limit, const ShapeFilter& filter) {
-    return guarded("listShapes", [&]() -> Result<std::vector<Shape>> {
-        std::vector<Shape> page;
-        for (auto at = content_.shapes.upper_bound(afterId);
-             at != content_.shapes.end() && page.size() < limit; ++at) {
-            if (at->second.collectionId == collectionId && accepts(filter, at->second))
-                page.push_back(at->second);
-        }
-        return page;
-    });
+    return guarded("listShapes", [&] { return list(collectionId, afterId, limit, filter); });
+}
+
+Result<std::vector<Shape>> MemoryStore::list(std::int64_t collectionId, std::int64_t afterId,
+                                             std::size_t limit, const ShapeFilter& filter) const {
+    std::vector<Shape> page;
+    for (auto at = content_.shapes.upper_bound(afterId); at != content_.shapes.end() && page.size() < limit;
+         ++at) {
+        if (at->second.collectionId != collectionId) continue;
+        if (const auto go = filter.context.checkpoint(); !go) return fail(go.error());
+        if (accepts(filter, at->second)) page.push_back(at->second);
+    }
+    return page;
 }
 
 Result<std::uint64_t> MemoryStore::countShapes(std::int64_t collectionId, const ShapeFilter& filter) {
-    const auto all = listShapes(collectionId, 0, ~std::size_t{0}, filter);
-    if (!all) return fail(all.error());
-    return all->size();
+    return guarded("countShapes", [&]() -> Result<std::uint64_t> {
+        const auto all = list(collectionId, 0, ~std::size_t{0}, filter);
+        if (!all) return fail(all.error());
+        return all->size();
+    });
 }
 
 Result<Shape> MemoryStore::deleteShape(std::int64_t collectionId, const std::string& key,

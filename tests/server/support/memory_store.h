@@ -97,6 +97,8 @@ class MemoryStore : public store::Store {
         return body();
     }
 
+    Result<std::vector<store::Shape>> list(std::int64_t collectionId, std::int64_t afterId, std::size_t limit,
+                                           const store::ShapeFilter& filter) const;
     store::Shape* find(std::int64_t collectionId, const std::string& key);
     void queueJob(const store::Shape& shape);
     void removeShape(std::int64_t shapeId);

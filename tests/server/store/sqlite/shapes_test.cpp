@@ -1,3 +1,4 @@
+#include <atomic>
 #include <set>
 
 #include "tests/server/store/sqlite/store_fixture.h"
@@ -237,6 +238,29 @@ TEST_F(SqliteShapesTest, PagesAreStableAndFiltered) {
     bad.accept = [](const Shape&) -> bool { throw std::runtime_error("broken filter"); };
     EXPECT_FAILS(store_->listShapes(c.id, 0, 5, bad), ErrorCode::kInternal);
     EXPECT_EQ(store_->listShapes(c.id, 0, 5, {})->size(), 5u);
+}
+
+TEST_F(SqliteShapesTest, ACancelledListingReadsNoFurther) {
+    const Collection c = collection();
+    for (int i = 0; i < 40; ++i) put(c.id, "k" + std::to_string(i), 100 + i);
+    std::atomic<bool> cancel{false};
+    int read = 0;
+    ShapeFilter filter;
+    filter.context.cancel = &cancel;
+    filter.accept = [&](const Shape&) {
+        cancel = ++read == 5;
+        return false;
+    };
+    EXPECT_FAILS(store_->listShapes(c.id, 0, 10, filter), ErrorCode::kCancelled);
+    EXPECT_EQ(read, 5);
+    cancel = false;
+    read = 0;
+    EXPECT_FAILS(store_->countShapes(c.id, filter), ErrorCode::kCancelled);
+    EXPECT_EQ(read, 5);
+    cancel = false;
+    filter.context.deadline = RunContext::Clock::now();
+    EXPECT_FAILS(store_->listShapes(c.id, 0, 10, filter), ErrorCode::kDeadlineExceeded);
+    EXPECT_EQ(store_->listShapes(c.id, 0, 50, {})->size(), 40u) << "the connection serves the next read";
 }
 
 TEST_F(SqliteShapesTest, LoadsTheIndexInPages) {
