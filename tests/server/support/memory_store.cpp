@@ -1,6 +1,8 @@
 #include "tests/server/support/memory_store.h"
 
 #include <algorithm>
+#include <chrono>
+#include <utility>
 
 namespace shapedb::testing {
 
@@ -18,6 +20,11 @@ bool accepts(const ShapeFilter& filter, const Shape& shape) {
 
 }  // namespace
 
+TimestampMs MemoryStore::now() {
+    using namespace std::chrono;
+    return duration_cast<milliseconds>(system_clock::now().time_since_epoch()).count();
+}
+
 Result<Collection> MemoryStore::createCollection(const std::string& name, const std::string& description,
                                                  const std::string& parameters) {
     return guarded("createCollection", [&]() -> Result<Collection> {
@@ -29,6 +36,7 @@ Result<Collection> MemoryStore::createCollection(const std::string& name, const 
         collection.name = name;
         collection.description = description;
         collection.parameters = parameters;
+        collection.createdAt = now();
         return content_.collections[collection.id] = collection;
     });
 }
@@ -61,6 +69,7 @@ Result<void> MemoryStore::deleteCollection(std::int64_t collectionId) {
         for (const std::int64_t id : ids) removeShape(id);
         for (auto rebuild = content_.rebuilds.begin(); rebuild != content_.rebuilds.end();) {
             const bool its = rebuild->second.collectionId == collectionId;
+            if (its) content_.rebuilt.erase(rebuild->first);
             rebuild = its ? content_.rebuilds.erase(rebuild) : std::next(rebuild);
         }
         return {};
@@ -75,10 +84,7 @@ Shape* MemoryStore::find(std::int64_t collectionId, const std::string& key) {
 }
 
 void MemoryStore::queueJob(const Shape& shape) {
-    for (auto job = content_.jobs.begin(); job != content_.jobs.end();) {
-        const bool waiting = job->second.job.shapeId == shape.id && !job->second.running;
-        job = waiting ? content_.jobs.erase(job) : std::next(job);
-    }
+    removeJobs(shape.id);
     QueuedJob queued;
     queued.job.id = content_.nextId++;
     queued.job.shapeId = shape.id;
@@ -86,6 +92,12 @@ void MemoryStore::queueJob(const Shape& shape) {
     queued.job.pointsVersion = shape.pointsVersion;
     queued.job.pointBytes = shape.pointCount * 12;
     content_.jobs[queued.job.id] = queued;
+}
+
+void MemoryStore::removeJobs(std::int64_t shapeId) {
+    for (auto job = content_.jobs.begin(); job != content_.jobs.end();) {
+        job = job->second.job.shapeId == shapeId ? content_.jobs.erase(job) : std::next(job);
+    }
 }
 
 bool MemoryStore::hasJob(std::int64_t shapeId) const {
@@ -98,9 +110,20 @@ void MemoryStore::removeShape(std::int64_t shapeId) {
     content_.points.erase(shapeId);
     content_.signatures.erase(shapeId);
     for (auto& [id, results] : content_.rebuilt) results.erase(shapeId);
-    for (auto job = content_.jobs.begin(); job != content_.jobs.end();) {
-        job = job->second.job.shapeId == shapeId ? content_.jobs.erase(job) : std::next(job);
+    removeJobs(shapeId);
+}
+
+/// Whether the queue takes a new scan of this shape (0: a new one) in place of the one it may hold.
+bool MemoryStore::fits(const PutRequest& request, std::int64_t shapeId) const {
+    std::uint64_t jobs = 0;
+    std::uint64_t bytes = request.scan.bytes();
+    for (const auto& [id, queued] : content_.jobs) {
+        if (queued.job.shapeId == shapeId) continue;
+        jobs += 1;
+        bytes += queued.job.pointBytes;
     }
+    return (request.maxQueuedJobs == 0 || jobs < request.maxQueuedJobs) &&
+           (request.maxQueuedBytes == 0 || bytes <= request.maxQueuedBytes);
 }
 
 Result<PutResult> MemoryStore::putShape(const PutRequest& request) {
@@ -111,14 +134,15 @@ Result<PutResult> MemoryStore::putShape(const PutRequest& request) {
         const std::int64_t version = existing != nullptr ? existing->version : 0;
         const bool samePoints = existing != nullptr && existing->checksum == request.scan.checksum();
         const bool same = samePoints && existing->metadata == request.metadata;
-        if (request.expectedVersion && *request.expectedVersion != version) {
-            return fail(ErrorCode::kVersionConflict, "version is " + std::to_string(version));
-        }
-        if (same) return PutResult{PutOutcome::kUnchanged, *existing};
-        if (existing != nullptr && request.mode == PutMode::kInsertOnly) {
+        if (existing != nullptr && request.mode == PutMode::kInsertOnly && !same) {
             return fail(ErrorCode::kAlreadyExists, "key is taken");
         }
-        if (!samePoints && request.maxQueuedJobs != 0 && content_.jobs.size() >= request.maxQueuedJobs) {
+        if (request.expectedVersion && *request.expectedVersion != version) {
+            return fail(ErrorCode::kVersionConflict, "version is " + std::to_string(version) + ", not " +
+                                                         std::to_string(*request.expectedVersion));
+        }
+        if (same) return PutResult{PutOutcome::kUnchanged, *existing};
+        if (!samePoints && !fits(request, existing != nullptr ? existing->id : 0)) {
             return fail(ErrorCode::kQueueFull, "queue is full");
         }
         if (existing == nullptr) {
@@ -128,8 +152,10 @@ Result<PutResult> MemoryStore::putShape(const PutRequest& request) {
             existing->collectionId = request.collectionId;
             existing->key = request.key;
             existing->version = 0;
+            existing->createdAt = now();
         }
         existing->version += 1;
+        existing->updatedAt = now();
         existing->metadata = request.metadata;
         if (samePoints) return PutResult{PutOutcome::kMetadataChanged, *existing};
         existing->pointsVersion = existing->version;
@@ -138,6 +164,8 @@ Result<PutResult> MemoryStore::putShape(const PutRequest& request) {
         existing->state = ShapeState::kPending;
         existing->failure.reset();
         content_.points[existing->id] = request.scan.points();
+        // What a running rebuild made of the old points.
+        for (auto& [id, results] : content_.rebuilt) results.erase(existing->id);
         queueJob(*existing);
         return PutResult{version == 0 ? PutOutcome::kCreated : PutOutcome::kReplaced, *existing};
     });
@@ -190,7 +218,8 @@ Result<Shape> MemoryStore::deleteShape(std::int64_t collectionId, const std::str
         const Shape* found = find(collectionId, key);
         if (found == nullptr) return notFound("shape");
         if (expectedVersion && *expectedVersion != found->version) {
-            return fail(ErrorCode::kVersionConflict, "version is " + std::to_string(found->version));
+            return fail(ErrorCode::kVersionConflict, "version is " + std::to_string(found->version) +
+                                                         ", not " + std::to_string(*expectedVersion));
         }
         const Shape shape = *found;
         removeShape(shape.id);
@@ -221,51 +250,79 @@ Result<std::optional<Job>> MemoryStore::claimJob() {
             if (queued.running) continue;
             queued.running = true;
             ++queued.job.attempts;
+            queued.job.generation = content_.collections.at(queued.job.collectionId).generation;
             return std::optional<Job>(queued.job);
         }
         return std::optional<Job>();
     });
 }
 
-Shape* MemoryStore::settle(const Job& job) {
-    content_.jobs.erase(job.id);
-    const auto found = content_.shapes.find(job.shapeId);
-    const bool current = found != content_.shapes.end() && found->second.pointsVersion == job.pointsVersion;
-    return current ? &found->second : nullptr;
+Result<Shape*> MemoryStore::current(const Job& job, std::int64_t generation) {
+    const auto found = content_.jobs.find(job.id);
+    const auto shape = content_.shapes.find(job.shapeId);
+    if (found == content_.jobs.end() || shape == content_.shapes.end() ||
+        shape->second.pointsVersion != job.pointsVersion) {
+        return nullptr;
+    }
+    const std::int64_t serving = content_.collections.at(job.collectionId).generation;
+    if (generation > serving) return fail(ErrorCode::kInvalidArgument, "no such generation yet");
+    if (generation == serving) return &shape->second;
+    release(job);
+    return nullptr;
 }
 
 Result<std::optional<Shape>> MemoryStore::finishJob(const Job& job, const SignatureRow& signature) {
     return guarded("finishJob", [&]() -> Result<std::optional<Shape>> {
-        Shape* shape = settle(job);
-        if (shape == nullptr) return std::optional<Shape>();
-        shape->state = ShapeState::kReady;
-        shape->failure.reset();
-        content_.signatures[shape->id] = signature;
-        return std::optional<Shape>(*shape);
+        if (signature.shapeId != job.shapeId || signature.pointsVersion != job.pointsVersion) {
+            return fail(ErrorCode::kInvalidArgument, "the signature is of another shape or other points");
+        }
+        const Result<Shape*> shape = current(job, signature.generation);
+        if (!shape) return fail(shape.error());
+        if (*shape == nullptr) return std::optional<Shape>();
+        content_.jobs.erase(job.id);
+        (*shape)->state = ShapeState::kReady;
+        (*shape)->failure.reset();
+        (*shape)->updatedAt = now();
+        content_.signatures[job.shapeId] = signature;
+        return std::optional<Shape>(**shape);
     });
 }
 
 Result<std::optional<Shape>> MemoryStore::failJob(const Job& job, const Error& why) {
     return guarded("failJob", [&]() -> Result<std::optional<Shape>> {
-        Shape* shape = settle(job);
-        if (shape == nullptr) return std::optional<Shape>();
-        markFailed(*shape, why);
-        return std::optional<Shape>(*shape);
+        const Result<Shape*> shape = current(job, job.generation);
+        if (!shape) return fail(shape.error());
+        if (*shape == nullptr) return std::optional<Shape>();
+        markFailed(**shape, why);
+        return std::optional<Shape>(**shape);
     });
 }
 
 void MemoryStore::markFailed(Shape& shape, const Error& why) {
     shape.state = ShapeState::kFailed;
     shape.failure = why;
+    shape.updatedAt = now();
     content_.signatures.erase(shape.id);
+    for (auto& [id, results] : content_.rebuilt) {
+        const auto result = results.find(shape.id);
+        if (result != results.end() && !result->second.failure) results.erase(result);
+    }
+    removeJobs(shape.id);
+}
+
+void MemoryStore::release(const Job& job) {
+    const auto found = content_.jobs.find(job.id);
+    if (found == content_.jobs.end()) return;
+    QueuedJob& queued = found->second;
+    // A claim after a recovery has more attempts.
+    if (!queued.running || queued.job.attempts != job.attempts) return;
+    queued.running = false;
+    --queued.job.attempts;
 }
 
 Result<void> MemoryStore::releaseJob(const Job& job) {
     return guarded("releaseJob", [&]() -> Result<void> {
-        const auto found = content_.jobs.find(job.id);
-        if (found == content_.jobs.end()) return {};
-        found->second.running = false;
-        --found->second.job.attempts;
+        release(job);
         return {};
     });
 }
@@ -278,10 +335,9 @@ Result<std::vector<Shape>> MemoryStore::recoverJobs(int maxAttempts) {
             if (!queued.running) continue;
             queued.running = false;
             if (queued.job.attempts < maxAttempts) continue;
-            if (Shape* shape = settle(Job(queued.job))) {
-                markFailed(*shape, {ErrorCode::kInternal, "the server died while it was segmented"});
-                quarantined.push_back(*shape);
-            }
+            Shape& shape = content_.shapes.at(queued.job.shapeId);
+            markFailed(shape, {ErrorCode::kInternal, "the server died while it was segmented"});
+            quarantined.push_back(shape);
         }
         return quarantined;
     });
@@ -303,7 +359,7 @@ Result<std::vector<IndexRow>> MemoryStore::loadIndex(std::int64_t collectionId, 
     return guarded("loadIndex", [&]() -> Result<std::vector<IndexRow>> {
         std::vector<IndexRow> rows;
         const auto collection = content_.collections.find(collectionId);
-        if (collection == content_.collections.end()) return rows;
+        if (collection == content_.collections.end()) return notFound("collection");
         for (auto at = content_.signatures.upper_bound(afterId);
              at != content_.signatures.end() && rows.size() < limit; ++at) {
             const Shape& shape = content_.shapes.at(at->first);
@@ -315,146 +371,37 @@ Result<std::vector<IndexRow>> MemoryStore::loadIndex(std::int64_t collectionId, 
     });
 }
 
-Result<Rebuild> MemoryStore::startRebuild(std::int64_t collectionId, const std::string& parameters) {
-    return guarded("startRebuild", [&]() -> Result<Rebuild> {
-        const auto collection = content_.collections.find(collectionId);
-        if (collection == content_.collections.end()) return notFound("collection");
-        for (const auto& [id, rebuild] : content_.rebuilds) {
-            if (rebuild.collectionId == collectionId && rebuild.state == RebuildState::kRunning) {
-                return fail(ErrorCode::kAlreadyExists, "a rebuild is running");
-            }
-        }
-        Rebuild rebuild;
-        rebuild.id = content_.nextId++;
-        rebuild.collectionId = collectionId;
-        rebuild.targetGeneration = collection->second.generation + 1;
-        rebuild.parameters = parameters;
-        count(rebuild);
-        return content_.rebuilds[rebuild.id] = rebuild;
-    });
-}
-
-void MemoryStore::count(Rebuild& rebuild) const {
-    if (rebuild.state != RebuildState::kRunning) return;
-    rebuild.total = rebuild.done = rebuild.failed = 0;
-    const auto results = content_.rebuilt.find(rebuild.id);
-    for (const auto& [id, shape] : content_.shapes) {
-        if (shape.collectionId != rebuild.collectionId) continue;
-        ++rebuild.total;
-        if (results == content_.rebuilt.end()) continue;
-        const auto result = results->second.find(id);
-        if (result == results->second.end() || result->second.pointsVersion != shape.pointsVersion) continue;
-        ++rebuild.done;
-        if (result->second.failure) ++rebuild.failed;
-    }
-}
-
-Result<Rebuild> MemoryStore::getRebuild(std::int64_t rebuildId) {
-    return guarded("getRebuild", [&]() -> Result<Rebuild> {
-        const auto found = content_.rebuilds.find(rebuildId);
-        if (found == content_.rebuilds.end()) return notFound("rebuild");
-        count(found->second);
-        return found->second;
-    });
-}
-
-Result<std::vector<Rebuild>> MemoryStore::runningRebuilds() {
-    return guarded("runningRebuilds", [&]() -> Result<std::vector<Rebuild>> {
-        std::vector<Rebuild> running;
-        for (auto& [id, rebuild] : content_.rebuilds) {
-            count(rebuild);
-            if (rebuild.state == RebuildState::kRunning) running.push_back(rebuild);
-        }
-        return running;
-    });
-}
-
-Result<std::vector<Shape>> MemoryStore::rebuildBatch(std::int64_t rebuildId, std::int64_t afterId,
-                                                     std::size_t limit) {
-    return guarded("rebuildBatch", [&]() -> Result<std::vector<Shape>> {
-        const auto rebuild = content_.rebuilds.find(rebuildId);
-        if (rebuild == content_.rebuilds.end()) return notFound("rebuild");
-        std::vector<Shape> batch;
-        const auto& results = content_.rebuilt[rebuildId];
-        for (auto at = content_.shapes.upper_bound(afterId);
-             at != content_.shapes.end() && batch.size() < limit; ++at) {
-            const Shape& shape = at->second;
-            if (shape.collectionId != rebuild->second.collectionId || hasJob(shape.id)) continue;
-            const auto result = results.find(shape.id);
-            if (result == results.end() || result->second.pointsVersion != shape.pointsVersion)
-                batch.push_back(shape);
-        }
-        return batch;
-    });
-}
-
-Result<void> MemoryStore::putRebuilt(std::int64_t rebuildId, const SignatureRow& signature) {
-    return guarded("putRebuilt", [&]() -> Result<void> {
-        content_.rebuilt[rebuildId][signature.shapeId] = {signature.pointsVersion, signature.bytes,
-                                                          std::nullopt};
-        return {};
-    });
-}
-
-Result<void> MemoryStore::putRebuildFailure(std::int64_t rebuildId, std::int64_t shapeId,
-                                            std::int64_t pointsVersion, const Error& why) {
-    return guarded("putRebuildFailure", [&]() -> Result<void> {
-        content_.rebuilt[rebuildId][shapeId] = {pointsVersion, "", why};
-        return {};
-    });
-}
-
-Result<bool> MemoryStore::finishRebuild(std::int64_t rebuildId) {
-    const auto missing = rebuildBatch(rebuildId, 0, 1);
-    return guarded("finishRebuild", [&]() -> Result<bool> {
-        if (!missing) return fail(missing.error());
-        if (!missing->empty()) return false;
-        Rebuild& rebuild = content_.rebuilds.at(rebuildId);
-        count(rebuild);
-        rebuild.state = RebuildState::kDone;
-        Collection& collection = content_.collections.at(rebuild.collectionId);
-        collection.generation = rebuild.targetGeneration;
-        collection.parameters = rebuild.parameters;
-        for (auto& [id, shape] : content_.shapes) {
-            if (shape.collectionId != rebuild.collectionId) continue;
-            content_.signatures.erase(id);
-            const auto result = content_.rebuilt[rebuildId].find(id);
-            if (result == content_.rebuilt[rebuildId].end() || hasJob(id)) continue;
-            shape.state = result->second.failure ? ShapeState::kFailed : ShapeState::kReady;
-            shape.failure = result->second.failure;
-            if (!shape.failure) {
-                content_.signatures[id] = {id, shape.pointsVersion, collection.generation,
-                                           result->second.bytes};
-            }
-        }
-        content_.rebuilt.erase(rebuildId);
-        return true;
-    });
-}
-
-Result<void> MemoryStore::abandonRebuild(std::int64_t rebuildId, RebuildState state) {
-    return guarded("abandonRebuild", [&]() -> Result<void> {
-        const auto found = content_.rebuilds.find(rebuildId);
-        if (found == content_.rebuilds.end()) return notFound("rebuild");
-        found->second.state = state;
-        content_.rebuilt.erase(rebuildId);
-        return {};
-    });
-}
-
-Result<void> MemoryStore::backup(const std::string& path, const RunContext&) {
+Result<void> MemoryStore::backup(const std::string& path, const RunContext& context) {
     return guarded("backup", [&]() -> Result<void> {
+        if (const auto go = context.checkpoint(); !go) return go;
         if (!backups_.emplace(path, content_).second)
             return fail(ErrorCode::kAlreadyExists, path + " is there");
         return {};
     });
 }
 
-Result<void> MemoryStore::restore(const std::string& path, const RunContext&) {
+Result<void> MemoryStore::restore(const std::string& path, const RunContext& context) {
     return guarded("restore", [&]() -> Result<void> {
+        if (const auto go = context.checkpoint(); !go) return go;
         const auto found = backups_.find(path);
         if (found == backups_.end()) return fail(ErrorCode::kFileNotReadable, path + " is missing");
+        // New ids continue after both histories, and jobs and rebuilds get new ones.
+        const std::int64_t nextId = std::max(content_.nextId, found->second.nextId);
         content_ = found->second;
+        content_.nextId = nextId;
+        for (auto& [id, queued] : std::exchange(content_.jobs, {})) {
+            if (queued.running) --queued.job.attempts;
+            queued.running = false;
+            queued.job.id = content_.nextId++;
+            content_.jobs[queued.job.id] = queued;
+        }
+        auto results = std::exchange(content_.rebuilt, {});
+        for (auto& [id, rebuild] : std::exchange(content_.rebuilds, {})) {
+            rebuild.id = content_.nextId++;
+            content_.rebuilds[rebuild.id] = rebuild;
+            const auto its = results.find(id);
+            if (its != results.end()) content_.rebuilt[rebuild.id] = std::move(its->second);
+        }
         return {};
     });
 }
@@ -473,6 +420,10 @@ Result<StoreStats> MemoryStore::stats() {
             if (shape.state == ShapeState::kFailed) ++stats.shapesFailed;
         }
         stats.signatures = content_.signatures.size();
+        for (const auto& [id, results] : content_.rebuilt) {
+            for (const auto& [shapeId, result] : results) stats.signatures += result.failure ? 0 : 1;
+        }
+        for (const auto& [id, points] : content_.points) stats.pointBytes += points.size() * sizeof(float);
         return stats;
     });
 }

@@ -99,14 +99,25 @@ class MemoryStore : public store::Store {
 
     Result<std::vector<store::Shape>> list(std::int64_t collectionId, std::int64_t afterId, std::size_t limit,
                                            const store::ShapeFilter& filter) const;
+    static store::TimestampMs now();
     store::Shape* find(std::int64_t collectionId, const std::string& key);
     void queueJob(const store::Shape& shape);
     void removeShape(std::int64_t shapeId);
     /// The shape if the job is still its current one; the job is dropped in any case.
-    store::Shape* settle(const store::Job& job);
-    void markFailed(store::Shape& shape, const Error& why);
+    void removeJobs(std::int64_t shapeId);
     bool hasJob(std::int64_t shapeId) const;
+    bool fits(const store::PutRequest& request, std::int64_t shapeId) const;
+    /// The job's shape; null when a result no longer counts. One of an older generation puts the job back.
+    Result<store::Shape*> current(const store::Job& job, std::int64_t generation);
+    void markFailed(store::Shape& shape, const Error& why);
+    void release(const store::Job& job);
+
+    Result<store::Rebuild*> running(std::int64_t rebuildId);
     void count(store::Rebuild& rebuild) const;
+    std::vector<store::Shape> missing(const store::Rebuild& rebuild, std::int64_t afterId,
+                                      std::size_t limit) const;
+    void put(const store::Rebuild& rebuild, std::int64_t shapeId, Rebuilt result);
+    void end(store::Rebuild& rebuild, store::RebuildState state);
 
     std::mutex mutex_;
     Content content_;
