@@ -17,6 +17,11 @@ constexpr std::chrono::milliseconds kCount{200};
 /// Before another pass when nothing was left but the rebuild could not be finished.
 constexpr std::chrono::milliseconds kAnotherPass{50};
 
+/// Deleted with its collection, or done or cancelled though the driver could not see it at once.
+bool isOver(const Error& error) {
+    return error.code == ErrorCode::kNotFound || error.code == ErrorCode::kRejected;
+}
+
 bool sameProgress(const store::Rebuild& a, const store::Rebuild& b) {
     return a.state == b.state && a.done == b.done && a.failed == b.failed && a.total == b.total;
 }
@@ -221,8 +226,8 @@ void RebuildDriver::readBatch(const ActivePtr& active, std::unique_lock<std::mut
     const auto shapes = store_.rebuildBatch(active->rebuild.id, active->afterId, options_.batch);
     lock.lock();
     if (!shapes) {
-        if (shapes.error().code == ErrorCode::kNotFound) {
-            retire(active);  // deleted with its collection
+        if (isOver(shapes.error())) {
+            retire(active);
         } else {
             log_->error("rebuild cannot read its next shapes", fieldsOf(active->rebuild, shapes.error()));
             rest(lock, options_.backOff);

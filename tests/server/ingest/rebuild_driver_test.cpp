@@ -281,6 +281,29 @@ TEST_F(Driver, RetriesAfterStoreErrors) {
     expectAllOf(3);
 }
 
+// After it is done its state cannot be read once: the driver finds out with the next shapes.
+TEST_F(Driver, ARebuildThatIsDoneMakesRoomForTheNext) {
+    fill(3);
+    std::atomic<bool> finishing{false};
+    std::atomic<bool> failed{false};
+    store.fault = [&](const std::string& function) -> std::optional<Error> {
+        if (function == "finishRebuild") finishing = true;
+        if (function == "getRebuild" && finishing && !failed.exchange(true))
+            return Error{ErrorCode::kStorage, "once"};
+        return std::nullopt;
+    };
+    start(quickDescribe, 1);
+    const auto first = begin();
+    ASSERT_TRUE(eventually([&] { return failed.load(); }));
+    const auto cups = *store.createCollection("cups", "", paperParameters());
+    ASSERT_TRUE(index.add(cups));
+    const auto second = driver->begin(cups, parametersWith(2));
+    ASSERT_TRUE(second);
+    EXPECT_EQ(finished(*second).state, store::RebuildState::kDone);
+    EXPECT_EQ(store.getRebuild(first.id)->state, store::RebuildState::kDone);
+    EXPECT_EQ(store.rebuildBatch(first.id, 0, 1).error().code, ErrorCode::kRejected);
+}
+
 TEST_F(Driver, DeletedCollectionEndsItsRebuild) {
     fill(5);
     closed = true;
