@@ -184,13 +184,14 @@ Result<void> Catalog::restoreExclusively(const std::string& path, const RunConte
     rebuilds_.pause();
     workers_.pause();
     Result<void> restored = store_->restore(path, context);
+    const auto content = restored ? ingest::Content::kReplaced : ingest::Content::kSame;
     if (restored) {
         restores_.replaced();
         restored = index_.loadAll();
     }
     // Whatever happened: work continues on what the store holds now.
-    const auto workers = workers_.resume();
-    const auto rebuilds = rebuilds_.resume();
+    const auto workers = workers_.resume(content);
+    const auto rebuilds = rebuilds_.resume(content);
     if (!restored) return restored;
     return workers ? rebuilds : workers;
 }

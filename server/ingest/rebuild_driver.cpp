@@ -148,8 +148,8 @@ void RebuildDriver::pause() {
     waitUntilQuiet(lock);
 }
 
-Result<void> RebuildDriver::resume() {
-    journal_.clear();
+Result<void> RebuildDriver::resume(Content content) {
+    if (content == Content::kReplaced) journal_.clear();
     const Result<void> queued = enqueueRunning();
     const std::lock_guard<std::mutex> lock(mutex_);
     paused_ = false;

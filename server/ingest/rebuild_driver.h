@@ -68,9 +68,9 @@ class RebuildDriver {
 
     /// Returns when no thread uses the store.
     void pause();
-    /// Continues with the rebuilds that the store, which may hold other content now, calls running.
-    /// Errors: as Store::runningRebuilds.
-    [[nodiscard]] Result<void> resume();
+    /// Continues with the rebuilds that the store calls running. Deaths are on record for the content they
+    /// were counted with. Errors: as Store::runningRebuilds.
+    [[nodiscard]] Result<void> resume(Content content);
     /// As `pause`, and ends the threads; the next start continues. Idempotent.
     void stop();
 

@@ -96,16 +96,19 @@ void WorkerPool::pause() {
     changed_.wait(lock, [this] { return running_.empty() && claiming_ == 0; });
 }
 
-Result<void> WorkerPool::resume() {
-    {
-        const std::lock_guard<std::mutex> lock(mutex_);
-        // recover() puts back all claimed jobs, these among them.
-        unreleased_.clear();
+Result<void> WorkerPool::resume(Content content) {
+    Result<void> recovered;
+    if (content == Content::kReplaced) {
+        {
+            // They are jobs of the old content.
+            const std::lock_guard<std::mutex> lock(mutex_);
+            unreleased_.clear();
+        }
+        recovered = recover();
     }
-    const Result<void> recovered = recover();
     const std::lock_guard<std::mutex> lock(mutex_);
     paused_ = false;
-    probing_ = true;
+    if (content == Content::kReplaced) probing_ = true;
     ++signals_;
     changed_.notify_all();
     return recovered;
@@ -120,6 +123,9 @@ void WorkerPool::stop() {
     }
     for (std::thread& thread : threads_) thread.join();
     threads_.clear();
+    // A last time: what stays claimed would count as a death of this process at the next start.
+    std::unique_lock<std::mutex> lock(mutex_);
+    if (!unreleased_.empty()) retryReleases(lock);
 }
 
 std::size_t WorkerPool::running() const {

@@ -33,6 +33,12 @@ struct WorkerOptions {
     std::chrono::milliseconds backOff{1'000};
 };
 
+/// What the store holds after a pause.
+enum class Content {
+    kSame,
+    kReplaced,  ///< by that of another process (Store::restore)
+};
+
 /// Thread-safe unless a function says otherwise.
 class WorkerPool {
   public:
@@ -61,9 +67,9 @@ class WorkerPool {
 
     /// Stops claiming and puts running jobs back; returns when no worker uses the store.
     void pause();
-    /// Continues after `pause` and recovers running jobs: after a restore they are those of another
-    /// process. Errors: as Store::recoverJobs.
-    [[nodiscard]] Result<void> resume();
+    /// Continues after `pause`. Replaced content is recovered as at the start. Errors: as
+    /// Store::recoverJobs; it has continued all the same.
+    [[nodiscard]] Result<void> resume(Content content);
     /// As `pause`, and ends the threads. Idempotent.
     void stop();
 

@@ -240,7 +240,7 @@ TEST_F(Driver, PauseAndResume) {
     pool->wake();
     ASSERT_TRUE(eventually([&] { return store.queueDepth()->jobs == 0; }));
     EXPECT_EQ(described, before);
-    ASSERT_TRUE(driver->resume());
+    ASSERT_TRUE(driver->resume(Content::kSame));
     EXPECT_EQ(finished(rebuild).state, store::RebuildState::kDone);
 }
 
@@ -341,6 +341,22 @@ TEST_F(Driver, QuarantinesAScanThatCrashesTheServerTwice) {
     driver.reset();
     std::ifstream left(journal);
     EXPECT_EQ(left.peek(), std::ifstream::traits_type::eof());
+    std::remove(journal.c_str());
+}
+
+TEST_F(Driver, OnlyReplacedContentForgetsDeaths) {
+    fill(2);
+    journal = ::testing::TempDir() + "shapedb-rebuild-journal-" + std::to_string(::getpid());
+    const auto guilty = *store.getShape(parts.id, "1");
+    const auto deaths = [&] { return CrashJournal(journal, log).deaths(guilty); };
+    std::ofstream(journal) << guilty.id << " 1 1 0\n";
+    start();
+    driver->pause();
+    ASSERT_TRUE(driver->resume(Content::kSame));
+    EXPECT_EQ(deaths(), 1) << "after a restore that failed";
+    driver->pause();
+    ASSERT_TRUE(driver->resume(Content::kReplaced));
+    EXPECT_EQ(deaths(), 0);
     std::remove(journal.c_str());
 }
 

@@ -189,9 +189,45 @@ TEST_F(Pool, PauseStopsAndResumeGoesOn) {
     other.stop();
     EXPECT_EQ(pool->ingested(), 0u);
     for (int i = 5; i < 10; ++i) put(std::to_string(i), static_cast<float>(i + 1));
-    ASSERT_TRUE(pool->resume());
+    ASSERT_TRUE(pool->resume(Content::kSame));
     ASSERT_TRUE(eventually([&] { return idle(); }));
     EXPECT_EQ(pool->ingested(), 5u);
+}
+
+/// Claims "k", which can be put back again only once `store.fault` is null.
+class PoolThatCannotPutBack : public Pool {
+  protected:
+    PoolThatCannotPutBack() {
+        put("k", 1.0f);
+        EXPECT_TRUE(*store.claimJob());  // one death, as every innocent scan may have
+        start(through(gate), 1);
+        EXPECT_TRUE(eventually([&] { return gate.entered() == 1; }));
+        store.fault = [](const std::string& function) -> std::optional<Error> {
+            if (function == "releaseJob") return Error{ErrorCode::kStorage, "full"};
+            return std::nullopt;
+        };
+    }
+    ~PoolThatCannotPutBack() override { pool.reset(); }
+
+    Gate gate;
+};
+
+// A restore that failed is no death of the process.
+TEST_F(PoolThatCannotPutBack, AfterAPauseTheJobIsNeitherLostNorSetAside) {
+    pool->pause();
+    store.fault = nullptr;
+    gate.open();
+    ASSERT_TRUE(pool->resume(Content::kSame));
+    ASSERT_TRUE(eventually([&] { return settled("k"); }));
+    EXPECT_EQ(shape("k").state, store::ShapeState::kReady) << log->all();
+}
+
+TEST_F(PoolThatCannotPutBack, AStopTriesAgainAtItsEnd) {
+    pool->pause();
+    store.fault = nullptr;
+    pool->stop();
+    EXPECT_TRUE(store.recoverJobs(2)->empty()) << "the next start sets nothing aside";
+    EXPECT_EQ((*store.claimJob())->attempts, 2);
 }
 
 TEST_F(Pool, JobOfADeadProcessIsDoneAgainButNotForEver) {
