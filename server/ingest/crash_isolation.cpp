@@ -1,21 +1,36 @@
 #include "server/ingest/crash_isolation.h"
 
+#include <chrono>
+
 namespace shapedb::ingest {
 
-CrashIsolation::Pass::Pass(CrashIsolation& gate, bool suspect) : gate_(gate), suspect_(suspect) {
+namespace {
+
+/// How often one who waits checks for cancellation.
+constexpr std::chrono::milliseconds kLook{20};
+
+}  // namespace
+
+CrashIsolation::Pass::Pass(CrashIsolation& gate, bool suspect, const std::atomic<bool>& cancel)
+    : gate_(gate), suspect_(suspect) {
     std::unique_lock<std::mutex> lock(gate_.mutex_);
     if (!suspect_) {
-        gate_.changed_.wait(lock, [this] { return gate_.isOpen(false); });
-        ++gate_.ordinary_;
+        admitted_ = gate_.waitUntilOpen(lock, false, cancel);
+        if (admitted_) ++gate_.ordinary_;
         return;
     }
     ++gate_.waitingSuspects_;
-    gate_.changed_.wait(lock, [this] { return gate_.isOpen(true); });
+    admitted_ = gate_.waitUntilOpen(lock, true, cancel);
     --gate_.waitingSuspects_;
-    gate_.suspectInside_ = true;
+    if (admitted_) {
+        gate_.suspectInside_ = true;
+    } else {
+        gate_.changed_.notify_all();  // it kept ordinary scans out
+    }
 }
 
 CrashIsolation::Pass::~Pass() {
+    if (!admitted_) return;
     const std::lock_guard<std::mutex> lock(gate_.mutex_);
     if (suspect_) {
         gate_.suspectInside_ = false;
@@ -23,6 +38,15 @@ CrashIsolation::Pass::~Pass() {
         --gate_.ordinary_;
     }
     gate_.changed_.notify_all();
+}
+
+/// False when cancelled.
+bool CrashIsolation::waitUntilOpen(std::unique_lock<std::mutex>& lock, bool suspect,
+                                   const std::atomic<bool>& cancel) {
+    while (!cancel) {
+        if (changed_.wait_for(lock, kLook, [&] { return isOpen(suspect); })) return true;
+    }
+    return false;
 }
 
 bool CrashIsolation::wouldWait(bool suspect) const {

@@ -5,6 +5,7 @@
 // it.
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <mutex>
 
@@ -14,17 +15,21 @@ namespace shapedb::ingest {
 /// scans out until it has had its turn. Thread-safe.
 class CrashIsolation {
   public:
-    /// Admission until destroyed. The constructor waits for it.
+    /// Admission until destroyed. The constructor waits for it, which may take as long as another scan, or
+    /// until `cancel` is set.
     class Pass {
       public:
-        Pass(CrashIsolation& gate, bool suspect);
+        Pass(CrashIsolation& gate, bool suspect, const std::atomic<bool>& cancel);
         ~Pass();
         Pass(const Pass&) = delete;
         Pass& operator=(const Pass&) = delete;
+        /// False when cancelled while it waited: the scan must not be segmented.
+        [[nodiscard]] bool admitted() const { return admitted_; }
 
       private:
         CrashIsolation& gate_;
         const bool suspect_;
+        bool admitted_;
     };
 
     /// Whether a Pass made now would have to wait.
@@ -32,6 +37,7 @@ class CrashIsolation {
 
   private:
     [[nodiscard]] bool isOpen(bool suspect) const;
+    bool waitUntilOpen(std::unique_lock<std::mutex>& lock, bool suspect, const std::atomic<bool>& cancel);
 
     mutable std::mutex mutex_;
     std::condition_variable changed_;

@@ -311,7 +311,8 @@ Result<void> RebuildDriver::isolated(Active& active, const store::Shape& shape) 
         if (stored) entry.acquit();
         return stored;
     }
-    const CrashIsolation::Pass pass(isolation_, deaths > 0);
+    const CrashIsolation::Pass pass(isolation_, deaths > 0, active.cancel);
+    if (!pass.admitted()) return {};
     CrashJournal::Entry entry(journal_, shape);
     const Result<void> stored = process(active, shape);
     if (stored && !active.cancel) entry.acquit();

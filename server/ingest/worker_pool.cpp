@@ -149,7 +149,7 @@ void WorkerPool::run() {
         std::optional<CrashIsolation::Pass> pass;
         const std::shared_ptr<Running> running = next(pass);
         if (!running) return;
-        const Outcome outcome = work(*running);
+        const Outcome outcome = work(*running, pass.has_value());
         pass.reset();
         std::unique_lock<std::mutex> lock(mutex_);
         running_.erase(running);
@@ -191,14 +191,14 @@ Result<std::optional<store::Job>> WorkerPool::claim(std::unique_lock<std::mutex>
     return job;
 }
 
-/// Blocks until there is a job that this worker may have; null when the pool stops.
+bool WorkerPool::mayClaim() const { return !paused_ && (!probing_ || (claiming_ == 0 && running_.empty())); }
+
+/// Blocks until there is a job that this worker may have; null when the pool stops. Without a pass the job
+/// was cancelled before its turn.
 std::shared_ptr<WorkerPool::Running> WorkerPool::next(std::optional<CrashIsolation::Pass>& pass) {
     std::unique_lock<std::mutex> lock(mutex_);
     for (;;) {
-        const auto mayClaim = [this] {
-            return !paused_ && (!probing_ || (claiming_ == 0 && running_.empty()));
-        };
-        changed_.wait(lock, [&] { return stopping_ || mayClaim(); });
+        changed_.wait(lock, [this] { return stopping_ || mayClaim(); });
         if (stopping_) return nullptr;
         // Before the claim: a job that is queued in between raises it, and the wait below ends at once.
         const std::uint64_t seen = signals_;
@@ -207,8 +207,14 @@ std::shared_ptr<WorkerPool::Running> WorkerPool::next(std::optional<CrashIsolati
         lock.unlock();
         // Before the claim: a claimed job would count as tried if a suspect of a rebuild brought the
         // process down while this one waited for its turn.
-        if (probing) pass.emplace(isolation_, true);
+        if (probing) pass.emplace(isolation_, true, paused_);
         lock.lock();
+        if (pass && !pass->admitted()) {
+            pass.reset();
+            --claiming_;
+            changed_.notify_all();
+            continue;
+        }
         const auto job = claim(lock);
         --claiming_;
         const bool suspect = job && *job && (*job)->attempts > 1;
@@ -218,22 +224,23 @@ std::shared_ptr<WorkerPool::Running> WorkerPool::next(std::optional<CrashIsolati
         if (job && *job) {
             auto running = std::make_shared<Running>();
             running->job = **job;
-            running->cancel = paused_;  // paused while claiming: straight back
+            running->cancel = paused_.load();  // paused while claiming: straight back
             running_.insert(running);
             lock.unlock();
-            if (!pass) pass.emplace(isolation_, suspect);
+            if (!pass) pass.emplace(isolation_, suspect, running->cancel);
+            if (!pass->admitted()) pass.reset();
             return running;
         }
         changed_.wait(lock, [&] { return stopping_ || paused_ || signals_ != seen; });
     }
 }
 
-WorkerPool::Outcome WorkerPool::work(Running& running) {
+WorkerPool::Outcome WorkerPool::work(Running& running, bool admitted) {
     const auto began = std::chrono::steady_clock::now();
     const store::Job& job = running.job;
     Outcome outcome = Outcome::kDone;
     try {
-        outcome = attempt(running);
+        outcome = admitted ? attempt(running) : cancelled(running);
     } catch (...) {
         // An exception that left the thread would end the process.
         outcome = giveUp(job, errorOfException());
@@ -270,15 +277,18 @@ WorkerPool::Outcome WorkerPool::attempt(Running& running) {
     switch (made.kind) {
         case PipelineOutcome::Kind::kSignature:
             return commit(running, (*collection)->collection.generation, std::move(made));
-        case PipelineOutcome::Kind::kCancelled:
-            if (!running.superseded) return Outcome::kPutBack;
-            break;
+        case PipelineOutcome::Kind::kCancelled: return cancelled(running);
         case PipelineOutcome::Kind::kScanFailed: break;
         case PipelineOutcome::Kind::kStoreFailed:
             log_->error("cannot read the points of a job", fieldsOf(job, made.why));
             return Outcome::kStoreFailed;
     }
     return giveUp(job, made.why);
+}
+
+WorkerPool::Outcome WorkerPool::cancelled(const Running& running) {
+    if (!running.superseded) return Outcome::kPutBack;
+    return giveUp(running.job, {ErrorCode::kCancelled, "its points were deleted or replaced"});
 }
 
 WorkerPool::Outcome WorkerPool::commit(const Running& running, std::int64_t generation,

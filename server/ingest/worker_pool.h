@@ -89,12 +89,14 @@ class WorkerPool {
     enum class Outcome { kDone, kPutBack, kStoreFailed };
 
     static void markSuperseded(Running& running);
+    bool mayClaim() const;
     void run();
     std::shared_ptr<Running> next(std::optional<CrashIsolation::Pass>& pass);
     Result<std::optional<store::Job>> claim(std::unique_lock<std::mutex>& lock);
     void retryReleases(std::unique_lock<std::mutex>& lock);
-    Outcome work(Running& running);
+    Outcome work(Running& running, bool admitted);
     Outcome attempt(Running& running);
+    Outcome cancelled(const Running& running);
     Outcome commit(const Running& running, std::int64_t generation, PipelineOutcome made);
     Outcome giveUp(const store::Job& job, const Error& why);
     void stopSearching(const store::Shape& failed);
@@ -112,8 +114,8 @@ class WorkerPool {
 
     mutable std::mutex mutex_;
     std::condition_variable changed_;
-    std::uint64_t signals_ = 0;  ///< rises when there may be a job
-    bool paused_ = false;
+    std::uint64_t signals_ = 0;        ///< rises when there may be a job
+    std::atomic<bool> paused_{false};  ///< changes under mutex_
     bool stopping_ = false;
     /// True from the start until the first job that no dead process had in hand (those come first,
     /// being older): jobs run one at a time and alone, so that a deadly one dies alone.

@@ -14,6 +14,8 @@ namespace {
 
 using testing::eventually;
 
+const std::atomic<bool> never{false};
+
 TEST(CrashIsolation, SuspectsAreAlone) {
     CrashIsolation gate;
     std::atomic<int> ordinary{0};
@@ -24,7 +26,7 @@ TEST(CrashIsolation, SuspectsAreAlone) {
         threads.emplace_back([&, t] {
             const bool suspect = t % 3 == 0;
             for (int i = 0; i < 200; ++i) {
-                const CrashIsolation::Pass pass(gate, suspect);
+                const CrashIsolation::Pass pass(gate, suspect, never);
                 ++(suspect ? suspects : ordinary);
                 if (suspects > 1 || (suspects == 1 && ordinary > 0)) together = true;
                 std::this_thread::yield();
@@ -38,10 +40,10 @@ TEST(CrashIsolation, SuspectsAreAlone) {
 
 TEST(CrashIsolation, OrdinaryScansRunTogether) {
     CrashIsolation gate;
-    auto first = std::make_unique<CrashIsolation::Pass>(gate, false);
+    auto first = std::make_unique<CrashIsolation::Pass>(gate, false, never);
     std::atomic<bool> secondIn{false};
     std::thread other([&] {
-        const CrashIsolation::Pass second(gate, false);
+        const CrashIsolation::Pass second(gate, false, never);
         secondIn = true;
     });
     EXPECT_TRUE(eventually([&] { return secondIn.load(); })) << "while the first is still inside";
@@ -51,13 +53,13 @@ TEST(CrashIsolation, OrdinaryScansRunTogether) {
 
 TEST(CrashIsolation, WaitingSuspectKeepsNewOrdinaryScansOut) {
     CrashIsolation gate;
-    auto first = std::make_unique<CrashIsolation::Pass>(gate, false);
+    auto first = std::make_unique<CrashIsolation::Pass>(gate, false, never);
     EXPECT_FALSE(gate.wouldWait(false));
     EXPECT_TRUE(gate.wouldWait(true));
     std::atomic<bool> suspectIn{false};
     std::atomic<bool> letSuspectGo{false};
     std::thread suspect([&] {
-        const CrashIsolation::Pass pass(gate, true);
+        const CrashIsolation::Pass pass(gate, true, never);
         suspectIn = true;
         eventually([&] { return letSuspectGo.load(); });
     });
@@ -70,6 +72,23 @@ TEST(CrashIsolation, WaitingSuspectKeepsNewOrdinaryScansOut) {
     letSuspectGo = true;
     suspect.join();
     EXPECT_FALSE(gate.wouldWait(false));
+    EXPECT_FALSE(gate.wouldWait(true));
+}
+
+TEST(CrashIsolation, CancellingEndsTheWait) {
+    CrashIsolation gate;
+    for (const bool suspect : {false, true}) {
+        const CrashIsolation::Pass inside(gate, true, never);
+        std::atomic<bool> cancel{false};
+        std::atomic<bool> admitted{true};
+        std::thread waiting([&] { admitted = CrashIsolation::Pass(gate, suspect, cancel).admitted(); });
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        cancel = true;
+        waiting.join();
+        EXPECT_FALSE(admitted);
+        EXPECT_TRUE(gate.wouldWait(false)) << "the first is still inside";
+    }
+    EXPECT_FALSE(gate.wouldWait(false)) << "neither of those who gave up left a trace";
     EXPECT_FALSE(gate.wouldWait(true));
 }
 

@@ -3,7 +3,9 @@
 #include <atomic>
 #include <cstdio>
 #include <fstream>
+#include <optional>
 #include <set>
+#include <utility>
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -358,6 +360,22 @@ TEST_F(Driver, OnlyReplacedContentForgetsDeaths) {
     ASSERT_TRUE(driver->resume(Content::kReplaced));
     EXPECT_EQ(deaths(), 0);
     std::remove(journal.c_str());
+}
+
+// A worker has a suspect in hand, and nobody may come in.
+TEST_F(Driver, PauseDoesNotWaitForTheScanThatKeepsItOut) {
+    fill(2);
+    start(counting());
+    const std::atomic<bool> never{false};
+    std::optional<CrashIsolation::Pass> suspect(std::in_place, isolation, true, never);
+    const auto rebuild = begin();
+    std::this_thread::sleep_for(20ms);
+    driver->pause();
+    EXPECT_EQ(described, 0);
+    suspect.reset();
+    ASSERT_TRUE(driver->resume(Content::kSame));
+    EXPECT_EQ(finished(rebuild).state, store::RebuildState::kDone);
+    EXPECT_EQ(described, 2);
 }
 
 TEST_F(Driver, AbandonsARebuildWithUnreadableParameters) {

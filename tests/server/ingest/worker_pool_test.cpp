@@ -3,7 +3,9 @@
 #include <atomic>
 #include <condition_variable>
 #include <mutex>
+#include <optional>
 #include <thread>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -288,6 +290,30 @@ TEST_F(Pool, SuspectsRunOneAtATimeAndTheRestTogether) {
     EXPECT_FALSE(suspectHadCompany);
     EXPECT_TRUE(innocentsMet);
     EXPECT_EQ(pool->ingested(), 9u);
+}
+
+// A rebuild has a suspect in hand, and nobody may come in.
+TEST_F(Pool, PauseDoesNotWaitForTheScanThatKeepsItOut) {
+    const std::atomic<bool> never{false};
+    for (const bool probing : {true, false}) {
+        if (probing) put("k", 1.0f);
+        std::optional<CrashIsolation::Pass> suspect(std::in_place, isolation, true, never);
+        if (probing) {
+            start();
+        } else {
+            put("l", 2.0f);
+            ASSERT_TRUE(eventually([&] { return pool->running() == 1; }));
+        }
+        std::this_thread::sleep_for(20ms);
+        pool->pause();
+        EXPECT_EQ(pool->running(), 0u);
+        EXPECT_EQ(store.queueDepth()->jobs, 1u) << "put back";
+        suspect.reset();
+        ASSERT_TRUE(pool->resume(Content::kSame));
+        ASSERT_TRUE(eventually([&] { return idle(); }));
+    }
+    EXPECT_EQ(shape("k").state, store::ShapeState::kReady);
+    EXPECT_EQ(shape("l").state, store::ShapeState::kReady);
 }
 
 // The store fails now and then: everything is done in the end, nothing twice.
