@@ -195,24 +195,37 @@ void RebuildDriver::run() {
     }
 }
 
-/// The rebuild to work on; null when it had to be abandoned.
+/// The rebuild to work on; null when it had to be given up.
 RebuildDriver::ActivePtr RebuildDriver::activate(std::unique_lock<std::mutex>& lock) {
     if (active_) return active_;
-    const store::Rebuild rebuild = queue_.front();
+    const auto active = std::make_shared<Active>();
+    active->rebuild = queue_.front();
     queue_.pop_front();
-    const auto parameters = store::decodeParameters(rebuild.parameters);
+    active_ = active;
+    const auto parameters = store::decodeParameters(active->rebuild.parameters);
     if (parameters) {
-        active_ = std::make_shared<Active>();
-        active_->rebuild = rebuild;
-        active_->parameters = *parameters;
-        return active_;
+        active->parameters = *parameters;
+        return active;
     }
-    log_->error("rebuild given up", fieldsOf(rebuild, parameters.error()));
-    lock.unlock();
-    const auto abandoned = store_.abandonRebuild(rebuild.id, store::RebuildState::kFailed);
-    if (!abandoned) log_->error("rebuild cannot be ended", fieldsOf(rebuild, abandoned.error()));
-    lock.lock();
+    log_->error("rebuild given up", fieldsOf(active->rebuild, parameters.error()));
+    giveUp(active, lock);
     return nullptr;
+}
+
+/// Unlocks while it uses the store, where it counts as reading: pausing and cancelling wait for it.
+void RebuildDriver::giveUp(const ActivePtr& active, std::unique_lock<std::mutex>& lock) {
+    active->reading = true;
+    lock.unlock();
+    const auto abandoned = store_.abandonRebuild(active->rebuild.id, store::RebuildState::kFailed);
+    lock.lock();
+    if (!abandoned && !isOver(abandoned.error())) {
+        log_->error("rebuild cannot be ended", fieldsOf(active->rebuild, abandoned.error()));
+        rest(lock, options_.backOff);
+        if (!active->cancel) queue_.push_back(active->rebuild);
+    }
+    retire(active);
+    active->reading = false;
+    changed_.notify_all();
 }
 
 void RebuildDriver::retire(const ActivePtr& active) {

@@ -81,7 +81,7 @@ class RebuildDriver {
         std::deque<store::Shape> batch;
         std::int64_t afterId = 0;
         int inFlight = 0;      ///< threads working on one of its shapes
-        bool reading = false;  ///< a thread is reading the next batch or finishing
+        bool reading = false;  ///< a thread is reading the next batch, or ending the rebuild
         std::atomic<bool> cancel{false};
     };
     using ActivePtr = std::shared_ptr<Active>;
@@ -90,6 +90,7 @@ class RebuildDriver {
     ActivePtr activate(std::unique_lock<std::mutex>& lock);
     void readBatch(const ActivePtr& active, std::unique_lock<std::mutex>& lock);
     void finish(const ActivePtr& active, std::unique_lock<std::mutex>& lock);
+    void giveUp(const ActivePtr& active, std::unique_lock<std::mutex>& lock);
     void rebuildOne(const ActivePtr& active, std::unique_lock<std::mutex>& lock);
     Result<void> isolated(Active& active, const store::Shape& shape);
     Result<void> process(Active& active, const store::Shape& shape);

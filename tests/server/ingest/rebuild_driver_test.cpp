@@ -5,6 +5,7 @@
 #include <fstream>
 #include <optional>
 #include <set>
+#include <thread>
 #include <utility>
 
 #include <gtest/gtest.h>
@@ -383,6 +384,41 @@ TEST_F(Driver, AbandonsARebuildWithUnreadableParameters) {
     start();
     ASSERT_TRUE(eventually([&] { return store.runningRebuilds()->empty(); }));
     EXPECT_NE(log->all().find("rebuild given up"), std::string::npos) << log->all();
+}
+
+TEST_F(Driver, PauseWaitsForARebuildThatIsBeingGivenUp) {
+    ASSERT_TRUE(store.startRebuild(parts.id, "not parameters"));
+    std::atomic<bool> abandoning{false};
+    std::atomic<bool> mayEnd{false};
+    store.fault = [&](const std::string& function) -> std::optional<Error> {
+        if (function != "abandonRebuild") return std::nullopt;
+        abandoning = true;
+        eventually([&] { return mayEnd.load(); });
+        return std::nullopt;
+    };
+    start();
+    ASSERT_TRUE(eventually([&] { return abandoning.load(); }));
+    std::atomic<bool> paused{false};
+    std::thread pausing([&] {
+        driver->pause();
+        paused = true;
+    });
+    std::this_thread::sleep_for(20ms);
+    EXPECT_FALSE(paused) << "while a thread uses the store";
+    mayEnd = true;
+    pausing.join();
+    EXPECT_TRUE(store.runningRebuilds()->empty());
+}
+
+TEST_F(Driver, ARebuildThatCannotBeGivenUpIsTriedAgain) {
+    ASSERT_TRUE(store.startRebuild(parts.id, "not parameters"));
+    std::atomic<bool> failed{false};
+    store.fault = [&](const std::string& function) -> std::optional<Error> {
+        if (function == "abandonRebuild" && !failed.exchange(true)) return Error{ErrorCode::kStorage, "once"};
+        return std::nullopt;
+    };
+    start();
+    EXPECT_TRUE(eventually([&] { return store.runningRebuilds()->empty(); }));
 }
 
 TEST_F(Driver, CancelledWaitDoesNotStopTheRebuild) {
