@@ -61,10 +61,22 @@ Result<void> Catalog::stop() {
 // Collections ----------------------------------------------------------------------------
 
 Result<index::SnapshotPtr> Catalog::collection(const std::string& name) const {
+    RETURN_IF_ERROR(requireContent());
     return index_.byName(collectionNameOrDefault(name));
 }
 
-std::vector<index::SnapshotPtr> Catalog::collections() const { return index_.all(); }
+Result<std::vector<index::SnapshotPtr>> Catalog::collections() const {
+    RETURN_IF_ERROR(requireContent());
+    return index_.all();
+}
+
+Result<void> Catalog::requireContent() const {
+    if (!restores_.apart()) return {};
+    return fail(ErrorCode::kUnavailable,
+                restores_.restoring()
+                    ? "the database is being replaced by a backup: try again later"
+                    : "the content of a backup could not be loaded: restart the server or restore again");
+}
 
 Result<ShapeCounts> Catalog::countShapes(const index::Snapshot& collection) {
     const auto count = [&](std::optional<store::ShapeState> state) {
@@ -84,6 +96,7 @@ Result<index::SnapshotPtr> Catalog::createCollection(const std::string& name, co
     RETURN_IF_ERROR(checkCollectionName(name));
     RETURN_IF_ERROR(checkDescription(description));
     const RestoreGate::Write write(restores_);
+    RETURN_IF_ERROR(requireContent());
     const auto created = store_->createCollection(name, description, store::encodeParameters(parameters));
     RETURN_IF_ERROR(created);
     return index_.add(*created);
@@ -92,7 +105,7 @@ Result<index::SnapshotPtr> Catalog::createCollection(const std::string& name, co
 Result<void> Catalog::deleteCollection(const std::string& name, bool force) {
     RETURN_IF_ERROR(checkCollectionName(name));
     const RestoreGate::Write write(restores_);
-    const auto found = index_.byName(name);
+    const auto found = collection(name);
     RETURN_IF_ERROR(found);
     const store::Collection& collection = (*found)->collection;
     if (!force) {
@@ -183,17 +196,36 @@ Result<void> Catalog::restoreExclusively(const std::string& path, const RunConte
     const auto exclusive = restores_.exclusive();
     rebuilds_.pause();
     workers_.pause();
-    Result<void> restored = store_->restore(path, context);
-    const auto content = restored ? ingest::Content::kReplaced : ingest::Content::kSame;
-    if (restored) {
-        restores_.replaced();
-        restored = index_.loadAll();
-    }
+    bool replaced = false;
+    const Result<void> restored = replaceContent(path, context, replaced);
     // Whatever happened: work continues on what the store holds now.
+    const auto content = replaced ? ingest::Content::kReplaced : ingest::Content::kSame;
     const auto workers = workers_.resume(content);
     const auto rebuilds = rebuilds_.resume(content);
     if (!restored) return restored;
     return workers ? rebuilds : workers;
+}
+
+/// `replaced` tells whether the store holds other content, also after an error.
+Result<void> Catalog::replaceContent(const std::string& path, const RunContext& context, bool& replaced) {
+    Result<void> restored = store_->restore(path, context, [&] { restores_.replacing(); });
+    replaced = restored.has_value();
+    if (!restored) {
+        if (restores_.apart() && !lost_) restores_.replaced();
+        return restored;
+    }
+    const Result<void> loaded = index_.loadAll();
+    lost_ = !loaded;
+    if (loaded) {
+        restores_.replaced();
+        return {};
+    }
+    // The old index would pass off its parameters and signatures as those of the new content.
+    index_.clear();
+    log_->error("the content of a backup cannot be loaded: restart the server or restore again",
+                telemetry::fieldsOf(loaded.error()));
+    return fail(loaded.error().code, "the backup has replaced the content, but could not be loaded: " +
+                                         loaded.error().message + "; restart the server or restore again");
 }
 
 Result<CatalogStats> Catalog::stats() {

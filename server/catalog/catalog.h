@@ -88,7 +88,8 @@ struct CatalogStats {
 using Checkpoint = std::function<Result<void>()>;
 
 /// Thread-safe between `start` and `stop`, which belong to one thread. Errors of the store (store.h)
-/// are possible everywhere and not repeated.
+/// are possible everywhere and not repeated; nor is kUnavailable, which is the answer of all that looks up a
+/// collection while a restore puts its content in place, and when that could not be loaded.
 class Catalog {
   public:
     Catalog(std::unique_ptr<store::Store> store, ingest::SignaturePipeline pipeline, telemetry::LoggerPtr log,
@@ -107,7 +108,7 @@ class Catalog {
     /// The default collection for an empty name. Errors: kNotFound.
     [[nodiscard]] Result<index::SnapshotPtr> collection(const std::string& name) const;
     /// By name.
-    [[nodiscard]] std::vector<index::SnapshotPtr> collections() const;
+    [[nodiscard]] Result<std::vector<index::SnapshotPtr>> collections() const;
     [[nodiscard]] Result<ShapeCounts> countShapes(const index::Snapshot& collection);
     /// Errors: kInvalidArgument (name, description), kAlreadyExists.
     [[nodiscard]] Result<index::SnapshotPtr> createCollection(const std::string& name,
@@ -198,14 +199,18 @@ class Catalog {
     [[nodiscard]] Result<void> backup(const std::string& path, const RunContext& context);
     [[nodiscard]] Result<std::vector<std::string>> check(const RunContext& context);
     /// Replaces everything by the backup `path` while workers and rebuilds pause, and loads the index.
-    /// Errors: kRejected (another restore is running), those of store::Store::restore.
+    /// Errors: kRejected (another restore is running), those of store::Store::restore; those of
+    /// CollectionIndex::loadAll, after which the content is replaced but cannot be looked up.
     [[nodiscard]] Result<void> restore(const std::string& path, const RunContext& context);
-    /// Rises with each restore: ids read under one epoch mean other shapes under another.
+    /// Rises with each restore: ids read under one epoch may mean other shapes under another.
     [[nodiscard]] std::uint64_t epoch() const { return restores_.epoch(); }
     [[nodiscard]] Result<CatalogStats> stats();
 
   private:
+    /// Errors: kUnavailable.
+    Result<void> requireContent() const;
     Result<void> restoreExclusively(const std::string& path, const RunContext& context);
+    Result<void> replaceContent(const std::string& path, const RunContext& context, bool& replaced);
     /// After a change that the store has acknowledged, which must not be reported as refused.
     void refreshOrLog(const store::Shape& shape, const char* consequence);
 
@@ -220,6 +225,7 @@ class Catalog {
     ingest::WorkerPool workers_;
     ingest::RebuildDriver rebuilds_;
     RestoreGate restores_;
+    bool lost_ = false;  ///< the last content restored could not be loaded; only restores look at it
     SegmentationSlots slots_;
 };
 

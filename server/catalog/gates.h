@@ -45,7 +45,8 @@ class RestoreGate {
         std::shared_lock<std::shared_mutex> lock_;
     };
 
-    /// Rises with each restore: ids read under one epoch mean other shapes under another.
+    /// Rises before and after content is replaced: ids read under one epoch may mean other shapes under
+    /// another.
     [[nodiscard]] std::uint64_t epoch() const { return epoch_.load(); }
 
     /// Errors: kRejected (a restore is running).
@@ -54,7 +55,19 @@ class RestoreGate {
     [[nodiscard]] std::unique_lock<std::shared_mutex> exclusive() {
         return std::unique_lock<std::shared_mutex>(mutex_);
     }
-    void replaced() { epoch_.fetch_add(1); }
+    /// Before the store may show other content than the index.
+    void replacing() {
+        apart_ = true;
+        epoch_.fetch_add(1);
+    }
+    /// Once both hold the same content, be it the new or, after an error, the old.
+    void replaced() {
+        // First, so that a call that began in between notices at its end.
+        epoch_.fetch_add(1);
+        apart_ = false;
+    }
+    /// Between `replacing` and `replaced`: what is looked up now cannot be trusted.
+    [[nodiscard]] bool apart() const { return apart_.load(); }
     void endRestore() { restoring_ = false; }
     [[nodiscard]] bool restoring() const { return restoring_.load(); }
 
@@ -62,6 +75,7 @@ class RestoreGate {
     std::shared_mutex mutex_;
     std::atomic<std::uint64_t> epoch_{0};
     std::atomic<bool> restoring_{false};
+    std::atomic<bool> apart_{false};
 };
 
 /// Limits how many segmentations run for callers at a time; the others wait. Thread-safe.

@@ -41,5 +41,7 @@ constexpr std::chrono::milliseconds kProgressInterval{100};  ///< between two pr
 constexpr std::chrono::milliseconds kReadStateAgain{1'000};
 /// Retry hint when upload memory or places to wait are used up.
 constexpr std::chrono::milliseconds kBudgetRetry{500};
+/// Retry hint while the database is being replaced, and for calls that it cut short.
+constexpr std::chrono::milliseconds kRestoreRetry{1'000};
 
 }  // namespace shapedb::catalog

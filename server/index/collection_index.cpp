@@ -185,6 +185,12 @@ Result<void> CollectionIndex::loadAllUnguarded(const RunContext& context) {
     return {};
 }
 
+void CollectionIndex::clear() {
+    Directory none;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    std::swap(directory_, none);  // freed after the lock
+}
+
 Result<SnapshotPtr> CollectionIndex::byName(const std::string& name) const {
     SlotPtr slot;
     {

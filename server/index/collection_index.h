@@ -48,6 +48,9 @@ class CollectionIndex {
     /// of a collection, which is named).
     [[nodiscard]] Result<void> loadAll(const RunContext& context = {});
 
+    /// Forgets everything; running searches keep their snapshot.
+    void clear();
+
     /// Errors: kNotFound.
     [[nodiscard]] Result<SnapshotPtr> byName(const std::string& name) const;
     /// Errors: kNotFound.

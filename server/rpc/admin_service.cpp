@@ -77,7 +77,9 @@ grpc::Status AdminServiceHandler::Rebuild(grpc::ServerContext* context, const v1
                         request->cache_only() ? "parameters cannot change with cache_only: leave one out"
                                               : "collection: new parameters need one to be named");
         }
-        std::vector<index::SnapshotPtr> collections = services_.catalog.collections();
+        auto all = services_.catalog.collections();
+        RETURN_IF_ERROR(all);
+        std::vector<index::SnapshotPtr> collections = std::move(*all);
         if (!request->collection().empty()) {
             const auto found = call.collection(request->collection());
             RETURN_IF_ERROR(found);

@@ -118,6 +118,9 @@ grpc::Status Call::finish(Result<void> result) {
         // gRPC cancels a call whose deadline passed; the deadline is the reason.
         result = fail(ErrorCode::kDeadlineExceeded, "the deadline passed before the work was done");
     }
+    if (!result && result.error().code == ErrorCode::kUnavailable && !services_.admission.calls.draining()) {
+        retryAfter(catalog::kRestoreRetry);  // nothing but a restore
+    }
     const grpc::Status status = result ? grpc::Status::OK : makeStatus(result.error(), context_, retryAfter_);
     logLine(status, result ? nullptr : &result.error());
     return status;

@@ -75,7 +75,7 @@ class Call {
     }
     /// Takes one of the places for calls that wait, until the call ends. Errors: kQueueFull.
     [[nodiscard]] Result<void> becomeFollower();
-    /// The retry hint that goes with RESOURCE_EXHAUSTED.
+    /// The retry hint that goes with RESOURCE_EXHAUSTED. UNAVAILABLE has its own.
     void retryAfter(std::chrono::milliseconds time) { retryAfter_ = time; }
     /// For the call that replaces the database: a restore does not make it fail.
     void expectRestore() { expectsRestore_ = true; }

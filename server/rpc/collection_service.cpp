@@ -49,7 +49,9 @@ grpc::Status CollectionServiceHandler::ListCollections(grpc::ServerContext* cont
                                                        const v1::ListCollectionsRequest*,
                                                        v1::ListCollectionsResponse* response) {
     return handle(services_, context, "ListCollections", [&](Call&) -> Result<void> {
-        for (const index::SnapshotPtr& snapshot : services_.catalog.collections()) {
+        const auto collections = services_.catalog.collections();
+        RETURN_IF_ERROR(collections);
+        for (const index::SnapshotPtr& snapshot : *collections) {
             RETURN_IF_ERROR(fill(services_, *snapshot, response->add_collections()));
         }
         return {};

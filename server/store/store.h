@@ -300,11 +300,13 @@ class Store {
     ///
     /// Collections and shapes keep their ids and generations; jobs come back queued. Jobs and
     /// rebuilds get new ids and no id is ever given out twice, so that results still in flight for
-    /// the old content are dropped. The caller reloads whatever it has cached. Reports "copy"
-    /// (bytes), "integrity", "points", "restore" (pages).
+    /// the old content are dropped. The caller reloads whatever it has cached. `replacing`, unless null, is
+    /// called once the file has passed, before any read can see its content; it must not call the store.
+    /// Reports "copy" (bytes), "integrity", "points", "restore" (pages).
     /// Errors: kFileNotReadable, kMalformedFile (says what is wrong), kSchemaTooNew, kCancelled,
     /// kDeadlineExceeded.
-    [[nodiscard]] virtual Result<void> restore(const std::string& path, const RunContext& context) = 0;
+    [[nodiscard]] virtual Result<void> restore(const std::string& path, const RunContext& context,
+                                               const std::function<void()>& replacing) = 0;
     /// Reads everything: database integrity, references, all checksums, the rules between tables.
     /// One line per problem, at most two hundred; empty when sound. Reports the stages "integrity"
     /// and "points" (in shapes). Errors: kCancelled, kDeadlineExceeded.

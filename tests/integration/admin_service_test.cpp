@@ -338,6 +338,7 @@ TEST_F(AdminRpc, CallsDuringARestoreMustBeRepeated) {
     const auto watched = testing::drain(context, *reader);
     EXPECT_EQ(watched.status.error_code(), StatusCode::UNAVAILABLE) << watched;
     EXPECT_EQ(watched.error, "unavailable");
+    EXPECT_EQ(watched.retryAfter, "1000");
     EXPECT_TRUE(
         eventually([&] { return getShape(client, collection, "k").value.state() == pb::SHAPE_STATE_READY; }));
 }

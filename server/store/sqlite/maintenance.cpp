@@ -240,7 +240,8 @@ Result<void> SqliteStore::backup(const std::string& path, const RunContext& cont
     });
 }
 
-Result<void> SqliteStore::restore(const std::string& path, const RunContext& context) {
+Result<void> SqliteStore::restore(const std::string& path, const RunContext& context,
+                                  const std::function<void()>& replacing) {
     return guarded("restore the backup", [&] {
         requireBackupFile(path, options_.path);
         const TemporaryFile temporary(options_.path + ".restore");
@@ -255,6 +256,7 @@ Result<void> SqliteStore::restore(const std::string& path, const RunContext& con
         // Until the end: no id may be given out between reading the last ones and replacing the tables.
         const std::lock_guard<std::mutex> lock(writerMutex_);
         separateIds(*copy, *writer_);
+        if (replacing) replacing();
         copyDatabase(*copy, *writer_, kStepPages, [&](std::uint64_t done, std::uint64_t total) {
             context.report("restore", done, total);
             orRaise(context.checkpoint());

@@ -65,7 +65,8 @@ class SqliteStore final : public Store {
     Result<void> abandonRebuild(std::int64_t rebuildId, RebuildState state) override;
 
     Result<void> backup(const std::string& path, const RunContext& context) override;
-    Result<void> restore(const std::string& path, const RunContext& context) override;
+    Result<void> restore(const std::string& path, const RunContext& context,
+                         const std::function<void()>& replacing) override;
     Result<std::vector<std::string>> check(const RunContext& context) override;
     Result<StoreStats> stats() override;
     Result<void> checkpoint() override;

@@ -1,6 +1,7 @@
 #include "server/catalog/catalog.h"
 
 #include <atomic>
+#include <functional>
 
 #include <gtest/gtest.h>
 
@@ -19,6 +20,7 @@ class CatalogTest : public ::testing::Test {
     CatalogTest() {
         auto owned = std::make_unique<MemoryStore>();
         owned->fault = [this](const std::string& function) -> std::optional<Error> {
+            if (function == "listCollections" && loading) return loading();
             if (noJobs && function == "claimJob") return Error{ErrorCode::kStorage, "broken"};
             return std::nullopt;
         };
@@ -45,6 +47,8 @@ class CatalogTest : public ::testing::Test {
 
     std::shared_ptr<RecordingLogger> log = std::make_shared<RecordingLogger>();
     std::atomic<bool> noJobs{false};
+    /// Called when the index begins to load, after the store has replaced its content.
+    std::function<std::optional<Error>()> loading;
     std::unique_ptr<Catalog> catalog;
 };
 
@@ -122,6 +126,50 @@ TEST_F(CatalogTest, RestoreBringsBackTheOldContentAndRaisesTheEpoch) {
     EXPECT_EQ(searched(before.id), 5.0);
     EXPECT_EQ(searched(after.id), 0.0);
     EXPECT_EQ(putAndWait("new", 7.0f).state, store::ShapeState::kReady) << "the workers continue";
+}
+
+TEST_F(CatalogTest, NothingIsLookedUpWhileStoreAndIndexDiffer) {
+    const store::Shape cup = putAndWait("cup", 5.0f);
+    ASSERT_TRUE(catalog->backup("backup", {}));
+    const auto before = catalog->epoch();
+    auto between = before;
+    loading = [&]() -> std::optional<Error> {
+        between = catalog->epoch();
+        for (const std::string name : {"", "default", "unknown"}) {
+            const auto found = catalog->collection(name);
+            EXPECT_EQ(found ? ErrorCode::kInternal : found.error().code, ErrorCode::kUnavailable) << name;
+        }
+        EXPECT_FALSE(catalog->collections());
+        return std::nullopt;
+    };
+    ASSERT_TRUE(catalog->restore("backup", {}));
+    EXPECT_GT(between, before) << "calls from before must be repeated";
+    EXPECT_GT(catalog->epoch(), between) << "and those that began in between";
+    EXPECT_EQ(searched(cup.id), 5.0);
+}
+
+TEST_F(CatalogTest, ContentThatCannotBeLoadedIsNotMixedWithTheOld) {
+    const store::Shape cup = putAndWait("cup", 5.0f);
+    ASSERT_TRUE(catalog->backup("backup", {}));
+    loading = [] { return Error{ErrorCode::kDataLoss, "broken parameters"}; };
+    const auto restored = catalog->restore("backup", {});
+    ASSERT_FALSE(restored);
+    EXPECT_EQ(restored.error().code, ErrorCode::kDataLoss);
+    EXPECT_NE(restored.error().message.find("has replaced the content"), std::string::npos);
+    const auto expectNothing = [&] {
+        EXPECT_EQ(catalog->collection("").error().code, ErrorCode::kUnavailable);
+        EXPECT_EQ(put("jug", 6.0f).error().code, ErrorCode::kUnavailable);
+        EXPECT_EQ(catalog->createCollection("parts", "", parametersOf(Profile::kPaper)).error().code,
+                  ErrorCode::kUnavailable);
+        EXPECT_EQ(catalog->deleteCollection("default", true).error().code, ErrorCode::kUnavailable);
+    };
+    expectNothing();
+    EXPECT_FALSE(catalog->restore("unknown", {}));
+    expectNothing();
+    loading = nullptr;
+    ASSERT_TRUE(catalog->restore("backup", {}));
+    EXPECT_EQ(searched(cup.id), 5.0);
+    EXPECT_TRUE(put("jug", 6.0f));
 }
 
 TEST_F(CatalogTest, ARebuildIsFollowedToItsEnd) {

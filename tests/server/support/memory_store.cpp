@@ -380,11 +380,13 @@ Result<void> MemoryStore::backup(const std::string& path, const RunContext& cont
     });
 }
 
-Result<void> MemoryStore::restore(const std::string& path, const RunContext& context) {
+Result<void> MemoryStore::restore(const std::string& path, const RunContext& context,
+                                  const std::function<void()>& replacing) {
     return guarded("restore", [&]() -> Result<void> {
         if (const auto go = context.checkpoint(); !go) return go;
         const auto found = backups_.find(path);
         if (found == backups_.end()) return fail(ErrorCode::kFileNotReadable, path + " is missing");
+        if (replacing) replacing();
         // New ids continue after both histories, and jobs and rebuilds get new ones.
         const std::int64_t nextId = std::max(content_.nextId, found->second.nextId);
         content_ = found->second;

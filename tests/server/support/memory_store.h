@@ -61,7 +61,8 @@ class MemoryStore : public store::Store {
     Result<void> abandonRebuild(std::int64_t rebuildId, store::RebuildState state) override;
 
     Result<void> backup(const std::string& path, const RunContext& context) override;
-    Result<void> restore(const std::string& path, const RunContext& context) override;
+    Result<void> restore(const std::string& path, const RunContext& context,
+                         const std::function<void()>& replacing) override;
     Result<std::vector<std::string>> check(const RunContext& context) override;
     Result<store::StoreStats> stats() override;
     Result<void> checkpoint() override;

@@ -212,7 +212,7 @@ TEST_F(MemoryStoreTest, RestoresAsSqliteDoes) {
         ASSERT_TRUE(store.backup(backup, {}));
         EXPECT_FAILS(store.backup(backup, {}), ErrorCode::kAlreadyExists);
         const Shape later = store.putShape(request(side->collection, "k1", cloud(2)))->shape;
-        ASSERT_TRUE(store.restore(backup, {}));
+        ASSERT_TRUE(store.restore(backup, {}, {}));
         // Results for the old content are dropped.
         EXPECT_FALSE(store.finishJob(running, signatureFor(running)).value());
         EXPECT_FAILS(store.getRebuild(rebuild.id), ErrorCode::kNotFound);
@@ -223,7 +223,7 @@ TEST_F(MemoryStoreTest, RestoresAsSqliteDoes) {
         EXPECT_GT(store.putShape(request(side->collection, "k2", cloud(3)))->shape.id, later.id);
     }
     EXPECT_EQ(stateOf(a), stateOf(b));
-    EXPECT_FAILS(memory.restore("unknown", {}), ErrorCode::kFileNotReadable);
+    EXPECT_FAILS(memory.restore("unknown", {}, {}), ErrorCode::kFileNotReadable);
 }
 
 }  // namespace

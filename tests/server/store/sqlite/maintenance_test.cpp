@@ -27,7 +27,7 @@ class SqliteMaintenanceTest : public StoreTest {
 
     void expectRefused(const std::string& path, ErrorCode code) {
         const Shape before = put(collection_.id, "live", 99);
-        const auto refused = store_->restore(path, {});
+        const auto refused = store_->restore(path, {}, {});
         ASSERT_FALSE(refused);
         EXPECT_EQ(refused.error().code, code) << refused.error().message;
         EXPECT_TRUE(store_->getShape(collection_.id, "live").value() == before);
@@ -60,7 +60,7 @@ TEST_F(SqliteMaintenanceTest, RestoreReproducesTheContent) {
     context.progress = [&](const char* stage, std::uint64_t, std::uint64_t) {
         if (stages.find(stage) == std::string::npos) stages += std::string(stage) + " ";
     };
-    const auto restored = store_->restore(backup_, context);
+    const auto restored = store_->restore(backup_, context, {});
     ASSERT_TRUE(restored) << restored.error().message;
     EXPECT_NE(stages.find("copy integrity points"), std::string::npos) << stages;
     EXPECT_TRUE(slurp(backup_) == file) << "the backup is left as it is";
@@ -85,7 +85,7 @@ TEST_F(SqliteMaintenanceTest, DropsResultsInFlightAcrossARestore) {
     put(collection_.id, "later", 51);
     const Job inFlight = claim();
     const Rebuild rebuild = store_->startRebuild(collection_.id, "finer").value();
-    ASSERT_TRUE(store_->restore(backup_, {}));
+    ASSERT_TRUE(store_->restore(backup_, {}, {}));
     const Shape fresh = put(collection_.id, "fresh", 52);
     EXPECT_GT(fresh.id, later.id);
     EXPECT_FALSE(store_->finishJob(inFlight, signatureFor(inFlight)).value());
@@ -104,7 +104,7 @@ TEST_F(SqliteMaintenanceTest, RunningJobsComeBackQueuedAndUntried) {
     claim();
     const std::string path = folder_.file("second.db");
     ASSERT_TRUE(store_->backup(path, {}));
-    ASSERT_TRUE(store_->restore(path, {}));
+    ASSERT_TRUE(store_->restore(path, {}, {}));
     EXPECT_EQ(claim().attempts, 1);
     EXPECT_EQ(claim().attempts, 1);
 }
@@ -202,7 +202,9 @@ TEST_F(SqliteMaintenanceTest, CancelledBackupLeavesNothing) {
             EXPECT_FALSE(std::filesystem::exists(path));
         } else {
             put(collection_.id, "live", 98);
-            EXPECT_FAILS(store_->restore(large, context), ErrorCode::kCancelled);
+            bool replacing = false;
+            EXPECT_FAILS(store_->restore(large, context, [&] { replacing = true; }), ErrorCode::kCancelled);
+            EXPECT_EQ(replacing, stop == "restore") << stop;
             EXPECT_TRUE(store_->getShape(collection_.id, "live")) << stop;
         }
     }
@@ -240,7 +242,7 @@ TEST_F(SqliteMaintenanceTest, ReadersSeeOldOrNewContent) {
     }
     // At least ten, more until the readers had their turn; the last one restores `other`.
     for (int i = 0; i < 10 || i % 2 != 0 || (reads <= 10 && i < 1'000); ++i) {
-        const auto restored = store_->restore(i % 2 ? other : backup_, {});
+        const auto restored = store_->restore(i % 2 ? other : backup_, {}, {});
         EXPECT_TRUE(restored) << restored.error().message;
     }
     stop = true;
