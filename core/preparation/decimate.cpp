@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/base/return_if_error.h"
+#include "core/base/spread_key.h"
 #include "core/geometry/merge_duplicates.h"
 
 namespace shapedb {
@@ -44,7 +45,7 @@ std::size_t countCells(const PointCloud& points, double cell) {
     std::vector<std::uint64_t> table(1 << 12, kFree);
     std::size_t cells = 0;
     const auto slotOf = [&](std::uint64_t key) {
-        std::size_t slot = (key * 0x9e3779b97f4a7c15ULL) >> 20;
+        std::size_t slot = spreadKey(key);
         for (slot &= table.size() - 1; table[slot] != kFree && table[slot] != key;) {
             slot = (slot + 1) & (table.size() - 1);
         }

@@ -11,6 +11,7 @@
 #include "core/base/prefetch.h"
 #include "core/base/radix_sort.h"
 #include "core/base/return_if_error.h"
+#include "core/base/spread_key.h"
 #include "core/geometry/merge_duplicates.h"
 #include "core/geometry/morton.h"
 #include "core/preparation/decimate.h"
@@ -171,11 +172,7 @@ class Grid {
     }
 
     // Where probing for a key starts.
-    std::size_t firstSlotOf(std::uint64_t key) const {
-        std::uint64_t mixed = key * 0x9e3779b97f4a7c15ULL;
-        mixed = (mixed ^ mixed >> 32) * 0xd6e8feb86659fd93ULL;
-        return (mixed >> 32) & (slots_.size() - 1);
-    }
+    std::size_t firstSlotOf(std::uint64_t key) const { return spreadKey(key) & (slots_.size() - 1); }
 
     // Slot of the cell with this key, or the free one where it belongs. Slots hold the keys too, so that
     // most look-ups touch one cache line.
