@@ -308,8 +308,8 @@ class Store {
     [[nodiscard]] virtual Result<void> restore(const std::string& path, const RunContext& context,
                                                const std::function<void()>& replacing) = 0;
     /// Reads everything: database integrity, references, all checksums, the rules between tables.
-    /// One line per problem, at most two hundred; empty when sound. Reports the stages "integrity"
-    /// and "points" (in shapes). Errors: kCancelled, kDeadlineExceeded.
+    /// One line per problem; after two hundred, one that says there are more; empty when sound. Reports
+    /// the stages "integrity" and "points" (in shapes). Errors: kCancelled, kDeadlineExceeded.
     [[nodiscard]] virtual Result<std::vector<std::string>> check(const RunContext& context) = 0;
     [[nodiscard]] virtual Result<StoreStats> stats() = 0;
     /// Moves the write-ahead log into the database file (at shutdown). Errors: kStorage also when a

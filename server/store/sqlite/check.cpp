@@ -79,8 +79,11 @@ class Checker {
 
   private:
     void add(std::string problem) {
-        if (problems_.size() < kMaxProblems) problems_.push_back(std::move(problem));
-        if (problems_.size() == kMaxProblems) problems_.push_back("... and more");
+        if (problems_.size() < kMaxProblems) {
+            problems_.push_back(std::move(problem));
+        } else if (problems_.size() == kMaxProblems) {
+            problems_.push_back("... and more");
+        }
     }
 
     /// Damage ends a section, but not the check.

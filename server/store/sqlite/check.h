@@ -9,7 +9,8 @@
 
 namespace shapedb::store {
 
-/// One line per problem, at most two hundred; empty when sound. Reads everything in one snapshot.
+/// One line per problem; after two hundred, one that says there are more; empty when sound. Reads everything
+/// in one snapshot.
 /// Reports the stages "integrity" and "points" (in shapes). Damage is a line, not a Failure; throws
 /// Failure kCancelled, kDeadlineExceeded, or when it cannot read.
 std::vector<std::string> checkDatabase(Connection& connection, const RunContext& context);
