@@ -85,7 +85,7 @@ class Builder {
     Result<void> build() {
         RETURN_IF_ERROR(context_.checkpoint());
         context_.report("delaunay", 0, sites_.size());
-        cells_.reserve(kCellsPerPoint * sites_.size() + kSpareCells);
+        reserve(kCellsPerPoint * sites_.size() + kSpareCells);
         const Rounds rounds = makeRounds(sites_.size());
         RETURN_IF_ERROR(makeFirstCells(rounds.order));
         std::size_t begin = 0;
@@ -100,6 +100,8 @@ class Builder {
     }
 
   private:
+    // More cells than indices can tell apart are of no use.
+    void reserve(std::size_t cells) { cells_.reserve(std::min(kMaxCells, cells)); }
     void dropFirst(std::vector<std::uint32_t>& list) const {
         const auto taken = [&](std::uint32_t v) {
             return std::find(first_.begin(), first_.end(), v) != first_.end();
@@ -188,7 +190,7 @@ Result<void> Builder::insertSerially(const std::vector<std::uint32_t>& list) {
                             "the Delaunay triangulation needs more than 4e9 tetrahedra");
             }
             // By half, so that all copying together is linear.
-            cells_.reserve(std::min(kMaxCells, cells_.capacity() + cells_.capacity() / 2));
+            reserve(cells_.capacity() + cells_.capacity() / 2);
             outcome = inserter.insert(list[i]);
         }
         if (outcome != Insertion::kInserted) return fail(duplicatePointsError());
@@ -208,7 +210,7 @@ std::uint32_t Builder::anyCell() const {
 // Inserts what the workers can insert independently of each other; the rest stays in `list`.
 Result<void> Builder::insertInParallel(std::vector<std::uint32_t>& list) {
     // Workers cannot grow the store, because that moves the cells from under the others.
-    cells_.reserve(std::min(kMaxCells, cells_.used() + kCellsPerPoint * list.size() + kSpareCells));
+    reserve(cells_.used() + kCellsPerPoint * list.size() + kSpareCells);
     RETURN_IF_ERROR(parallel_.insert(list, free_));
     for (int side = 0; side < 2 && list.size() >= threads_ * limits_.minPerThread / kPendingFraction;
          ++side) {
