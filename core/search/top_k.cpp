@@ -77,7 +77,7 @@ template <typename Work>
 Result<void> parallelUntilStopped(std::size_t begin, std::size_t end, std::size_t grain,
                                   const RunContext& context, const Work& work) {
     std::atomic<bool> stop{false};
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(begin, end, grain), [&](const auto& range) {
+    const auto runRange = [&](const tbb::blocked_range<std::size_t>& range) {
         for (std::size_t i = range.begin(); i < range.end(); ++i) {
             if (stop.load(std::memory_order_relaxed)) return;
             if (!context.checkpoint()) {
@@ -86,7 +86,10 @@ Result<void> parallelUntilStopped(std::size_t begin, std::size_t end, std::size_
             }
             work(i);
         }
-    });
+    };
+    // Isolated: a search that waits for its last range must not begin another one of the same arena.
+    tbb::this_task_arena::isolate(
+        [&] { tbb::parallel_for(tbb::blocked_range<std::size_t>(begin, end, grain), runRange); });
     return context.checkpoint();
 }
 
@@ -280,7 +283,7 @@ Result<std::vector<SearchResult>> topKBatch(const std::vector<BatchQuery>& queri
     try {
         std::vector<Result<SearchResult>> found(queries.size(), SearchResult{});
         std::atomic<bool> failed{false};
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, queries.size(), 1), [&](const auto& range) {
+        const auto runRange = [&](const tbb::blocked_range<std::size_t>& range) {
             // Each query on one thread: what it spreads over several it would have to wait for.
             tbb::task_arena alone(1);
             for (std::size_t q = range.begin(); q < range.end() && !failed.load(); ++q) {
@@ -289,7 +292,10 @@ Result<std::vector<SearchResult>> topKBatch(const std::vector<BatchQuery>& queri
                 found[q] = alone.execute([&] { return topK(queries[q].signature, set, own, context); });
                 if (!found[q]) failed = true;
             }
-        });
+        };
+        // Isolated, as above.
+        tbb::this_task_arena::isolate(
+            [&] { tbb::parallel_for(tbb::blocked_range<std::size_t>(0, queries.size(), 1), runRange); });
         std::vector<SearchResult> results;
         results.reserve(queries.size());
         for (std::size_t q = 0; q < found.size(); ++q) {

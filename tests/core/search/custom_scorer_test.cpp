@@ -1,8 +1,13 @@
 // The search is independent of the method: any scorer can be plugged in.
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <cmath>
+#include <memory>
+#include <thread>
 
 #include <gtest/gtest.h>
+#include <tbb/task_arena.h>
 
 #include "core/search/top_k.h"
 #include "tests/core/matching/random_signatures.h"
@@ -53,6 +58,30 @@ class HandingOnScorer final : public Scorer {
         return value;
     }
 };
+
+// Scans take a while, so that searches wait for one another's threads. Counts the scans that were done by a
+// thread which called for another search.
+class SlowScorer final : public Scorer {
+  public:
+    static thread_local const SlowScorer* wanted;  ///< by the search that this thread called for; may be null
+    static std::atomic<int> foreign;
+
+    bool compares(const ShapeRow&) const override { return true; }
+    double score(const ShapeRow&) const override { return 1.0; }
+    double bound(const ShapeRow&) const override { return 1.0; }
+    Explanation explain(const Signature&) const override { return {}; }
+    void scan(const ShapeRows&, const std::vector<std::uint8_t>&, double, std::vector<Survivor>&,
+              ScanCounts&) const override {
+        if (wanted != nullptr && wanted != this) ++foreign;
+        std::this_thread::sleep_for(std::chrono::milliseconds(1 + calls_++ % 3));
+    }
+
+  private:
+    mutable std::atomic<int> calls_{0};
+};
+
+thread_local const SlowScorer* SlowScorer::wanted = nullptr;
+std::atomic<int> SlowScorer::foreign{0};
 
 std::vector<IndexEntry> randomEntries(Random& random, std::int64_t count) {
     std::vector<IndexEntry> entries;
@@ -116,6 +145,34 @@ TEST(CustomScorer, BoundsRuleOutMostShapes) {
     EXPECT_LT(found->counts.scored, 4500u);
     options.k = 0;
     EXPECT_EQ(topK(scorer, SignatureSet(), options).error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST(CustomScorer, ASearchDoesNotWaitForPartsOfOthers) {
+    Random random(4);
+    std::vector<std::shared_ptr<const SignatureBlock>> blocks;
+    for (const IndexEntry& entry : randomEntries(random, 12)) {
+        auto block = std::make_shared<SignatureBlock>();
+        block->append(entry);
+        blocks.push_back(std::move(block));
+    }
+    const SignatureSet set = SignatureSet::ofBlocks(blocks);
+    // As in a server: the calls of several threads share an arena.
+    tbb::task_arena arena(4, 3);
+    std::vector<std::thread> callers;
+    for (int t = 0; t < 3; ++t) {
+        callers.emplace_back([&] {
+            for (int i = 0; i < 10; ++i) {
+                const SlowScorer scorer;
+                SlowScorer::wanted = &scorer;
+                SearchOptions options;
+                options.k = 1;
+                EXPECT_TRUE(arena.execute([&] { return topK(scorer, set, options); }));
+                SlowScorer::wanted = nullptr;
+            }
+        });
+    }
+    for (std::thread& caller : callers) caller.join();
+    EXPECT_EQ(SlowScorer::foreign, 0);
 }
 
 }  // namespace
