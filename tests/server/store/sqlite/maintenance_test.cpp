@@ -173,7 +173,7 @@ TEST_F(SqliteMaintenanceTest, RestoreReportsHowMuchOfTheFileItHasCopied) {
         EXPECT_EQ(total, size);
         copied.push_back(done);
     };
-    ASSERT_TRUE(store_->restore(large, context));
+    ASSERT_TRUE(store_->restore(large, context, {}));
     ASSERT_GT(copied.size(), 2u) << "the file is to be longer than one piece";
     EXPECT_TRUE(std::is_sorted(copied.begin(), copied.end()));
     EXPECT_EQ(copied.front(), 0u);
