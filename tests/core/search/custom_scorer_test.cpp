@@ -69,7 +69,7 @@ class SlowScorer final : public Scorer {
     bool compares(const ShapeRow&) const override { return true; }
     double score(const ShapeRow&) const override { return 1.0; }
     double bound(const ShapeRow&) const override { return 1.0; }
-    Explanation explain(const Signature&) const override { return {}; }
+    Explanation explain(const ShapeRow&) const override { return {}; }
     void scan(const ShapeRows&, const std::vector<std::uint8_t>&, double, std::vector<Survivor>&,
               ScanCounts&) const override {
         if (wanted != nullptr && wanted != this) ++foreign;
