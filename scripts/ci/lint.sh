@@ -41,7 +41,7 @@ forbid 'core/matching/attributed/' "the published score does not know the one wi
 forbid 'CGAL' "CGAL in a header that others include" 'core/**/*.h'
 forbid 'sqlite3' "sqlite3.h outside server/store/sqlite/" \
   server client tests bench common ':!server/store/sqlite' ':!tests/server/store/sqlite'
-forbid "$transport" "gRPC or protobuf below server/rpc/" server ':!server/rpc' ':!server/main.cpp'
+forbid "$transport" "gRPC or protobuf below server/rpc/" server ':!server/rpc'
 forbid 'server/(rpc|catalog|ingest|index|config)/' "the store may not include what is built on it" server/store
 forbid 'server/rpc/' "server/rpc is the outermost layer" server/catalog server/ingest server/index server/telemetry server/config
 forbid 'server/catalog/' "the catalog is built on these" server/ingest server/index server/telemetry

@@ -220,7 +220,7 @@ std::vector<Setting> makeSettings() {
             "zstd level of stored points. Higher: smaller and slower."),
         number(
             "search.threads", kInteger, 0, 256, [](C& c) -> int& { return c.search.threads; },
-            "Processors shared by all searches. 0: all."),
+            "Processors shared by all searches, and query scans segmented at once. 0: all."),
         number(
             "rebuild.threads", kInteger, 0, 256, [](C& c) -> int& { return c.rebuild.threads; },
             "Processors a rebuild uses. 0: all."),
