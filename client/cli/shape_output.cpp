@@ -101,8 +101,10 @@ std::string motionText(const client::Explanation& explanation, const std::string
     const Motion& motion = explanation.motion;
     std::vector<std::string> steps;
     if (motion.reflected) steps.emplace_back("mirrored");
-    steps.push_back("turned by " + formatFixed(rotationDegrees(motion), 0) + " degrees");
+    const std::string degrees = formatFixed(rotationDegrees(motion), 0);
+    if (degrees != "0") steps.push_back("turned by " + degrees + " degrees");
     if (std::abs(motion.scale - 1.0) >= 5e-4) steps.push_back("scaled by " + formatNumber(motion.scale));
+    if (steps.empty()) return hitName + " is in the same pose.\n";
     return "To match, " + hitName + " is " + joined(steps) + ".\n";
 }
 

@@ -62,7 +62,7 @@ Result<void> appendPoint(std::string& bytes, const PointCloud& points, std::size
         }
         if (std::abs(coordinate) > static_cast<double>(std::numeric_limits<float>::max())) {
             return fail(ErrorCode::kCoordinateOutOfRange,
-                        name() + "beyond single precision, which the file has");
+                        name() + "too large for single precision, in which the file stores it");
         }
         const auto single = static_cast<float>(coordinate);
         std::uint32_t bits = 0;

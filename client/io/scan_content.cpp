@@ -21,7 +21,7 @@ Error VertexSink::refusal(const Point3& p, const std::string& where) const {
                                                      "vertex"};
     }
     return {ErrorCode::kPointLimitExceeded, place + "the file has more than " + std::to_string(maxPoints_) +
-                                                " points, which is the limit; thin the scan out or raise "
+                                                " points, which is the limit; remove some or raise "
                                                 "the limit"};
 }
 

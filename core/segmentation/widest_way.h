@@ -9,9 +9,9 @@
 
 namespace shapedb {
 
-/// Per tetrahedron of `inside` the width, in spacings, of the narrowest facet on the way from outside on
-/// which it is widest (a maximin path): peeling through facets wider than w takes exactly those above w.
-/// Minus infinity elsewhere.
+/// For each tetrahedron of `inside`: of all ways to it from outside, the one whose narrowest facet is widest
+/// (a maximin path), and the width of that facet in spacings. Peeling through facets wider than w removes
+/// exactly the tetrahedra with a value above w. Minus infinity for all others.
 [[nodiscard]] std::vector<double> widestWays(const PointCloud& points, const Tetrahedra& tetrahedra,
                                              const std::vector<double>& spacings,
                                              const std::vector<std::uint8_t>& inside);

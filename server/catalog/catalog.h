@@ -88,8 +88,9 @@ struct CatalogStats {
 using Checkpoint = std::function<Result<void>()>;
 
 /// Thread-safe between `start` and `stop`, which belong to one thread. Errors of the store (store.h)
-/// are possible everywhere and not repeated; nor is kUnavailable, which is the answer of all that looks up a
-/// collection while a restore puts its content in place, and when that could not be loaded.
+/// are possible everywhere and not repeated below. The same goes for kUnavailable: every call that looks up a
+/// collection returns it while a restore replaces the content, and after one whose content could not be
+/// loaded.
 class Catalog {
   public:
     Catalog(std::unique_ptr<store::Store> store, ingest::SignaturePipeline pipeline, telemetry::LoggerPtr log,

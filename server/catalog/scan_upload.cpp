@@ -8,7 +8,8 @@
 namespace shapedb::catalog {
 
 Result<void> ScanUpload::begin(std::uint64_t announced, const std::string& sha256) {
-    if (announced_) return fail(ErrorCode::kMalformedStream, "second header: exactly one must come, first");
+    if (announced_)
+        return fail(ErrorCode::kMalformedStream, "a second header arrived; send one, before the chunks");
     if (announced < kMinPoints) {
         return fail(ErrorCode::kTooFewPoints, "point_count: " + std::to_string(announced) +
                                                   " points, a scan needs at least " +
@@ -17,7 +18,7 @@ Result<void> ScanUpload::begin(std::uint64_t announced, const std::string& sha25
     if (announced > maxPoints_) {
         return fail(ErrorCode::kPointLimitExceeded, "point_count: " + std::to_string(announced) +
                                                         " points, this server takes at most " +
-                                                        std::to_string(maxPoints_) + ": thin the scan out");
+                                                        std::to_string(maxPoints_) + ": send fewer points");
     }
     if (!sha256.empty()) {
         store::Checksum& expected = expected_.emplace();
@@ -53,8 +54,8 @@ Result<void> ScanUpload::checkChunk(const std::string& xyz) const {
         return malformed("all " + std::to_string(*announced_) + " announced points had already come");
     }
     if (points() + xyz.size() / kPointBytes > *announced_) {
-        return fail(ErrorCode::kCountMismatch,
-                    "more points came than the " + std::to_string(*announced_) + " announced in the header");
+        return fail(ErrorCode::kCountMismatch, "received more points than the " +
+                                                   std::to_string(*announced_) + " announced in the header");
     }
     return {};
 }
@@ -68,9 +69,9 @@ Result<void> ScanUpload::add(const std::string& xyz) {
 Result<store::VerifiedScan> ScanUpload::finish() {
     if (!announced_) return fail(ErrorCode::kMalformedStream, "the stream ended before a header came");
     if (points() != *announced_) {
-        return fail(
-            ErrorCode::kCountMismatch,
-            std::to_string(points()) + " points came, the header announced " + std::to_string(*announced_));
+        return fail(ErrorCode::kCountMismatch, std::to_string(points()) +
+                                                   " points received, the header announced " +
+                                                   std::to_string(*announced_));
     }
     return verifier_.finish(expected_ ? &*expected_ : nullptr);
 }

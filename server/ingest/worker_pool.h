@@ -36,7 +36,7 @@ struct WorkerOptions {
 /// What the store holds after a pause.
 enum class Content {
     kSame,
-    kReplaced,  ///< by that of another process (Store::restore)
+    kReplaced,  ///< by a restore (Store::restore)
 };
 
 /// Thread-safe unless a function says otherwise.

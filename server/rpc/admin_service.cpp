@@ -74,8 +74,9 @@ grpc::Status AdminServiceHandler::Rebuild(grpc::ServerContext* context, const v1
     return handle(services_, context, "Rebuild", [&](Call& call) -> Result<void> {
         if (hasParameters(*request) && (request->cache_only() || request->collection().empty())) {
             return fail(ErrorCode::kInvalidArgument,
-                        request->cache_only() ? "parameters cannot change with cache_only: leave one out"
-                                              : "collection: new parameters need one to be named");
+                        request->cache_only()
+                            ? "parameters cannot change with cache_only: leave one out"
+                            : "collection: name the collection that gets the new parameters");
         }
         auto all = services_.catalog.collections();
         RETURN_IF_ERROR(all);

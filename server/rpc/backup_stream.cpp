@@ -81,7 +81,7 @@ Result<void> FileReceiver::add(const v1::BackupChunk& chunk) {
     }
     if (received_ + chunk.data().size() > announced_) {
         return fail(ErrorCode::kCountMismatch,
-                    "more bytes came than the " + std::to_string(announced_) + " announced");
+                    "received more bytes than the " + std::to_string(announced_) + " announced");
     }
     if (!chunk.sha256().empty() && chunk.sha256().size() != Sha256Digest().size()) {
         return fail(ErrorCode::kInvalidArgument,
@@ -92,9 +92,9 @@ Result<void> FileReceiver::add(const v1::BackupChunk& chunk) {
 }
 
 Result<void> FileReceiver::finish() {
-    if (first_) return fail(ErrorCode::kMalformedStream, "the stream ended before a message came");
+    if (first_) return fail(ErrorCode::kMalformedStream, "the stream ended before the first message");
     if (received_ != announced_) {
-        return fail(ErrorCode::kCountMismatch, std::to_string(received_) + " bytes came, " +
+        return fail(ErrorCode::kCountMismatch, std::to_string(received_) + " bytes received, " +
                                                    std::to_string(announced_) + " were announced");
     }
     if (wantedChecksum_.empty())
@@ -102,7 +102,7 @@ Result<void> FileReceiver::finish() {
     if (std::fclose(file_.release()) != 0) return fail(writeError(errno));
     const Sha256Digest digest = hash_.finish();
     if (std::memcmp(wantedChecksum_.data(), digest.data(), digest.size()) != 0) {
-        return fail(ErrorCode::kChecksumMismatch, "the backup that came has the SHA-256 " + toHex(digest) +
+        return fail(ErrorCode::kChecksumMismatch, "the backup received has the SHA-256 " + toHex(digest) +
                                                       ", which is not the one sent with it: send it again");
     }
     return {};

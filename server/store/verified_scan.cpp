@@ -98,7 +98,7 @@ Result<VerifiedScan> ScanVerifier::finish(const Checksum* expected) {
     const Checksum checksum = hash_.finish();
     if (expected != nullptr && *expected != checksum) {
         return fail(ErrorCode::kChecksumMismatch,
-                    "the points that came have the SHA-256 " + toHex(checksum) +
+                    "the points received have the SHA-256 " + toHex(checksum) +
                         ", which is not the one in the header: send the scan again");
     }
     RETURN_IF_ERROR(checkUsable());

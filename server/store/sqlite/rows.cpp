@@ -134,7 +134,7 @@ std::vector<float> readPoints(const Query& query) {
     if (sha256(points->data(), points->size() * sizeof(float)) != readChecksum(query, 2, key)) {
         raise(ErrorCode::kDataLoss,
               "the stored points of shape " + quoted(key) +
-                  " do not have their checksum; restore a backup or add the shape again");
+                  " do not match their checksum; restore a backup or add the shape again");
     }
     return std::move(*points);
 }

@@ -86,7 +86,16 @@ TEST(ShapeOutput, ExplanationOfAMirroredShapeOfTheSameSize) {
     EXPECT_EQ(explanationText(explanation, signatureOf({1.0}), "a", "b"),
               "1 of 1 part of a match (100 % of its volume)\n"
               "  part 1 <-> part 1: 100 % of the match, centres 0 % apart\n"
-              "To match, b is mirrored and turned by 0 degrees.\n");
+              "To match, b is mirrored.\n");
+}
+
+TEST(ShapeOutput, ExplanationOfAShapeInTheSamePose) {
+    client::Explanation explanation;
+    explanation.matches = {{0, 0, 1.0, 0.0}};
+    EXPECT_EQ(explanationText(explanation, signatureOf({1.0}), "a", "b"),
+              "1 of 1 part of a match (100 % of its volume)\n"
+              "  part 1 <-> part 1: 100 % of the match, centres 0 % apart\n"
+              "b is in the same pose.\n");
 }
 
 TEST(ShapeOutput, ExplanationOfADegenerateOrEmptyMatch) {

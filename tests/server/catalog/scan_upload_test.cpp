@@ -70,7 +70,7 @@ TEST_F(ScanUploadTest, RefusesMessagesOutOfOrder) {
     EXPECT_EQ(empty.finish().error().code, ErrorCode::kMalformedStream);
     ScanUpload twice(10, budget);
     ASSERT_TRUE(twice.begin(4, ""));
-    expectError(twice.begin(4, ""), ErrorCode::kMalformedStream, "second header");
+    expectError(twice.begin(4, ""), ErrorCode::kMalformedStream, "a second header arrived");
     ScanUpload after(10, budget);
     ASSERT_TRUE(after.begin(4, ""));
     ASSERT_TRUE(after.add(four));
