@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numeric>
 
 #include "core/base/return_if_error.h"
 
@@ -91,18 +90,6 @@ std::size_t firstRightRank(const GalleryQuery& query) {
 }
 
 }  // namespace
-
-Result<std::vector<std::size_t>> rankByScore(const std::vector<double>& scores) {
-    for (std::size_t i = 0; i < scores.size(); ++i) {
-        if (std::isnan(scores[i])) {
-            return fail(ErrorCode::kInvalidArgument, "score " + std::to_string(i) + " is not a number");
-        }
-    }
-    std::vector<std::size_t> order(scores.size());
-    std::iota(order.begin(), order.end(), std::size_t{0});
-    sortByScore(order, scores.data());
-    return order;
-}
 
 Result<void> checkScoreMatrix(const ScoreMatrix& scores, std::size_t count) {
     if (count == 0) return fail(ErrorCode::kInvalidArgument, "there are no shapes to evaluate");

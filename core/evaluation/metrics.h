@@ -15,13 +15,8 @@ namespace shapedb {
 
 /// Scores of n shapes against each other, row-major: `values[query * n + candidate]`, where n is the
 /// number of labels. Higher is better. Infinite values are allowed, NaN is not. Need not be symmetric.
+/// Candidates are ranked by descending score, ties by ascending index.
 using ScoreMatrix = std::vector<double>;
-
-/// The candidates in descending order of score, ties in ascending order of index: the ranking rule of this
-/// folder.
-///
-/// Errors: kInvalidArgument when a score is NaN (the message names its index).
-[[nodiscard]] Result<std::vector<std::size_t>> rankByScore(const std::vector<double>& scores);
 
 /// Whether `scores` is a score matrix of `count` shapes.
 ///

@@ -287,12 +287,6 @@ double thinnestPart(const Solid& solid) {
     return thinnest;
 }
 
-Solid movedSolid(const Motion& motion, const Solid& solid) {
-    Solid moved = solid;
-    for (SolidPart& part : moved.parts) part.placement = compose(motion, part.placement);
-    return moved;
-}
-
 Result<PointCloud> sampleBoundary(const Solid& solid, std::size_t count, std::uint64_t seed) {
     RETURN_IF_ERROR(checkSolid(solid));
     if (count == 0) {

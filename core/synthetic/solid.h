@@ -87,9 +87,6 @@ struct Solid {
 /// of an ellipsoid, the smallest side of a box. In the units of the solid.
 [[nodiscard]] double thinnestPart(const Solid& solid);
 
-/// The solid with every part moved.
-[[nodiscard]] Solid movedSolid(const Motion& motion, const Solid& solid);
-
 /// `count` points, independent and uniform by area on the boundary of the union, in random order. Faces where
 /// two parts touch are not part of the boundary; coincident faces count once. (Both are tested 1e-9 diagonals
 /// off the boundary.) Same solid, count and seed: same points.

@@ -95,11 +95,6 @@ class SpdlogLogger : public Logger {
     spdlog::logger logger_;
 };
 
-class SilentLogger : public Logger {
-  public:
-    void log(Level, const std::string&, const std::vector<Field>&) override {}
-};
-
 }  // namespace
 
 std::vector<Field> fieldsOf(const Error& error) {
@@ -144,7 +139,5 @@ Result<LoggerPtr> makeLogger(const LogOptions& options) {
                     "log file " + options.file + " cannot be opened for writing: " + error.what());
     }
 }
-
-LoggerPtr makeSilentLogger() { return std::make_shared<SilentLogger>(); }
 
 }  // namespace shapedb::telemetry

@@ -59,9 +59,6 @@ struct LogOptions {
 /// Errors: kFileNotWritable.
 [[nodiscard]] Result<LoggerPtr> makeLogger(const LogOptions& options);
 
-/// Drops everything.
-[[nodiscard]] LoggerPtr makeSilentLogger();
-
 /// A line without time and level: `message name=value name="quoted value"`, or the members of a JSON
 /// object without braces.
 [[nodiscard]] std::string formatText(const std::string& message, const std::vector<Field>& fields);

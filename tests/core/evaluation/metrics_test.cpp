@@ -238,20 +238,6 @@ TEST(LeaveOneOut, NamesTheScoreThatIsNotANumber) {
     EXPECT_NE(report.error().message.find("candidate 3"), std::string::npos);
 }
 
-TEST(RankByScore, FallingScoresTiesByIndex) {
-    const auto order = rankByScore({0.5, 0.9, 0.5, -1.0, 0.9});
-    ASSERT_TRUE(order);
-    EXPECT_EQ(*order, (std::vector<std::size_t>{1, 4, 0, 2, 3}));
-    EXPECT_TRUE(rankByScore({})->empty());
-}
-
-TEST(RankByScore, RefusesNaN) {
-    const auto order = rankByScore({0.5, kNaN});
-    ASSERT_FALSE(order);
-    EXPECT_EQ(order.error().code, ErrorCode::kInvalidArgument);
-    EXPECT_NE(order.error().message.find("score 1"), std::string::npos);
-}
-
 TEST(Gallery, HandComputedExample) {
     const std::vector<GalleryQuery> queries = {
         {{4, 2, 0, 1, 3, 5, 6}, {4}},     // first

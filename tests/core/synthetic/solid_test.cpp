@@ -24,6 +24,12 @@ void expectShare(const PointCloud& points, const std::function<bool(const Point3
     EXPECT_NEAR(found, expected, 5.0 * std::sqrt(expected * (1.0 - expected) / n));
 }
 
+Solid movedSolid(const Motion& motion, const Solid& solid) {
+    Solid moved = solid;
+    for (SolidPart& part : moved.parts) part.placement = compose(motion, part.placement);
+    return moved;
+}
+
 PointCloud sample(const Solid& solid, std::size_t count = 40000, std::uint64_t seed = 1) {
     const auto points = sampleBoundary(solid, count, seed);
     EXPECT_TRUE(points) << (points ? "" : points.error().message);
