@@ -40,7 +40,14 @@ inline double min3(double a, double b, double c) { return std::min(std::min(a, b
 
 // The error bounds of both filters are those of CGAL's semi-static ones (Melquiond and Pion, "Formally
 // certified floating-point filters for homogeneous geometric predicates", 2007). They hold for exactly this
-// order of operations.
+// order of operations, and cover neither underflow nor overflow of the products: hence the least and the most
+// that coordinate differences may be.
+inline constexpr double kOrientationError = 5.1107127829973299e-15;
+inline constexpr double kOrientationLeast = 1e-97;
+inline constexpr double kOrientationMost = 1e102;
+inline constexpr double kSphereError = 1.2466136531027298e-13;
+inline constexpr double kSphereLeast = 1e-58;
+inline constexpr double kSphereMost = 1e61;
 
 /// The sign of det(b - a, c - a, d - a): 1, 0 or -1.
 [[nodiscard]] inline int orientation(const Site& a, const Site& b, const Site& c, const Site& d) {
@@ -54,9 +61,8 @@ inline double min3(double a, double b, double c) { return std::min(std::min(a, b
     const double mx = max3(std::abs(bx), std::abs(cx), std::abs(dx));
     const double my = max3(std::abs(by), std::abs(cy), std::abs(dy));
     const double mz = max3(std::abs(bz), std::abs(cz), std::abs(dz));
-    const double bound = 5.1107127829973299e-15 * mx * my * mz;
-    // The bound does not cover underflow and overflow of the products.
-    if (min3(mx, my, mz) >= 1e-97 && max3(mx, my, mz) < 1e102) {
+    const double bound = kOrientationError * mx * my * mz;
+    if (min3(mx, my, mz) >= kOrientationLeast && max3(mx, my, mz) < kOrientationMost) {
         if (det > bound) return 1;
         if (det < -bound) return -1;
     }
@@ -91,8 +97,8 @@ inline double min3(double a, double b, double c) { return std::min(std::min(a, b
     const double my = std::max(std::max(std::abs(ay), std::abs(by)), std::max(std::abs(cy), std::abs(dy)));
     const double mz = std::max(std::max(std::abs(az), std::abs(bz)), std::max(std::abs(cz), std::abs(dz)));
     const double widest = max3(mx, my, mz);
-    const double bound = 1.2466136531027298e-13 * mx * my * mz * (widest * widest);
-    if (min3(mx, my, mz) >= 1e-58 && widest < 1e61) {
+    const double bound = kSphereError * mx * my * mz * (widest * widest);
+    if (min3(mx, my, mz) >= kSphereLeast && widest < kSphereMost) {
         if (det > bound) return 1;
         if (det < -bound) return -1;
     }

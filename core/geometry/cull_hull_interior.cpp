@@ -27,6 +27,9 @@ constexpr std::size_t kSquares = 24;
 // A point counts as inside only by this margin, a share of the body's reach: far above rounding.
 constexpr double kMargin = 1e-6;
 
+// A body with a face closer to its centre than this share of the distance to a corner is too flat to use.
+constexpr double kFlattestBody = 1e-9;
+
 // Evenly spread over the sphere: a Fibonacci spiral, whose steps are the golden angle.
 Point3 direction(int i) {
     const double z = 1.0 - (2.0 * i + 1.0) / kDirections;
@@ -83,8 +86,8 @@ Body spannedBy(const PointCloud& extreme) {
         for (std::size_t i = 0; i < 3; ++i) corners[i] = body.toBody(face[i]);
         const Point3 normal = cross(corners[1] - corners[0], corners[2] - corners[0]);
         const double height = dot(normal, corners[0]);
-        // A face this close to the centre: the body is too flat to use.
-        if (!(height > 1e-9 * length(normal) * length(corners[0]))) return {body.centre, body.stretch, {}};
+        if (!(height > kFlattestBody * length(normal) * length(corners[0])))
+            return {body.centre, body.stretch, {}};
         body.faces.push_back((1.0 / height) * normal);
     }
     return body;

@@ -6,6 +6,13 @@
 
 namespace shapedb {
 
+namespace {
+
+// Shorter draws are repeated: dividing by their length would magnify rounding.
+constexpr double kShortestQuaternion = 1e-6;
+
+}  // namespace
+
 Point3 rotate(const Matrix3& r, const Point3& v) {
     return {r[0][0] * v.x + r[0][1] * v.y + r[0][2] * v.z, r[1][0] * v.x + r[1][1] * v.y + r[1][2] * v.z,
             r[2][0] * v.x + r[2][1] * v.y + r[2][2] * v.z};
@@ -60,7 +67,7 @@ Motion compose(const Motion& second, const Motion& first) {
 Matrix3 randomRotation(Random& random) {
     // Four independent normals have a direction uniform on the unit 3-sphere.
     double w = 0.0, x = 0.0, y = 0.0, z = 0.0, norm = 0.0;
-    while (!(norm > 1e-6)) {
+    while (!(norm > kShortestQuaternion)) {
         w = random.normal();
         x = random.normal();
         y = random.normal();

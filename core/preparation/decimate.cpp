@@ -21,6 +21,7 @@ constexpr double kMaxCell = 2.5;
 constexpr int kMaxSteps = 32;
 constexpr int kSecantSteps = 4;
 constexpr double kAcceptedShare = 0.9;
+constexpr double kAimedShare = 0.96;
 
 using CellAndPoint = std::pair<std::uint64_t, std::uint32_t>;  // cell, point
 
@@ -112,7 +113,7 @@ Result<DecimatedPoints> decimateOrThrow(const PointCloud& points, std::size_t ta
         }
         // Aim a little below the target. Where nearly every point has a cell of its own, the count
         // hardly depends on the size and such steps creep, so after a few every other one bisects.
-        const double guess = cell * std::sqrt(share / 0.96);
+        const double guess = cell * std::sqrt(share / kAimedShare);
         const bool bisect = step >= kSecantSteps && step % 2 == 0;
         // Bisects the logarithm: cell sizes span six decades.
         cell = !bisect && guess > fine && guess < coarse ? guess : std::sqrt(fine * coarse);

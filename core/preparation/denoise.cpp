@@ -131,6 +131,10 @@ struct LocalFrame {
     Eigen::Matrix3d axes;  // columns, by rising spread: the first is the normal
 };
 
+// Below this share of the largest pivot, the neighbours do not determine a quadric: they lie along a line,
+// say.
+constexpr double kSmallestPivot = 1e-4;
+
 // Height along the normal, above the origin (the point to be moved), of the fitted quadric; of the plane
 // where there are too few neighbours for a quadric.
 double heightOfFit(const std::vector<Eigen::Vector3d>& offsets, const std::vector<double>& weights,
@@ -151,8 +155,7 @@ double heightOfFit(const std::vector<Eigen::Vector3d>& offsets, const std::vecto
     }
     const Eigen::LDLT<Eigen::Matrix<double, 6, 6>> factors(normalMatrix);
     const auto pivots = factors.vectorD();
-    // Neighbours that lie along a line, say, do not determine a quadric.
-    if (!(pivots.minCoeff() > 1e-4 * pivots.maxCoeff())) return planeHeight;
+    if (!(pivots.minCoeff() > kSmallestPivot * pivots.maxCoeff())) return planeHeight;
     return factors.solve(right)[0];
 }
 

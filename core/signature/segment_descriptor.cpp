@@ -15,6 +15,9 @@ namespace {
 constexpr double kSmallestSize = -10.0;  // log2(kSmallestLength)
 static_assert(kSmallestLength == 1.0 / 1024.0, "kSmallestSize is its logarithm");
 
+// In steps of a stored share; allows for the float's rounding.
+constexpr double kFloatSlack = 0.01;
+
 float logLength(double length) { return static_cast<float>(std::log2(std::max(length, kSmallestLength))); }
 
 // Rounds halves away from zero, like std::lround, which is not inlined.
@@ -77,9 +80,9 @@ PackedSegmentDescriptor packed(const SegmentDescriptor& segment) noexcept {
     for (std::size_t i = 0; i < 3; ++i) {
         result.position[i] = nearest<std::int16_t>(segment.position[i] * kPositionSteps, -32767.0, 32767.0);
     }
-    // Rounded down, so that shares do not add up to more than the whole; 0.01 allows for the float's
-    // rounding.
-    result.share = nearest<std::uint16_t>(std::floor(segment.share * kShareSteps + 0.01), 1.0, kShareSteps);
+    // Rounded down, so that shares do not add up to more than the whole.
+    result.share =
+        nearest<std::uint16_t>(std::floor(segment.share * kShareSteps + kFloatSlack), 1.0, kShareSteps);
     for (std::size_t i = 0; i < 4; ++i) {
         result.size[i] = nearest<std::uint8_t>((segment.size[i] - kSmallestSize) * kSizeSteps, 0.0, 255.0);
     }

@@ -20,11 +20,15 @@ struct EvidenceWeight {
     double reliable;
     double unreliable;
 };
+constexpr EvidenceWeight kInsideWeight{1.0, 0.01};
+constexpr EvidenceWeight kSurfaceWeight{1.0, 0.5};
+constexpr EvidenceWeight kOutlineWeight{0.5, 1.0};
+
 constexpr EvidenceWeight weightOf(Evidence evidence) {
     switch (evidence) {
-        case Evidence::kInside: return {1.0, 0.01};
-        case Evidence::kSurface: return {1.0, 0.5};
-        case Evidence::kOutline: return {0.5, 1.0};
+        case Evidence::kInside: return kInsideWeight;
+        case Evidence::kSurface: return kSurfaceWeight;
+        case Evidence::kOutline: return kOutlineWeight;
     }
     return {1.0, 1.0};
 }
@@ -38,6 +42,11 @@ constexpr double kPartsWeight = 2.0;
 
 // The distance, in units of what unrelated shapes differ by, at which the score is 0.5.
 constexpr double kHalfWay = 0.5;
+
+// How far the bounds give way to rounding. Near 1, a rounding difference in the score is one of 1e-8 in the
+// distance.
+constexpr double kRelativeSlack = 1e-9;
+constexpr double kDistanceSlack = 1e-7;
 
 double scoreOf(double distance) {
     const double d = distance / kHalfWay;
@@ -131,14 +140,14 @@ LevelWeights levelWeights(std::uint8_t qualityA, std::uint8_t qualityB) {
 }
 
 double maxDistanceForScore(double score) {
-    // Near 1, a rounding difference in the score is one of 1e-8 in the distance.
-    return score > 0.0 ? kHalfWay * std::sqrt(std::max(0.0, 1.0 / score - 1.0)) * (1.0 + 1e-9) + 1e-7
+    return score > 0.0 ? kHalfWay * std::sqrt(std::max(0.0, 1.0 / score - 1.0)) * (1.0 + kRelativeSlack) +
+                             kDistanceSlack
                        : INFINITY;
 }
 
 double maxScoreAtDistance(double distance) {
     // At distance 0 it may be the shape itself.
-    return distance > 0.0 ? std::min(1.0, scoreOf(distance) * (1.0 + 1e-9)) : 1.0;
+    return distance > 0.0 ? std::min(1.0, scoreOf(distance) * (1.0 + kRelativeSlack)) : 1.0;
 }
 
 double octavesBetween(double scaleA, double scaleB) {
