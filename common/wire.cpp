@@ -47,6 +47,7 @@ void toProto(const Segmentation& segmentation, v1::SegmentationReport* out) {
     out->set_points_used(segmentation.sites.size());
     out->set_duplicates(segmentation.duplicates);
     out->set_outliers(segmentation.outliers);
+    out->set_outlier_clusters(segmentation.outlierClusters);
     out->set_quality(segmentation.quality);
     out->set_interior_source(toProto(segmentation.interiorSource));
     out->set_angle_degrees(segmentation.angleDegrees);

@@ -163,6 +163,7 @@ SegmentationReport fromWire(const v1::SegmentationReport& from) {
     to.pointsUsed = from.points_used();
     to.duplicates = from.duplicates();
     to.outliers = from.outliers();
+    to.outlierClusters = from.outlier_clusters();
     if (from.has_quality()) to.quality = from.quality();
     to.interiorSource = wire::fromProto(from.interior_source()).value_or(InteriorSource::kWalk);
     to.angleDegrees = from.angle_degrees();

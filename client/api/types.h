@@ -179,7 +179,8 @@ struct SegmentationReport {
     std::uint64_t points = 0;
     std::uint64_t pointsUsed = 0;  ///< without outliers and duplicates, after averaging and thinning
     std::uint64_t duplicates = 0;
-    std::uint64_t outliers = 0;  ///< points dropped
+    std::uint64_t outliers = 0;         ///< points dropped
+    std::uint64_t outlierClusters = 0;  ///< separate groups of nine points or more among them
     /// How certain the interior is, [0, 1]. InteriorMethod::kWalk does not assess it: always 1.
     double quality = 1.0;
     InteriorSource interiorSource = InteriorSource::kWalk;

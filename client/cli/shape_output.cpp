@@ -18,6 +18,8 @@ using nlohmann::json;
 
 namespace {
 
+constexpr double kManyOutliers = 0.05;  // of the points: worth a warning
+
 /// Pairs listed one by one; the rest is counted.
 constexpr std::size_t kListedPairs = 3;
 /// Pairs that contribute less of the similarity are not worth a line.
@@ -145,6 +147,7 @@ json toJson(const client::SegmentationReport& report) {
             {"duplicates", report.duplicates},
             {"outliers", report.outliers},
             {"strays", report.outliers},  // the former name
+            {"outlier_clusters", report.outlierClusters},
             {"quality", report.quality},
             {"interior_source", interiorSourceName(report.interiorSource)},
             {"angle_degrees", report.angleDegrees},
@@ -163,7 +166,12 @@ std::string preparationText(const client::SegmentationReport& report) {
     if (report.pointsUsed == report.points) return {};
     std::vector<std::string> steps;
     if (report.outliers > 0) {
-        steps.push_back(formatCount(report.outliers, "outlier", "outliers") + " dropped");
+        std::string step = formatCount(report.outliers, "outlier", "outliers") + " dropped";
+        if (report.outlierClusters > 0) {
+            step += " (with " + formatCount(report.outlierClusters, "separate cluster", "separate clusters") +
+                    ")";
+        }
+        steps.push_back(std::move(step));
     }
     if (report.duplicates > 0) {
         steps.push_back(formatCount(report.duplicates, "duplicate", "duplicates") + " merged");
@@ -199,7 +207,13 @@ std::string interiorText(const client::SegmentationReport& report, double scale)
         const std::string noise = "noise about " + formatPercent(report.noise / scale) + " of the size";
         text += report.interiorSource == InteriorSource::kWalk ? ", " + noise : " (" + noise + ")";
     }
-    return text + "\n" + qualityText(report.quality);
+    text += "\n" + qualityText(report.quality);
+    const double dropped = static_cast<double>(report.outliers) / static_cast<double>(report.points);
+    if (report.points > 0 && dropped > kManyOutliers) {
+        text += formatFixed(100.0 * dropped, 0) +
+                " % of the points were dropped as outliers: parts of the shape may be missing\n";
+    }
+    return text;
 }
 
 json toJson(const client::Explanation& explanation) {

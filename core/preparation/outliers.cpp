@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <iterator>
 #include <new>
 #include <string>
+#include <utility>
 
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
@@ -26,6 +29,9 @@ constexpr double kHazeFlatness = 0.25;
 constexpr double kLinkInReaches = 3.0;     // of the common reach
 constexpr double kOwnLinkInReaches = 1.5;  // of the mean reach of the two ends
 constexpr double kSmallGroupShare = 0.01;
+constexpr double kRareShare = 0.05;         // of the points: groups of like size hold less
+constexpr std::size_t kFewestOfABody = 24;  // points; a smaller group shows no surface
+constexpr std::size_t kCluster = 9;         // points; fewer are stray points, not a cluster
 
 // Each point's nearest neighbours, without itself.
 struct Surroundings {
@@ -82,9 +88,35 @@ bool liesInHaze(const PointCloud& points, const NeighbourIndex& index, const Poi
     return across > kHazeFlatness * std::sqrt(std::max(0.0, solver.eigenvalues()[1]));
 }
 
+// Which sizes of groups are those of debris: small, and rare among all groups.
+class Debris {
+  public:
+    /// `sizes`: of all groups, in any order.
+    Debris(std::vector<std::uint32_t> sizes, std::size_t points)
+        : sizes_(std::move(sizes)), points_(static_cast<double>(points)) {
+        std::sort(sizes_.begin(), sizes_.end());
+        before_.push_back(0);
+        for (const std::uint32_t size : sizes_) before_.push_back(before_.back() + size);
+    }
+
+    bool holds(std::uint32_t size) const {
+        if (static_cast<double>(size) >= kSmallGroupShare * points_) return false;
+        if (size < kFewestOfABody) return true;
+        const auto rank = [&](auto at) { return static_cast<std::size_t>(at - sizes_.begin()); };
+        const std::size_t from = rank(std::lower_bound(sizes_.begin(), sizes_.end(), (size + 1) / 2));
+        const std::size_t to = rank(std::upper_bound(sizes_.begin(), sizes_.end(), 2 * size));
+        return static_cast<double>(before_[to] - before_[from]) < kRareShare * points_;
+    }
+
+  private:
+    std::vector<std::uint32_t> sizes_;   // ascending
+    std::vector<std::uint64_t> before_;  // points in all smaller groups
+    double points_;
+};
+
 // A group: points connected by short links between neighbours.
-void markSmallGroups(const PointCloud& points, const Surroundings& around,
-                     std::vector<std::uint8_t>& outlier) {
+void markDebris(const PointCloud& points, const Surroundings& around, Outliers& found) {
+    std::vector<std::uint8_t>& outlier = found.isOutlier;
     DisjointSets groups(points.size());
     for (std::uint32_t i = 0; i < points.size(); ++i) {
         for (std::size_t k = 0; !outlier[i] && k < kNeighbours; ++k) {
@@ -98,33 +130,39 @@ void markSmallGroups(const PointCloud& points, const Surroundings& around,
     std::vector<std::uint32_t> size(points.size(), 0);
     // An outlier is joined to nothing: it neither bridges two groups nor makes one large.
     for (std::uint32_t i = 0; i < points.size(); ++i) ++size[groups.find(i)];
-    const double small = kSmallGroupShare * static_cast<double>(points.size());
+    std::vector<std::uint32_t> sizes;
+    std::copy_if(size.begin(), size.end(), std::back_inserter(sizes), [](std::uint32_t n) { return n > 0; });
+    const Debris debris(std::move(sizes), points.size());
     for (std::uint32_t i = 0; i < points.size(); ++i) {
-        if (static_cast<double>(size[groups.find(i)]) < small) outlier[i] = 1;
+        if (!debris.holds(size[groups.find(i)])) continue;
+        outlier[i] = 1;
+        // Each group has one representative.
+        if (groups.find(i) == i && size[i] >= kCluster) ++found.clusters;
     }
 }
 
-Result<std::vector<std::uint8_t>> findOutliersOrThrow(const PointCloud& points, const NeighbourIndex& index,
-                                                      double ratio, const RunContext& context) {
-    std::vector<std::uint8_t> outlier(points.size(), 0);
-    if (points.size() <= kSurroundings) return outlier;
+Result<Outliers> findOutliersOrThrow(const PointCloud& points, const NeighbourIndex& index, double ratio,
+                                     const RunContext& context) {
+    Outliers outliers;
+    outliers.isOutlier.assign(points.size(), 0);
+    if (points.size() <= kSurroundings) return outliers;
     const auto around = measureReaches(points, index, context);
     RETURN_IF_ERROR(around);
     std::vector<Neighbour> found;
     for (std::size_t i = 0; i < points.size(); ++i) {
         const bool farFromAll = around->reach[i] > kHazeReach * around->common;
-        outlier[i] =
-            standsOff(*around, i, ratio) || (farFromAll && liesInHaze(points, index, points[i], found)) ? 1
-                                                                                                        : 0;
+        const bool stray =
+            standsOff(*around, i, ratio) || (farFromAll && liesInHaze(points, index, points[i], found));
+        outliers.isOutlier[i] = stray ? 1 : 0;
     }
-    markSmallGroups(points, *around, outlier);
-    return outlier;
+    markDebris(points, *around, outliers);
+    return outliers;
 }
 
 }  // namespace
 
-Result<std::vector<std::uint8_t>> findOutliers(const PointCloud& points, const NeighbourIndex& index,
-                                               double ratio, const RunContext& context) {
+Result<Outliers> findOutliers(const PointCloud& points, const NeighbourIndex& index, double ratio,
+                              const RunContext& context) {
     try {
         return findOutliersOrThrow(points, index, ratio, context);
     } catch (const std::bad_alloc&) {

@@ -11,18 +11,23 @@
 
 namespace shapedb {
 
-/// Per point 1 when it is an outlier. With the reach of a point its distance to its eighth nearest
-/// neighbour, a point is an outlier when
+struct Outliers {
+    std::vector<std::uint8_t> isOutlier;  ///< for each point: 1 or 0
+    std::uint64_t clusters = 0;           ///< separate groups of nine points or more among the outliers
+};
+
+/// With the reach of a point its distance to its eighth nearest neighbour, a point is an outlier when
 /// - its reach exceeds `ratio` times the mean reach of those eight: it stands off a surface; or
 /// - its reach exceeds 2.5 times that of nine in ten points, and its neighbours surround it instead
 ///   of lying along a surface: it belongs to a haze; or
-/// - it belongs to a group of less than 1 % of the points that no short link joins to the rest.
-/// Sparsely sampled regions, thin parts and larger separate parts are kept.
+/// - it belongs to a group that no short link joins to the rest, and that is small and rare: less than 1 %
+///   of the points, and either fewer than 24 points, or less than 5 % of the points together with all
+///   groups of half to twice its size.
+/// Sparsely sampled regions, thin parts, larger separate parts and the many equal parts of a set are kept.
 ///
 /// `index` must hold `points`. The pose does not matter (up to rounding).
 /// Errors: kCancelled, kDeadlineExceeded, kOutOfMemory.
-[[nodiscard]] Result<std::vector<std::uint8_t>> findOutliers(const PointCloud& points,
-                                                             const NeighbourIndex& index, double ratio,
-                                                             const RunContext& context = {});
+[[nodiscard]] Result<Outliers> findOutliers(const PointCloud& points, const NeighbourIndex& index,
+                                            double ratio, const RunContext& context = {});
 
 }  // namespace shapedb

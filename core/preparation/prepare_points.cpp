@@ -53,12 +53,13 @@ struct Preparation {
 
 Result<void> leaveOutOutliers(Preparation& work, double ratio, const RunContext& context) {
     const PointCloud& sites = work.prepared.sites;
-    const auto outlier = findOutliers(sites, work.neighbours(), ratio, context);
-    RETURN_IF_ERROR(outlier);
+    const auto found = findOutliers(sites, work.neighbours(), ratio, context);
+    RETURN_IF_ERROR(found);
+    work.prepared.outlierClusters += found->clusters;
     std::vector<std::uint32_t> rank(sites.size(), kNoSite);
     PointCloud kept;
     for (std::size_t i = 0; i < sites.size(); ++i) {
-        if ((*outlier)[i]) continue;
+        if (found->isOutlier[i]) continue;
         rank[i] = static_cast<std::uint32_t>(kept.size());
         kept.push_back(sites[i]);
     }

@@ -21,11 +21,12 @@ struct PreparedPoints {
     PointCloud sites;  ///< distinct, in the unit frame, in lexicographic order
     Frame frame;
     std::vector<std::uint32_t> siteOfPoint;  ///< input point -> index into `sites`, or kNoSite
-    std::uint64_t duplicates = 0;  ///< input points that repeated another; not counted (0) when the scan
-                                   ///< was decimated by gridScan
-    std::uint64_t outliers = 0;    ///< input points left out
-    NoiseEstimate noise;           ///< before smoothing, unit frame; zero when not measured
-    double spacing = 0.0;          ///< the sites' own, unit frame; zero when not measured
+    std::uint64_t duplicates = 0;       ///< input points that repeated another; not counted (0) when the scan
+                                        ///< was decimated by gridScan
+    std::uint64_t outliers = 0;         ///< input points left out
+    std::uint64_t outlierClusters = 0;  ///< separate groups of nine sites or more among them
+    NoiseEstimate noise;                ///< before smoothing, unit frame; zero when not measured
+    double spacing = 0.0;               ///< the sites' own, unit frame; zero when not measured
 };
 
 /// Runs the enabled steps, in this order: sanitise, decimate, outliers, smooth, thin. `begin` is called

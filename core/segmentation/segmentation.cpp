@@ -24,6 +24,9 @@ namespace shapedb {
 
 namespace {
 
+// A larger share of outliers makes the interior less certain: what was left out may be part of the shape.
+constexpr double kOrdinaryOutliers = 0.05;
+
 using Clock = std::chrono::steady_clock;
 
 double secondsSince(Clock::time_point start) {
@@ -196,6 +199,7 @@ Result<PreparedPoints> prepare(const PointCloud& points, const SegmentationOptio
     if (!prepared) return prepared;
     result.duplicates = prepared->duplicates;
     result.outliers = prepared->outliers;
+    result.outlierClusters = prepared->outlierClusters;
     result.noise = prepared->noise.sigma * prepared->frame.unit;
     result.siteOfPoint = std::move(prepared->siteOfPoint);
     return prepared;
@@ -212,6 +216,13 @@ HilbertSortedCloud sortSites(PointCloud sites, std::vector<std::uint32_t>& siteO
     return sorted;
 }
 
+// 1 while few points were left out, 0 when all were.
+double shareTrusted(const Segmentation& result) {
+    const double share =
+        static_cast<double>(result.outliers) / static_cast<double>(result.siteOfPoint.size());
+    return 1.0 - std::max(0.0, share - kOrdinaryOutliers) / (1.0 - kOrdinaryOutliers);
+}
+
 // Per tetrahedron 1 when it is interior; records in the result how it was found.
 Result<std::vector<std::uint8_t>> findInterior(const PointCloud& sites, const std::vector<std::uint8_t>& big,
                                                const std::vector<double>& spacings,
@@ -225,7 +236,7 @@ Result<std::vector<std::uint8_t>> findInterior(const PointCloud& sites, const st
     RETURN_IF_ERROR(interior);
     result.interiorSource = interior->source;
     result.angleDegrees = interior->angleDegrees;
-    result.quality = interior->quality;
+    result.quality = interior->quality * shareTrusted(result);
     return std::move(interior->inside);
 }
 

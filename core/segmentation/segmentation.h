@@ -58,12 +58,13 @@ struct Segmentation {
     /// that no interior tetrahedron touches do not count.
     double size = 0.0;
     InteriorSource interiorSource = InteriorSource::kWalk;
-    double quality = 1.0;       ///< how far the interior can be trusted, [0, 1]: AdaptiveInterior; kWalk: 1
+    double quality = 1.0;       ///< how far the interior can be trusted, [0, 1]; kWalk: 1
     double angleDegrees = 0.0;  ///< deep angle of the walk; 0 for other sources
     double noise = 0.0;  ///< estimated standard deviation before smoothing, scan units; 0: not measured
 
-    std::uint64_t duplicates = 0;  ///< input points that repeated another; see PreparedPoints
-    std::uint64_t outliers = 0;    ///< input points left out
+    std::uint64_t duplicates = 0;       ///< input points that repeated another; see PreparedPoints
+    std::uint64_t outliers = 0;         ///< input points left out
+    std::uint64_t outlierClusters = 0;  ///< separate groups of points among them; see PreparedPoints
     std::uint64_t bigBalls = 0;
     std::uint64_t interiorTetrahedra = 0;
     std::uint64_t maxima = 0;  ///< segments before merging

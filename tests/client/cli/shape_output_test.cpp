@@ -135,7 +135,10 @@ TEST(ShapeOutput, PreparationTextAccountsForUnusedPoints) {
     report.pointsUsed = 500;
     EXPECT_EQ(preparationText(report),
               "500 points used: 10 outliers dropped, 1 duplicate merged, the rest averaged and thinned\n");
-    report.outliers = report.duplicates = 0;
+    report.outlierClusters = 2;
+    EXPECT_NE(preparationText(report).find("10 outliers dropped (with 2 separate clusters), 1 dup"),
+              std::string::npos);
+    report.outliers = report.duplicates = report.outlierClusters = 0;
     EXPECT_EQ(preparationText(report), "500 points used: averaged and thinned\n");
     report.duplicates = 500;
     EXPECT_EQ(preparationText(report), "500 points used: 500 duplicates merged\n");
@@ -155,6 +158,7 @@ TEST(ShapeOutput, ReportInJson) {
     const nlohmann::json document = toJson(report);
     EXPECT_EQ(document["outliers"], 3);
     EXPECT_EQ(document["strays"], 3) << "the former name stays";
+    EXPECT_EQ(document["outlier_clusters"], 0);
     EXPECT_EQ(document["quality"], 0.25);
     EXPECT_EQ(document["interior_source"], "thickened");
     EXPECT_EQ(document["angle_degrees"], 0.0);

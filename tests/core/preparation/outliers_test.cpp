@@ -25,7 +25,7 @@ PointCloud sphere(std::size_t count, Random& random) {
 
 std::vector<std::uint8_t> outliersOf(const PointCloud& points) {
     const auto outliers = findOutliers(points, NeighbourIndex(points), kRatio);
-    return outliers ? *outliers : std::vector<std::uint8_t>{};
+    return outliers ? outliers->isOutlier : std::vector<std::uint8_t>{};
 }
 
 std::size_t count(const std::vector<std::uint8_t>& outliers, std::size_t begin, std::size_t end) {
@@ -94,6 +94,57 @@ TEST(FindOutliers, KeepsALargerSeparatePart) {
     PointCloud points = sphere(5000, random);
     for (const Point3& p : sphere(300, random)) points.push_back({5.0 + 0.2 * p.x, 0.2 * p.y, 0.2 * p.z});
     EXPECT_LE(count(outliersOf(points), 5000, points.size()), 2u);
+}
+
+// `bodies` spheres on a grid, far apart, of about `size` points each (a tenth more or less).
+PointCloud manyBodies(int bodies, std::size_t size, Random& random) {
+    PointCloud points;
+    for (int i = 0; i < bodies; ++i) {
+        const Point3 centre{3.0 * (i % 10), 3.0 * (i / 10 % 10), 3.0 * (i / 100)};
+        const std::size_t count = size - size / 10 + random.below(size / 5 + 1);
+        for (const Point3& p : sphere(count, random)) points.push_back(centre + 0.5 * p);
+    }
+    return points;
+}
+
+TEST(FindOutliers, KeepsManySmallBodiesOfLikeSize) {
+    Random random(7);
+    for (const int bodies : {20, 60, 100, 150, 300}) {
+        for (const std::size_t points : {6000u, 20000u}) {
+            const std::size_t size = points / static_cast<std::size_t>(bodies);
+            const PointCloud cloud = manyBodies(bodies, size, random);
+            const auto found = findOutliers(cloud, NeighbourIndex(cloud), kRatio).value();
+            if (size < 40) continue;
+            EXPECT_LE(count(found.isOutlier, 0, cloud.size()), cloud.size() / 100) << bodies << " " << size;
+            EXPECT_EQ(found.clusters, 0u) << bodies << " " << size;
+        }
+    }
+}
+
+TEST(FindOutliers, DropsAFewSmallBodiesBesideALargeOneAndCountsThem) {
+    Random random(8);
+    PointCloud points = manyBodies(3, 60, random);
+    const std::size_t debris = points.size();
+    for (const Point3& p : sphere(9800, random)) points.push_back(Point3{0, 0, 20} + 4.0 * p);
+    const auto found = findOutliers(points, NeighbourIndex(points), kRatio).value();
+    EXPECT_EQ(found.clusters, 3u);
+    EXPECT_GE(count(found.isOutlier, 0, debris), debris - 2);
+    EXPECT_LE(count(found.isOutlier, debris, points.size()), 5u);
+}
+
+TEST(FindOutliers, ManyScatteredClumpsOfAFewPointsAreNoBodies) {
+    Random random(9);
+    PointCloud points = sphere(9000, random);
+    const std::size_t clean = points.size();
+    for (int clump = 0; clump < 100; ++clump) {
+        const Point3 centre{random.uniform(2, 6), random.uniform(2, 6), random.uniform(2, 6)};
+        for (int i = 0; i < 10; ++i) {
+            points.push_back(centre + 0.01 * Point3{random.normal(), random.normal(), random.normal()});
+        }
+    }
+    const auto outliers = outliersOf(points);
+    EXPECT_GE(count(outliers, clean, points.size()), 990u);
+    EXPECT_LE(count(outliers, 0, clean), 5u);
 }
 
 TEST(FindOutliers, DoesNotDependOnThePose) {
