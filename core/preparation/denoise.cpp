@@ -96,9 +96,9 @@ void measureSpread(const PointCloud& points, std::uint32_t centre, const std::ve
     }
 }
 
-Spreads measureSpreads(const PointCloud& points, const NeighbourIndex& index) {
+Spreads measureSpreads(const PointCloud& points, const NeighbourIndex& index, std::size_t mostNeighbours) {
     Spreads spreads;
-    while (spreads.sizes < kNeighbourhoods.size() && kNeighbourhoods[spreads.sizes] <= points.size() / 2) {
+    while (spreads.sizes < kNeighbourhoods.size() && kNeighbourhoods[spreads.sizes] <= mostNeighbours) {
         ++spreads.sizes;
     }
     if (spreads.sizes == 0) return spreads;
@@ -210,8 +210,9 @@ Result<PointCloud> smoothOnce(const PointCloud& points, const NeighbourIndex& in
 
 }  // namespace
 
-NoiseEstimate estimateNoise(const PointCloud& points, const NeighbourIndex& index) {
-    const Spreads spreads = measureSpreads(points, index);
+NoiseEstimate estimateNoise(const PointCloud& points, const NeighbourIndex& index,
+                            std::size_t mostNeighbours) {
+    const Spreads spreads = measureSpreads(points, index, std::min(mostNeighbours, points.size()));
     if (spreads.sizes == 0) return {};
     std::vector<double> across;
     std::vector<double> along;

@@ -1,6 +1,8 @@
 // Estimating the noise of a scan, and moving its points back to their surface.
 #pragma once
 
+#include <cstddef>
+
 #include "core/base/error.h"
 #include "core/base/run_context.h"
 #include "core/geometry/neighbours.h"
@@ -18,11 +20,15 @@ struct NoiseEstimate {
     double spacing = 0.0;
 };
 
+/// `mostNeighbours`: the largest neighbourhood to look at. It must not hold most of a separate body, whose
+/// thickness would be taken for noise.
+///
 /// An average over the shape, not a bound; noise above about a quarter of a part's thickness cannot be
 /// told from thickness. 0 with fewer than 16 points or so. The pose does not matter (up to rounding).
 ///
 /// `index` must hold `points`.
-[[nodiscard]] NoiseEstimate estimateNoise(const PointCloud& points, const NeighbourIndex& index);
+[[nodiscard]] NoiseEstimate estimateNoise(const PointCloud& points, const NeighbourIndex& index,
+                                          std::size_t mostNeighbours);
 
 /// Moves each point along the local normal onto a quadric fitted to its neighbours (moving least
 /// squares), by at most three sigma. Neighbourhoods reach `reachInSigmas` times the noise and hold

@@ -108,6 +108,12 @@ class Debris {
         return static_cast<double>(before_[to] - before_[from]) < kRareShare * points_;
     }
 
+    /// Size of the group that the median point belongs to, points counted by size of their groups.
+    std::size_t medianSize() const {
+        const auto at = std::lower_bound(before_.begin() + 1, before_.end(), (before_.back() + 1) / 2);
+        return sizes_[static_cast<std::size_t>(at - before_.begin()) - 1];
+    }
+
   private:
     std::vector<std::uint32_t> sizes_;   // ascending
     std::vector<std::uint64_t> before_;  // points in all smaller groups
@@ -133,6 +139,7 @@ void markDebris(const PointCloud& points, const Surroundings& around, Outliers& 
     std::vector<std::uint32_t> sizes;
     std::copy_if(size.begin(), size.end(), std::back_inserter(sizes), [](std::uint32_t n) { return n > 0; });
     const Debris debris(std::move(sizes), points.size());
+    found.bodyPoints = debris.medianSize();
     for (std::uint32_t i = 0; i < points.size(); ++i) {
         if (!debris.holds(size[groups.find(i)])) continue;
         outlier[i] = 1;
@@ -145,6 +152,7 @@ Result<Outliers> findOutliersOrThrow(const PointCloud& points, const NeighbourIn
                                      const RunContext& context) {
     Outliers outliers;
     outliers.isOutlier.assign(points.size(), 0);
+    outliers.bodyPoints = points.size();
     if (points.size() <= kSurroundings) return outliers;
     const auto around = measureReaches(points, index, context);
     RETURN_IF_ERROR(around);

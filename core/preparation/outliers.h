@@ -1,6 +1,7 @@
 // Finding points that lie off every surface.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -14,6 +15,7 @@ namespace shapedb {
 struct Outliers {
     std::vector<std::uint8_t> isOutlier;  ///< for each point: 1 or 0
     std::uint64_t clusters = 0;           ///< separate groups of nine points or more among the outliers
+    std::size_t bodyPoints = 0;  ///< half of the points belong to separate groups of at least this many
 };
 
 /// With the reach of a point its distance to its eighth nearest neighbour, a point is an outlier when

@@ -35,6 +35,7 @@ void follow(std::vector<std::uint32_t>& siteOfPoint, const std::vector<std::uint
 struct Preparation {
     PreparedPoints prepared;
     std::optional<NeighbourIndex> index;
+    std::size_t bodyPoints = SIZE_MAX;  // of a typical separate body, as far as known
 
     const NeighbourIndex& neighbours() {
         if (!index) index.emplace(prepared.sites);
@@ -56,6 +57,7 @@ Result<void> leaveOutOutliers(Preparation& work, double ratio, const RunContext&
     const auto found = findOutliers(sites, work.neighbours(), ratio, context);
     RETURN_IF_ERROR(found);
     work.prepared.outlierClusters += found->clusters;
+    work.bodyPoints = found->bodyPoints;
     std::vector<std::uint32_t> rank(sites.size(), kNoSite);
     PointCloud kept;
     for (std::size_t i = 0; i < sites.size(); ++i) {
@@ -69,7 +71,10 @@ Result<void> leaveOutOutliers(Preparation& work, double ratio, const RunContext&
 
 Result<void> smoothNoise(Preparation& work, double reach, const RunContext& context) {
     const PointCloud& sites = work.prepared.sites;
-    work.prepared.noise = estimateNoise(sites, work.neighbours());
+    // Half of a single body shows little curvature; of many small ones even that is too much.
+    const bool manyBodies = work.bodyPoints < sites.size() / 2;
+    work.prepared.noise =
+        estimateNoise(sites, work.neighbours(), manyBodies ? work.bodyPoints / 4 : sites.size() / 2);
     auto moved = smooth(sites, work.neighbours(), work.prepared.noise, reach, context);
     RETURN_IF_ERROR(moved);
     MergedPoints merged = mergeDuplicates(*moved);
@@ -128,7 +133,8 @@ Result<PreparedPoints> preparePoints(const PointCloud& points, const Preparation
     RETURN_IF_ERROR(begin("sanitise"));
     auto begun = sanitiseAndDecimate(points, options.decimateTo, context, begin);
     if (!begun) return begun;
-    Preparation work{std::move(*begun), std::nullopt};
+    Preparation work;
+    work.prepared = std::move(*begun);
     if (options.outlierRatio > 0.0) {
         RETURN_IF_ERROR(begin("outliers"));
         RETURN_IF_ERROR(leaveOutOutliers(work, options.outlierRatio, context));

@@ -33,7 +33,9 @@ double radialError(const PointCloud& points) {
     return std::sqrt(sum / static_cast<double>(points.size()));
 }
 
-NoiseEstimate estimateOf(const PointCloud& points) { return estimateNoise(points, NeighbourIndex(points)); }
+NoiseEstimate estimateOf(const PointCloud& points) {
+    return estimateNoise(points, NeighbourIndex(points), points.size() / 2);
+}
 
 TEST(EstimateNoise, FindsTheNoiseThatWasAdded) {
     for (const double sigma : {0.02, 0.04, 0.08}) {
@@ -82,7 +84,7 @@ TEST(Smooth, BringsPointsBackToTheirSurface) {
     for (const double sigma : {0.02, 0.05}) {
         const PointCloud points = noisySphere(sigma);
         const NeighbourIndex index(points);
-        const auto moved = smooth(points, index, estimateNoise(points, index), 5.0);
+        const auto moved = smooth(points, index, estimateNoise(points, index, points.size() / 2), 5.0);
         ASSERT_TRUE(moved);
         ASSERT_EQ(moved->size(), points.size());
         EXPECT_LT(radialError(*moved), 0.45 * sigma) << sigma;
@@ -95,7 +97,7 @@ TEST(Smooth, BringsPointsBackToTheirSurface) {
 TEST(Smooth, LeavesACleanScanAlone) {
     const PointCloud points = noisySphere(0.0);
     const NeighbourIndex index(points);
-    const auto moved = smooth(points, index, estimateNoise(points, index), 5.0);
+    const auto moved = smooth(points, index, estimateNoise(points, index, points.size() / 2), 5.0);
     ASSERT_TRUE(moved);
     EXPECT_EQ(*moved, points);
 }
@@ -103,7 +105,7 @@ TEST(Smooth, LeavesACleanScanAlone) {
 TEST(Smooth, MovesNoPointFartherThanThreeSigma) {
     const PointCloud points = noisySphere(0.05);
     const NeighbourIndex index(points);
-    const NoiseEstimate noise = estimateNoise(points, index);
+    const NoiseEstimate noise = estimateNoise(points, index, points.size() / 2);
     const auto moved = smooth(points, index, noise, 5.0);
     ASSERT_TRUE(moved);
     for (std::size_t i = 0; i < points.size(); ++i) {

@@ -1,9 +1,12 @@
 #include "core/preparation/prepare_points.h"
 
+#include <array>
+#include <cstdint>
 #include <string>
 
 #include <gtest/gtest.h>
 
+#include "core/base/random.h"
 #include "core/preparation/sanitise.h"
 #include "core/synthetic/named_shapes.h"
 #include "core/synthetic/noise.h"
@@ -34,6 +37,36 @@ Result<PreparedPoints> prepared(const PointCloud& points, const PreparationOptio
         if (stages != nullptr) stages->push_back(stage);
         return {};
     });
+}
+
+// Cubes of edge 1 in a row of rows, `perCube` points on the surface of each.
+PointCloud cubes(int count, int perCube, double noise) {
+    Random random(3);
+    PointCloud points;
+    for (int cube = 0; cube < count; ++cube) {
+        const Point3 corner{2.0 * (cube % 10), 2.0 * (cube / 10), 0.0};
+        for (int i = 0; i < perCube; ++i) {
+            std::array<double, 3> at = {random.uniform(0, 1), random.uniform(0, 1), random.uniform(0, 1)};
+            at[random.below(3)] = static_cast<double>(random.below(2));
+            points.push_back(corner + Point3{at[0], at[1], at[2]});
+        }
+    }
+    EXPECT_TRUE(addGaussianNoise(points, noise, 4));
+    return points;
+}
+
+TEST(PreparePoints, ThicknessOfSmallBodiesIsNotTakenForNoise) {
+    PreparationOptions options = everything();
+    options.decimateTo = 20000;
+    for (const int perCube : {100, 200, 400}) {
+        for (const double noise : {0.0, 0.0003}) {
+            const auto result = prepared(cubes(100, perCube, noise), options);
+            ASSERT_TRUE(result);
+            EXPECT_LT(result->outliers, static_cast<std::uint64_t>(perCube)) << perCube << " " << noise;
+            // Of the edge: the smallest neighbourhoods see the edges.
+            EXPECT_LT(result->noise.sigma * result->frame.unit, 0.08) << perCube << " " << noise;
+        }
+    }
 }
 
 TEST(PreparePoints, OnlySanitisesByDefault) {
