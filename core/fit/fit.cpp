@@ -1,0 +1,222 @@
+#include "core/fit/fit.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <new>
+#include <utility>
+
+#include "core/base/math.h"
+#include "core/base/return_if_error.h"
+#include "core/fit/comparison.h"
+#include "core/fit/free_axes.h"
+#include "core/fit/hypotheses.h"
+
+namespace shapedb {
+
+namespace {
+
+// Stages: many poses by a few points, fewer by more points, and so on. Widths are shares of the query's
+// diagonal.
+constexpr std::size_t kPromising = 240;
+constexpr std::size_t kPromisingPoints = 128;
+constexpr float kPromisingWidth = 0.05f;
+constexpr double kApart = 0.05;  // poses closer than this lead to the same end
+
+struct Stage {
+    std::size_t poses;   // that enter it
+    std::size_t points;  // of each shape
+    int steps;
+    float from;  // widths of the kernel
+    float to;
+    float judged;  // width by which the poses are sorted afterwards
+    bool turns;    // whether turned poses are added then
+};
+constexpr Stage kStages[] = {
+    {40, 96, 5, 0.15f, 0.07f, 0.04f, true},
+    {12, 256, 6, 0.07f, 0.035f, 0.02f, false},
+    {4, 512, 10, 0.035f, 0.02f, 0.02f, false},
+};
+
+constexpr std::size_t kTurnedPoses = 3;
+constexpr int kTurns = 24;
+
+constexpr float kScoreWidth = 0.02f;
+constexpr float kResidualWithin = 0.06f;
+
+// Poses further apart than this differ clearly, and one whose score is at least this share of the best is as
+// good.
+constexpr double kDifferent = 0.04;
+constexpr double kAsGood = 0.97;
+
+// Automatic: a score from which on no other kind is tried, and how much better the others, which are allowed
+// to leave parts of the other shape unexplained, must be.
+constexpr double kWholeEnough = 0.85;
+constexpr double kKindHandicap = 0.05;
+
+// Of the diagonals of two shapes whose scales are kept.
+constexpr double kMostRatio = 1000.0;
+
+struct Candidate {
+    Motion pose;
+    FitView view;
+    Shares shares;
+
+    double score() const { return shares.score(); }
+};
+
+// Best first; equal scores keep their order.
+void sortByScore(std::vector<Candidate>& candidates) {
+    std::stable_sort(candidates.begin(), candidates.end(),
+                     [](const Candidate& a, const Candidate& b) { return a.score() > b.score(); });
+}
+
+// The first `most` that are at least `apart` from all before them.
+std::vector<Candidate> distinct(const std::vector<Candidate>& sorted, std::size_t most, double apart,
+                                const Comparison& comparison) {
+    std::vector<Candidate> chosen;
+    for (const Candidate& c : sorted) {
+        if (chosen.size() == most) break;
+        const bool known = std::any_of(chosen.begin(), chosen.end(), [&](const Candidate& other) {
+            return comparison.apart(c.pose, other.pose) < apart;
+        });
+        if (!known) chosen.push_back(c);
+    }
+    return chosen;
+}
+
+// Shapes that look alike when turned (a cup without its handle, a table, an octopus) are stuck in the wrong
+// turn: adds the best poses turned about the axes of the other shape.
+void addTurned(std::vector<Candidate>& sorted, Comparison& comparison, const Stage& stage) {
+    const std::size_t seeds = std::min(kTurnedPoses, sorted.size());
+    for (std::size_t i = 0; i < seeds; ++i) {
+        for (const TurnAxis& axis : axesOf(comparison, sorted[i].pose)) {
+            for (int step = 1; step < kTurns; ++step) {
+                Candidate c = sorted[i];
+                c.pose = turnedAbout(axis, 2.0 * kPi * step / kTurns, c.pose);
+                c.shares = comparison.shares(c.pose, c.view, stage.points, stage.judged);
+                sorted.push_back(c);
+            }
+        }
+    }
+    sortByScore(sorted);
+}
+
+// All stages for one kind: fitted poses, best first, none less than kDifferent from a better one.
+Result<std::vector<Candidate>> candidatesOf(Comparison& comparison, FitKind kind, const FitOptions& options,
+                                            const RunContext& context) {
+    const auto promising =
+        promisingPoses(comparison.query(), comparison.other(), kind, options, kPromising, context);
+    RETURN_IF_ERROR(promising);
+    RETURN_IF_ERROR(context.checkpoint());
+    std::vector<Candidate> candidates;
+    for (const Hypothesis& h : *promising) {
+        candidates.push_back(
+            {h.pose, h.view, comparison.shares(h.pose, h.view, kPromisingPoints, kPromisingWidth)});
+    }
+    sortByScore(candidates);
+    for (const Stage& stage : kStages) {
+        candidates = distinct(candidates, stage.poses, kApart, comparison);
+        for (Candidate& c : candidates) {
+            RETURN_IF_ERROR(context.checkpoint());
+            c.pose = comparison.refined(c.pose, c.view, options.keepScale, stage.points, stage.steps,
+                                        stage.from, stage.to);
+            c.shares = comparison.shares(c.pose, c.view, 2 * stage.points, stage.judged);
+        }
+        sortByScore(candidates);
+        if (stage.turns) addTurned(candidates, comparison, stage);
+    }
+    for (Candidate& c : candidates)
+        c.shares = comparison.shares(c.pose, c.view, kMostSurfacePoints, kScoreWidth);
+    sortByScore(candidates);
+    return distinct(candidates, candidates.size(), kDifferent, comparison);
+}
+
+FitPose poseOf(const Candidate& c, Comparison& comparison, bool keepScale) {
+    FitPose pose;
+    pose.motion = compose(comparison.query().toScan, compose(c.pose, inverse(comparison.other().toScan)));
+    if (keepScale) pose.motion.scale = 1.0;
+    pose.score = c.score();
+    pose.explainedQuery = c.shares.query;
+    pose.explainedOther = c.shares.other;
+    pose.residual = comparison.residual(c.pose, kResidualWithin);
+    return pose;
+}
+
+FitResult resultOf(const std::vector<Candidate>& candidates, Comparison& comparison,
+                   const FitOptions& options) {
+    FitResult result;
+    const Candidate& best = candidates.front();
+    result.kind = best.view.kind;
+    result.best = poseOf(best, comparison, options.keepScale);
+    const std::vector<TurnAxis> axes = freeAxes(comparison, best.pose, best.view);
+    for (const TurnAxis& axis : axes) {
+        const Motion& toScan = comparison.query().toScan;
+        result.axes.push_back({apply(toScan, axis.point), rotate(toScan.rotation, axis.direction)});
+    }
+    double second = 0.0;
+    for (std::size_t i = 1; i < candidates.size(); ++i) {
+        const Candidate& c = candidates[i];
+        if (isTurned(comparison, best.pose, c.pose, axes, kDifferent)) continue;
+        second = std::max(second, c.score());
+        if (c.score() < kAsGood * best.score() || result.alternatives.size() == kMostAlternatives) continue;
+        result.alternatives.push_back(poseOf(c, comparison, options.keepScale));
+    }
+    const double score = best.score();
+    result.certainty = score > 0.0 ? std::clamp(1.0 - second / score, 0.0, 1.0) : 0.0;
+    return result;
+}
+
+// Sizes so different that neither is more than a point on the other, and that single precision may not hold
+// both: middle on middle.
+FitResult unlike(const FitQuery& query, const FitPoints& other, const FitOptions& options) {
+    FitResult result;
+    result.kind = options.kind == FitKind::kAutomatic ? FitKind::kWhole : options.kind;
+    result.best.motion.translation = query.points().toScan.translation - other.toScan.translation;
+    return result;
+}
+
+Result<FitResult> fitOrThrow(const FitQuery& query, const SurfacePoints& other, const FitOptions& options,
+                             const RunContext& context) {
+    RETURN_IF_ERROR(context.checkpoint());
+    const FitPoints candidate(other);
+    const double ratio = candidate.toScan.scale / query.diagonal();
+    if (options.keepScale && !(ratio < kMostRatio && ratio * kMostRatio > 1.0)) {
+        return unlike(query, candidate, options);
+    }
+    Comparison comparison(query.points(), candidate);
+    std::vector<FitKind> kinds = {options.kind};
+    if (options.kind == FitKind::kAutomatic) kinds = {FitKind::kWhole, FitKind::kOneSided, FitKind::kPiece};
+    std::vector<Candidate> best;
+    for (std::size_t i = 0; i < kinds.size(); ++i) {
+        context.report("fit", i, kinds.size());
+        auto found = candidatesOf(comparison, kinds[i], options, context);
+        RETURN_IF_ERROR(found);
+        if (best.empty() || found->front().score() > best.front().score() + kKindHandicap)
+            best = std::move(*found);
+        if (kinds.size() > 1 && best.front().score() >= kWholeEnough) break;
+    }
+    context.report("fit", kinds.size(), kinds.size());
+    return resultOf(best, comparison, options);
+}
+
+}  // namespace
+
+FitQuery::FitQuery(const SurfacePoints& surface) {
+    auto points = std::make_shared<FitPoints>(surface);
+    points->findHull();
+    points_ = std::move(points);
+}
+
+double FitQuery::diagonal() const { return points_->toScan.scale; }
+
+Result<FitResult> fit(const FitQuery& query, const SurfacePoints& other, const FitOptions& options,
+                      const RunContext& context) {
+    try {
+        return fitOrThrow(query, other, options, context);
+    } catch (const std::bad_alloc&) {
+        return fail(ErrorCode::kOutOfMemory, "not enough memory to align two shapes");
+    }
+}
+
+}  // namespace shapedb

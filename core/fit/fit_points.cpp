@@ -1,0 +1,148 @@
+#include "core/fit/fit_points.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+
+#include "core/geometry/box.h"
+
+namespace shapedb {
+
+namespace {
+
+constexpr std::size_t kSpacingSamples = 100;
+constexpr int kHullDirections = 80;
+
+// Principal axes as rows, longest spread first, right-handed.
+Matrix3 principalAxes(const PointCloud& points) {
+    Point3 mean;
+    for (const Point3& p : points) mean = mean + p;
+    mean = (1.0 / static_cast<double>(points.size())) * mean;
+    Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+    for (const Point3& p : points) {
+        const Eigen::Vector3d d(p.x - mean.x, p.y - mean.y, p.z - mean.z);
+        spread += d * d.transpose();
+    }
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(spread);
+    const Eigen::Vector3d first = solver.eigenvectors().col(2);
+    const Eigen::Vector3d second = solver.eigenvectors().col(1);
+    const Eigen::Vector3d third = first.cross(second);
+    return {{{first.x(), first.y(), first.z()},
+             {second.x(), second.y(), second.z()},
+             {third.x(), third.y(), third.z()}}};
+}
+
+Matrix3 transposed(const Matrix3& m) {
+    return {{{m[0][0], m[1][0], m[2][0]}, {m[0][1], m[1][1], m[2][1]}, {m[0][2], m[1][2], m[2][2]}}};
+}
+
+// Spread evenly over the sphere: a Fibonacci spiral, whose steps are the golden angle.
+PointCloud hullDirections() {
+    PointCloud directions;
+    for (int i = 0; i < kHullDirections; ++i) {
+        const double z = 1.0 - (2.0 * i + 1.0) / kHullDirections;
+        const double angle = 2.399963229728653 * i;
+        const double across = std::sqrt(std::max(0.0, 1.0 - z * z));
+        directions.push_back({across * std::cos(angle), across * std::sin(angle), z});
+    }
+    return directions;
+}
+
+// Over every so many-th point; a search tree for all of them would take longer than all else here.
+float meanSpacing(const SurfaceColumns& points, std::size_t count) {
+    const std::size_t step = std::max<std::size_t>(1, count / kSpacingSamples);
+    double sum = 0.0;
+    std::size_t samples = 0;
+    for (std::size_t i = 0; i < count; i += step, ++samples) {
+        // Eight at a time; the columns are filled up by points repeated, at no distance from themselves.
+        Float8 least = allLanes(INFINITY);
+        for (std::size_t j = 0; j < points.x.size(); j += kFloatLanes) {
+            const Float8 x = loadLanes(&points.x[j]) - points.x[i];
+            const Float8 y = loadLanes(&points.y[j]) - points.y[i];
+            const Float8 z = loadLanes(&points.z[j]) - points.z[i];
+            const Float8 d = x * x + y * y + z * z;
+            least = lesser(least, d > 0.0f ? d : allLanes(INFINITY));
+        }
+        float nearest = least[0];
+        for (std::size_t lane = 1; lane < kFloatLanes; ++lane) nearest = std::min(nearest, least[lane]);
+        sum += static_cast<double>(std::sqrt(nearest));
+    }
+    return static_cast<float>(sum / static_cast<double>(samples));
+}
+
+}  // namespace
+
+FitPoints::FitPoints(const SurfacePoints& surface) {
+    // In the frame of the set first, where coordinates are about 1 whatever the scan's units.
+    PointCloud points;
+    for (const PackedSurfacePoint& p : surface.points) {
+        constexpr double kStep = 1.0 / kSurfaceSteps;
+        points.push_back({kStep * p.position[0], kStep * p.position[1], kStep * p.position[2]});
+    }
+    const Matrix3 axes = principalAxes(points);
+    for (Point3& p : points) p = rotate(axes, p);
+    const Box box = boxOf(points);
+    const Point3 middle = 0.5 * (box.low + box.high);
+    const double unit = box.diagonal();
+    for (Point3& p : points) p = (1.0 / unit) * (p - middle);
+    half = (0.5 / unit) * box.extent();
+    toScan.rotation = transposed(axes);
+    toScan.scale = surface.unit * unit;
+    toScan.translation = surface.centre + surface.unit * rotate(toScan.rotation, middle);
+
+    for (const Point3& p : points) mean = mean + p;
+    mean = (1.0 / static_cast<double>(points.size())) * mean;
+    for (const Point3& p : points) {
+        const Point3 d = p - mean;
+        const std::array<double, 3> v = {d.x, d.y, d.z};
+        for (std::size_t i = 0; i < 3; ++i) {
+            for (std::size_t j = 0; j < 3; ++j) {
+                covariance[i][j] += v[i] * v[j] / static_cast<double>(points.size());
+            }
+        }
+    }
+
+    const std::size_t padded = (points.size() + kFloatLanes - 1) / kFloatLanes * kFloatLanes;
+    for (std::size_t i = 0; i < padded; ++i) {
+        const std::size_t at = i % points.size();
+        columns.add(points[at], rotate(axes, surface.normal(at)));
+    }
+    grid.build(columns, points.size(), half);
+    spacing = meanSpacing(columns, points.size());
+}
+
+void FitPoints::findHull() {
+    const PointCloud directions = hullDirections();
+    insideHull.assign(grid.size(), 1);
+    for (const Point3& direction : directions) {
+        const auto dx = static_cast<float>(direction.x);
+        const auto dy = static_cast<float>(direction.y);
+        const auto dz = static_cast<float>(direction.z);
+        float reach = -1.0f;
+        for (std::size_t i = 0; i < size(); ++i) {
+            reach = std::max(reach, dx * columns.x[i] + dy * columns.y[i] + dz * columns.z[i]);
+        }
+        const auto& cells = grid.cells();
+        const auto& o = grid.offset();
+        const float cell = 1.0f / grid.scale();
+        const auto middle = [&](std::int32_t i, float offset) {
+            return cell * (static_cast<float>(i) + 0.5f - offset);
+        };
+        std::uint8_t* inside = insideHull.data();
+        for (std::int32_t z = 0; z < cells[2]; ++z) {
+            for (std::int32_t y = 0; y < cells[1]; ++y) {
+                const float row = reach - dz * middle(z, o[2]) - dy * middle(y, o[1]);
+                for (std::int32_t x = 0; x < cells[0]; ++x, ++inside) {
+                    *inside = static_cast<std::uint8_t>(*inside & (dx * middle(x, o[0]) <= row ? 1 : 0));
+                }
+            }
+        }
+    }
+}
+
+float FitPoints::spacingOf(std::size_t count) const {
+    return spacing * std::sqrt(static_cast<float>(size()) / static_cast<float>(count));
+}
+
+}  // namespace shapedb
