@@ -44,6 +44,7 @@ int run(int argc, const char* const* argv, cli::Console& console, const std::ato
         app.set_version_flag("--version", std::string(kProgramName) + " " SHAPEDB_VERSION);
         app.require_subcommand(1);
         addRetrievalOperation(app, bench);
+        addAlignOperation(app, bench);
         addInteriorOperation(app, bench);
         addTopKOperation(app, bench);
         addLoadOperation(app, bench);
