@@ -18,7 +18,7 @@ namespace {
 
 // Stages: many poses by a few points, fewer by more points, and so on. Widths are shares of the query's
 // diagonal.
-constexpr std::size_t kPromising = 240;
+constexpr std::size_t kPromising = 160;
 constexpr std::size_t kPromisingPoints = 128;
 constexpr float kPromisingWidth = 0.05f;
 constexpr double kApart = 0.05;  // poses closer than this lead to the same end
@@ -26,6 +26,7 @@ constexpr double kApart = 0.05;  // poses closer than this lead to the same end
 struct Stage {
     std::size_t poses;   // that enter it
     std::size_t points;  // of each shape
+    double leastShare;   // of the best score, of poses that enter it
     int steps;
     float from;  // widths of the kernel
     float to;
@@ -33,12 +34,12 @@ struct Stage {
     bool turns;    // whether turned poses are added then
 };
 constexpr Stage kStages[] = {
-    {40, 96, 5, 0.15f, 0.07f, 0.04f, true},
-    {12, 256, 6, 0.07f, 0.035f, 0.02f, false},
-    {4, 512, 10, 0.035f, 0.02f, 0.02f, false},
+    {32, 96, 0.3, 5, 0.15f, 0.07f, 0.04f, true},
+    {12, 256, 0.65, 6, 0.07f, 0.035f, 0.02f, false},
+    {4, 512, 0.85, 10, 0.035f, 0.02f, 0.02f, false},
 };
 
-constexpr std::size_t kTurnedPoses = 3;
+constexpr std::size_t kTurnedPoses = 2;
 constexpr int kTurns = 24;
 
 constexpr float kScoreWidth = 0.02f;
@@ -115,7 +116,11 @@ Result<std::vector<Candidate>> candidatesOf(Comparison& comparison, FitKind kind
             {h.pose, h.view, comparison.shares(h.pose, h.view, kPromisingPoints, kPromisingWidth)});
     }
     sortByScore(candidates);
+    std::vector<Candidate> unfinished;  // what the last stage leaves out still says how certain the best is
     for (const Stage& stage : kStages) {
+        unfinished = candidates;
+        const double least = stage.leastShare * candidates.front().score();
+        while (candidates.back().score() < least) candidates.pop_back();
         candidates = distinct(candidates, stage.poses, kApart, comparison);
         for (Candidate& c : candidates) {
             RETURN_IF_ERROR(context.checkpoint());

@@ -17,7 +17,7 @@ constexpr double kRollDegrees = 15.0;
 constexpr int kRolls = 6;  // to a quarter turn, after which the axes lie on each other again
 
 // All poses are judged by a glance at a few points of the query, the best of them by more points.
-constexpr std::size_t kGlances = 24;
+constexpr std::size_t kGlances = 16;
 constexpr std::size_t kKeptPerTurn = 2;
 constexpr std::size_t kJudges = 128;
 

@@ -8,7 +8,7 @@ namespace shapedb {
 namespace {
 
 // Shares of the diagonal.
-constexpr float kCell = 1.0f / 44.0f;
+constexpr float kCell = 1.0f / 40.0f;
 constexpr float kMargin = 0.06f;
 constexpr float kClosenessWidth = 0.05f;
 
