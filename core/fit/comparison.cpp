@@ -1,6 +1,7 @@
 #include "core/fit/comparison.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <Eigen/Cholesky>
@@ -143,7 +144,7 @@ const float* Comparison::weighOther(const Motion& pose, const FitView& view, std
             weighInside(query_.grid, query_.insideHull.data(), mx_.data(), my_.data(), mz_.data(), count,
                         weights_.data());
             return weights_.data();
-        case FitKind::kOneSided: weighFront(pose, view.front, count); return weights_.data();
+        case FitKind::kOneSided: weighFront(pose, view, count); return weights_.data();
         case FitKind::kAutomatic:
         case FitKind::kWhole: break;
     }
@@ -152,13 +153,18 @@ const float* Comparison::weighOther(const Motion& pose, const FitView& view, std
 
 // A depth buffer across the view; each point that is seen counts by the cosine of its surface to the view, as
 // it does in the scan.
-void Comparison::weighFront(const Motion& pose, float front, std::size_t count) {
-    float lowX = mx_[0], highX = mx_[0], lowY = my_[0], highY = my_[0];
+void Comparison::weighFront(const Motion& pose, const FitView& view, std::size_t count) {
+    const std::array<const float*, 3> moved = {mx_.data(), my_.data(), mz_.data()};
+    const float* x = moved[(view.axis + 1) % 3];
+    const float* y = moved[(view.axis + 2) % 3];
+    const float* z = moved[view.axis];
+    const float front = view.front;
+    float lowX = x[0], highX = x[0], lowY = y[0], highY = y[0];
     for (std::size_t i = 1; i < count; ++i) {
-        lowX = std::min(lowX, mx_[i]);
-        highX = std::max(highX, mx_[i]);
-        lowY = std::min(lowY, my_[i]);
-        highY = std::max(highY, my_[i]);
+        lowX = std::min(lowX, x[i]);
+        highX = std::max(highX, x[i]);
+        lowY = std::min(lowY, y[i]);
+        highY = std::max(highY, y[i]);
     }
     float pixel = kPixelSpacings * other_.spacingOf(count) * static_cast<float>(pose.scale);
     pixel = std::max({pixel, (highX - lowX) / static_cast<float>(kMostPixels - 1),
@@ -168,21 +174,21 @@ void Comparison::weighFront(const Motion& pose, float front, std::size_t count) 
     const int rows = static_cast<int>((highY - lowY) * perPixel) + 1;
     std::fill_n(depth_.begin(), columns * rows, -INFINITY);
     const auto pixelOf = [&](std::size_t i) {
-        const int column = static_cast<int>((mx_[i] - lowX) * perPixel);
-        const int row = static_cast<int>((my_[i] - lowY) * perPixel);
+        const int column = static_cast<int>((x[i] - lowX) * perPixel);
+        const int row = static_cast<int>((y[i] - lowY) * perPixel);
         return static_cast<std::size_t>(row * columns + column);
     };
     for (std::size_t i = 0; i < count; ++i) {
         float& depth = depth_[pixelOf(i)];
-        depth = std::max(depth, front * mz_[i]);
+        depth = std::max(depth, front * z[i]);
     }
-    const auto& third = pose.rotation[2];
+    const auto& along = pose.rotation[view.axis];
     const auto& normals = other_.columns;
     for (std::size_t i = 0; i < count; ++i) {
-        const bool seen = front * mz_[i] > depth_[pixelOf(i)] - kDepthTolerance * pixel;
-        const float cosine = static_cast<float>(third[0]) * normals.nx[i] +
-                             static_cast<float>(third[1]) * normals.ny[i] +
-                             static_cast<float>(third[2]) * normals.nz[i];
+        const bool seen = front * z[i] > depth_[pixelOf(i)] - kDepthTolerance * pixel;
+        const float cosine = static_cast<float>(along[0]) * normals.nx[i] +
+                             static_cast<float>(along[1]) * normals.ny[i] +
+                             static_cast<float>(along[2]) * normals.nz[i];
         weights_[i] = seen ? std::abs(cosine) : 0.0f;
     }
 }

@@ -15,7 +15,8 @@ namespace shapedb {
 /// How the query saw the other shape.
 struct FitView {
     FitKind kind = FitKind::kWhole;
-    float front = 1.0f;  ///< one-sided: seen from +z or -z of the query's frame
+    std::size_t axis = 2;  ///< one-sided: seen along this axis of the query's frame,
+    float front = 1.0f;    ///< from its positive (1) or negative (-1) end
 };
 
 struct Shares {
@@ -52,7 +53,7 @@ class Comparison {
     [[nodiscard]] Gauge gaugeOfOther(const Motion& pose, float width) const;
     [[nodiscard]] Gauge gaugeOfQuery(float width) const;
     const float* weighOther(const Motion& pose, const FitView& view, std::size_t count);
-    void weighFront(const Motion& pose, float front, std::size_t count);
+    void weighFront(const Motion& pose, const FitView& view, std::size_t count);
 
     const FitPoints& query_;
     const FitPoints& other_;

@@ -24,6 +24,9 @@ constexpr std::size_t kJudges = 128;
 // Points that measure how far a turned shape reaches.
 constexpr std::size_t kOutline = 64;
 
+// One-sided: extent along the view over the smallest extent.
+constexpr double kDeepest = 1.7;
+
 // A piece may be as large as the whole or smaller: diagonal of the whole over that of the piece.
 constexpr std::array<double, 5> kPieceScales = {1.0, 1.12, 1.25, 1.4, 1.6};
 
@@ -119,6 +122,7 @@ Reach reachOf(const SurfaceColumns& points, std::size_t count, const Matrix3& ro
 struct Placement {
     double scale = 1.0;
     Extent shift{};
+    std::size_t axis = 2;  // of the view, and which end of it is in front
     float front = 1.0f;
 };
 
@@ -170,7 +174,7 @@ class Search {
         for (const Tried& t : tried) {
             place(turns_[t.turn].reach);
             const Placement& p = placements_[t.placement];
-            result.push_back({poseOf(turns_[t.turn], p), {kind_, p.front}});
+            result.push_back({poseOf(turns_[t.turn], p), {kind_, p.axis, p.front}});
         }
         return result;
     }
@@ -278,19 +282,27 @@ class Search {
         placements_.push_back(p);
     }
 
-    // Outlines across the third axis on each other, and either what is nearest to +z or what is nearest to
-    // -z.
+    // Outlines across the view on each other, and either what is nearest to the one end of the view or what
+    // is nearest to the other. A scan is seldom deeper than it is wide: the view is along the third axis, or
+    // along another that is hardly longer.
     void placeFronts(const Reach& reach) {
-        Placement p;
-        const double across = reach.high[0] - reach.low[0] + reach.high[1] - reach.low[1];
-        p.scale = options_.keepScale ? keptScale_ : 2.0 * (half_[0] + half_[1]) / std::max(across, 1e-6);
-        for (std::size_t k = 0; k < 2; ++k) p.shift[k] = -0.5 * p.scale * (reach.low[k] + reach.high[k]);
-        p.shift[2] = half_[2] - p.scale * reach.high[2];
-        p.front = 1.0f;
-        placements_.push_back(p);
-        p.shift[2] = -half_[2] - p.scale * reach.low[2];
-        p.front = -1.0f;
-        placements_.push_back(p);
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            if (half_[axis] > kDeepest * half_[2]) continue;
+            const std::size_t j = (axis + 1) % 3;
+            const std::size_t k = (axis + 2) % 3;
+            const double across = reach.high[j] - reach.low[j] + reach.high[k] - reach.low[k];
+            Placement p;
+            p.axis = axis;
+            p.scale = options_.keepScale ? keptScale_ : 2.0 * (half_[j] + half_[k]) / std::max(across, 1e-6);
+            p.shift[j] = -0.5 * p.scale * (reach.low[j] + reach.high[j]);
+            p.shift[k] = -0.5 * p.scale * (reach.low[k] + reach.high[k]);
+            p.shift[axis] = half_[axis] - p.scale * reach.high[axis];
+            p.front = 1.0f;
+            placements_.push_back(p);
+            p.shift[axis] = -half_[axis] - p.scale * reach.low[axis];
+            p.front = -1.0f;
+            placements_.push_back(p);
+        }
     }
 
     // Each corner of the query's box on the same corner of the other's.
