@@ -126,17 +126,25 @@ Result<void> Catalog::deleteCollection(const std::string& name, bool force) {
     return {};
 }
 
-Result<index::SnapshotPtr> Catalog::reload(const index::Snapshot& collection) {
-    RETURN_IF_ERROR(index_.reload(collection.collection.id));
-    return index_.byId(collection.collection.id);
+Result<index::SnapshotPtr> Catalog::reload(const std::string& name) {
+    const RestoreGate::Write write(restores_);
+    const auto found = collection(name);
+    RETURN_IF_ERROR(found);
+    const std::int64_t id = (*found)->collection.id;
+    RETURN_IF_ERROR(index_.reload(id));
+    return index_.byId(id);
 }
 
 // Rebuilds -------------------------------------------------------------------------------
 
-Result<store::Rebuild> Catalog::beginRebuild(const index::Snapshot& collection,
-                                             const ShapeParameters& parameters) {
+Result<store::Rebuild> Catalog::beginRebuild(const std::string& name, const ParameterChange& change) {
     const RestoreGate::Write write(restores_);
-    return rebuilds_.begin(collection.collection, parameters);
+    // Looked up under the gate: a restore may have replaced the collection and its parameters.
+    const auto found = collection(name);
+    RETURN_IF_ERROR(found);
+    const auto parameters = change((*found)->parameters);
+    RETURN_IF_ERROR(parameters);
+    return rebuilds_.begin((*found)->collection, *parameters);
 }
 
 Result<void> Catalog::cancelRebuild(const std::string& name) {

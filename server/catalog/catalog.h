@@ -84,6 +84,9 @@ struct CatalogStats {
 /// shape or its profile does not rate interiors.
 [[nodiscard]] std::optional<double> qualityIn(const SignatureSet& signatures, std::int64_t shapeId);
 
+/// The parameters that a request makes of those a collection has.
+using ParameterChange = std::function<Result<ShapeParameters>(const ShapeParameters& current)>;
+
 /// Called again and again while a caller waits; an error ends the waiting and is returned.
 using Checkpoint = std::function<Result<void>()>;
 
@@ -120,7 +123,7 @@ class Catalog {
     /// `force` is not set.
     [[nodiscard]] Result<void> deleteCollection(const std::string& name, bool force);
     /// Reads the stored signatures again; nothing is segmented. Errors: kNotFound.
-    [[nodiscard]] Result<index::SnapshotPtr> reload(const index::Snapshot& collection);
+    [[nodiscard]] Result<index::SnapshotPtr> reload(const std::string& name);
 
     // Shapes -----------------------------------------------------------------------
 
@@ -181,10 +184,10 @@ class Catalog {
 
     // Rebuilds ---------------------------------------------------------------------
 
-    /// Starts a rebuild, or returns the running one with the same parameters. Errors: kNotFound;
-    /// kRejected: one with other parameters is running.
-    [[nodiscard]] Result<store::Rebuild> beginRebuild(const index::Snapshot& collection,
-                                                      const ShapeParameters& parameters);
+    /// Starts a rebuild with the collection's parameters after `change`, or returns the running one with
+    /// the same parameters. Errors: those of `change`; kNotFound; kRejected: one with other parameters is
+    /// running.
+    [[nodiscard]] Result<store::Rebuild> beginRebuild(const std::string& name, const ParameterChange& change);
     /// Errors: kNotFound (the collection, or none is running).
     [[nodiscard]] Result<void> cancelRebuild(const std::string& collection);
     /// Calls `onChange` at once and after each change until the rebuild is done; the rebuild goes on

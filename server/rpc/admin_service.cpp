@@ -28,7 +28,7 @@ Result<void> reloadCache(const Services& services, Call& call,
                          const std::vector<index::SnapshotPtr>& collections, RebuildWriter& writer) {
     for (const index::SnapshotPtr& snapshot : collections) {
         const auto began = std::chrono::steady_clock::now();
-        const auto reloaded = services.catalog.reload(*snapshot);
+        const auto reloaded = services.catalog.reload(snapshot->collection.name);
         RETURN_IF_ERROR(reloaded);
         const std::uint64_t count = (*reloaded)->signatures.size();
         v1::RebuildProgress progress;
@@ -91,11 +91,11 @@ grpc::Status AdminServiceHandler::Rebuild(grpc::ServerContext* context, const v1
         RETURN_IF_ERROR(call.becomeFollower());
         // All are started first: they continue even if this call is lost while it follows one.
         std::vector<store::Rebuild> started;
+        const auto change = [&](const ShapeParameters& current) {
+            return parametersFrom(request->profile(), request->segmentation(), request->signature(), current);
+        };
         for (const index::SnapshotPtr& snapshot : collections) {
-            const auto parameters = parametersFrom(request->profile(), request->segmentation(),
-                                                   request->signature(), snapshot->parameters);
-            RETURN_IF_ERROR(parameters);
-            const auto rebuild = services_.catalog.beginRebuild(*snapshot, *parameters);
+            const auto rebuild = services_.catalog.beginRebuild(snapshot->collection.name, change);
             RETURN_IF_ERROR(rebuild);
             started.push_back(*rebuild);
         }

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <functional>
+#include <future>
 
 #include <gtest/gtest.h>
 
@@ -14,6 +15,13 @@ namespace {
 using namespace shapedb::testing;
 
 Result<void> goOn() { return {}; }
+
+ParameterChange withMaxPoints(std::uint32_t maxPoints) {
+    return [maxPoints](ShapeParameters parameters) -> Result<ShapeParameters> {
+        parameters.signature.maxPoints = maxPoints;
+        return parameters;
+    };
+}
 
 class CatalogTest : public ::testing::Test {
   protected:
@@ -174,10 +182,7 @@ TEST_F(CatalogTest, ContentThatCannotBeLoadedIsNotMixedWithTheOld) {
 
 TEST_F(CatalogTest, ARebuildIsFollowedToItsEnd) {
     putAndWait("cup", 5.0f);
-    const auto collection = catalog->collection("").value();
-    ShapeParameters parameters = collection->parameters;
-    parameters.signature.maxPoints = 3;
-    const auto rebuild = catalog->beginRebuild(*collection, parameters);
+    const auto rebuild = catalog->beginRebuild("", withMaxPoints(3));
     ASSERT_TRUE(rebuild) << rebuild.error().message;
     std::uint64_t done = 0;
     ASSERT_TRUE(catalog->followRebuild("default", *rebuild, {}, goOn, [&](const store::Rebuild& now) {
@@ -187,6 +192,38 @@ TEST_F(CatalogTest, ARebuildIsFollowedToItsEnd) {
     EXPECT_EQ(done, 1u);
     EXPECT_EQ(catalog->collection("").value()->parameters.signature.maxPoints, 3u);
     EXPECT_EQ(catalog->cancelRebuild("").error().code, ErrorCode::kNotFound);
+}
+
+TEST_F(CatalogTest, ARebuildThatWaitedForARestoreIsOneOfTheNewContent) {
+    ShapeParameters parameters = parametersOf(Profile::kPaper);
+    parameters.segmentation.maxSegments = 11;
+    ASSERT_TRUE(catalog->createCollection("parts", "", parameters));
+    ASSERT_TRUE(catalog->backup("backup", {}));
+    ASSERT_TRUE(catalog->deleteCollection("parts", true));
+    parameters.segmentation.maxSegments = 12;
+    ASSERT_TRUE(catalog->createCollection("parts", "", parameters));
+    std::future<Result<store::Rebuild>> begun;
+    std::future<Result<index::SnapshotPtr>> reloaded;
+    loading = [&]() -> std::optional<Error> {
+        begun =
+            std::async(std::launch::async, [&] { return catalog->beginRebuild("parts", withMaxPoints(3)); });
+        reloaded = std::async(std::launch::async, [&] { return catalog->reload("parts"); });
+        EXPECT_EQ(begun.wait_for(std::chrono::milliseconds(20)), std::future_status::timeout);
+        EXPECT_EQ(reloaded.wait_for(std::chrono::milliseconds(20)), std::future_status::timeout);
+        return std::nullopt;
+    };
+    ASSERT_TRUE(catalog->restore("backup", {}));
+    const auto rebuild = begun.get();
+    ASSERT_TRUE(rebuild) << rebuild.error().message;
+    const auto now = catalog->collection("parts").value();
+    EXPECT_EQ(rebuild->collectionId, now->collection.id);
+    const auto used = store::decodeParameters(rebuild->parameters);
+    ASSERT_TRUE(used);
+    EXPECT_EQ(used->segmentation.maxSegments, 11u) << "of the backup";
+    EXPECT_EQ(used->signature.maxPoints, 3u);
+    const auto snapshot = reloaded.get();
+    ASSERT_TRUE(snapshot) << snapshot.error().message;
+    EXPECT_EQ((*snapshot)->collection.id, now->collection.id);
 }
 
 TEST_F(CatalogTest, FollowingEndsWhenTheCallerGivesUp) {
