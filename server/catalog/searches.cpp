@@ -3,7 +3,9 @@
 #include <utility>
 
 #include "core/base/return_if_error.h"
+#include "core/matching/score.h"
 #include "core/matching/scorer.h"
+#include "core/signature/signature_codec.h"
 #include "server/catalog/request_checks.h"
 
 namespace shapedb::catalog {
@@ -40,6 +42,40 @@ Result<BatchQuery> Searches::storedQuery(const PreparedSearch& search, const std
     auto signature = catalog_.signature(*found);
     RETURN_IF_ERROR(signature);
     return BatchQuery{std::move(*signature), found->shape.id};
+}
+
+Result<BatchQuery> Searches::query(const PreparedSearch& search, const QuerySource& source) const {
+    if (source.key && source.signature) {
+        return fail(ErrorCode::kInvalidArgument, "both key and signature are set: leave one out");
+    }
+    if (source.key) return storedQuery(search, *source.key);
+    if (!source.signature) return fail(ErrorCode::kInvalidArgument, "neither key nor signature is set");
+    auto signature = decodeSignature(*source.signature);
+    RETURN_IF_ERROR(signature);
+    return BatchQuery{std::move(*signature), std::nullopt};
+}
+
+Result<Signature> Searches::compared(const char* which, const ShapeName& name) const {
+    const auto signatureOf = [&]() -> Result<Signature> {
+        const auto collection = catalog_.collection(name.collection);
+        RETURN_IF_ERROR(collection);
+        const auto found = catalog_.findShape(*collection, name.key);
+        RETURN_IF_ERROR(found);
+        return catalog_.signature(*found);
+    };
+    auto signature = signatureOf();
+    if (!signature) return fail(signature.error().code, which + (": " + signature.error().message));
+    return signature;
+}
+
+Result<Comparison> Searches::compare(const ShapeName& query, const ShapeName& other,
+                                     const ScoreOptions& options) const {
+    auto first = compared("query", query);
+    RETURN_IF_ERROR(first);
+    auto second = compared("other", other);
+    RETURN_IF_ERROR(second);
+    Explanation explanation = shapedb::explain(*first, *second, options);
+    return Comparison{std::move(*first), std::move(*second), std::move(explanation)};
 }
 
 Result<SearchResult> Searches::run(const PreparedSearch& search, const BatchQuery& query,

@@ -34,6 +34,25 @@ struct PreparedSearch {
     bool explain = true;
 };
 
+/// What a request names as a query: one of the two. Not owned.
+struct QuerySource {
+    const std::string* key = nullptr;        ///< of a stored shape
+    const std::string* signature = nullptr;  ///< docs/signature-format.md
+};
+
+/// A shape as a request names it.
+struct ShapeName {
+    std::string collection;  ///< empty: the default collection
+    std::string key;
+};
+
+/// Two stored shapes, compared.
+struct Comparison {
+    Signature query;
+    Signature other;
+    Explanation explanation;
+};
+
 struct FoundHit {
     store::Shape shape;
     std::optional<double> quality;  ///< as `qualityIn` the collection searched
@@ -65,6 +84,15 @@ class Searches {
     /// kNotReady, kDataLoss.
     [[nodiscard]] Result<BatchQuery> storedQuery(const PreparedSearch& search, const std::string& key) const;
 
+    /// The query that `source` names; a stored shape as above. Errors: those of `storedQuery` and of
+    /// decodeSignature; kInvalidArgument (not exactly one is set).
+    [[nodiscard]] Result<BatchQuery> query(const PreparedSearch& search, const QuerySource& source) const;
+
+    /// How alike two stored shapes are, and why. Errors, saying which of the two they are about:
+    /// kInvalidArgument (key), kNotFound, kNotReady, kDataLoss.
+    [[nodiscard]] Result<Comparison> compare(const ShapeName& query, const ShapeName& other,
+                                             const ScoreOptions& options) const;
+
     /// Calls `visit` with each hit, best first, leaving out shapes deleted meanwhile. An explanation is
     /// missing where the signature scored was replaced meanwhile. `found` by `run` or `runBatch`. Errors:
     /// those of topK and of `visit`; kDataLoss.
@@ -83,6 +111,7 @@ class Searches {
     [[nodiscard]] std::uint64_t count() const { return runner_.count(); }
 
   private:
+    Result<Signature> compared(const char* which, const ShapeName& name) const;
     Result<std::optional<Explanation>> explain(const PreparedSearch& search, const Scorer& scorer,
                                                const SearchHit& hit) const;
 

@@ -3,7 +3,6 @@
 #include <utility>
 
 #include "core/base/return_if_error.h"
-#include "core/matching/score.h"
 #include "core/signature/signature_codec.h"
 #include "server/catalog/request_checks.h"
 #include "server/catalog/scan_upload.h"
@@ -15,6 +14,15 @@
 namespace shapedb::rpc {
 namespace {
 
+template <typename Message>
+ScoreOptions scoreOptionsFrom(const Message& message) {
+    ScoreOptions options;
+    options.reflection = !message.forbid_reflection();
+    options.keepScale = message.keep_scale();
+    options.partial = message.partial();
+    return options;
+}
+
 Result<catalog::PreparedSearch> prepare(const Services& services, Call& call,
                                         const pb::SearchOptions& options) {
     call.note({"k", std::uint64_t{options.k()}});
@@ -24,9 +32,7 @@ Result<catalog::PreparedSearch> prepare(const Services& services, Call& call,
     request.k = options.k();
     request.threshold = options.threshold();
     request.filter = options.filter();
-    request.score.reflection = !options.forbid_reflection();
-    request.score.keepScale = options.keep_scale();
-    request.score.partial = options.partial();
+    request.score = scoreOptionsFrom(options);
     request.explain = !options.no_explanation();
     return services.searches.prepare(*collection, request);
 }
@@ -58,20 +64,11 @@ Result<void> search(const Services& services, const Call& call, const catalog::P
     return answer(services, prepared, query.signature, *found, room, response);
 }
 
-Result<BatchQuery> batchQuery(const Services& services, const catalog::PreparedSearch& prepared,
-                              const v1::SearchBatchRequest::Query& query) {
-    switch (query.by_case()) {
-        case v1::SearchBatchRequest::Query::kKey: {
-            return services.searches.storedQuery(prepared, query.key());
-        }
-        case v1::SearchBatchRequest::Query::kSignature: {
-            auto signature = decodeSignature(query.signature());
-            RETURN_IF_ERROR(signature);
-            return BatchQuery{std::move(*signature), std::nullopt};
-        }
-        case v1::SearchBatchRequest::Query::BY_NOT_SET: break;
-    }
-    return fail(ErrorCode::kInvalidArgument, "neither key nor signature is set");
+catalog::QuerySource sourceFrom(const v1::SearchBatchRequest::Query& query) {
+    catalog::QuerySource source;
+    if (query.has_key()) source.key = &query.key();
+    if (query.has_signature()) source.signature = &query.signature();
+    return source;
 }
 
 Result<void> ofQuery(int i, const Error& error) {
@@ -83,7 +80,7 @@ Result<void> searchBatch(const Services& services, const Call& call, const catal
                          const v1::SearchBatchRequest& request, v1::SearchBatchResponse* response) {
     std::vector<BatchQuery> queries;
     for (int i = 0; i < request.queries_size(); ++i) {
-        auto query = batchQuery(services, prepared, request.queries(i));
+        auto query = services.searches.query(prepared, sourceFrom(request.queries(i)));
         if (!query) return ofQuery(i, query.error());
         queries.push_back(std::move(*query));
     }
@@ -172,27 +169,19 @@ grpc::Status SearchServiceHandler::SearchBatch(grpc::ServerContext* context,
 grpc::Status SearchServiceHandler::Compare(grpc::ServerContext* context, const v1::CompareRequest* request,
                                            v1::CompareResponse* response) {
     return handle(services_, context, "Compare", [&](Call& call) -> Result<void> {
-        Signature signatures[2];
-        const pb::ShapeRef* refs[2] = {&request->query(), &request->other()};
-        for (int i = 0; i < 2; ++i) {
-            const auto found = call.shape(*refs[i]);
-            auto signature =
-                found ? services_.catalog.signature(*found) : Result<Signature>(fail(found.error()));
-            if (!signature) {
-                return fail(signature.error().code,
-                            (i == 0 ? "query: " : "other: ") + signature.error().message);
-            }
-            signatures[i] = std::move(*signature);
-        }
-        ScoreOptions options;
-        options.reflection = !request->forbid_reflection();
-        options.keepScale = request->keep_scale();
-        options.partial = request->partial();
-        const Explanation explanation = explain(signatures[0], signatures[1], options);
-        response->set_score(explanation.score);
-        toProto(explanation, response->mutable_explanation());
-        toProto(signatures[0], response->mutable_query());
-        toProto(signatures[1], response->mutable_other());
+        const auto nameFrom = [&](const pb::ShapeRef& ref) {
+            call.noteKey(ref.key());
+            call.noteCollection(ref.collection());
+            return catalog::ShapeName{ref.collection(), ref.key()};
+        };
+        const catalog::ShapeName query = nameFrom(request->query());
+        const catalog::ShapeName other = nameFrom(request->other());
+        const auto compared = services_.searches.compare(query, other, scoreOptionsFrom(*request));
+        RETURN_IF_ERROR(compared);
+        response->set_score(compared->explanation.score);
+        toProto(compared->explanation, response->mutable_explanation());
+        toProto(compared->query, response->mutable_query());
+        toProto(compared->other, response->mutable_other());
         return {};
     });
 }

@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include "core/matching/score.h"
+#include "core/signature/signature_codec.h"
 #include "server/catalog/listing.h"
 #include "tests/server/support/fixtures.h"
 #include "tests/server/support/memory_store.h"
@@ -105,6 +107,44 @@ TEST_F(SearchesTest, AnswersExplainHitsAndLeaveOutDeletedShapes) {
     found.hits.pop_back();
     ASSERT_TRUE(catalog->deleteShape("", "cup", std::nullopt));
     EXPECT_TRUE(keysOf(found).empty());
+}
+
+TEST_F(SearchesTest, AQueryIsAStoredShapeOrASignature) {
+    const store::Shape cup = putAndWait("cup", 5.0f);
+    SearchRequest request;
+    request.k = 10;
+    const auto prepared = prepare(request);
+    const std::string key = "cup";
+    const std::string bytes = encodeSignature(signatureOf(7.0));
+    const std::string damaged = "damaged";
+    EXPECT_EQ(searches().query(*prepared, {&key, nullptr}).value().excludeId, cup.id);
+    const auto given = searches().query(*prepared, {nullptr, &bytes});
+    ASSERT_TRUE(given);
+    EXPECT_EQ(given->signature.volume, 7.0);
+    EXPECT_FALSE(given->excludeId);
+    EXPECT_FALSE(searches().query(*prepared, {nullptr, &damaged}));
+    const auto none = searches().query(*prepared, {});
+    ASSERT_FALSE(none);
+    EXPECT_EQ(none.error().code, ErrorCode::kInvalidArgument);
+    EXPECT_EQ(none.error().message, "neither key nor signature is set");
+    EXPECT_EQ(searches().query(*prepared, {&key, &bytes}).error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST_F(SearchesTest, AComparisonExplainsAndSaysWhichShapeIsMissing) {
+    putAndWait("cup", 5.0f);
+    putAndWait("jug", 6.0f);
+    const auto compared = searches().compare({"", "cup"}, {"default", "jug"}, {});
+    ASSERT_TRUE(compared);
+    EXPECT_EQ(compared->query.volume, 5.0);
+    EXPECT_EQ(compared->other.volume, 6.0);
+    EXPECT_EQ(compared->explanation.score, shapedb::explain(signatureOf(5.0), signatureOf(6.0), {}).score);
+    const auto first = searches().compare({"", "none"}, {"", "none"}, {});
+    ASSERT_FALSE(first);
+    EXPECT_EQ(first.error().code, ErrorCode::kNotFound);
+    EXPECT_EQ(first.error().message, "query: there is no shape 'none' in collection 'default'");
+    const auto second = searches().compare({"", "cup"}, {"", "none"}, {});
+    ASSERT_FALSE(second);
+    EXPECT_EQ(second.error().message, "other: there is no shape 'none' in collection 'default'");
 }
 
 TEST(AnswerRoom, RefusesWhatDoesNotFit) {
