@@ -72,10 +72,9 @@ Result<std::vector<index::SnapshotPtr>> Catalog::collections() const {
 
 Result<void> Catalog::requireContent() const {
     if (!restores_.apart()) return {};
+    RETURN_IF_ERROR(restores_.requireNoRestore());
     return fail(ErrorCode::kUnavailable,
-                restores_.restoring()
-                    ? "the database is being replaced by a backup: try again later"
-                    : "the content of a backup could not be loaded: restart the server or restore again");
+                "the content of a backup could not be loaded: restart the server or restore again");
 }
 
 Result<ShapeCounts> Catalog::countShapes(const index::Snapshot& collection) {
@@ -137,14 +136,42 @@ Result<index::SnapshotPtr> Catalog::reload(const std::string& name) {
 
 // Rebuilds -------------------------------------------------------------------------------
 
-Result<store::Rebuild> Catalog::beginRebuild(const std::string& name, const ParameterChange& change) {
+Result<std::vector<std::string>> Catalog::rebuildTargets(const RebuildRequest& request) const {
+    if (request.change && (request.cacheOnly || request.collection.empty())) {
+        return fail(ErrorCode::kInvalidArgument,
+                    request.cacheOnly ? "parameters cannot change with cache_only: leave one out"
+                                      : "collection: name the collection that gets the new parameters");
+    }
+    std::vector<std::string> names;
+    if (!request.collection.empty()) {
+        const auto found = collection(request.collection);
+        RETURN_IF_ERROR(found);
+        names.push_back((*found)->collection.name);
+        return names;
+    }
+    const auto all = collections();
+    RETURN_IF_ERROR(all);
+    for (const index::SnapshotPtr& snapshot : *all) names.push_back(snapshot->collection.name);
+    return names;
+}
+
+Result<std::vector<store::Rebuild>> Catalog::beginRebuilds(const std::vector<std::string>& names,
+                                                           const ParameterChange& change) {
     const RestoreGate::Write write(restores_);
-    // Looked up under the gate: a restore may have replaced the collection and its parameters.
-    const auto found = collection(name);
-    RETURN_IF_ERROR(found);
-    const auto parameters = change((*found)->parameters);
-    RETURN_IF_ERROR(parameters);
-    return rebuilds_.begin((*found)->collection, *parameters);
+    std::vector<store::Rebuild> begun;
+    for (const std::string& name : names) {
+        // Looked up under the gate: a restore may have replaced the collection and its parameters.
+        const auto found = collection(name);
+        RETURN_IF_ERROR(found);
+        Result<ShapeParameters> parameters = (*found)->parameters;
+        if (change) parameters = change(*parameters);
+        RETURN_IF_ERROR(parameters);
+        RETURN_IF_ERROR(validate(*parameters));
+        auto rebuild = rebuilds_.begin((*found)->collection, *parameters);
+        RETURN_IF_ERROR(rebuild);
+        begun.push_back(std::move(*rebuild));
+    }
+    return begun;
 }
 
 Result<void> Catalog::cancelRebuild(const std::string& name) {
@@ -246,6 +273,8 @@ Result<CatalogStats> Catalog::stats() {
     stats.queue = *depth;
     stats.index = index_.totals();
     stats.running = workers_.running();
+    // Read one after the other: a job may have begun in between.
+    stats.queued = depth->jobs - std::min(depth->jobs, stats.running);
     stats.ingested = workers_.ingested();
     return stats;
 }

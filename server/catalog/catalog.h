@@ -74,8 +74,9 @@ struct ShapeCounts {
 
 struct CatalogStats {
     store::StoreStats store;
-    store::QueueDepth queue;
+    store::QueueDepth queue;  ///< waiting and running
     index::CollectionIndex::Totals index;
+    std::uint64_t queued = 0;    ///< jobs that wait for a worker
     std::uint64_t running = 0;   ///< jobs
     std::uint64_t ingested = 0;  ///< jobs since start that ended in a signature
 };
@@ -86,6 +87,23 @@ struct CatalogStats {
 
 /// The parameters that a request makes of those a collection has.
 using ParameterChange = std::function<Result<ShapeParameters>(const ShapeParameters& current)>;
+
+struct RebuildRequest {
+    std::string collection;  ///< empty: all
+    bool cacheOnly = false;  ///< read the stored signatures again, segment nothing
+    ParameterChange change;  ///< empty: the parameters stay
+};
+
+/// What a caller who follows a shape is told.
+struct IngestEvent {
+    store::ShapeState state = store::ShapeState::kPending;
+    std::string stage;  ///< this and the next two only while pending, as ProgressBoard::Status
+    std::uint64_t done = 0;
+    std::uint64_t total = 0;
+    std::optional<Error> failure;
+    std::optional<double> quality;  ///< as `Catalog::servingQuality`, once ready
+};
+[[nodiscard]] bool operator==(const IngestEvent& a, const IngestEvent& b);
 
 /// Called again and again while a caller waits; an error ends the waiting and is returned.
 using Checkpoint = std::function<Result<void>()>;
@@ -152,13 +170,12 @@ class Catalog {
                                                  std::optional<std::int64_t> expectedVersion);
 
     /// Follows a shape until it is no longer pending, and if it is ready, until searches find it. Calls
-    /// `onChange` with its row and its progress, at once and after each change. Returns the final row.
-    /// Errors: kNotFound (deleted meanwhile); those of `onChange` and `checkpoint`.
-    [[nodiscard]] Result<store::Shape> followIngest(
-        std::int64_t shapeId, const Checkpoint& checkpoint,
-        const std::function<Result<void>(const store::Shape&, const ingest::ProgressBoard::Status&)>&
-            onChange);
-    /// `followIngest` for a shape that was just added. Its errors say that the scan was stored.
+    /// `onEvent` at once and after each change of what it tells, never twice with the same event. Errors:
+    /// kNotFound (deleted meanwhile); those of `onEvent` and `checkpoint`.
+    [[nodiscard]] Result<void> watchIngest(std::int64_t shapeId, const Checkpoint& checkpoint,
+                                           const std::function<Result<void>(const IngestEvent&)>& onEvent);
+    /// Waits until a shape that was just added is no longer pending, and if it is ready, until searches
+    /// find it. Returns the final row. Errors: as `watchIngest`; they say that the scan was stored.
     [[nodiscard]] Result<store::Shape> awaitIngest(const store::Shape& added, const Checkpoint& checkpoint);
 
     /// The signature of a shape that searches of its collection find. Errors: kNotReady, saying whether
@@ -184,10 +201,15 @@ class Catalog {
 
     // Rebuilds ---------------------------------------------------------------------
 
-    /// Starts a rebuild with the collection's parameters after `change`, or returns the running one with
-    /// the same parameters. Errors: those of `change`; kNotFound; kRejected: one with other parameters is
-    /// running.
-    [[nodiscard]] Result<store::Rebuild> beginRebuild(const std::string& name, const ParameterChange& change);
+    /// The names of the collections that a request means. Errors: kInvalidArgument (a change of parameters
+    /// with `cacheOnly`, or without a collection named), kNotFound.
+    [[nodiscard]] Result<std::vector<std::string>> rebuildTargets(const RebuildRequest& request) const;
+    /// Starts the rebuilds of all `names` before any is followed, so that they go on if the caller is lost.
+    /// Each has its collection's parameters after `change`, or is the running one with the same
+    /// parameters. Errors: those of `change`; kInvalidArgument (parameters), kNotFound; kRejected: one with
+    /// other parameters is running. Rebuilds started before an error go on.
+    [[nodiscard]] Result<std::vector<store::Rebuild>> beginRebuilds(const std::vector<std::string>& names,
+                                                                    const ParameterChange& change);
     /// Errors: kNotFound (the collection, or none is running).
     [[nodiscard]] Result<void> cancelRebuild(const std::string& collection);
     /// Calls `onChange` at once and after each change until the rebuild is done; the rebuild goes on
@@ -213,6 +235,13 @@ class Catalog {
   private:
     /// Errors: kUnavailable.
     Result<void> requireContent() const;
+    /// Calls `onChange` with the row of a shape and its progress, at once and after each change, until it
+    /// is no longer pending. Returns the final row.
+    Result<store::Shape> followIngest(
+        std::int64_t shapeId, const Checkpoint& checkpoint,
+        const std::function<Result<void>(const store::Shape&, const ingest::ProgressBoard::Status&)>&
+            onChange);
+    IngestEvent eventOf(const store::Shape& shape, const ingest::ProgressBoard::Status& status) const;
     Result<void> restoreExclusively(const std::string& path, const RunContext& context);
     Result<void> replaceContent(const std::string& path, const RunContext& context, bool& replaced);
     /// After a change that the store has acknowledged, which must not be reported as refused.

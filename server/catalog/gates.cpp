@@ -36,6 +36,11 @@ Result<void> RestoreGate::beginRestore() {
     return {};
 }
 
+Result<void> RestoreGate::requireNoRestore() const {
+    if (!restoring_.load()) return {};
+    return fail(ErrorCode::kUnavailable, "the database is being replaced by a backup: try again later");
+}
+
 SegmentationSlots::Slot::~Slot() {
     if (!taken_) return;
     const std::lock_guard<std::mutex> lock(slots_.mutex_);

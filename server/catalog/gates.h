@@ -69,7 +69,8 @@ class RestoreGate {
     /// Between `replacing` and `replaced`: what is looked up now cannot be trusted.
     [[nodiscard]] bool apart() const { return apart_.load(); }
     void endRestore() { restoring_ = false; }
-    [[nodiscard]] bool restoring() const { return restoring_.load(); }
+    /// Errors: kUnavailable (a restore is running).
+    [[nodiscard]] Result<void> requireNoRestore() const;
 
   private:
     std::shared_mutex mutex_;

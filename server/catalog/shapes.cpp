@@ -81,10 +81,7 @@ Result<void> Catalog::admitUpload(const ShapeHeader& header) const {
         return fail(ErrorCode::kInvalidArgument, "expected_version: must be 0 (the key is free) or more");
     }
     RETURN_IF_ERROR(collection(header.collection));
-    if (restores_.restoring()) {
-        return fail(ErrorCode::kUnavailable, "the database is being replaced by a backup: try again later");
-    }
-    return {};
+    return restores_.requireNoRestore();
 }
 
 Result<AddedShape> Catalog::put(const ShapeHeader& header, store::VerifiedScan scan) {
@@ -169,6 +166,43 @@ Result<store::Shape> Catalog::followIngest(
             watch->waitForChange(status.sequence, ingest::ProgressBoard::Clock::now() + kLookForCancellation);
         }
     }
+}
+
+bool operator==(const IngestEvent& a, const IngestEvent& b) {
+    const auto sameFailure = [&] {
+        if (!a.failure || !b.failure) return a.failure.has_value() == b.failure.has_value();
+        return a.failure->code == b.failure->code && a.failure->message == b.failure->message;
+    };
+    return a.state == b.state && a.stage == b.stage && a.done == b.done && a.total == b.total &&
+           a.quality == b.quality && sameFailure();
+}
+
+IngestEvent Catalog::eventOf(const store::Shape& shape, const ingest::ProgressBoard::Status& status) const {
+    IngestEvent event;
+    event.state = shape.state;
+    event.failure = shape.failure;
+    if (shape.state == store::ShapeState::kPending) {
+        event.stage = status.stage;
+        event.done = status.done;
+        event.total = status.total;
+    }
+    if (shape.state == store::ShapeState::kReady) event.quality = servingQuality(shape);
+    return event;
+}
+
+Result<void> Catalog::watchIngest(std::int64_t shapeId, const Checkpoint& checkpoint,
+                                  const std::function<Result<void>(const IngestEvent&)>& onEvent) {
+    std::optional<IngestEvent> last;
+    const auto tell = [&](const store::Shape& shape,
+                          const ingest::ProgressBoard::Status& status) -> Result<void> {
+        IngestEvent event = eventOf(shape, status);
+        if (last && event == *last) return {};
+        last = std::move(event);
+        return onEvent(*last);
+    };
+    const auto settled = followIngest(shapeId, checkpoint, tell);
+    RETURN_IF_ERROR(settled);
+    return {};
 }
 
 Result<store::Shape> Catalog::awaitIngest(const store::Shape& added, const Checkpoint& checkpoint) {

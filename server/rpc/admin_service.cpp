@@ -18,21 +18,29 @@ namespace {
 
 using RebuildWriter = grpc::ServerWriter<v1::RebuildProgress>;
 
-bool hasParameters(const v1::RebuildRequest& request) {
-    return request.has_segmentation() || request.has_signature() ||
-           request.profile() != v1::PROFILE_UNSPECIFIED;
+catalog::RebuildRequest rebuildRequestFrom(const v1::RebuildRequest& request) {
+    catalog::RebuildRequest wanted;
+    wanted.collection = request.collection();
+    wanted.cacheOnly = request.cache_only();
+    if (request.has_segmentation() || request.has_signature() ||
+        request.profile() != v1::PROFILE_UNSPECIFIED) {
+        wanted.change = [&request](const ShapeParameters& current) {
+            return parametersFrom(request.profile(), request.segmentation(), request.signature(), current);
+        };
+    }
+    return wanted;
 }
 
 /// Reads the stored signatures again; nothing is segmented.
-Result<void> reloadCache(const Services& services, Call& call,
-                         const std::vector<index::SnapshotPtr>& collections, RebuildWriter& writer) {
-    for (const index::SnapshotPtr& snapshot : collections) {
+Result<void> reloadCache(const Services& services, Call& call, const std::vector<std::string>& names,
+                         RebuildWriter& writer) {
+    for (const std::string& name : names) {
         const auto began = std::chrono::steady_clock::now();
-        const auto reloaded = services.catalog.reload(snapshot->collection.name);
+        const auto reloaded = services.catalog.reload(name);
         RETURN_IF_ERROR(reloaded);
         const std::uint64_t count = (*reloaded)->signatures.size();
         v1::RebuildProgress progress;
-        progress.set_collection(snapshot->collection.name);
+        progress.set_collection(name);
         progress.set_done(count);
         progress.set_total(count);
         progress.set_finished(true);
@@ -72,41 +80,24 @@ Error withoutName(Error error, const std::string& file) {
 grpc::Status AdminServiceHandler::Rebuild(grpc::ServerContext* context, const v1::RebuildRequest* request,
                                           RebuildWriter* writer) {
     return handle(services_, context, "Rebuild", [&](Call& call) -> Result<void> {
-        if (hasParameters(*request) && (request->cache_only() || request->collection().empty())) {
-            return fail(ErrorCode::kInvalidArgument,
-                        request->cache_only()
-                            ? "parameters cannot change with cache_only: leave one out"
-                            : "collection: name the collection that gets the new parameters");
-        }
-        auto all = services_.catalog.collections();
-        RETURN_IF_ERROR(all);
-        std::vector<index::SnapshotPtr> collections = std::move(*all);
-        if (!request->collection().empty()) {
-            const auto found = call.collection(request->collection());
-            RETURN_IF_ERROR(found);
-            collections = {*found};
-        }
-        if (request->cache_only()) return reloadCache(services_, call, collections, *writer);
+        const catalog::RebuildRequest wanted = rebuildRequestFrom(*request);
+        if (!wanted.collection.empty()) call.noteCollection(wanted.collection);
+        const auto names = services_.catalog.rebuildTargets(wanted);
+        RETURN_IF_ERROR(names);
+        if (wanted.cacheOnly) return reloadCache(services_, call, *names, *writer);
 
         RETURN_IF_ERROR(call.becomeFollower());
-        // All are started first: they continue even if this call is lost while it follows one.
-        std::vector<store::Rebuild> started;
-        const auto change = [&](const ShapeParameters& current) {
-            return parametersFrom(request->profile(), request->segmentation(), request->signature(), current);
-        };
-        for (const index::SnapshotPtr& snapshot : collections) {
-            const auto rebuild = services_.catalog.beginRebuild(snapshot->collection.name, change);
-            RETURN_IF_ERROR(rebuild);
-            started.push_back(*rebuild);
-        }
-        for (std::size_t i = 0; i < started.size(); ++i) {
-            const std::string& name = collections[i]->collection.name;
+        const auto started = services_.catalog.beginRebuilds(*names, wanted.change);
+        RETURN_IF_ERROR(started);
+        for (std::size_t i = 0; i < started->size(); ++i) {
+            const std::string& name = (*names)[i];
+            const store::Rebuild& begun = (*started)[i];
             const auto send = [&](const store::Rebuild& rebuild) {
                 return sendProgress(call, name, rebuild, *writer);
             };
-            RETURN_IF_ERROR(request->detach() ? send(started[i])
+            RETURN_IF_ERROR(request->detach() ? send(begun)
                                               : services_.catalog.followRebuild(
-                                                    name, started[i], call.run(),
+                                                    name, begun, call.run(),
                                                     [&] { return call.checkpointWhileFollowing(); }, send));
         }
         return {};
@@ -204,7 +195,7 @@ grpc::Status AdminServiceHandler::Stats(grpc::ServerContext* context, const v1::
         response->set_shapes_failed(stored.shapesFailed);
         response->set_cached_signatures(stats->index.signatures);
         response->set_cache_bytes(stats->index.bytes);
-        response->set_queued_jobs(stats->queue.jobs - std::min(stats->queue.jobs, stats->running));
+        response->set_queued_jobs(stats->queued);
         response->set_queued_bytes(stats->queue.bytes);
         response->set_running_jobs(stats->running);
         response->set_database_bytes(stored.databaseBytes);

@@ -186,29 +186,18 @@ grpc::Status ShapeServiceHandler::WatchIngest(grpc::ServerContext* context,
         const auto found = call.shape(request->shape());
         RETURN_IF_ERROR(found);
         RETURN_IF_ERROR(call.becomeFollower());
-        std::string last;
-        const auto tell = [&](const store::Shape& shape,
-                              const ingest::ProgressBoard::Status& status) -> Result<void> {
-            v1::IngestEvent event;
-            event.set_state(toProto(shape.state));
-            if (shape.state == store::ShapeState::kPending) {
-                event.set_stage(status.stage);
-                event.set_done(status.done);
-                event.set_total(status.total);
-            }
-            if (shape.failure) toProto(*shape.failure, event.mutable_failure());
-            if (shape.state == store::ShapeState::kReady) {
-                if (const auto quality = services_.catalog.servingQuality(shape)) event.set_quality(*quality);
-            }
-            const std::string text = event.SerializeAsString();
-            if (text == last) return {};
-            last = text;
-            return call.write(*writer, event);
+        const auto tell = [&](const catalog::IngestEvent& event) -> Result<void> {
+            v1::IngestEvent out;
+            out.set_state(toProto(event.state));
+            out.set_stage(event.stage);
+            out.set_done(event.done);
+            out.set_total(event.total);
+            if (event.failure) toProto(*event.failure, out.mutable_failure());
+            if (event.quality) out.set_quality(*event.quality);
+            return call.write(*writer, out);
         };
-        const auto settled = services_.catalog.followIngest(
+        return services_.catalog.watchIngest(
             found->shape.id, [&] { return call.checkpointWhileFollowing(); }, tell);
-        RETURN_IF_ERROR(settled);
-        return {};
     });
 }
 

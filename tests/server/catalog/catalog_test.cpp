@@ -182,13 +182,14 @@ TEST_F(CatalogTest, ContentThatCannotBeLoadedIsNotMixedWithTheOld) {
 
 TEST_F(CatalogTest, ARebuildIsFollowedToItsEnd) {
     putAndWait("cup", 5.0f);
-    const auto rebuild = catalog->beginRebuild("", withMaxPoints(3));
-    ASSERT_TRUE(rebuild) << rebuild.error().message;
+    const auto rebuilds = catalog->beginRebuilds({"default"}, withMaxPoints(3));
+    ASSERT_TRUE(rebuilds) << rebuilds.error().message;
     std::uint64_t done = 0;
-    ASSERT_TRUE(catalog->followRebuild("default", *rebuild, {}, goOn, [&](const store::Rebuild& now) {
-        done = now.done;
-        return Result<void>();
-    }));
+    ASSERT_TRUE(
+        catalog->followRebuild("default", rebuilds->front(), {}, goOn, [&](const store::Rebuild& now) {
+            done = now.done;
+            return Result<void>();
+        }));
     EXPECT_EQ(done, 1u);
     EXPECT_EQ(catalog->collection("").value()->parameters.signature.maxPoints, 3u);
     EXPECT_EQ(catalog->cancelRebuild("").error().code, ErrorCode::kNotFound);
@@ -202,28 +203,93 @@ TEST_F(CatalogTest, ARebuildThatWaitedForARestoreIsOneOfTheNewContent) {
     ASSERT_TRUE(catalog->deleteCollection("parts", true));
     parameters.segmentation.maxSegments = 12;
     ASSERT_TRUE(catalog->createCollection("parts", "", parameters));
-    std::future<Result<store::Rebuild>> begun;
+    std::future<Result<std::vector<store::Rebuild>>> begun;
     std::future<Result<index::SnapshotPtr>> reloaded;
     loading = [&]() -> std::optional<Error> {
-        begun =
-            std::async(std::launch::async, [&] { return catalog->beginRebuild("parts", withMaxPoints(3)); });
+        begun = std::async(std::launch::async,
+                           [&] { return catalog->beginRebuilds({"parts"}, withMaxPoints(3)); });
         reloaded = std::async(std::launch::async, [&] { return catalog->reload("parts"); });
         EXPECT_EQ(begun.wait_for(std::chrono::milliseconds(20)), std::future_status::timeout);
         EXPECT_EQ(reloaded.wait_for(std::chrono::milliseconds(20)), std::future_status::timeout);
         return std::nullopt;
     };
     ASSERT_TRUE(catalog->restore("backup", {}));
-    const auto rebuild = begun.get();
-    ASSERT_TRUE(rebuild) << rebuild.error().message;
+    const auto rebuilds = begun.get();
+    ASSERT_TRUE(rebuilds) << rebuilds.error().message;
+    const store::Rebuild& rebuild = rebuilds->front();
     const auto now = catalog->collection("parts").value();
-    EXPECT_EQ(rebuild->collectionId, now->collection.id);
-    const auto used = store::decodeParameters(rebuild->parameters);
+    EXPECT_EQ(rebuild.collectionId, now->collection.id);
+    const auto used = store::decodeParameters(rebuild.parameters);
     ASSERT_TRUE(used);
     EXPECT_EQ(used->segmentation.maxSegments, 11u) << "of the backup";
     EXPECT_EQ(used->signature.maxPoints, 3u);
     const auto snapshot = reloaded.get();
     ASSERT_TRUE(snapshot) << snapshot.error().message;
     EXPECT_EQ((*snapshot)->collection.id, now->collection.id);
+}
+
+TEST_F(CatalogTest, ARebuildMeansTheNamedCollectionOrAll) {
+    ASSERT_TRUE(catalog->createCollection("parts", "", parametersOf(Profile::kPaper)));
+    using Names = std::vector<std::string>;
+    RebuildRequest request;
+    EXPECT_EQ(catalog->rebuildTargets(request).value(), (Names{"default", "parts"}));
+    request.change = withMaxPoints(3);
+    const auto nameless = catalog->rebuildTargets(request);
+    ASSERT_FALSE(nameless);
+    EXPECT_EQ(nameless.error().message, "collection: name the collection that gets the new parameters");
+    request.collection = "parts";
+    EXPECT_EQ(catalog->rebuildTargets(request).value(), Names{"parts"});
+    request.cacheOnly = true;
+    const auto cached = catalog->rebuildTargets(request);
+    ASSERT_FALSE(cached);
+    EXPECT_EQ(cached.error().message, "parameters cannot change with cache_only: leave one out");
+    request.change = nullptr;
+    EXPECT_EQ(catalog->rebuildTargets(request).value(), Names{"parts"});
+    request.collection = "none";
+    EXPECT_EQ(catalog->rebuildTargets(request).error().code, ErrorCode::kNotFound);
+}
+
+TEST_F(CatalogTest, RebuildsOfSeveralCollectionsBeginTogether) {
+    ASSERT_TRUE(catalog->createCollection("parts", "", parametersOf(Profile::kPaper)));
+    const auto rebuilds = catalog->beginRebuilds({"default", "parts"}, nullptr);
+    ASSERT_TRUE(rebuilds) << rebuilds.error().message;
+    ASSERT_EQ(rebuilds->size(), 2u);
+    const auto parts = catalog->collection("parts").value();
+    EXPECT_EQ((*rebuilds)[1].collectionId, parts->collection.id);
+    EXPECT_EQ((*rebuilds)[1].parameters, store::encodeParameters(parts->parameters));
+    const auto refused = catalog->beginRebuilds(
+        {"default"}, [](const ShapeParameters&) { return fail(ErrorCode::kInvalidArgument, "no"); });
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST_F(CatalogTest, AWatcherIsNotToldTheSameTwice) {
+    noJobs = true;
+    const auto added = put("cup", 5.0f);
+    ASSERT_TRUE(added);
+    std::vector<IngestEvent> events;
+    ASSERT_TRUE(catalog->watchIngest(added->shape.id, goOn, [&](const IngestEvent& event) {
+        events.push_back(event);
+        if (events.size() == 1) {
+            noJobs = false;
+            (void)put("jug", 6.0f);
+        }
+        return Result<void>();
+    }));
+    ASSERT_GE(events.size(), 2u);
+    EXPECT_EQ(events.front().stage, "queued");
+    EXPECT_EQ(events.back().state, store::ShapeState::kReady);
+    EXPECT_EQ(events.back().stage, "");
+    for (std::size_t i = 1; i < events.size(); ++i) EXPECT_FALSE(events[i] == events[i - 1]) << i;
+}
+
+TEST_F(CatalogTest, StatsTellWaitingJobsFromRunningOnes) {
+    noJobs = true;
+    ASSERT_TRUE(put("cup", 5.0f));
+    ASSERT_TRUE(put("jug", 6.0f));
+    ASSERT_TRUE(eventually([&] { return catalog->stats().value().running == 0; }));
+    EXPECT_EQ(catalog->stats().value().queued, 2u);
+    EXPECT_EQ(catalog->stats().value().queue.jobs, 2u);
 }
 
 TEST_F(CatalogTest, FollowingEndsWhenTheCallerGivesUp) {

@@ -75,7 +75,7 @@ TEST(RestoreGate, AdmitsOneRestoreAndRaisesTheEpoch) {
     RestoreGate gate;
     const auto before = gate.epoch();
     ASSERT_TRUE(gate.beginRestore());
-    EXPECT_TRUE(gate.restoring());
+    EXPECT_EQ(gate.requireNoRestore().error().code, ErrorCode::kUnavailable);
     EXPECT_EQ(gate.beginRestore().error().code, ErrorCode::kRejected);
     gate.replaced();
     gate.endRestore();
