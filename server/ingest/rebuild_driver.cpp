@@ -6,7 +6,9 @@
 
 #include "core/base/return_if_error.h"
 #include "server/ingest/background_thread.h"
+#include "server/ingest/quarantine_log.h"
 #include "server/store/parameters_codec.h"
+#include "server/store/quarantine.h"
 
 namespace shapedb::ingest {
 namespace {
@@ -310,15 +312,10 @@ void RebuildDriver::rebuildOne(const ActivePtr& active, std::unique_lock<std::mu
 /// A scan that was in hand when the process died runs alone; after too many deaths it runs no more.
 Result<void> RebuildDriver::isolated(Active& active, const store::Shape& shape) {
     const int deaths = journal_.deaths(shape);
-    if (deaths >= options_.maxAttempts) {
-        log_->error("scan set aside: the server died each time it was segmented",
-                    {{"shape", shape.id}, {"key", shape.key}, {"attempts", std::int64_t{deaths}}});
-        const auto stored = store_.putRebuildFailure(
-            active.rebuild.id, shape.id, shape.pointsVersion,
-            {ErrorCode::kInternal,
-             "the server stopped " + std::to_string(deaths) +
-                 " times while it segmented this scan; it is quarantined. Replace its points, "
-                 "or rebuild the collection, to try again"});
+    if (store::isQuarantined(deaths, options_.maxAttempts)) {
+        logQuarantine(*log_, shape, deaths);
+        const auto stored = store_.putRebuildFailure(active.rebuild.id, shape.id, shape.pointsVersion,
+                                                     store::quarantineError(deaths));
         // Made only to be acquitted, which takes the deaths off the record.
         CrashJournal::Entry entry(journal_, shape);
         if (stored) entry.acquit();

@@ -6,6 +6,7 @@
 
 #include "core/base/return_if_error.h"
 #include "server/ingest/background_thread.h"
+#include "server/ingest/quarantine_log.h"
 
 namespace shapedb::ingest {
 namespace {
@@ -41,9 +42,7 @@ Result<void> WorkerPool::recover() {
     const auto quarantined = store_.recoverJobs(options_.maxAttempts);
     RETURN_IF_ERROR(quarantined);
     for (const store::Shape& shape : *quarantined) {
-        log_->error(
-            "scan set aside: the server died each time it was segmented",
-            {{"shape", shape.id}, {"key", shape.key}, {"attempts", std::int64_t{options_.maxAttempts}}});
+        logQuarantine(*log_, shape, options_.maxAttempts);
         stopSearching(shape);
         board_.settled(shape.id);
     }

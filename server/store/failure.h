@@ -17,6 +17,7 @@ namespace shapedb::store {
 struct Failure : std::exception {
     Failure(ErrorCode code, std::string message, bool fromLibrary = false)
         : error{code, std::move(message)}, fromDatabase(fromLibrary) {}
+    explicit Failure(Error why) : error(std::move(why)), fromDatabase(false) {}
     const char* what() const noexcept override { return error.message.c_str(); }
 
     Error error;
@@ -27,10 +28,13 @@ struct Failure : std::exception {
     throw Failure(code, std::move(message));
 }
 
+/// A name as it appears in messages.
+inline std::string quoted(const std::string& name) { return "'" + name + "'"; }
+
 /// The value, or the error as a Failure.
 template <typename T>
 T orRaise(Result<T> result) {
-    if (!result) raise(result.error().code, result.error().message);
+    if (!result) throw Failure(result.error());
     if constexpr (!std::is_void_v<T>) return std::move(*result);
 }
 

@@ -1,4 +1,5 @@
 // The job queue.
+#include "server/store/quarantine.h"
 #include "server/store/sqlite/rows.h"
 #include "server/store/sqlite/sqlite_store_impl.h"
 
@@ -89,17 +90,13 @@ Result<std::vector<Shape>> SqliteStore::recoverJobs(int maxAttempts) {
         // All first, because markFailed deletes from the table that is read here.
         std::vector<Lost> lost;
         {
-            Query query(connection, sql::kRunningJobs, maxAttempts);
+            Query query(connection, sql::kRunningJobs);
             while (query.step()) lost.push_back({query.integer(0), query.integer(1)});
         }
         std::vector<Shape> quarantined;
         for (const Lost& job : lost) {
-            const Error why{
-                ErrorCode::kInternal,
-                "the server stopped " + std::to_string(job.attempts) +
-                    " times while it segmented this scan; it is quarantined. Replace its points, or "
-                    "rebuild the collection, to try again"};
-            if (auto shape = markFailed(connection, job.shapeId, why))
+            if (!isQuarantined(job.attempts, maxAttempts)) continue;
+            if (auto shape = markFailed(connection, job.shapeId, quarantineError(job.attempts)))
                 quarantined.push_back(std::move(*shape));
         }
         Query(connection, sql::kRequeueRunning).run();
@@ -108,12 +105,7 @@ Result<std::vector<Shape>> SqliteStore::recoverJobs(int maxAttempts) {
 }
 
 Result<QueueDepth> SqliteStore::queueDepth() {
-    return read("read the queue depth", [&](Connection& connection) {
-        Query tally(connection, sql::kTally);
-        if (!tally.step()) raise(ErrorCode::kDataLoss, "the row of table tally is missing");
-        return QueueDepth{static_cast<std::uint64_t>(tally.integer(0)),
-                          static_cast<std::uint64_t>(tally.integer(1))};
-    });
+    return read("read the queue depth", [](Connection& connection) { return readTally(connection); });
 }
 
 }  // namespace shapedb::store

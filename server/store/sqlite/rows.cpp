@@ -31,8 +31,6 @@ ShapeState readState(const Query& query, int column, const std::string& key) {
 
 }  // namespace
 
-std::string quoted(const std::string& key) { return "'" + key + "'"; }
-
 Shape readShape(const Query& query) {
     Shape shape;
     shape.id = query.integer(0);
@@ -137,6 +135,12 @@ std::vector<float> readPoints(const Query& query) {
                   " do not match their checksum; restore a backup or add the shape again");
     }
     return std::move(*points);
+}
+
+QueueDepth readTally(Connection& connection) {
+    Query tally(connection, sql::kTally);
+    if (!tally.step()) raise(ErrorCode::kDataLoss, "the row of table tally is missing");
+    return {static_cast<std::uint64_t>(tally.integer(0)), static_cast<std::uint64_t>(tally.integer(1))};
 }
 
 }  // namespace shapedb::store

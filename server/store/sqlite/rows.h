@@ -52,7 +52,7 @@ std::int64_t signatureDigest(const std::string& bytes);
 /// Decodes the points of a kLoadPoints row and verifies their checksum. Throws Failure.
 std::vector<float> readPoints(const Query& query);
 
-/// A name as it appears in messages.
-std::string quoted(const std::string& key);
+/// Jobs queued and running. Throws Failure kDataLoss.
+QueueDepth readTally(Connection& connection);
 
 }  // namespace shapedb::store

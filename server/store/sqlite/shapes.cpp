@@ -3,6 +3,7 @@
 
 #include "core/base/return_if_error.h"
 #include "server/store/point_blob.h"
+#include "server/store/put_rules.h"
 #include "server/store/sqlite/rows.h"
 #include "server/store/sqlite/sqlite_store_impl.h"
 
@@ -17,23 +18,16 @@ constexpr std::size_t kMostReserved = 4096;
     raise(ErrorCode::kNotFound, "there is no shape with id " + std::to_string(shapeId));
 }
 
-[[noreturn]] void raiseNoShape(const Collection& collection, const std::string& key) {
-    raise(ErrorCode::kNotFound,
-          "there is no shape " + quoted(key) + " in collection " + quoted(collection.name));
-}
-
-void requireVersion(const std::string& key, std::int64_t actual, std::optional<std::int64_t> expected) {
-    if (!expected || *expected == actual) return;
-    const std::string is =
-        actual == 0 ? "does not exist (version 0)" : "has version " + std::to_string(actual);
-    raise(ErrorCode::kVersionConflict,
-          "shape " + quoted(key) + " " + is + ", not the expected version " + std::to_string(*expected));
-}
-
 void writeMetadata(Connection& connection, std::int64_t shapeId, const Metadata& metadata) {
     for (const auto& [name, value] : metadata) {
         Query(connection, sql::kInsertMetadata, shapeId, name, value).run();
     }
+}
+
+void replaceMetadata(Connection& connection, const Shape& existing, const Metadata& metadata) {
+    if (existing.metadata == metadata) return;
+    Query(connection, sql::kDeleteMetadata, existing.id).run();
+    writeMetadata(connection, existing.id, metadata);
 }
 
 void writePoints(Connection& connection, std::int64_t shapeId, const PutRequest& request,
@@ -52,37 +46,13 @@ void writePoints(Connection& connection, std::int64_t shapeId, const PutRequest&
 
 BlobView view(const Checksum& checksum) { return {checksum.data(), checksum.size()}; }
 
-/// The rules of PutMode and expectedVersion for the key as it is now.
-void requireAllowed(const PutRequest& request, const Collection& collection,
-                    const std::optional<Shape>& existing, bool identical) {
-    if (!existing && request.mode == PutMode::kUpdateOnly) raiseNoShape(collection, request.key);
-    if (existing && request.mode == PutMode::kInsertOnly && !identical) {
-        raise(ErrorCode::kAlreadyExists, "shape " + quoted(request.key) + " already exists in collection " +
-                                             quoted(collection.name) + " with other points or metadata");
-    }
-    requireVersion(request.key, existing ? existing->version : 0, request.expectedVersion);
-}
-
 }  // namespace
 
 void SqliteStore::queueJob(Connection& connection, const PutRequest& request, std::int64_t shapeId,
                            std::int64_t pointsVersion) {
-    const std::uint64_t bytes = request.scan.bytes();
     // In the transaction of the upload, so that two cannot take the same last place.
-    Query tally(connection, sql::kTally);
-    if (!tally.step()) raise(ErrorCode::kDataLoss, "the row of table tally is missing");
-    const auto jobs = static_cast<std::uint64_t>(tally.integer(0));
-    const auto queued = static_cast<std::uint64_t>(tally.integer(1));
-    if (request.maxQueuedJobs > 0 && jobs >= request.maxQueuedJobs) {
-        raise(ErrorCode::kQueueFull, "the ingest queue holds " + std::to_string(jobs) + " scans of at most " +
-                                         std::to_string(request.maxQueuedJobs) + "; retry later");
-    }
-    if (request.maxQueuedBytes > 0 && queued + bytes > request.maxQueuedBytes) {
-        raise(ErrorCode::kQueueFull, "the ingest queue holds " + std::to_string(queued) +
-                                         " bytes of at most " + std::to_string(request.maxQueuedBytes) +
-                                         ", no room for " + std::to_string(bytes) + " more; retry later");
-    }
-    Query(connection, sql::kInsertJob, shapeId, pointsVersion, bytes, now()).run();
+    orRaise(requireRoom(request, readTally(connection)));
+    Query(connection, sql::kInsertJob, shapeId, pointsVersion, request.scan.bytes(), now()).run();
 }
 
 PutResult SqliteStore::insertShape(Connection& connection, const PutRequest& request,
@@ -97,18 +67,17 @@ PutResult SqliteStore::insertShape(Connection& connection, const PutRequest& req
     return {PutOutcome::kCreated, *findShapeById(connection, shapeId)};
 }
 
-PutResult SqliteStore::changeShape(Connection& connection, const PutRequest& request,
-                                   const PointEncoding& encoding, const Shape& existing) {
+PutResult SqliteStore::changeMetadata(Connection& connection, const PutRequest& request,
+                                      const Shape& existing) {
+    replaceMetadata(connection, existing, request.metadata);
+    Query(connection, sql::kRaiseVersion, existing.id, now()).run();
+    return {PutOutcome::kMetadataChanged, *findShapeById(connection, existing.id)};
+}
+
+PutResult SqliteStore::replacePoints(Connection& connection, const PutRequest& request,
+                                     const PointEncoding& encoding, const Shape& existing) {
     const std::int64_t shapeId = existing.id;
-    const bool samePoints = existing.checksum == request.scan.checksum();
-    if (existing.metadata != request.metadata) {
-        Query(connection, sql::kDeleteMetadata, shapeId).run();
-        writeMetadata(connection, shapeId, request.metadata);
-    }
-    if (samePoints) {
-        Query(connection, sql::kRaiseVersion, shapeId, now()).run();
-        return {PutOutcome::kMetadataChanged, *findShapeById(connection, shapeId)};
-    }
+    replaceMetadata(connection, existing, request.metadata);
     Query(connection, sql::kReplacePointsOfShape, shapeId, request.scan.pointCount(),
           view(request.scan.checksum()), now())
         .run();
@@ -133,19 +102,20 @@ Result<PutResult> SqliteStore::putShape(const PutRequest& request) {
     return write("store the scan", [&](Connection& connection) -> PutResult {
         const Collection collection = requireCollection(connection, request.collectionId);
         const std::optional<Shape> existing = findShape(connection, request.collectionId, request.key);
-        const bool identical = existing && existing->checksum == request.scan.checksum() &&
-                               existing->metadata == request.metadata;
-        requireAllowed(request, collection, existing, identical);
-        if (!existing) return insertShape(connection, request, *encoding);
-        if (identical) return {PutOutcome::kUnchanged, *existing};
-        return changeShape(connection, request, *encoding, *existing);
+        switch (orRaise(decidePut(request, collection.name, existing ? &*existing : nullptr))) {
+            case PutOutcome::kCreated: return insertShape(connection, request, *encoding);
+            case PutOutcome::kUnchanged: return {PutOutcome::kUnchanged, *existing};
+            case PutOutcome::kMetadataChanged: return changeMetadata(connection, request, *existing);
+            case PutOutcome::kReplaced: break;
+        }
+        return replacePoints(connection, request, *encoding, *existing);
     });
 }
 
 Result<Shape> SqliteStore::getShape(std::int64_t collectionId, const std::string& key) {
     return read("read the shape", [&](Connection& connection) {
         auto found = findShape(connection, collectionId, key);
-        if (!found) raiseNoShape(requireCollection(connection, collectionId), key);
+        if (!found) throw Failure(noSuchShape(requireCollection(connection, collectionId).name, key));
         return std::move(*found);
     });
 }
@@ -218,8 +188,8 @@ Result<Shape> SqliteStore::deleteShape(std::int64_t collectionId, const std::str
                                        std::optional<std::int64_t> expectedVersion) {
     return write("delete the shape", [&](Connection& connection) {
         auto found = findShape(connection, collectionId, key);
-        if (!found) raiseNoShape(requireCollection(connection, collectionId), key);
-        requireVersion(key, found->version, expectedVersion);
+        if (!found) throw Failure(noSuchShape(requireCollection(connection, collectionId).name, key));
+        orRaise(requireVersion(key, found->version, expectedVersion));
         Query(connection, sql::kDeleteShape, found->id).run();
         return std::move(*found);
     });

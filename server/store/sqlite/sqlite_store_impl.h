@@ -111,8 +111,9 @@ class SqliteStore final : public Store {
     void boundWal() noexcept;
 
     PutResult insertShape(Connection& connection, const PutRequest& request, const PointEncoding& encoding);
-    PutResult changeShape(Connection& connection, const PutRequest& request, const PointEncoding& encoding,
-                          const Shape& existing);
+    PutResult changeMetadata(Connection& connection, const PutRequest& request, const Shape& existing);
+    PutResult replacePoints(Connection& connection, const PutRequest& request, const PointEncoding& encoding,
+                            const Shape& existing);
     void queueJob(Connection& connection, const PutRequest& request, std::int64_t shapeId,
                   std::int64_t pointsVersion);
     std::optional<Shape> markFailed(Connection& connection, std::int64_t shapeId, const Error& why);

@@ -4,6 +4,9 @@
 #include <chrono>
 #include <utility>
 
+#include "server/store/put_rules.h"
+#include "server/store/quarantine.h"
+
 namespace shapedb::testing {
 
 using namespace shapedb::store;
@@ -113,37 +116,27 @@ void MemoryStore::removeShape(std::int64_t shapeId) {
     removeJobs(shapeId);
 }
 
-/// Whether the queue takes a new scan of this shape (0: a new one) in place of the one it may hold.
-bool MemoryStore::fits(const PutRequest& request, std::int64_t shapeId) const {
-    std::uint64_t jobs = 0;
-    std::uint64_t bytes = request.scan.bytes();
+QueueDepth MemoryStore::queueWithout(std::int64_t shapeId) const {
+    QueueDepth depth;
     for (const auto& [id, queued] : content_.jobs) {
         if (queued.job.shapeId == shapeId) continue;
-        jobs += 1;
-        bytes += queued.job.pointBytes;
+        depth.jobs += 1;
+        depth.bytes += queued.job.pointBytes;
     }
-    return (request.maxQueuedJobs == 0 || jobs < request.maxQueuedJobs) &&
-           (request.maxQueuedBytes == 0 || bytes <= request.maxQueuedBytes);
+    return depth;
 }
 
 Result<PutResult> MemoryStore::putShape(const PutRequest& request) {
     return guarded("putShape", [&]() -> Result<PutResult> {
-        if (content_.collections.count(request.collectionId) == 0) return notFound("collection");
+        const auto collection = content_.collections.find(request.collectionId);
+        if (collection == content_.collections.end()) return notFound("collection");
         Shape* existing = find(request.collectionId, request.key);
-        if (existing == nullptr && request.mode == PutMode::kUpdateOnly) return notFound("shape");
-        const std::int64_t version = existing != nullptr ? existing->version : 0;
-        const bool samePoints = existing != nullptr && existing->checksum == request.scan.checksum();
-        const bool same = samePoints && existing->metadata == request.metadata;
-        if (existing != nullptr && request.mode == PutMode::kInsertOnly && !same) {
-            return fail(ErrorCode::kAlreadyExists, "key is taken");
-        }
-        if (request.expectedVersion && *request.expectedVersion != version) {
-            return fail(ErrorCode::kVersionConflict, "version is " + std::to_string(version) + ", not " +
-                                                         std::to_string(*request.expectedVersion));
-        }
-        if (same) return PutResult{PutOutcome::kUnchanged, *existing};
-        if (!samePoints && !fits(request, existing != nullptr ? existing->id : 0)) {
-            return fail(ErrorCode::kQueueFull, "queue is full");
+        const auto outcome = decidePut(request, collection->second.name, existing);
+        if (!outcome) return fail(outcome.error());
+        if (*outcome == PutOutcome::kUnchanged) return PutResult{*outcome, *existing};
+        if (*outcome != PutOutcome::kMetadataChanged) {
+            const auto room = requireRoom(request, queueWithout(existing != nullptr ? existing->id : 0));
+            if (!room) return fail(room.error());
         }
         if (existing == nullptr) {
             const std::int64_t id = content_.nextId++;
@@ -157,7 +150,7 @@ Result<PutResult> MemoryStore::putShape(const PutRequest& request) {
         existing->version += 1;
         existing->updatedAt = now();
         existing->metadata = request.metadata;
-        if (samePoints) return PutResult{PutOutcome::kMetadataChanged, *existing};
+        if (*outcome == PutOutcome::kMetadataChanged) return PutResult{*outcome, *existing};
         existing->pointsVersion = existing->version;
         existing->checksum = request.scan.checksum();
         existing->pointCount = request.scan.pointCount();
@@ -167,7 +160,7 @@ Result<PutResult> MemoryStore::putShape(const PutRequest& request) {
         // What a running rebuild made of the old points.
         for (auto& [id, results] : content_.rebuilt) results.erase(existing->id);
         queueJob(*existing);
-        return PutResult{version == 0 ? PutOutcome::kCreated : PutOutcome::kReplaced, *existing};
+        return PutResult{*outcome, *existing};
     });
 }
 
@@ -217,10 +210,8 @@ Result<Shape> MemoryStore::deleteShape(std::int64_t collectionId, const std::str
     return guarded("deleteShape", [&]() -> Result<Shape> {
         const Shape* found = find(collectionId, key);
         if (found == nullptr) return notFound("shape");
-        if (expectedVersion && *expectedVersion != found->version) {
-            return fail(ErrorCode::kVersionConflict, "version is " + std::to_string(found->version) +
-                                                         ", not " + std::to_string(*expectedVersion));
-        }
+        const auto version = requireVersion(key, found->version, expectedVersion);
+        if (!version) return fail(version.error());
         const Shape shape = *found;
         removeShape(shape.id);
         return shape;
@@ -334,9 +325,9 @@ Result<std::vector<Shape>> MemoryStore::recoverJobs(int maxAttempts) {
             QueuedJob& queued = (at++)->second;
             if (!queued.running) continue;
             queued.running = false;
-            if (queued.job.attempts < maxAttempts) continue;
+            if (!isQuarantined(queued.job.attempts, maxAttempts)) continue;
             Shape& shape = content_.shapes.at(queued.job.shapeId);
-            markFailed(shape, {ErrorCode::kInternal, "the server died while it was segmented"});
+            markFailed(shape, quarantineError(queued.job.attempts));
             quarantined.push_back(shape);
         }
         return quarantined;
@@ -344,14 +335,7 @@ Result<std::vector<Shape>> MemoryStore::recoverJobs(int maxAttempts) {
 }
 
 Result<QueueDepth> MemoryStore::queueDepth() {
-    return guarded("queueDepth", [&]() -> Result<QueueDepth> {
-        QueueDepth depth;
-        for (const auto& [id, queued] : content_.jobs) {
-            depth.jobs += 1;
-            depth.bytes += queued.job.pointBytes;
-        }
-        return depth;
-    });
+    return guarded("queueDepth", [&]() -> Result<QueueDepth> { return queueWithout(0); });
 }
 
 Result<std::vector<IndexRow>> MemoryStore::loadIndex(std::int64_t collectionId, std::int64_t afterId,

@@ -107,7 +107,8 @@ class MemoryStore : public store::Store {
     /// The shape if the job is still its current one; the job is dropped in any case.
     void removeJobs(std::int64_t shapeId);
     bool hasJob(std::int64_t shapeId) const;
-    bool fits(const store::PutRequest& request, std::int64_t shapeId) const;
+    /// All jobs but those of this shape; 0: all.
+    store::QueueDepth queueWithout(std::int64_t shapeId) const;
     /// The job's shape; null when a result no longer counts. One of an older generation puts the job back.
     Result<store::Shape*> current(const store::Job& job, std::int64_t generation);
     void markFailed(store::Shape& shape, const Error& why);

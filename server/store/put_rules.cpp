@@ -1,0 +1,57 @@
+#include "server/store/put_rules.h"
+
+#include "core/base/return_if_error.h"
+#include "server/store/failure.h"
+
+namespace shapedb::store {
+
+Result<PutOutcome> decidePut(const PutRequest& request, const std::string& collectionName,
+                             const Shape* existing) {
+    const bool samePoints = existing != nullptr && existing->checksum == request.scan.checksum();
+    const bool identical = samePoints && existing->metadata == request.metadata;
+    if (existing == nullptr && request.mode == PutMode::kUpdateOnly) {
+        return fail(noSuchShape(collectionName, request.key));
+    }
+    if (existing != nullptr && request.mode == PutMode::kInsertOnly && !identical) {
+        return fail(ErrorCode::kAlreadyExists, "shape " + quoted(request.key) +
+                                                   " already exists in collection " + quoted(collectionName) +
+                                                   " with other points or metadata");
+    }
+    RETURN_IF_ERROR(
+        requireVersion(request.key, existing != nullptr ? existing->version : 0, request.expectedVersion));
+    if (existing == nullptr) return PutOutcome::kCreated;
+    if (identical) return PutOutcome::kUnchanged;
+    return samePoints ? PutOutcome::kMetadataChanged : PutOutcome::kReplaced;
+}
+
+Result<void> requireVersion(const std::string& key, std::int64_t actual,
+                            std::optional<std::int64_t> expected) {
+    if (!expected || *expected == actual) return {};
+    const std::string is =
+        actual == 0 ? "does not exist (version 0)" : "has version " + std::to_string(actual);
+    return fail(ErrorCode::kVersionConflict, "shape " + quoted(key) + " " + is +
+                                                 ", not the expected version " + std::to_string(*expected));
+}
+
+Result<void> requireRoom(const PutRequest& request, const QueueDepth& others) {
+    const std::uint64_t bytes = request.scan.bytes();
+    if (request.maxQueuedJobs > 0 && others.jobs >= request.maxQueuedJobs) {
+        return fail(ErrorCode::kQueueFull, "the ingest queue holds " + std::to_string(others.jobs) +
+                                               " scans of at most " + std::to_string(request.maxQueuedJobs) +
+                                               "; retry later");
+    }
+    if (request.maxQueuedBytes > 0 && others.bytes + bytes > request.maxQueuedBytes) {
+        return fail(ErrorCode::kQueueFull, "the ingest queue holds " + std::to_string(others.bytes) +
+                                               " bytes of at most " + std::to_string(request.maxQueuedBytes) +
+                                               ", no room for " + std::to_string(bytes) +
+                                               " more; retry later");
+    }
+    return {};
+}
+
+Error noSuchShape(const std::string& collectionName, const std::string& key) {
+    return {ErrorCode::kNotFound,
+            "there is no shape " + quoted(key) + " in collection " + quoted(collectionName)};
+}
+
+}  // namespace shapedb::store

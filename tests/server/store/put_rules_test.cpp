@@ -1,0 +1,103 @@
+#include "server/store/put_rules.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/server/support/fixtures.h"
+
+namespace shapedb::store {
+namespace {
+
+using namespace shapedb::testing;
+
+/// A put of "cup" in "parts", and the shape that has the key (version 3) unless a test takes it away.
+class PutRules : public ::testing::Test {
+  protected:
+    PutRules() : request(putRequest(1, "cup", taggedPoints(1.0f), {{"colour", "red"}})) {
+        existing.version = 3;
+        existing.checksum = request.scan.checksum();
+        existing.metadata = request.metadata;
+    }
+
+    Result<PutOutcome> onFreeKey() { return decidePut(request, "parts", nullptr); }
+    Result<PutOutcome> onTakenKey() { return decidePut(request, "parts", &existing); }
+    void otherPoints() { existing.checksum[0] ^= 1; }
+    void otherMetadata() { existing.metadata["colour"] = "blue"; }
+
+    PutRequest request;
+    Shape existing;
+};
+
+void expectError(const Error& error, ErrorCode code, const std::string& message) {
+    EXPECT_EQ(error.code, code);
+    EXPECT_EQ(error.message, message);
+}
+
+TEST_F(PutRules, PointsWeighMoreThanMetadata) {
+    EXPECT_EQ(onFreeKey().value(), PutOutcome::kCreated);
+    EXPECT_EQ(onTakenKey().value(), PutOutcome::kUnchanged);
+    otherMetadata();
+    EXPECT_EQ(onTakenKey().value(), PutOutcome::kMetadataChanged);
+    otherPoints();
+    EXPECT_EQ(onTakenKey().value(), PutOutcome::kReplaced);
+    existing.metadata = request.metadata;
+    EXPECT_EQ(onTakenKey().value(), PutOutcome::kReplaced);
+}
+
+TEST_F(PutRules, InsertOnlyAcceptsARepeatedRequest) {
+    request.mode = PutMode::kInsertOnly;
+    EXPECT_EQ(onFreeKey().value(), PutOutcome::kCreated);
+    EXPECT_EQ(onTakenKey().value(), PutOutcome::kUnchanged);
+    const std::string taken =
+        "shape 'cup' already exists in collection 'parts' with other points or metadata";
+    otherMetadata();
+    expectError(onTakenKey().error(), ErrorCode::kAlreadyExists, taken);
+    existing.metadata = request.metadata;
+    otherPoints();
+    expectError(onTakenKey().error(), ErrorCode::kAlreadyExists, taken);
+}
+
+TEST_F(PutRules, UpdateOnlyNeedsTheShape) {
+    request.mode = PutMode::kUpdateOnly;
+    expectError(onFreeKey().error(), ErrorCode::kNotFound, "there is no shape 'cup' in collection 'parts'");
+    EXPECT_EQ(onTakenKey().value(), PutOutcome::kUnchanged);
+    otherPoints();
+    EXPECT_EQ(onTakenKey().value(), PutOutcome::kReplaced);
+}
+
+TEST_F(PutRules, ExpectedVersionHoldsForRepeatedRequestsToo) {
+    request.expectedVersion = 3;
+    EXPECT_EQ(onTakenKey().value(), PutOutcome::kUnchanged);
+    expectError(onFreeKey().error(), ErrorCode::kVersionConflict,
+                "shape 'cup' does not exist (version 0), not the expected version 3");
+    request.expectedVersion = 2;
+    expectError(onTakenKey().error(), ErrorCode::kVersionConflict,
+                "shape 'cup' has version 3, not the expected version 2");
+    request.expectedVersion = 0;
+    EXPECT_EQ(onFreeKey().value(), PutOutcome::kCreated);
+    EXPECT_EQ(onTakenKey().error().code, ErrorCode::kVersionConflict);
+}
+
+TEST_F(PutRules, TheModeIsLookedAtBeforeTheVersion) {
+    request.expectedVersion = 2;
+    request.mode = PutMode::kUpdateOnly;
+    EXPECT_EQ(onFreeKey().error().code, ErrorCode::kNotFound);
+    request.mode = PutMode::kInsertOnly;
+    otherPoints();
+    EXPECT_EQ(onTakenKey().error().code, ErrorCode::kAlreadyExists);
+}
+
+TEST_F(PutRules, TheQueueHoldsAtMostItsLimits) {
+    ASSERT_EQ(request.scan.bytes(), 48u);
+    EXPECT_TRUE(requireRoom(request, {1000, 1000})) << "no limits";
+    request.maxQueuedJobs = 3;
+    EXPECT_TRUE(requireRoom(request, {2, 1000}));
+    expectError(requireRoom(request, {3, 0}).error(), ErrorCode::kQueueFull,
+                "the ingest queue holds 3 scans of at most 3; retry later");
+    request.maxQueuedBytes = 100;
+    EXPECT_TRUE(requireRoom(request, {2, 52}));
+    expectError(requireRoom(request, {2, 53}).error(), ErrorCode::kQueueFull,
+                "the ingest queue holds 53 bytes of at most 100, no room for 48 more; retry later");
+}
+
+}  // namespace
+}  // namespace shapedb::store
