@@ -15,7 +15,9 @@ CrashIsolation::Pass::Pass(CrashIsolation& gate, bool suspect, const std::atomic
     : gate_(gate), suspect_(suspect) {
     std::unique_lock<std::mutex> lock(gate_.mutex_);
     if (!suspect_) {
+        ++gate_.waitingOrdinary_;
         admitted_ = gate_.waitUntilOpen(lock, false, cancel);
+        --gate_.waitingOrdinary_;
         if (admitted_) ++gate_.ordinary_;
         return;
     }
@@ -52,6 +54,11 @@ bool CrashIsolation::waitUntilOpen(std::unique_lock<std::mutex>& lock, bool susp
 bool CrashIsolation::wouldWait(bool suspect) const {
     const std::lock_guard<std::mutex> lock(mutex_);
     return !isOpen(suspect);
+}
+
+int CrashIsolation::waiting() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return waitingSuspects_ + waitingOrdinary_;
 }
 
 bool CrashIsolation::isOpen(bool suspect) const {

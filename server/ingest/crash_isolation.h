@@ -34,6 +34,8 @@ class CrashIsolation {
 
     /// Whether a Pass made now would have to wait.
     [[nodiscard]] bool wouldWait(bool suspect) const;
+    /// How many wait for a Pass now.
+    [[nodiscard]] int waiting() const;
 
   private:
     [[nodiscard]] bool isOpen(bool suspect) const;
@@ -43,6 +45,7 @@ class CrashIsolation {
     std::condition_variable changed_;
     int ordinary_ = 0;         ///< inside
     int waitingSuspects_ = 0;  ///< outside
+    int waitingOrdinary_ = 0;  ///< outside
     bool suspectInside_ = false;
 };
 

@@ -139,7 +139,9 @@ Result<void> RebuildDriver::cancel(const store::Collection& collection) {
 void RebuildDriver::waitUntilQuiet(std::unique_lock<std::mutex>& lock) {
     if (active_) active_->cancel = true;
     changed_.notify_all();
+    ++pausing_;
     changed_.wait(lock, [this] { return !active_ || (active_->inFlight == 0 && !active_->reading); });
+    --pausing_;
     active_.reset();
     queue_.clear();
 }
@@ -148,6 +150,11 @@ void RebuildDriver::pause() {
     std::unique_lock<std::mutex> lock(mutex_);
     paused_ = true;
     waitUntilQuiet(lock);
+}
+
+bool RebuildDriver::pauseWaits() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return pausing_ > 0;
 }
 
 Result<void> RebuildDriver::resume(Content content) {

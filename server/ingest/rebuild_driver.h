@@ -68,6 +68,8 @@ class RebuildDriver {
 
     /// Returns when no thread uses the store.
     void pause();
+    /// Whether `pause` or `stop` has been called and waits for a thread.
+    [[nodiscard]] bool pauseWaits() const;
     /// Continues with the rebuilds that the store calls running. Deaths are on record for the content they
     /// were counted with. Errors: as Store::runningRebuilds.
     [[nodiscard]] Result<void> resume(Content content);
@@ -109,10 +111,11 @@ class RebuildDriver {
     CrashJournal journal_;
 
     std::mutex beginMutex_;  ///< one `begin` or `cancel` at a time; taken before mutex_
-    std::mutex mutex_;
+    mutable std::mutex mutex_;
     std::condition_variable changed_;
     std::deque<store::Rebuild> queue_;
     ActivePtr active_;
+    int pausing_ = 0;  ///< calls inside `pause` or `stop`
     bool paused_ = false;
     bool stopping_ = false;
     std::vector<std::thread> threads_;

@@ -92,7 +92,9 @@ void WorkerPool::pause() {
     paused_ = true;
     for (const auto& running : running_) running->cancel = true;
     changed_.notify_all();
+    ++pausing_;
     changed_.wait(lock, [this] { return running_.empty() && claiming_ == 0; });
+    --pausing_;
 }
 
 Result<void> WorkerPool::resume(Content content) {
@@ -125,6 +127,11 @@ void WorkerPool::stop() {
     // A last time: what stays claimed would count as a death of this process at the next start.
     std::unique_lock<std::mutex> lock(mutex_);
     if (!unreleased_.empty()) retryReleases(lock);
+}
+
+bool WorkerPool::pauseWaits() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return pausing_ > 0;
 }
 
 std::size_t WorkerPool::running() const {

@@ -73,6 +73,8 @@ class WorkerPool {
     /// As `pause`, and ends the threads. Idempotent.
     void stop();
 
+    /// Whether `pause` or `stop` has been called and waits for a worker.
+    [[nodiscard]] bool pauseWaits() const;
     [[nodiscard]] std::size_t running() const;
     /// Jobs since start that ended in a signature.
     [[nodiscard]] std::uint64_t ingested() const { return ingested_.load(); }
@@ -120,6 +122,7 @@ class WorkerPool {
     /// True from the start until the first job that no dead process had in hand (those come first,
     /// being older): jobs run one at a time and alone, so that a deadly one dies alone.
     bool probing_ = true;
+    int pausing_ = 0;   ///< calls inside `pause`
     int claiming_ = 0;  ///< workers in the store without a job
     /// One for each worker that has a scan in hand. Not by job: a job that was put back may be with its next
     /// worker before the last one has left.

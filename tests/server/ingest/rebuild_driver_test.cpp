@@ -370,7 +370,7 @@ TEST_F(Driver, PauseDoesNotWaitForTheScanThatKeepsItOut) {
     const std::atomic<bool> never{false};
     std::optional<CrashIsolation::Pass> suspect(std::in_place, isolation, true, never);
     const auto rebuild = begin();
-    std::this_thread::sleep_for(20ms);
+    ASSERT_TRUE(eventually([&] { return isolation.waiting() > 0; }));
     driver->pause();
     EXPECT_EQ(described, 0);
     suspect.reset();
@@ -403,7 +403,7 @@ TEST_F(Driver, PauseWaitsForARebuildThatIsBeingGivenUp) {
         driver->pause();
         paused = true;
     });
-    std::this_thread::sleep_for(20ms);
+    EXPECT_TRUE(eventually([&] { return driver->pauseWaits(); }));
     EXPECT_FALSE(paused) << "while a thread uses the store";
     mayEnd = true;
     pausing.join();

@@ -304,7 +304,7 @@ TEST_F(Pool, PauseDoesNotWaitForTheScanThatKeepsItOut) {
             put("l", 2.0f);
             ASSERT_TRUE(eventually([&] { return pool->running() == 1; }));
         }
-        std::this_thread::sleep_for(20ms);
+        ASSERT_TRUE(eventually([&] { return isolation.waiting() == 1; }));
         pool->pause();
         EXPECT_EQ(pool->running(), 0u);
         EXPECT_EQ(store.queueDepth()->jobs, 1u) << "put back";
@@ -348,7 +348,9 @@ TEST_F(Pool, ARestingWorkerDoesNotHideTheNextOneWithItsJob) {
     std::atomic<int> visitsOfX{0};
     std::atomic<int> visitsOfY{0};
     std::atomic<int> left{0};
+    std::atomic<int> claims{0};
     store.fault = [&](const std::string& function) -> std::optional<Error> {
+        if (function == "claimJob") ++claims;
         if (function == "finishJob" && failOnce.exchange(false)) return Error{ErrorCode::kStorage, "once"};
         return std::nullopt;
     };
@@ -368,7 +370,8 @@ TEST_F(Pool, ARestingWorkerDoesNotHideTheNextOneWithItsJob) {
     ASSERT_TRUE(eventually([&] { return log->all().find("cannot store a signature") != std::string::npos; }));
     yMayEnd = true;  // its worker takes x
     ASSERT_TRUE(eventually([&] { return settled("y") && visitsOfX == 2; }));
-    std::this_thread::sleep_for(2 * backOff);
+    // Of x, of y, of x again, and of nothing by the other worker.
+    ASSERT_TRUE(eventually([&] { return claims == 4; }));
     EXPECT_EQ(pool->running(), 1u) << "the rest of the first worker is over, x is still in hand";
     pool->supersede(x.id);
     std::atomic<bool> paused{false};
@@ -376,7 +379,7 @@ TEST_F(Pool, ARestingWorkerDoesNotHideTheNextOneWithItsJob) {
         pool->pause();
         paused = true;
     });
-    std::this_thread::sleep_for(20ms);
+    EXPECT_TRUE(eventually([&] { return pool->pauseWaits(); }));
     EXPECT_FALSE(paused) << "while a worker has x in hand";
     EXPECT_EQ(left, 0);
     xMayEnd = true;
