@@ -60,6 +60,16 @@ Result<ShapeParameters> parametersOf(const store::Collection& collection) {
     return parameters;
 }
 
+/// A snapshot to be filled.
+Result<std::shared_ptr<Snapshot>> withoutSignatures(const store::Collection& collection) {
+    Result<ShapeParameters> parameters = parametersOf(collection);
+    RETURN_IF_ERROR(parameters);
+    auto snapshot = std::make_shared<Snapshot>();
+    snapshot->collection = collection;
+    snapshot->parameters = *parameters;
+    return snapshot;
+}
+
 /// Runs `work`; a failed allocation becomes an error.
 template <typename Work>
 auto guarded(Work&& work) -> decltype(work()) {
@@ -146,16 +156,13 @@ Result<SignatureSet> CollectionIndex::readSignatures(std::int64_t collectionId, 
 
 Result<SnapshotPtr> CollectionIndex::read(const store::Collection& collection, std::size_t batches,
                                           const RunContext& context) const {
-    auto snapshot = std::make_shared<Snapshot>();
-    snapshot->collection = collection;
-    Result<ShapeParameters> parameters = parametersOf(collection);
-    RETURN_IF_ERROR(parameters);
-    snapshot->parameters = *parameters;
+    auto snapshot = withoutSignatures(collection);
+    RETURN_IF_ERROR(snapshot);
 
     auto signatures = readSignatures(collection.id, batches, context);
     RETURN_IF_ERROR(signatures);
-    snapshot->signatures = std::move(*signatures);
-    return SnapshotPtr(std::move(snapshot));
+    (*snapshot)->signatures = std::move(*signatures);
+    return SnapshotPtr(std::move(*snapshot));
 }
 
 void CollectionIndex::insert(Directory& directory, SlotPtr slot) const {
@@ -222,16 +229,13 @@ std::vector<SnapshotPtr> CollectionIndex::all() const {
 }
 
 Result<SnapshotPtr> CollectionIndex::add(const store::Collection& collection) {
-    auto snapshot = std::make_shared<Snapshot>();
-    snapshot->collection = collection;
-    Result<ShapeParameters> parameters = parametersOf(collection);
-    RETURN_IF_ERROR(parameters);
-    snapshot->parameters = *parameters;
+    auto snapshot = withoutSignatures(collection);
+    RETURN_IF_ERROR(snapshot);
     auto slot = std::make_shared<Slot>();
-    slot->publish(snapshot);
+    slot->publish(*snapshot);
     const std::lock_guard<std::mutex> lock(mutex_);
     insert(directory_, std::move(slot));
-    return SnapshotPtr(snapshot);
+    return SnapshotPtr(std::move(*snapshot));
 }
 
 void CollectionIndex::remove(std::int64_t collectionId) {

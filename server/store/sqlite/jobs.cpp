@@ -57,10 +57,7 @@ Result<std::optional<Shape>> SqliteStore::finishJob(const Job& job, const Signat
             raise(ErrorCode::kInvalidArgument, "the signature is not of the job's shape and points");
         }
         if (!jobIsCurrent(connection, job, signature.generation)) return std::nullopt;
-        Query(connection, sql::kPutSignature, signature.shapeId, signature.generation,
-              signature.pointsVersion, signatureDigest(signature.bytes),
-              BlobView{signature.bytes.data(), signature.bytes.size()})
-            .run();
+        putSignature(connection, signature);
         Query(connection, sql::kSetReady, job.shapeId, now()).run();
         Query(connection, sql::kDeleteJob, job.shapeId).run();
         return findShapeById(connection, job.shapeId);

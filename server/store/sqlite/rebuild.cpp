@@ -129,10 +129,7 @@ Result<void> SqliteStore::putRebuilt(std::int64_t rebuildId, const SignatureRow&
                       " for a rebuild into generation " + std::to_string(rebuild.targetGeneration));
         }
         if (!pointsAreCurrent(connection, rebuild, signature.shapeId, signature.pointsVersion)) return;
-        Query(connection, sql::kPutSignature, signature.shapeId, signature.generation,
-              signature.pointsVersion, signatureDigest(signature.bytes),
-              BlobView{signature.bytes.data(), signature.bytes.size()})
-            .run();
+        putSignature(connection, signature);
         Query(connection, sql::kDeleteRebuildFailure, rebuildId, signature.shapeId).run();
     });
 }

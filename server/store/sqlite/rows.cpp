@@ -119,6 +119,12 @@ SignatureRow readSignature(Connection& connection, const Query& query, int colum
     return row;
 }
 
+void putSignature(Connection& connection, const SignatureRow& signature) {
+    Query(connection, sql::kPutSignature, signature.shapeId, signature.generation, signature.pointsVersion,
+          signatureDigest(signature.bytes), BlobView{signature.bytes.data(), signature.bytes.size()})
+        .run();
+}
+
 std::vector<float> readPoints(const Query& query) {
     const std::string key = query.text(0);
     if (query.isNull(3)) raise(ErrorCode::kDataLoss, "shape " + quoted(key) + " has lost its points");

@@ -46,6 +46,9 @@ Collection readCollection(const Query& query);
 /// Failure kDataLoss, naming the shape.
 SignatureRow readSignature(Connection& connection, const Query& query, int column, std::int64_t shapeId);
 
+/// Replaces the shape's signature of that generation, if there is one.
+void putSignature(Connection& connection, const SignatureRow& signature);
+
 /// Column signature.digest: the first eight bytes of the SHA-256, little-endian. Persisted.
 std::int64_t signatureDigest(const std::string& bytes);
 
