@@ -18,6 +18,7 @@
 #include "core/base/random.h"
 #include "core/base/return_if_error.h"
 #include "core/geometry/bounding.h"
+#include "core/geometry/box.h"
 #include "core/geometry/motion.h"
 #include "core/pipeline.h"
 #include "core/segmentation/segmentation.h"
@@ -51,12 +52,7 @@ constexpr std::array<Condition, 7> kConditions = {{
 
 // Adds points uniform in the cloud's box: kOutlierShare of its number.
 void addOutliers(PointCloud& points) {
-    Point3 low = points.front();
-    Point3 high = low;
-    for (const Point3& p : points) {
-        low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-        high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-    }
+    const auto [low, high] = boxOf(points);
     Random random(kSeed);
     const auto count = static_cast<std::size_t>(kOutlierShare * static_cast<double>(points.size()));
     for (std::size_t i = 0; i < count; ++i) {

@@ -6,16 +6,15 @@
 #include <cstdint>
 #include <string>
 
+#include "common/point_stream.h"
 #include "core/base/error.h"
 #include "core/base/run_context.h"
 #include "core/geometry/point.h"
 
 namespace shapedb::client {
 
-/// Bytes of one point on the wire.
-constexpr std::size_t kPointBytes = 12;
-/// Bytes of one chunk: the most whole points that fit into 1 MiB.
-constexpr std::size_t kChunkBytes = (std::size_t{1} << 20) / kPointBytes * kPointBytes;
+/// Bytes of one chunk: the most whole points that fit.
+constexpr std::size_t kChunkBytes = kMaxChunkBytes / kPointBytes * kPointBytes;
 
 /// A float32 rounds a coordinate beyond this many box diagonals by more than 2^-20 (a millionth) of the
 /// diagonal: it has 24 significant bits, and 24 = 20 + log2(16).

@@ -90,7 +90,7 @@ CommandResult runSegment(Session& session, const SegmentFlags& flags) {
 void addSegmentCommand(CLI::App& app, Session& session) {
     auto flags = std::make_shared<SegmentFlags>();
     CLI::App* command = app.add_subcommand("segment", "Cut one scan into its parts (needs no server)");
-    command->add_option("FILE", flags->file, "Scan file: PLY, PCD, OFF, OBJ, STL or XYZ")->required();
+    command->add_option("FILE", flags->file, "Scan file: " + scanFormatList())->required();
     command->add_option("--out", flags->out, "Write the points, coloured and labelled by part")
         ->type_name("FILE.ply");
     addScanFlags(*command, flags->scan);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <new>
@@ -59,6 +60,23 @@ std::string endingList() {
     std::string list;
     for (const Format& format : kFormats) list += (list.empty() ? "" : " ") + std::string(format.ending);
     return list;
+}
+
+std::string upperCase(std::string word) {
+    std::transform(word.begin(), word.end(), word.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+    return word;
+}
+
+/// Endings of one reader are neighbours in kFormats, the first of them names the format.
+std::vector<std::string> formatNames() {
+    std::vector<std::string> names;
+    ReadFormat last = nullptr;
+    for (const Format& format : kFormats) {
+        if (format.read != last) names.push_back(upperCase(format.ending + 1));
+        last = format.read;
+    }
+    return names;
 }
 
 Error unknownFormat(const std::string& path) {
@@ -243,6 +261,16 @@ const std::vector<std::string>& scanFileEndings() {
         return all;
     }();
     return endings;
+}
+
+std::string scanFormatList() {
+    const std::vector<std::string> names = formatNames();
+    std::string list;
+    for (std::size_t i = 0; i < names.size(); ++i) {
+        if (i > 0) list += i + 1 == names.size() ? " or " : ", ";
+        list += names[i];
+    }
+    return list;
 }
 
 Result<std::vector<ScanFile>> listScanFiles(const std::vector<std::string>& paths) {

@@ -82,6 +82,9 @@ struct Scan {
 /// In lower case with the dot, e.g. ".ply".
 [[nodiscard]] const std::vector<std::string>& scanFileEndings();
 
+/// The formats for people: "PLY, PCD, ... or XYZ".
+[[nodiscard]] std::string scanFormatList();
+
 struct ScanFile {
     std::string path;
     /// Name of the file's folder: "Hand" for "scans/Hand/193.ply", the current folder for "193.ply".

@@ -7,6 +7,7 @@
 
 #include "core/base/parallel.h"
 #include "core/base/radix_sort.h"
+#include "core/geometry/box.h"
 #include "core/geometry/morton.h"
 
 namespace shapedb {
@@ -41,13 +42,8 @@ std::uint64_t hilbertIndex(std::array<std::uint32_t, 3> x) {
 }
 
 LargeVector<KeyedIndex> keysOf(const PointCloud& points) {
-    Point3 low = points.front();
-    Point3 high = low;
-    for (const Point3& p : points) {
-        low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-        high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-    }
-    const double extent = std::max({high.x - low.x, high.y - low.y, high.z - low.z});
+    const Box box = boxOf(points);
+    const double extent = std::max({box.extent().x, box.extent().y, box.extent().z});
     const double last = (1u << kBits) - 1;
     // The extent of finite points may overflow. Then all of them lie in one step, in the order of their
     // indices.
@@ -58,7 +54,7 @@ LargeVector<KeyedIndex> keysOf(const PointCloud& points) {
     // Cannot fail: the default context never cancels.
     static_cast<void>(parallelFor(points.size(), kBlock, {}, [&](std::size_t from, std::size_t to) {
         for (std::size_t i = from; i < to; ++i) {
-            const Point3 p = points[i] - low;
+            const Point3 p = points[i] - box.low;
             keyed[i] = {hilbertIndex({step(p.x), step(p.y), step(p.z)}), static_cast<std::uint32_t>(i)};
         }
     }));

@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "common/point_stream.h"
+
 namespace shapedb::catalog {
 
 // Names and text (repeated in the comments of proto/).
@@ -18,9 +20,9 @@ constexpr std::size_t kMaxMetadataValueBytes = 1'024;
 constexpr std::size_t kMaxFilterBytes = 16'384;
 
 // Scans.
-constexpr std::size_t kPointBytes = 12;  ///< float32 x y z
+using shapedb::kPointBytes;
 constexpr std::uint64_t kMinPoints = 4;
-constexpr std::size_t kMaxChunkBytes = std::size_t{1} << 20;
+using shapedb::kMaxChunkBytes;
 
 // Listings and answers.
 constexpr std::uint32_t kDefaultPageSize = 100;

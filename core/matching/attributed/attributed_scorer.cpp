@@ -106,6 +106,11 @@ class WholeScorer final : public AttributedScorer {
   protected:
     double scoreOf(const Pair& pair) const override;
     double boundOf(const Pair& pair) const override;
+
+  private:
+    static double scoreAt(const Pair& pair, double agreement) {
+        return belowOne(attributeScore(pair.distance, agreement));
+    }
 };
 
 WholeScorer::WholeScorer(const Signature& query, const ScoreOptions& options)
@@ -113,11 +118,11 @@ WholeScorer::WholeScorer(const Signature& query, const ScoreOptions& options)
                        options.keepScale ? StatisticsRule::kWholeAndSize : StatisticsRule::kWhole) {}
 
 double WholeScorer::scoreOf(const Pair& pair) const {
-    return belowOne(attributeScore(pair.distance, pair.comparison.match().agreement));
+    return scoreAt(pair, pair.comparison.match().agreement);
 }
 
 double WholeScorer::boundOf(const Pair& pair) const {
-    return belowOne(attributeScore(pair.distance, pair.comparison.agreementBound()));
+    return scoreAt(pair, pair.comparison.agreementBound());
 }
 
 Explanation WholeScorer::explain(const ShapeRow& shape) const {
@@ -127,7 +132,7 @@ Explanation WholeScorer::explain(const ShapeRow& shape) const {
     const ShapeRow b = pair.exchanged ? query().row() : shape;
     const SegmentMatch match = pair.comparison.match();
     Explanation result;
-    result.score = isSame(shape) ? 1.0 : belowOne(attributeScore(pair.distance, match.agreement));
+    result.score = isSame(shape) ? 1.0 : scoreAt(pair, match.agreement);
     result.similarity = match.agreement;
     result.dissimilarity = std::max(0.0, 1.0 - match.agreement);
     result.degenerate = a.pointCount == 1 || b.pointCount == 1;
@@ -148,6 +153,11 @@ class PartialScorer final : public AttributedScorer {
   protected:
     double scoreOf(const Pair& pair) const override;
     double boundOf(const Pair& pair) const override;
+
+  private:
+    static double scoreAt(const Pair& pair, double agreement, double share) {
+        return belowOne(partialScore(pair.distance, agreement, share));
+    }
 };
 
 PartialScorer::PartialScorer(const Signature& query, const ScoreOptions& options)
@@ -155,12 +165,12 @@ PartialScorer::PartialScorer(const Signature& query, const ScoreOptions& options
 
 double PartialScorer::scoreOf(const Pair& pair) const {
     const Containment found = containment(query().segments(), pair.segments, pair.knownScale, options());
-    return belowOne(partialScore(pair.distance, pair.comparison.match().agreement, found.share));
+    return scoreAt(pair, pair.comparison.match().agreement, found.share);
 }
 
 double PartialScorer::boundOf(const Pair& pair) const {
     const double share = containmentBound(query().segments(), pair.segments, pair.knownScale);
-    return belowOne(partialScore(pair.distance, pair.comparison.agreementBound(), share));
+    return scoreAt(pair, pair.comparison.agreementBound(), share);
 }
 
 Explanation PartialScorer::explain(const ShapeRow& shape) const {
@@ -170,7 +180,7 @@ Explanation PartialScorer::explain(const ShapeRow& shape) const {
     const Containment found = containment(query().segments(), pair.segments, pair.knownScale, options());
     const double agreement = pair.comparison.match().agreement;
     Explanation result;
-    result.score = isSame(shape) ? 1.0 : belowOne(partialScore(pair.distance, agreement, found.share));
+    result.score = isSame(shape) ? 1.0 : scoreAt(pair, agreement, found.share);
     result.similarity = found.share;
     result.dissimilarity = 1.0 - found.share;
     result.degenerate = piece.pointCount == 1 || shape.pointCount == 1;

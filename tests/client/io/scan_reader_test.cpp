@@ -188,6 +188,8 @@ TEST_F(ScanReader, ErrorsNameUnreadableAndUnknownFiles) {
     }
 }
 
+TEST_F(ScanReader, NamesEachFormatOnce) { EXPECT_EQ(scanFormatList(), "PLY, PCD, OFF, OBJ, STL or XYZ"); }
+
 TEST_F(ScanReader, ReadsPipes) {
     for (const SampleFile& file : sampleFiles()) {
         const std::string pipe = path("pipe-" + file.name);
