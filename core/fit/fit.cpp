@@ -116,9 +116,7 @@ Result<std::vector<Candidate>> candidatesOf(Comparison& comparison, FitKind kind
             {h.pose, h.view, comparison.shares(h.pose, h.view, kPromisingPoints, kPromisingWidth)});
     }
     sortByScore(candidates);
-    std::vector<Candidate> unfinished;  // what the last stage leaves out still says how certain the best is
     for (const Stage& stage : kStages) {
-        unfinished = candidates;
         const double least = stage.leastShare * candidates.front().score();
         while (candidates.back().score() < least) candidates.pop_back();
         candidates = distinct(candidates, stage.poses, kApart, comparison);

@@ -52,7 +52,8 @@ struct FitResult {
     FitPose best;
     FitKind kind = FitKind::kWhole;  ///< as what the query was fitted; never kAutomatic
     /// 1 - F of the best clearly different pose / F of the best: 0 when another is as good, 1 when there is
-    /// no other at all. Turns about a free axis are not different poses.
+    /// no other comes near: poses that fall below 0.85 of the best before the last stage are not followed,
+    /// and count as none. Turns about a free axis are not different poses.
     double certainty = 0.0;
     /// Clearly different poses (more than 4 % of the query's diagonal apart) whose score is within 3 % of the
     /// best, best first; at most kMostAlternatives.
