@@ -6,8 +6,8 @@
 #include <cstring>
 #include <new>
 
-#include <zlib.h>
-
+#include "core/base/return_if_error.h"
+#include "core/base/stored_bytes.h"
 #include "core/preparation/frame.h"
 
 namespace shapedb {
@@ -32,42 +32,6 @@ constexpr double kLargestCentre = 1.01 * kMaxCoordinate;
 constexpr double kLargestUnit = 2.0 * kMaxCoordinate;
 constexpr double kSmallestUnit = 1e-45;
 
-std::uint32_t checksumOf(const char* bytes, std::size_t size) {
-    return static_cast<std::uint32_t>(
-        crc32(0, reinterpret_cast<const Bytef*>(bytes), static_cast<uInt>(size)));
-}
-
-template <typename Unsigned>
-void put(std::string& out, Unsigned value) {
-    for (std::size_t i = 0; i < sizeof(Unsigned); ++i)
-        out.push_back(static_cast<char>((value >> (8 * i)) & 0xffu));
-}
-
-void putDouble(std::string& out, double value) {
-    std::uint64_t bits = 0;
-    std::memcpy(&bits, &value, sizeof bits);
-    put(out, bits);
-}
-
-template <typename Unsigned>
-Unsigned take(const char*& at) {
-    Unsigned value = 0;
-    for (std::size_t i = 0; i < sizeof(Unsigned); ++i) {
-        // Shifts instead of a copy: the same on machines of either byte order.
-        value = static_cast<Unsigned>(value |
-                                      (static_cast<Unsigned>(static_cast<unsigned char>(at[i])) << (8 * i)));
-    }
-    at += sizeof(Unsigned);
-    return value;
-}
-
-double takeDouble(const char*& at) {
-    const auto bits = take<std::uint64_t>(at);
-    double value = 0.0;
-    std::memcpy(&value, &bits, sizeof value);
-    return value;
-}
-
 tl::unexpected<Error> damaged(const std::string& how) {
     return fail(ErrorCode::kDataLoss, "the stored surface points are damaged: " + how);
 }
@@ -84,9 +48,9 @@ Result<std::size_t> checkedCount(const std::string& bytes) {
                                                   std::to_string(version) + "; this program knows up to " +
                                                   std::to_string(kVersion));
     }
-    const char* at = bytes.data() + 5;
-    if (take<std::uint8_t>(at) != 0) return damaged("a reserved byte is not 0");
-    const std::size_t count = take<std::uint16_t>(at);
+    ByteReader reader(bytes.data() + 5);
+    if (reader.takeUnsigned<std::uint8_t>() != 0) return damaged("a reserved byte is not 0");
+    const std::size_t count = reader.takeUnsigned<std::uint16_t>();
     if (count < kLeastPoints || count > kMostSurfacePoints) {
         return damaged(std::to_string(count) + " points instead of 4 to " +
                        std::to_string(kMostSurfacePoints));
@@ -95,8 +59,9 @@ Result<std::size_t> checkedCount(const std::string& bytes) {
         return damaged(std::to_string(bytes.size()) + " bytes instead of " + std::to_string(sizeOf(count)));
     }
     const std::size_t body = bytes.size() - kChecksumBytes;
-    const char* end = bytes.data() + body;
-    if (take<std::uint32_t>(end) != checksumOf(bytes.data(), body)) return damaged("the checksum is wrong");
+    if (ByteReader(bytes.data() + body).takeUnsigned<std::uint32_t>() != checksumOf(bytes.data(), body)) {
+        return damaged("the checksum is wrong");
+    }
     return count;
 }
 
@@ -135,37 +100,38 @@ std::string encodeSurfacePoints(const SurfacePoints& surface) {
     std::string bytes;
     bytes.reserve(sizeOf(surface.size()));
     bytes.append(kMagic, sizeof kMagic);
-    put(bytes, kVersion);
-    put(bytes, std::uint8_t{0});
-    put(bytes, static_cast<std::uint16_t>(surface.size()));
+    putUnsigned(bytes, kVersion);
+    putUnsigned(bytes, std::uint8_t{0});
+    putUnsigned(bytes, static_cast<std::uint16_t>(surface.size()));
     for (const double v : {surface.centre.x, surface.centre.y, surface.centre.z, surface.unit}) {
         putDouble(bytes, v);
     }
     for (const PackedSurfacePoint& p : surface.points) {
-        for (const std::int16_t v : p.position) put(bytes, static_cast<std::uint16_t>(v));
-        for (const std::int8_t v : p.normal) put(bytes, static_cast<std::uint8_t>(v));
+        for (const std::int16_t v : p.position) putUnsigned(bytes, static_cast<std::uint16_t>(v));
+        for (const std::int8_t v : p.normal) putUnsigned(bytes, static_cast<std::uint8_t>(v));
     }
-    put(bytes, checksumOf(bytes.data(), bytes.size()));
+    putUnsigned(bytes, checksumOf(bytes.data(), bytes.size()));
     return bytes;
 }
 
 Result<SurfacePoints> decodeSurfacePoints(const std::string& bytes) {
     const auto count = checkedCount(bytes);
-    if (!count) return fail(count.error());
+    RETURN_IF_ERROR(count);
     try {
         SurfacePoints surface;
         surface.points.reserve(*count);
-        const char* at = bytes.data() + 8;
+        ByteReader reader(bytes.data() + 8);
         for (double* v : {&surface.centre.x, &surface.centre.y, &surface.centre.z, &surface.unit}) {
-            *v = takeDouble(at);
+            *v = reader.takeDouble();
         }
         for (std::size_t i = 0; i < *count; ++i) {
             PackedSurfacePoint p;
-            for (std::int16_t& v : p.position) v = static_cast<std::int16_t>(take<std::uint16_t>(at));
-            for (std::int8_t& v : p.normal) v = static_cast<std::int8_t>(take<std::uint8_t>(at));
+            for (std::int16_t& v : p.position)
+                v = static_cast<std::int16_t>(reader.takeUnsigned<std::uint16_t>());
+            for (std::int8_t& v : p.normal) v = static_cast<std::int8_t>(reader.takeUnsigned<std::uint8_t>());
             surface.points.push_back(p);
         }
-        if (const auto checked = checkNumbers(surface); !checked) return fail(checked.error());
+        RETURN_IF_ERROR(checkNumbers(surface));
         return surface;
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::kOutOfMemory, "not enough memory to read surface points");

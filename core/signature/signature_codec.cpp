@@ -5,9 +5,8 @@
 #include <cstring>
 #include <new>
 
-#include <zlib.h>
-
 #include "core/base/return_if_error.h"
+#include "core/base/stored_bytes.h"
 
 namespace shapedb {
 
@@ -48,64 +47,7 @@ constexpr double kSmallestSize = 1e-40;
 // By this much the weight of a single segment, rounded to a float, may exceed the volume.
 constexpr double kShareRounding = 1e-6;
 
-// CRC-32 (IEEE 802.3, reflected), by zlib for speed: a starting server reads a million signatures.
-std::uint32_t checksumOf(const char* bytes, std::size_t size) {
-    return static_cast<std::uint32_t>(
-        crc32(0, reinterpret_cast<const Bytef*>(bytes), static_cast<uInt>(size)));
-}
-
-template <typename Unsigned>
-void putUnsigned(std::string& out, Unsigned value) {
-    for (std::size_t i = 0; i < sizeof(Unsigned); ++i)
-        out.push_back(static_cast<char>((value >> (8 * i)) & 0xffu));
-}
-
-void putFloat(std::string& out, float value) {
-    std::uint32_t bits = 0;
-    std::memcpy(&bits, &value, sizeof bits);
-    putUnsigned(out, bits);
-}
-
-void putDouble(std::string& out, double value) {
-    std::uint64_t bits = 0;
-    std::memcpy(&bits, &value, sizeof bits);
-    putUnsigned(out, bits);
-}
-
-// Reads from bytes whose length has been checked.
-class Reader {
-  public:
-    explicit Reader(const char* at) : at_(at) {}
-
-    template <typename Unsigned>
-    Unsigned takeUnsigned() {
-        Unsigned value = 0;
-        for (std::size_t i = 0; i < sizeof(Unsigned); ++i) {
-            // Shifts instead of a copy: the same on machines of either byte order.
-            value = static_cast<Unsigned>(
-                value | (static_cast<Unsigned>(static_cast<unsigned char>(at_[i])) << (8 * i)));
-        }
-        at_ += sizeof(Unsigned);
-        return value;
-    }
-    float takeFloat() {
-        const auto bits = takeUnsigned<std::uint32_t>();
-        float value = 0.0f;
-        std::memcpy(&value, &bits, sizeof value);
-        return value;
-    }
-    double takeDouble() {
-        const auto bits = takeUnsigned<std::uint64_t>();
-        double value = 0.0;
-        std::memcpy(&value, &bits, sizeof value);
-        return value;
-    }
-
-  private:
-    const char* at_;
-};
-
-WeightedPoint takePoint(Reader& reader, std::uint16_t version, const Signature& of) {
+WeightedPoint takePoint(ByteReader& reader, std::uint16_t version, const Signature& of) {
     WeightedPoint point;
     for (float& v : point.position) v = reader.takeFloat();
     point.weight = reader.takeFloat();
@@ -165,7 +107,7 @@ void putStatistics(std::string& out, const ShapeStatistics& levels) {
     }
 }
 
-ShapeStatistics takeStatistics(Reader& reader, std::uint16_t version) {
+ShapeStatistics takeStatistics(ByteReader& reader, std::uint16_t version) {
     ShapeStatistics levels;
     for (std::size_t i = 0; i < levels.size();) {
         const auto byte = reader.takeUnsigned<std::uint8_t>();
@@ -217,7 +159,7 @@ Result<void> decodeSignature(const std::string& bytes, Signature& signature) {
     }
     if (std::memcmp(bytes.data(), kMagic, sizeof kMagic) != 0)
         return malformed("it does not begin with SDBG");
-    Reader reader(bytes.data() + sizeof kMagic);
+    ByteReader reader(bytes.data() + sizeof kMagic);
     const auto version = reader.takeUnsigned<std::uint16_t>();
     if (version < kPointsOnly || version > kWithLevels)
         return malformed("version " + std::to_string(version) + " is unknown");
@@ -228,7 +170,7 @@ Result<void> decodeSignature(const std::string& bytes, Signature& signature) {
         return malformed(std::to_string(bytes.size()) + " bytes do not fit " + std::to_string(count) +
                          " points");
     }
-    Reader checksum(bytes.data() + bytes.size() - kChecksumBytes);
+    ByteReader checksum(bytes.data() + bytes.size() - kChecksumBytes);
     if (checksum.takeUnsigned<std::uint32_t>() != checksumOf(bytes.data(), bytes.size() - kChecksumBytes)) {
         return malformed("the checksum does not agree");
     }
