@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <cstring>
 
+#include "core/base/wide.h"
+
 namespace shapedb {
 
 constexpr std::size_t kFloatLanes = 8;
@@ -16,16 +18,6 @@ typedef float Float8 __attribute__((vector_size(32)));
 typedef std::int32_t Int8 __attribute__((vector_size(32)));
 #else
 #error "core/base/float8.h needs the vector types of g++ or clang"
-#endif
-
-/// For the second of two functions with the same body: compiled for AVX2, to be called where
-/// processorIsWide().
-#if defined(__x86_64__)
-#define SHAPEDB_WIDE __attribute__((target("avx2")))
-[[nodiscard]] inline bool processorIsWide() { return __builtin_cpu_supports("avx2") != 0; }
-#else
-#define SHAPEDB_WIDE
-[[nodiscard]] inline bool processorIsWide() { return false; }
 #endif
 
 /// Must be inlined, so that a caller compiled for wider registers uses them here too.

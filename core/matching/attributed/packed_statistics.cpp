@@ -10,6 +10,8 @@
 #define SHAPEDB_HAS_AVX2 0
 #endif
 
+#include "core/base/wide.h"
+
 namespace shapedb {
 
 namespace {
@@ -96,7 +98,7 @@ HalfSums portableSums(const HalfRow& query, const HalfRow& row) {
 #if SHAPEDB_HAS_AVX2
 
 // Four partial sums of the differences of 64 levels.
-__attribute__((target("avx2"))) inline __m256i differences(const std::uint8_t* a, const std::uint8_t* b) {
+SHAPEDB_WIDE inline __m256i differences(const std::uint8_t* a, const std::uint8_t* b) {
     const __m256i mask = _mm256_set1_epi8(0x0f);
     const __m256i x = _mm256_load_si256(reinterpret_cast<const __m256i*>(a));
     const __m256i y = _mm256_load_si256(reinterpret_cast<const __m256i*>(b));
@@ -108,18 +110,17 @@ __attribute__((target("avx2"))) inline __m256i differences(const std::uint8_t* a
 }
 
 // The sum of all four. It is at most 64 times 15, so the lower half of each is enough.
-__attribute__((target("avx2"))) inline std::uint32_t whole(__m256i partial) {
+SHAPEDB_WIDE inline std::uint32_t whole(__m256i partial) {
     const __m128i halves =
         _mm_add_epi32(_mm256_castsi256_si128(partial), _mm256_extracti128_si256(partial, 1));
     return static_cast<std::uint32_t>(_mm_cvtsi128_si32(halves) + _mm_extract_epi16(halves, 4));
 }
 
-__attribute__((target("avx2"))) inline std::uint32_t lane(__m128i partial) {
+SHAPEDB_WIDE inline std::uint32_t lane(__m128i partial) {
     return static_cast<std::uint32_t>(_mm_cvtsi128_si32(partial) + _mm_extract_epi16(partial, 4));
 }
 
-__attribute__((target("avx2"))) void wideSums(const HalfRow& query, const HalfRow* rows, std::size_t count,
-                                              HalfSums* sums) {
+SHAPEDB_WIDE void wideSums(const HalfRow& query, const HalfRow* rows, std::size_t count, HalfSums* sums) {
     for (std::size_t r = 0; r < count; ++r) {
         const std::uint8_t* row = rows[r].bytes.data();
         for (std::size_t s = 0; s < 3; ++s) {
@@ -131,17 +132,14 @@ __attribute__((target("avx2"))) void wideSums(const HalfRow& query, const HalfRo
     }
 }
 
-__attribute__((target("avx2"))) std::uint32_t wideSlotSum(const HalfRow& a, const HalfRow& b) {
+SHAPEDB_WIDE std::uint32_t wideSlotSum(const HalfRow& a, const HalfRow& b) {
     return whole(differences(a.bytes.data() + 32 * kReversibleSlot, b.bytes.data() + 32 * kReversibleSlot));
 }
-
-bool processorIsWide() { return __builtin_cpu_supports("avx2") != 0; }
 
 #else
 
 void wideSums(const HalfRow&, const HalfRow*, std::size_t, HalfSums*) {}
 std::uint32_t wideSlotSum(const HalfRow&, const HalfRow&) { return 0; }
-bool processorIsWide() { return false; }
 
 #endif
 
