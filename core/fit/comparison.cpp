@@ -69,17 +69,11 @@ System systemOf(const StepSums& sums) {
     return s;
 }
 
-// The rotation about `turn` by its length, in radians (Rodrigues).
+// The rotation about `turn` by its length, in radians.
 Matrix3 rotationBy(const Point3& turn) {
     const double angle = length(turn);
     if (!(angle > 1e-12)) return Motion{}.rotation;
-    const Point3 u = (1.0 / angle) * turn;
-    const double c = std::cos(angle);
-    const double s = std::sin(angle);
-    const double d = 1.0 - c;
-    return {{{c + d * u.x * u.x, d * u.x * u.y - s * u.z, d * u.x * u.z + s * u.y},
-             {d * u.x * u.y + s * u.z, c + d * u.y * u.y, d * u.y * u.z - s * u.x},
-             {d * u.x * u.z - s * u.y, d * u.y * u.z + s * u.x, c + d * u.z * u.z}}};
+    return rotationAbout((1.0 / angle) * turn, angle);
 }
 
 // Rounding of many small turns must not make a rotation skew.

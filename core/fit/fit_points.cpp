@@ -33,22 +33,6 @@ Matrix3 principalAxes(const PointCloud& points) {
              {third.x(), third.y(), third.z()}}};
 }
 
-Matrix3 transposed(const Matrix3& m) {
-    return {{{m[0][0], m[1][0], m[2][0]}, {m[0][1], m[1][1], m[2][1]}, {m[0][2], m[1][2], m[2][2]}}};
-}
-
-// Spread evenly over the sphere: a Fibonacci spiral, whose steps are the golden angle.
-PointCloud hullDirections() {
-    PointCloud directions;
-    for (int i = 0; i < kHullDirections; ++i) {
-        const double z = 1.0 - (2.0 * i + 1.0) / kHullDirections;
-        const double angle = 2.399963229728653 * i;
-        const double across = std::sqrt(std::max(0.0, 1.0 - z * z));
-        directions.push_back({across * std::cos(angle), across * std::sin(angle), z});
-    }
-    return directions;
-}
-
 // Over every so many-th point; a search tree for all of them would take longer than all else here.
 float meanSpacing(const SurfaceColumns& points, std::size_t count) {
     const std::size_t step = std::max<std::size_t>(1, count / kSpacingSamples);
@@ -113,21 +97,21 @@ FitPoints::FitPoints(const SurfacePoints& surface) {
 }
 
 void FitPoints::findHull() {
-    const PointCloud directions = hullDirections();
     insideHull.assign(grid.size(), 1);
-    for (const Point3& direction : directions) {
+    for (int i = 0; i < kHullDirections; ++i) {
+        const Point3 direction = evenDirection(i, kHullDirections);
         const auto dx = static_cast<float>(direction.x);
         const auto dy = static_cast<float>(direction.y);
         const auto dz = static_cast<float>(direction.z);
         float reach = -1.0f;
-        for (std::size_t i = 0; i < size(); ++i) {
-            reach = std::max(reach, dx * columns.x[i] + dy * columns.y[i] + dz * columns.z[i]);
+        for (std::size_t p = 0; p < size(); ++p) {
+            reach = std::max(reach, dx * columns.x[p] + dy * columns.y[p] + dz * columns.z[p]);
         }
         const auto& cells = grid.cells();
         const auto& o = grid.offset();
         const float cell = 1.0f / grid.scale();
-        const auto middle = [&](std::int32_t i, float offset) {
-            return cell * (static_cast<float>(i) + 0.5f - offset);
+        const auto middle = [&](std::int32_t c, float offset) {
+            return cell * (static_cast<float>(c) + 0.5f - offset);
         };
         std::uint8_t* inside = insideHull.data();
         for (std::int32_t z = 0; z < cells[2]; ++z) {

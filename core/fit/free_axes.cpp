@@ -20,15 +20,6 @@ constexpr float kProbeWidth =
 
 constexpr int kTurnSteps = 72;
 
-Matrix3 rotationAbout(const Point3& u, double angle) {
-    const double c = std::cos(angle);
-    const double s = std::sin(angle);
-    const double d = 1.0 - c;
-    return {{{c + d * u.x * u.x, d * u.x * u.y - s * u.z, d * u.x * u.z + s * u.y},
-             {d * u.x * u.y + s * u.z, c + d * u.y * u.y, d * u.y * u.z - s * u.x},
-             {d * u.x * u.z - s * u.y, d * u.y * u.z + s * u.x, c + d * u.z * u.z}}};
-}
-
 }  // namespace
 
 Motion turnedAbout(const TurnAxis& axis, double angle, const Motion& pose) {

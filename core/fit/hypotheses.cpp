@@ -37,30 +37,6 @@ struct Reach {
     Extent high{};
 };
 
-Matrix3 product(const Matrix3& a, const Matrix3& b) {
-    Matrix3 r{};
-    for (std::size_t i = 0; i < 3; ++i) {
-        for (std::size_t j = 0; j < 3; ++j) {
-            for (std::size_t k = 0; k < 3; ++k) r[i][j] += a[i][k] * b[k][j];
-        }
-    }
-    return r;
-}
-
-Matrix3 rollAbout(std::size_t axis, double angle) {
-    const double c = std::cos(angle);
-    const double s = std::sin(angle);
-    const std::size_t j = (axis + 1) % 3;
-    const std::size_t k = (axis + 2) % 3;
-    Matrix3 r{};
-    r[axis][axis] = 1.0;
-    r[j][j] = c;
-    r[j][k] = -s;
-    r[k][j] = s;
-    r[k][k] = c;
-    return r;
-}
-
 // The 24 rotations that lay axes on axes, each rolled about each axis in steps; those that a roll by a
 // quarter turn would repeat are left out.
 std::vector<Matrix3> makeRotations() {
@@ -78,7 +54,7 @@ std::vector<Matrix3> makeRotations() {
     for (const Matrix3& m : onAxes) {
         for (std::size_t axis = 0; axis < 3; ++axis) {
             for (int step = 1; step < kRolls; ++step) {
-                rotations.push_back(product(rollAbout(axis, toRadians(kRollDegrees * step)), m));
+                rotations.push_back(multiply(rotationAboutAxis(axis, toRadians(kRollDegrees * step)), m));
             }
         }
     }
@@ -216,9 +192,7 @@ class Search {
         const Turn& turn = turns_[number];
         place(turn.reach);
         Motion back;
-        for (std::size_t i = 0; i < 3; ++i) {
-            for (std::size_t j = 0; j < 3; ++j) back.rotation[i][j] = turn.rotation[j][i];
-        }
+        back.rotation = transposed(turn.rotation);
         const std::size_t glances = query_.prefix(kGlances);
         double scale = 0.0;
         std::array<Tried, kKeptPerTurn> kept{};

@@ -10,6 +10,7 @@
 
 #include "core/geometry/box.h"
 #include "core/geometry/convex_hull.h"
+#include "core/geometry/motion.h"
 
 namespace shapedb {
 
@@ -30,20 +31,13 @@ constexpr double kMargin = 1e-6;
 // A body with a face closer to its centre than this share of the distance to a corner is too flat to use.
 constexpr double kFlattestBody = 1e-9;
 
-// Evenly spread over the sphere: a Fibonacci spiral, whose steps are the golden angle.
-Point3 direction(int i) {
-    const double z = 1.0 - (2.0 * i + 1.0) / kDirections;
-    const double angle = 2.399963229728653 * i;
-    const double across = std::sqrt(std::max(0.0, 1.0 - z * z));
-    return {across * std::cos(angle), across * std::sin(angle), z};
-}
-
 PointCloud extremePoints(const PointCloud& points) {
     std::array<double, kDirections> farthest;
     std::array<std::size_t, kDirections> at{};
     std::array<Point3, kDirections> directions;
     farthest.fill(-std::numeric_limits<double>::infinity());
-    for (int i = 0; i < kDirections; ++i) directions[static_cast<std::size_t>(i)] = direction(i);
+    for (int i = 0; i < kDirections; ++i)
+        directions[static_cast<std::size_t>(i)] = evenDirection(i, kDirections);
     // The hull of a sample lies inside the hull of all points.
     const std::size_t step = std::max<std::size_t>(1, points.size() / 20000);
     for (std::size_t p = 0; p < points.size(); p += step) {

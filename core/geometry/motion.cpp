@@ -1,5 +1,6 @@
 #include "core/geometry/motion.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/base/math.h"
@@ -16,6 +17,45 @@ constexpr double kShortestQuaternion = 1e-6;
 Point3 rotate(const Matrix3& r, const Point3& v) {
     return {r[0][0] * v.x + r[0][1] * v.y + r[0][2] * v.z, r[1][0] * v.x + r[1][1] * v.y + r[1][2] * v.z,
             r[2][0] * v.x + r[2][1] * v.y + r[2][2] * v.z};
+}
+
+Matrix3 multiply(const Matrix3& a, const Matrix3& b) {
+    Matrix3 product;
+    for (std::size_t row = 0; row < 3; ++row) {
+        for (std::size_t column = 0; column < 3; ++column) {
+            double sum = 0.0;
+            for (std::size_t k = 0; k < 3; ++k) sum += a[row][k] * b[k][column];
+            product[row][column] = sum;
+        }
+    }
+    return product;
+}
+
+Matrix3 transposed(const Matrix3& m) {
+    return {{{m[0][0], m[1][0], m[2][0]}, {m[0][1], m[1][1], m[2][1]}, {m[0][2], m[1][2], m[2][2]}}};
+}
+
+Matrix3 rotationAbout(const Point3& u, double angle) {
+    const double c = std::cos(angle);
+    const double s = std::sin(angle);
+    const double d = 1.0 - c;
+    return {{{c + d * u.x * u.x, d * u.x * u.y - s * u.z, d * u.x * u.z + s * u.y},
+             {d * u.x * u.y + s * u.z, c + d * u.y * u.y, d * u.y * u.z - s * u.x},
+             {d * u.x * u.z - s * u.y, d * u.y * u.z + s * u.x, c + d * u.z * u.z}}};
+}
+
+Matrix3 rotationAboutAxis(std::size_t axis, double angle) {
+    const double c = std::cos(angle);
+    const double s = std::sin(angle);
+    const std::size_t j = (axis + 1) % 3;
+    const std::size_t k = (axis + 2) % 3;
+    Matrix3 r{};
+    r[axis][axis] = 1.0;
+    r[j][j] = c;
+    r[j][k] = -s;
+    r[k][j] = s;
+    r[k][k] = c;
+    return r;
 }
 
 double determinant(const Matrix3& m) {
@@ -40,11 +80,7 @@ Motion inverse(const Motion& motion) {
     Motion result;
     result.scale = 1.0 / motion.scale;
     result.reflected = motion.reflected;
-    for (std::size_t row = 0; row < 3; ++row) {
-        for (std::size_t column = 0; column < 3; ++column) {
-            result.rotation[row][column] = motion.rotation[column][row];
-        }
-    }
+    result.rotation = transposed(motion.rotation);
     result.translation = -result.scale * rotate(result.rotation, motion.translation);
     return result;
 }
@@ -53,13 +89,7 @@ Motion compose(const Motion& second, const Motion& first) {
     Motion result;
     result.scale = second.scale * first.scale;
     result.reflected = second.reflected != first.reflected;
-    for (std::size_t row = 0; row < 3; ++row) {
-        for (std::size_t column = 0; column < 3; ++column) {
-            double sum = 0.0;
-            for (std::size_t k = 0; k < 3; ++k) sum += second.rotation[row][k] * first.rotation[k][column];
-            result.rotation[row][column] = sum;
-        }
-    }
+    result.rotation = multiply(second.rotation, first.rotation);
     result.translation = apply(second, first.translation);
     return result;
 }
@@ -81,6 +111,14 @@ Matrix3 randomRotation(Random& random) {
     return {{{1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)},
              {2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)},
              {2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)}}};
+}
+
+Point3 evenDirection(int i, int count) {
+    constexpr double kGoldenAngle = 2.399963229728653;
+    const double z = 1.0 - (2.0 * i + 1.0) / count;
+    const double angle = kGoldenAngle * i;
+    const double across = std::sqrt(std::max(0.0, 1.0 - z * z));
+    return {across * std::cos(angle), across * std::sin(angle), z};
 }
 
 Point3 randomDirection(Random& random) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 
 #include "core/base/random.h"
 #include "core/geometry/point.h"
@@ -24,6 +25,17 @@ struct Motion {
 /// R v: rotates (and reflects) a direction.
 [[nodiscard]] Point3 rotate(const Matrix3& rotation, const Point3& v);
 
+/// a b: first b, then a.
+[[nodiscard]] Matrix3 multiply(const Matrix3& a, const Matrix3& b);
+
+[[nodiscard]] Matrix3 transposed(const Matrix3& m);
+
+/// The rotation by `angle`, radians, about a unit vector (Rodrigues).
+[[nodiscard]] Matrix3 rotationAbout(const Point3& direction, double angle);
+
+/// The same about a coordinate axis (0 to 2), which is left exactly where it is.
+[[nodiscard]] Matrix3 rotationAboutAxis(std::size_t axis, double angle);
+
 /// The determinant of a 3x3 matrix.
 [[nodiscard]] double determinant(const Matrix3& m);
 
@@ -43,6 +55,9 @@ struct Motion {
 /// A rotation (determinant +1) uniform over SO(3), from a uniform unit quaternion (Shoemake 1992).
 /// Advances `random`.
 [[nodiscard]] Matrix3 randomRotation(Random& random);
+
+/// Number `i` of `count` unit vectors spread evenly over the sphere: a Fibonacci spiral.
+[[nodiscard]] Point3 evenDirection(int i, int count);
 
 /// A unit vector uniform over the sphere. Advances `random`.
 [[nodiscard]] Point3 randomDirection(Random& random);

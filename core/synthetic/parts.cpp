@@ -25,32 +25,6 @@ Matrix3 rotationFromZ(const Point3& to) {
     return {{{x.x, y.x, z.x}, {x.y, y.y, z.y}, {x.z, y.z, z.z}}};
 }
 
-Matrix3 rotationAboutX(double angle) {
-    const double c = std::cos(angle);
-    const double s = std::sin(angle);
-    return {{{1.0, 0.0, 0.0}, {0.0, c, -s}, {0.0, s, c}}};
-}
-
-Matrix3 rotationAboutY(double angle) {
-    const double c = std::cos(angle);
-    const double s = std::sin(angle);
-    return {{{c, 0.0, s}, {0.0, 1.0, 0.0}, {-s, 0.0, c}}};
-}
-
-Matrix3 rotationAboutZ(double angle) {
-    const double c = std::cos(angle);
-    const double s = std::sin(angle);
-    return {{{c, -s, 0.0}, {s, c, 0.0}, {0.0, 0.0, 1.0}}};
-}
-
-Matrix3 multiply(const Matrix3& a, const Matrix3& b) {
-    Motion first;
-    first.rotation = b;
-    Motion second;
-    second.rotation = a;
-    return compose(second, first).rotation;
-}
-
 SolidPart ball(const Point3& centre, double radius) {
     return place(SolidSphere{radius}, centre, Motion{}.rotation);
 }

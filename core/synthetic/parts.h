@@ -1,6 +1,7 @@
 // Shorthands for placing primitives; for the sources of this folder.
 #pragma once
 
+#include "core/geometry/motion.h"
 #include "core/synthetic/solid.h"
 
 namespace shapedb {
@@ -9,12 +10,9 @@ namespace shapedb {
 [[nodiscard]] Matrix3 rotationFromZ(const Point3& to);
 
 /// Rotations by `angle` radians, counter-clockwise as seen from the tip of the axis.
-[[nodiscard]] Matrix3 rotationAboutX(double angle);
-[[nodiscard]] Matrix3 rotationAboutY(double angle);
-[[nodiscard]] Matrix3 rotationAboutZ(double angle);
-
-/// First `b`, then `a`.
-[[nodiscard]] Matrix3 multiply(const Matrix3& a, const Matrix3& b);
+[[nodiscard]] inline Matrix3 rotationAboutX(double angle) { return rotationAboutAxis(0, angle); }
+[[nodiscard]] inline Matrix3 rotationAboutY(double angle) { return rotationAboutAxis(1, angle); }
+[[nodiscard]] inline Matrix3 rotationAboutZ(double angle) { return rotationAboutAxis(2, angle); }
 
 [[nodiscard]] SolidPart ball(const Point3& centre, double radius);
 [[nodiscard]] SolidPart ellipsoid(const Point3& centre, const Point3& semiAxes,
