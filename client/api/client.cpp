@@ -35,8 +35,7 @@ grpc::ChannelArguments channelArguments() {
 }
 
 /// "localhost" -> "localhost:7878", "::1" -> "[::1]:7878". Addresses with a port, or with a scheme of their
-/// own
-/// ("unix:/path", "dns:///host:1"), stay as they are.
+/// own ("unix:/path", "dns:///host:1"), stay as they are.
 std::string withDefaultPort(const std::string& address) {
     const std::string port = ":" + std::to_string(kDefaultPort);
     if (address.find('/') != std::string::npos || address.rfind("unix:", 0) == 0 ||

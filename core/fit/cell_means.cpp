@@ -23,6 +23,12 @@ struct Gathered {
     std::int64_t z = 0;
     std::uint64_t count = 0;
 
+    void add(const Gathered& other) {
+        x += other.x;
+        y += other.y;
+        z += other.z;
+        count += other.count;
+    }
     Point3 mean() const {
         const double scale = 1.0 / (kSumSteps * static_cast<double>(count));
         return {scale * static_cast<double>(x), scale * static_cast<double>(y),
@@ -68,11 +74,8 @@ CellMeans cellMeans(const PointCloud& points, std::size_t most) {
     std::vector<std::uint32_t> fineOfPoint;
     std::vector<Gathered> gathered(group(keys, fineOfPoint));
     for (std::size_t i = 0; i < points.size(); ++i) {
-        Gathered& cell = gathered[fineOfPoint[i]];
-        cell.x += static_cast<std::int64_t>(std::nearbyint(kSumSteps * points[i].x));
-        cell.y += static_cast<std::int64_t>(std::nearbyint(kSumSteps * points[i].y));
-        cell.z += static_cast<std::int64_t>(std::nearbyint(kSumSteps * points[i].z));
-        ++cell.count;
+        const auto steps = [](double v) { return static_cast<std::int64_t>(std::nearbyint(kSumSteps * v)); };
+        gathered[fineOfPoint[i]].add({steps(points[i].x), steps(points[i].y), steps(points[i].z), 1});
     }
     CellMeans result;
     result.cellOfPoint = fineOfPoint;
@@ -89,13 +92,7 @@ CellMeans cellMeans(const PointCloud& points, std::size_t most) {
         for (const Point3& p : means) keys.push_back(keyOf(p, large));
         std::vector<std::uint32_t> coarseOfFine;
         std::vector<Gathered> coarse(group(keys, coarseOfFine));
-        for (std::size_t i = 0; i < gathered.size(); ++i) {
-            Gathered& cell = coarse[coarseOfFine[i]];
-            cell.x += gathered[i].x;
-            cell.y += gathered[i].y;
-            cell.z += gathered[i].z;
-            cell.count += gathered[i].count;
-        }
+        for (std::size_t i = 0; i < gathered.size(); ++i) coarse[coarseOfFine[i]].add(gathered[i]);
         gathered = std::move(coarse);
         for (std::uint32_t& cell : result.cellOfPoint) cell = coarseOfFine[cell];
     }
