@@ -22,6 +22,14 @@ Result<void> ensureDefaultCollection(store::Store& store) {
     return {};
 }
 
+// Whoever sent the backup does not know the name of the server's copy.
+Error withoutName(Error error, const std::string& file) {
+    const std::string name = "'" + file + "'";
+    const std::size_t at = error.message.find(name);
+    if (at != std::string::npos) error.message.replace(at, name.size(), "the backup");
+    return error;
+}
+
 }  // namespace
 
 Catalog::Catalog(std::unique_ptr<store::Store> store, ingest::SignaturePipeline pipeline,
@@ -224,6 +232,7 @@ Result<void> Catalog::restore(const std::string& path, const RunContext& context
     RETURN_IF_ERROR(restores_.beginRestore());
     Result<void> restored = restoreExclusively(path, context);
     restores_.endRestore();
+    if (!restored) return fail(withoutName(restored.error(), path));
     return restored;
 }
 

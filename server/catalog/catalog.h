@@ -225,8 +225,9 @@ class Catalog {
     [[nodiscard]] Result<void> backup(const std::string& path, const RunContext& context);
     [[nodiscard]] Result<std::vector<std::string>> check(const RunContext& context);
     /// Replaces everything by the backup `path` while workers and rebuilds pause, and loads the index.
-    /// Errors: kRejected (another restore is running), those of store::Store::restore; those of
-    /// CollectionIndex::loadAll, after which the content is replaced but cannot be looked up.
+    /// Errors, which call the file "the backup": kRejected (another restore is running), those of
+    /// store::Store::restore; those of CollectionIndex::loadAll, after which the content is replaced but
+    /// cannot be looked up.
     [[nodiscard]] Result<void> restore(const std::string& path, const RunContext& context);
     /// Rises with each restore: ids read under one epoch may mean other shapes under another.
     [[nodiscard]] std::uint64_t epoch() const { return restores_.epoch(); }

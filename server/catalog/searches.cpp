@@ -78,6 +78,23 @@ Result<Comparison> Searches::compare(const ShapeName& query, const ShapeName& ot
     return Comparison{std::move(*first), std::move(*second), std::move(explanation)};
 }
 
+Error ofQuery(std::size_t i, Error error) {
+    error.message = "query " + std::to_string(i) + ": " + error.message;
+    return error;
+}
+
+Result<std::vector<BatchQuery>> Searches::queries(const PreparedSearch& search,
+                                                  const std::vector<QuerySource>& sources) const {
+    std::vector<BatchQuery> queries;
+    queries.reserve(sources.size());
+    for (const QuerySource& source : sources) {
+        auto one = query(search, source);
+        if (!one) return fail(ofQuery(queries.size(), one.error()));
+        queries.push_back(std::move(*one));
+    }
+    return queries;
+}
+
 Result<SearchResult> Searches::run(const PreparedSearch& search, const BatchQuery& query,
                                    const RunContext& context) const {
     SearchOptions options = search.options;

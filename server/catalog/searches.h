@@ -70,6 +70,9 @@ class AnswerRoom {
     std::size_t left_ = kMaxAnswerBytes;
 };
 
+/// `error`, saying which query of a batch it is about, counted from 0.
+[[nodiscard]] Error ofQuery(std::size_t i, Error error);
+
 /// Thread-safe. The references must outlive it.
 class Searches {
   public:
@@ -87,6 +90,10 @@ class Searches {
     /// The query that `source` names; a stored shape as above. Errors: those of `storedQuery` and of
     /// decodeSignature; kInvalidArgument (not exactly one is set).
     [[nodiscard]] Result<BatchQuery> query(const PreparedSearch& search, const QuerySource& source) const;
+
+    /// The queries of a batch. Errors: those of `query`, named by `ofQuery`.
+    [[nodiscard]] Result<std::vector<BatchQuery>> queries(const PreparedSearch& search,
+                                                          const std::vector<QuerySource>& sources) const;
 
     /// How alike two stored shapes are, and why. Errors, saying which of the two they are about:
     /// kInvalidArgument (key), kNotFound, kNotReady, kDataLoss.

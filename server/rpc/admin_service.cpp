@@ -67,14 +67,6 @@ Result<void> sendProgress(Call& call, const std::string& collection, const store
     return call.write(writer, progress);
 }
 
-// The sender does not know the name of the server's copy of its file.
-Error withoutName(Error error, const std::string& file) {
-    const std::string name = "'" + file + "'";
-    const std::size_t at = error.message.find(name);
-    if (at != std::string::npos) error.message.replace(at, name.size(), "the backup");
-    return error;
-}
-
 }  // namespace
 
 grpc::Status AdminServiceHandler::Rebuild(grpc::ServerContext* context, const v1::RebuildRequest* request,
@@ -86,7 +78,7 @@ grpc::Status AdminServiceHandler::Rebuild(grpc::ServerContext* context, const v1
         RETURN_IF_ERROR(names);
         if (wanted.cacheOnly) return reloadCache(services_, call, *names, *writer);
 
-        RETURN_IF_ERROR(call.becomeFollower());
+        RETURN_IF_ERROR(call.frame().becomeFollower());
         const auto started = services_.catalog.beginRebuilds(*names, wanted.change);
         RETURN_IF_ERROR(started);
         for (std::size_t i = 0; i < started->size(); ++i) {
@@ -95,10 +87,11 @@ grpc::Status AdminServiceHandler::Rebuild(grpc::ServerContext* context, const v1
             const auto send = [&](const store::Rebuild& rebuild) {
                 return sendProgress(call, name, rebuild, *writer);
             };
-            RETURN_IF_ERROR(request->detach() ? send(begun)
-                                              : services_.catalog.followRebuild(
-                                                    name, begun, call.run(),
-                                                    [&] { return call.checkpointWhileFollowing(); }, send));
+            RETURN_IF_ERROR(request->detach()
+                                ? send(begun)
+                                : services_.catalog.followRebuild(
+                                      name, begun, call.run(),
+                                      [&] { return call.frame().checkpointWhileFollowing(); }, send));
         }
         return {};
     });
@@ -128,7 +121,7 @@ grpc::Status AdminServiceHandler::Restore(grpc::ServerContext* context,
                                           grpc::ServerReader<v1::BackupChunk>* reader,
                                           v1::RestoreResponse* response) {
     return handle(services_, context, "Restore", [&](Call& call) -> Result<void> {
-        call.expectRestore();
+        call.frame().expectRestore();
         const auto file = catalog::TemporaryFile::create(services_.temporaryDirectory);
         RETURN_IF_ERROR(file);
         auto receiver = FileReceiver::create(file->path());
@@ -142,8 +135,7 @@ grpc::Status AdminServiceHandler::Restore(grpc::ServerContext* context,
         RETURN_IF_ERROR(receiver->finish());
         call.note({"bytes", receiver->bytes()});
 
-        const Result<void> restored = services_.catalog.restore(file->path(), call.run());
-        if (!restored) return fail(withoutName(restored.error(), file->path()));
+        RETURN_IF_ERROR(services_.catalog.restore(file->path(), call.run()));
         const auto stats = services_.catalog.stats();
         RETURN_IF_ERROR(stats);
         const store::StoreStats& stored = stats->store;

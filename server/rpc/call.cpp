@@ -3,7 +3,6 @@
 #include <utility>
 
 #include "core/base/return_if_error.h"
-#include "server/catalog/limits.h"
 #include "server/catalog/request_checks.h"
 #include "server/rpc/status.h"
 
@@ -59,28 +58,9 @@ Call::Call(const Services& services, grpc::ServerContext& context, const char* r
       peer_(context.peer()),
       began_(std::chrono::steady_clock::now()),
       cancellation_(services.cancellations, context),
-      follower_(services.admission.followers),
-      epoch_(services.catalog.epoch()) {
+      frame_(services.catalog, services.admission, run_) {
     run_.cancel = &cancellation_.flag();
     run_.deadline = steadyDeadline(context);
-}
-
-Call::~Call() {
-    if (admitted_) services_.admission.calls.leave();
-}
-
-Result<void> Call::admit() {
-    admitted_ = services_.admission.calls.enter();
-    if (!admitted_) return fail(ErrorCode::kUnavailable, "the server is shutting down: try again later");
-    return {};
-}
-
-Result<void> Call::checkpointWhileFollowing() const {
-    if (services_.admission.calls.draining()) {
-        return fail(ErrorCode::kUnavailable,
-                    "the server is shutting down: the work continues after its restart");
-    }
-    return run_.checkpoint();
 }
 
 Result<index::SnapshotPtr> Call::collection(const std::string& name) {
@@ -97,31 +77,16 @@ Result<catalog::FoundShape> Call::shape(const v1::ShapeRef& ref) {
 
 void Call::noteCollection(const std::string& name) { collection_ = catalog::collectionNameOrDefault(name); }
 
-Result<void> Call::becomeFollower() {
-    auto taken = follower_.take(1);
-    if (!taken) retryAfter(catalog::kBudgetRetry);
-    return taken;
-}
-
 grpc::Status Call::finish(Result<void> result) {
-    if (!expectsRestore_ && services_.catalog.epoch() != epoch_) {
-        // Ids read before the restore mean other shapes now.
-        result = fail(ErrorCode::kUnavailable,
-                      "the database was replaced by a backup while the call ran: repeat it");
+    std::optional<Error> cutOff;
+    if (cancellation_.stalled()) {
+        cutOff = Error{ErrorCode::kCancelled, "the client neither sent nor read anything for " +
+                                                  std::to_string(services_.config.limits.stallSeconds) +
+                                                  " seconds"};
     }
-    if (!result && cancellation_.stalled()) {
-        result = fail(ErrorCode::kCancelled, "the client neither sent nor read anything for " +
-                                                 std::to_string(services_.config.limits.stallSeconds) +
-                                                 " seconds");
-    } else if (!result && result.error().code == ErrorCode::kCancelled &&
-               RunContext::Clock::now() >= run_.deadline) {
-        // gRPC cancels a call whose deadline passed; the deadline is the reason.
-        result = fail(ErrorCode::kDeadlineExceeded, "the deadline passed before the work was done");
-    }
-    if (!result && result.error().code == ErrorCode::kUnavailable && !services_.admission.calls.draining()) {
-        retryAfter(catalog::kRestoreRetry);  // nothing but a restore
-    }
-    const grpc::Status status = result ? grpc::Status::OK : makeStatus(result.error(), context_, retryAfter_);
+    result = frame_.settle(std::move(result), cutOff);
+    const grpc::Status status =
+        result ? grpc::Status::OK : makeStatus(result.error(), context_, frame_.retryHint());
     logLine(status, result ? nullptr : &result.error());
     return status;
 }

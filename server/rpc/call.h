@@ -1,12 +1,11 @@
-// The frame around every handler: admission, cancellation and deadline, one log line; no exception
-// leaves it.
+// One gRPC call around its handler: the rules of catalog::CallFrame, the client's cancellation and
+// deadline, one log line; no exception leaves it.
 #pragma once
 
 #include <chrono>
 #include <cstdint>
 #include <exception>
 #include <new>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -16,6 +15,7 @@
 
 #include "core/base/error.h"
 #include "core/base/run_context.h"
+#include "server/catalog/call_frame.h"
 #include "server/rpc/services.h"
 #include "shapedb/v1/shape_service.pb.h"
 
@@ -25,12 +25,10 @@ namespace shapedb::rpc {
 class Call {
   public:
     Call(const Services& services, grpc::ServerContext& context, const char* rpc);
-    ~Call();
     Call(const Call&) = delete;
     Call& operator=(const Call&) = delete;
 
-    /// Errors: kUnavailable (draining).
-    [[nodiscard]] Result<void> admit();
+    [[nodiscard]] catalog::CallFrame& frame() { return frame_; }
 
     /// Follows the client's cancellation and deadline.
     [[nodiscard]] const RunContext& run() const { return run_; }
@@ -57,10 +55,6 @@ class Call {
     /// Asks gRPC directly; the flag in `run()` follows a moment later.
     [[nodiscard]] bool clientGone() const { return context_.IsCancelled(); }
 
-    /// For calls that follow something for long. Errors: kCancelled, kDeadlineExceeded, kUnavailable
-    /// (draining).
-    [[nodiscard]] Result<void> checkpointWhileFollowing() const;
-
     /// The collection, the default one for an empty name; noted for the log. Errors: kNotFound.
     [[nodiscard]] Result<index::SnapshotPtr> collection(const std::string& name);
     /// The shape, with collection and key noted for the log. Errors: as Catalog::findShape.
@@ -73,12 +67,6 @@ class Call {
         points_ += points;
         bytes_ += bytes;
     }
-    /// Takes one of the places for calls that wait, until the call ends. Errors: kQueueFull.
-    [[nodiscard]] Result<void> becomeFollower();
-    /// The retry hint that goes with RESOURCE_EXHAUSTED. UNAVAILABLE has its own.
-    void retryAfter(std::chrono::milliseconds time) { retryAfter_ = time; }
-    /// For the call that replaces the database: a restore does not make it fail.
-    void expectRestore() { expectsRestore_ = true; }
 
     /// Makes the status and writes the log line. Call once, last.
     [[nodiscard]] grpc::Status finish(Result<void> result);
@@ -92,23 +80,19 @@ class Call {
     const std::string peer_;  ///< asked at the start: a cancelled call has none
     std::chrono::steady_clock::time_point began_;
     CancelWatcher::Registration cancellation_;
-    catalog::Budget::Share follower_;
     RunContext run_;
-    std::uint64_t epoch_;
-    bool admitted_ = false;
-    bool expectsRestore_ = false;
+    catalog::CallFrame frame_;
     std::string collection_;
     std::vector<telemetry::Field> notes_;
     std::uint64_t points_ = 0;
     std::uint64_t bytes_ = 0;
-    std::optional<std::chrono::milliseconds> retryAfter_;
 };
 
 /// Runs `body(call)`, which returns Result<void>, as the handler of one call.
 template <typename Body>
 grpc::Status handle(const Services& services, grpc::ServerContext* context, const char* rpc, Body&& body) {
     Call call(services, *context, rpc);
-    Result<void> result = call.admit();
+    Result<void> result = call.frame().admit();
     if (result) {
         try {
             result = body(call);

@@ -1,15 +1,15 @@
 // Reads an upload from a gRPC stream: AddShape, SearchByScan and Segment share it.
 #pragma once
 
+#include "common/point_stream.h"
 #include "core/base/return_if_error.h"
-#include "server/catalog/limits.h"
 #include "server/catalog/scan_upload.h"
 #include "server/rpc/call.h"
 
 namespace shapedb::rpc {
 
 /// `onHeader(header)` checks the other fields of the header as soon as it arrives, so that a hopeless
-/// upload is refused before its points are sent. Sets the retry hint after kQueueFull. Errors: those of
+/// upload is refused before its points are sent. Errors: those of
 /// ScanUpload and of `onHeader`; kCancelled, kDeadlineExceeded.
 template <typename Request, typename Reader, typename OnHeader>
 Result<store::VerifiedScan> receiveScan(Reader& reader, catalog::ScanUpload& upload, Call& call,
@@ -24,11 +24,10 @@ Result<store::VerifiedScan> receiveScan(Reader& reader, catalog::ScanUpload& upl
         } else if (request.has_chunk()) {
             const std::string& xyz = request.chunk().xyz();
             taken = upload.add(xyz);
-            if (taken) call.addPoints(xyz.size() / catalog::kPointBytes, xyz.size());
+            if (taken) call.addPoints(xyz.size() / kPointBytes, xyz.size());
         } else {
             taken = fail(ErrorCode::kMalformedStream, "message with neither header nor chunk");
         }
-        if (!taken && taken.error().code == ErrorCode::kQueueFull) call.retryAfter(catalog::kBudgetRetry);
         RETURN_IF_ERROR(taken);
     }
     // `Read` also returns false when the client has gone: then the upload is not complete.

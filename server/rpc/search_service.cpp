@@ -71,27 +71,20 @@ catalog::QuerySource sourceFrom(const v1::SearchBatchRequest::Query& query) {
     return source;
 }
 
-Result<void> ofQuery(int i, const Error& error) {
-    return fail(error.code, "query " + std::to_string(i) + ": " + error.message);
-}
-
 /// Reads all queries first and searches them together.
 Result<void> searchBatch(const Services& services, const Call& call, const catalog::PreparedSearch& prepared,
                          const v1::SearchBatchRequest& request, v1::SearchBatchResponse* response) {
-    std::vector<BatchQuery> queries;
-    for (int i = 0; i < request.queries_size(); ++i) {
-        auto query = services.searches.query(prepared, sourceFrom(request.queries(i)));
-        if (!query) return ofQuery(i, query.error());
-        queries.push_back(std::move(*query));
-    }
-    const auto found = services.searches.runBatch(prepared, queries, call.run());
+    std::vector<catalog::QuerySource> sources;
+    for (const auto& query : request.queries()) sources.push_back(sourceFrom(query));
+    const auto queries = services.searches.queries(prepared, sources);
+    RETURN_IF_ERROR(queries);
+    const auto found = services.searches.runBatch(prepared, *queries, call.run());
     RETURN_IF_ERROR(found);
     catalog::AnswerRoom room;
-    for (int i = 0; i < request.queries_size(); ++i) {
-        const auto at = static_cast<std::size_t>(i);
+    for (std::size_t i = 0; i < queries->size(); ++i) {
         const auto done =
-            answer(services, prepared, queries[at].signature, (*found)[at], room, response->add_responses());
-        if (!done) return ofQuery(i, done.error());
+            answer(services, prepared, (*queries)[i].signature, (*found)[i], room, response->add_responses());
+        if (!done) return fail(catalog::ofQuery(i, done.error()));
     }
     return {};
 }

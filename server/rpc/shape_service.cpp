@@ -100,14 +100,14 @@ Result<ShapeServiceHandler::Received> ShapeServiceHandler::receiveAndPut(
         header = std::move(*converted);
         wait = message.wait();
         RETURN_IF_ERROR(services_.catalog.admitUpload(header));
-        return wait ? call.becomeFollower() : Result<void>();
+        return wait ? call.frame().becomeFollower() : Result<void>();
     };
     auto scan = receiveScan<v1::AddShapeRequest>(reader, upload, call, takeHeader);
     RETURN_IF_ERROR(scan);
     RETURN_IF_ERROR(call.run().checkpoint());
     auto added = services_.catalog.put(header, std::move(*scan));
     if (!added && added.error().code == ErrorCode::kQueueFull) {
-        call.retryAfter(services_.catalog.retryAfterQueueFull());
+        call.frame().retryAfter(services_.catalog.retryAfterQueueFull());
     }
     RETURN_IF_ERROR(added);
     return Received{std::move(*added), wait};
@@ -185,7 +185,7 @@ grpc::Status ShapeServiceHandler::WatchIngest(grpc::ServerContext* context,
     return handle(services_, context, "WatchIngest", [&](Call& call) -> Result<void> {
         const auto found = call.shape(request->shape());
         RETURN_IF_ERROR(found);
-        RETURN_IF_ERROR(call.becomeFollower());
+        RETURN_IF_ERROR(call.frame().becomeFollower());
         const auto tell = [&](const catalog::IngestEvent& event) -> Result<void> {
             v1::IngestEvent out;
             out.set_state(toProto(event.state));
@@ -197,7 +197,7 @@ grpc::Status ShapeServiceHandler::WatchIngest(grpc::ServerContext* context,
             return call.write(*writer, out);
         };
         return services_.catalog.watchIngest(
-            found->shape.id, [&] { return call.checkpointWhileFollowing(); }, tell);
+            found->shape.id, [&] { return call.frame().checkpointWhileFollowing(); }, tell);
     });
 }
 

@@ -6,6 +6,8 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/eventually.h"
+
 namespace shapedb::catalog {
 namespace {
 
@@ -41,7 +43,8 @@ TEST(SegmentationSlots, LimitsConcurrentHolders) {
                 int seen = most.load();
                 while (now > seen && !most.compare_exchange_weak(seen, now)) {
                 }
-                std::this_thread::sleep_for(100us);
+                // The first holder waits for a second one, so that two are known to be inside at once.
+                EXPECT_TRUE(shapedb::testing::eventually([&] { return most.load() >= 2; }));
                 --inside;
             }
         });

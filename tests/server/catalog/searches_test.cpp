@@ -130,6 +130,25 @@ TEST_F(SearchesTest, AQueryIsAStoredShapeOrASignature) {
     EXPECT_EQ(searches().query(*prepared, {&key, &bytes}).error().code, ErrorCode::kInvalidArgument);
 }
 
+TEST_F(SearchesTest, ABatchSaysWhichOfItsQueriesIsWrong) {
+    const store::Shape cup = putAndWait("cup", 5.0f);
+    SearchRequest request;
+    request.k = 10;
+    const auto prepared = prepare(request);
+    const std::string key = "cup";
+    const std::string none = "none";
+    const std::string bytes = encodeSignature(signatureOf(7.0));
+    const auto both = searches().queries(*prepared, {{&key, nullptr}, {nullptr, &bytes}});
+    ASSERT_TRUE(both);
+    ASSERT_EQ(both->size(), 2u);
+    EXPECT_EQ(both->front().excludeId, cup.id);
+    EXPECT_EQ(both->back().signature.volume, 7.0);
+    const auto wrong = searches().queries(*prepared, {{&key, nullptr}, {&none, nullptr}});
+    ASSERT_FALSE(wrong);
+    EXPECT_EQ(wrong.error().code, ErrorCode::kNotFound);
+    EXPECT_EQ(wrong.error().message.rfind("query 1: ", 0), 0u) << wrong.error().message;
+}
+
 TEST_F(SearchesTest, AComparisonExplainsAndSaysWhichShapeIsMissing) {
     putAndWait("cup", 5.0f);
     putAndWait("jug", 6.0f);
