@@ -121,6 +121,16 @@ Point3 evenDirection(int i, int count) {
     return {across * std::cos(angle), across * std::sin(angle), z};
 }
 
+Point3 anyPerpendicular(const Point3& direction) {
+    // The coordinate axis it is least aligned with will do.
+    const double x = std::abs(direction.x);
+    const double y = std::abs(direction.y);
+    const double z = std::abs(direction.z);
+    const Point3 other = x <= y && x <= z ? Point3{1, 0, 0} : (y <= z ? Point3{0, 1, 0} : Point3{0, 0, 1});
+    const Point3 across = cross(direction, other);
+    return (1.0 / length(across)) * across;
+}
+
 Point3 randomDirection(Random& random) {
     // Archimedes: z is uniform over the sphere.
     const double z = random.uniform(-1.0, 1.0);

@@ -59,6 +59,9 @@ struct Motion {
 /// Number `i` of `count` unit vectors spread evenly over the sphere: a Fibonacci spiral.
 [[nodiscard]] Point3 evenDirection(int i, int count);
 
+/// Some unit vector perpendicular to `direction`, which must not be zero.
+[[nodiscard]] Point3 anyPerpendicular(const Point3& direction);
+
 /// A unit vector uniform over the sphere. Advances `random`.
 [[nodiscard]] Point3 randomDirection(Random& random);
 

@@ -19,6 +19,7 @@
 #include "core/matching/score_options.h"
 #include "core/matching/shape_row.h"
 #include "core/signature/signature.h"
+#include "core/signature/statistics.h"
 
 namespace shapedb {
 
@@ -26,25 +27,34 @@ namespace shapedb {
 /// what it is: any value of at most kMostBytes that may be copied as bytes.
 class Findings {
   public:
-    static constexpr std::size_t kMostBytes = 20;
+    /// The largest: the level sums of scorers with attributes, 16 bits for each statistic.
+    static constexpr std::size_t kMostBytes = kStatisticKinds * sizeof(std::uint16_t);
 
     Findings() = default;
     template <typename T>
     explicit Findings(const T& value) {
-        static_assert(std::is_trivially_copyable_v<T> && sizeof(T) <= kMostBytes);
+        requireFits<T>();
         std::memcpy(bytes_.data(), &value, sizeof(T));
     }
 
     /// `T` as it was written.
     template <typename T>
     [[nodiscard]] T as() const {
-        static_assert(std::is_trivially_copyable_v<T> && sizeof(T) <= kMostBytes);
+        requireFits<T>();
         T value;
         std::memcpy(&value, bytes_.data(), sizeof(T));
         return value;
     }
 
   private:
+    template <typename T>
+    static constexpr void requireFits() {
+        static_assert(std::is_trivially_copyable_v<T>, "findings are copied as bytes");
+        static_assert(sizeof(T) <= kMostBytes,
+                      "these findings are the largest of all scorers: kMostBytes has to be their size, which "
+                      "every survivor of a scan then takes");
+    }
+
     std::array<std::byte, kMostBytes> bytes_{};
 };
 

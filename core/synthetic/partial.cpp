@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/geometry/box.h"
+#include "core/geometry/motion.h"
 
 namespace shapedb {
 
@@ -17,17 +18,11 @@ constexpr double kPointsPerPixel = 16.0;
 constexpr double kBehindPixels = 2.0;
 constexpr std::size_t kMostPixels = std::size_t{1} << 22;
 
-Point3 anyAcross(const Point3& direction) {
-    const Point3 axis = std::abs(direction.x) < 0.6 ? Point3{1, 0, 0} : Point3{0, 1, 0};
-    const Point3 across = cross(direction, axis);
-    return (1.0 / length(across)) * across;
-}
-
 }  // namespace
 
 PointCloud seenFrom(const PointCloud& points, const Point3& towards) {
     if (points.empty()) return {};
-    const Point3 right = anyAcross(towards);
+    const Point3 right = anyPerpendicular(towards);
     const Point3 up = cross(towards, right);
     PointCloud viewed;
     viewed.reserve(points.size());

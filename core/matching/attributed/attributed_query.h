@@ -13,6 +13,8 @@ namespace shapedb {
     LevelSums sums;
     for (std::size_t s = 0; s < kKindsPerHalf; ++s) {
         sums[static_cast<std::size_t>(kFirstHalf[s])] = static_cast<std::uint16_t>(first[s]);
+    }
+    for (std::size_t s = 0; s < kKindsInSecondHalf; ++s) {
         sums[static_cast<std::size_t>(kSecondHalf[s])] = static_cast<std::uint16_t>(second[s]);
     }
     return sums;

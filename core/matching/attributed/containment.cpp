@@ -110,7 +110,7 @@ class Search {
     void turn(Containment trial, std::size_t q, std::size_t i, std::size_t k) {
         Tripod to;
         const Point3 axis = placeOf(piece_[i]) - trial.to;
-        const Point3 side = i == k ? anyAcross(axis) : placeOf(piece_[k]) - trial.to;
+        const Point3 side = i == k ? anyPerpendicular(axis) : placeOf(piece_[k]) - trial.to;
         if (!tripod(axis, side, to)) return;
         for (std::size_t j = 0; j < whole_.size(); ++j) {
             if (j == q || !alike(i, j)) continue;

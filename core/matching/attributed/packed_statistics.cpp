@@ -29,8 +29,9 @@ constexpr const StatisticLayout& layoutOf(Statistic kind) {
     return kStatistics[static_cast<std::size_t>(kind)];
 }
 
-constexpr bool fits(const std::array<Statistic, kKindsPerHalf>& half, bool mayReverse) {
-    for (std::size_t s = 0; s < kKindsPerHalf; ++s) {
+template <std::size_t kKinds>
+constexpr bool fits(const std::array<Statistic, kKinds>& half, bool mayReverse) {
+    for (std::size_t s = 0; s < kKinds; ++s) {
         const StatisticLayout& layout = layoutOf(half[s]);
         if (layout.count % 2 != 0 || layout.count / 2 > kSlots[s].bytes) return false;
         if (layout.reversibleRows > 0 && !(mayReverse && s == kReversibleSlot)) return false;
@@ -39,9 +40,21 @@ constexpr bool fits(const std::array<Statistic, kKindsPerHalf>& half, bool mayRe
 }
 static_assert(fits(kFirstHalf, false) && fits(kSecondHalf, true), "a statistic does not fit its slot");
 
-void packHalf(const std::uint8_t* levels, const std::array<Statistic, kKindsPerHalf>& kinds, HalfRow& row) {
+constexpr bool eachIsHeldOnce() {
+    std::array<int, kStatisticKinds> held{};
+    for (const Statistic kind : kFirstHalf) ++held[static_cast<std::size_t>(kind)];
+    for (const Statistic kind : kSecondHalf) ++held[static_cast<std::size_t>(kind)];
+    for (const int times : held) {
+        if (times != 1) return false;
+    }
+    return true;
+}
+static_assert(eachIsHeldOnce(), "each statistic belongs to one half");
+
+template <std::size_t kKinds>
+void packHalf(const std::uint8_t* levels, const std::array<Statistic, kKinds>& kinds, HalfRow& row) {
     HalfRow packed;  // a local one may be vectorised: nothing else points to it
-    for (std::size_t s = 0; s < kKindsPerHalf; ++s) {
+    for (std::size_t s = 0; s < kKinds; ++s) {
         const StatisticLayout& layout = layoutOf(kinds[s]);
         const std::uint8_t* from = levels + layout.offset;
         std::uint8_t* to = packed.bytes.data() + kSlots[s].offset;
@@ -54,8 +67,9 @@ void packHalf(const std::uint8_t* levels, const std::array<Statistic, kKindsPerH
     row = packed;
 }
 
-void unpackHalf(const HalfRow& row, const std::array<Statistic, kKindsPerHalf>& kinds, std::uint8_t* levels) {
-    for (std::size_t s = 0; s < kKindsPerHalf; ++s) {
+template <std::size_t kKinds>
+void unpackHalf(const HalfRow& row, const std::array<Statistic, kKinds>& kinds, std::uint8_t* levels) {
+    for (std::size_t s = 0; s < kKinds; ++s) {
         const StatisticLayout& layout = layoutOf(kinds[s]);
         for (std::size_t i = 0; i < layout.count; i += 2) {
             const std::uint8_t byte = row.bytes[kSlots[s].offset + i / 2];

@@ -17,19 +17,21 @@ struct alignas(32) HalfRow {
     std::array<std::uint8_t, kHalfRowBytes> bytes{};
 };
 
-constexpr std::size_t kKindsPerHalf = kStatisticKinds / 2;
+/// Of an odd number of statistics the first half holds one more.
+constexpr std::size_t kKindsPerHalf = (kStatisticKinds + 1) / 2;
+constexpr std::size_t kKindsInSecondHalf = kStatisticKinds - kKindsPerHalf;
 
 /// Which statistics a half holds, in the order of HalfSums. The first half was chosen to tell most
 /// shapes apart.
 constexpr std::array<Statistic, kKindsPerHalf> kFirstHalf{
     Statistic::kChords, Statistic::kThicknessByCentrality, Statistic::kThicknessByRadius, Statistic::kBending,
     Statistic::kSurfaceDistances};
-constexpr std::array<Statistic, kKindsPerHalf> kSecondHalf{
+constexpr std::array<Statistic, kKindsInSecondHalf> kSecondHalf{
     Statistic::kInteriorHarmonics, Statistic::kSurfaceHarmonics, Statistic::kFootprint, Statistic::kSpread,
     Statistic::kFootprintDistances};
 
 /// The L1 distance, in levels, of each statistic of a half; of a reversible one the smaller of both
-/// orders.
+/// orders. 0 where the second half has no statistic.
 using HalfSums = std::array<std::uint32_t, kKindsPerHalf>;
 
 /// Without loss for levels up to kTopLevel; larger ones count as kTopLevel.

@@ -30,6 +30,8 @@ StatisticsBound::StatisticsBound(const AttributedQuery& query, StatisticsRule ru
         const double share = rule == StatisticsRule::kPartial ? weights.partial : 1.0;
         for (std::size_t s = 0; s < kKindsPerHalf; ++s) {
             first_[quality][s] = share * weights.perLevel[static_cast<std::size_t>(kFirstHalf[s])];
+        }
+        for (std::size_t s = 0; s < kKindsInSecondHalf; ++s) {
             second_[quality][s] = share * weights.perLevel[static_cast<std::size_t>(kSecondHalf[s])];
         }
     }

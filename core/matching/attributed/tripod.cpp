@@ -16,16 +16,6 @@ bool tripod(const Point3& first, const Point3& second, Tripod& out) {
     return true;
 }
 
-Point3 anyAcross(const Point3& direction) {
-    // The coordinate axis it is least aligned with will do.
-    const double x = std::abs(direction.x);
-    const double y = std::abs(direction.y);
-    const double z = std::abs(direction.z);
-    const Point3 other = x <= y && x <= z ? Point3{1, 0, 0} : (y <= z ? Point3{0, 1, 0} : Point3{0, 0, 1});
-    const Point3 across = cross(direction, other);
-    return (1.0 / length(across)) * across;
-}
-
 Matrix3 tripodMap(const Tripod& from, const Tripod& to, bool reflected) {
     const double sign = reflected ? -1.0 : 1.0;
     const auto row = [&](double x, double y, double z) {

@@ -18,9 +18,6 @@ constexpr double kShortestDirection = 1e-3;
 /// `first`, or the component of `second` across it, is shorter than kShortestDirection.
 [[nodiscard]] bool tripod(const Point3& first, const Point3& second, Tripod& out);
 
-/// Some unit vector perpendicular to `direction`, which must not be zero.
-[[nodiscard]] Point3 anyAcross(const Point3& direction);
-
 /// Maps each axis of `from` to that of `to`; reflected: the third axis to the opposite.
 [[nodiscard]] Matrix3 tripodMap(const Tripod& from, const Tripod& to, bool reflected);
 

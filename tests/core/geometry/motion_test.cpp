@@ -93,6 +93,17 @@ TEST(Motion, MovesACloudPointByPoint) {
     for (std::size_t i = 0; i < points.size(); ++i) EXPECT_EQ(moved[i], apply(motion, points[i]));
 }
 
+TEST(Motion, EveryDirectionHasAUnitVectorPerpendicularToIt) {
+    Random random(11);
+    std::vector<Point3> directions = {{1, 0, 0}, {0, -1, 0}, {0, 0, 1e-9}, {1, 1, 1}, {1, 1, 0}, {-1e9, 0, 1}};
+    for (int i = 0; i < 100; ++i) directions.push_back(3.0 * randomDirection(random));
+    for (const Point3& direction : directions) {
+        const Point3 across = anyPerpendicular(direction);
+        EXPECT_NEAR(length(across), 1.0, 1e-12);
+        EXPECT_NEAR(dot(across, direction) / length(direction), 0.0, 1e-12);
+    }
+}
+
 TEST(Motion, RandomRotationIsOrthonormalWithDeterminantOne) {
     Random random(5);
     for (int i = 0; i < 500; ++i) {

@@ -88,6 +88,8 @@ TEST(PackedStatistics, SumsEqualPlainLoops) {
                 const HalfSums rest = difference.second(second[i]);
                 for (std::size_t s = 0; s < kKindsPerHalf; ++s) {
                     ASSERT_EQ(sums[i][s], plainSum(query, others[i], kFirstHalf[s])) << "slot " << s;
+                }
+                for (std::size_t s = 0; s < kKindsInSecondHalf; ++s) {
                     ASSERT_EQ(rest[s], plainSum(query, others[i], kSecondHalf[s])) << "slot " << s;
                 }
             }
