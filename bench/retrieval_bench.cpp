@@ -21,10 +21,7 @@ namespace shapedb::bench {
 namespace {
 
 struct RetrievalFlags {
-    std::vector<std::string> paths;
-    std::vector<std::string> gallery;
-    std::string match = "folder";
-    cli::ClassFlags classes;
+    cli::TaskFlags task;
     std::vector<double> noise;
     std::vector<std::string> methods;
     bool noRotation = false;
@@ -39,32 +36,10 @@ struct RetrievalFlags {
 const std::vector<double> kDefaultNoise = {0.0, 0.005, 0.01};
 
 Result<RetrievalTask> taskOf(const RetrievalFlags& flags) {
-    RetrievalTask task;
-    if (flags.gallery.empty()) {
-        if (flags.paths.size() != 1) {
-            return fail(ErrorCode::kInvalidArgument,
-                        "leave-one-out takes one folder of class folders; to rank queries against other "
-                        "shapes give --gallery");
-        }
-        auto scans = cli::listClasses(flags.paths.front(), flags.classes);
-        RETURN_IF_ERROR(scans);
-        task.queries = std::move(*scans);
-        return task;
+    if (!flags.task.gallery.empty() && !flags.plot.empty()) {
+        return fail(ErrorCode::kInvalidArgument, "--plot is for leave-one-out: leave --gallery out");
     }
-    if (flags.classes.any() || !flags.plot.empty()) {
-        return fail(ErrorCode::kInvalidArgument,
-                    "--classes, --except-classes and --plot are for leave-one-out; leave --gallery out");
-    }
-    const auto match = cli::matchFromName(flags.match);
-    RETURN_IF_ERROR(match);
-    task.match = *match;
-    auto queries = cli::listCollection(flags.paths);
-    RETURN_IF_ERROR(queries);
-    auto gallery = cli::listCollection(flags.gallery);
-    RETURN_IF_ERROR(gallery);
-    task.queries = std::move(*queries);
-    task.gallery = std::move(*gallery);
-    return task;
+    return cli::retrievalTask(flags.task);
 }
 
 RetrievalSettings settingsOf(const RetrievalFlags& flags) {
@@ -74,7 +49,7 @@ RetrievalSettings settingsOf(const RetrievalFlags& flags) {
     settings.threads = flags.threads;
     settings.noise = flags.noise;
     if (settings.noise.empty())
-        settings.noise = flags.gallery.empty() ? kDefaultNoise : std::vector<double>{0.0};
+        settings.noise = flags.task.gallery.empty() ? kDefaultNoise : std::vector<double>{0.0};
     return settings;
 }
 
@@ -130,18 +105,7 @@ void addRetrievalOperation(CLI::App& app, Bench& bench) {
         "retrieval",
         "Our profiles beside D2 and the descriptors of the Point Cloud Library, on the same points: "
         "leave-one-out over DIR/CLASS/*, or queries against a gallery");
-    command
-        ->add_option("DIR", flags->paths,
-                     "Folder of class folders; with --gallery: queries (files or folders)")
-        ->required();
-    command->add_option("--gallery", flags->gallery, "Rank the queries against these files or folders")
-        ->type_name("DIR");
-    command
-        ->add_option("--match", flags->match,
-                     "With --gallery, what makes an entry right: the same folder name or file name")
-        ->check(CLI::IsMember({"folder", "stem"}))
-        ->capture_default_str();
-    cli::addClassFlags(*command, flags->classes);
+    cli::addTaskFlags(*command, flags->task);
     command->add_option("--methods", flags->methods, "Only these: default, paper, esf, vfh, gasd, d2")
         ->delimiter(',')
         ->type_name("A,B,...");

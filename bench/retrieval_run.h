@@ -16,12 +16,7 @@
 
 namespace shapedb::bench {
 
-struct RetrievalTask {
-    std::vector<cli::CollectionScan> queries;
-    /// Empty: leave-one-out, each query against all other queries, right when the label is the same.
-    std::vector<cli::CollectionScan> gallery;
-    cli::Match match = cli::Match::kFolder;  ///< with a gallery
-};
+using cli::RetrievalTask;
 
 struct RetrievalSettings {
     cli::ScanFlags scan;                ///< its noise is not used

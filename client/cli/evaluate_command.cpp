@@ -22,10 +22,7 @@ using nlohmann::json;
 namespace {
 
 struct EvaluateFlags {
-    std::vector<std::string> paths;
-    std::vector<std::string> gallery;
-    std::string match = "folder";
-    ClassFlags classes;
+    TaskFlags task;
     std::string confusion;
     bool perClass = false;
     unsigned threads = defaultThreads();
@@ -79,8 +76,8 @@ json settingsJson(const EvaluateFlags& flags, const ShapeParameters& parameters)
                      {"reflection", !flags.score.noReflection},
                      {"keep_scale", flags.score.keepScale},
                      {"partial", flags.score.partial}};
-    if (!flags.classes.only.empty()) settings["only_classes"] = flags.classes.only;
-    if (!flags.classes.except.empty()) settings["except_classes"] = flags.classes.except;
+    if (!flags.task.classes.only.empty()) settings["only_classes"] = flags.task.classes.only;
+    if (!flags.task.classes.except.empty()) settings["except_classes"] = flags.task.classes.except;
     return settings;
 }
 
@@ -205,19 +202,14 @@ std::string leaveOneOutText(const EvaluateFlags& flags, const ShapeParameters& p
 }
 
 CommandResult runLeaveOneOut(Session& session, const EvaluateFlags& flags) {
-    if (flags.paths.size() != 1) {
-        return fail(ErrorCode::kInvalidArgument,
-                    "leave-one-out takes one folder of class folders; use --gallery to rank queries against "
-                    "other shapes");
-    }
     if (!flags.confusion.empty()) {
         RETURN_IF_ERROR(checkFigurePath(flags.confusion));
     }
     const auto parameters = flags.parameters.resolve();
     RETURN_IF_ERROR(parameters);
-    const auto scans = listClasses(flags.paths.front(), flags.classes);
-    RETURN_IF_ERROR(scans);
-    std::vector<EvaluatedShape> shapes = shapesOf(*scans);
+    const auto task = retrievalTask(flags.task);
+    RETURN_IF_ERROR(task);
+    std::vector<EvaluatedShape> shapes = shapesOf(task->queries);
 
     Timing timing;
     const Stopwatch segmenting;
@@ -271,7 +263,7 @@ json galleryJson(const EvaluateFlags& flags, const ShapeParameters& parameters, 
                  const std::vector<RankedQuery>& ranked, std::size_t gallerySize,
                  const std::vector<const EvaluatedShape*>& failures, const Timing& timing) {
     json document = settingsJson(flags, parameters);
-    document["match"] = flags.match;
+    document["match"] = flags.task.match;
     document["queries"] = report.queries;
     document["without_right_answer"] = report.withoutRightAnswer;
     document["gallery"] = gallerySize;
@@ -297,7 +289,7 @@ std::string galleryText(const EvaluateFlags& flags, const ShapeParameters& param
                         std::size_t gallerySize, const Timing& timing) {
     std::string text = formatCount(ranked.size(), "query", "queries") + " against a gallery of " +
                        formatCount(gallerySize, "shape", "shapes") + "; right answers have the same " +
-                       (flags.match == "stem" ? "file name" : "folder name") + "; " +
+                       (flags.task.match == "stem" ? "file name" : "folder name") + "; " +
                        settingsText(flags, parameters) + "\n\n";
     const auto right = Table::Align::kRight;
     Table table(
@@ -346,21 +338,12 @@ CommandResult runGallery(Session& session, const EvaluateFlags& flags) {
     if (!flags.confusion.empty() || flags.perClass) {
         return fail(ErrorCode::kInvalidArgument, "--confusion and --per-class do not work with --gallery");
     }
-    if (flags.classes.any()) {
-        return fail(
-            ErrorCode::kInvalidArgument,
-            "--classes and --except-classes do not work with --gallery; give the folders that take part");
-    }
-    const auto match = matchFromName(flags.match);
-    RETURN_IF_ERROR(match);
     const auto parameters = flags.parameters.resolve();
     RETURN_IF_ERROR(parameters);
-    const auto queryScans = listCollection(flags.paths);
-    RETURN_IF_ERROR(queryScans);
-    const auto galleryScans = listCollection(flags.gallery);
-    RETURN_IF_ERROR(galleryScans);
-    std::vector<EvaluatedShape> queries = shapesOf(*queryScans);
-    std::vector<EvaluatedShape> gallery = shapesOf(*galleryScans);
+    const auto task = retrievalTask(flags.task);
+    RETURN_IF_ERROR(task);
+    std::vector<EvaluatedShape> queries = shapesOf(task->queries);
+    std::vector<EvaluatedShape> gallery = shapesOf(task->gallery);
 
     // The gallery stands for what a user has stored: noise and subset are for the queries alone.
     ScanFlags clean = flags.scan;
@@ -382,7 +365,7 @@ CommandResult runGallery(Session& session, const EvaluateFlags& flags) {
     std::vector<GalleryQuery> asked;
     for (std::size_t q = 0; q < queries.size(); ++q) {
         asked.push_back(
-            rankGallery(*match, queries[q], *galleryScans, scores->data() + q * gallery.size(),
+            rankGallery(task->match, queries[q], task->gallery, scores->data() + q * gallery.size(),
                         [&](std::size_t g) { return queries[q].signature && gallery[g].signature; }));
     }
     const auto report = evaluateGallery(asked, gallery.size());
@@ -406,22 +389,11 @@ void addEvaluateCommand(CLI::App& app, Session& session) {
         app.add_subcommand("evaluate",
                            "Measure retrieval on labelled scans (needs no server): leave-one-out over "
                            "DIR/CLASS/*, or queries against a gallery");
-    command
-        ->add_option("DIR", flags->paths,
-                     "Folder of class folders; with --gallery, the queries (files or folders)")
-        ->required();
-    command->add_option("--gallery", flags->gallery, "Rank the queries against these files or folders")
-        ->type_name("DIR");
-    command
-        ->add_option("--match", flags->match,
-                     "With --gallery: right answers have the same folder name, or the same file name")
-        ->check(CLI::IsMember({"folder", "stem"}))
-        ->capture_default_str();
+    addTaskFlags(*command, flags->task);
     command
         ->add_option("--confusion", flags->confusion,
                      "Draw the similarity matrix (as in the paper's Figure 6)")
         ->type_name("FILE.png|svg");
-    addClassFlags(*command, flags->classes);
     command->add_flag("--per-class", flags->perClass, "Also print the figures of each class");
     command->add_option("--threads", flags->threads, "Number of threads; does not change the result")
         ->check(CLI::Range(1, 1024))
@@ -431,7 +403,8 @@ void addEvaluateCommand(CLI::App& app, Session& session) {
     addScoreFlags(*command, flags->score);
     command->callback([&session, flags] {
         session.action = [&session, flags] {
-            return flags->gallery.empty() ? runLeaveOneOut(session, *flags) : runGallery(session, *flags);
+            return flags->task.gallery.empty() ? runLeaveOneOut(session, *flags)
+                                               : runGallery(session, *flags);
         };
     });
 }

@@ -68,16 +68,13 @@ Result<void> keepClasses(std::vector<CollectionScan>& scans, const ClassFlags& c
     return {};
 }
 
-}  // namespace
-
-void addClassFlags(CLI::App& command, ClassFlags& flags) {
-    command.add_option("--classes", flags.only, "Measure only these classes, as queries and as candidates")
-        ->delimiter(',')
-        ->type_name("A,B,...");
-    command.add_option("--except-classes", flags.except, "Measure all classes but these")
-        ->delimiter(',')
-        ->type_name("A,B,...");
+Result<Match> matchFromName(const std::string& name) {
+    if (name == "folder") return Match::kFolder;
+    if (name == "stem") return Match::kStem;
+    return fail(ErrorCode::kInvalidArgument, "'" + name + "' is not a way to match; use folder or stem");
 }
+
+}  // namespace
 
 Result<std::vector<CollectionScan>> listCollection(const std::vector<std::string>& roots) {
     std::vector<CollectionScan> scans;
@@ -106,10 +103,55 @@ Result<std::vector<CollectionScan>> listClasses(const std::string& root, const C
     return scans;
 }
 
-Result<Match> matchFromName(const std::string& name) {
-    if (name == "folder") return Match::kFolder;
-    if (name == "stem") return Match::kStem;
-    return fail(ErrorCode::kInvalidArgument, "'" + name + "' is not a way to match; use folder or stem");
+void addTaskFlags(CLI::App& command, TaskFlags& flags) {
+    command
+        .add_option("DIR", flags.paths,
+                    "Folder of class folders; with --gallery, the queries (files or folders)")
+        ->required();
+    command.add_option("--gallery", flags.gallery, "Rank the queries against these files or folders")
+        ->type_name("DIR");
+    command
+        .add_option("--match", flags.match,
+                    "With --gallery: right answers have the same folder name, or the same file name")
+        ->check(CLI::IsMember({"folder", "stem"}))
+        ->capture_default_str();
+    command
+        .add_option("--classes", flags.classes.only, "Measure only these classes, as queries and candidates")
+        ->delimiter(',')
+        ->type_name("A,B,...");
+    command.add_option("--except-classes", flags.classes.except, "Measure all classes but these")
+        ->delimiter(',')
+        ->type_name("A,B,...");
+}
+
+Result<RetrievalTask> retrievalTask(const TaskFlags& flags) {
+    RetrievalTask task;
+    if (flags.gallery.empty()) {
+        if (flags.paths.size() != 1) {
+            return fail(ErrorCode::kInvalidArgument,
+                        "leave-one-out takes one folder of class folders; use --gallery to rank queries "
+                        "against other shapes");
+        }
+        auto scans = listClasses(flags.paths.front(), flags.classes);
+        RETURN_IF_ERROR(scans);
+        task.queries = std::move(*scans);
+        return task;
+    }
+    if (flags.classes.any()) {
+        return fail(
+            ErrorCode::kInvalidArgument,
+            "--classes and --except-classes do not work with --gallery; give the folders that take part");
+    }
+    const auto match = matchFromName(flags.match);
+    RETURN_IF_ERROR(match);
+    task.match = *match;
+    auto queries = listCollection(flags.paths);
+    RETURN_IF_ERROR(queries);
+    auto gallery = listCollection(flags.gallery);
+    RETURN_IF_ERROR(gallery);
+    task.queries = std::move(*queries);
+    task.gallery = std::move(*gallery);
+    return task;
 }
 
 GalleryQuery rankGallery(Match match, const CollectionScan& query, const std::vector<CollectionScan>& gallery,

@@ -31,9 +31,6 @@ struct ClassFlags {
     [[nodiscard]] bool any() const { return !only.empty() || !except.empty(); }
 };
 
-/// `flags` must outlive the parsing.
-void addClassFlags(CLI::App& command, ClassFlags& flags);
-
 /// All scan files under the roots, by root and path, labelled by the folder that holds them. Errors: those
 /// of listScanFiles.
 [[nodiscard]] Result<std::vector<CollectionScan>> listCollection(const std::vector<std::string>& roots);
@@ -52,8 +49,27 @@ enum class Match {
     kStem,    ///< same file name without extension, in any folder: a noisy copy has to find the clean file
 };
 
-/// Errors: kInvalidArgument for a name that is neither "folder" nor "stem".
-[[nodiscard]] Result<Match> matchFromName(const std::string& name);
+/// What to measure: DIR..., --gallery, --match, --classes and --except-classes.
+struct TaskFlags {
+    std::vector<std::string> paths;
+    std::vector<std::string> gallery;
+    std::string match = "folder";
+    ClassFlags classes;
+};
+
+/// `flags` must outlive the parsing.
+void addTaskFlags(CLI::App& command, TaskFlags& flags);
+
+struct RetrievalTask {
+    std::vector<CollectionScan> queries;
+    /// Empty: leave-one-out, each query against all other queries, right when the label is the same.
+    std::vector<CollectionScan> gallery;
+    Match match = Match::kFolder;  ///< with a gallery
+};
+
+/// The scans that `flags` name. Errors: those of listClasses and listCollection; kInvalidArgument (several
+/// folders or an unknown --match; classes with a gallery).
+[[nodiscard]] Result<RetrievalTask> retrievalTask(const TaskFlags& flags);
 
 /// The ranking of one query: entries in descending order of score (`scores[g]` of gallery entry g, no NaN),
 /// ties by index, without the query's own file (kFolder) and without unusable entries. The right ones include

@@ -12,7 +12,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-class RetrievalTask : public CommandTest {
+class RetrievalTaskTest : public CommandTest {
   protected:
     void SetUp() override {
         const PointCloud points = ellipsoidPoints(1.0, 0.9, 0.8, 20);
@@ -41,7 +41,7 @@ class RetrievalTask : public CommandTest {
     }
 };
 
-TEST_F(RetrievalTask, CollectionLabelsAreTheFoldersOfTheFiles) {
+TEST_F(RetrievalTaskTest, CollectionLabelsAreTheFoldersOfTheFiles) {
     const auto scans = listCollection({path("set")});
     ASSERT_TRUE(scans);
     ASSERT_EQ(scans->size(), 4u);
@@ -52,7 +52,7 @@ TEST_F(RetrievalTask, CollectionLabelsAreTheFoldersOfTheFiles) {
     EXPECT_FALSE(listCollection({path("nowhere")}));
 }
 
-TEST_F(RetrievalTask, ClassIsTheFolderBelowTheRoot) {
+TEST_F(RetrievalTaskTest, ClassIsTheFolderBelowTheRoot) {
     const auto scans = listClasses(path("set"));
     ASSERT_TRUE(scans);
     EXPECT_EQ((*scans)[1].name, "bell/old/2.xyz");
@@ -61,27 +61,27 @@ TEST_F(RetrievalTask, ClassIsTheFolderBelowTheRoot) {
     EXPECT_THAT(refusalOf({}), HasSubstr("stray.xyz"));
 }
 
-TEST_F(RetrievalTask, OnlyChosenClassesTakePart) {
+TEST_F(RetrievalTaskTest, OnlyChosenClassesTakePart) {
     EXPECT_THAT(namesOf({{"round", "bell"}, {}}), ElementsAre("bell/1.xyz", "bell/old/2.xyz", "round/7.xyz"));
     EXPECT_THAT(namesOf({{}, {"bell"}}), ElementsAre("cup/1.xyz", "round/7.xyz"));
     EXPECT_THAT(namesOf({{"bell", "cup"}, {"bell"}}), ElementsAre("cup/1.xyz"));
 }
 
-TEST_F(RetrievalTask, ClassesAndTheirComplementMakeTheWhole) {
+TEST_F(RetrievalTaskTest, ClassesAndTheirComplementMakeTheWhole) {
     const auto half = namesOf({{"cup"}, {}});
     auto both = namesOf({{}, {"cup"}});
     both.insert(both.end(), half.begin(), half.end());
     EXPECT_THAT(both, ::testing::UnorderedElementsAreArray(namesOf({})));
 }
 
-TEST_F(RetrievalTask, RefusesAnUnknownClassAndListsTheClasses) {
+TEST_F(RetrievalTaskTest, RefusesAnUnknownClassAndListsTheClasses) {
     EXPECT_THAT(refusalOf({{"bel"}, {}}),
                 ::testing::AllOf(HasSubstr("'bel'"), HasSubstr("bell, cup, round")));
     EXPECT_THAT(refusalOf({{}, {"Cup"}}), HasSubstr("'Cup'"));
     EXPECT_THAT(refusalOf({{"cup"}, {"cup"}}), HasSubstr("leave no class"));
 }
 
-TEST_F(RetrievalTask, MatchByFolderExcludesTheQueryItself) {
+TEST_F(RetrievalTaskTest, MatchByFolderExcludesTheQueryItself) {
     const auto scans = listCollection({path("set")});
     ASSERT_TRUE(scans);
     const std::vector<double> scores = {1.0, 0.5, 0.2, 0.9};
@@ -94,7 +94,7 @@ TEST_F(RetrievalTask, MatchByFolderExcludesTheQueryItself) {
     EXPECT_THAT(byStem.right, ElementsAre(0, 2)) << "the files named 1";
 }
 
-TEST_F(RetrievalTask, UnusableEntriesAreNotRankedButStillRight) {
+TEST_F(RetrievalTaskTest, UnusableEntriesAreNotRankedButStillRight) {
     const auto scans = listCollection({path("set")});
     ASSERT_TRUE(scans);
     const std::vector<double> scores = {0.5, 0.5, 0.5, 0.5};
@@ -104,10 +104,32 @@ TEST_F(RetrievalTask, UnusableEntriesAreNotRankedButStillRight) {
     EXPECT_THAT(query.right, ElementsAre(0, 2));
 }
 
-TEST(Match, IsParsedFromItsName) {
-    EXPECT_EQ(*matchFromName("folder"), Match::kFolder);
-    EXPECT_EQ(*matchFromName("stem"), Match::kStem);
-    EXPECT_EQ(matchFromName("colour").error().code, ErrorCode::kInvalidArgument);
+TEST_F(RetrievalTaskTest, WithoutAGalleryTheClassesOfOneFolderTakePart) {
+    TaskFlags flags;
+    flags.paths = {path("set")};
+    const auto task = retrievalTask(flags);
+    ASSERT_TRUE(task);
+    EXPECT_EQ(task->queries.size(), listClasses(path("set"))->size());
+    EXPECT_TRUE(task->gallery.empty());
+    flags.paths.push_back(path("set"));
+    EXPECT_EQ(retrievalTask(flags).error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST_F(RetrievalTaskTest, WithAGalleryQueriesAndEntriesAreListedApart) {
+    TaskFlags flags;
+    flags.paths = {path("set")};
+    flags.gallery = {path("set"), path("set")};
+    EXPECT_EQ(retrievalTask(flags)->match, Match::kFolder);
+    flags.match = "stem";
+    const auto task = retrievalTask(flags);
+    ASSERT_TRUE(task);
+    EXPECT_EQ(task->match, Match::kStem);
+    EXPECT_EQ(task->gallery.size(), 2 * task->queries.size());
+    flags.match = "colour";
+    EXPECT_EQ(retrievalTask(flags).error().code, ErrorCode::kInvalidArgument);
+    flags.match = "stem";
+    flags.classes.only = {"bell"};
+    EXPECT_THAT(retrievalTask(flags).error().message, HasSubstr("--gallery"));
 }
 
 TEST(TiesAgainstFailures, LowersOnlySameClassPairsWithAFailure) {
