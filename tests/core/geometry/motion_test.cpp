@@ -95,7 +95,8 @@ TEST(Motion, MovesACloudPointByPoint) {
 
 TEST(Motion, EveryDirectionHasAUnitVectorPerpendicularToIt) {
     Random random(11);
-    std::vector<Point3> directions = {{1, 0, 0}, {0, -1, 0}, {0, 0, 1e-9}, {1, 1, 1}, {1, 1, 0}, {-1e9, 0, 1}};
+    std::vector<Point3> directions = {{1, 0, 0}, {0, -1, 0}, {0, 0, 1e-9},
+                                      {1, 1, 1}, {1, 1, 0},  {-1e9, 0, 1}};
     for (int i = 0; i < 100; ++i) directions.push_back(3.0 * randomDirection(random));
     for (const Point3& direction : directions) {
         const Point3 across = anyPerpendicular(direction);
