@@ -44,15 +44,20 @@ if(SHAPEDB_BUILD_FUZZ)
   add_compile_options(-fsanitize=fuzzer-no-link)
 endif()
 
-# shapedb_library(NAME SOURCES a.cpp ... [PUBLIC lib ...] [PRIVATE lib ...] [PCH header ... | PCH_OF target] [UNITY n]
+# With SHAPEDB_UNITY, six sources at a time are compiled as one: most of the time of a source goes into headers. Names
+# of their anonymous namespaces must differ then.
+function(shapedb_unity name)
+  set_target_properties(${name} PROPERTIES UNITY_BUILD ${SHAPEDB_UNITY} UNITY_BUILD_BATCH_SIZE 6)
+endfunction()
+
+# shapedb_library(NAME SOURCES a.cpp ... [PUBLIC lib ...] [PRIVATE lib ...] [PCH header ... | PCH_OF target]
 #                 [FAST | SMALL])
 #   FAST    -O3: measured to be worth it
 #   SMALL   -O1: runs once a command, compiles slowly
 #   PCH     headers parsed once for the whole target. Not CLI11: each source would compile its global validators (3 s)
 #   PCH_OF  the same, shared with a target of the same flags
-#   UNITY   this many sources are compiled as one: worth it where a header-only library is most of the work
 function(shapedb_library name)
-  cmake_parse_arguments(ARG "FAST;SMALL" "PCH_OF;UNITY" "SOURCES;PUBLIC;PRIVATE;PCH" ${ARGN})
+  cmake_parse_arguments(ARG "FAST;SMALL" "PCH_OF" "SOURCES;PUBLIC;PRIVATE;PCH" ${ARGN})
   add_library(${name} STATIC ${ARG_SOURCES})
   target_link_libraries(${name} PUBLIC shapedb_options ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
   if(ARG_FAST)
@@ -65,9 +70,7 @@ function(shapedb_library name)
   elseif(ARG_PCH_OF)
     target_precompile_headers(${name} REUSE_FROM ${ARG_PCH_OF})
   endif()
-  if(ARG_UNITY)
-    set_target_properties(${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE ${ARG_UNITY})
-  endif()
+  shapedb_unity(${name})
 endfunction()
 
 # shapedb_test(NAME FOLDERS folder ... [SUPPORT file.cpp ...] LIBS lib ... [PCH header ...] [TIMEOUT seconds] [LABEL name]
@@ -94,6 +97,7 @@ function(shapedb_test name)
                             <functional> <map> <memory> <optional> <string> <thread> <vector> "${PROJECT_SOURCE_DIR}/core/base/error.h"
                             ${ARG_PCH})
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
+  shapedb_unity(${name})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
   endif()

@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::size_t kBufferBytes = std::size_t{1} << 20;
+constexpr std::size_t kWriteBufferBytes = std::size_t{1} << 20;
 constexpr int kNameAttempts = 16;
 
 Error notWritable(const std::string& path, int number) {
@@ -74,7 +74,7 @@ OutputFile::~OutputFile() {
 
 Result<void> OutputFile::write(std::string_view bytes) {
     buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
-    if (buffer_.size() < kBufferBytes) return {};
+    if (buffer_.size() < kWriteBufferBytes) return {};
     return flush();
 }
 

@@ -21,7 +21,7 @@ namespace shapedb::io {
 
 namespace {
 
-constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
+constexpr std::size_t kNoField = std::numeric_limits<std::size_t>::max();
 
 // LZF writes at most 264 bytes (its longest back reference) for 3 bytes read.
 constexpr std::uint64_t kLzfGreatestRatio = 88;
@@ -45,7 +45,7 @@ struct PcdHeader {
     std::optional<std::uint64_t> height;
     std::optional<std::uint64_t> points;
     PcdEncoding encoding = PcdEncoding::kAscii;
-    std::array<std::size_t, 3> coordinates = {kNone, kNone, kNone};  ///< fields named x, y, z
+    std::array<std::size_t, 3> coordinates = {kNoField, kNoField, kNoField};  ///< fields named x, y, z
 
     std::uint64_t bytesPerPoint(bool withPadding) const {
         std::uint64_t sum = 0;
@@ -124,14 +124,14 @@ class HeaderParser {
             field.name = name;
             if (name == "x" || name == "y" || name == "z") {
                 std::size_t& place = header_.coordinates[static_cast<std::size_t>(name[0] - 'x')];
-                if (place != kNone)
+                if (place != kNoField)
                     return fail(file_.malformedLine("field " + inQuotes(name) + " appears twice"));
                 place = header_.fields.size();
             }
             header_.fields.push_back(std::move(field));
         }
         for (std::size_t axis = 0; axis < 3; ++axis) {
-            if (header_.coordinates[axis] == kNone) {
+            if (header_.coordinates[axis] == kNoField) {
                 return fail(file_.malformedLine(std::string("FIELDS has no field '") + "xyz"[axis] + "'"));
             }
         }

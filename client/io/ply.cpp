@@ -22,7 +22,7 @@ namespace shapedb::io {
 
 namespace {
 
-constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
+constexpr std::size_t kNoProperty = std::numeric_limits<std::size_t>::max();
 
 std::string recordName(const PlyElement& element, std::uint64_t index) {
     return element.name + " " + std::to_string(index) + " of " + std::to_string(element.count);
@@ -139,19 +139,19 @@ Result<void> endRecord(Record& record, const PlyElement& element, std::uint64_t 
 
 // Finds the properties x, y and z.
 Result<std::array<std::size_t, 3>> findCoordinates(const InputFile& file, const PlyElement& vertex) {
-    std::array<std::size_t, 3> at = {kNone, kNone, kNone};
+    std::array<std::size_t, 3> at = {kNoProperty, kNoProperty, kNoProperty};
     for (std::size_t i = 0; i < vertex.properties.size(); ++i) {
         const PlyProperty& property = vertex.properties[i];
         if (property.name.size() != 1 || property.name[0] < 'x' || property.name[0] > 'z') continue;
         std::size_t& place = at[static_cast<std::size_t>(property.name[0] - 'x')];
-        if (place != kNone || property.isList) {
+        if (place != kNoProperty || property.isList) {
             return fail(file.malformed("header: element vertex needs one number '" + property.name +
                                        "', not a list or two of them"));
         }
         place = i;
     }
     for (std::size_t axis = 0; axis < 3; ++axis) {
-        if (at[axis] == kNone) {
+        if (at[axis] == kNoProperty) {
             return fail(
                 file.malformed(std::string("header: element vertex has no property '") + "xyz"[axis] + "'"));
         }
@@ -248,13 +248,13 @@ class PlyBody {
     Result<void> readElementWith(Record record, const PlyElement& element) {
         if (element.name == "vertex") return readVertices(record, element);
         const bool strips = element.name == "tristrips";
-        std::size_t indices = kNone;
+        std::size_t indices = kNoProperty;
         for (std::size_t i = 0; i < element.properties.size(); ++i) {
             const PlyProperty& property = element.properties[i];
             const bool named = property.name == "vertex_indices" || property.name == "vertex_index";
             if ((strips || element.name == "face") && property.isList && named) indices = i;
         }
-        if (indices != kNone && isFloating(element.properties[indices].type)) {
+        if (indices != kNoProperty && isFloating(element.properties[indices].type)) {
             return fail(file_.malformed("header: the indices of element " + element.name +
                                         " must be integers, not float or double"));
         }
@@ -336,7 +336,7 @@ class PlyBody {
     const PlyHeader& header_;
     ScanContent& content_;
     VertexSink sink_;
-    std::array<std::size_t, 3> coordinates_ = {kNone, kNone, kNone};
+    std::array<std::size_t, 3> coordinates_ = {kNoProperty, kNoProperty, kNoProperty};
     std::uint64_t vertexCount_ = 0;
 };
 

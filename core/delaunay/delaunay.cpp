@@ -71,7 +71,7 @@ void makeCanonical(Cell& cell) {
     }
 }
 
-constexpr std::size_t kBlock = 8192;  // points, cells or tetrahedra that a thread handles at a time
+constexpr std::size_t kCopiedPerBlock = 8192;  // points, cells or tetrahedra that a thread handles at a time
 // Parts of the store with fewer cells are not worth counters of their own.
 constexpr std::size_t kMinPart = std::size_t{1} << 18;
 
@@ -143,7 +143,7 @@ Result<LargeVector<std::uint32_t>> sortedCells(CellStore& cells, std::size_t sit
     RETURN_IF_ERROR(done);
     // Within the cells of one lowest vertex: the second and third corner decide, since only one cell lies on
     // either side of a facet.
-    done = parallelFor(siteCount, kBlock, context, [&](std::size_t from, std::size_t to) {
+    done = parallelFor(siteCount, kCopiedPerBlock, context, [&](std::size_t from, std::size_t to) {
         std::vector<std::pair<std::uint64_t, std::uint32_t>> group;
         for (std::size_t v = from; v < to; ++v) {
             group.clear();
@@ -178,7 +178,7 @@ Result<Tetrahedra> flatten(CellStore& cells, const std::vector<std::uint32_t>& o
         flat.vertices = balls.makeVector<Corners>(cellOf.size());
         flat.neighbours = balls.makeVector<Corners>(cellOf.size());
     }
-    auto done = parallelFor(cellOf.size(), kBlock, context, [&](std::size_t from, std::size_t to) {
+    auto done = parallelFor(cellOf.size(), kCopiedPerBlock, context, [&](std::size_t from, std::size_t to) {
         for (std::size_t t = from; t < to; ++t) {
             if (t + kPrefetchFarDistance < to) {
                 prefetch(&cells[cellOf[t + kPrefetchFarDistance]]);
@@ -222,7 +222,7 @@ Result<void> computeBalls(const PointCloud& points, Tetrahedra& flat, PageRecycl
     // 32 bytes a tetrahedron, like the cells.
     flat.circumcentres = pages.makeVector<Point3>(flat.size());
     flat.circumradii = pages.makeVector<double>(flat.size());
-    return parallelFor(flat.size(), kBlock, context, [&](std::size_t from, std::size_t to) {
+    return parallelFor(flat.size(), kCopiedPerBlock, context, [&](std::size_t from, std::size_t to) {
         for (std::size_t t = from; t < to; t += 2) computeTwoBalls(points, flat, t, std::min(t + 1, to - 1));
     });
 }
@@ -237,7 +237,7 @@ Result<Tetrahedra> triangulateInOrder(const PointCloud& points, const std::vecto
                                       const RunContext& context) {
     CellStore cells;
     LargeVector<Site> sites(points.size());
-    auto placed = parallelFor(sites.size(), kBlock, context, [&](std::size_t from, std::size_t to) {
+    auto placed = parallelFor(sites.size(), kCopiedPerBlock, context, [&](std::size_t from, std::size_t to) {
         for (std::size_t i = from; i < to; ++i) {
             const Point3& p = points[order[i]];
             sites[i] = {p.x, p.y, p.z};

@@ -15,7 +15,7 @@ namespace shapedb {
 namespace {
 
 constexpr std::uint32_t kBits = 21;
-constexpr std::size_t kBlock = 4096;  // points that a thread handles at a time
+constexpr std::size_t kPointsPerBlock = 4096;  // points that a thread handles at a time
 
 // Skilling, "Programming the Hilbert curve" (2004): turns the coordinates into the transposed index, in
 // place; interleaving its bits gives the index.
@@ -52,7 +52,7 @@ LargeVector<KeyedIndex> keysOf(const PointCloud& points) {
     const auto step = [=](double v) { return static_cast<std::uint32_t>(std::min(last, v * steps)); };
     LargeVector<KeyedIndex> keyed(points.size());
     // Cannot fail: the default context never cancels.
-    static_cast<void>(parallelFor(points.size(), kBlock, {}, [&](std::size_t from, std::size_t to) {
+    static_cast<void>(parallelFor(points.size(), kPointsPerBlock, {}, [&](std::size_t from, std::size_t to) {
         for (std::size_t i = from; i < to; ++i) {
             const Point3 p = points[i] - box.low;
             keyed[i] = {hilbertIndex({step(p.x), step(p.y), step(p.z)}), static_cast<std::uint32_t>(i)};

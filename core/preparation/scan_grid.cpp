@@ -35,7 +35,7 @@ constexpr int kLowBits = 26;
 constexpr std::uint64_t kLowMask = (std::uint64_t{1} << kLowBits) - 1;
 
 constexpr std::size_t kCellsPerTarget = 8;
-constexpr std::size_t kPointsBetweenCheckpoints = 1 << 16;
+constexpr std::size_t kReadBetweenCheckpoints = 1 << 16;
 // With fewer points per cell, merging a stretch costs more than filling it saves.
 constexpr std::size_t kPointsPerCell = 4;
 // Points per cell of the limit in the sample that tells how fine the grid will be.
@@ -247,7 +247,7 @@ Result<void> fill(Stretch& stretch, const PointCloud& scan, const Frame& frame, 
     const double inverse = 1.0 / frame.unit;  // exact: a power of two
     std::array<Steps, 32> steps;
     for (std::size_t i = stretch.begin; i < stretch.end;) {
-        if ((i - stretch.begin) % kPointsBetweenCheckpoints == 0) {
+        if ((i - stretch.begin) % kReadBetweenCheckpoints == 0) {
             RETURN_IF_ERROR(context.checkpoint());
         }
         const std::size_t count = std::min(steps.size(), stretch.end - i);

@@ -13,7 +13,7 @@ namespace shapedb {
 
 namespace {
 
-constexpr std::size_t kStepsBetweenCheckpoints = 1 << 16;
+constexpr std::size_t kWalkedBetweenCheckpoints = 1 << 16;
 
 }  // namespace
 
@@ -55,7 +55,7 @@ Result<std::vector<double>> bottleneckAngles(const PointCloud& points, const Tet
         }
     }
     for (std::size_t steps = 1; !queue.empty(); ++steps) {
-        if (steps % kStepsBetweenCheckpoints == 0) {
+        if (steps % kWalkedBetweenCheckpoints == 0) {
             RETURN_IF_ERROR(context.checkpoint());
         }
         const auto [value, t] = queue.top();

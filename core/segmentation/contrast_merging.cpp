@@ -16,7 +16,7 @@ namespace shapedb {
 
 namespace {
 
-constexpr std::size_t kStepsBetweenCheckpoints = 4096;
+constexpr std::size_t kMergesBetweenCheckpoints = 4096;
 
 // A group's pairs are updated when its radius has moved by this share of itself.
 constexpr double kRadiusDrift = 1e-3;
@@ -107,11 +107,11 @@ class Groups {
 
 // A pair of groups waiting to merge. Equal contrasts are ordered by index, so that the order of pushing does
 // not matter.
-struct Candidate {
+struct MergeCandidate {
     double contrast;
     std::uint32_t a;
     std::uint32_t b;
-    bool operator<(const Candidate& o) const {
+    bool operator<(const MergeCandidate& o) const {
         return std::tie(contrast, a, b) > std::tie(o.contrast, o.a, o.b);  // least first
     }
 };
@@ -119,7 +119,7 @@ struct Candidate {
 // Pairs that are most alike merge first. So a limb of many maxima becomes one group before it is compared
 // with the body, and a limb much thinner than the body stays separate however wide its root.
 Result<void> mergeAlike(Groups& groups, double limit, const RunContext& context) {
-    std::priority_queue<Candidate> queue;
+    std::priority_queue<MergeCandidate> queue;
     const auto consider = [&](std::uint32_t a, std::uint32_t b, double saddleRadius) {
         const double contrast = groups.contrast(a, b, saddleRadius);
         if (contrast <= limit) queue.push({contrast, std::min(a, b), std::max(a, b)});
@@ -132,10 +132,10 @@ Result<void> mergeAlike(Groups& groups, double limit, const RunContext& context)
         }
     }
     for (std::size_t step = 1; !queue.empty(); ++step) {
-        if (step % kStepsBetweenCheckpoints == 0) {
+        if (step % kMergesBetweenCheckpoints == 0) {
             RETURN_IF_ERROR(context.checkpoint());
         }
-        const Candidate best = queue.top();
+        const MergeCandidate best = queue.top();
         queue.pop();
         if (!groups.isGroup(best.a) || !groups.isGroup(best.b)) continue;
         // Groups that touch once go on touching, so the entry exists.
@@ -172,18 +172,18 @@ std::uint32_t widestNeighbour(const Groups& groups, std::uint32_t group) {
 
 Result<void> absorbLight(Groups& groups, const ContrastMerging& options, const RunContext& context) {
     // Only groups that touch another: a separate lump can join none, and does not count towards the limit. A
-    // Candidate is one group here, with its weight as the contrast.
-    std::priority_queue<Candidate> lightest;
+    // MergeCandidate is one group here, with its weight as the contrast.
+    std::priority_queue<MergeCandidate> lightest;
     for (std::uint32_t i = 0; i < groups.size(); ++i) {
         if (!groups.neighbours(i).empty()) lightest.push({groups.weight(i), i, 0});
     }
     std::size_t left = lightest.size();
     const double least = options.minShare * groups.totalVolume();
     for (std::size_t step = 1; !lightest.empty(); ++step) {
-        if (step % kStepsBetweenCheckpoints == 0) {
+        if (step % kMergesBetweenCheckpoints == 0) {
             RETURN_IF_ERROR(context.checkpoint());
         }
-        const Candidate light = lightest.top();
+        const MergeCandidate light = lightest.top();
         lightest.pop();
         // Weights only grow, so an entry with another weight is outdated.
         if (!groups.isGroup(light.a) || groups.weight(light.a) != light.contrast) continue;

@@ -15,7 +15,7 @@ namespace shapedb {
 
 namespace {
 
-constexpr std::uint64_t kSeed = 2004;  // the year of the paper; any number does
+constexpr std::uint64_t kSampleSeed = 2004;  // the year of the paper; any number does
 
 struct PrincipalFrame {
     Point3 centre;
@@ -128,7 +128,7 @@ InteriorView interiorView(const Segmentation& segmentation) {
         view.sites.push_back({dot(d, frame.axes[0]), dot(d, frame.axes[1]), dot(d, frame.axes[2])});
     }
     takeTetrahedra(segmentation, view);
-    Random random(kSeed);
+    Random random(kSampleSeed);
     sampleTetrahedra(view, random);
     takeSurface(view);
     view.meanSurfaceDistance = meanDistance(view.surface, random);

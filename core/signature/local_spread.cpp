@@ -14,12 +14,12 @@ namespace shapedb {
 
 namespace {
 
-constexpr std::uint64_t kSeed = 10;
+constexpr std::uint64_t kSpreadSeed = 10;
 
 // The first points of a random permutation, so the first few of these are a random choice as well.
 PointCloud drawn(const PointCloud& points, std::size_t count) {
     PointCloud result = points;
-    Random random(kSeed);
+    Random random(kSpreadSeed);
     count = std::min(count, result.size());
     for (std::size_t i = 0; i < count; ++i) std::swap(result[i], result[i + random.below(result.size() - i)]);
     result.resize(count);

@@ -31,7 +31,7 @@ constexpr std::size_t kOutlineWidths = 4;
 constexpr std::size_t kOutlineDistances = 20;
 constexpr std::size_t kChords = 100000;
 // Every statistic starts a stream of its own, so none depends on which others were computed before it.
-constexpr std::uint64_t kSeed = 145;
+constexpr std::uint64_t kChordSeed = 145;
 
 const StatisticLayout& layout(Statistic statistic) {
     return kStatistics[static_cast<std::size_t>(statistic)];
@@ -98,7 +98,7 @@ void bending(const InnerDistances& inner, std::uint8_t* out) {
 }
 
 void surfaceDistances(const InteriorView& view, std::uint8_t* out) {
-    Random random(kSeed);
+    Random random(kChordSeed);
     Histogram histogram(1, kDistanceBins);
     const std::size_t n = view.surface.size();
     for (std::size_t i = 0; i < InteriorView::kPairs; ++i) {
@@ -113,7 +113,7 @@ void surfaceDistances(const InteriorView& view, std::uint8_t* out) {
 
 void chords(const InteriorView& view, std::uint8_t* out) {
     const Voxels voxels(view);
-    Random random(kSeed);
+    Random random(kChordSeed);
     Histogram histogram(kChordLengths, kChordShares);
     const std::size_t n = view.surface.size();
     for (std::size_t i = 0; i < kChords; ++i) {
@@ -149,7 +149,7 @@ void placesInOutline(const std::vector<OutlinePoint>& outline, std::uint8_t* out
 }
 
 void distancesInOutline(const std::vector<OutlinePoint>& outline, std::uint8_t* out) {
-    Random random(kSeed);
+    Random random(kChordSeed);
     Histogram histogram(1, kOutlineDistances);
     for (std::size_t i = 0; i < kChords && outline.size() > 1; ++i) {
         const OutlinePoint& a = outline[random.below(outline.size())];

@@ -17,10 +17,10 @@ files=$(grep -vE '^bench/(pcl_methods|faiss_vector_scan)\.cpp$' <<< "$files" || 
 [ -n "$files" ] || { echo "tidy: nothing to check"; exit 0; }
 scripts/install-deps.sh --analysis
 
-# A folder of its own: clang cannot read g++'s precompiled headers.
+# A folder of its own, in which each source is compiled alone: clang cannot read g++'s precompiled headers.
 build_dir=${BUILD_DIR:-build-tidy}
 cmake --preset bench -B "$build_dir" -DCMAKE_CXX_COMPILER=clang++-14 -DCMAKE_C_COMPILER=clang-14 \
-  -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON > /dev/null
+  -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON -DSHAPEDB_UNITY=OFF > /dev/null
 # The headers that protoc generates, and nothing compiled.
 ninja -C "$build_dir" $(ninja -C "$build_dir" -t targets all | sed -nE 's/^(.*\.pb\.h): .*/\1/p') > /dev/null
 xargs -P "$(nproc)" -n 4 clang-tidy-14 -p "$build_dir" --quiet <<< "$files"

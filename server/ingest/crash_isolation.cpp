@@ -7,7 +7,7 @@ namespace shapedb::ingest {
 namespace {
 
 /// How often one who waits checks for cancellation.
-constexpr std::chrono::milliseconds kLook{20};
+constexpr std::chrono::milliseconds kLookForCancel{20};
 
 }  // namespace
 
@@ -46,7 +46,7 @@ CrashIsolation::Pass::~Pass() {
 bool CrashIsolation::waitUntilOpen(std::unique_lock<std::mutex>& lock, bool suspect,
                                    const std::atomic<bool>& cancel) {
     while (!cancel) {
-        if (changed_.wait_for(lock, kLook, [&] { return isOpen(suspect); })) return true;
+        if (changed_.wait_for(lock, kLookForCancel, [&] { return isOpen(suspect); })) return true;
     }
     return false;
 }

@@ -91,7 +91,7 @@ class ObjectReader {
     std::string problem_;
 };
 
-tl::unexpected<Error> damaged(const std::string& what) {
+tl::unexpected<Error> damagedParameters(const std::string& what) {
     return fail(ErrorCode::kDataLoss, "stored collection parameters: " + what);
 }
 
@@ -123,9 +123,9 @@ Result<void> readSegmentation(const Json& json, SegmentationOptions& options) {
     reader.read("even_spacing", options.preparation.thinning);
     std::string method = interiorMethodName(options.interiorMethod);
     reader.read("interior_method", method);
-    if (const std::string problem = reader.problem(); !problem.empty()) return damaged(problem);
+    if (const std::string problem = reader.problem(); !problem.empty()) return damagedParameters(problem);
     const auto known = interiorMethodFromName(method);
-    if (!known) return damaged("'segmentation.interior_method' is '" + method + "'");
+    if (!known) return damagedParameters("'segmentation.interior_method' is '" + method + "'");
     options.interiorMethod = *known;
     return {};
 }
@@ -162,10 +162,10 @@ Result<ShapeParameters> decodeParameters(const std::string& text) {
         const Json empty = Json::object();
         const Json* segmentationJson = top.find("segmentation");
         const Json* signatureJson = top.find("signature");
-        if (const std::string problem = top.problem(); !problem.empty()) return damaged(problem);
+        if (const std::string problem = top.problem(); !problem.empty()) return damagedParameters(problem);
 
         const Result<Profile> profile = profileFromName(name);
-        if (!profile) return damaged(profile.error().message);
+        if (!profile) return damagedParameters(profile.error().message);
         ShapeParameters parameters = parametersOf(Profile::kPaper);
         parameters.profile = *profile;
         if (const auto read = readSegmentation(segmentationJson != nullptr ? *segmentationJson : empty,
@@ -177,12 +177,14 @@ Result<ShapeParameters> decodeParameters(const std::string& text) {
         ObjectReader signature(signatureJson != nullptr ? *signatureJson : empty, "signature.");
         signature.read("max_points", parameters.signature.maxPoints);
         signature.read("attributes", parameters.signature.attributes);
-        if (const std::string problem = signature.problem(); !problem.empty()) return damaged(problem);
+        if (const std::string problem = signature.problem(); !problem.empty())
+            return damagedParameters(problem);
 
-        if (const Result<void> valid = validate(parameters); !valid) return damaged(valid.error().message);
+        if (const Result<void> valid = validate(parameters); !valid)
+            return damagedParameters(valid.error().message);
         return parameters;
     } catch (const std::exception& error) {
-        return damaged(error.what());
+        return damagedParameters(error.what());
     }
 }
 

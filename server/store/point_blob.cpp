@@ -26,13 +26,13 @@ std::string rawBlob(const std::vector<float>& points) {
     return blob;
 }
 
-tl::unexpected<Error> damaged(const std::string& how) {
-    return fail(ErrorCode::kDataLoss, "the stored points are damaged: " + how);
+tl::unexpected<Error> damagedPoints(const std::string& how) {
+    return fail(ErrorCode::kDataLoss, "the stored points are damagedPoints: " + how);
 }
 
 Result<std::vector<float>> decodeRaw(const char* body, std::size_t size, std::uint64_t floatCount) {
     if (size / kFloatBytes != floatCount || size % kFloatBytes != 0) {
-        return damaged(std::to_string(size) + " bytes for " + std::to_string(floatCount) + " numbers");
+        return damagedPoints(std::to_string(size) + " bytes for " + std::to_string(floatCount) + " numbers");
     }
     std::vector<float> points(static_cast<std::size_t>(floatCount));
     if (size > 0) std::memcpy(points.data(), body, size);
@@ -42,16 +42,16 @@ Result<std::vector<float>> decodeRaw(const char* body, std::size_t size, std::ui
 Result<std::vector<float>> decodePlanes(const char* body, std::size_t size, std::uint64_t floatCount) {
     const unsigned long long content = ZSTD_getFrameContentSize(body, size);
     if (content == ZSTD_CONTENTSIZE_ERROR || content == ZSTD_CONTENTSIZE_UNKNOWN) {
-        return damaged("it is no zstd frame of known size");
+        return damagedPoints("it is no zstd frame of known size");
     }
     if (content / kFloatBytes != floatCount || content % kPointBytes != 0) {
-        return damaged("a zstd frame of " + std::to_string(content) + " bytes for " +
-                       std::to_string(floatCount) + " numbers");
+        return damagedPoints("a zstd frame of " + std::to_string(content) + " bytes for " +
+                             std::to_string(floatCount) + " numbers");
     }
     std::vector<unsigned char> planes(static_cast<std::size_t>(content));
     const std::size_t got = ZSTD_decompress(planes.data(), planes.size(), body, size);
-    if (ZSTD_isError(got) != 0) return damaged(ZSTD_getErrorName(got));
-    if (got != planes.size()) return damaged("the zstd frame is shorter than it says");
+    if (ZSTD_isError(got) != 0) return damagedPoints(ZSTD_getErrorName(got));
+    if (got != planes.size()) return damagedPoints("the zstd frame is shorter than it says");
     std::vector<float> points(static_cast<std::size_t>(floatCount));
     planesToBytes(planes.data(), reinterpret_cast<unsigned char*>(points.data()), points.size() / 3);
     return points;
@@ -173,7 +173,7 @@ void PointEncoding::write(const Sink& sink) const {
 }
 
 Result<std::vector<float>> decodePoints(const void* blob, std::size_t size, std::uint64_t floatCount) try {
-    if (size == 0) return damaged("empty");
+    if (size == 0) return damagedPoints("empty");
     const char* bytes = static_cast<const char*>(blob);
     switch (static_cast<PointFormat>(bytes[0])) {
         case PointFormat::kRaw: return decodeRaw(bytes + 1, size - 1, floatCount);

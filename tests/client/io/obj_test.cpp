@@ -7,8 +7,6 @@ namespace {
 
 using Obj = FileTest;
 
-constexpr auto kMalformed = ErrorCode::kMalformedFile;
-
 TEST_F(Obj, ReadsFilesWithoutFaces) {
     const Scan scan = readGood("a.obj", "v 1 2 3\nv 4 5 6 1.0\nv 7 8 9 0.5 0.5 0.5\np 1 2 3\n");
     EXPECT_EQ(scan.points, (PointCloud{{1, 2, 3}, {4, 5, 6}, {7, 8, 9}}));

@@ -7,8 +7,6 @@ namespace {
 
 using Off = FileTest;
 
-constexpr auto kMalformed = ErrorCode::kMalformedFile;
-
 TEST_F(Off, ReadsEveryHeaderSpelling) {
     const std::string body = "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
     for (const std::string start :

@@ -9,7 +9,6 @@ namespace {
 using Pcd = FileTest;
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-constexpr auto kMalformed = ErrorCode::kMalformedFile;
 
 std::string header(const std::string& fields, const std::string& size, const std::string& type,
                    const std::string& count, const std::string& width, const std::string& height,

@@ -8,8 +8,6 @@ namespace {
 
 using Stl = FileTest;
 
-constexpr auto kMalformed = ErrorCode::kMalformedFile;
-
 std::string facet(const std::string& a, const std::string& b, const std::string& c) {
     return "facet normal 0 0 1\nouter loop\nvertex " + a + "\nvertex " + b + "\nvertex " + c +
            "\nendloop\nendfacet\n";

@@ -11,6 +11,8 @@
 
 namespace shapedb {
 
+constexpr ErrorCode kMalformed = ErrorCode::kMalformedFile;
+
 /// Gives each test a temporary folder.
 class FileTest : public ::testing::Test {
   protected:

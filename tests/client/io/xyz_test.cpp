@@ -7,8 +7,6 @@ namespace {
 
 using Xyz = FileTest;
 
-constexpr auto kMalformed = ErrorCode::kMalformedFile;
-
 TEST_F(Xyz, EverySeparatorGivesTheSamePoints) {
     const PointCloud expected = {{1.5, -2, 3e2}, {4, 5, 6}};
     for (const std::string text :

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kMembers = 4;
 
-struct Library {
+struct SignatureLibrary {
     std::vector<IndexEntry> entries;  // of id i + 1
     SignatureSet set;
 };
@@ -35,8 +35,8 @@ const std::vector<std::string>& families() {
     return kFamilies;
 }
 
-Library makeLibrary() {
-    Library library;
+SignatureLibrary makeLibrary() {
+    SignatureLibrary library;
     for (const std::string& family : families()) {
         for (std::size_t member = 0; member < kMembers; ++member) {
             IndexEntry entry;
@@ -50,13 +50,13 @@ Library makeLibrary() {
     return library;
 }
 
-const Library& firstScans() {
-    static const Library library = makeLibrary();
+const SignatureLibrary& firstScans() {
+    static const SignatureLibrary library = makeLibrary();
     return library;
 }
 
 TEST(Retrieval, FindsTheShapeItselfFirstAndMostlyItsFamily) {
-    const Library& library = firstScans();
+    const SignatureLibrary& library = firstScans();
     std::size_t right = 0;
     for (const IndexEntry& entry : library.entries) {
         SearchOptions options;
@@ -80,7 +80,7 @@ TEST(Retrieval, FindsTheShapeItselfFirstAndMostlyItsFamily) {
 }
 
 TEST(Retrieval, FindsTheShapeOfANewScan) {
-    const Library& library = firstScans();
+    const SignatureLibrary& library = firstScans();
     std::size_t first = 0;
     std::size_t queries = 0;
     for (std::size_t f = 0; f < families().size(); ++f) {

@@ -70,7 +70,7 @@ void measure(InteriorView& view, double side) {
 
 }  // namespace
 
-std::vector<Cube> block(const Cube& first, const Cube& last) {
+std::vector<Cube> cubeBlock(const Cube& first, const Cube& last) {
     std::vector<Cube> cubes;
     for (int x = first[0]; x < last[0]; ++x) {
         for (int y = first[1]; y < last[1]; ++y) {
@@ -88,9 +88,9 @@ std::vector<Cube> together(std::vector<Cube> a, const std::vector<Cube>& b) {
 }
 
 std::vector<Cube> horseshoe(int length, int thick, int gap) {
-    const auto arm = block({0, 0, 0}, {length, thick, thick});
-    const auto other = block({0, thick + gap, 0}, {length, 2 * thick + gap, thick});
-    return together(together(arm, other), block({0, 0, 0}, {thick, 2 * thick + gap, thick}));
+    const auto arm = cubeBlock({0, 0, 0}, {length, thick, thick});
+    const auto other = cubeBlock({0, thick + gap, 0}, {length, 2 * thick + gap, thick});
+    return together(together(arm, other), cubeBlock({0, 0, 0}, {thick, 2 * thick + gap, thick}));
 }
 
 InteriorView viewOfCubes(const std::vector<Cube>& cubes, double side) {

@@ -14,7 +14,7 @@ namespace shapedb::testing_support {
 using Cube = std::array<int, 3>;
 
 /// All cubes with first <= index < last in every direction.
-std::vector<Cube> block(const Cube& first, const Cube& last);
+std::vector<Cube> cubeBlock(const Cube& first, const Cube& last);
 std::vector<Cube> together(std::vector<Cube> a, const std::vector<Cube>& b);
 
 /// Two arms of `length` cubes along x, `thick` wide and high, `gap` cubes apart, joined at x = 0.

@@ -14,7 +14,7 @@
 namespace shapedb {
 namespace {
 
-using testing_support::block;
+using testing_support::cubeBlock;
 using testing_support::horseshoe;
 using testing_support::together;
 using testing_support::viewOfCubes;
@@ -69,8 +69,8 @@ void expectShortest(const InteriorView& view, const InnerDistances& inner) {
 }
 
 TEST(InnerDistances, AreLengthsOfShortestPaths) {
-    for (const auto& cubes : {horseshoe(6, 1, 2), block({0, 0, 0}, {4, 3, 2}),
-                              together(block({0, 0, 0}, {2, 2, 2}), block({5, 0, 0}, {8, 2, 2}))}) {
+    for (const auto& cubes : {horseshoe(6, 1, 2), cubeBlock({0, 0, 0}, {4, 3, 2}),
+                              together(cubeBlock({0, 0, 0}, {2, 2, 2}), cubeBlock({5, 0, 0}, {8, 2, 2}))}) {
         const InteriorView view = viewOfCubes(cubes, 0.1);
         const auto inner = innerDistances(view);
         ASSERT_TRUE(inner);
@@ -118,7 +118,7 @@ TEST(InnerDistances, CellsAreConnectedLumpsThatCoverTheInterior) {
 }
 
 TEST(InnerDistances, AreStraightAlongARod) {
-    const InteriorView view = viewOfCubes(block({0, 0, 0}, {60, 4, 4}), 1.0 / 60);
+    const InteriorView view = viewOfCubes(cubeBlock({0, 0, 0}, {60, 4, 4}), 1.0 / 60);
     const auto inner = innerDistances(view);
     ASSERT_TRUE(inner);
     for (std::size_t s = 0; s < inner->sources.size(); ++s) {
@@ -155,8 +155,8 @@ TEST(InnerDistances, GoRoundAHorseshoe) {
 }
 
 TEST(InnerDistances, DoNotReachOtherPieces) {
-    const auto left = block({0, 0, 0}, {3, 3, 3});
-    const InteriorView view = viewOfCubes(together(left, block({5, 0, 0}, {8, 3, 3})), 0.1);
+    const auto left = cubeBlock({0, 0, 0}, {3, 3, 3});
+    const InteriorView view = viewOfCubes(together(left, cubeBlock({5, 0, 0}, {8, 3, 3})), 0.1);
     const auto inner = innerDistances(view);
     ASSERT_TRUE(inner);
     std::size_t unreached = 0;
@@ -177,7 +177,7 @@ TEST(InnerDistances, DoNotReachOtherPieces) {
 }
 
 TEST(InnerDistances, HaveAUnitForASingleTetrahedron) {
-    InteriorView view = viewOfCubes(block({0, 0, 0}, {1, 1, 1}), 0.5);
+    InteriorView view = viewOfCubes(cubeBlock({0, 0, 0}, {1, 1, 1}), 0.5);
     const auto keepOne = [](auto& all) { all.resize(1); };
     keepOne(view.vertices);
     keepOne(view.volumes);
@@ -193,7 +193,7 @@ TEST(InnerDistances, HaveAUnitForASingleTetrahedron) {
 }
 
 TEST(InnerDistances, CanBeCancelled) {
-    const InteriorView view = viewOfCubes(block({0, 0, 0}, {3, 3, 3}), 0.2);
+    const InteriorView view = viewOfCubes(cubeBlock({0, 0, 0}, {3, 3, 3}), 0.2);
     const std::atomic<bool> cancel{true};
     RunContext context;
     context.cancel = &cancel;

@@ -20,7 +20,7 @@
 namespace shapedb {
 namespace {
 
-using testing_support::block;
+using testing_support::cubeBlock;
 using testing_support::horseshoe;
 using testing_support::levelsOf;
 using testing_support::together;
@@ -57,8 +57,8 @@ std::vector<double> sharesOf(const ShapeStatistics& statistics, Statistic which)
 }
 
 std::vector<InteriorView> someViews() {
-    return {viewOfCubes(horseshoe(10, 2, 2), 0.06), viewOfCubes(block({0, 0, 0}, {12, 2, 2}), 0.08),
-            viewOfCubes(together(block({0, 0, 0}, {4, 4, 4}), block({6, 0, 0}, {8, 2, 2})), 0.1)};
+    return {viewOfCubes(horseshoe(10, 2, 2), 0.06), viewOfCubes(cubeBlock({0, 0, 0}, {12, 2, 2}), 0.08),
+            viewOfCubes(together(cubeBlock({0, 0, 0}, {4, 4, 4}), cubeBlock({6, 0, 0}, {8, 2, 2})), 0.1)};
 }
 
 ShapeStatistics ofScan(const Solid& solid) {
@@ -289,7 +289,7 @@ TEST(Statistics, AStraightRodIsLongerThanABentOne) {
         for (std::size_t i = 0; i < shares.size(); ++i) sum += shares[i] * (static_cast<double>(i) + 0.5);
         return sum * 2.6 / static_cast<double>(shares.size());
     };
-    const auto straight = shapeStatistics(viewOfCubes(block({0, 0, 0}, {40, 2, 2}), 1.0 / 40));
+    const auto straight = shapeStatistics(viewOfCubes(cubeBlock({0, 0, 0}, {40, 2, 2}), 1.0 / 40));
     const auto bent = shapeStatistics(viewOfCubes(horseshoe(20, 2, 3), 1.0 / 20));
     ASSERT_TRUE(straight && bent);
     const double ofStraight = mean(sharesOf(*straight, Statistic::kBending));
@@ -302,7 +302,7 @@ TEST(Statistics, AStraightRodIsLongerThanABentOne) {
 
 TEST(Statistics, BendingAnArmChangesInnerDistancesLess) {
     // A long rod, straight and as a U: thickness by centrality hardly changes, the harmonics do.
-    const auto straight = shapeStatistics(viewOfCubes(block({0, 0, 0}, {43, 2, 2}), 1.0 / 43));
+    const auto straight = shapeStatistics(viewOfCubes(cubeBlock({0, 0, 0}, {43, 2, 2}), 1.0 / 43));
     const auto bent = shapeStatistics(viewOfCubes(horseshoe(20, 2, 3), 1.0 / 20));
     ASSERT_TRUE(straight && bent);
     const auto columns = [](const ShapeStatistics& statistics, Statistic which) {
@@ -322,7 +322,7 @@ TEST(Statistics, BendingAnArmChangesInnerDistancesLess) {
 }
 
 TEST(Statistics, CanBeCancelled) {
-    const InteriorView view = viewOfCubes(block({0, 0, 0}, {3, 3, 3}), 0.2);
+    const InteriorView view = viewOfCubes(cubeBlock({0, 0, 0}, {3, 3, 3}), 0.2);
     const std::atomic<bool> cancel{true};
     RunContext context;
     context.cancel = &cancel;

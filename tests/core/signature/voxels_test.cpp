@@ -13,7 +13,7 @@ namespace shapedb {
 namespace {
 
 using testing_support::barycentric;
-using testing_support::block;
+using testing_support::cubeBlock;
 using testing_support::horseshoe;
 using testing_support::randomPointIn;
 using testing_support::viewOfCubes;
@@ -128,7 +128,7 @@ TEST(Voxels, MeasureTheFractionOfALineInside) {
 }
 
 TEST(Voxels, HoldWholeLinesOfAConvexSolid) {
-    const InteriorView view = viewOfCubes(block({0, 0, 0}, {6, 5, 4}), 0.1);
+    const InteriorView view = viewOfCubes(cubeBlock({0, 0, 0}, {6, 5, 4}), 0.1);
     const Voxels voxels(view);
     Random random(5);
     double sum = 0.0;

@@ -14,7 +14,7 @@ namespace {
 
 using testing::eventually;
 
-const std::atomic<bool> never{false};
+const std::atomic<bool> kNotCancelled{false};
 
 TEST(CrashIsolation, SuspectsAreAlone) {
     CrashIsolation gate;
@@ -26,7 +26,7 @@ TEST(CrashIsolation, SuspectsAreAlone) {
         threads.emplace_back([&, t] {
             const bool suspect = t % 3 == 0;
             for (int i = 0; i < 200; ++i) {
-                const CrashIsolation::Pass pass(gate, suspect, never);
+                const CrashIsolation::Pass pass(gate, suspect, kNotCancelled);
                 ++(suspect ? suspects : ordinary);
                 if (suspects > 1 || (suspects == 1 && ordinary > 0)) together = true;
                 std::this_thread::yield();
@@ -40,10 +40,10 @@ TEST(CrashIsolation, SuspectsAreAlone) {
 
 TEST(CrashIsolation, OrdinaryScansRunTogether) {
     CrashIsolation gate;
-    auto first = std::make_unique<CrashIsolation::Pass>(gate, false, never);
+    auto first = std::make_unique<CrashIsolation::Pass>(gate, false, kNotCancelled);
     std::atomic<bool> secondIn{false};
     std::thread other([&] {
-        const CrashIsolation::Pass second(gate, false, never);
+        const CrashIsolation::Pass second(gate, false, kNotCancelled);
         secondIn = true;
     });
     EXPECT_TRUE(eventually([&] { return secondIn.load(); })) << "while the first is still inside";
@@ -53,13 +53,13 @@ TEST(CrashIsolation, OrdinaryScansRunTogether) {
 
 TEST(CrashIsolation, WaitingSuspectKeepsNewOrdinaryScansOut) {
     CrashIsolation gate;
-    auto first = std::make_unique<CrashIsolation::Pass>(gate, false, never);
+    auto first = std::make_unique<CrashIsolation::Pass>(gate, false, kNotCancelled);
     EXPECT_FALSE(gate.wouldWait(false));
     EXPECT_TRUE(gate.wouldWait(true));
     std::atomic<bool> suspectIn{false};
     std::atomic<bool> letSuspectGo{false};
     std::thread suspect([&] {
-        const CrashIsolation::Pass pass(gate, true, never);
+        const CrashIsolation::Pass pass(gate, true, kNotCancelled);
         suspectIn = true;
         eventually([&] { return letSuspectGo.load(); });
     });
@@ -78,7 +78,7 @@ TEST(CrashIsolation, WaitingSuspectKeepsNewOrdinaryScansOut) {
 TEST(CrashIsolation, CancellingEndsTheWait) {
     CrashIsolation gate;
     for (const bool suspect : {false, true}) {
-        const CrashIsolation::Pass inside(gate, true, never);
+        const CrashIsolation::Pass inside(gate, true, kNotCancelled);
         std::atomic<bool> cancel{false};
         std::atomic<bool> admitted{true};
         std::thread waiting([&] { admitted = CrashIsolation::Pass(gate, suspect, cancel).admitted(); });

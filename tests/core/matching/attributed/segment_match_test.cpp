@@ -26,7 +26,7 @@ using testing_support::sameBits;
 using testing_support::scannedFamilies;
 using testing_support::turnedAttributed;
 
-const Body& bodyOf(const Signature& signature) { return signature.attributes->body; }
+const Body& attributedBody(const Signature& signature) { return signature.attributes->body; }
 
 double shareOf(const Body& body) {
     double sum = 0.0;
@@ -57,8 +57,9 @@ TEST(SegmentMatch, BodyAgreesFullyWithItself) {
         for (const double width : {1e-6, 0.1, 10.0}) {
             for (const bool reflection : {false, true}) {
                 const SegmentMatch match =
-                    SegmentComparison(bodyOf(a), bodyOf(a), optionsOf(reflection, width)).match();
-                EXPECT_NEAR(match.agreement, shareOf(bodyOf(a)), 1e-9);
+                    SegmentComparison(attributedBody(a), attributedBody(a), optionsOf(reflection, width))
+                        .match();
+                EXPECT_NEAR(match.agreement, shareOf(attributedBody(a)), 1e-9);
             }
         }
     }
@@ -72,8 +73,9 @@ TEST(SegmentMatch, BodyAgreesFullyWithItsRotatedCopy) {
         const Signature a = randomAttributed(random);
         const Signature b =
             turnedAttributed(a, round % 2 == 0 ? randomRotation(random) : randomReflection(random));
-        const SegmentMatch match = SegmentComparison(bodyOf(a), bodyOf(b), optionsOf(true, 0.1)).match();
-        good += match.agreement > 0.999 * shareOf(bodyOf(a)) ? 1 : 0;
+        const SegmentMatch match =
+            SegmentComparison(attributedBody(a), attributedBody(b), optionsOf(true, 0.1)).match();
+        good += match.agreement > 0.999 * shareOf(attributedBody(a)) ? 1 : 0;
     }
     // Frames with equal spreads, or too many segments to try all, leave a few. Scans have neither.
     EXPECT_GT(good, kRounds * 95 / 100);
@@ -86,13 +88,14 @@ TEST(SegmentMatch, RecoversAKnownRotation) {
         const bool mirrored = round % 2 == 1;
         const Matrix3 turn = mirrored ? randomReflection(random) : randomRotation(random);
         const Signature b = turnedAttributed(a, turn);
-        const SegmentMatch match = SegmentComparison(bodyOf(a), bodyOf(b), optionsOf(true, 0.1)).match();
-        EXPECT_NEAR(match.agreement, shareOf(bodyOf(a)), 1e-4);
+        const SegmentMatch match =
+            SegmentComparison(attributedBody(a), attributedBody(b), optionsOf(true, 0.1)).match();
+        EXPECT_NEAR(match.agreement, shareOf(attributedBody(a)), 1e-4);
         EXPECT_EQ(match.reflected, mirrored);
         EXPECT_NEAR(determinant(match.rotation), mirrored ? -1.0 : 1.0, 1e-9);
         for (std::size_t i = 0; i < a.points.size(); ++i) {
-            const auto& p = bodyOf(a).parts[i].position;
-            const auto& q = bodyOf(b).parts[i].position;
+            const auto& p = attributedBody(a).parts[i].position;
+            const auto& q = attributedBody(b).parts[i].position;
             EXPECT_LT(distance({p[0], p[1], p[2]}, rotate(match.rotation, {q[0], q[1], q[2]})), 1e-4);
         }
     }
@@ -103,8 +106,10 @@ TEST(SegmentMatch, TellsLeftFromRightOnlyWithoutReflection) {
     Random random(4);
     for (int round = 0; round < 50; ++round) {
         const Signature b = turnedAttributed(a, randomReflection(random));
-        const SegmentMatch with = SegmentComparison(bodyOf(a), bodyOf(b), optionsOf(true, 0.05)).match();
-        const SegmentMatch without = SegmentComparison(bodyOf(a), bodyOf(b), optionsOf(false, 0.05)).match();
+        const SegmentMatch with =
+            SegmentComparison(attributedBody(a), attributedBody(b), optionsOf(true, 0.05)).match();
+        const SegmentMatch without =
+            SegmentComparison(attributedBody(a), attributedBody(b), optionsOf(false, 0.05)).match();
         EXPECT_TRUE(with.reflected);
         EXPECT_FALSE(without.reflected);
         EXPECT_LT(without.agreement, with.agreement - 0.02);
@@ -116,9 +121,9 @@ TEST(SegmentMatch, ReflectionCanOnlyRaiseTheAgreement) {
     for (int round = 0; round < 1500; ++round) {
         const AttributedPair pair = randomAttributedPair(random, 1e-5, 0.1);
         const SegmentMatch with =
-            SegmentComparison(bodyOf(pair.a), bodyOf(pair.b), optionsOf(true, 0.1)).match();
+            SegmentComparison(attributedBody(pair.a), attributedBody(pair.b), optionsOf(true, 0.1)).match();
         const SegmentMatch without =
-            SegmentComparison(bodyOf(pair.a), bodyOf(pair.b), optionsOf(false, 0.1)).match();
+            SegmentComparison(attributedBody(pair.a), attributedBody(pair.b), optionsOf(false, 0.1)).match();
         EXPECT_GE(with.agreement, without.agreement);
         EXPECT_FALSE(without.reflected);
     }
@@ -130,8 +135,10 @@ TEST(SegmentMatch, StaysInRangeAndPruningDoesNotChangeIt) {
         const AttributedPair pair = randomAttributedPair(random, 1e-5, 0.1);
         const ScoreOptions options =
             optionsOf(round % 2 == 0, round % 3 == 0 ? std::pow(10.0, random.uniform(-3, 1)) : 0.1);
-        const SegmentMatch fast = SegmentComparison(bodyOf(pair.a), bodyOf(pair.b), options).match();
-        const SegmentMatch all = SegmentComparison(bodyOf(pair.a), bodyOf(pair.b), options).match(false);
+        const SegmentMatch fast =
+            SegmentComparison(attributedBody(pair.a), attributedBody(pair.b), options).match();
+        const SegmentMatch all =
+            SegmentComparison(attributedBody(pair.a), attributedBody(pair.b), options).match(false);
         EXPECT_TRUE(sameBits(fast.agreement, all.agreement));
         EXPECT_EQ(fast.rotation, all.rotation);
         EXPECT_EQ(fast.reflected, all.reflected);
@@ -151,9 +158,10 @@ TEST(SegmentMatch, PruningDoesNotChangeTheMatchOfScans) {
     const auto& scans = scannedFamilies(2, 1);
     for (const auto& x : scans) {
         for (const auto& y : scans) {
-            const SegmentMatch fast = SegmentComparison(bodyOf(x.signature), bodyOf(y.signature), {}).match();
+            const SegmentMatch fast =
+                SegmentComparison(attributedBody(x.signature), attributedBody(y.signature), {}).match();
             const SegmentMatch all =
-                SegmentComparison(bodyOf(x.signature), bodyOf(y.signature), {}).match(false);
+                SegmentComparison(attributedBody(x.signature), attributedBody(y.signature), {}).match(false);
             ASSERT_TRUE(sameBits(fast.agreement, all.agreement));
             ASSERT_EQ(fast.rotation, all.rotation);
         }
@@ -173,8 +181,8 @@ TEST(SegmentMatch, AgreementFollowsItsDefinition) {
             }
             testing_support::updateBody(*s);
         }
-        const Body& x = bodyOf(a);
-        const Body& y = bodyOf(b);
+        const Body& x = attributedBody(a);
+        const Body& y = attributedBody(b);
         const ScoreOptions options = optionsOf(true, 0.1);
         const SegmentMatch match = SegmentComparison(x, y, options).match();
         const auto gain = [&](const SegmentDescriptor& p, const SegmentDescriptor& q) {
@@ -208,14 +216,15 @@ TEST(SegmentMatch, IsAtLeastAsGoodAsEveryFrameAlignment) {
     for (int round = 0; round < 200; ++round) {
         const AttributedPair pair = randomAttributedPair(random, 1e-5, 0.1);
         const ScoreOptions options = optionsOf(true, 0.1);
-        const SegmentMatch match = SegmentComparison(bodyOf(pair.a), bodyOf(pair.b), options).match();
+        const SegmentMatch match =
+            SegmentComparison(attributedBody(pair.a), attributedBody(pair.b), options).match();
         for (int signs = 0; signs < 8; ++signs) {
             SegmentMatch frame;
             for (std::size_t axis = 0; axis < 3; ++axis) {
                 frame.rotation[axis][axis] = ((signs >> axis) & 1) != 0 ? -1.0 : 1.0;
             }
             const SegmentPairs pairs =
-                SegmentComparison(bodyOf(pair.a), bodyOf(pair.b), options).pairs(frame);
+                SegmentComparison(attributedBody(pair.a), attributedBody(pair.b), options).pairs(frame);
             double sum = 0.0;
             for (std::size_t i = 0; i < pairs.count; ++i) sum += pairs.pairs[i].gain;
             EXPECT_LE(sum, match.agreement + 1e-12);
@@ -229,8 +238,8 @@ TEST(SegmentMatch, IsAtLeastAsGoodAsEveryAlignmentOfTheOutlyingSegments) {
     for (int round = 0; round < 300; ++round) {
         const Signature a = randomAttributed(random, kMaxSignaturePoints);
         const Signature b = turnedAttributed(a, randomRotation(random));
-        const Body& x = bodyOf(a);
-        const Body& y = bodyOf(b);
+        const Body& x = attributedBody(a);
+        const Body& y = attributedBody(b);
         const ScoreOptions options = optionsOf(false, 0.1);
         const SegmentMatch match = SegmentComparison(x, y, options).match();
         std::vector<std::size_t> order(x.parts.size());
@@ -270,19 +279,19 @@ TEST(SegmentMatch, SegmentsOfDifferentSizesDoNotAgree) {
         p.maximumRadius *= 0.03f;
     }
     testing_support::updateBody(b);
-    const SegmentMatch match = SegmentComparison(bodyOf(a), bodyOf(b), {}).match();
+    const SegmentMatch match = SegmentComparison(attributedBody(a), attributedBody(b), {}).match();
     EXPECT_EQ(match.agreement, 0.0);
-    EXPECT_EQ(SegmentComparison(bodyOf(a), bodyOf(b), {}).pairs(match).count, 0U);
+    EXPECT_EQ(SegmentComparison(attributedBody(a), attributedBody(b), {}).pairs(match).count, 0U);
     EXPECT_FALSE(match.reflected);
     // A little thinner is a little less alike.
-    double before = SegmentComparison(bodyOf(a), bodyOf(a), {}).match().agreement;
+    double before = SegmentComparison(attributedBody(a), attributedBody(a), {}).match().agreement;
     for (const float factor : {0.8f, 0.6f, 0.4f, 0.2f}) {
         b = a;
         for (WeightedPoint& p : b.points) {
             for (float& c : p.covariance) c *= factor;
         }
         testing_support::updateBody(b);
-        const double now = SegmentComparison(bodyOf(a), bodyOf(b), {}).match().agreement;
+        const double now = SegmentComparison(attributedBody(a), attributedBody(b), {}).match().agreement;
         EXPECT_LT(now, before) << factor;
         before = now;
     }
@@ -301,9 +310,10 @@ TEST(SegmentMatch, BentLimbKeepsHalfItsGain) {
     };
     const Signature down = withArm(1.5707963);
     const Signature up = withArm(-2.5);
-    const double same = SegmentComparison(bodyOf(down), bodyOf(down), {}).match().agreement;
-    const double bent = SegmentComparison(bodyOf(down), bodyOf(up), optionsOf(false, 0.1)).match().agreement;
-    const double arm = bodyOf(down).parts.back().share;
+    const double same = SegmentComparison(attributedBody(down), attributedBody(down), {}).match().agreement;
+    const double bent =
+        SegmentComparison(attributedBody(down), attributedBody(up), optionsOf(false, 0.1)).match().agreement;
+    const double arm = attributedBody(down).parts.back().share;
     EXPECT_LT(bent, same - 0.2 * arm);
     EXPECT_GT(bent, same - 0.75 * arm - 0.05);
 }
@@ -313,8 +323,8 @@ TEST(SegmentPairs, GainsSumToTheAgreement) {
     for (int round = 0; round < 2000; ++round) {
         const AttributedPair pair = randomAttributedPair(random, 1e-5, 0.1);
         const ScoreOptions options = optionsOf(round % 2 == 0, 0.1);
-        const Body& a = bodyOf(pair.a);
-        const Body& b = bodyOf(pair.b);
+        const Body& a = attributedBody(pair.a);
+        const Body& b = attributedBody(pair.b);
         const SegmentMatch match = SegmentComparison(a, b, options).match();
         const SegmentPairs pairs = SegmentComparison(a, b, options).pairs(match);
         ASSERT_LE(pairs.count, pairs.pairs.size());
@@ -347,9 +357,12 @@ TEST(SegmentAgreementBound, IsNeverBelowTheAgreement) {
             for (const double width : {0.1, std::pow(10.0, random.uniform(-6, 2))}) {
                 const ScoreOptions options = optionsOf(reflection, width);
                 const double agreement =
-                    SegmentComparison(bodyOf(pair.a), bodyOf(pair.b), options).match().agreement;
+                    SegmentComparison(attributedBody(pair.a), attributedBody(pair.b), options)
+                        .match()
+                        .agreement;
                 const double bound =
-                    SegmentComparison(bodyOf(pair.a), bodyOf(pair.b), options).agreementBound();
+                    SegmentComparison(attributedBody(pair.a), attributedBody(pair.b), options)
+                        .agreementBound();
                 ASSERT_GE(bound, std::min(1.0, agreement)) << "width " << width;
                 ASSERT_LE(bound, 1.0);
                 if (width == 0.1 && reflection) slack += (bound - agreement) / kRounds;
@@ -362,11 +375,12 @@ TEST(SegmentAgreementBound, IsNeverBelowTheAgreement) {
         for (const auto& y : scans) {
             for (const double width : {0.02, 0.1, 0.5}) {
                 const ScoreOptions options = optionsOf(false, width);
-                ASSERT_GE(
-                    SegmentComparison(bodyOf(x.signature), bodyOf(y.signature), options).agreementBound(),
-                    std::min(1.0, SegmentComparison(bodyOf(x.signature), bodyOf(y.signature), options)
-                                      .match()
-                                      .agreement));
+                ASSERT_GE(SegmentComparison(attributedBody(x.signature), attributedBody(y.signature), options)
+                              .agreementBound(),
+                          std::min(1.0, SegmentComparison(attributedBody(x.signature),
+                                                          attributedBody(y.signature), options)
+                                            .match()
+                                            .agreement));
             }
         }
     }
