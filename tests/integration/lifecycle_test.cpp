@@ -286,7 +286,7 @@ TEST_F(Lifecycle, RestartContinuesARebuild) {
     start();
     for (int i = 0; i < 6; ++i) {
         ASSERT_TRUE(
-            addAndWait(*client, "", std::to_string(i), slowScan(static_cast<std::uint64_t>(i), 8'000)).ok());
+            addAndWait(*client, "", std::to_string(i), slowScan(static_cast<std::uint64_t>(i), 6'000)).ok());
     }
     pb::RebuildRequest request;
     request.set_collection("default");

@@ -73,7 +73,7 @@ bool onALine(const Signature& signature) {
 
 TEST(Score, AgreesWithItsDefinition) {
     Random random(1);
-    for (int round = 0; round < 4000; ++round) {
+    for (int round = 0; round < 2500; ++round) {
         const Pair pair = randomPair(random, round % 5 == 0 ? 8 : 6);
         const ScoreOptions options = randomOptions(random);
         const double fast = score(pair.a, pair.b, options);

@@ -151,7 +151,7 @@ TEST(InteriorTetrahedra, AreTheFixpointOfTheWalk) {
     std::size_t sharp = 0;
     for (const Triangulated& cloud : triangulatedClouds()) {
         const Balls balls(cloud);
-        for (const double degrees : {10.0, 20.0, 40.0}) {
+        for (const double degrees : {10.0, 30.0}) {
             SegmentationOptions options;
             options.deepAngleDegrees = degrees;
             const auto big = bigOf(cloud, options.bigBallRatio);
@@ -167,7 +167,7 @@ TEST(InteriorTetrahedra, AreTheFixpointOfTheWalk) {
             sharp += most == least;
         }
     }
-    EXPECT_GT(sharp, 2 * triangulatedClouds().size()) << "the references must pin the result down";
+    EXPECT_GT(sharp, triangulatedClouds().size()) << "the references must pin the result down";
 }
 
 TEST(InteriorTetrahedra, AreFewerForALargerAngle) {
