@@ -1,4 +1,4 @@
-// The rules of the upload of a backup, whatever the transport, which keeps the bytes.
+// The rules for uploading a backup, whatever the transport; the transport keeps the bytes.
 #pragma once
 
 #include <cstdint>

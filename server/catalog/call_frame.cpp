@@ -1,5 +1,9 @@
 #include "server/catalog/call_frame.h"
 
+#include <exception>
+#include <new>
+#include <string>
+
 #include "server/catalog/limits.h"
 
 namespace shapedb::catalog {
@@ -47,6 +51,18 @@ Result<void> CallFrame::settle(Result<void> result, const std::optional<Error>& 
     // Nothing but a restore makes a server that is not draining unavailable.
     if (code == ErrorCode::kUnavailable && !admission_.calls.draining()) hint_ = kRestoreRetry;
     return result;
+}
+
+Error errorOfCall() {
+    try {
+        throw;
+    } catch (const std::bad_alloc&) {
+        return {ErrorCode::kOutOfMemory, "not enough memory for this request: try again later"};
+    } catch (const std::exception& error) {
+        return {ErrorCode::kInternal, std::string("unexpected failure: ") + error.what()};
+    } catch (...) {
+        return {ErrorCode::kInternal, "unexpected failure of unknown kind"};
+    }
 }
 
 }  // namespace shapedb::catalog

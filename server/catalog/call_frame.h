@@ -22,6 +22,9 @@ class CallFrame {
     CallFrame(const CallFrame&) = delete;
     CallFrame& operator=(const CallFrame&) = delete;
 
+    /// The caller's cancellation and deadline.
+    [[nodiscard]] const RunContext& run() const { return run_; }
+
     /// First of all. Errors: kUnavailable (draining).
     [[nodiscard]] Result<void> admit();
 
@@ -55,5 +58,19 @@ class CallFrame {
     std::chrono::milliseconds whenQueueFull_;
     std::optional<std::chrono::milliseconds> hint_;
 };
+
+/// Inside a catch block around the body of a call: what the exception means for the caller. kOutOfMemory or
+/// kInternal.
+[[nodiscard]] Error errorOfCall();
+
+/// Runs `body`, which returns Result<void>; exceptions become errors.
+template <typename Body>
+Result<void> guarded(Body&& body) {
+    try {
+        return body();
+    } catch (...) {
+        return fail(errorOfCall());
+    }
+}
 
 }  // namespace shapedb::catalog

@@ -1,4 +1,4 @@
-// Start and stop, collections, rebuilds, backup and restore; shapes.cpp has the shapes.
+// Start and stop, collections, backup and restore; shapes.cpp has the shapes, rebuilds.cpp the rebuilds.
 #include "server/catalog/catalog.h"
 
 #include <algorithm>
@@ -142,84 +142,6 @@ Result<index::SnapshotPtr> Catalog::reload(const std::string& name) {
     return index_.byId(id);
 }
 
-// Rebuilds -------------------------------------------------------------------------------
-
-Result<std::vector<std::string>> Catalog::rebuildTargets(const RebuildRequest& request) const {
-    if (request.change && (request.cacheOnly || request.collection.empty())) {
-        return fail(ErrorCode::kInvalidArgument,
-                    request.cacheOnly ? "parameters cannot change with cache_only: leave one out"
-                                      : "collection: name the collection that gets the new parameters");
-    }
-    std::vector<std::string> names;
-    if (!request.collection.empty()) {
-        const auto found = collection(request.collection);
-        RETURN_IF_ERROR(found);
-        names.push_back((*found)->collection.name);
-        return names;
-    }
-    const auto all = collections();
-    RETURN_IF_ERROR(all);
-    for (const index::SnapshotPtr& snapshot : *all) names.push_back(snapshot->collection.name);
-    return names;
-}
-
-Result<std::vector<store::Rebuild>> Catalog::beginRebuilds(const std::vector<std::string>& names,
-                                                           const ParameterChange& change) {
-    const RestoreGate::Write write(restores_);
-    std::vector<store::Rebuild> begun;
-    for (const std::string& name : names) {
-        // Looked up under the gate: a restore may have replaced the collection and its parameters.
-        const auto found = collection(name);
-        RETURN_IF_ERROR(found);
-        Result<ShapeParameters> parameters = (*found)->parameters;
-        if (change) parameters = change(*parameters);
-        RETURN_IF_ERROR(parameters);
-        RETURN_IF_ERROR(validate(*parameters));
-        auto rebuild = rebuilds_.begin((*found)->collection, *parameters);
-        RETURN_IF_ERROR(rebuild);
-        begun.push_back(std::move(*rebuild));
-    }
-    return begun;
-}
-
-Result<void> Catalog::cancelRebuild(const std::string& name) {
-    const RestoreGate::Write write(restores_);
-    const auto found = collection(name);
-    RETURN_IF_ERROR(found);
-    return rebuilds_.cancel((*found)->collection);
-}
-
-Result<void> Catalog::followRebuild(const std::string& collection, store::Rebuild rebuild,
-                                    const RunContext& context, const Checkpoint& checkpoint,
-                                    const std::function<Result<void>(const store::Rebuild&)>& onChange) {
-    RunContext briefly = context;
-    for (;;) {
-        RETURN_IF_ERROR(onChange(rebuild));
-        switch (rebuild.state) {
-            case store::RebuildState::kRunning: break;
-            case store::RebuildState::kDone: return {};
-            case store::RebuildState::kCancelled:
-                return fail(ErrorCode::kCancelled,
-                            "the rebuild of collection '" + collection + "' was cancelled");
-            case store::RebuildState::kFailed:
-                return fail(ErrorCode::kInternal,
-                            "the rebuild of collection '" + collection + "' failed: see the log");
-        }
-        for (bool waiting = true; waiting;) {
-            RETURN_IF_ERROR(checkpoint());
-            // In short pieces, so that the caller is asked in between.
-            briefly.deadline = std::min(context.deadline, RunContext::Clock::now() + kProgressInterval);
-            const auto changed = rebuilds_.waitForChange(rebuild, briefly);
-            if (changed) {
-                rebuild = *changed;
-                waiting = false;
-            } else if (changed.error().code != ErrorCode::kDeadlineExceeded) {
-                return fail(changed.error());
-            }
-        }
-    }
-}
-
 // The whole database ---------------------------------------------------------------------
 
 Result<void> Catalog::backup(const std::string& path, const RunContext& context) {
@@ -246,7 +168,7 @@ Result<void> Catalog::restoreExclusively(const std::string& path, const RunConte
     const auto content = replaced ? ingest::Content::kReplaced : ingest::Content::kSame;
     const auto workers = workers_.resume(content);
     const auto rebuilds = rebuilds_.resume(content);
-    if (!restored) return restored;
+    RETURN_IF_ERROR(restored);
     return workers ? rebuilds : workers;
 }
 

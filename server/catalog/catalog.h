@@ -17,6 +17,7 @@
 #include "core/base/metadata.h"
 #include "core/base/run_context.h"
 #include "server/catalog/gates.h"
+#include "server/catalog/parameter_overrides.h"
 #include "server/index/collection_index.h"
 #include "server/ingest/crash_isolation.h"
 #include "server/ingest/progress_board.h"
@@ -27,6 +28,8 @@
 #include "server/telemetry/logger.h"
 
 namespace shapedb::catalog {
+
+class CallFrame;
 
 struct CatalogOptions {
     std::uint64_t maxQueuedJobs = 0;   ///< as store::PutRequest
@@ -85,14 +88,23 @@ struct CatalogStats {
 /// shape or its profile does not rate interiors.
 [[nodiscard]] std::optional<double> qualityIn(const SignatureSet& signatures, std::int64_t shapeId);
 
-/// The parameters that a request makes of those a collection has.
-using ParameterChange = std::function<Result<ShapeParameters>(const ShapeParameters& current)>;
-
 struct RebuildRequest {
-    std::string collection;  ///< empty: all
-    bool cacheOnly = false;  ///< read the stored signatures again, segment nothing
-    ParameterChange change;  ///< empty: the parameters stay
+    std::string collection;                    ///< empty: all
+    bool cacheOnly = false;                    ///< read the stored signatures again, segment nothing
+    bool detached = false;                     ///< tell only how each rebuild begins
+    std::optional<ParameterOverrides> change;  ///< empty: the parameters stay
 };
+
+/// What a caller of `Catalog::rebuild` is told of one collection.
+struct RebuildProgress {
+    std::string collection;
+    std::uint64_t done = 0;    ///< shapes, failed ones included
+    std::uint64_t total = 0;   ///< shapes
+    std::uint64_t failed = 0;  ///< shapes
+    bool finished = false;     ///< the results are searched
+    double seconds = 0.0;      ///< since it began, or until it ended
+};
+using OnRebuildProgress = std::function<Result<void>(const RebuildProgress&)>;
 
 /// What a caller who follows a shape is told.
 struct IngestEvent {
@@ -175,7 +187,8 @@ class Catalog {
     [[nodiscard]] Result<void> watchIngest(std::int64_t shapeId, const Checkpoint& checkpoint,
                                            const std::function<Result<void>(const IngestEvent&)>& onEvent);
     /// Waits until a shape that was just added is no longer pending, and if it is ready, until searches
-    /// find it. Returns the final row. Errors: as `watchIngest`; they say that the scan was stored.
+    /// find it. Returns the final row. Errors: as `watchIngest`; unless the shape was deleted they say that
+    /// the scan is stored.
     [[nodiscard]] Result<store::Shape> awaitIngest(const store::Shape& added, const Checkpoint& checkpoint);
 
     /// The signature of a shape that searches of its collection find. Errors: kNotReady, saying whether
@@ -190,10 +203,8 @@ class Catalog {
     // Segmentation for callers -----------------------------------------------------
 
     [[nodiscard]] SegmentationSlots& segmentationSlots() { return slots_; }
-    /// Segments `points` (packed) once `slot` has been acquired. Errors: those of `describe` and of
-    /// acquiring the slot.
-    [[nodiscard]] Result<Description> describe(SegmentationSlots::Slot& slot,
-                                               const std::vector<float>& points,
+    /// Segments `scan` once `slot` has been acquired. Errors: those of `describe` and of acquiring the slot.
+    [[nodiscard]] Result<Description> describe(SegmentationSlots::Slot& slot, const store::VerifiedScan& scan,
                                                const ShapeParameters& parameters, const RunContext& context);
     /// The same for a stored scan, with the parameters of its collection; loads it under the slot.
     [[nodiscard]] Result<DescribedScan> describe(SegmentationSlots::Slot& slot, const FoundShape& found,
@@ -201,15 +212,19 @@ class Catalog {
 
     // Rebuilds ---------------------------------------------------------------------
 
+    /// Reads signatures again, or rebuilds and follows one collection after the other, and tells the
+    /// progress of each. Errors: those of the functions below; kQueueFull (too many calls wait).
+    [[nodiscard]] Result<void> rebuild(const RebuildRequest& request, CallFrame& frame,
+                                       const OnRebuildProgress& onProgress);
     /// The names of the collections that a request means. Errors: kInvalidArgument (a change of parameters
     /// with `cacheOnly`, or without a collection named), kNotFound.
     [[nodiscard]] Result<std::vector<std::string>> rebuildTargets(const RebuildRequest& request) const;
     /// Starts the rebuilds of all `names` before any is followed, so that they go on if the caller is lost.
     /// Each has its collection's parameters after `change`, or is the running one with the same
-    /// parameters. Errors: those of `change`; kInvalidArgument (parameters), kNotFound; kRejected: one with
+    /// parameters. Errors: kInvalidArgument (parameters), kNotFound; kRejected: one with
     /// other parameters is running. Rebuilds started before an error go on.
-    [[nodiscard]] Result<std::vector<store::Rebuild>> beginRebuilds(const std::vector<std::string>& names,
-                                                                    const ParameterChange& change);
+    [[nodiscard]] Result<std::vector<store::Rebuild>> beginRebuilds(
+        const std::vector<std::string>& names, const std::optional<ParameterOverrides>& change);
     /// Errors: kNotFound (the collection, or none is running).
     [[nodiscard]] Result<void> cancelRebuild(const std::string& collection);
     /// Calls `onChange` at once and after each change until the rebuild is done; the rebuild goes on
@@ -229,6 +244,8 @@ class Catalog {
     /// store::Store::restore; those of CollectionIndex::loadAll, after which the content is replaced but
     /// cannot be looked up.
     [[nodiscard]] Result<void> restore(const std::string& path, const RunContext& context);
+    /// Calls that wait for a restore to end before they change something.
+    [[nodiscard]] int waitingWrites() const { return restores_.waitingWrites(); }
     /// Rises with each restore: ids read under one epoch may mean other shapes under another.
     [[nodiscard]] std::uint64_t epoch() const { return restores_.epoch(); }
     [[nodiscard]] Result<CatalogStats> stats();
@@ -243,6 +260,7 @@ class Catalog {
         const std::function<Result<void>(const store::Shape&, const ingest::ProgressBoard::Status&)>&
             onChange);
     IngestEvent eventOf(const store::Shape& shape, const ingest::ProgressBoard::Status& status) const;
+    Result<void> reloadAll(const std::vector<std::string>& names, const OnRebuildProgress& onProgress);
     Result<void> restoreExclusively(const std::string& path, const RunContext& context);
     Result<void> replaceContent(const std::string& path, const RunContext& context, bool& replaced);
     /// After a change that the store has acknowledged, which must not be reported as refused.

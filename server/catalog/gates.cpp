@@ -29,6 +29,13 @@ bool CallGate::waitUntilEmpty(std::chrono::steady_clock::time_point until) {
     return changed_.wait_until(lock, until, [this] { return calls_ == 0; });
 }
 
+RestoreGate::Write::Write(RestoreGate& gate) : lock_(gate.mutex_, std::try_to_lock) {
+    if (lock_) return;
+    gate.waitingWrites_.fetch_add(1);
+    lock_.lock();
+    gate.waitingWrites_.fetch_sub(1);
+}
+
 Result<void> RestoreGate::beginRestore() {
     if (restoring_.exchange(true)) {
         return fail(ErrorCode::kRejected, "another restore is running: wait until it is done");

@@ -39,7 +39,7 @@ class RestoreGate {
     /// Held (shared) from looking up a collection until the write to it is done.
     class Write {
       public:
-        explicit Write(RestoreGate& gate) : lock_(gate.mutex_) {}
+        explicit Write(RestoreGate& gate);
 
       private:
         std::shared_lock<std::shared_mutex> lock_;
@@ -55,6 +55,8 @@ class RestoreGate {
     [[nodiscard]] std::unique_lock<std::shared_mutex> exclusive() {
         return std::unique_lock<std::shared_mutex>(mutex_);
     }
+    /// How many writes wait for a restore to end.
+    [[nodiscard]] int waitingWrites() const { return waitingWrites_.load(); }
     /// Before the store may show other content than the index.
     void replacing() {
         apart_ = true;
@@ -77,6 +79,7 @@ class RestoreGate {
     std::atomic<std::uint64_t> epoch_{0};
     std::atomic<bool> restoring_{false};
     std::atomic<bool> apart_{false};
+    std::atomic<int> waitingWrites_{0};
 };
 
 /// Limits how many segmentations run for callers at a time; the others wait. Thread-safe.

@@ -67,7 +67,7 @@ Result<void> ScanUpload::add(const std::string& xyz) {
 }
 
 Result<store::VerifiedScan> ScanUpload::finish() {
-    if (!announced_) return fail(ErrorCode::kMalformedStream, "the stream ended before a header came");
+    if (!announced_) return fail(ErrorCode::kMalformedStream, "the stream ended before a header arrived");
     if (points() != *announced_) {
         return fail(ErrorCode::kCountMismatch, std::to_string(points()) +
                                                    " points received, the header announced " +

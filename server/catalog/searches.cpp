@@ -36,12 +36,15 @@ Result<PreparedSearch> Searches::prepare(index::SnapshotPtr collection, const Se
     return prepared;
 }
 
-Result<BatchQuery> Searches::storedQuery(const PreparedSearch& search, const std::string& key) const {
+Result<BatchQuery> Searches::storedQuery(const PreparedSearch& search, const std::string& key,
+                                         bool includeSelf) const {
     const auto found = catalog_.findShape(search.collection, key);
     RETURN_IF_ERROR(found);
     auto signature = catalog_.signature(*found);
     RETURN_IF_ERROR(signature);
-    return BatchQuery{std::move(*signature), found->shape.id};
+    BatchQuery query{std::move(*signature), std::nullopt};
+    if (!includeSelf) query.excludeId = found->shape.id;
+    return query;
 }
 
 Result<BatchQuery> Searches::query(const PreparedSearch& search, const QuerySource& source) const {
@@ -64,7 +67,7 @@ Result<Signature> Searches::compared(const char* which, const ShapeName& name) c
         return catalog_.signature(*found);
     };
     auto signature = signatureOf();
-    if (!signature) return fail(signature.error().code, which + (": " + signature.error().message));
+    if (!signature) return fail(withContext(signature.error(), which + std::string(": ")));
     return signature;
 }
 
@@ -79,8 +82,7 @@ Result<Comparison> Searches::compare(const ShapeName& query, const ShapeName& ot
 }
 
 Error ofQuery(std::size_t i, Error error) {
-    error.message = "query " + std::to_string(i) + ": " + error.message;
-    return error;
+    return withContext(std::move(error), "query " + std::to_string(i) + ": ");
 }
 
 Result<std::vector<BatchQuery>> Searches::queries(const PreparedSearch& search,
@@ -100,6 +102,19 @@ Result<SearchResult> Searches::run(const PreparedSearch& search, const BatchQuer
     SearchOptions options = search.options;
     options.excludeId = query.excludeId;
     return runner_.run(query.signature, search.collection->signatures, options, context);
+}
+
+Result<ScanSearch> Searches::byScan(const PreparedSearch& search, const store::VerifiedScan& scan,
+                                    const RunContext& context) const {
+    const auto describe = [&] {
+        SegmentationSlots::Slot slot(catalog_.segmentationSlots());
+        return catalog_.describe(slot, scan, search.collection->parameters, context);
+    };
+    auto description = describe();
+    RETURN_IF_ERROR(description);
+    auto found = runner_.run(description->signature, search.collection->signatures, search.options, context);
+    RETURN_IF_ERROR(found);
+    return ScanSearch{std::move(*description), std::move(*found)};
 }
 
 Result<std::vector<SearchResult>> Searches::runBatch(const PreparedSearch& search,

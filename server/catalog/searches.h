@@ -46,6 +46,12 @@ struct ShapeName {
     std::string key;
 };
 
+/// The segmentation of a scan sent as a query, and what it found.
+struct ScanSearch {
+    Description description;
+    SearchResult found;
+};
+
 /// Two stored shapes, compared.
 struct Comparison {
     Signature query;
@@ -83,9 +89,10 @@ class Searches {
     [[nodiscard]] Result<PreparedSearch> prepare(index::SnapshotPtr collection,
                                                  const SearchRequest& request) const;
 
-    /// A stored shape as a query that does not find itself. Errors: kInvalidArgument (key), kNotFound,
-    /// kNotReady, kDataLoss.
-    [[nodiscard]] Result<BatchQuery> storedQuery(const PreparedSearch& search, const std::string& key) const;
+    /// A stored shape as a query, which finds itself only with `includeSelf`. Errors: kInvalidArgument (key),
+    /// kNotFound, kNotReady, kDataLoss.
+    [[nodiscard]] Result<BatchQuery> storedQuery(const PreparedSearch& search, const std::string& key,
+                                                 bool includeSelf = false) const;
 
     /// The query that `source` names; a stored shape as above. Errors: those of `storedQuery` and of
     /// decodeSignature; kInvalidArgument (not exactly one is set).
@@ -110,6 +117,10 @@ class Searches {
     /// As `topK`; `query.excludeId` holds.
     [[nodiscard]] Result<SearchResult> run(const PreparedSearch& search, const BatchQuery& query,
                                            const RunContext& context) const;
+    /// Segments `scan` with the parameters of the collection, holding one of the places for segmentations
+    /// only meanwhile, and searches. Errors: those of Catalog::describe and of `run`.
+    [[nodiscard]] Result<ScanSearch> byScan(const PreparedSearch& search, const store::VerifiedScan& scan,
+                                            const RunContext& context) const;
     /// As `topKBatch`.
     [[nodiscard]] Result<std::vector<SearchResult>> runBatch(const PreparedSearch& search,
                                                              const std::vector<BatchQuery>& queries,

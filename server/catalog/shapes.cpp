@@ -152,7 +152,7 @@ Result<store::Shape> Catalog::followIngest(
         // Before the row: whatever happens after this raises the sequence, and the wait returns.
         const ingest::ProgressBoard::Status status = watch->status();
         auto shape = store_->getShapeById(shapeId);
-        if (!shape) return shape;
+        RETURN_IF_ERROR(shape);
         if (shape->state == store::ShapeState::kReady) {
             // The store is a moment ahead of the index: READY must mean that searches find it.
             RETURN_IF_ERROR(index_.refresh(shape->collectionId, shapeId));
@@ -208,19 +208,20 @@ Result<void> Catalog::watchIngest(std::int64_t shapeId, const Checkpoint& checkp
 Result<store::Shape> Catalog::awaitIngest(const store::Shape& added, const Checkpoint& checkpoint) {
     auto settled =
         followIngest(added.id, checkpoint, [](const auto&, const auto&) { return Result<void>(); });
-    if (!settled) {
+    // Gone: deleted meanwhile, with its scan.
+    if (!settled && settled.error().code != ErrorCode::kNotFound) {
         return fail(settled.error().code,
-                    settled.error().message + "; the scan of shape '" + added.key + "' had been stored");
+                    settled.error().message + "; the scan is stored and will be segmented");
     }
     return settled;
 }
 
 // Segmentation for callers ---------------------------------------------------------------
 
-Result<Description> Catalog::describe(SegmentationSlots::Slot& slot, const std::vector<float>& points,
+Result<Description> Catalog::describe(SegmentationSlots::Slot& slot, const store::VerifiedScan& scan,
                                       const ShapeParameters& parameters, const RunContext& context) {
     RETURN_IF_ERROR(slot.acquire(context));
-    return pipeline_.describe(points, parameters, context);
+    return pipeline_.describe(scan.points(), parameters, context);
 }
 
 Result<DescribedScan> Catalog::describe(SegmentationSlots::Slot& slot, const FoundShape& found,

@@ -38,6 +38,12 @@ void ProgressBoard::settled(std::int64_t shapeId) {
     release(found);
 }
 
+int ProgressBoard::waiting(std::int64_t shapeId) const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const auto found = entries_.find(shapeId);
+    return found == entries_.end() ? 0 : found->second->waiting;
+}
+
 std::unique_ptr<ProgressBoard::Watch> ProgressBoard::watch(std::int64_t shapeId) {
     std::unique_ptr<Watch> watch(new Watch(*this, shapeId));
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -66,7 +72,9 @@ ProgressBoard::Status ProgressBoard::Watch::status() const {
 void ProgressBoard::Watch::waitForChange(std::uint64_t seen, Clock::time_point until) const {
     std::unique_lock<std::mutex> lock(board_.mutex_);
     Entry& entry = *board_.entries_.at(shapeId_);
+    ++entry.waiting;
     entry.changed.wait_until(lock, until, [&] { return entry.status.sequence != seen; });
+    --entry.waiting;
 }
 
 }  // namespace shapedb::ingest

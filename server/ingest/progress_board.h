@@ -31,6 +31,9 @@ class ProgressBoard {
     /// No worker has the shape any more, and its state in the store may have changed.
     void settled(std::int64_t shapeId);
 
+    /// How many wait for a change of the shape now.
+    [[nodiscard]] int waiting(std::int64_t shapeId) const;
+
     /// Watches one shape until destroyed.
     class Watch {
       public:
@@ -57,6 +60,7 @@ class ProgressBoard {
         Status status;
         bool running = false;
         int watchers = 0;
+        int waiting = 0;  ///< watchers inside `waitForChange`
         Clock::time_point announced{};
         std::condition_variable changed;
     };

@@ -1,9 +1,8 @@
 #include "server/rpc/admin_service.h"
 
-#include <algorithm>
+#include <chrono>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include "core/base/return_if_error.h"
 #include "server/catalog/limits.h"
@@ -16,84 +15,43 @@
 namespace shapedb::rpc {
 namespace {
 
-using RebuildWriter = grpc::ServerWriter<v1::RebuildProgress>;
-
-catalog::RebuildRequest rebuildRequestFrom(const v1::RebuildRequest& request) {
+Result<catalog::RebuildRequest> rebuildRequestFrom(const v1::RebuildRequest& request) {
     catalog::RebuildRequest wanted;
     wanted.collection = request.collection();
     wanted.cacheOnly = request.cache_only();
+    wanted.detached = request.detach();
     if (request.has_segmentation() || request.has_signature() ||
         request.profile() != v1::PROFILE_UNSPECIFIED) {
-        wanted.change = [&request](const ShapeParameters& current) {
-            return parametersFrom(request.profile(), request.segmentation(), request.signature(), current);
-        };
+        auto change = overridesFrom(request.profile(), request.segmentation(), request.signature());
+        RETURN_IF_ERROR(change);
+        wanted.change = std::move(*change);
     }
     return wanted;
 }
 
-/// Reads the stored signatures again; nothing is segmented.
-Result<void> reloadCache(const Services& services, Call& call, const std::vector<std::string>& names,
-                         RebuildWriter& writer) {
-    for (const std::string& name : names) {
-        const auto began = std::chrono::steady_clock::now();
-        const auto reloaded = services.catalog.reload(name);
-        RETURN_IF_ERROR(reloaded);
-        const std::uint64_t count = (*reloaded)->signatures.size();
-        v1::RebuildProgress progress;
-        progress.set_collection(name);
-        progress.set_done(count);
-        progress.set_total(count);
-        progress.set_finished(true);
-        progress.set_seconds(std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count());
-        RETURN_IF_ERROR(call.write(writer, progress));
-    }
-    return {};
-}
-
-Result<void> sendProgress(Call& call, const std::string& collection, const store::Rebuild& rebuild,
-                          RebuildWriter& writer) {
-    using std::chrono::system_clock;
-    const auto nowMs =
-        std::chrono::duration_cast<std::chrono::milliseconds>(system_clock::now().time_since_epoch());
-    const store::TimestampMs end = rebuild.finishedAt != 0 ? rebuild.finishedAt : nowMs.count();
-    v1::RebuildProgress progress;
-    progress.set_collection(collection);
-    progress.set_done(rebuild.done);
-    progress.set_total(rebuild.total);
-    progress.set_failed(rebuild.failed);
-    progress.set_finished(rebuild.state == store::RebuildState::kDone);
-    progress.set_seconds(static_cast<double>(std::max<store::TimestampMs>(0, end - rebuild.startedAt)) /
-                         1'000.0);
-    return call.write(writer, progress);
+v1::RebuildProgress progressFrom(const catalog::RebuildProgress& progress) {
+    v1::RebuildProgress message;
+    message.set_collection(progress.collection);
+    message.set_done(progress.done);
+    message.set_total(progress.total);
+    message.set_failed(progress.failed);
+    message.set_finished(progress.finished);
+    message.set_seconds(progress.seconds);
+    return message;
 }
 
 }  // namespace
 
 grpc::Status AdminServiceHandler::Rebuild(grpc::ServerContext* context, const v1::RebuildRequest* request,
-                                          RebuildWriter* writer) {
+                                          grpc::ServerWriter<v1::RebuildProgress>* writer) {
     return handle(services_, context, "Rebuild", [&](Call& call) -> Result<void> {
-        const catalog::RebuildRequest wanted = rebuildRequestFrom(*request);
-        if (!wanted.collection.empty()) call.noteCollection(wanted.collection);
-        const auto names = services_.catalog.rebuildTargets(wanted);
-        RETURN_IF_ERROR(names);
-        if (wanted.cacheOnly) return reloadCache(services_, call, *names, *writer);
-
-        RETURN_IF_ERROR(call.frame().becomeFollower());
-        const auto started = services_.catalog.beginRebuilds(*names, wanted.change);
-        RETURN_IF_ERROR(started);
-        for (std::size_t i = 0; i < started->size(); ++i) {
-            const std::string& name = (*names)[i];
-            const store::Rebuild& begun = (*started)[i];
-            const auto send = [&](const store::Rebuild& rebuild) {
-                return sendProgress(call, name, rebuild, *writer);
-            };
-            RETURN_IF_ERROR(request->detach()
-                                ? send(begun)
-                                : services_.catalog.followRebuild(
-                                      name, begun, call.run(),
-                                      [&] { return call.frame().checkpointWhileFollowing(); }, send));
-        }
-        return {};
+        if (!request->collection().empty()) call.noteCollection(request->collection());
+        const auto wanted = rebuildRequestFrom(*request);
+        RETURN_IF_ERROR(wanted);
+        return services_.catalog.rebuild(*wanted, call.frame(),
+                                         [&](const catalog::RebuildProgress& progress) {
+                                             return call.write(*writer, progressFrom(progress));
+                                         });
     });
 }
 
@@ -106,6 +64,8 @@ grpc::Status AdminServiceHandler::CancelRebuild(grpc::ServerContext* context,
     });
 }
 
+// Backup and Restore keep the order of their steps here: the file is written and read in the messages of
+// the stream, and the rules about the database are in Catalog::backup and Catalog::restore.
 grpc::Status AdminServiceHandler::Backup(grpc::ServerContext* context, const v1::BackupRequest*,
                                          grpc::ServerWriter<v1::BackupChunk>* writer) {
     return handle(services_, context, "Backup", [&](Call& call) -> Result<void> {

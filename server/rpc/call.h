@@ -4,8 +4,6 @@
 
 #include <chrono>
 #include <cstdint>
-#include <exception>
-#include <new>
 #include <string>
 #include <utility>
 #include <vector>
@@ -93,17 +91,7 @@ template <typename Body>
 grpc::Status handle(const Services& services, grpc::ServerContext* context, const char* rpc, Body&& body) {
     Call call(services, *context, rpc);
     Result<void> result = call.frame().admit();
-    if (result) {
-        try {
-            result = body(call);
-        } catch (const std::bad_alloc&) {
-            result = fail(ErrorCode::kOutOfMemory, "not enough memory for this request: try again later");
-        } catch (const std::exception& error) {
-            result = fail(ErrorCode::kInternal, std::string("unexpected failure: ") + error.what());
-        } catch (...) {
-            result = fail(ErrorCode::kInternal, "unexpected failure of unknown kind");
-        }
-    }
+    if (result) result = catalog::guarded([&]() -> Result<void> { return body(call); });
     return call.finish(std::move(result));
 }
 

@@ -25,8 +25,9 @@ grpc::Status CollectionServiceHandler::CreateCollection(grpc::ServerContext* con
                                                         v1::Collection* response) {
     return handle(services_, context, "CreateCollection", [&](Call& call) -> Result<void> {
         call.note({"collection", request->name()});
-        const auto parameters = parametersFrom(request->profile(), request->segmentation(),
-                                               request->signature(), parametersOf(Profile::kDefault));
+        const auto wanted = overridesFrom(request->profile(), request->segmentation(), request->signature());
+        RETURN_IF_ERROR(wanted);
+        const auto parameters = wanted->ofNew();
         RETURN_IF_ERROR(parameters);
         const auto created =
             services_.catalog.createCollection(request->name(), request->description(), *parameters);

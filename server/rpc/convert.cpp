@@ -2,8 +2,6 @@
 
 #include <string>
 
-#include "core/base/return_if_error.h"
-
 namespace shapedb::rpc {
 namespace {
 
@@ -83,37 +81,32 @@ Result<store::PutMode> fromProto(pb::AddMode mode) {
     }
 }
 
-Result<ShapeParameters> parametersFrom(pb::Profile profile, const pb::SegmentationParameters& segmentation,
-                                       const pb::SignatureParameters& signature,
-                                       const ShapeParameters& current) {
-    ShapeParameters parameters = current;
+Result<catalog::ParameterOverrides> overridesFrom(pb::Profile profile,
+                                                  const pb::SegmentationParameters& segmentation,
+                                                  const pb::SignatureParameters& signature) {
+    catalog::ParameterOverrides overrides;
     if (profile != pb::PROFILE_UNSPECIFIED) {
-        const auto known = fromProto(profile);
-        if (!known) return unknownNumber("profile", profile);
-        parameters = parametersOf(*known);
+        overrides.profile = fromProto(profile);
+        if (!overrides.profile) return unknownNumber("profile", profile);
     }
-    SegmentationOptions& options = parameters.segmentation;
-    if (segmentation.has_big_ball_ratio()) options.bigBallRatio = segmentation.big_ball_ratio();
-    if (segmentation.has_deep_angle_degrees()) options.deepAngleDegrees = segmentation.deep_angle_degrees();
-    if (segmentation.has_hull_angle_degrees()) options.hullAngleDegrees = segmentation.hull_angle_degrees();
-    if (segmentation.has_merge_ratio()) options.mergeRatio = segmentation.merge_ratio();
-    if (segmentation.has_decimate_to()) options.preparation.decimateTo = segmentation.decimate_to();
-    if (segmentation.has_merge_contrast()) options.mergeContrast = segmentation.merge_contrast();
-    if (segmentation.has_min_segment_share()) options.minSegmentShare = segmentation.min_segment_share();
-    if (segmentation.has_max_segments()) options.maxSegments = segmentation.max_segments();
-    if (segmentation.has_outlier_ratio()) options.preparation.outlierRatio = segmentation.outlier_ratio();
-    if (segmentation.has_smoothing_reach())
-        options.preparation.smoothingReach = segmentation.smoothing_reach();
-    if (segmentation.has_thinning()) options.preparation.thinning = segmentation.thinning();
+    if (segmentation.has_big_ball_ratio()) overrides.bigBallRatio = segmentation.big_ball_ratio();
+    if (segmentation.has_deep_angle_degrees()) overrides.deepAngleDegrees = segmentation.deep_angle_degrees();
+    if (segmentation.has_hull_angle_degrees()) overrides.hullAngleDegrees = segmentation.hull_angle_degrees();
+    if (segmentation.has_merge_ratio()) overrides.mergeRatio = segmentation.merge_ratio();
+    if (segmentation.has_merge_contrast()) overrides.mergeContrast = segmentation.merge_contrast();
+    if (segmentation.has_min_segment_share()) overrides.minSegmentShare = segmentation.min_segment_share();
+    if (segmentation.has_max_segments()) overrides.maxSegments = segmentation.max_segments();
+    if (segmentation.has_decimate_to()) overrides.decimateTo = segmentation.decimate_to();
+    if (segmentation.has_outlier_ratio()) overrides.outlierRatio = segmentation.outlier_ratio();
+    if (segmentation.has_smoothing_reach()) overrides.smoothingReach = segmentation.smoothing_reach();
+    if (segmentation.has_thinning()) overrides.thinning = segmentation.thinning();
     if (const auto method = segmentation.interior_method(); method != pb::INTERIOR_METHOD_UNSPECIFIED) {
-        const auto known = fromProto(method);
-        if (!known) return unknownNumber("interior_method", method);
-        options.interiorMethod = *known;
+        overrides.interiorMethod = fromProto(method);
+        if (!overrides.interiorMethod) return unknownNumber("interior_method", method);
     }
-    if (signature.has_max_points()) parameters.signature.maxPoints = signature.max_points();
-    if (signature.has_attributes()) parameters.signature.attributes = signature.attributes();
-    RETURN_IF_ERROR(validate(parameters));
-    return parameters;
+    if (signature.has_max_points()) overrides.maxPoints = signature.max_points();
+    if (signature.has_attributes()) overrides.attributes = signature.attributes();
+    return overrides;
 }
 
 Metadata toMetadata(const google::protobuf::Map<std::string, std::string>& metadata) {

@@ -1,4 +1,4 @@
-// The one conversion between the messages of the API and the types of core/ and store/.
+// The only conversion between the messages of the API and the types of core/ and store/.
 #pragma once
 
 #include <optional>
@@ -6,6 +6,7 @@
 #include "common/wire.h"
 #include "core/base/error.h"
 #include "core/pipeline.h"
+#include "server/catalog/parameter_overrides.h"
 #include "server/index/collection_index.h"
 #include "server/store/store.h"
 #include "shapedb/v1/collection_service.pb.h"
@@ -34,12 +35,10 @@ void toProto(store::TimestampMs time, google::protobuf::Timestamp* out);
 /// UNSPECIFIED is upsert. Errors: kInvalidArgument.
 [[nodiscard]] Result<store::PutMode> fromProto(pb::AddMode mode);
 
-/// The parameters a request asks for: starts from the profile it names, or from `current`, and
-/// changes each field that is set. Errors: kInvalidArgument (names parameter, value and range).
-[[nodiscard]] Result<ShapeParameters> parametersFrom(pb::Profile profile,
-                                                     const pb::SegmentationParameters& segmentation,
-                                                     const pb::SignatureParameters& signature,
-                                                     const ShapeParameters& current);
+/// Each field that is set. Errors: kInvalidArgument (a number without a name).
+[[nodiscard]] Result<catalog::ParameterOverrides> overridesFrom(
+    pb::Profile profile, const pb::SegmentationParameters& segmentation,
+    const pb::SignatureParameters& signature);
 
 [[nodiscard]] Metadata toMetadata(const google::protobuf::Map<std::string, std::string>& metadata);
 

@@ -10,7 +10,7 @@
 #include "server/rpc/admin_service.h"
 #include "server/rpc/cancel_watcher.h"
 #include "server/rpc/collection_service.h"
-#include "server/rpc/limits.h"
+#include "server/rpc/message_limits.h"
 #include "server/rpc/search_service.h"
 #include "server/rpc/services.h"
 #include "server/rpc/shape_service.h"

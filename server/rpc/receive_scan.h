@@ -9,8 +9,8 @@
 namespace shapedb::rpc {
 
 /// `onHeader(header)` checks the other fields of the header as soon as it arrives, so that a hopeless
-/// upload is refused before its points are sent. Errors: those of
-/// ScanUpload and of `onHeader`; kCancelled, kDeadlineExceeded.
+/// upload is refused before its points are sent. Errors: those of ScanUpload and of `onHeader`; kCancelled,
+/// kDeadlineExceeded.
 template <typename Request, typename Reader, typename OnHeader>
 Result<store::VerifiedScan> receiveScan(Reader& reader, catalog::ScanUpload& upload, Call& call,
                                         OnHeader&& onHeader) {

@@ -98,9 +98,8 @@ grpc::Status SearchServiceHandler::SearchByKey(grpc::ServerContext* context,
         call.noteKey(request->key());
         const auto prepared = prepare(services_, call, request->options());
         RETURN_IF_ERROR(prepared);
-        auto query = services_.searches.storedQuery(*prepared, request->key());
+        const auto query = services_.searches.storedQuery(*prepared, request->key(), request->include_self());
         RETURN_IF_ERROR(query);
-        if (request->include_self()) query->excludeId.reset();
         return search(services_, call, *prepared, *query, response);
     });
 }
@@ -120,16 +119,13 @@ grpc::Status SearchServiceHandler::SearchByScan(grpc::ServerContext* context,
         const auto scan = receiveScan<v1::SearchByScanRequest>(*reader, upload, call, checkSearchHeader);
         RETURN_IF_ERROR(scan);
 
-        Result<Description> description = fail(ErrorCode::kInternal, "not segmented");
-        {
-            catalog::SegmentationSlots::Slot slot(services_.catalog.segmentationSlots());
-            description =
-                services_.catalog.describe(slot, scan->points(), prepared.collection->parameters, call.run());
-        }
-        RETURN_IF_ERROR(description);
-        toProto(description->segmentation, response->mutable_report());
-        response->set_seconds_segment(description->segmentation.totalSeconds);
-        return search(services_, call, prepared, {std::move(description->signature), std::nullopt}, response);
+        const auto searched = services_.searches.byScan(prepared, *scan, call.run());
+        RETURN_IF_ERROR(searched);
+        const Description& description = searched->description;
+        toProto(description.segmentation, response->mutable_report());
+        response->set_seconds_segment(description.segmentation.totalSeconds);
+        catalog::AnswerRoom room;
+        return answer(services_, prepared, description.signature, searched->found, room, response);
     });
 }
 

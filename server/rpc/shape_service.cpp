@@ -8,9 +8,10 @@
 #include "core/search/filter.h"
 #include "server/catalog/listing.h"
 #include "server/catalog/scan_upload.h"
+#include "server/catalog/shape_addition.h"
 #include "server/rpc/call.h"
 #include "server/rpc/convert.h"
-#include "server/rpc/limits.h"
+#include "server/rpc/message_limits.h"
 #include "server/rpc/receive_scan.h"
 
 namespace shapedb::rpc {
@@ -72,45 +73,23 @@ grpc::Status ShapeServiceHandler::AddShape(grpc::ServerContext* context,
 
 Result<void> ShapeServiceHandler::addShape(Call& call, grpc::ServerReader<v1::AddShapeRequest>& reader,
                                            v1::AddShapeResponse& response) {
-    const auto added = receiveAndPut(call, reader);
-    RETURN_IF_ERROR(added);
-    store::Shape shape = added->added.shape;
-    if (added->wait) {
-        const auto settled = services_.catalog.awaitIngest(shape, [&] { return call.run().checkpoint(); });
-        RETURN_IF_ERROR(settled);
-        shape = *settled;
-    }
-    response.set_outcome(outcomeOf(added->added.outcome));
-    toProto(shape, added->added.collection, services_.catalog.servingQuality(shape),
-            response.mutable_shape());
-    return {};
-}
-
-/// The points, and their share of the upload memory, are released when this returns.
-Result<ShapeServiceHandler::Received> ShapeServiceHandler::receiveAndPut(
-    Call& call, grpc::ServerReader<v1::AddShapeRequest>& reader) {
-    catalog::ScanUpload upload(services_.config.limits.maxPoints, services_.admission.uploads);
-    catalog::ShapeHeader header;
-    bool wait = false;
+    catalog::ShapeAddition addition(services_.catalog, call.frame(), services_.config.limits.maxPoints,
+                                    services_.admission.uploads);
     const auto takeHeader = [&](const v1::AddShapeHeader& message) -> Result<void> {
         call.noteKey(message.key());
         call.noteCollection(message.collection());
-        auto converted = headerFrom(message);
-        RETURN_IF_ERROR(converted);
-        header = std::move(*converted);
-        wait = message.wait();
-        RETURN_IF_ERROR(services_.catalog.admitUpload(header));
-        return wait ? call.frame().becomeFollower() : Result<void>();
+        auto header = headerFrom(message);
+        RETURN_IF_ERROR(header);
+        return addition.begin(std::move(*header), message.wait());
     };
-    auto scan = receiveScan<v1::AddShapeRequest>(reader, upload, call, takeHeader);
+    auto scan = receiveScan<v1::AddShapeRequest>(reader, addition.upload(), call, takeHeader);
     RETURN_IF_ERROR(scan);
-    RETURN_IF_ERROR(call.run().checkpoint());
-    auto added = services_.catalog.put(header, std::move(*scan));
-    if (!added && added.error().code == ErrorCode::kQueueFull) {
-        call.frame().retryAfter(services_.catalog.retryAfterQueueFull());
-    }
+    const auto added = addition.finish(std::move(*scan));
     RETURN_IF_ERROR(added);
-    return Received{std::move(*added), wait};
+    response.set_outcome(outcomeOf(added->outcome));
+    toProto(added->shape, added->collection, services_.catalog.servingQuality(added->shape),
+            response.mutable_shape());
+    return {};
 }
 
 grpc::Status ShapeServiceHandler::GetShape(grpc::ServerContext* context, const v1::GetShapeRequest* request,
@@ -235,17 +214,18 @@ grpc::Status ShapeServiceHandler::Segment(
         ShapeParameters parameters;
         bool summaryOnly = false;
         const auto checkSegmentHeader = [&](const v1::SegmentHeader& header) -> Result<void> {
-            const auto wanted = parametersFrom(header.profile(), header.segmentation(), header.signature(),
-                                               parametersOf(Profile::kDefault));
+            const auto wanted = overridesFrom(header.profile(), header.segmentation(), header.signature());
             RETURN_IF_ERROR(wanted);
-            parameters = *wanted;
+            const auto checked = wanted->ofNew();
+            RETURN_IF_ERROR(checked);
+            parameters = *checked;
             summaryOnly = header.summary_only();
             return {};
         };
         const auto scan = receiveScan<v1::SegmentRequest>(*stream, upload, call, checkSegmentHeader);
         RETURN_IF_ERROR(scan);
         catalog::SegmentationSlots::Slot slot(services_.catalog.segmentationSlots());
-        const auto description = services_.catalog.describe(slot, scan->points(), parameters, call.run());
+        const auto description = services_.catalog.describe(slot, *scan, parameters, call.run());
         RETURN_IF_ERROR(description);
         return sendSegments(call, *stream, *description, scan->points(), summaryOnly);
     });

@@ -33,11 +33,6 @@ class ShapeServiceHandler final : public shapedb::v1::ShapeService::Service {
                          grpc::ServerReaderWriter<v1::SegmentedPoints, v1::SegmentRequest>* stream) override;
 
   private:
-    struct Received {
-        catalog::AddedShape added;
-        bool wait = false;
-    };
-    Result<Received> receiveAndPut(Call& call, grpc::ServerReader<v1::AddShapeRequest>& reader);
     Result<void> addShape(Call& call, grpc::ServerReader<v1::AddShapeRequest>& reader,
                           v1::AddShapeResponse& response);
 

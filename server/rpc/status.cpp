@@ -1,6 +1,6 @@
 #include "server/rpc/status.h"
 
-#include "server/rpc/limits.h"
+#include "server/rpc/message_limits.h"
 
 namespace shapedb::rpc {
 

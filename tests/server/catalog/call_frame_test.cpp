@@ -1,6 +1,8 @@
 #include "server/catalog/call_frame.h"
 
 #include <memory>
+#include <new>
+#include <stdexcept>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -115,6 +117,17 @@ TEST_F(CallFrameTest, AFullQueueSaysWhenToTryAgain) {
     informed.retryAfter(7s);
     EXPECT_FALSE(informed.settle(failed(ErrorCode::kQueueFull), std::nullopt));
     EXPECT_EQ(informed.retryHint(), 7s);
+}
+
+TEST(Guarded, ExceptionsBecomeErrorsThatTheCallerUnderstands) {
+    EXPECT_TRUE(guarded([] { return Result<void>(); }));
+    const auto memory = guarded([]() -> Result<void> { throw std::bad_alloc(); });
+    EXPECT_EQ(memory.error().code, ErrorCode::kOutOfMemory);
+    const auto known = guarded([]() -> Result<void> { throw std::runtime_error("broken"); });
+    EXPECT_EQ(known.error().code, ErrorCode::kInternal);
+    EXPECT_EQ(known.error().message, "unexpected failure: broken");
+    const auto unknown = guarded([]() -> Result<void> { throw 1; });
+    EXPECT_EQ(unknown.error().code, ErrorCode::kInternal);
 }
 
 TEST_F(CallFrameTest, FollowersGiveTheirPlacesBack) {

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "server/catalog/call_frame.h"
 #include "tests/server/support/fixtures.h"
 #include "tests/server/support/memory_store.h"
 
@@ -16,11 +17,10 @@ using namespace shapedb::testing;
 
 Result<void> goOn() { return {}; }
 
-ParameterChange withMaxPoints(std::uint32_t maxPoints) {
-    return [maxPoints](ShapeParameters parameters) -> Result<ShapeParameters> {
-        parameters.signature.maxPoints = maxPoints;
-        return parameters;
-    };
+ParameterOverrides withMaxPoints(std::uint32_t maxPoints) {
+    ParameterOverrides overrides;
+    overrides.maxPoints = maxPoints;
+    return overrides;
 }
 
 class CatalogTest : public ::testing::Test {
@@ -209,8 +209,7 @@ TEST_F(CatalogTest, ARebuildThatWaitedForARestoreIsOneOfTheNewContent) {
         begun = std::async(std::launch::async,
                            [&] { return catalog->beginRebuilds({"parts"}, withMaxPoints(3)); });
         reloaded = std::async(std::launch::async, [&] { return catalog->reload("parts"); });
-        EXPECT_EQ(begun.wait_for(std::chrono::milliseconds(20)), std::future_status::timeout);
-        EXPECT_EQ(reloaded.wait_for(std::chrono::milliseconds(20)), std::future_status::timeout);
+        EXPECT_TRUE(eventually([&] { return catalog->waitingWrites() == 2; }));
         return std::nullopt;
     };
     ASSERT_TRUE(catalog->restore("backup", {}));
@@ -243,7 +242,7 @@ TEST_F(CatalogTest, ARebuildMeansTheNamedCollectionOrAll) {
     const auto cached = catalog->rebuildTargets(request);
     ASSERT_FALSE(cached);
     EXPECT_EQ(cached.error().message, "parameters cannot change with cache_only: leave one out");
-    request.change = nullptr;
+    request.change.reset();
     EXPECT_EQ(catalog->rebuildTargets(request).value(), Names{"parts"});
     request.collection = "none";
     EXPECT_EQ(catalog->rebuildTargets(request).error().code, ErrorCode::kNotFound);
@@ -251,16 +250,53 @@ TEST_F(CatalogTest, ARebuildMeansTheNamedCollectionOrAll) {
 
 TEST_F(CatalogTest, RebuildsOfSeveralCollectionsBeginTogether) {
     ASSERT_TRUE(catalog->createCollection("parts", "", parametersOf(Profile::kPaper)));
-    const auto rebuilds = catalog->beginRebuilds({"default", "parts"}, nullptr);
+    const auto rebuilds = catalog->beginRebuilds({"default", "parts"}, std::nullopt);
     ASSERT_TRUE(rebuilds) << rebuilds.error().message;
     ASSERT_EQ(rebuilds->size(), 2u);
     const auto parts = catalog->collection("parts").value();
     EXPECT_EQ((*rebuilds)[1].collectionId, parts->collection.id);
     EXPECT_EQ((*rebuilds)[1].parameters, store::encodeParameters(parts->parameters));
-    const auto refused = catalog->beginRebuilds(
-        {"default"}, [](const ShapeParameters&) { return fail(ErrorCode::kInvalidArgument, "no"); });
+    const auto refused = catalog->beginRebuilds({"default"}, withMaxPoints(0));
     ASSERT_FALSE(refused);
     EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST_F(CatalogTest, ARebuildTellsOfEachCollectionToItsEnd) {
+    putAndWait("cup", 5.0f);
+    ASSERT_TRUE(catalog->createCollection("parts", "", parametersOf(Profile::kPaper)));
+    Admission admission{1'000};
+    const RunContext run;
+    std::vector<RebuildProgress> told;
+    const auto rebuild = [&](const RebuildRequest& request) {
+        told.clear();
+        CallFrame frame(*catalog, admission, run);
+        return catalog->rebuild(request, frame, [&](const RebuildProgress& progress) {
+            EXPECT_GE(progress.seconds, 0.0);
+            told.push_back(progress);
+            return Result<void>();
+        });
+    };
+    RebuildRequest request;
+    ASSERT_TRUE(rebuild(request));
+    std::vector<std::string> finished;
+    for (const RebuildProgress& progress : told) {
+        if (progress.finished) finished.push_back(progress.collection);
+    }
+    EXPECT_EQ(finished, (std::vector<std::string>{"default", "parts"}));
+
+    request.cacheOnly = true;
+    ASSERT_TRUE(rebuild(request));
+    ASSERT_EQ(told.size(), 2u);
+    EXPECT_TRUE(told[0].finished);
+    EXPECT_EQ(told[0].done, 1u);
+    EXPECT_EQ(told[0].total, 1u);
+
+    request.cacheOnly = false;
+    request.detached = true;
+    request.collection = "default";
+    ASSERT_TRUE(rebuild(request));
+    ASSERT_EQ(told.size(), 1u) << "only how it begins";
+    EXPECT_EQ(told[0].total, 1u);
 }
 
 TEST_F(CatalogTest, AWatcherIsNotToldTheSameTwice) {
@@ -300,7 +336,7 @@ TEST_F(CatalogTest, FollowingEndsWhenTheCallerGivesUp) {
         added->shape, []() -> Result<void> { return fail(ErrorCode::kCancelled, "no longer interested"); });
     ASSERT_FALSE(waited);
     EXPECT_EQ(waited.error().code, ErrorCode::kCancelled);
-    EXPECT_NE(waited.error().message.find("'cup' had been stored"), std::string::npos);
+    EXPECT_NE(waited.error().message.find("the scan is stored and will be segmented"), std::string::npos);
 }
 
 }  // namespace

@@ -67,16 +67,31 @@ TEST_F(SearchesTest, AStoredShapeFindsOthersButNotItself) {
     const auto prepared = prepare(request);
     ASSERT_TRUE(prepared);
     EXPECT_EQ(searches().storedQuery(*prepared, "none").error().code, ErrorCode::kNotFound);
-    auto query = searches().storedQuery(*prepared, "cup");
+    const auto query = searches().storedQuery(*prepared, "cup");
     ASSERT_TRUE(query);
     EXPECT_EQ(query->excludeId, cup.id);
     const auto found = searches().run(*prepared, *query, {});
     ASSERT_TRUE(found);
     ASSERT_EQ(found->hits.size(), 1u);
     EXPECT_EQ(found->hits[0].id, jug.id);
-    query->excludeId.reset();
-    EXPECT_EQ(searches().run(*prepared, *query, {}).value().hits.size(), 2u);
+    const auto withSelf = searches().storedQuery(*prepared, "cup", true);
+    EXPECT_EQ(searches().run(*prepared, withSelf.value(), {}).value().hits.size(), 2u);
     EXPECT_EQ(searches().count(), 2u);
+}
+
+TEST_F(SearchesTest, AScanIsSegmentedAndSearched) {
+    const store::Shape cup = putAndWait("cup", 5.0f);
+    SearchRequest request;
+    request.k = 10;
+    const auto prepared = prepare(request);
+    const auto scan = store::VerifiedScan::verify(taggedPoints(5.0f)).value();
+    const auto searched = searches().byScan(*prepared, scan, {});
+    ASSERT_TRUE(searched) << searched.error().message;
+    EXPECT_EQ(searched->description.signature.volume, 5.0);
+    ASSERT_EQ(searched->found.hits.size(), 1u);
+    EXPECT_EQ(searched->found.hits[0].id, cup.id);
+    const auto open = store::VerifiedScan::verify(taggedPoints(-1.0f)).value();
+    EXPECT_EQ(searches().byScan(*prepared, open, {}).error().code, ErrorCode::kNoInterior);
 }
 
 TEST_F(SearchesTest, AnswersExplainHitsAndLeaveOutDeletedShapes) {

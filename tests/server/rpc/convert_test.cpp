@@ -2,10 +2,19 @@
 
 #include <gtest/gtest.h>
 
+#include "core/base/return_if_error.h"
 #include "core/signature/signature_codec.h"
 
 namespace shapedb::rpc {
 namespace {
+
+Result<ShapeParameters> parametersFrom(pb::Profile profile, const pb::SegmentationParameters& segmentation,
+                                       const pb::SignatureParameters& signature,
+                                       const ShapeParameters& current) {
+    const auto overrides = overridesFrom(profile, segmentation, signature);
+    RETURN_IF_ERROR(overrides);
+    return overrides->applyTo(current);
+}
 
 TEST(ParametersFrom, SetFieldsOverrideTheBase) {
     ShapeParameters current = parametersOf(Profile::kPaper);
