@@ -25,7 +25,7 @@ namespace shapedb {
 /// Bounds are raised by this factor: room for the rounding of sums taken in another order.
 constexpr double kBoundMargin = 1.0 + 1e-12;
 
-/// Only a shape itself scores 1, however little another one differs.
+/// Only a shape compared with itself scores 1; any other scores less, however similar.
 [[nodiscard]] inline double belowOne(double score) { return std::min(score, std::nextafter(1.0, 0.0)); }
 
 }  // namespace shapedb

@@ -56,6 +56,13 @@ std::optional<double> Scorer::scoreIfReaches(const ShapeRow& shape, const Surviv
     return score(shape);
 }
 
+Result<void> checkQuery(const Signature& query, std::size_t attributed) {
+    if (query.attributes || attributed == 0) return {};
+    return fail(ErrorCode::kInvalidArgument,
+                "the query's signature has only points and weights, but those of the collection have "
+                "attributes; make the query's signature with the collection's profile");
+}
+
 std::unique_ptr<const Scorer> makeScorer(const Signature& query, const ScoreOptions& options) {
     auto published = makePublishedScorer(query, options);
     if (!query.attributes) return published;

@@ -15,6 +15,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "core/base/error.h"
 #include "core/matching/explanation.h"
 #include "core/matching/score_options.h"
 #include "core/matching/shape_row.h"
@@ -86,8 +87,8 @@ class Scorer {
     Scorer& operator=(const Scorer&) = delete;
     virtual ~Scorer() = default;
 
-    /// Whether the shape has what this scorer reads. No other member may be given one that has not;
-    /// `scan` leaves such rows out.
+    /// Whether the shape has what this scorer reads. Pass only such shapes to the other members; `scan`
+    /// leaves other rows out.
     [[nodiscard]] virtual bool compares(const ShapeRow& shape) const = 0;
 
     /// In [0, 1]; 1 for the same shape.
@@ -118,6 +119,10 @@ class Scorer {
         return explain(PackedShape(shape).row());
     }
 };
+
+/// Whether a query can be searched for among shapes of which `attributed` have attributes. Errors:
+/// kInvalidArgument (it has points and weights alone, they have more).
+[[nodiscard]] Result<void> checkQuery(const Signature& query, std::size_t attributed);
 
 /// The scorer of a query: with attributes it compares these where the other shape has them too, and
 /// points and weights otherwise. Keeps a copy of what it needs. `query` and `options` must be valid.

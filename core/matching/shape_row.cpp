@@ -54,7 +54,7 @@ PackedShape::PackedShape(const Signature& signature)
     const Body& body = signature.attributes->body;
     placement_.centre = body.centre;
     placement_.axes = body.axes;
-    const auto& segments = body.parts;
+    const auto& segments = body.segments;
     segmentCount_ = segments.size();
     for (std::size_t i = 0; i < segmentCount_; ++i) segments_[i] = packed(segments[i]);
     packStatistics(signature.attributes->statistics, firstHalf_, secondHalf_);

@@ -64,11 +64,7 @@ Result<void> check(const SearchOptions& options) {
 
 Result<void> check(const Signature& query, const SignatureSet& set, const SearchOptions& options) {
     RETURN_IF_ERROR(check(options));
-    if (!query.attributes && set.attributedCount() > 0) {
-        return fail(ErrorCode::kInvalidArgument,
-                    "the query's signature has only points and weights, but those of the collection have "
-                    "attributes; make the query's signature with the collection's profile");
-    }
+    RETURN_IF_ERROR(checkQuery(query, set.attributedCount()));
     return validate(options.score);
 }
 
@@ -299,10 +295,7 @@ Result<std::vector<SearchResult>> topKBatch(const std::vector<BatchQuery>& queri
         std::vector<SearchResult> results;
         results.reserve(queries.size());
         for (std::size_t q = 0; q < found.size(); ++q) {
-            if (!found[q]) {
-                return fail(found[q].error().code,
-                            "query " + std::to_string(q) + ": " + found[q].error().message);
-            }
+            if (!found[q]) return fail(withContext(found[q].error(), "query " + std::to_string(q) + ": "));
             results.push_back(std::move(*found[q]));
         }
         return results;

@@ -27,7 +27,7 @@ class SegmentArray {
 class SegmentSpan {
   public:
     SegmentSpan(const SegmentArray& segments) : data_(segments.data()), size_(segments.size()) {}
-    SegmentSpan(const Body& body) : data_(body.parts.data()), size_(body.parts.size()) {}
+    SegmentSpan(const Body& body) : data_(body.segments.data()), size_(body.segments.size()) {}
 
     [[nodiscard]] std::size_t size() const { return size_; }
     const SegmentDescriptor& operator[](std::size_t i) const { return data_[i]; }

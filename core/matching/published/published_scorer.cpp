@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "core/matching/kernel.h"
 #include "core/matching/published/alignment.h"
@@ -50,7 +51,8 @@ double underCeiling(double score, const ShapeRow& a, const ShapeRow& b) {
 
 class PublishedScorer : public Scorer {
   public:
-    PublishedScorer(const Signature& query, const ScoreOptions& options) : query_(query), options_(options) {}
+    PublishedScorer(const Signature& query, const ScoreOptions& options)
+        : query_(query), options_(options), anchored_(anchoredPoints(query_.row(), 1.0)) {}
 
     bool compares(const ShapeRow& shape) const final { return shape.pointCount > 0; }
 
@@ -58,21 +60,27 @@ class PublishedScorer : public Scorer {
         const ShapeRow query = query_.row();
         if (sameShape(query, shape, options_.keepScale)) return 1.0;
         const bool exchange = exchanges(query, shape);
-        const CommonScale scaled(exchange ? shape : query, exchange ? query : shape, options_);
-        const double similarity = bestAlignment(scaled.a, scaled.b, options_).matches.similarity;
-        return underCeiling(ratio(similarity, scaled.a, scaled.b), query, shape);
+        std::optional<AnchoredPoints> rescaled;
+        const AnchoredPoints& own = anchoredQuery(shape, rescaled);
+        const AnchoredPoints other = anchoredPoints(shape, inCommonUnit(shape, query, options_));
+        const AnchoredPoints& a = exchange ? other : own;
+        const AnchoredPoints& b = exchange ? own : other;
+        const double similarity = bestAlignment(a, b, options_).matches.similarity;
+        return underCeiling(ratio(similarity, a, b), query, shape);
     }
 
     double bound(const ShapeRow& shape) const final {
         const ShapeRow query = query_.row();
         if (sameShape(query, shape, options_.keepScale)) return 1.0;
         // Not exchanged: a bound need not have the same bits both ways.
-        const CommonScale scaled(query, shape, options_);
+        std::optional<AnchoredPoints> rescaled;
+        const AnchoredPoints& a = anchoredQuery(shape, rescaled);
+        const AnchoredPoints b = anchoredPoints(shape, inCommonUnit(shape, query, options_));
         // Pairs are one to one, so the points of either side bound the sum.
-        const double most = std::min(similarityBound(scaled.a, scaled.b, options_.kernelWidth),
-                                     similarityBound(scaled.b, scaled.a, options_.kernelWidth)) *
+        const double most = std::min(similarityBound(a, b, options_.kernelWidth),
+                                     similarityBound(b, a, options_.kernelWidth)) *
                             kBoundMargin;
-        const double value = std::min(1.0, most / leastWhole(most, scaled.a, scaled.b) * kBoundMargin);
+        const double value = std::min(1.0, most / leastWhole(most, a, b) * kBoundMargin);
         return underCeiling(value, query, shape);
     }
 
@@ -93,6 +101,15 @@ class PublishedScorer : public Scorer {
     virtual bool exchanges(const ShapeRow& query, const ShapeRow& shape) const = 0;
 
   private:
+    // The query in the unit in which it is compared with `shape`; `rescaled` gives room where that is not
+    // its own.
+    const AnchoredPoints& anchoredQuery(const ShapeRow& shape,
+                                        std::optional<AnchoredPoints>& rescaled) const {
+        const double factor = inCommonUnit(query_.row(), shape, options_);
+        if (factor == 1.0) return anchored_;
+        return rescaled.emplace(anchoredPoints(query_.row(), factor));
+    }
+
     Explanation explain(const ShapeRow& a, const ShapeRow& b) const {
         const CommonScale scaled(a, b, options_);
         const BestAlignment best = bestAlignment(scaled.a, scaled.b, options_);
@@ -120,6 +137,7 @@ class PublishedScorer : public Scorer {
 
     const PackedShape query_;
     const ScoreOptions options_;
+    const AnchoredPoints anchored_;  ///< the query in its own scale
 };
 
 class PublishedWholeScorer final : public PublishedScorer {
