@@ -82,7 +82,7 @@ TEST(CrashIsolation, CancellingEndsTheWait) {
         std::atomic<bool> cancel{false};
         std::atomic<bool> admitted{true};
         std::thread waiting([&] { admitted = CrashIsolation::Pass(gate, suspect, cancel).admitted(); });
-        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        EXPECT_TRUE(eventually([&] { return gate.waiting() == 1; }));
         cancel = true;
         waiting.join();
         EXPECT_FALSE(admitted);

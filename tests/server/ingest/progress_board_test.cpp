@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/eventually.h"
+
 namespace shapedb::ingest {
 namespace {
 
@@ -38,7 +40,7 @@ TEST(ProgressBoard, ChangeWakesTheWatcher) {
     const auto before = watch->status().sequence;
     const auto began = ProgressBoard::Clock::now();
     std::thread worker([&] {
-        std::this_thread::sleep_for(20ms);  // so that the watcher is most likely waiting
+        EXPECT_TRUE(testing::eventually([&] { return board.waiting(1) == 1; }));
         board.report(1, "flow", 0, 0);
     });
     watch->waitForChange(before, in(10s));

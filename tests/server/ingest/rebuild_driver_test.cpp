@@ -383,7 +383,7 @@ TEST_F(Driver, AbandonsARebuildWithUnreadableParameters) {
     ASSERT_TRUE(store.startRebuild(parts.id, "not parameters"));
     start();
     ASSERT_TRUE(eventually([&] { return store.runningRebuilds()->empty(); }));
-    EXPECT_NE(log->all().find("rebuild given up"), std::string::npos) << log->all();
+    EXPECT_NE(log->all().find("rebuild abandoned"), std::string::npos) << log->all();
 }
 
 TEST_F(Driver, PauseWaitsForARebuildThatIsBeingGivenUp) {
