@@ -31,7 +31,7 @@ constexpr double kOwnLinkInReaches = 1.5;  // of the mean reach of the two ends
 constexpr double kSmallGroupShare = 0.01;
 constexpr double kRareShare = 0.05;         // of the points: groups of like size hold less
 constexpr std::size_t kFewestOfABody = 24;  // points; a smaller group shows no surface
-constexpr std::size_t kCluster = 9;         // points; fewer are stray points, not a cluster
+constexpr std::size_t kCluster = 9;         // points; fewer are single outliers, not a cluster
 
 // Each point's nearest neighbours, without itself.
 struct Surroundings {
@@ -159,9 +159,9 @@ Result<Outliers> findOutliersOrThrow(const PointCloud& points, const NeighbourIn
     std::vector<Neighbour> found;
     for (std::size_t i = 0; i < points.size(); ++i) {
         const bool farFromAll = around->reach[i] > kHazeReach * around->common;
-        const bool stray =
+        const bool outlying =
             standsOff(*around, i, ratio) || (farFromAll && liesInHaze(points, index, points[i], found));
-        outliers.isOutlier[i] = stray ? 1 : 0;
+        outliers.isOutlier[i] = outlying ? 1 : 0;
     }
     markDebris(points, *around, outliers);
     return outliers;

@@ -132,7 +132,7 @@ Result<PreparedPoints> preparePoints(const PointCloud& points, const Preparation
                                      const std::function<Result<void>(const char*)>& begin) {
     RETURN_IF_ERROR(begin("sanitise"));
     auto begun = sanitiseAndDecimate(points, options.decimateTo, context, begin);
-    if (!begun) return begun;
+    RETURN_IF_ERROR(begun);
     Preparation work;
     work.prepared = std::move(*begun);
     if (options.outlierRatio > 0.0) {

@@ -24,7 +24,7 @@ struct Range {
     double length = 0.0;
 };
 
-// The range of the values without the tails: a few stray points do not set the length.
+// The range of the values without the tails: a few outlying points do not set the length.
 Range spanOf(std::vector<double> values) {
     const auto at = [&](double share) {
         const auto n = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1) + 0.5);

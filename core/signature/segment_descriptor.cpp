@@ -119,9 +119,9 @@ Body bodyOf(const std::vector<WeightedPoint>& points) {
 
 void setBody(const std::vector<WeightedPoint>& points, Body& body) {
     setFrame(points, body);
-    body.parts.clear();
-    body.parts.reserve(points.size());
-    for (const WeightedPoint& point : points) body.parts.push_back(descriptorOf(point, body));
+    body.segments.clear();
+    body.segments.reserve(points.size());
+    for (const WeightedPoint& point : points) body.segments.push_back(descriptorOf(point, body));
 }
 
 }  // namespace shapedb

@@ -52,9 +52,9 @@ constexpr double kSmallestLength = 1.0 / 1024.0;
 /// axes of their matter, in descending order of spread, right-handed. Signs of axes, and the order of axes of
 /// equal spread, are arbitrary, so a comparison of two bodies must try all.
 struct Body {
-    std::vector<SegmentDescriptor> parts;  ///< in the order of the points
-    Point3 centre;                         ///< in the coordinates of WeightedPoint::position
-    Matrix3 axes{};                        ///< rows: the frame's axes in those coordinates
+    std::vector<SegmentDescriptor> segments;  ///< in the order of the points
+    Point3 centre;                            ///< in the coordinates of WeightedPoint::position
+    Matrix3 axes{};                           ///< rows: the frame's axes in those coordinates
 };
 
 /// `points`: at least one, valid, as in a Signature. Deterministic.

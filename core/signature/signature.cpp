@@ -31,7 +31,7 @@ bool sameShape(const Signature& a, const Signature& b) noexcept {
     if (a.attributes) {
         return a.attributes->quality == b.attributes->quality &&
                a.attributes->statistics == b.attributes->statistics &&
-               a.attributes->body.parts == b.attributes->body.parts;
+               a.attributes->body.segments == b.attributes->body.segments;
     }
     if (a.points.size() != b.points.size()) return false;
     for (std::size_t i = 0; i < a.points.size(); ++i) {

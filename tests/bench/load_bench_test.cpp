@@ -12,7 +12,7 @@
 namespace shapedb::bench {
 namespace {
 
-TEST(LoadRun, Percentile) {
+TEST(LoadRun, PercentilesAreNearestRanks) {
     EXPECT_EQ(percentile({}, 0.5), 0.0);
     EXPECT_EQ(percentile({3.0, 1.0, 2.0}, 0.5), 2.0);
     EXPECT_EQ(percentile({3.0, 1.0, 2.0, 4.0}, 0.5), 2.0);
@@ -56,7 +56,7 @@ class LoadBench : public BenchTest {
     }
 };
 
-TEST_F(LoadBench, Ingest) {
+TEST_F(LoadBench, MeasuresHowFastScansAreIngested) {
     const auto figures = partOf(load("ingest"), "ingest");
     EXPECT_EQ(figures["rounds"].size(), 1U);
     EXPECT_GT(figures["core_scans_per_second"], 0.0);
@@ -64,7 +64,7 @@ TEST_F(LoadBench, Ingest) {
     EXPECT_GT(figures["ratio"], 0.0);
 }
 
-TEST_F(LoadBench, Latency) {
+TEST_F(LoadBench, MeasuresTheLatencyOfSearches) {
     const auto figures = partOf(load("latency"), "latency");
     EXPECT_EQ(figures["idle"]["queries"], 5);
     EXPECT_EQ(figures["busy"]["queries"], 5);
@@ -84,7 +84,7 @@ TEST_F(LoadBench, StartKeepsAGivenDataDirectory) {
               80);
 }
 
-TEST_F(LoadBench, Upload) {
+TEST_F(LoadBench, MeasuresHowFastPointsAreUploaded) {
     const auto figures = partOf(load("upload"), "upload");
     EXPECT_EQ(figures["point_bytes"], 1'200'000);
     EXPECT_LT(figures["growth_bytes"], 64 << 20);

@@ -85,7 +85,7 @@ TEST_F(StandardServices, ServerInfoTellsVersionAndLimits) {
     EXPECT_EQ(reply.value.limits().max_chunk_bytes(), 1u << 20);
 }
 
-TEST_F(StandardServices, StatsCount) {
+TEST_F(StandardServices, StatsCountShapesJobsAndSearches) {
     const auto before = statsOf(client);
     ASSERT_TRUE(addAndWait(client, collection, "k", dumbbell()).ok());
     ASSERT_TRUE(addAndWait(client, collection, "open", openSheet()).ok());

@@ -233,7 +233,7 @@ TEST(LocalResult, SignatureIsWhatTheServerWouldSend) {
     EXPECT_EQ(told.attributes->statistics[0].shares[1], 0.0f);
 }
 
-TEST(ShapeOutput, ShapeInJson) {
+TEST(ShapeOutput, WritesAFailedShapeAsJson) {
     client::Shape shape;
     shape.key = "cup";
     shape.sha256 = std::string("\x00\xff\x1a", 3);

@@ -9,7 +9,7 @@
 namespace shapedb {
 namespace {
 
-TEST(ExactCircumcentre, OfKnownTetrahedra) {
+TEST(ExactCircumcentre, AgreesWithTetrahedraSolvedByHand) {
     EXPECT_EQ(exactCircumcentre({{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}), (Point3{0.5, 0.5, 0.5}));
     EXPECT_EQ(exactCircumcentre({{{1, 1, 1}, {-1, -1, 1}, {-1, 1, -1}, {1, -1, -1}}}), (Point3{0, 0, 0}));
     // Nearly flat: a square of side 2 with one corner lifted by h. Three corners give x = y = 0, the fourth
@@ -18,7 +18,7 @@ TEST(ExactCircumcentre, OfKnownTetrahedra) {
     EXPECT_EQ(centre, (Point3{0, 0, 0x1p-41}));
 }
 
-TEST(ExactFlowMask, OfKnownTetrahedra) {
+TEST(ExactFlowMask, MarksTheFacetsTheCircumcentreLiesBeyond) {
     // Inside a regular tetrahedron; beyond the long facet of a corner of a cube.
     EXPECT_EQ(exactFlowMask({{{1, 1, 1}, {-1, 1, -1}, {-1, -1, 1}, {1, -1, -1}}}), 0U);
     EXPECT_EQ(exactFlowMask({{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}), 1U);

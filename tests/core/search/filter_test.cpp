@@ -9,8 +9,6 @@
 namespace shapedb {
 namespace {
 
-using Metadata = std::map<std::string, std::string>;
-
 Filter parsed(const std::string& text) {
     auto filter = Filter::parse(text);
     EXPECT_TRUE(filter) << text << ": " << (filter ? "" : filter.error().message);

@@ -180,11 +180,11 @@ TEST(AttributesInvariance, SameShapeComparesAttributes) {
     };
     differs([](Signature& s) { s.attributes->statistics[351] ^= 1; });
     differs([](Signature& s) { s.attributes->quality ^= 1; });
-    differs([](Signature& s) { s.attributes->body.parts.back().size[3] += 1.0f / 24.0f; });
-    differs([](Signature& s) { s.attributes->body.parts.back().size[0] -= 1.0f / 24.0f; });
-    differs([](Signature& s) { s.attributes->body.parts.front().position[1] += 1.0f / 16384.0f; });
-    differs([](Signature& s) { s.attributes->body.parts.back().share *= 0.99f; });
-    differs([](Signature& s) { s.attributes->body.parts.pop_back(); });
+    differs([](Signature& s) { s.attributes->body.segments.back().size[3] += 1.0f / 24.0f; });
+    differs([](Signature& s) { s.attributes->body.segments.back().size[0] -= 1.0f / 24.0f; });
+    differs([](Signature& s) { s.attributes->body.segments.front().position[1] += 1.0f / 16384.0f; });
+    differs([](Signature& s) { s.attributes->body.segments.back().share *= 0.99f; });
+    differs([](Signature& s) { s.attributes->body.segments.pop_back(); });
 }
 
 }  // namespace

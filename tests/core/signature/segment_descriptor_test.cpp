@@ -45,17 +45,17 @@ TEST(Body, FrameIsRightHandedAndCentred) {
     for (int round = 0; round < 300; ++round) {
         const auto points = randomPoints(random, 1 + random.below(kMaxSignaturePoints));
         const Body body = bodyOf(points);
-        ASSERT_EQ(body.parts.size(), points.size());
+        ASSERT_EQ(body.segments.size(), points.size());
         EXPECT_NEAR(determinant(body.axes), 1.0, 1e-9);
         double total = 0.0;
         Point3 centre;
         for (std::size_t i = 0; i < points.size(); ++i) {
             total += points[i].weight;
-            centre = centre + static_cast<double>(points[i].weight) * at(body.parts[i].position);
+            centre = centre + static_cast<double>(points[i].weight) * at(body.segments[i].position);
         }
         EXPECT_LT(length((1.0 / total) * centre), kHalfStep) << "the origin is the centroid of all matter";
         for (std::size_t i = 0; i < points.size(); ++i) {
-            const SegmentDescriptor& part = body.parts[i];
+            const SegmentDescriptor& part = body.segments[i];
             const Point3 expected = rotate(body.axes, at(points[i].position) - body.centre);
             EXPECT_LT(distance(at(part.position), expected), kHalfStep);
             EXPECT_NEAR(part.radius, length(expected), kHalfStep);
@@ -112,8 +112,8 @@ TEST(Body, FrameLiesAlongThePrincipalAxes) {
         for (std::size_t n = 0; n < points.size(); ++n) {
             const auto& c = points[n].covariance;
             const Matrix3 own = {{{c[0], c[1], c[2]}, {c[1], c[3], c[4]}, {c[2], c[4], c[5]}}};
-            const std::array<double, 3> p{body.parts[n].position[0], body.parts[n].position[1],
-                                          body.parts[n].position[2]};
+            const std::array<double, 3> p{body.segments[n].position[0], body.segments[n].position[1],
+                                          body.segments[n].position[2]};
             total += points[n].weight;
             for (std::size_t i = 0; i < 3; ++i) {
                 for (std::size_t j = 0; j < 3; ++j) {
@@ -141,7 +141,7 @@ TEST(SegmentDescriptor, SizesAreLogarithmsOfExtentsAndMaximumRadius) {
     point.volumeShare = 1.0f;
     point.maximumRadius = 0.125f;
     point.covariance = {0.0625f * 0.0625f, 0, 0, 0.25f * 0.25f, 0, 0.5f * 0.5f};
-    const SegmentDescriptor part = bodyOf({point}).parts.front();
+    const SegmentDescriptor part = bodyOf({point}).segments.front();
     EXPECT_NEAR(part.size[0], -1.0f, 1e-6f);
     EXPECT_NEAR(part.size[1], -2.0f, 1e-6f);
     EXPECT_NEAR(part.size[2], -4.0f, 1e-6f);
@@ -152,12 +152,12 @@ TEST(SegmentDescriptor, SizesAreLogarithmsOfExtentsAndMaximumRadius) {
     // Flat matter, rounded below zero, and a maximum in a flat tetrahedron: both ends are bounded.
     point.covariance = {1e-20f, 0, 0, -1e-9f, 0, 0};
     point.maximumRadius = 1e30f;
-    const SegmentDescriptor flat = bodyOf({point}).parts.front();
+    const SegmentDescriptor flat = bodyOf({point}).segments.front();
     for (std::size_t i = 0; i < 3; ++i)
         EXPECT_EQ(flat.size[i], std::log2(static_cast<float>(kSmallestLength)));
     EXPECT_EQ(flat.size[3], 0.0f);
     point.maximumRadius = 1e-30f;
-    EXPECT_EQ(bodyOf({point}).parts.front().size[3], std::log2(static_cast<float>(kSmallestLength)));
+    EXPECT_EQ(bodyOf({point}).segments.front().size[3], std::log2(static_cast<float>(kSmallestLength)));
 }
 
 TEST(SegmentDescriptor, SizesAndRadiiDoNotChangeUnderRotation) {
@@ -174,8 +174,9 @@ TEST(SegmentDescriptor, SizesAndRadiiDoNotChangeUnderRotation) {
         const Body a = bodyOf(points);
         const Body b = bodyOf(turned);
         for (std::size_t i = 0; i < points.size(); ++i) {
-            EXPECT_NEAR(a.parts[i].radius, b.parts[i].radius, 1e-6f);
-            for (std::size_t k = 0; k < 4; ++k) EXPECT_NEAR(a.parts[i].size[k], b.parts[i].size[k], 1e-3f);
+            EXPECT_NEAR(a.segments[i].radius, b.segments[i].radius, 1e-6f);
+            for (std::size_t k = 0; k < 4; ++k)
+                EXPECT_NEAR(a.segments[i].size[k], b.segments[i].size[k], 1e-3f);
         }
     }
 }

@@ -60,12 +60,12 @@ Signature randomAttributed(Random& random, std::size_t count) {
 void expectSameBody(const Body& a, const Body& b) {
     EXPECT_EQ(a.centre, b.centre);
     EXPECT_EQ(a.axes, b.axes);
-    ASSERT_EQ(a.parts.size(), b.parts.size());
-    for (std::size_t i = 0; i < a.parts.size(); ++i) {
-        EXPECT_EQ(a.parts[i].position, b.parts[i].position);
-        EXPECT_EQ(a.parts[i].radius, b.parts[i].radius);
-        EXPECT_EQ(a.parts[i].share, b.parts[i].share);
-        EXPECT_EQ(a.parts[i].size, b.parts[i].size);
+    ASSERT_EQ(a.segments.size(), b.segments.size());
+    for (std::size_t i = 0; i < a.segments.size(); ++i) {
+        EXPECT_EQ(a.segments[i].position, b.segments[i].position);
+        EXPECT_EQ(a.segments[i].radius, b.segments[i].radius);
+        EXPECT_EQ(a.segments[i].share, b.segments[i].share);
+        EXPECT_EQ(a.segments[i].size, b.segments[i].size);
     }
 }
 
@@ -90,7 +90,7 @@ std::string goldenHead(const std::string& version) {
     return bytes;
 }
 
-TEST(SignatureCodecAttributes, GoldenBytes) {
+TEST(SignatureCodecAttributes, ReadsAndWritesTheGoldenBytes) {
     std::string golden = goldenHead("0300");
     for (int i = 0; i < 432; i += 2) {
         golden.push_back(static_cast<char>((7 * i + 3) % 16 + 16 * ((7 * (i + 1) + 3) % 16)));
@@ -105,7 +105,7 @@ TEST(SignatureCodecAttributes, GoldenBytes) {
 }
 
 // Version 2 kept roots in 255 steps; they are read as today's levels.
-TEST(SignatureCodecAttributes, GoldenBytesOfVersion2) {
+TEST(SignatureCodecAttributes, ReadsTheGoldenBytesOfVersion2) {
     std::string golden = goldenHead("0200");
     for (int i = 0; i < 432; ++i) golden.push_back(static_cast<char>((7 * i + 3) % 256));
     for (const int byte : {0x7a, 0x99, 0x93, 0xff}) golden.push_back(static_cast<char>(byte));
@@ -165,7 +165,7 @@ TEST(SignatureCodecAttributes, DecodingReplacesEarlierContents) {
         EXPECT_EQ(used.attributes.has_value(), fresh.attributes.has_value());
         if (!fresh.attributes) continue;
         const Body& body = used.attributes->body;
-        EXPECT_EQ(body.parts, fresh.attributes->body.parts);
+        EXPECT_EQ(body.segments, fresh.attributes->body.segments);
         EXPECT_EQ(body.centre, fresh.attributes->body.centre);
         EXPECT_EQ(body.axes, fresh.attributes->body.axes);
     }

@@ -39,7 +39,7 @@ std::string hex(const std::string& bytes) {
 }
 
 // Stored signatures must stay readable: these bytes never change.
-TEST(SignatureCodec, GoldenBytes) {
+TEST(SignatureCodec, ReadsAndWritesTheGoldenBytes) {
     const std::string golden =
         "53444247"          // SDBG
         "0100"              // version 1
