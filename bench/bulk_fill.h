@@ -19,7 +19,7 @@ struct FillShape {
 /// Creates the database at `options.path`, or opens it as openSqliteStore does, makes the collection and
 /// puts `count` READY shapes into it, `make(0)`, `make(1)`, ... Each has the same four points, so that
 /// the database passes `check` (but a rebuild would replace all signatures by that of a tetrahedron).
-/// Commits now and then: after an error part of it is there.
+/// Commits in batches: after an error some rows are already stored.
 ///
 /// Errors: those of openSqliteStore; kAlreadyExists (collection, or a key); kCancelled,
 /// kDeadlineExceeded. Not thread-safe.

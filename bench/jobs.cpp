@@ -162,7 +162,7 @@ Result<Work> storeJob(const JobFolder& folder) {
         const std::string signature(1'000, 's');
         for (std::size_t i = 0; i < kStoredShapes; ++i) {
             const auto stored = storeOne(*store, id, "shape-" + std::to_string(i), points, signature);
-            if (!stored) return stored;
+            RETURN_IF_ERROR(stored);
         }
         const auto rows = store->loadIndex(id, 0, kStoredShapes);
         RETURN_IF_ERROR(rows);

@@ -282,7 +282,7 @@ Result<Start> startOnce(const LoadSettings& settings, const std::string& data, c
     const auto health = client->health("", cancelledBy(context));
     RETURN_IF_ERROR(health);
     if (*health != client::Health::kServing)
-        return fail(ErrorCode::kUnavailable, "the server listens but does not say that it serves");
+        return fail(ErrorCode::kUnavailable, "the server listens but does not report that it is serving");
     start.serving = since(began);
     const auto processor = server->processorSeconds();
     RETURN_IF_ERROR(processor);

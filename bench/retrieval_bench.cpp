@@ -37,7 +37,7 @@ const std::vector<double> kDefaultNoise = {0.0, 0.005, 0.01};
 
 Result<RetrievalTask> taskOf(const RetrievalFlags& flags) {
     if (!flags.task.gallery.empty() && !flags.plot.empty()) {
-        return fail(ErrorCode::kInvalidArgument, "--plot is for leave-one-out: leave --gallery out");
+        return fail(ErrorCode::kInvalidArgument, "--plot shows leave-one-out only: omit --gallery");
     }
     return cli::retrievalTask(flags.task);
 }

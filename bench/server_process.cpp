@@ -23,7 +23,7 @@ std::string procPath(pid_t process, const char* name) {
     return "/proc/" + std::to_string(process) + "/" + name;
 }
 
-tl::unexpected<Error> gone() { return fail(ErrorCode::kUnavailable, "shapedbd is not running any more"); }
+tl::unexpected<Error> gone() { return fail(ErrorCode::kUnavailable, "shapedbd is no longer running"); }
 
 }  // namespace
 

@@ -1,4 +1,4 @@
-// Runs shapedbd as a child process, so that its time and memory can be told from ours.
+// Runs shapedbd as a child process, so that its time and memory are measured separately.
 #pragma once
 
 #include <cstdint>

@@ -131,7 +131,9 @@ Result<SignatureGenerator> SignatureGenerator::create(const Options& options, co
     for (std::size_t i = 0; i < made.size(); ++i) {
         if (good[i] != 0) generator.anchors_.push_back(std::move(made[i]));
     }
-    if (generator.anchors_.size() < 3) return fail(ErrorCode::kInternal, "the synthetic families fail");
+    if (generator.anchors_.size() < 3) {
+        return fail(ErrorCode::kInternal, "fewer than 3 synthetic shapes could be described");
+    }
     return generator;
 }
 

@@ -172,7 +172,7 @@ class TopKRun {
             std::vector<double> latencies;
             Result<void> done;
             withThreads(flags_.threads, [&] { done = searchAll(&latencies); });
-            if (!done) return done;
+            RETURN_IF_ERROR(done);
             all.insert(all.end(), latencies.begin(), latencies.end());
             medians.push_back(median(latencies));
             if (peer == nullptr) continue;
@@ -228,20 +228,20 @@ class TopKRun {
                 done = searchAll(nullptr);
                 alone = millisecondsSince(start);
             });
-            if (!done) return done;
+            RETURN_IF_ERROR(done);
             withThreads(flags_.threads, [&] {
                 const auto start = Clock::now();
                 done = searchAll(nullptr);
                 split = millisecondsSince(start);
             });
-            if (!done) return done;
+            RETURN_IF_ERROR(done);
             withThreads(flags_.threads, [&] {
                 const auto start = Clock::now();
                 const auto results = topKBatch(batch, set_, options_, bench_.context());
                 together = millisecondsSince(start);
                 if (!results) done = fail(results.error());
             });
-            if (!done) return done;
+            RETURN_IF_ERROR(done);
             inside.push_back(alone / split);
             over.push_back(alone / together);
         }
@@ -336,7 +336,7 @@ Result<std::vector<Mixture>> mixturesOf(const std::string& text) {
         if (text == name(mixture)) return std::vector<Mixture>{mixture};
     }
     return fail(ErrorCode::kInvalidArgument,
-                "--mixture is " + text + "; it is plain, duplicates, hard or all");
+                "unknown --mixture '" + text + "'; use plain, duplicates, hard or all");
 }
 
 Result<int> runTopK(const Flags& flags, Bench& bench) {

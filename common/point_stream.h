@@ -7,7 +7,7 @@ namespace shapedb {
 
 /// Bytes of one point.
 constexpr std::size_t kPointBytes = 12;
-/// A chunk of points is no larger, in bytes.
+/// Largest chunk of points, in bytes.
 constexpr std::size_t kMaxChunkBytes = std::size_t{1} << 20;
 
 }  // namespace shapedb

@@ -1,5 +1,5 @@
-// How SIGINT and SIGTERM end the programs. SIGPIPE is ignored: a reader that goes away is a failed
-// write.
+// How SIGINT and SIGTERM end the programs. SIGPIPE is ignored: when a reader goes away, the write
+// fails.
 #pragma once
 
 #include <atomic>

@@ -96,7 +96,7 @@ Result<void> Daemon::Parts::drain() {
     grpc.reportNotServing();
     admission.calls.drain();
     const bool empty = admission.calls.waitUntilEmpty(until);
-    if (!empty) log->warn("drain time is over: cancelling the calls still running");
+    if (!empty) log->warn("drain time has run out: cancelling the calls still running");
     grpc.shutDown();
     return catalog.stop();
 }

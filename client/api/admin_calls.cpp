@@ -43,7 +43,7 @@ Result<BackupReport> receiveBackup(Stream& stream, BackupFile& file, const RunCo
                                                    " bytes; nothing was kept");
     }
     if (expected != report.sha256) {
-        return fail(ErrorCode::kChecksumMismatch, "the backup was damaged on the way; nothing was kept");
+        return fail(ErrorCode::kChecksumMismatch, "the backup was damaged in transfer; nothing was kept");
     }
     return report;
 }
@@ -161,7 +161,7 @@ Result<BackupReport> Client::backupToFile(const std::string& path, const RunCont
                                    return stream->Finish();
                                });
     RETURN_IF_ERROR(made);
-    if (!report) return report;
+    RETURN_IF_ERROR(report);
     RETURN_IF_ERROR(file.commit());
     return report;
 }

@@ -50,7 +50,7 @@ struct ClientOptions {
 /// A connection to one server, opened when first needed and reopened when lost.
 ///
 /// Every call blocks until it is answered. A RunContext can cancel it (kCancelled, within about 20 ms) and
-/// limit its time (kDeadlineExceeded), and hears the progress of uploads and downloads in bytes.
+/// limit its time (kDeadlineExceeded), and receives the progress of uploads and downloads in bytes.
 ///
 /// Errors of every call, not repeated below: the server's, with its name and message; kUnavailable (cannot be
 /// reached); kDeadlineExceeded; kCancelled; kOutOfMemory; kInternal. Scans are checked before they are sent:

@@ -12,7 +12,7 @@ namespace shapedb::cli {
     return {[](const std::string& text) {
                 double value = 0.0;
                 const bool good = CLI::detail::lexical_cast(text, value) && value >= 0.0 && value <= 1e300;
-                return good ? std::string() : "'" + text + "' is not a number of 0 or more";
+                return good ? std::string() : "'" + text + "' must be a number, 0 or greater";
             },
             ">=0", "at least zero"};
 }
@@ -22,7 +22,7 @@ namespace shapedb::cli {
     return {[](const std::string& text) {
                 double value = 0.0;
                 const bool good = CLI::detail::lexical_cast(text, value) && value > 0.0 && value <= 1e300;
-                return good ? std::string() : "'" + text + "' is not a number above 0";
+                return good ? std::string() : "'" + text + "' must be a number greater than 0";
             },
             ">0", "above zero"};
 }

@@ -35,7 +35,7 @@ Result<Signature> describeFile(Session& session, const CompareFlags& flags, cons
     const auto scan = loadScan(path, flags.scan, flags.scan.seed, context);
     RETURN_IF_ERROR(scan);
     const auto description = describe(scan->points, parameters, context);
-    if (!description) return fail(description.error().code, path + ": " + description.error().message);
+    if (!description) return fail(withContext(description.error(), path + ": "));
     return description->signature;
 }
 

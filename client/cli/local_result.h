@@ -1,4 +1,4 @@
-// What the command computes itself, in the form the server answers in, so that both are shown alike.
+// What the command computes itself, in the form of a reply of the server, so that both are shown alike.
 #pragma once
 
 #include "client/api/types.h"

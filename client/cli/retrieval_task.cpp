@@ -71,7 +71,7 @@ Result<void> keepClasses(std::vector<CollectionScan>& scans, const ClassFlags& c
 Result<Match> matchFromName(const std::string& name) {
     if (name == "folder") return Match::kFolder;
     if (name == "stem") return Match::kStem;
-    return fail(ErrorCode::kInvalidArgument, "'" + name + "' is not a way to match; use folder or stem");
+    return fail(ErrorCode::kInvalidArgument, "unknown --match '" + name + "'; use folder or stem");
 }
 
 }  // namespace
@@ -90,11 +90,11 @@ Result<std::vector<CollectionScan>> listCollection(const std::vector<std::string
 
 Result<std::vector<CollectionScan>> listClasses(const std::string& root, const ClassFlags& classes) {
     auto scans = listCollection({root});
-    if (!scans) return scans;
+    RETURN_IF_ERROR(scans);
     for (CollectionScan& scan : *scans) {
         const std::size_t slash = scan.name.find('/');
         if (slash == std::string::npos) {
-            return fail(ErrorCode::kInvalidArgument, scan.path + " is in no class folder; " + root +
+            return fail(ErrorCode::kInvalidArgument, scan.path + " is not in a class folder; " + root +
                                                          " must have one folder per class (DIR/CLASS/FILE)");
         }
         scan.label = scan.name.substr(0, slash);

@@ -38,14 +38,14 @@ struct ClassFlags {
 /// The scans of ROOT/CLASS/... at any depth, by path, labelled by the folder right below the root; only
 /// those of the selected classes.
 ///
-/// Errors: those of listScanFiles; kInvalidArgument when a file is in no class folder, a class of the flags
-/// does not exist (the message lists those that do), or none is left.
+/// Errors: those of listScanFiles; kInvalidArgument when a file is not in a class folder, a class of the
+/// flags does not exist (the message lists those that do), or none is left.
 [[nodiscard]] Result<std::vector<CollectionScan>> listClasses(const std::string& root,
                                                               const ClassFlags& classes = {});
 
 /// What makes a gallery entry right for a query.
 enum class Match {
-    kFolder,  ///< same label, another file: a query is no answer to itself
+    kFolder,  ///< same label, another file: a query does not count as its own answer
     kStem,    ///< same file name without extension, in any folder: a noisy copy has to find the clean file
 };
 

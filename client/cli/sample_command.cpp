@@ -84,7 +84,7 @@ Result<void> writeSample(const SampleFlags& flags, const SampleFile& file) {
     options.seed = fileSeed(flags.seed, sampleName(file.family, file.number));
     options.randomPose = !flags.upright;
     const auto scan = scanOf(*solid, options);
-    if (!scan) return fail(scan.error().code, file.path + ": " + scan.error().message);
+    if (!scan) return fail(withContext(scan.error(), file.path + ": "));
     return writePointsPly(file.path, *scan);
 }
 

@@ -6,6 +6,7 @@
 
 #include "client/cli/checks.h"
 #include "core/base/random.h"
+#include "core/base/return_if_error.h"
 #include "core/synthetic/noise.h"
 
 namespace shapedb::cli {
@@ -51,7 +52,7 @@ Result<Scan> loadScan(const std::string& path, const ScanFlags& flags, std::uint
     options.meshSamples = flags.meshSamples;
     options.seed = flags.seed;
     auto scan = readScan(path, options, context);
-    if (!scan) return scan;
+    RETURN_IF_ERROR(scan);
     // Two streams, so that the subset does not depend on the noise.
     Random random(seed);
     const std::uint64_t noiseSeed = random.next();

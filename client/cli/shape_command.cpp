@@ -148,7 +148,7 @@ Result<client::ListPage> listAll(const client::Client& client, const ListFlags& 
         const std::uint64_t missing = flags.limit ? *flags.limit - all.shapes.size() : kPageSize;
         request.pageSize = static_cast<std::uint32_t>(std::min<std::uint64_t>(kPageSize, missing));
         auto page = client.listShapes(request, context);
-        if (!page) return page;
+        RETURN_IF_ERROR(page);
         std::move(page->shapes.begin(), page->shapes.end(), std::back_inserter(all.shapes));
         all.nextCursor = page->nextCursor;
         request.cursor = page->nextCursor;

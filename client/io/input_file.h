@@ -34,7 +34,7 @@ class InputFile {
     std::uint64_t offset() const { return bufferOffset_ + begin_; }
     /// Bytes from offset() to the end of the file; unknown for a pipe.
     std::optional<std::uint64_t> remaining() const;
-    /// False only if fewer than `bytes` remain for certain.
+    /// False only if fewer than `bytes` are known to remain.
     bool mayHold(std::uint64_t bytes) const;
 
     /// The bytes in the buffer not yet consumed. Valid until the next call of a non-const member.

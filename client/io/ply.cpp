@@ -264,7 +264,7 @@ class PlyBody {
                 auto done = j != indices ? skipProperty(file_, record, element, i, element.properties[j])
                             : strips ? readIndices<TriangleStrip>(record, element, i, element.properties[j])
                                      : readIndices<PolygonFan>(record, element, i, element.properties[j]);
-                if (!done) return done;
+                RETURN_IF_ERROR(done);
             }
             RETURN_IF_ERROR(endRecord(record, element, i));
         }

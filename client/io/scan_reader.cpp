@@ -144,7 +144,7 @@ Result<PointCloud> samplePoints(const std::string& path, ScanContent&& content, 
     }
     const TriangleMesh mesh = {std::move(content.vertices), std::move(content.triangles)};
     auto points = sampleSurface(mesh, options.meshSamples, options.seed);
-    if (!points) return fail(points.error().code, path + ": " + points.error().message);
+    if (!points) return fail(withContext(points.error(), path + ": "));
     return points;
 }
 

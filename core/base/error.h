@@ -74,6 +74,12 @@ struct Error {
 template <typename T>
 using Result = tl::expected<T, Error>;
 
+/// The same error, saying first what it is about: "query 3: " or the path of a file.
+[[nodiscard]] inline Error withContext(Error error, const std::string& prefix) {
+    error.message.insert(0, prefix);
+    return error;
+}
+
 /// `return fail(ErrorCode::kNotFound, "...");` from any function returning a Result.
 inline tl::unexpected<Error> fail(ErrorCode code, std::string message) {
     return tl::unexpected<Error>(Error{code, std::move(message)});

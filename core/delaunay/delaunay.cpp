@@ -253,7 +253,7 @@ Result<Tetrahedra> triangulateInOrder(const PointCloud& points, const std::vecto
     }
     LargeVector<Site>().swap(sites);  // unlike clear(), frees the memory
     auto flat = flatten(cells, order, context);
-    if (!flat) return flat;
+    RETURN_IF_ERROR(flat);
     RETURN_IF_ERROR(computeBalls(points, *flat, cells.recycleCells(), context));
     return flat;
 }

@@ -20,7 +20,7 @@ struct SurfaceColumns {
 };
 
 /// A grid of cubic cells over the box of the points and some margin. Each cell knows the point nearest to its
-/// middle; in a few of a hundred cells, most of them far from all points, one that is up to half a cell
+/// middle; in a few per cent of the cells, most of them far from all points, one that is up to half a cell
 /// further. A place outside the grid takes the cell of the border that is nearest to it.
 class NearestGrid {
   public:

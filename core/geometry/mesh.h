@@ -1,4 +1,4 @@
-// Triangle meshes, only as far as it takes to turn one into a point cloud.
+// Triangle meshes, with no more than it takes to turn one into a point cloud.
 #pragma once
 
 #include <array>

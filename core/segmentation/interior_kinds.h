@@ -1,4 +1,4 @@
-// How an interior may be found, and where one came from. Apart from the rest of core/segmentation because
+// How an interior may be found, and where one came from. Kept apart from core/segmentation because
 // the client library and the wire use these two as well.
 #pragma once
 

@@ -196,7 +196,7 @@ Result<PreparedPoints> prepare(const PointCloud& points, const SegmentationOptio
                                const RunContext& context, StageClock& clock, Segmentation& result) {
     auto prepared = preparePoints(points, options.preparation, context,
                                   [&](const char* stage) { return clock.begin(stage); });
-    if (!prepared) return prepared;
+    RETURN_IF_ERROR(prepared);
     result.duplicates = prepared->duplicates;
     result.outliers = prepared->outliers;
     result.outlierClusters = prepared->outlierClusters;

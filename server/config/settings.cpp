@@ -20,7 +20,7 @@ Result<std::uint64_t> parseUnsigned(const std::string& text) {
     std::uint64_t value = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
     if (error != std::errc() || end != text.data() + text.size() || text.empty()) {
-        return fail(ErrorCode::kInvalidArgument, quoted(text) + " is not a whole number of 0 or more");
+        return fail(ErrorCode::kInvalidArgument, quoted(text) + " must be a whole number, 0 or greater");
     }
     return value;
 }
@@ -118,7 +118,8 @@ Setting choice(const std::string& key, std::vector<std::string> names, Field fie
     Setting setting = named(key, SettingKind::kText, list, std::move(help));
     setting.assign = [=](ServerConfig& config, const std::string& text) -> Result<void> {
         if (std::find(names.begin(), names.end(), text) == names.end()) {
-            return fail(ErrorCode::kInvalidArgument, quoted(text) + " is none of " + list);
+            return fail(ErrorCode::kInvalidArgument,
+                        "unknown value " + quoted(text) + "; use one of " + list);
         }
         field(config) = text;
         return {};

@@ -1,4 +1,4 @@
-// The log line of a scan that is quarantined, whoever finds that it has to be.
+// The log line of a quarantined scan, the same from workers and from rebuilds.
 #pragma once
 
 #include <cstdint>

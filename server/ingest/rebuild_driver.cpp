@@ -82,7 +82,7 @@ Result<store::Rebuild> RebuildDriver::begin(const store::Collection& collection,
                                               "' with other parameters is running: wait for it or cancel it");
     }
     auto started = store_.startRebuild(collection.id, text);
-    if (!started) return started;
+    RETURN_IF_ERROR(started);
     log_->info("rebuild started", {{"collection", collection.name},
                                    {"rebuild", started->id},
                                    {"generation", started->targetGeneration},
@@ -216,7 +216,7 @@ RebuildDriver::ActivePtr RebuildDriver::activate(std::unique_lock<std::mutex>& l
         active->parameters = *parameters;
         return active;
     }
-    log_->error("rebuild given up", fieldsOf(active->rebuild, parameters.error()));
+    log_->error("rebuild abandoned", fieldsOf(active->rebuild, parameters.error()));
     giveUp(active, lock);
     return nullptr;
 }

@@ -347,7 +347,7 @@ void WorkerPool::stopSearching(const store::Shape& failed) {
     if (refreshed) return;
     auto fields = telemetry::fieldsOf(refreshed.error());
     fields.push_back({"shape", failed.id});
-    log_->error("failed scan is still searched", fields);
+    log_->error("a failed scan still appears in searches", fields);
 }
 
 void WorkerPool::putBack(const store::Job& job) {

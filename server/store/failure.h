@@ -1,5 +1,5 @@
 // How errors travel inside a store: as the exception `Failure`, which `guarded` turns into an
-// Error at the border of every public function. SQL code stays in straight lines, and
+// Error at the boundary of every public function. SQL code stays in straight lines, and
 // transactions roll back on every way out.
 #pragma once
 

@@ -36,15 +36,15 @@ Result<void> requireVersion(const std::string& key, std::int64_t actual,
 Result<void> requireRoom(const PutRequest& request, const QueueDepth& others) {
     const std::uint64_t bytes = request.scan.bytes();
     if (request.maxQueuedJobs > 0 && others.jobs >= request.maxQueuedJobs) {
-        return fail(ErrorCode::kQueueFull, "the ingest queue holds " + std::to_string(others.jobs) +
-                                               " scans of at most " + std::to_string(request.maxQueuedJobs) +
-                                               "; retry later");
+        return fail(ErrorCode::kQueueFull, "the ingest queue is full (" + std::to_string(others.jobs) +
+                                               " of " + std::to_string(request.maxQueuedJobs) +
+                                               " scans); retry later");
     }
     if (request.maxQueuedBytes > 0 && others.bytes + bytes > request.maxQueuedBytes) {
-        return fail(ErrorCode::kQueueFull, "the ingest queue holds " + std::to_string(others.bytes) +
-                                               " bytes of at most " + std::to_string(request.maxQueuedBytes) +
-                                               ", no room for " + std::to_string(bytes) +
-                                               " more; retry later");
+        return fail(ErrorCode::kQueueFull, "the ingest queue has no room for " + std::to_string(bytes) +
+                                               " more bytes (" + std::to_string(others.bytes) + " of " +
+                                               std::to_string(request.maxQueuedBytes) +
+                                               " bytes taken); retry later");
     }
     return {};
 }

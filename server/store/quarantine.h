@@ -1,4 +1,4 @@
-// Scans that bring the server down are not segmented for ever: after so many deaths of the process a
+// Scans that bring the server down are not segmented for ever: after several deaths of the process a
 // scan is quarantined, which means failed until its points are replaced or its collection is rebuilt.
 #pragma once
 

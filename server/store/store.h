@@ -102,7 +102,7 @@ struct ShapeFilter {
     std::optional<ShapeState> state;
     /// Called for each row inside the read; null accepts all. Must not call the store.
     std::function<bool(const Shape&)> accept;
-    /// Looked at before each row: a read that nobody waits for ends there.
+    /// Checked before each row, so that a read whose caller has gone stops.
     RunContext context{};
 };
 

@@ -14,7 +14,7 @@
 namespace shapedb::store {
 
 /// SHA-256 of the points as they travel: packed little-endian float32 x y z.
-using Checksum = std::array<std::uint8_t, 32>;
+using Checksum = Sha256Digest;
 
 /// Packed x y z as points. Throws std::bad_alloc.
 [[nodiscard]] PointCloud toCloud(const std::vector<float>& xyz);

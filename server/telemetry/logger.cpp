@@ -107,7 +107,8 @@ Result<Level> levelFromName(const std::string& name) {
     if (name == "info") return Level::kInfo;
     if (name == "warn") return Level::kWarn;
     if (name == "error") return Level::kError;
-    return fail(ErrorCode::kInvalidArgument, "'" + name + "' is none of trace, debug, info, warn, error");
+    return fail(ErrorCode::kInvalidArgument,
+                "unknown log level '" + name + "'; use trace, debug, info, warn or error");
 }
 
 std::string formatText(const std::string& message, const std::vector<Field>& fields) {

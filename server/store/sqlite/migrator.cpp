@@ -92,7 +92,8 @@ void verifySchema(Connection& connection, const std::vector<Migration>& migratio
     }
     for (const auto& entry : actual) {
         if (expected.count(entry.first) == 0) {
-            raise(ErrorCode::kDataLoss, "the database has a " + entry.first + " that is not ours; drop it");
+            raise(ErrorCode::kDataLoss,
+                  "the database has a " + entry.first + " that ShapeDB did not create; drop it");
         }
     }
 }
@@ -120,7 +121,7 @@ void migrate(Connection& connection, const std::vector<Migration>& migrations, s
     }
     const std::size_t applied = version == 0 ? 0 : verifyRecord(connection, migrations);
     if (applied != static_cast<std::size_t>(version)) {
-        raise(ErrorCode::kDataLoss, "the database says schema version " + std::to_string(version) +
+        raise(ErrorCode::kDataLoss, "the database claims to have schema version " + std::to_string(version) +
                                         " but records " + std::to_string(applied) + " migrations");
     }
     for (std::size_t i = applied; i < migrations.size(); ++i) apply(connection, migrations[i], nowMs);

@@ -92,11 +92,11 @@ TEST_F(PutRules, TheQueueHoldsAtMostItsLimits) {
     request.maxQueuedJobs = 3;
     EXPECT_TRUE(requireRoom(request, {2, 1000}));
     expectError(requireRoom(request, {3, 0}).error(), ErrorCode::kQueueFull,
-                "the ingest queue holds 3 scans of at most 3; retry later");
+                "the ingest queue is full (3 of 3 scans); retry later");
     request.maxQueuedBytes = 100;
     EXPECT_TRUE(requireRoom(request, {2, 52}));
     expectError(requireRoom(request, {2, 53}).error(), ErrorCode::kQueueFull,
-                "the ingest queue holds 53 bytes of at most 100, no room for 48 more; retry later");
+                "the ingest queue has no room for 48 more bytes (53 of 100 bytes taken); retry later");
 }
 
 }  // namespace
