@@ -43,7 +43,7 @@ Error errorOf(const grpc::Status& status, const TrailingMetadata& trailing, cons
         case grpc::StatusCode::DEADLINE_EXCEEDED:
             return {error.code, "the server at " + address + " did not answer before the deadline"};
         case grpc::StatusCode::UNIMPLEMENTED:
-            return {error.code, "the server at " + address + " does not know this call (" + error.message +
+            return {error.code, "the server at " + address + " does not support this call (" + error.message +
                                     "): is it a ShapeDB server, and new enough?"};
         default: return error;
     }

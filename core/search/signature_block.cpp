@@ -62,7 +62,7 @@ void SignatureBlock::append(const IndexEntry& entry) {
         HalfRow first, second;
         packStatistics(signature.attributes->statistics, first, second);
         appendStatistics(first, second);
-        for (const SegmentDescriptor& segment : signature.attributes->body.parts) {
+        for (const SegmentDescriptor& segment : signature.attributes->body.segments) {
             segments_.push_back(packed(segment));
         }
     } else {

@@ -1,4 +1,4 @@
-// Background work must not slow down the calls that somebody waits for.
+// Background work must not slow down the calls that clients wait for.
 #pragma once
 
 #include <functional>

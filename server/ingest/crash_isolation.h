@@ -1,6 +1,6 @@
 // Keeps scans that may have crashed the server apart from the others.
 //
-// When the process dies, every scan in hand is a suspect. After the restart suspects are segmented
+// When the process dies, every scan being segmented is a suspect. After the restart suspects are segmented
 // one at a time: the guilty one dies alone, and the others are cleared instead of quarantined with
 // it.
 #pragma once

@@ -1,4 +1,4 @@
-// Which scans a rebuild had in hand when the process died, and how often.
+// Which scans a rebuild was segmenting when the process died, and how often.
 //
 // Ingest jobs count their attempts in the store, but a rebuild has no jobs: without this file, a
 // scan that crashes the server would do so again at every start.
@@ -22,10 +22,10 @@ class CrashJournal {
     /// Reads what a dead process left. With an empty path everything stays in memory.
     CrashJournal(std::string path, telemetry::LoggerPtr log);
 
-    /// How often the process died with these points in hand.
+    /// How often the process died while these points were segmented.
     [[nodiscard]] int deaths(const store::Shape& shape) const;
 
-    /// The scan is in hand until this is destroyed.
+    /// The scan counts as being segmented until this is destroyed.
     class Entry {
       public:
         Entry(CrashJournal& journal, const store::Shape& shape);

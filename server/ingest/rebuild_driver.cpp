@@ -316,7 +316,7 @@ void RebuildDriver::rebuildOne(const ActivePtr& active, std::unique_lock<std::mu
     changed_.notify_all();
 }
 
-/// A scan that was in hand when the process died runs alone; after too many deaths it runs no more.
+/// A scan that was being segmented when the process died runs alone; after too many deaths it runs no more.
 Result<void> RebuildDriver::isolated(Active& active, const store::Shape& shape) {
     const int deaths = journal_.deaths(shape);
     if (store::isQuarantined(deaths, options_.maxAttempts)) {

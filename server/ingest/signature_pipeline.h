@@ -57,7 +57,7 @@ class SignaturePipeline {
 /// Errors of the store or the machine, not of the scan: a later try may succeed.
 [[nodiscard]] bool isTransient(ErrorCode code) noexcept;
 
-/// Inside a catch block of a worker: what the exception means for the scan it had in hand.
+/// Inside a catch block of a worker: what the exception means for the scan it was segmenting.
 /// kOutOfMemory or kInternal.
 [[nodiscard]] Error errorOfException();
 

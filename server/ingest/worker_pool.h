@@ -119,13 +119,13 @@ class WorkerPool {
     std::uint64_t signals_ = 0;        ///< rises when there may be a job
     std::atomic<bool> paused_{false};  ///< changes under mutex_
     bool stopping_ = false;
-    /// True from the start until the first job that no dead process had in hand (those come first,
+    /// True from the start until the first job that no dead process was segmenting (those come first,
     /// being older): jobs run one at a time and alone, so that a deadly one dies alone.
     bool probing_ = true;
     int pausing_ = 0;   ///< calls inside `pause`
     int claiming_ = 0;  ///< workers in the store without a job
-    /// One for each worker that has a scan in hand. Not by job: a job that was put back may be with its next
-    /// worker before the last one has left.
+    /// One for each worker that is segmenting a scan. Not by job: a job that was put back may be with its
+    /// next worker before the last one has left.
     std::set<std::shared_ptr<Running>> running_;
     std::vector<store::Job> unreleased_;  ///< jobs the store would not take back yet
     double secondsPerJob_ = 1.0;          ///< running mean

@@ -128,7 +128,8 @@ class Checker {
                 const auto bytes = static_cast<std::int64_t>(loaded.size() * sizeof(float));
                 if (query.integer(4) != bytes ||
                     query.integer(5) != static_cast<std::int64_t>(query.blob(3).size)) {
-                    add("shape " + quoted(query.text(0)) + " has wrong byte counts beside its points");
+                    add("shape " + quoted(query.text(0)) +
+                        ": the stored byte counts do not match its points");
                 }
             } catch (const Failure& failure) {
                 // One damaged scan is a problem to list; a failing database ends the section.

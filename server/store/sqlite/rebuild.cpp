@@ -49,8 +49,8 @@ const char* stateName(RebuildState state) {
 Rebuild requireRunning(Connection& connection, std::int64_t rebuildId) {
     Rebuild rebuild = requireRebuild(connection, rebuildId);
     if (rebuild.state != RebuildState::kRunning) {
-        raise(ErrorCode::kRejected,
-              "rebuild " + std::to_string(rebuildId) + " is not running but " + stateName(rebuild.state));
+        raise(ErrorCode::kRejected, "rebuild " + std::to_string(rebuildId) +
+                                        " is no longer running; its state is " + stateName(rebuild.state));
     }
     return rebuild;
 }

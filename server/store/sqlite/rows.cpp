@@ -127,7 +127,7 @@ void putSignature(Connection& connection, const SignatureRow& signature) {
 
 std::vector<float> readPoints(const Query& query) {
     const std::string key = query.text(0);
-    if (query.isNull(3)) raise(ErrorCode::kDataLoss, "shape " + quoted(key) + " has lost its points");
+    if (query.isNull(3)) raise(ErrorCode::kDataLoss, "the points of shape " + quoted(key) + " are missing");
     const BlobView blob = query.blob(3);
     const auto pointCount = static_cast<std::uint64_t>(query.integer(1));
     // A damaged count must not wrap around when multiplied.

@@ -99,8 +99,8 @@ TEST(Containment, FindsAPieceInItsWholeInAnyPose) {
             EXPECT_EQ(pairs.pairs[i].b, expected[i]);
             EXPECT_LT(pairs.pairs[i].distance, 0.01);
             // As the header writes the motion.
-            const auto& x = bodyOf(whole).parts[expected[i]].position;
-            const auto& y = bodyOf(piece).parts[i].position;
+            const auto& x = bodyOf(whole).segments[expected[i]].position;
+            const auto& y = bodyOf(piece).segments[i].position;
             const Point3 moved =
                 (1.0 / found.scale) * rotate(found.rotation, Point3{x[0], x[1], x[2]} - found.from) +
                 found.to;

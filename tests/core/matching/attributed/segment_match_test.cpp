@@ -30,7 +30,7 @@ const Body& attributedBody(const Signature& signature) { return signature.attrib
 
 double shareOf(const Body& body) {
     double sum = 0.0;
-    for (const SegmentDescriptor& segment : body.parts) sum += segment.share;
+    for (const SegmentDescriptor& segment : body.segments) sum += segment.share;
     return sum;
 }
 
@@ -94,8 +94,8 @@ TEST(SegmentMatch, RecoversAKnownRotation) {
         EXPECT_EQ(match.reflected, mirrored);
         EXPECT_NEAR(determinant(match.rotation), mirrored ? -1.0 : 1.0, 1e-9);
         for (std::size_t i = 0; i < a.points.size(); ++i) {
-            const auto& p = attributedBody(a).parts[i].position;
-            const auto& q = attributedBody(b).parts[i].position;
+            const auto& p = attributedBody(a).segments[i].position;
+            const auto& q = attributedBody(b).segments[i].position;
             EXPECT_LT(distance({p[0], p[1], p[2]}, rotate(match.rotation, {q[0], q[1], q[2]})), 1e-4);
         }
     }
@@ -197,14 +197,14 @@ TEST(SegmentMatch, AgreementFollowsItsDefinition) {
             return std::min(p.share, q.share) * (k(radii) + k(apart)) / 2.0;
         };
         double sum = 0.0;
-        for (const SegmentDescriptor& p : x.parts) {
+        for (const SegmentDescriptor& p : x.segments) {
             double best = 0.0;
-            for (const SegmentDescriptor& q : y.parts) best = std::max(best, gain(p, q));
+            for (const SegmentDescriptor& q : y.segments) best = std::max(best, gain(p, q));
             sum += best / 2.0;
         }
-        for (const SegmentDescriptor& q : y.parts) {
+        for (const SegmentDescriptor& q : y.segments) {
             double best = 0.0;
-            for (const SegmentDescriptor& p : x.parts) best = std::max(best, gain(p, q));
+            for (const SegmentDescriptor& p : x.segments) best = std::max(best, gain(p, q));
             sum += best / 2.0;
         }
         EXPECT_NEAR(match.agreement, sum, 1e-6);
@@ -242,9 +242,9 @@ TEST(SegmentMatch, IsAtLeastAsGoodAsEveryAlignmentOfTheOutlyingSegments) {
         const Body& y = attributedBody(b);
         const ScoreOptions options = optionsOf(false, 0.1);
         const SegmentMatch match = SegmentComparison(x, y, options).match();
-        std::vector<std::size_t> order(x.parts.size());
+        std::vector<std::size_t> order(x.segments.size());
         std::iota(order.begin(), order.end(), std::size_t{0});
-        const auto leverage = [&](std::size_t i) { return x.parts[i].share * x.parts[i].radius; };
+        const auto leverage = [&](std::size_t i) { return x.segments[i].share * x.segments[i].radius; };
         std::stable_sort(order.begin(), order.end(),
                          [&](std::size_t i, std::size_t k) { return leverage(i) > leverage(k); });
         const auto at = [](const SegmentDescriptor& s) {
@@ -256,8 +256,8 @@ TEST(SegmentMatch, IsAtLeastAsGoodAsEveryAlignmentOfTheOutlyingSegments) {
                 const std::size_t k = order[m];
                 Tripod to;
                 Tripod from;
-                if (i == k || !tripod(at(x.parts[i]), at(x.parts[k]), to)) continue;
-                if (!tripod(at(y.parts[i]), at(y.parts[k]), from)) continue;
+                if (i == k || !tripod(at(x.segments[i]), at(x.segments[k]), to)) continue;
+                if (!tripod(at(y.segments[i]), at(y.segments[k]), from)) continue;
                 SegmentMatch aligned;
                 aligned.rotation = tripodMap(from, to, false);
                 const SegmentPairs pairs = SegmentComparison(x, y, options).pairs(aligned);
@@ -313,7 +313,7 @@ TEST(SegmentMatch, BentLimbKeepsHalfItsGain) {
     const double same = SegmentComparison(attributedBody(down), attributedBody(down), {}).match().agreement;
     const double bent =
         SegmentComparison(attributedBody(down), attributedBody(up), optionsOf(false, 0.1)).match().agreement;
-    const double arm = attributedBody(down).parts.back().share;
+    const double arm = attributedBody(down).segments.back().share;
     EXPECT_LT(bent, same - 0.2 * arm);
     EXPECT_GT(bent, same - 0.75 * arm - 0.05);
 }
@@ -332,13 +332,13 @@ TEST(SegmentPairs, GainsSumToTheAgreement) {
         std::set<std::pair<int, int>> seen;
         for (std::size_t i = 0; i < pairs.count; ++i) {
             const SegmentPair& p = pairs.pairs[i];
-            ASSERT_LT(p.a, a.parts.size());
-            ASSERT_LT(p.b, b.parts.size());
+            ASSERT_LT(p.a, a.segments.size());
+            ASSERT_LT(p.b, b.segments.size());
             EXPECT_TRUE(seen.insert({p.a, p.b}).second) << "each pair once";
             EXPECT_GT(p.gain, 0.0);
-            EXPECT_LE(p.gain, std::min(a.parts[p.a].share, b.parts[p.b].share) * (1.0 + 1e-9));
-            const auto& x = a.parts[p.a].position;
-            const auto& y = b.parts[p.b].position;
+            EXPECT_LE(p.gain, std::min(a.segments[p.a].share, b.segments[p.b].share) * (1.0 + 1e-9));
+            const auto& x = a.segments[p.a].position;
+            const auto& y = b.segments[p.b].position;
             EXPECT_NEAR(p.distance, distance({x[0], x[1], x[2]}, rotate(match.rotation, {y[0], y[1], y[2]})),
                         1e-9);
             sum += p.gain;

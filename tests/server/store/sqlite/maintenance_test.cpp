@@ -287,7 +287,7 @@ TEST_F(SqliteMaintenanceTest, CheckFindsDamage) {
         {"UPDATE shape_points SET points = x'01' WHERE shape_id = 1", "damaged"},
         {"UPDATE shape SET point_count = 9 WHERE id = 1", "damaged"},
         {"UPDATE shape SET point_count = 4611686018427387904 WHERE id = 1", "point count"},
-        {"DELETE FROM shape_points WHERE shape_id = 1", "lost its points"},
+        {"DELETE FROM shape_points WHERE shape_id = 1", "are missing"},
         {"UPDATE shape_points SET stored_bytes = 1 WHERE shape_id = 1", "byte counts"},
         {"DELETE FROM signature WHERE shape_id = 1", "is ready but"},
         {"UPDATE signature SET bytes = x'00' WHERE shape_id = 1", "signature of shape 'k0'"},
