@@ -42,7 +42,9 @@ class ShapeAdditionTest : public ::testing::Test {
         EXPECT_TRUE(addition.upload().add(bytes));
         auto added = addition.finish(addition.upload().finish().value());
         Budget::Share all(admission.uploads);
-        if (added) EXPECT_TRUE(all.take(1'000)) << "the upload's memory has been given up";
+        if (added) {
+            EXPECT_TRUE(all.take(1'000)) << "the upload's memory has been given up";
+        }
         return added;
     }
 
