@@ -136,11 +136,6 @@ std::optional<Error> describeShape(const PointCloud& points, const Flags& flags,
     return std::nullopt;
 }
 
-struct Way {
-    const char* name;
-    std::vector<std::size_t> ranks;
-};
-
 // Gallery indices by rising distance, equal ones with the right answers last.
 std::vector<std::size_t> orderBy(const std::vector<double>& distance, const std::vector<bool>& right) {
     std::vector<std::size_t> order(distance.size());
@@ -272,7 +267,8 @@ Result<std::vector<Described>> readQueries(const std::vector<Model>& gallery, co
 std::string qualityText(const char* of, const std::vector<Described>& shapes) {
     std::vector<double> qualities;
     for (const Described& shape : shapes) {
-        if (shape.signature) qualities.push_back(shape.signature->quality / 255.0);
+        if (!shape.signature || !shape.signature->attributes) continue;
+        qualities.push_back(shape.signature->attributes->quality / 255.0);
     }
     if (qualities.empty()) return {};
     std::sort(qualities.begin(), qualities.end());
