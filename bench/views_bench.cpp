@@ -306,7 +306,8 @@ Result<int> runViews(const Flags& flags, Bench& bench) {
         sum.push_back(ranks.sum);
         if (flags.list) {
             listed += query.name + ": views " + std::to_string(ranks.views) + ", profile " +
-                      std::to_string(ranks.profile) + "\n";
+                      std::to_string(ranks.profile) + ", in turn " + std::to_string(ranks.interleaved) +
+                      ", sum " + std::to_string(ranks.sum) + "\n";
         }
     }
     double seconds = 0.0;

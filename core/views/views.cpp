@@ -1,5 +1,6 @@
 #include "core/views/views.h"
 
+#include <algorithm>
 #include <cmath>
 #include <new>
 
@@ -95,6 +96,24 @@ Result<ViewSignature> makeViewOfScan(const SurfacePoints& surface, const Point3&
         return viewSignature(inOwnFrame(surface), towards, surface.unit);
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::kOutOfMemory, "not enough memory for the view of a scan");
+    }
+}
+
+Result<double> seenShare(const SurfacePoints& surface) {
+    try {
+        const SeenSurface all = inOwnFrame(surface);
+        const Eigen::Matrix3d axes = principalAxes(all.points);
+        std::size_t most = 0;
+        const auto look = [&](const Eigen::Vector3d& direction) {
+            const Point3 towards{direction.x(), direction.y(), direction.z()};
+            most = std::max(most, visiblePoints(all, all.points, towards, kSurfacePerPixel).points.size());
+        };
+        for (const Eigen::Vector3d& corner : corners()) look(axes * corner);
+        look(axes.col(0));
+        look(-axes.col(0));
+        return static_cast<double>(most) / static_cast<double>(all.points.size());
+    } catch (const std::bad_alloc&) {
+        return fail(ErrorCode::kOutOfMemory, "not enough memory to look at a scan");
     }
 }
 

@@ -42,4 +42,11 @@ struct ViewSet {
 /// Errors: kOutOfMemory.
 [[nodiscard]] Result<ViewSignature> makeViewOfScan(const SurfacePoints& surface, const Point3& towards = {});
 
+/// The largest share of the surface points, 0 to 1, that can be seen from one side: one of the twenty, or an
+/// end of the third principal axis. Near 1 for a scan of one side, and for a shape so flat that one side
+/// shows it all; about a half for other wholes (docs/views.md).
+///
+/// Errors: kOutOfMemory.
+[[nodiscard]] Result<double> seenShare(const SurfacePoints& surface);
+
 }  // namespace shapedb

@@ -121,6 +121,14 @@ TEST(Views, OfAFlatScanAreFinite) {
     EXPECT_GT(makeViewOfScan(surfaceOf(plane))->size, 0.0f);
 }
 
+TEST(SeenShare, TellsOneSideFromTheWhole) {
+    for (const char* family : {"animal", "mug", "bottle"}) {
+        const PointCloud points = scan(family);
+        EXPECT_LT(*seenShare(surfaceOf(points)), 0.8) << family;
+        EXPECT_GT(*seenShare(surfaceOf(seenFrom(points, {0.6, 0.0, 0.8}))), 0.85) << family;
+    }
+}
+
 TEST(Views, AreStopped) {
     const PointCloud points = scan("fish");
     const SurfacePoints surface = surfaceOf(points);
