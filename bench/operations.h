@@ -35,6 +35,7 @@ struct Bench {
 
 /// Each adds its subcommand to `app`; both must live as long as the program.
 void addAlignOperation(CLI::App& app, Bench& bench);
+void addViewsOperation(CLI::App& app, Bench& bench);
 void addRetrievalOperation(CLI::App& app, Bench& bench);
 void addInteriorOperation(CLI::App& app, Bench& bench);
 void addTopKOperation(CLI::App& app, Bench& bench);

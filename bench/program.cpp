@@ -45,6 +45,7 @@ int run(int argc, const char* const* argv, cli::Console& console, const std::ato
         app.require_subcommand(1);
         addRetrievalOperation(app, bench);
         addAlignOperation(app, bench);
+        addViewsOperation(app, bench);
         addInteriorOperation(app, bench);
         addTopKOperation(app, bench);
         addLoadOperation(app, bench);

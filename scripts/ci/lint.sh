@@ -24,11 +24,11 @@ transport='grpc|google/protobuf|shapedb/v1'
 forbid "$transport|sqlite3|spdlog|fstream|filesystem|server/|client/|bench/" "core/ may not include these" core
 # Folders of core/ include only those before them; each line is a folder and the ones it may not include.
 later=''
-for folder in synthetic evaluation search matching pipeline signature segmentation delaunay fit preparation geometry base; do
+for folder in synthetic evaluation search matching pipeline signature segmentation delaunay views fit preparation geometry base; do
   # Neither is built on the rest.
   case "$folder" in
-    synthetic) siblings='delaunay/|fit/|preparation/|segmentation/|signature/|pipeline|matching/|search/|evaluation/|' ;;
-    evaluation) siblings='delaunay/|fit/|preparation/|segmentation/|signature/|pipeline|matching/|search/|' ;;
+    synthetic) siblings='delaunay/|views/|fit/|preparation/|segmentation/|signature/|pipeline|matching/|search/|evaluation/|' ;;
+    evaluation) siblings='delaunay/|views/|fit/|preparation/|segmentation/|signature/|pipeline|matching/|search/|' ;;
     *) siblings='' ;;
   esac
   paths=(core/$folder)
