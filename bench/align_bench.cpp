@@ -31,7 +31,7 @@ namespace shapedb::bench {
 
 namespace {
 
-constexpr double kRight = 0.02;             // error of a motion that counts as found
+constexpr double kRightWithin = 0.02;       // error of a motion that counts as found
 constexpr std::size_t kErrorPoints = 8000;  // of the model, to measure an error by
 constexpr std::size_t kLeastToHalve = 8000;
 
@@ -75,8 +75,8 @@ struct Column {
     void add(const AlignOutcome& outcome) {
         errors.push_back(outcome.error);
         scores.push_back(outcome.score);
-        right += outcome.error <= kRight ? 1 : 0;
-        rightOrEqual += outcome.bestOfEqual <= kRight ? 1 : 0;
+        right += outcome.error <= kRightWithin ? 1 : 0;
+        rightOrEqual += outcome.bestOfEqual <= kRightWithin ? 1 : 0;
         seconds += outcome.seconds;
         ++kinds[outcome.kind];
     }
@@ -99,7 +99,7 @@ std::string line(const char* name, const Column& column) {
            " |\n";
 }
 
-struct Flags {
+struct AlignFlags {
     std::vector<std::string> folders;
     std::size_t perFolder = 0;
     AlignSettings settings;
@@ -108,7 +108,7 @@ struct Flags {
     bool listMisses = false;
 };
 
-Result<int> runAlign(const Flags& flags, Bench& bench) {
+Result<int> runAlign(const AlignFlags& flags, Bench& bench) {
     AlignSettings settings = flags.settings;
     settings.toldKind = !flags.automatic;
     settings.fit.reflection = !flags.noReflection;
@@ -127,7 +127,7 @@ Result<int> runAlign(const Flags& flags, Bench& bench) {
                                                   cli::fileSeed(settings.seed, scan.name), bench.context());
             RETURN_IF_ERROR(outcome);
             columns[i].add(*outcome);
-            if (!flags.listMisses || outcome->error <= kRight) continue;
+            if (!flags.listMisses || outcome->error <= kRightWithin) continue;
             misses += "- " + scan.name + ", " + kAlignConditions[i].name + ": error " +
                       numberText("%.2f", 100.0 * outcome->error) + " %, score " +
                       numberText("%.3f", outcome->score) + "\n";
@@ -191,7 +191,7 @@ Result<AlignOutcome> measureAlignment(const PointCloud& model, const AlignCondit
         return outcome;
     }
     FitOptions options = settings.fit;
-    options.kind = settings.toldKind ? condition.kind : FitKind::kAutomatic;
+    if (settings.toldKind) options.kinds = FitKinds::only(condition.kind);
     const FitQuery prepared(*querySurface);
     const ThreadStopwatch watch;
     const auto result = fit(prepared, *otherSurface, options, context);
@@ -208,7 +208,7 @@ Result<AlignOutcome> measureAlignment(const PointCloud& model, const AlignCondit
 }
 
 void addAlignOperation(CLI::App& app, Bench& bench) {
-    auto flags = std::make_shared<Flags>();
+    auto flags = std::make_shared<AlignFlags>();
     CLI::App* command =
         app.add_subcommand("align", "Are the motions of whole, one-sided and cut scans found, and how fast?");
     command->add_option("folders", flags->folders, "Folders with clean, whole scans")->required();

@@ -37,7 +37,7 @@ void insertReady(Connection& connection, std::int64_t collectionId, const FillSh
     Query(connection, sql::kInsertPoints, id, scan.points.size() * sizeof(float), scan.blob.size(),
           BlobView{scan.blob.data(), scan.blob.size()})
         .run();
-    Query(connection, sql::kPutSignature, id, kFirstGeneration, 1, signatureDigest(shape.signature),
+    Query(connection, sql::kPutSignature, id, kFirstGeneration, 1, digestOf(shape.signature),
           BlobView{shape.signature.data(), shape.signature.size()})
         .run();
     Query(connection, sql::kSetReady, id, now).run();

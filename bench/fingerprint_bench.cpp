@@ -26,7 +26,7 @@ namespace shapedb::bench {
 
 namespace {
 
-struct Flags {
+struct FingerprintFlags {
     std::vector<std::string> paths;
     std::vector<std::string> profiles = {"default", "paper"};
     std::size_t queries = 100;
@@ -183,8 +183,8 @@ std::string nameOf(const ScoreOptions& options) {
     return name;
 }
 
-Result<void> printProfile(const std::string& name, const std::vector<ScanFile>& files, const Flags& flags,
-                          Bench& bench) {
+Result<void> printProfile(const std::string& name, const std::vector<ScanFile>& files,
+                          const FingerprintFlags& flags, Bench& bench) {
     const auto profile = profileFromName(name);
     RETURN_IF_ERROR(profile);
     const ShapeParameters parameters = parametersOf(*profile);
@@ -229,7 +229,7 @@ Result<void> printProfile(const std::string& name, const std::vector<ScanFile>& 
     return {};
 }
 
-Result<int> runFingerprint(const Flags& flags, Bench& bench) {
+Result<int> runFingerprint(const FingerprintFlags& flags, Bench& bench) {
     const auto files = listScanFiles(flags.paths);
     RETURN_IF_ERROR(files);
     const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, flags.threads);
@@ -242,7 +242,7 @@ Result<int> runFingerprint(const Flags& flags, Bench& bench) {
 }  // namespace
 
 void addFingerprintOperation(CLI::App& app, Bench& bench) {
-    auto flags = std::make_shared<Flags>();
+    auto flags = std::make_shared<FingerprintFlags>();
     CLI::App* command = app.add_subcommand(
         "fingerprint",
         "Hashes of all results from a set of scans, to show that a change keeps them bit for bit");

@@ -32,19 +32,19 @@ namespace {
 
 using Work = std::function<Result<void>()>;
 
-constexpr std::uint64_t kSeed = 1;
+constexpr std::uint64_t kJobSeed = 1;
 constexpr std::size_t kSignatures = 2'000;
 constexpr std::size_t kSegmentPoints = 5'000;
 constexpr std::size_t kSignaturePoints = 2'000;
 constexpr std::size_t kPlyPoints = 100'000;
 constexpr std::size_t kStoredShapes = 200;
 constexpr std::size_t kStoredPoints = 500;
-constexpr std::size_t kHits = 10;
+constexpr std::size_t kJobHits = 10;
 /// Neighbours are of different families: few pairs are of the same kind, as in a search.
 constexpr std::size_t kPairStep = 7;
 
 Result<PointCloud> oneScan(std::size_t points) {
-    auto scans = makeScans(2, points, kSeed, 1, {});
+    auto scans = makeScans(2, points, kJobSeed, 1, {});
     RETURN_IF_ERROR(scans);
     return std::move(scans->back());
 }
@@ -114,7 +114,7 @@ Result<Work> topKJob(const JobFolder& folder) {
     const SignatureSet set = SignatureSet().with(entries, {});
     return Work([set, query]() -> Result<void> {
         SearchOptions options;
-        options.k = kHits;
+        options.k = kJobHits;
         const auto found = topK(query, set, options);
         RETURN_IF_ERROR(found);
         return {};
@@ -199,7 +199,7 @@ const std::vector<Job>& jobs() {
 
 Result<void> prepareJobs(const JobFolder& folder, unsigned threads) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    const auto generator = SignatureGenerator::create({Mixture::kPlain, kSignatures, kSeed, 3000, 2}, {});
+    const auto generator = SignatureGenerator::create({Mixture::kPlain, kSignatures, kJobSeed, 3000, 2}, {});
     RETURN_IF_ERROR(generator);
     std::string bytes;
     for (std::size_t i = 0; i < kSignatures; ++i) {

@@ -39,7 +39,7 @@ constexpr std::uint64_t kSeed = 1;
 constexpr const char* kFamily = "animal";
 constexpr double kMegabyte = 1e6;
 
-struct Flags {
+struct SegmentFlags {
     std::string file;
     std::size_t points = 0;
     double noise = 0.0005;
@@ -102,7 +102,7 @@ SegmentationOptions undecimatedOptions(const std::string& profile) {
     return options;
 }
 
-Result<PointCloud> loadPoints(const Flags& flags, Figures& figures) {
+Result<PointCloud> loadPoints(const SegmentFlags& flags, Figures& figures) {
     if (!flags.file.empty()) {
         auto scan = readScan(flags.file);
         RETURN_IF_ERROR(scan);
@@ -119,7 +119,8 @@ Result<PointCloud> loadPoints(const Flags& flags, Figures& figures) {
 }
 
 // First: children must be forked before any thread starts.
-void measureMemory(const Flags& flags, const PointCloud& scan, const PointCloud& distinct, Figures& figures) {
+void measureMemory(const SegmentFlags& flags, const PointCloud& scan, const PointCloud& distinct,
+                   Figures& figures) {
     const auto limited = [](const std::function<bool()>& work) {
         return peakMemoryOf([&work] {
             const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
@@ -200,7 +201,7 @@ std::string stageTable(const Stages& stages) {
     return text;
 }
 
-std::string textOf(const Flags& flags, const Figures& f) {
+std::string textOf(const SegmentFlags& flags, const Figures& f) {
     std::string text = describe(environment()) + "\n" + f.source + ": " + std::to_string(f.points) +
                        " points, " + std::to_string(f.distinct) + " distinct; medians, of ratios too, of " +
                        std::to_string(flags.repeat) + "\n";
@@ -240,7 +241,7 @@ json stagesJson(const Stages& stages) {
     return table;
 }
 
-json documentOf(const Flags& flags, const std::string& command, const Figures& f) {
+json documentOf(const SegmentFlags& flags, const std::string& command, const Figures& f) {
     json document = {{"environment", environmentJson(environment())},
                      {"command", command},
                      {"source", f.source},
@@ -279,7 +280,7 @@ json documentOf(const Flags& flags, const std::string& command, const Figures& f
     return document;
 }
 
-Result<int> runSegment(const Flags& flags, Bench& bench) {
+Result<int> runSegment(const SegmentFlags& flags, Bench& bench) {
     Figures figures;
     const RunContext context = bench.context();
     const auto scan = loadPoints(flags, figures);
@@ -320,7 +321,7 @@ Result<int> runSegment(const Flags& flags, Bench& bench) {
 }  // namespace
 
 void addSegmentOperation(CLI::App& app, Bench& bench) {
-    auto flags = std::make_shared<Flags>();
+    auto flags = std::make_shared<SegmentFlags>();
     CLI::App* command = app.add_subcommand(
         "segment",
         "Time and memory of a segmentation beside CGAL's Delaunay triangulation of the same points");

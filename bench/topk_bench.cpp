@@ -42,7 +42,7 @@ constexpr std::size_t kPeerQueries = 5;        // per round
 constexpr std::size_t kLoadBatch = 8192;
 constexpr std::size_t kPairsForSpread = 4000;
 
-struct Flags {
+struct TopkFlags {
     std::vector<std::size_t> shapes = {100000};
     std::size_t k = 10;
     std::size_t queries = 100;
@@ -72,7 +72,7 @@ struct Queries {
 
 class TopKRun {
   public:
-    TopKRun(const Flags& flags, std::size_t shapes, Mixture mixture, Bench& bench)
+    TopKRun(const TopkFlags& flags, std::size_t shapes, Mixture mixture, Bench& bench)
         : flags_(flags), shapes_(shapes), mixture_(mixture), bench_(bench) {}
 
     Result<nlohmann::json> run() {
@@ -304,7 +304,7 @@ class TopKRun {
                                               " shapes is not what scoring all of them gives");
     }
 
-    const Flags& flags_;
+    const TopkFlags& flags_;
     std::size_t shapes_;
     Mixture mixture_;
     Bench& bench_;
@@ -339,7 +339,7 @@ Result<std::vector<Mixture>> mixturesOf(const std::string& text) {
                 "unknown --mixture '" + text + "'; use plain, duplicates, hard or all");
 }
 
-Result<int> runTopK(const Flags& flags, Bench& bench) {
+Result<int> runTopK(const TopkFlags& flags, Bench& bench) {
     const auto mixtures = mixturesOf(flags.mixture);
     RETURN_IF_ERROR(mixtures);
     announceJson(bench.console, flags.json);
@@ -372,7 +372,7 @@ Result<int> runTopK(const Flags& flags, Bench& bench) {
 }  // namespace
 
 void addTopKOperation(CLI::App& app, Bench& bench) {
-    auto flags = std::make_shared<Flags>();
+    auto flags = std::make_shared<TopkFlags>();
     CLI::App* command =
         app.add_subcommand("topk", "Exact search among many signatures, beside a flat scan of vectors");
     command->add_option("--shapes", flags->shapes, "Sizes of collections, e.g. 1000,1000000")

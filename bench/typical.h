@@ -1,4 +1,5 @@
-// What two unrelated shapes differ by: where the constants kTypical of the attributed score come from.
+// What two unrelated shapes differ by: where the constants kTypical of the attributed score and
+// kTypicalMisfit of the fit come from.
 #pragma once
 
 #include <array>
@@ -17,6 +18,7 @@ struct TypicalSettings {
     std::size_t points = 20000;  ///< of each scan
     double noise = 0.002;        ///< standard deviation as a share of the diagonal
     std::uint64_t seed = 1;
+    std::size_t fitEvery = 7;  ///< only each so-many-th pair is laid on each other; at least 1
 };
 
 struct TypicalResult {
@@ -24,6 +26,8 @@ struct TypicalResult {
     std::size_t pairs = 0;  ///< of different families
     /// Medians over the pairs, in the units of typicalDifferences(): the statistics, then the parts.
     std::array<double, kStatisticKinds + 1> medians{};
+    std::size_t fits = 0;             ///< pairs that were laid on each other
+    std::array<double, 3> misfits{};  ///< medians of 1 - F over them, by FitKind
 };
 
 /// Describes the scans with the profile `default` and compares all pairs of different families.

@@ -39,7 +39,7 @@ constexpr std::size_t kLeastToHalve = 8000;
 // Of unrelated shapes, to add the two distances.
 constexpr double kTypicalViewDistance = 150.0;
 
-struct Flags {
+struct ViewsFlags {
     std::vector<std::string> gallery;
     std::vector<std::string> queries;
     std::size_t synthetic = 0;
@@ -112,8 +112,8 @@ PointCloud half(const PointCloud& points, std::size_t which) {
     return some;
 }
 
-std::optional<Error> describeShape(const PointCloud& points, const Flags& flags, bool whole, Described& shape,
-                                   const RunContext& context) {
+std::optional<Error> describeShape(const PointCloud& points, const ViewsFlags& flags, bool whole,
+                                   Described& shape, const RunContext& context) {
     const auto surface = makeSurfacePoints(points, context);
     if (!surface && stops(surface.error())) return surface.error();
     if (surface) {
@@ -173,7 +173,7 @@ struct Ranks {
     std::size_t sum = 0;
 };
 
-Ranks ranksOf(const Described& query, const std::vector<Described>& gallery, const Flags& flags,
+Ranks ranksOf(const Described& query, const std::vector<Described>& gallery, const ViewsFlags& flags,
               std::vector<double>* unrelated) {
     std::vector<bool> right(gallery.size(), false);
     for (const std::size_t g : query.right) right[g] = true;
@@ -212,7 +212,7 @@ std::string line(const char* name, const std::vector<std::size_t>& ranks) {
            within(32) + within(64) + " |\n";
 }
 
-Result<std::vector<Described>> describeGallery(const std::vector<Model>& models, const Flags& flags,
+Result<std::vector<Described>> describeGallery(const std::vector<Model>& models, const ViewsFlags& flags,
                                                bool halved, const RunContext& context) {
     std::vector<Described> gallery(models.size());
     const auto run = cli::forEachItem(models.size(), flags.threads, context, [&](std::size_t i) {
@@ -224,7 +224,7 @@ Result<std::vector<Described>> describeGallery(const std::vector<Model>& models,
     return gallery;
 }
 
-Result<std::vector<Described>> simulatedQueries(const std::vector<Model>& models, const Flags& flags,
+Result<std::vector<Described>> simulatedQueries(const std::vector<Model>& models, const ViewsFlags& flags,
                                                 const RunContext& context) {
     std::vector<Described> queries(models.size() * flags.perShape);
     const auto run =
@@ -241,7 +241,7 @@ Result<std::vector<Described>> simulatedQueries(const std::vector<Model>& models
     return queries;
 }
 
-Result<std::vector<Described>> readQueries(const std::vector<Model>& gallery, const Flags& flags,
+Result<std::vector<Described>> readQueries(const std::vector<Model>& gallery, const ViewsFlags& flags,
                                            const RunContext& context) {
     const auto models = readModels(flags.queries, context);
     RETURN_IF_ERROR(models);
@@ -280,7 +280,7 @@ std::string qualityText(const char* of, const std::vector<Described>& shapes) {
            at(0.5) + ", " + at(0.75) + ", " + at(0.95) + ".\n";
 }
 
-Result<int> runViews(const Flags& flags, Bench& bench) {
+Result<int> runViews(const ViewsFlags& flags, Bench& bench) {
     auto models = readModels(flags.gallery, bench.context());
     RETURN_IF_ERROR(models);
     RETURN_IF_ERROR(addFamilies(*models, flags.synthetic, flags.seed));
@@ -331,7 +331,7 @@ Result<int> runViews(const Flags& flags, Bench& bench) {
 }  // namespace
 
 void addViewsOperation(CLI::App& app, Bench& bench) {
-    auto flags = std::make_shared<Flags>();
+    auto flags = std::make_shared<ViewsFlags>();
     CLI::App* command = app.add_subcommand(
         "views", "Are the shapes found of which scans show one side, by views and by profile?");
     command->add_option("gallery", flags->gallery, "Folders with whole scans");

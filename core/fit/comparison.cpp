@@ -139,7 +139,6 @@ const float* Comparison::weighOther(const Motion& pose, const FitView& view, std
                         weights_.data());
             return weights_.data();
         case FitKind::kOneSided: weighFront(pose, view, count); return weights_.data();
-        case FitKind::kAutomatic:
         case FitKind::kWhole: break;
     }
     return nullptr;

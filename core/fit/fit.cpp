@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <new>
 #include <utility>
 
@@ -50,10 +51,15 @@ constexpr float kResidualWithin = 0.06f;
 constexpr double kDifferent = 0.04;
 constexpr double kAsGood = 0.97;
 
-// Automatic: a score from which on no other kind is tried, and how much better the others, which are allowed
-// to leave parts of the other shape unexplained, must be.
+// The same of a mirrored and an unmirrored pose: closer than two scans of one object come to each other.
+constexpr double kHandsAlike = 0.99;
+
+// By FitKind.
+constexpr std::array<double, 3> kTypicalMisfit{0.70, 0.65, 0.60};
+constexpr std::array<FitKind, 3> kKinds{FitKind::kWhole, FitKind::kOneSided, FitKind::kPiece};
+
+// A score of whole shapes from which on no other kind is tried.
 constexpr double kWholeEnough = 0.85;
-constexpr double kKindHandicap = 0.05;
 
 // Of the diagonals of two shapes whose scales are kept.
 constexpr double kMostRatio = 1000.0;
@@ -135,6 +141,8 @@ Result<std::vector<Candidate>> candidatesOf(Comparison& comparison, FitKind kind
     return distinct(candidates, candidates.size(), kDifferent, comparison);
 }
 
+double misfitOf(const Candidate& c) { return (1.0 - c.score()) / typicalMisfit(c.view.kind); }
+
 FitPose poseOf(const Candidate& c, Comparison& comparison, bool keepScale) {
     FitPose pose;
     pose.motion = compose(comparison.query().toScan, compose(c.pose, inverse(comparison.other().toScan)));
@@ -146,9 +154,20 @@ FitPose poseOf(const Candidate& c, Comparison& comparison, bool keepScale) {
     return pose;
 }
 
-FitResult resultOf(const std::vector<Candidate>& candidates, Comparison& comparison,
-                   const FitOptions& options) {
+// Where the points do not tell left from right, the best unmirrored pose comes first; returns whether that is
+// so.
+bool preferUnmirrored(std::vector<Candidate>& candidates) {
+    const bool mirrored = candidates.front().pose.reflected;
+    const auto other = std::find_if(candidates.begin(), candidates.end(),
+                                    [&](const Candidate& c) { return c.pose.reflected != mirrored; });
+    if (other == candidates.end() || other->score() < kHandsAlike * candidates.front().score()) return false;
+    if (mirrored) std::rotate(candidates.begin(), other, other + 1);
+    return true;
+}
+
+FitResult resultOf(std::vector<Candidate> candidates, Comparison& comparison, const FitOptions& options) {
     FitResult result;
+    result.handednessOpen = preferUnmirrored(candidates);
     const Candidate& best = candidates.front();
     result.kind = best.view.kind;
     result.best = poseOf(best, comparison, options.keepScale);
@@ -166,6 +185,7 @@ FitResult resultOf(const std::vector<Candidate>& candidates, Comparison& compari
         result.alternatives.push_back(poseOf(c, comparison, options.keepScale));
     }
     const double score = best.score();
+    result.misfit = misfitOf(best);
     result.certainty = score > 0.0 ? std::clamp(1.0 - second / score, 0.0, 1.0) : 0.0;
     return result;
 }
@@ -174,7 +194,9 @@ FitResult resultOf(const std::vector<Candidate>& candidates, Comparison& compari
 // both: middle on middle.
 FitResult unlike(const FitQuery& query, const FitPoints& other, const FitOptions& options) {
     FitResult result;
-    result.kind = options.kind == FitKind::kAutomatic ? FitKind::kWhole : options.kind;
+    result.kind =
+        *std::find_if(kKinds.begin(), kKinds.end(), [&](FitKind kind) { return options.kinds.allows(kind); });
+    result.misfit = 1.0 / typicalMisfit(result.kind);
     result.best.motion.translation = query.points().toScan.translation - other.toScan.translation;
     return result;
 }
@@ -188,22 +210,37 @@ Result<FitResult> fitOrThrow(const FitQuery& query, const SurfacePoints& other, 
         return unlike(query, candidate, options);
     }
     Comparison comparison(query.points(), candidate);
-    std::vector<FitKind> kinds = {options.kind};
-    if (options.kind == FitKind::kAutomatic) kinds = {FitKind::kWhole, FitKind::kOneSided, FitKind::kPiece};
+    std::vector<FitKind> kinds;
+    std::copy_if(kKinds.begin(), kKinds.end(), std::back_inserter(kinds),
+                 [&](FitKind kind) { return options.kinds.allows(kind); });
     std::vector<Candidate> best;
     for (std::size_t i = 0; i < kinds.size(); ++i) {
         context.report("fit", i, kinds.size());
         auto found = candidatesOf(comparison, kinds[i], options, context);
         RETURN_IF_ERROR(found);
-        if (best.empty() || found->front().score() > best.front().score() + kKindHandicap)
-            best = std::move(*found);
-        if (kinds.size() > 1 && best.front().score() >= kWholeEnough) break;
+        if (best.empty() || misfitOf(found->front()) < misfitOf(best.front())) best = std::move(*found);
+        if (kinds[i] == FitKind::kWhole && best.front().score() >= kWholeEnough) break;
     }
     context.report("fit", kinds.size(), kinds.size());
-    return resultOf(best, comparison, options);
+    return resultOf(std::move(best), comparison, options);
 }
 
 }  // namespace
+
+FitKinds FitKinds::only(FitKind kind) {
+    return {kind == FitKind::kWhole, kind == FitKind::kOneSided, kind == FitKind::kPiece};
+}
+
+bool FitKinds::allows(FitKind kind) const {
+    switch (kind) {
+        case FitKind::kWhole: return whole;
+        case FitKind::kOneSided: return oneSided;
+        case FitKind::kPiece: return piece;
+    }
+    return false;
+}
+
+double typicalMisfit(FitKind kind) noexcept { return kTypicalMisfit[static_cast<std::size_t>(kind)]; }
 
 FitQuery::FitQuery(const SurfacePoints& surface) {
     auto points = std::make_shared<FitPoints>(surface);

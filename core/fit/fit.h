@@ -15,14 +15,28 @@ namespace shapedb {
 
 /// What the query is a scan of. The other shape is always taken to be whole.
 enum class FitKind {
-    kAutomatic,  ///< tries the others in this order and says which one it chose
-    kWhole,      ///< all of the surface
-    kOneSided,   ///< what one camera saw from far away
-    kPiece,      ///< all sides of a part: some was cut off, or there are holes
+    kWhole,     ///< all of the surface
+    kOneSided,  ///< what one camera saw from far away
+    kPiece,     ///< all sides of a part: some was cut off, or there are holes
 };
 
+/// What the query may be a scan of: at least one. Each takes the time of a fit.
+struct FitKinds {
+    bool whole = true;
+    bool oneSided = true;
+    bool piece = true;
+
+    [[nodiscard]] static FitKinds only(FitKind kind);
+    [[nodiscard]] bool allows(FitKind kind) const;
+};
+
+/// What 1 - F of two unrelated shapes typically is, fitted as this kind: the medians over pairs of
+/// different synthetic families (`shapedb-bench typical`). Kinds that leave parts of the other shape
+/// unexplained score more easily.
+[[nodiscard]] double typicalMisfit(FitKind kind) noexcept;
+
 struct FitOptions {
-    FitKind kind = FitKind::kAutomatic;
+    FitKinds kinds;          ///< of several, the one with the least misfit is taken
     bool keepScale = false;  ///< both shapes have the same unit of length: motions have scale 1
     bool reflection = true;  ///< a mirrored shape may be laid on the query
 };
@@ -50,7 +64,9 @@ struct FreeAxis {
 
 struct FitResult {
     FitPose best;
-    FitKind kind = FitKind::kWhole;  ///< as what the query was fitted; never kAutomatic
+    FitKind kind = FitKind::kWhole;  ///< as what the query was fitted
+    /// (1 - F of the best) / typicalMisfit(kind): 0 if the shapes coincide, about 1 if they are unrelated.
+    double misfit = 1.0;
     /// 1 - F of the best clearly different pose / F of the best: 0 when another is as good, 1 when there is
     /// no other comes near: poses that fall below 0.85 of the best before the last stage are not followed,
     /// and count as none. Turns about a free axis are not different poses.
@@ -58,6 +74,9 @@ struct FitResult {
     /// Clearly different poses (more than 4 % of the query's diagonal apart) whose score is within 3 % of the
     /// best, best first; at most kMostAlternatives.
     std::vector<FitPose> alternatives;
+    /// A mirrored and an unmirrored pose are as good (both score within 1 % of the better): the points do not
+    /// tell left from right. `best` is then the unmirrored one. Never without FitOptions::reflection.
+    bool handednessOpen = false;
     std::vector<FreeAxis> axes;  ///< one for a bottle; three for a ball, which may be turned any way
 };
 

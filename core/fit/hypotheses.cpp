@@ -241,7 +241,6 @@ class Search {
     void place(const Reach& reach) {
         placements_.clear();
         switch (kind_) {
-            case FitKind::kAutomatic:
             case FitKind::kWhole: placeWhole(reach); break;
             case FitKind::kOneSided: placeFronts(reach); break;
             case FitKind::kPiece: placeCorners(reach); break;

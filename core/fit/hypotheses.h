@@ -17,7 +17,7 @@ struct Hypothesis {
     FitView view;
 };
 
-/// The `count` most promising poses of one kind, best first, ties in a fixed order. `kind` is not kAutomatic.
+/// The `count` most promising poses of one kind, best first, ties in a fixed order.
 /// Errors: kCancelled, kDeadlineExceeded.
 [[nodiscard]] Result<std::vector<Hypothesis>> promisingPoses(const FitPoints& query, const FitPoints& other,
                                                              FitKind kind, const FitOptions& options,

@@ -53,7 +53,9 @@ bool visitedBefore(const Candidate& a, const Candidate& b) {
     return a.bound != b.bound ? a.bound > b.bound : a.id() < b.id();
 }
 
-Result<void> check(const SearchOptions& options) {
+}  // namespace
+
+Result<void> validate(const SearchOptions& options) {
     if (options.k == 0) return fail(ErrorCode::kInvalidArgument, "k is 0; ask for at least 1 hit");
     if (!(options.threshold >= 0.0 && options.threshold <= 1.0)) {
         return fail(ErrorCode::kInvalidArgument,
@@ -62,8 +64,10 @@ Result<void> check(const SearchOptions& options) {
     return {};
 }
 
+namespace {
+
 Result<void> check(const Signature& query, const SignatureSet& set, const SearchOptions& options) {
-    RETURN_IF_ERROR(check(options));
+    RETURN_IF_ERROR(validate(options));
     RETURN_IF_ERROR(checkQuery(query, set.attributedCount()));
     return validate(options.score);
 }
@@ -261,7 +265,7 @@ Result<SearchResult> topK(const Signature& query, const SignatureSet& set, const
 
 Result<SearchResult> topK(const Scorer& scorer, const SignatureSet& set, const SearchOptions& options,
                           const RunContext& context) {
-    RETURN_IF_ERROR(check(options));
+    RETURN_IF_ERROR(validate(options));
     try {
         const auto began = RunContext::Clock::now();
         auto result = Searcher(scorer, set, options, context).run();
@@ -272,6 +276,10 @@ Result<SearchResult> topK(const Scorer& scorer, const SignatureSet& set, const S
     } catch (const std::exception& e) {
         return fail(ErrorCode::kInternal, std::string("search: ") + e.what());
     }
+}
+
+Error ofQuery(std::size_t i, Error error) {
+    return withContext(std::move(error), "query " + std::to_string(i) + ": ");
 }
 
 Result<std::vector<SearchResult>> topKBatch(const std::vector<BatchQuery>& queries, const SignatureSet& set,
@@ -295,7 +303,7 @@ Result<std::vector<SearchResult>> topKBatch(const std::vector<BatchQuery>& queri
         std::vector<SearchResult> results;
         results.reserve(queries.size());
         for (std::size_t q = 0; q < found.size(); ++q) {
-            if (!found[q]) return fail(withContext(found[q].error(), "query " + std::to_string(q) + ": "));
+            if (!found[q]) return fail(ofQuery(q, found[q].error()));
             results.push_back(std::move(*found[q]));
         }
         return results;

@@ -22,6 +22,9 @@ struct SearchOptions {
     std::optional<std::int64_t> excludeId;  ///< leaves one shape out (a query by key)
 };
 
+/// Errors: kInvalidArgument (k, threshold).
+[[nodiscard]] Result<void> validate(const SearchOptions& options);
+
 struct SearchHit {
     std::int64_t id = 0;
     double score = 0.0;
@@ -59,6 +62,9 @@ struct BatchQuery {
     Signature signature;
     std::optional<std::int64_t> excludeId;  ///< instead of SearchOptions::excludeId
 };
+
+/// `error`, saying which query of a batch it is about, counted from 0.
+[[nodiscard]] Error ofQuery(std::size_t i, Error error);
 
 /// `topK` of many queries, each on one thread, as many at once as the arena has: none waits for another.
 /// Results in the order of the queries. The first error ends all and names its query ("query 3: ...",

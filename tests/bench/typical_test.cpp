@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/fit/fit.h"
 #include "core/matching/attributed/attribute_distance.h"
 #include "tests/bench/run_bench.h"
 
@@ -22,6 +23,10 @@ TEST(Typical, CommittedConstantsFollowFromSyntheticFamilies) {
     for (std::size_t i = 0; i < kept.size(); ++i) {
         EXPECT_NEAR(result->medians[i] / kept[i], 1.0, 0.1)
             << (i < kStatisticKinds ? kStatistics[i].name : "parts");
+    }
+    EXPECT_EQ(result->fits, result->pairs / settings.fitEvery);
+    for (const FitKind kind : {FitKind::kWhole, FitKind::kOneSided, FitKind::kPiece}) {
+        EXPECT_NEAR(result->misfits[static_cast<std::size_t>(kind)] / typicalMisfit(kind), 1.0, 0.1);
     }
 }
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/matching/score_scale.h"
+
 namespace shapedb {
 
 namespace {
@@ -40,18 +42,10 @@ constexpr EvidenceWeight kContainedWeight{0.5, 0.25};
 // The parts say both which parts there are and where they lie: as much as two statistics.
 constexpr double kPartsWeight = 2.0;
 
-// The distance, in units of what unrelated shapes differ by, at which the score is 0.5.
-constexpr double kHalfWay = 0.5;
-
 // How far the bounds give way to rounding. Near 1, a rounding difference in the score is one of 1e-8 in the
 // distance.
 constexpr double kRelativeSlack = 1e-9;
 constexpr double kDistanceSlack = 1e-7;
-
-double scoreOf(double distance) {
-    const double d = distance / kHalfWay;
-    return 1.0 / (1.0 + d * d);
-}
 
 // An interior of this quality is fully trusted. Below, trust falls fast: a thickness that is off by
 // half makes its histograms useless.
@@ -116,12 +110,12 @@ AttributeDistance attributeDistance(double statistics, std::uint8_t qualityA, st
 }
 
 double attributeScore(const AttributeDistance& distance, double agreement) {
-    return scoreOf(std::hypot(meanDistance(distance, agreement), distance.scale));
+    return scoreOfDistance(std::hypot(meanDistance(distance, agreement), distance.scale));
 }
 
 double partialScore(const AttributeDistance& distance, double agreement, double share) {
-    return scoreOf((1.0 - distance.containedWeight) * meanDistance(distance, agreement) +
-                   distance.containedWeight * disagreement(share));
+    return scoreOfDistance((1.0 - distance.containedWeight) * meanDistance(distance, agreement) +
+                           distance.containedWeight * disagreement(share));
 }
 
 LevelWeights levelWeights(std::uint8_t qualityA, std::uint8_t qualityB) {
@@ -140,14 +134,12 @@ LevelWeights levelWeights(std::uint8_t qualityA, std::uint8_t qualityB) {
 }
 
 double maxDistanceForScore(double score) {
-    return score > 0.0 ? kHalfWay * std::sqrt(std::max(0.0, 1.0 / score - 1.0)) * (1.0 + kRelativeSlack) +
-                             kDistanceSlack
-                       : INFINITY;
+    return score > 0.0 ? distanceOfScore(score) * (1.0 + kRelativeSlack) + kDistanceSlack : INFINITY;
 }
 
 double maxScoreAtDistance(double distance) {
     // At distance 0 it may be the shape itself.
-    return distance > 0.0 ? std::min(1.0, scoreOf(distance) * (1.0 + kRelativeSlack)) : 1.0;
+    return distance > 0.0 ? std::min(1.0, scoreOfDistance(distance) * (1.0 + kRelativeSlack)) : 1.0;
 }
 
 double octavesBetween(double scaleA, double scaleB) {

@@ -65,9 +65,9 @@ Likenesses likenesses(const SegmentSpan& piece, const SegmentSpan& whole, double
     return table;
 }
 
-class Search {
+class ContainmentSearch {
   public:
-    Search(SegmentSpan piece, SegmentSpan whole, double knownScale, const ScoreOptions& options)
+    ContainmentSearch(SegmentSpan piece, SegmentSpan whole, double knownScale, const ScoreOptions& options)
         : piece_(piece),
           whole_(whole),
           knownScale_(knownScale),
@@ -178,7 +178,7 @@ class Search {
 
 Containment containment(SegmentSpan piece, SegmentSpan whole, double knownScale,
                         const ScoreOptions& options) {
-    return Search(piece, whole, knownScale, options).run();
+    return ContainmentSearch(piece, whole, knownScale, options).run();
 }
 
 double containmentBound(SegmentSpan piece, SegmentSpan whole, double knownScale) {

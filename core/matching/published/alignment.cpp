@@ -161,9 +161,9 @@ double axisBound(const AnchoredPoints& a, const Cylindrical& viewA, const Anchor
     return sum * kBoundMargin;
 }
 
-class Search {
+class AlignmentSearch {
   public:
-    Search(const AnchoredPoints& a, const AnchoredPoints& b, double width, bool prune)
+    AlignmentSearch(const AnchoredPoints& a, const AnchoredPoints& b, double width, bool prune)
         : a_(a), b_(b), width_(width), prune_(prune) {}
 
     void tryRolls(Alignment alignment, const Cylindrical& viewA, const Cylindrical& viewB) {
@@ -261,7 +261,7 @@ AnchoredPoints anchoredPoints(const ShapeRow& shape, double factor) {
 BestAlignment bestAlignment(const AnchoredPoints& a, const AnchoredPoints& b, const ScoreOptions& options,
                             bool prune) {
     if (!hasAxis(a) || !hasAxis(b)) return {{}, matchesOf(a, b, options.kernelWidth, {})};
-    Search search(a, b, options.kernelWidth, prune);
+    AlignmentSearch search(a, b, options.kernelWidth, prune);
     std::array<Cylindrical, kMaxSignaturePoints> viewsA;
     std::array<Cylindrical, kMaxSignaturePoints> viewsB;
     for (std::size_t i = 1; i < a.count; ++i) viewsA[i] = alongAxis(a, i);

@@ -97,7 +97,7 @@ TEST(Fit, FindsKnownMotions) {
             const PointCloud query =
                 applyToCloud(motion, damaged(scanOfMember(family.name, 2, 12), kind, tried + 1));
             FitOptions options;
-            options.kind = kind;
+            options.kinds = FitKinds::only(kind);
             const FitResult result = fitted(query, other, options);
             EXPECT_EQ(result.kind, kind);
             EXPECT_GT(result.best.score, 0.4) << family.name;
@@ -114,7 +114,7 @@ TEST(Fit, ReportsASimilarityThatMatchesItsFields) {
     const PointCloud scan = scanOfMember("animal", 0, 1);
     const Motion motion = anyMotion(3, true, 0.01);
     FitOptions options;
-    options.kind = FitKind::kWhole;
+    options.kinds = FitKinds::only(FitKind::kWhole);
     const FitPose best = fitted(applyToCloud(motion, scan), scanOfMember("animal", 0, 2), options).best;
     EXPECT_TRUE(best.motion.reflected);
     EXPECT_NEAR(determinant(best.motion.rotation), -1.0, 1e-9);
@@ -126,7 +126,7 @@ TEST(Fit, KeepsTheScaleWhenAsked) {
     const PointCloud scan = scanOfMember("animal", 0, 1);
     FitOptions options;
     options.keepScale = true;
-    options.kind = FitKind::kWhole;
+    options.kinds = FitKinds::only(FitKind::kWhole);
     const FitResult same =
         fitted(applyToCloud(anyMotion(3, false, 1.0), scan), scanOfMember("animal", 0, 2), options);
     EXPECT_EQ(same.best.motion.scale, 1.0);
@@ -143,7 +143,7 @@ TEST(Fit, TellsMirroredTwinsApartWithoutReflection) {
     mirror.reflected = true;
     mirror.rotation[0][0] = -1.0;
     for (const FitKind kind : {FitKind::kWhole, FitKind::kPiece}) {
-        options.kind = kind;
+        options.kinds = FitKinds::only(kind);
         for (const char* family : {"octopus", "human"}) {
             const PointCloud query =
                 applyToCloud(anyMotion(8, false, 1.0), damaged(scanOfMember(family, 1, 1), kind, 2));
@@ -165,7 +165,7 @@ TEST(Fit, ReportsTheAxisOfARotationalSymmetry) {
     const Motion motion = anyMotion(4, false, 1.0);
     const PointCloud query = applyToCloud(motion, *sampleBoundary(pin, 20000, 2));
     FitOptions options;
-    options.kind = FitKind::kWhole;
+    options.kinds = FitKinds::only(FitKind::kWhole);
     const FitResult result = fitted(query, other, options);
     ASSERT_EQ(result.axes.size(), 1u);
     const Point3 along = rotate(motion.rotation, {0.0, 0.0, 1.0});
@@ -176,7 +176,7 @@ TEST(Fit, ReportsTheAxisOfARotationalSymmetry) {
 
 TEST(Fit, ABallMayBeTurnedAnyWay) {
     FitOptions options;
-    options.kind = FitKind::kWhole;
+    options.kinds = FitKinds::only(FitKind::kWhole);
     const FitResult result = fitted(*sampleBoundary(makeSphere().solid, 20000, 1),
                                     *sampleBoundary(makeSphere().solid, 20000, 2), options);
     EXPECT_EQ(result.axes.size(), 3u);
@@ -186,7 +186,7 @@ TEST(Fit, ABallMayBeTurnedAnyWay) {
 TEST(Fit, ReturnsEquallyGoodPoses) {
     // A box laid on itself: four ways without reflection, and no axis.
     FitOptions options;
-    options.kind = FitKind::kWhole;
+    options.kinds = FitKinds::only(FitKind::kWhole);
     options.reflection = false;
     const PointCloud other = *sampleBoundary(makeBox().solid, 20000, 1);
     const Motion motion = anyMotion(6, false, 1.0);
@@ -206,7 +206,7 @@ TEST(Fit, ReturnsEquallyGoodPoses) {
 
 TEST(Fit, ScoresUnrelatedShapesLower) {
     FitOptions options;
-    options.kind = FitKind::kWhole;
+    options.kinds = FitKinds::only(FitKind::kWhole);
     const PointCloud query = scanOfMember("chair", 0, 1);
     const double own = fitted(query, scanOfMember("chair", 0, 2), options).best.score;
     for (const char* family : {"animal", "bottle", "fish"}) {
@@ -265,10 +265,9 @@ TEST(Fit, SurvivesDegenerateShapes) {
     for (const SurfacePoints& query : shapes) {
         const FitQuery prepared(query);
         for (const SurfacePoints& other : shapes) {
-            for (const FitKind kind :
-                 {FitKind::kAutomatic, FitKind::kWhole, FitKind::kOneSided, FitKind::kPiece}) {
+            for (const FitKind kind : {FitKind::kWhole, FitKind::kOneSided, FitKind::kPiece}) {
                 for (const bool keepScale : {false, true}) {
-                    const auto result = fit(prepared, other, {kind, keepScale, true});
+                    const auto result = fit(prepared, other, {FitKinds::only(kind), keepScale, true});
                     ASSERT_TRUE(result) << result.error().message;
                     const FitPose& best = result->best;
                     EXPECT_GE(best.score, 0.0);
@@ -284,7 +283,7 @@ TEST(Fit, SurvivesDegenerateShapes) {
         }
     }
     FitOptions whole;
-    whole.kind = FitKind::kWhole;
+    whole.kinds = FitKinds::only(FitKind::kWhole);
     EXPECT_GT(fitted(huge, normal, whole).best.score, 0.7);
     EXPECT_GT(fitted(flat, flat, whole).best.score, 0.9);
 }

@@ -1,0 +1,88 @@
+// Verified search: the best candidates of a search are laid on the query (core/fit/), and how well they fit
+// is part of their score.
+//
+// A signature says what a shape is like; only laying it on the query shows whether it is the same one, left
+// or right, and where it lies. docs/verify.md has the formulas and what they gain.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/run_context.h"
+#include "core/fit/fit.h"
+#include "core/search/top_k.h"
+
+namespace shapedb {
+
+/// How candidates are verified.
+struct VerifyOptions {
+    /// At most so many candidates are laid on the query, those that the signatures rank first; at least 1.
+    /// With fewer shapes in the collection, or when no other can reach the hits, the answer is exact.
+    std::size_t mostCandidates = 64;
+};
+
+/// The surface points of a shape; null for one that has none (yet). Called from several threads at once.
+/// Errors end the search.
+using SurfaceOf = std::function<Result<std::shared_ptr<const SurfacePoints>>(std::int64_t id)>;
+
+struct VerifiedHit {
+    std::int64_t id = 0;
+    /// In [0, 1]: from the distance of the signatures and the misfit. A candidate that was not verified
+    /// counts as if it fitted like an unrelated shape, so that all scores of an answer can be compared.
+    double score = 0.0;
+    double signatureScore = 0.0;           ///< as topK gives it
+    std::shared_ptr<const FitResult> fit;  ///< null if it was not verified
+    double misfitShare = 0.0;              ///< weight of the misfit in the score, if it was verified
+};
+
+struct VerifiedResult {
+    std::vector<VerifiedHit> hits;  ///< in descending order of score, ties in ascending order of id
+    std::size_t verified = 0;       ///< candidates that were laid on the query
+    /// Whether verifying more candidates could change no hit.
+    bool exact = false;
+    SearchCounts counts;   ///< of the search for candidates
+    double seconds = 0.0;  ///< taken, by both
+    std::shared_ptr<const Scorer> scorer;
+};
+
+/// A search, and what verifying it needs.
+struct VerifiableQuery : BatchQuery {
+    std::shared_ptr<const SurfacePoints> surface = nullptr;  ///< null: it cannot be verified
+};
+
+/// What topK found, as hits that were not verified: their scores are those of the signatures.
+[[nodiscard]] VerifiedResult unverified(SearchResult found);
+
+/// What the query may be a scan of: whole, and one-sided too if its interior is unreliable, for a camera that
+/// sees one side leaves it open; with `score.partial` also a piece. `quality`: of the query's attributes, 0
+/// to 255; a signature without attributes counts as reliable.
+[[nodiscard]] FitKinds kindsOfQuery(const Signature& query, const ScoreOptions& score);
+
+/// The score of a candidate whose signature scores `signatureScore` and whose misfit is `misfit`
+/// (FitResult::misfit). Falls with the misfit, rises with the signature's score, and is 1 for the same
+/// signature whatever the misfit.
+///
+/// It is scoreOfDistance of the mean of distanceOfScore(signatureScore) and `misfit`, the latter weighted by
+/// misfitShare.
+[[nodiscard]] double verifiedScore(double signatureScore, double misfit, const FitKinds& kinds,
+                                   const ScoreOptions& score);
+
+/// The weight of the misfit, in (0, 1).
+[[nodiscard]] double misfitShare(const FitKinds& kinds, const ScoreOptions& score) noexcept;
+
+/// The `options.k` best scores of a snapshot, verified. Uses the threads of the caller's oneTBB arena;
+/// neither their number nor the order of candidates changes a bit. Reports progress as stages "search" and
+/// "verify".
+///
+/// Errors: those of topK and of `surfaceOf`; kCancelled, kDeadlineExceeded, kOutOfMemory.
+[[nodiscard]] Result<VerifiedResult> topKVerified(const Signature& query, const FitQuery& querySurface,
+                                                  const SignatureSet& set, const SearchOptions& options,
+                                                  const VerifyOptions& verify, const SurfaceOf& surfaceOf,
+                                                  const RunContext& context = {});
+
+}  // namespace shapedb

@@ -1,0 +1,254 @@
+#include "core/search/verify.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <tbb/task_arena.h>
+
+#include "core/geometry/motion.h"
+#include "core/matching/score_scale.h"
+#include "core/pipeline.h"
+#include "core/synthetic/families.h"
+#include "core/synthetic/partial.h"
+
+namespace shapedb {
+namespace {
+
+struct Scanned {
+    Signature signature;
+    std::shared_ptr<const SurfacePoints> surface;
+};
+
+PointCloud scanOfFamily(const std::string& family, std::size_t member, std::uint64_t seed) {
+    ScanOptions options;
+    options.count = 2500;
+    options.noise = 0.002;
+    options.seed = seed;
+    return scanOf(makeMember(family, member, 1).value(), options).value();
+}
+
+Scanned scanned(const PointCloud& points) {
+    return {describe(points, parametersOf(Profile::kDefault)).value().signature,
+            std::make_shared<const SurfacePoints>(makeSurfacePoints(points).value())};
+}
+
+// Shapes with ids 10, 20, ..., the last of which has no surface points; and a second scan of the first.
+struct Gallery {
+    std::map<std::int64_t, Scanned> shapes;
+    SignatureSet set;
+    Scanned query;
+
+    std::shared_ptr<const SurfacePoints> surfaceOf(std::int64_t id) const { return shapes.at(id).surface; }
+};
+
+const Gallery& gallery() {
+    static const Gallery made = [] {
+        Gallery g;
+        std::vector<IndexEntry> entries;
+        for (const char* family : {"hammer", "animal", "airplane", "table"}) {
+            for (std::size_t member = 0; member < 2; ++member) {
+                const auto id = static_cast<std::int64_t>(10 * (g.shapes.size() + 1));
+                g.shapes[id] = scanned(scanOfFamily(family, member, 5 + static_cast<std::uint64_t>(id)));
+                entries.push_back({id, {}, g.shapes[id].signature});
+            }
+        }
+        g.shapes[80].surface = nullptr;
+        g.set = SignatureSet().with(entries, {});
+        g.query = scanned(scanOfFamily("hammer", 0, 1));
+        return g;
+    }();
+    return made;
+}
+
+const SurfaceOf kStored = [](std::int64_t id) -> Result<std::shared_ptr<const SurfacePoints>> {
+    return gallery().surfaceOf(id);
+};
+
+Result<VerifiedResult> searched(const Scanned& query, const SearchOptions& options, std::size_t most,
+                                const RunContext& context = {}) {
+    return topKVerified(query.signature, FitQuery(*query.surface), gallery().set, options, {most}, kStored,
+                        context);
+}
+
+// Fits everything, one after another, and sorts.
+std::vector<VerifiedHit> bruteForce(const Scanned& query, const SearchOptions& options) {
+    const FitKinds kinds = kindsOfQuery(query.signature, options.score);
+    std::vector<VerifiedHit> hits;
+    for (const auto& [id, shape] : gallery().shapes) {
+        VerifiedHit hit;
+        hit.id = id;
+        hit.signatureScore = makeScorer(query.signature, options.score)->score(shape.signature);
+        double misfit = 1.0;
+        if (shape.surface) {
+            const FitOptions fitOptions{kinds, options.score.keepScale, options.score.reflection};
+            misfit = fit(FitQuery(*query.surface), *shape.surface, fitOptions).value().misfit;
+        }
+        hit.score = verifiedScore(hit.signatureScore, misfit, kinds, options.score);
+        if (hit.score >= options.threshold) hits.push_back(hit);
+    }
+    std::sort(hits.begin(), hits.end(), [](const VerifiedHit& a, const VerifiedHit& b) {
+        return a.score != b.score ? a.score > b.score : a.id < b.id;
+    });
+    if (hits.size() > options.k) hits.resize(options.k);
+    return hits;
+}
+
+void expectSame(const std::vector<VerifiedHit>& hits, const std::vector<VerifiedHit>& expected) {
+    ASSERT_EQ(hits.size(), expected.size());
+    for (std::size_t i = 0; i < hits.size(); ++i) {
+        EXPECT_EQ(hits[i].id, expected[i].id) << i;
+        EXPECT_EQ(hits[i].score, expected[i].score) << i;
+        EXPECT_EQ(hits[i].signatureScore, expected[i].signatureScore) << i;
+    }
+}
+
+TEST(Verify, EqualsBruteForceBitForBit) {
+    for (const std::size_t k : {1, 3, 20}) {
+        for (const double threshold : {0.0, 0.3}) {
+            SearchOptions options;
+            options.k = k;
+            options.threshold = threshold;
+            const auto result = searched(gallery().query, options, 100);
+            ASSERT_TRUE(result) << result.error().message;
+            EXPECT_TRUE(result->exact);
+            expectSame(result->hits, bruteForce(gallery().query, options));
+        }
+    }
+}
+
+TEST(Verify, DoesNotDependOnTheNumberOfThreads) {
+    SearchOptions options;
+    options.k = 8;
+    const auto wide = searched(gallery().query, options, 100);
+    tbb::task_arena alone(1);
+    const auto narrow = alone.execute([&] { return searched(gallery().query, options, 100); });
+    ASSERT_TRUE(wide);
+    ASSERT_TRUE(narrow);
+    expectSame(wide->hits, narrow->hits);
+    EXPECT_EQ(wide->verified, narrow->verified);
+}
+
+TEST(Verify, PutsTheSameObjectFirstAndSaysHowItLies) {
+    SearchOptions options;
+    options.k = 3;
+    const auto result = searched(gallery().query, options, 100);
+    ASSERT_TRUE(result);
+    const VerifiedHit& first = result->hits.front();
+    EXPECT_EQ(first.id, 10);
+    EXPECT_GT(first.score, 0.9);
+    ASSERT_TRUE(first.fit);
+    EXPECT_GT(first.fit->best.explainedQuery, 0.9);
+    EXPECT_EQ(first.misfitShare, 0.5);
+}
+
+TEST(Verify, NamesAnAnswerThatTheCapMadeInexact) {
+    SearchOptions options;
+    options.k = 8;
+    const auto capped = searched(gallery().query, options, 2);
+    ASSERT_TRUE(capped);
+    EXPECT_EQ(capped->verified, 2u);
+    EXPECT_FALSE(capped->exact);
+    ASSERT_EQ(capped->hits.size(), 8u) << "the others are ranked by their signatures";
+    for (const VerifiedHit& hit : capped->hits) {
+        if (hit.fit) continue;
+        EXPECT_EQ(hit.score,
+                  verifiedScore(hit.signatureScore, 1.0,
+                                kindsOfQuery(gallery().query.signature, options.score), options.score));
+    }
+}
+
+TEST(Verify, LeavesShapesWithoutSurfacePointsUnverified) {
+    SearchOptions options;
+    options.k = 8;
+    const auto result = searched(gallery().query, options, 100);
+    ASSERT_TRUE(result);
+    EXPECT_EQ(result->verified, 7u);
+    for (const VerifiedHit& hit : result->hits) EXPECT_EQ(hit.fit != nullptr, hit.id != 80) << hit.id;
+}
+
+TEST(Verify, KeepsAScoreOfOneForTheSameSignature) {
+    SearchOptions options;
+    options.k = 2;
+    const auto result = searched(gallery().shapes.at(30), options, 100);
+    ASSERT_TRUE(result);
+    EXPECT_EQ(result->hits.front().id, 30);
+    EXPECT_EQ(result->hits.front().score, 1.0);
+    EXPECT_LT(result->hits.back().score, 1.0);
+    options.excludeId = 30;
+    EXPECT_NE(searched(gallery().shapes.at(30), options, 100)->hits.front().id, 30);
+}
+
+TEST(Verify, ScoreFallsWithTheMisfitAndRisesWithTheSignatures) {
+    for (const FitKinds kinds : {FitKinds{true, false, false}, FitKinds{true, true, true}}) {
+        const double share = misfitShare(kinds, {});
+        double last = 1.0;
+        for (const double misfit : {0.0, 0.2, 0.5, 1.0, 1.4}) {
+            const double score = verifiedScore(0.6, misfit, kinds, {});
+            EXPECT_LT(score, last);
+            EXPECT_NEAR(score, scoreOfDistance((1.0 - share) * distanceOfScore(0.6) + share * misfit), 1e-12);
+            EXPECT_GT(verifiedScore(0.7, misfit, kinds, {}), score);
+            last = score;
+        }
+        EXPECT_LT(verifiedScore(0.999999, 0.0, kinds, {}), 1.0) << "1 is for the same shape alone";
+    }
+    ScoreOptions handed;
+    handed.reflection = false;
+    EXPECT_GT(misfitShare({true, false, false}, handed), misfitShare({true, false, false}, {}))
+        << "signatures do not tell left from right";
+}
+
+TEST(Verify, TakesOpenScansForOneSided) {
+    const PointCloud whole = scanOfFamily("animal", 1, 9);
+    const Signature open = describe(seenFrom(whole, {0, 0, 1}), parametersOf(Profile::kDefault))->signature;
+    EXPECT_TRUE(kindsOfQuery(open, {}).oneSided);
+    EXPECT_FALSE(kindsOfQuery(open, {}).piece);
+    const Signature& closed = gallery().query.signature;
+    EXPECT_FALSE(kindsOfQuery(closed, {}).oneSided);
+    ScoreOptions partial;
+    partial.partial = true;
+    EXPECT_TRUE(kindsOfQuery(closed, partial).piece);
+    EXPECT_TRUE(kindsOfQuery(closed, partial).whole);
+}
+
+TEST(Verify, EndsWithTheErrorOfASurfaceOrTheContext) {
+    SearchOptions options;
+    const auto broken =
+        topKVerified(gallery().query.signature, FitQuery(*gallery().query.surface), gallery().set, options,
+                     {}, [](std::int64_t) -> Result<std::shared_ptr<const SurfacePoints>> {
+                         return fail(ErrorCode::kDataLoss, "damaged");
+                     });
+    ASSERT_FALSE(broken);
+    EXPECT_EQ(broken.error().code, ErrorCode::kDataLoss);
+
+    std::atomic<bool> cancel{false};
+    RunContext context;
+    context.cancel = &cancel;
+    context.progress = [&](const char* stage, std::uint64_t, std::uint64_t) {
+        if (std::string(stage) == "verify") cancel = true;
+    };
+    const auto cancelled = searched(gallery().query, options, 100, context);
+    ASSERT_FALSE(cancelled);
+    EXPECT_EQ(cancelled.error().code, ErrorCode::kCancelled);
+
+    options.k = 0;
+    EXPECT_EQ(searched(gallery().query, options, 100).error().code, ErrorCode::kInvalidArgument);
+    options.k = 1;
+    EXPECT_EQ(searched(gallery().query, options, 0).error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST(ScoreScale, DistanceAndScoreAreInverse) {
+    EXPECT_EQ(scoreOfDistance(0.0), 1.0);
+    EXPECT_NEAR(scoreOfDistance(1.0), 0.2, 1e-15);
+    for (const double score : {1.0, 0.9, 0.5, 0.2, 1e-6}) {
+        EXPECT_NEAR(scoreOfDistance(distanceOfScore(score)), score, 1e-12);
+    }
+    EXPECT_TRUE(std::isinf(distanceOfScore(0.0)));
+}
+
+}  // namespace
+}  // namespace shapedb
