@@ -112,7 +112,7 @@ struct CollectionIndex::Slot {
 };
 
 CollectionIndex::CollectionIndex(store::Store& store, telemetry::LoggerPtr log)
-    : store_(store), log_(std::move(log)) {}
+    : store_(store), log_(std::move(log)), surfaces_(store) {}
 
 CollectionIndex::~CollectionIndex() = default;
 
@@ -186,6 +186,7 @@ Result<void> CollectionIndex::loadAllUnguarded(const RunContext& context) {
         slot->publish(*snapshot);
         insert(next, std::move(slot));
     }
+    surfaces_.clear();
     const std::lock_guard<std::mutex> lock(mutex_);
     // The old directory is freed with `next`, after the lock has been released.
     std::swap(directory_, next);
@@ -194,6 +195,7 @@ Result<void> CollectionIndex::loadAllUnguarded(const RunContext& context) {
 
 void CollectionIndex::clear() {
     Directory none;
+    surfaces_.clear();
     const std::lock_guard<std::mutex> lock(mutex_);
     std::swap(directory_, none);  // freed after the lock
 }
@@ -252,6 +254,7 @@ void CollectionIndex::remove(std::int64_t collectionId) {
 }
 
 Result<void> CollectionIndex::refresh(std::int64_t collectionId, std::int64_t shapeId) {
+    surfaces_.forget(shapeId);
     const SlotPtr slot = find(collectionId);
     if (!slot) return {};
     return guarded([&] {
@@ -297,6 +300,7 @@ Result<void> CollectionIndex::applyDirty(Slot& slot) {
 }
 
 Result<void> CollectionIndex::reloadLocked(Slot& slot) {
+    surfaces_.clear();
     slot.stale = true;
     // What is marked by now will be read; later marks are applied afterwards.
     slot.takeDirty();

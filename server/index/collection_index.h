@@ -18,6 +18,7 @@
 #include "core/base/error.h"
 #include "core/pipeline.h"
 #include "core/search/signature_set.h"
+#include "server/index/surface_cache.h"
 #include "server/store/store.h"
 #include "server/telemetry/logger.h"
 
@@ -82,6 +83,11 @@ class CollectionIndex {
     [[nodiscard]] Result<bool> switchGeneration(std::int64_t collectionId,
                                                 const std::function<Result<bool>()>& change);
 
+    /// The surface points of a shape, cached (surface_cache.h).
+    [[nodiscard]] Result<std::shared_ptr<const SurfacePoints>> surface(std::int64_t shapeId) {
+        return surfaces_.get(shapeId);
+    }
+
     struct Totals {
         std::uint64_t signatures = 0;
         std::uint64_t bytes = 0;  ///< approximate
@@ -108,6 +114,7 @@ class CollectionIndex {
 
     store::Store& store_;
     telemetry::LoggerPtr log_;
+    SurfaceCache surfaces_;
     mutable std::mutex mutex_;  ///< guards directory_; held only to look up or to replace
     Directory directory_;
 };

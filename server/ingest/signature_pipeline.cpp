@@ -3,6 +3,8 @@
 #include <exception>
 #include <new>
 
+#include "core/fit/surface_points.h"
+#include "core/fit/surface_points_codec.h"
 #include "core/signature/signature_codec.h"
 #include "server/ingest/background_thread.h"
 
@@ -33,13 +35,20 @@ PipelineOutcome runOrThrow(const Describe& describe, store::Store& store, std::i
         cloud = store::toCloud(*points);
     }
     Result<Description> description = fail(ErrorCode::kInternal, "not described");
-    onThisThreadAlone([&] { description = describe(cloud, parameters, context); });
-    if (!description) {
-        const bool cancelled = description.error().code == ErrorCode::kCancelled;
-        return failed(cancelled ? Kind::kCancelled : Kind::kScanFailed, description.error());
+    Result<SurfacePoints> surface = fail(ErrorCode::kInternal, "no surface points");
+    onThisThreadAlone([&] {
+        description = describe(cloud, parameters, context);
+        if (description) surface = makeSurfacePoints(cloud, context);
+    });
+    const bool cancelled = !description && description.error().code == ErrorCode::kCancelled;
+    if (cancelled || (!surface && surface.error().code == ErrorCode::kCancelled)) {
+        return failed(Kind::kCancelled, cancelled ? description.error() : surface.error());
     }
+    if (!description) return failed(Kind::kScanFailed, description.error());
     PipelineOutcome outcome;
     outcome.signature = encodeSignature(description->signature);
+    // A scan that has a signature but no surface points is searched all the same.
+    if (surface) outcome.surface = encodeSurfacePoints(*surface);
     outcome.seconds = description->segmentation.totalSeconds;
     return outcome;
 }

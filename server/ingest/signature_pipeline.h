@@ -28,6 +28,7 @@ struct PipelineOutcome {
     };
     Kind kind = Kind::kSignature;
     std::string signature;  ///< encoded
+    std::string surface;    ///< encoded surface points; empty if the scan has none
     double seconds = 0.0;   ///< of the segmentation
     Error why{ErrorCode::kInternal, ""};
 };

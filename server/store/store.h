@@ -127,6 +127,15 @@ struct SignatureRow {
     std::int64_t pointsVersion = 0;
     std::int64_t generation = 1;
     std::string bytes;  ///< core/signature/signature_codec.h
+    /// When written: the surface points (core/fit/surface_points_codec.h), stored beside the signature; empty
+    /// leaves those of the shape as they are. Never read: see getSurface.
+    std::string surface{};
+};
+
+/// What verifying a shape needs.
+struct SurfaceRow {
+    std::int64_t pointsVersion = 0;
+    std::string bytes;  ///< core/fit/surface_points_codec.h
 };
 
 /// What the index needs of one shape.
@@ -214,6 +223,8 @@ class Store {
     [[nodiscard]] virtual Result<std::vector<float>> loadPoints(std::int64_t shapeId) = 0;
     /// The signature that serves now. Errors: kNotFound (shape), kNotReady.
     [[nodiscard]] virtual Result<SignatureRow> getSignature(std::int64_t shapeId) = 0;
+    /// The surface points of the shape; empty if none were stored yet. Errors: kNotFound (shape).
+    [[nodiscard]] virtual Result<std::optional<SurfaceRow>> getSurface(std::int64_t shapeId) = 0;
 
     // Jobs -------------------------------------------------------------------------
 

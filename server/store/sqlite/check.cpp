@@ -22,6 +22,9 @@ constexpr char kAllPoints[] =
 constexpr char kAllSignatures[] =
     "SELECT g.shape_id, g.points_version, g.generation, g.digest, g.bytes FROM signature g "
     "JOIN shape s ON s.id = g.shape_id";
+constexpr char kAllSurfaces[] =
+    "SELECT s.key, f.points_version, f.digest, f.bytes FROM shape_surface f JOIN shape s ON s.id = "
+    "f.shape_id";
 constexpr char kShapesTotal[] = "SELECT count(*) FROM shape";
 
 /// A rule between tables; the statement lists the keys of shapes that break it.
@@ -51,6 +54,9 @@ constexpr Rule kRules[] = {
      "s.id "
      "WHERE s.state = 2 AND g.generation = c.generation",
      "has failed but still serves a signature"},
+    {"SELECT s.key FROM shape s JOIN shape_surface f ON f.shape_id = s.id WHERE f.points_version > "
+     "s.points_version",
+     "has surface points of points that it never had"},
 };
 
 class Checker {
@@ -65,6 +71,7 @@ class Checker {
         section([&] { foreignKeys(); });
         section([&] { points(); });
         section([&] { signatures(); });
+        section([&] { surfaces(); });
         for (const Rule& rule : kRules) {
             section([&] {
                 Query query(connection_, rule.sql);
@@ -146,6 +153,19 @@ class Checker {
             orRaise(context_.checkpoint());
             try {
                 readSignature(connection_, query, 1, query.integer(0));
+            } catch (const Failure& failure) {
+                if (failure.fromDatabase) throw;
+                add(failure.error.message);
+            }
+        }
+    }
+
+    void surfaces() {
+        Query query(connection_, kAllSurfaces);
+        while (query.step()) {
+            orRaise(context_.checkpoint());
+            try {
+                (void)readSurface(query);
             } catch (const Failure& failure) {
                 if (failure.fromDatabase) throw;
                 add(failure.error.message);

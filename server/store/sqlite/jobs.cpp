@@ -27,6 +27,7 @@ std::optional<Shape> SqliteStore::markFailed(Connection& connection, std::int64_
         .run();
     // Also what a running rebuild made; its next pass finds the shape again.
     Query(connection, sql::kDeleteSignatures, shapeId).run();
+    Query(connection, sql::kDeleteSurface, shapeId).run();
     Query(connection, sql::kDeleteJob, shapeId).run();
     return findShapeById(connection, shapeId);
 }

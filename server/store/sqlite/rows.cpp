@@ -96,7 +96,7 @@ std::optional<Collection> findCollection(Connection& connection, const std::stri
     return readCollection(query);
 }
 
-std::int64_t signatureDigest(const std::string& bytes) {
+std::int64_t digestOf(const std::string& bytes) {
     const Sha256Digest digest = sha256(bytes.data(), bytes.size());
     std::uint64_t value = 0;
     for (int i = 7; i >= 0; --i) value = value << 8 | digest[static_cast<std::size_t>(i)];
@@ -110,7 +110,7 @@ SignatureRow readSignature(Connection& connection, const Query& query, int colum
     row.generation = query.integer(column + 1);
     const BlobView blob = query.blob(column + 3);
     row.bytes.assign(static_cast<const char*>(blob.size > 0 ? blob.data : ""), blob.size);
-    if (signatureDigest(row.bytes) != query.integer(column + 2)) {
+    if (digestOf(row.bytes) != query.integer(column + 2)) {
         const auto shape = findShapeById(connection, shapeId);
         raise(ErrorCode::kDataLoss,
               "the stored signature of shape " + (shape ? quoted(shape->key) : std::to_string(shapeId)) +
@@ -121,8 +121,25 @@ SignatureRow readSignature(Connection& connection, const Query& query, int colum
 
 void putSignature(Connection& connection, const SignatureRow& signature) {
     Query(connection, sql::kPutSignature, signature.shapeId, signature.generation, signature.pointsVersion,
-          signatureDigest(signature.bytes), BlobView{signature.bytes.data(), signature.bytes.size()})
+          digestOf(signature.bytes), BlobView{signature.bytes.data(), signature.bytes.size()})
         .run();
+    if (signature.surface.empty()) return;
+    Query(connection, sql::kPutSurface, signature.shapeId, signature.pointsVersion,
+          digestOf(signature.surface), BlobView{signature.surface.data(), signature.surface.size()})
+        .run();
+}
+
+std::optional<SurfaceRow> readSurface(const Query& query) {
+    if (query.isNull(1)) return std::nullopt;
+    const BlobView blob = query.blob(3);
+    SurfaceRow row;
+    row.pointsVersion = query.integer(1);
+    row.bytes.assign(static_cast<const char*>(blob.size > 0 ? blob.data : ""), blob.size);
+    if (digestOf(row.bytes) != query.integer(2)) {
+        raise(ErrorCode::kDataLoss, "the stored surface points of shape " + quoted(query.text(0)) +
+                                        " are damaged; rebuild the collection");
+    }
+    return row;
 }
 
 std::vector<float> readPoints(const Query& query) {

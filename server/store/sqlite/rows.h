@@ -46,11 +46,15 @@ Collection readCollection(const Query& query);
 /// Failure kDataLoss, naming the shape.
 SignatureRow readSignature(Connection& connection, const Query& query, int column, std::int64_t shapeId);
 
-/// Replaces the shape's signature of that generation, if there is one.
+/// Replaces the shape's signature of that generation, and its surface points if the row brings some.
 void putSignature(Connection& connection, const SignatureRow& signature);
 
-/// Column signature.digest: the first eight bytes of the SHA-256, little-endian. Persisted.
-std::int64_t signatureDigest(const std::string& bytes);
+/// The surface points of a kSurfaceOfShape row, verified; empty if there are none. Throws Failure kDataLoss,
+/// naming the shape.
+std::optional<SurfaceRow> readSurface(const Query& query);
+
+/// Columns named digest: the first eight bytes of the SHA-256, little-endian. Persisted.
+std::int64_t digestOf(const std::string& bytes);
 
 /// Decodes the points of a kLoadPoints row and verifies their checksum. Throws Failure.
 std::vector<float> readPoints(const Query& query);

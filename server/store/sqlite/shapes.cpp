@@ -217,6 +217,14 @@ Result<SignatureRow> SqliteStore::getSignature(std::int64_t shapeId) {
     });
 }
 
+Result<std::optional<SurfaceRow>> SqliteStore::getSurface(std::int64_t shapeId) {
+    return read("read the surface points", [&](Connection& connection) {
+        Query query(connection, sql::kSurfaceOfShape, shapeId);
+        if (!query.step()) raiseNoShape(shapeId);
+        return readSurface(query);
+    });
+}
+
 Result<std::vector<IndexRow>> SqliteStore::loadIndex(std::int64_t collectionId, std::int64_t afterId,
                                                      std::size_t limit) {
     return read("load the index", [&](Connection& connection) {

@@ -42,6 +42,7 @@ class SqliteStore final : public Store {
                               std::optional<std::int64_t> expectedVersion) override;
     Result<std::vector<float>> loadPoints(std::int64_t shapeId) override;
     Result<SignatureRow> getSignature(std::int64_t shapeId) override;
+    Result<std::optional<SurfaceRow>> getSurface(std::int64_t shapeId) override;
 
     Result<std::optional<Job>> claimJob() override;
     Result<std::optional<Shape>> finishJob(const Job& job, const SignatureRow& signature) override;

@@ -101,20 +101,20 @@ TEST_F(SearchesTest, AnswersExplainHitsAndLeaveOutDeletedShapes) {
     request.k = 10;
     const auto prepared = prepare(request);
     const auto query = searches().storedQuery(*prepared, "cup");
-    SearchResult found = searches().run(*prepared, {query->signature, std::nullopt}, {}).value();
+    VerifiedResult found = searches().run(*prepared, {{query->signature, std::nullopt}, nullptr}, {}).value();
     ASSERT_EQ(found.hits.size(), 2u);
-    const auto keysOf = [&](const SearchResult& result) {
+    const auto keysOf = [&](const VerifiedResult& result) {
         std::vector<std::string> keys;
         EXPECT_TRUE(searches().visitHits(*prepared, result, [&](const FoundHit& hit) {
             EXPECT_TRUE(hit.explanation) << hit.shape.key;
-            EXPECT_EQ(hit.explanation.value_or(Explanation{}).score, hit.score);
+            EXPECT_EQ(hit.explanation.value_or(Explanation{}).score, hit.signatureScore);
             keys.push_back(hit.shape.key);
             return Result<void>();
         }));
         return keys;
     };
     EXPECT_EQ(keysOf(found), (std::vector<std::string>{"cup", "jug"}));
-    found.hits[1].score /= 2.0;  // as if the signature had been replaced after the search
+    found.hits[1].signatureScore /= 2.0;  // as if the signature had been replaced after the search
     EXPECT_TRUE(searches().visitHits(*prepared, found, [&](const FoundHit& hit) {
         EXPECT_EQ(hit.explanation.has_value(), hit.shape.key == "cup");
         return Result<void>();
@@ -167,16 +167,16 @@ TEST_F(SearchesTest, ABatchSaysWhichOfItsQueriesIsWrong) {
 TEST_F(SearchesTest, AComparisonExplainsAndSaysWhichShapeIsMissing) {
     putAndWait("cup", 5.0f);
     putAndWait("jug", 6.0f);
-    const auto compared = searches().compare({"", "cup"}, {"default", "jug"}, {});
+    const auto compared = searches().compare({"", "cup"}, {"default", "jug"}, {}, {});
     ASSERT_TRUE(compared);
     EXPECT_EQ(compared->query.volume, 5.0);
     EXPECT_EQ(compared->other.volume, 6.0);
     EXPECT_EQ(compared->explanation.score, shapedb::explain(signatureOf(5.0), signatureOf(6.0), {}).score);
-    const auto first = searches().compare({"", "none"}, {"", "none"}, {});
+    const auto first = searches().compare({"", "none"}, {"", "none"}, {}, {});
     ASSERT_FALSE(first);
     EXPECT_EQ(first.error().code, ErrorCode::kNotFound);
     EXPECT_EQ(first.error().message, "query: there is no shape 'none' in collection 'default'");
-    const auto second = searches().compare({"", "cup"}, {"", "none"}, {});
+    const auto second = searches().compare({"", "cup"}, {"", "none"}, {}, {});
     ASSERT_FALSE(second);
     EXPECT_EQ(second.error().message, "other: there is no shape 'none' in collection 'default'");
 }

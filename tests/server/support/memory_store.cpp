@@ -112,6 +112,7 @@ void MemoryStore::removeShape(std::int64_t shapeId) {
     content_.shapes.erase(shapeId);
     content_.points.erase(shapeId);
     content_.signatures.erase(shapeId);
+    content_.surfaces.erase(shapeId);
     for (auto& [id, results] : content_.rebuilt) results.erase(shapeId);
     removeJobs(shapeId);
 }
@@ -235,6 +236,19 @@ Result<SignatureRow> MemoryStore::getSignature(std::int64_t shapeId) {
     });
 }
 
+Result<std::optional<SurfaceRow>> MemoryStore::getSurface(std::int64_t shapeId) {
+    return guarded("getSurface", [&]() -> Result<std::optional<SurfaceRow>> {
+        if (content_.shapes.count(shapeId) == 0) return notFound("shape");
+        const auto found = content_.surfaces.find(shapeId);
+        if (found == content_.surfaces.end()) return std::optional<SurfaceRow>();
+        return std::optional<SurfaceRow>(found->second);
+    });
+}
+
+void MemoryStore::putSurface(const SignatureRow& row) {
+    if (!row.surface.empty()) content_.surfaces[row.shapeId] = {row.pointsVersion, row.surface};
+}
+
 Result<std::optional<Job>> MemoryStore::claimJob() {
     return guarded("claimJob", [&]() -> Result<std::optional<Job>> {
         for (auto& [id, queued] : content_.jobs) {
@@ -275,6 +289,7 @@ Result<std::optional<Shape>> MemoryStore::finishJob(const Job& job, const Signat
         (*shape)->failure.reset();
         (*shape)->updatedAt = now();
         content_.signatures[job.shapeId] = signature;
+        putSurface(signature);
         return std::optional<Shape>(**shape);
     });
 }
@@ -294,6 +309,7 @@ void MemoryStore::markFailed(Shape& shape, const Error& why) {
     shape.failure = why;
     shape.updatedAt = now();
     content_.signatures.erase(shape.id);
+    content_.surfaces.erase(shape.id);
     for (auto& [id, results] : content_.rebuilt) {
         const auto result = results.find(shape.id);
         if (result != results.end() && !result->second.failure) results.erase(result);

@@ -37,6 +37,7 @@ class MemoryStore : public store::Store {
                                      std::optional<std::int64_t> expectedVersion) override;
     Result<std::vector<float>> loadPoints(std::int64_t shapeId) override;
     Result<store::SignatureRow> getSignature(std::int64_t shapeId) override;
+    Result<std::optional<store::SurfaceRow>> getSurface(std::int64_t shapeId) override;
 
     Result<std::optional<store::Job>> claimJob() override;
     Result<std::optional<store::Shape>> finishJob(const store::Job& job,
@@ -83,6 +84,7 @@ class MemoryStore : public store::Store {
         std::map<std::int64_t, store::Shape> shapes;
         std::map<std::int64_t, std::vector<float>> points;
         std::map<std::int64_t, store::SignatureRow> signatures;
+        std::map<std::int64_t, store::SurfaceRow> surfaces;
         std::map<std::int64_t, QueuedJob> jobs;
         std::map<std::int64_t, store::Rebuild> rebuilds;
         std::map<std::int64_t, std::map<std::int64_t, Rebuilt>> rebuilt;
@@ -112,6 +114,7 @@ class MemoryStore : public store::Store {
     /// The job's shape; null when a result no longer counts. One of an older generation puts the job back.
     Result<store::Shape*> current(const store::Job& job, std::int64_t generation);
     void markFailed(store::Shape& shape, const Error& why);
+    void putSurface(const store::SignatureRow& row);
     void release(const store::Job& job);
 
     Result<store::Rebuild*> running(std::int64_t rebuildId);

@@ -115,6 +115,10 @@ Result<void> MemoryStore::putRebuilt(std::int64_t rebuildId, const SignatureRow&
             return fail(ErrorCode::kInvalidArgument, "a signature of another generation");
         }
         put(**rebuild, signature.shapeId, {signature.pointsVersion, signature.bytes, std::nullopt});
+        const auto shape = content_.shapes.find(signature.shapeId);
+        if (shape != content_.shapes.end() && shape->second.pointsVersion == signature.pointsVersion) {
+            putSurface(signature);
+        }
         return {};
     });
 }
@@ -148,7 +152,7 @@ Result<bool> MemoryStore::finishRebuild(std::int64_t rebuildId) {
             shape.state = result.failure ? ShapeState::kFailed : ShapeState::kReady;
             shape.failure = result.failure;
             if (!shape.failure) {
-                content_.signatures[id] = {id, shape.pointsVersion, collection.generation, result.bytes};
+                content_.signatures[id] = {id, shape.pointsVersion, collection.generation, result.bytes, {}};
             }
         }
         return true;

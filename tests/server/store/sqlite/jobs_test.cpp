@@ -39,11 +39,48 @@ TEST_F(SqliteJobsTest, FinishMakesTheShapeReady) {
     EXPECT_EQ(done->version, 1);
     EXPECT_EQ(done->metadata, shape.metadata);
     EXPECT_EQ(store_->getSignature(shape.id)->bytes, signatureFor(job).bytes);
+    EXPECT_EQ(store_->getSurface(shape.id).value()->bytes, signatureFor(job).surface);
+    EXPECT_EQ(store_->getSurface(shape.id).value()->pointsVersion, 1);
     EXPECT_EQ(store_->queueDepth()->jobs, 0u);
     EXPECT_EQ(store_->queueDepth()->bytes, 0u);
     EXPECT_FALSE(store_->finishJob(job, signatureFor(job)).value()) << "the job is gone";
     EXPECT_FALSE(store_->failJob(job, {ErrorCode::kInternal, "late"}).value());
     expectSound();
+}
+
+TEST_F(SqliteJobsTest, ASurfaceServesUntilTheNextResult) {
+    const Collection c = collection();
+    const Shape shape = put(c.id, "a", 1);
+    EXPECT_FALSE(store_->getSurface(shape.id).value()) << "pending";
+    Job job = claim();
+    ASSERT_TRUE(store_->finishJob(job, signatureFor(job)).value());
+    put(c.id, "a", 2);
+    EXPECT_EQ(store_->getSurface(shape.id).value()->pointsVersion, 1) << "like the signature";
+    job = claim();
+    SignatureRow row = signatureFor(job);
+    row.surface = std::string("\0\x01", 2);
+    ASSERT_TRUE(store_->finishJob(job, row).value());
+    EXPECT_EQ(store_->getSurface(shape.id).value()->bytes, row.surface);
+    EXPECT_EQ(store_->getSurface(shape.id).value()->pointsVersion, 2);
+    put(c.id, "a", 3);
+    ASSERT_TRUE(store_->failJob(claim(), {ErrorCode::kNoInterior, "open"}).value());
+    EXPECT_FALSE(store_->getSurface(shape.id).value());
+    expectSound();
+    EXPECT_FAILS(store_->getSurface(shape.id + 1), ErrorCode::kNotFound);
+}
+
+TEST_F(SqliteJobsTest, DamagedSurfacesAreToldByReadsAndChecks) {
+    const Collection c = collection();
+    const Shape shape = put(c.id, "a", 1);
+    const Job job = claim();
+    ASSERT_TRUE(store_->finishJob(job, signatureFor(job)).value());
+    store_.reset();
+    Connection(options().path, OpenMode::kReadWrite, 0).execute("UPDATE shape_surface SET bytes = x'00'");
+    open();
+    EXPECT_FAILS(store_->getSurface(shape.id), ErrorCode::kDataLoss);
+    const auto problems = store_->check({}).value();
+    ASSERT_EQ(problems.size(), 1u);
+    EXPECT_NE(problems.front().find("surface points of shape 'a'"), std::string::npos) << problems.front();
 }
 
 TEST_F(SqliteJobsTest, StoresSignaturesAsBytes) {

@@ -41,7 +41,8 @@ inline PutRequest request(std::int64_t collectionId, const std::string& key, con
 inline SignatureRow signatureFor(std::int64_t shapeId, std::int64_t pointsVersion, std::int64_t generation) {
     return {shapeId, pointsVersion, generation,
             "signature of " + std::to_string(shapeId) + "/" + std::to_string(pointsVersion) + "/" +
-                std::to_string(generation)};
+                std::to_string(generation),
+            "surface of " + std::to_string(shapeId) + "/" + std::to_string(pointsVersion)};
 }
 inline SignatureRow signatureFor(const Job& job) {
     return signatureFor(job.shapeId, job.pointsVersion, job.generation);
