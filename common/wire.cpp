@@ -66,16 +66,40 @@ void toProto(const Segmentation& segmentation, v1::SegmentationReport* out) {
     }
 }
 
+namespace {
+
+void fillMotion(const Motion& motion, v1::Motion* out) {
+    for (const auto& row : motion.rotation) {
+        for (const double entry : row) out->add_rotation(entry);
+    }
+    out->set_scale(motion.scale);
+    shapedb::wire::toProto(motion.translation, out->mutable_translation());
+    out->set_reflected(motion.reflected);
+}
+
+void fillPose(const FitPose& pose, v1::FitPose* out) {
+    fillMotion(pose.motion, out->mutable_motion());
+    out->set_score(pose.score);
+    out->set_explained_query(pose.explainedQuery);
+    out->set_explained_other(pose.explainedOther);
+    out->set_residual(pose.residual);
+}
+
+v1::FitKind kindOf(FitKind kind) {
+    switch (kind) {
+        case FitKind::kWhole: return v1::FIT_KIND_WHOLE;
+        case FitKind::kOneSided: return v1::FIT_KIND_ONE_SIDED;
+        case FitKind::kPiece: return v1::FIT_KIND_PIECE;
+    }
+    return v1::FIT_KIND_WHOLE;
+}
+
+}  // namespace
+
 void toProto(const Explanation& explanation, v1::Explanation* out) {
     out->set_similarity(explanation.similarity);
     out->set_dissimilarity(explanation.dissimilarity);
-    v1::Motion* motion = out->mutable_motion();
-    for (const auto& row : explanation.motion.rotation) {
-        for (const double entry : row) motion->add_rotation(entry);
-    }
-    motion->set_scale(explanation.motion.scale);
-    toProto(explanation.motion.translation, motion->mutable_translation());
-    motion->set_reflected(explanation.motion.reflected);
+    fillMotion(explanation.motion, out->mutable_motion());
     for (const PointMatch& match : explanation.matches) {
         v1::SegmentMatch* pair = out->add_matches();
         pair->set_query_segment(match.a);
@@ -91,6 +115,20 @@ void toProto(const Explanation& explanation, v1::Explanation* out) {
         part->set_name(term.name);
         part->set_distance(term.distance);
         part->set_weight(term.weight);
+    }
+}
+
+void toProto(const FitResult& fit, v1::Fit* out) {
+    fillPose(fit.best, out->mutable_best());
+    out->set_kind(kindOf(fit.kind));
+    out->set_misfit(fit.misfit);
+    out->set_certainty(fit.certainty);
+    out->set_left_right_open(fit.handednessOpen);
+    for (const FitPose& pose : fit.alternatives) fillPose(pose, out->add_alternatives());
+    for (const FreeAxis& axis : fit.axes) {
+        v1::FreeAxis* line = out->add_axes();
+        toProto(axis.point, line->mutable_point());
+        toProto(axis.direction, line->mutable_direction());
     }
 }
 

@@ -5,6 +5,7 @@
 #pragma once
 
 #include "common/wire_enums.h"
+#include "core/fit/fit.h"
 #include "core/geometry/point.h"
 #include "core/matching/score.h"
 #include "core/pipeline.h"
@@ -20,6 +21,7 @@ void toProto(const Point3& point, v1::Vector3* out);
 void toProto(const Signature& signature, v1::Signature* out);
 void toProto(const Segmentation& segmentation, v1::SegmentationReport* out);
 void toProto(const Explanation& explanation, v1::Explanation* out);
+void toProto(const FitResult& fit, v1::Fit* out);
 /// Sets every field of both.
 void toProto(const ShapeParameters& parameters, v1::SegmentationParameters* segmentation,
              v1::SignatureParameters* signature);

@@ -72,6 +72,8 @@ void fill(const SearchOptions& from, v1::SearchOptions* to) {
     to->set_keep_scale(from.keepScale);
     to->set_partial(from.partial);
     to->set_no_explanation(!from.explanation);
+    if (from.verify) to->set_verify(*from.verify);
+    to->set_verify_candidates(from.verifyCandidates);
 }
 
 v1::AddMode toWire(AddMode mode) {
@@ -196,18 +198,54 @@ Explanation fromWire(const v1::Explanation& from) {
     return to;
 }
 
+namespace {
+
+FitPose fromWire(const v1::FitPose& from) {
+    return {fromWire(from.motion()), from.score(), from.explained_query(), from.explained_other(),
+            from.residual()};
+}
+
+FitKind fromWire(v1::FitKind from) {
+    switch (from) {
+        case v1::FIT_KIND_ONE_SIDED: return FitKind::kOneSided;
+        case v1::FIT_KIND_PIECE: return FitKind::kPiece;
+        default: return FitKind::kWhole;
+    }
+}
+
+}  // namespace
+
+Fit fromWire(const v1::Fit& from) {
+    Fit to;
+    to.best = fromWire(from.best());
+    to.kind = fromWire(from.kind());
+    to.misfit = from.misfit();
+    to.certainty = from.certainty();
+    to.handednessOpen = from.left_right_open();
+    for (const v1::FitPose& pose : from.alternatives()) to.alternatives.push_back(fromWire(pose));
+    for (const v1::FreeAxis& axis : from.axes()) {
+        to.axes.push_back({fromWire(axis.point()), fromWire(axis.direction())});
+    }
+    return to;
+}
+
 SearchReply fromWire(const v1::SearchResponse& from) {
     SearchReply to;
     for (const v1::Hit& hit : from.hits()) {
         Hit out;
         out.shape = fromWire(hit.shape());
         out.score = hit.score();
+        out.signatureScore = hit.signature_score();
         if (hit.has_explanation()) out.explanation = fromWire(hit.explanation());
+        if (hit.has_fit()) out.fit = fromWire(hit.fit());
         to.hits.push_back(std::move(out));
     }
     to.candidates = from.candidates();
     to.filtered = from.filtered();
     to.scored = from.scored();
+    to.verified = from.candidates_verified();
+    to.exact = !from.not_exact();
+    to.pending = from.pending();
     to.query = fromWire(from.query());
     to.secondsSegment = from.seconds_segment();
     to.secondsSearch = from.seconds_search();

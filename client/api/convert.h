@@ -46,6 +46,7 @@ void fillParameters(const Parameters& from, Message* to) {
 [[nodiscard]] Signature fromWire(const v1::Signature& from);
 [[nodiscard]] SegmentationReport fromWire(const v1::SegmentationReport& from);
 [[nodiscard]] Explanation fromWire(const v1::Explanation& from);
+[[nodiscard]] Fit fromWire(const v1::Fit& from);
 [[nodiscard]] SearchReply fromWire(const v1::SearchResponse& from);
 [[nodiscard]] Collection fromWire(const v1::Collection& from);
 [[nodiscard]] RebuildProgress fromWire(const v1::RebuildProgress& from);

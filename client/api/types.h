@@ -213,6 +213,10 @@ struct SearchOptions {
     bool keepScale = false;   ///< true: size matters
     bool partial = false;     ///< true: the query may be a one-sided scan or a broken piece of a hit
     bool explanation = true;  ///< false: no motion and no matches with the hits
+    /// Whether the best candidates are laid on the query; nothing: yes, but not in collections of profile
+    /// `paper`.
+    std::optional<bool> verify;
+    std::uint32_t verifyCandidates = 0;  ///< how many at most; 0: the server's default
 };
 
 struct CompareOptions {
@@ -248,10 +252,44 @@ struct Explanation {
     std::vector<ScoreTerm> terms;  ///< empty unless both signatures have attributes
 };
 
+/// One way of laying a shape on the query (docs/fit.md).
+struct FitPose {
+    Motion motion;                ///< from coordinates of the shape to those of the query
+    double score = 0.0;           ///< [0, 1]: root of the product of the next two
+    double explainedQuery = 0.0;  ///< share of the query's surface that lies on the shape's, [0, 1]
+    /// The same of the part of the shape's surface that the query should have seen.
+    double explainedOther = 0.0;
+    /// Root of the mean squared distance of the query's points from the shape, where they are near it, as a
+    /// share of the query's diagonal.
+    double residual = 0.0;
+};
+
+/// Any turn about this line is as good.
+struct FreeAxis {
+    Point3 point;      ///< query coordinates
+    Point3 direction;  ///< unit vector
+};
+
+/// What the query was taken for.
+enum class FitKind { kWhole, kOneSided, kPiece };
+
+/// How a shape lies on the query.
+struct Fit {
+    FitPose best;
+    FitKind kind = FitKind::kWhole;
+    double misfit = 0.0;                ///< 0: the shapes coincide; about 1: typical of unrelated shapes
+    double certainty = 0.0;             ///< [0, 1]: 0 if a clearly different pose is as good
+    bool handednessOpen = false;        ///< the points do not tell left from right
+    std::vector<FitPose> alternatives;  ///< clearly different poses that are as good, best first
+    std::vector<FreeAxis> axes;         ///< one for a bottle, three for a ball
+};
+
 struct Hit {
     Shape shape;
     double score = 0.0;                      ///< [0, 1]; 1 exactly for identical signatures
+    double signatureScore = 0.0;             ///< what the signatures alone say; the same if not verified
     std::optional<Explanation> explanation;  ///< unless the options leave it out
+    std::optional<Fit> fit;                  ///< if it was verified
 };
 
 struct SearchReply {
@@ -259,6 +297,9 @@ struct SearchReply {
     std::uint64_t candidates = 0;  ///< shapes in the snapshot searched
     std::uint64_t filtered = 0;    ///< of these, how many pass the filter
     std::uint64_t scored = 0;      ///< of these, how many no bound ruled out
+    std::uint64_t verified = 0;    ///< candidates that were laid on the query
+    bool exact = true;             ///< false: verifying more candidates could change the hits
+    std::uint64_t pending = 0;     ///< shapes of the collection that have no signature yet
     Signature query;               ///< as it was scored
     double secondsSegment = 0.0;   ///< searchByScan only
     double secondsSearch = 0.0;

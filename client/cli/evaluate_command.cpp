@@ -29,6 +29,7 @@ struct EvaluateFlags {
     ScanFlags scan;
     ParameterFlags parameters;
     ScoreFlags score;
+    VerifyFlags verify;
 };
 
 struct Timing {
@@ -75,7 +76,9 @@ json settingsJson(const EvaluateFlags& flags, const ShapeParameters& parameters)
                      {"threads", flags.threads},
                      {"reflection", !flags.score.noReflection},
                      {"keep_scale", flags.score.keepScale},
-                     {"partial", flags.score.partial}};
+                     {"partial", flags.score.partial},
+                     {"verify", flags.verify.resolve(parameters.profile)},
+                     {"candidates", flags.verify.candidates}};
     if (!flags.task.classes.only.empty()) settings["only_classes"] = flags.task.classes.only;
     if (!flags.task.classes.except.empty()) settings["except_classes"] = flags.task.classes.except;
     return settings;
@@ -87,6 +90,9 @@ std::string settingsText(const EvaluateFlags& flags, const ShapeParameters& para
                                          " of the diagonal (seed " + std::to_string(flags.scan.seed) + ")"
                                    : ", no noise added";
     if (flags.scan.points) text += ", " + formatCount(*flags.scan.points) + " points each";
+    text += flags.verify.resolve(parameters.profile)
+                ? ", up to " + formatCount(flags.verify.candidates, "candidate", "candidates") + " verified"
+                : ", not verified";
     return text;
 }
 
@@ -118,8 +124,22 @@ Result<void> describeAll(Session& session, const char* what, std::vector<Evaluat
                          const ScanFlags& scan, const EvaluateFlags& flags,
                          const ShapeParameters& parameters) {
     return describeShapes(
-        shapes, scan, parameters, flags.threads,
+        shapes, scan, parameters, flags.verify.resolve(parameters.profile), flags.threads,
         [&](std::size_t done) { session.console().progress(what, done, shapes.size()); }, session.context());
+}
+
+Result<ScoreMatrix> scoresOf(Session& session, const std::vector<EvaluatedShape>& queries,
+                             const std::vector<EvaluatedShape>& candidates, const EvaluateFlags& flags,
+                             const ShapeParameters& parameters) {
+    const auto progress = [&](std::size_t done) {
+        session.console().progress("match", done, queries.size());
+    };
+    const ScoreOptions options = flags.score.resolve();
+    if (!flags.verify.resolve(parameters.profile)) {
+        return scorePairs(queries, candidates, options, flags.threads, progress, session.context());
+    }
+    return verifyPairs(queries, candidates, options, {flags.verify.candidates}, flags.threads, progress,
+                       session.context());
 }
 
 // ---------------------------------------------------------------------------------- leave one out
@@ -196,8 +216,9 @@ std::string leaveOneOutText(const EvaluateFlags& flags, const ShapeParameters& p
         text += formatCount(failures.size(), "shape", "shapes") +
                 " could not be segmented; they count as matching nothing.\n";
     }
-    // Partial scores have a direction: each pair is scored both ways.
-    const std::size_t pairs = shapes.size() * (shapes.size() - 1) / (flags.score.partial ? 1 : 2);
+    // Partial and verified scores have a direction: each pair is scored both ways.
+    const bool directed = flags.score.partial || flags.verify.resolve(parameters.profile);
+    const std::size_t pairs = shapes.size() * (shapes.size() - 1) / (directed ? 1 : 2);
     return text + timingText(timing, shapes.size(), pairs);
 }
 
@@ -216,10 +237,7 @@ CommandResult runLeaveOneOut(Session& session, const EvaluateFlags& flags) {
     RETURN_IF_ERROR(describeAll(session, "segment", shapes, flags.scan, flags, *parameters));
     timing.segment = segmenting.seconds();
     const Stopwatch matching;
-    const auto scores = scorePairs(
-        shapes, shapes, flags.score.resolve(), flags.threads,
-        [&](std::size_t done) { session.console().progress("match", done, shapes.size()); },
-        session.context());
+    const auto scores = scoresOf(session, shapes, shapes, flags, *parameters);
     RETURN_IF_ERROR(scores);
     timing.match = matching.seconds();
 
@@ -355,10 +373,7 @@ CommandResult runGallery(Session& session, const EvaluateFlags& flags) {
     RETURN_IF_ERROR(describeAll(session, "gallery", gallery, clean, flags, *parameters));
     timing.segment = segmenting.seconds();
     const Stopwatch matching;
-    const auto scores = scorePairs(
-        queries, gallery, flags.score.resolve(), flags.threads,
-        [&](std::size_t done) { session.console().progress("match", done, queries.size()); },
-        session.context());
+    const auto scores = scoresOf(session, queries, gallery, flags, *parameters);
     RETURN_IF_ERROR(scores);
     timing.match = matching.seconds();
 
@@ -401,6 +416,7 @@ void addEvaluateCommand(CLI::App& app, Session& session) {
     addScanFlags(*command, flags->scan);
     addParameterFlags(*command, flags->parameters);
     addScoreFlags(*command, flags->score);
+    addVerifyFlags(*command, flags->verify);
     command->callback([&session, flags] {
         session.action = [&session, flags] {
             return flags->task.gallery.empty() ? runLeaveOneOut(session, *flags)

@@ -21,6 +21,20 @@ bool endsTheRun(const Error& error) {
            error.code == ErrorCode::kInvalidArgument;
 }
 
+// Ids of a SignatureSet begin with 1.
+std::int64_t idOf(std::size_t column) { return static_cast<std::int64_t>(column) + 1; }
+std::size_t columnOf(std::int64_t id) { return static_cast<std::size_t>(id - 1); }
+
+void addSurface(EvaluatedShape& shape, const PointCloud& points, const RunContext& context) {
+    auto surface = makeSurfacePoints(points, context);
+    if (surface) {
+        shape.surface = std::make_shared<const SurfacePoints>(std::move(*surface));
+    } else {
+        shape.signature.reset();
+        shape.failure = surface.error();
+    }
+}
+
 }  // namespace
 
 unsigned defaultThreads() { return static_cast<unsigned>(tbb::info::default_concurrency()); }
@@ -66,7 +80,7 @@ std::vector<EvaluatedShape> shapesOf(const std::vector<CollectionScan>& scans) {
 }
 
 Result<void> describeShapes(std::vector<EvaluatedShape>& shapes, const ScanFlags& flags,
-                            const ShapeParameters& parameters, unsigned threads,
+                            const ShapeParameters& parameters, bool withSurface, unsigned threads,
                             const std::function<void(std::size_t done)>& progress,
                             const RunContext& context) {
     RunContext quiet = context;  // progress counts shapes, not the stages of one
@@ -82,6 +96,7 @@ Result<void> describeShapes(std::vector<EvaluatedShape>& shapes, const ScanFlags
             shape.failure = description.error();
         } else {
             shape.signature = std::move(description->signature);
+            if (withSurface) addSurface(shape, scan->points, quiet);
         }
         shape.seconds = std::chrono::duration<double>(RunContext::Clock::now() - start).count();
         if (shape.failure && endsTheRun(*shape.failure)) return shape.failure;
@@ -107,6 +122,47 @@ Result<ScoreMatrix> scorePairs(const std::vector<EvaluatedShape>& rows,
                 scores[r * width + c] = value;
                 // Only this task writes (c, r): no other row reaches left of its diagonal.
                 if (symmetric) scores[c * width + r] = value;
+            }
+            progress(++done);
+            return std::nullopt;
+        });
+    RETURN_IF_ERROR(scored);
+    return scores;
+}
+
+Result<ScoreMatrix> verifyPairs(const std::vector<EvaluatedShape>& rows,
+                                const std::vector<EvaluatedShape>& columns, const ScoreOptions& options,
+                                const VerifyOptions& verify, unsigned threads,
+                                const std::function<void(std::size_t rowsDone)>& progress,
+                                const RunContext& context) {
+    const std::size_t width = columns.size();
+    std::vector<IndexEntry> entries;
+    for (std::size_t c = 0; c < width; ++c) {
+        if (columns[c].signature) entries.push_back({idOf(c), {}, *columns[c].signature});
+    }
+    const SignatureSet set = SignatureSet().with(entries, {});
+    const SurfaceOf surfaceOf = [&](std::int64_t id) -> Result<std::shared_ptr<const SurfacePoints>> {
+        return columns[columnOf(id)].surface;
+    };
+    RunContext quiet = context;  // progress counts queries
+    quiet.progress = nullptr;
+    ScoreMatrix scores(rows.size() * width, 0.0);
+    std::atomic<std::size_t> done{0};
+    const auto scored =
+        forEachItem(rows.size(), threads, context, [&](std::size_t r) -> std::optional<Error> {
+            SearchOptions search;
+            search.k = std::max<std::size_t>(1, width);
+            search.score = options;
+            if (&rows == &columns) search.excludeId = idOf(r);
+            if (rows[r].signature) {
+                if (search.excludeId) scores[r * width + r] = 1.0;
+                const FitQuery query(*rows[r].surface);
+                const auto found =
+                    topKVerified(*rows[r].signature, query, set, search, verify, surfaceOf, quiet);
+                if (!found) return found.error();
+                for (const VerifiedHit& hit : found->hits) {
+                    scores[r * width + columnOf(hit.id)] = hit.score;
+                }
             }
             progress(++done);
             return std::nullopt;

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,14 +14,17 @@
 #include "core/base/error.h"
 #include "core/base/run_context.h"
 #include "core/evaluation/metrics.h"
+#include "core/fit/surface_points.h"
 #include "core/matching/score.h"
 #include "core/pipeline.h"
+#include "core/search/verify.h"
 
 namespace shapedb::cli {
 
 struct EvaluatedShape : CollectionScan {
     /// Set unless `failure` is. A shape without a signature scores 0 against everything.
     std::optional<Signature> signature;
+    std::shared_ptr<const SurfacePoints> surface;  ///< with the signature, if asked for
     std::optional<Error> failure;
     double seconds = 0.0;  ///< for reading, noise and segmentation together
 };
@@ -39,12 +43,14 @@ struct EvaluatedShape : CollectionScan {
 /// Shapes with nothing computed yet.
 [[nodiscard]] std::vector<EvaluatedShape> shapesOf(const std::vector<CollectionScan>& scans);
 
-/// Sets `signature` or `failure` of each shape, on `threads` threads, at least 1. Noise and subset are seeded
-/// with fileSeed(flags.seed, name). A file that cannot be read or segmented is a `failure`, not an error.
+/// Sets `signature` (`withSurface`: and `surface`) or `failure` of each shape, on `threads` threads, at
+/// least 1. Noise and subset are seeded with fileSeed(flags.seed, name). A file that cannot be read or
+/// segmented is a `failure`, not an error.
 ///
 /// Errors: kCancelled, kDeadlineExceeded; kInvalidArgument (flags).
 [[nodiscard]] Result<void> describeShapes(std::vector<EvaluatedShape>& shapes, const ScanFlags& flags,
-                                          const ShapeParameters& parameters, unsigned threads,
+                                          const ShapeParameters& parameters, bool withSurface,
+                                          unsigned threads,
                                           const std::function<void(std::size_t done)>& progress,
                                           const RunContext& context);
 
@@ -58,5 +64,16 @@ struct EvaluatedShape : CollectionScan {
                                              const ScoreOptions& options, unsigned threads,
                                              const std::function<void(std::size_t rowsDone)>& progress,
                                              const RunContext& context);
+
+/// The same as a verified search ranks them (core/search/verify.h): each row is a query, without itself among
+/// the candidates if both are the same vector (its own score is 1 then). Needs surfaces.
+///
+/// Errors: kCancelled, kDeadlineExceeded, kOutOfMemory; kInvalidArgument (options).
+[[nodiscard]] Result<ScoreMatrix> verifyPairs(const std::vector<EvaluatedShape>& rows,
+                                              const std::vector<EvaluatedShape>& columns,
+                                              const ScoreOptions& options, const VerifyOptions& verify,
+                                              unsigned threads,
+                                              const std::function<void(std::size_t rowsDone)>& progress,
+                                              const RunContext& context);
 
 }  // namespace shapedb::cli

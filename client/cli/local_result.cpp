@@ -23,6 +23,8 @@ client::Explanation toClient(const Explanation& explanation) {
     return throughMessage<v1::Explanation>(explanation);
 }
 
+client::Fit toClient(const FitResult& fit) { return throughMessage<v1::Fit>(fit); }
+
 client::SegmentationReport toClient(const Segmentation& segmentation) {
     return throughMessage<v1::SegmentationReport>(segmentation);
 }

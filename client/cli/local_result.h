@@ -5,6 +5,7 @@
 
 namespace shapedb {
 struct Explanation;
+struct FitResult;
 struct Segmentation;
 struct Signature;
 }  // namespace shapedb
@@ -13,6 +14,7 @@ namespace shapedb::cli {
 
 [[nodiscard]] client::Signature toClient(const Signature& signature);
 [[nodiscard]] client::Explanation toClient(const Explanation& explanation);
+[[nodiscard]] client::Fit toClient(const FitResult& fit);
 [[nodiscard]] client::SegmentationReport toClient(const Segmentation& segmentation);
 
 }  // namespace shapedb::cli

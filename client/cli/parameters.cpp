@@ -177,6 +177,18 @@ void addScoreFlags(CLI::App& command, ScoreFlags& flags) {
                      "shape contains");
 }
 
+void addVerifyFlags(CLI::App& command, VerifyFlags& flags) {
+    const auto set = [&flags](bool value) { return [&flags, value](std::int64_t) { flags.verify = value; }; };
+    auto* on = command.add_flag(
+        "--verify", set(true),
+        "Lay the best candidates on the query and let the fit count in their scores (default, except with "
+        "profile paper)");
+    command.add_flag("--no-verify", set(false), "Rank by the signatures alone")->excludes(on);
+    command.add_option("--candidates", flags.candidates, "Verify at most so many candidates")
+        ->check(CLI::Range(1, 10000))
+        ->capture_default_str();
+}
+
 nlohmann::json toJson(const ShapeParameters& parameters) {
     client::Parameters all;
     visitNumbers([&](const char*, auto member, auto used, const char*) {

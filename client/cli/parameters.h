@@ -1,6 +1,9 @@
 // The flags that choose how a scan is segmented and scored, the same for every command.
 #pragma once
 
+#include <cstdint>
+#include <optional>
+
 #include <nlohmann/json_fwd.hpp>
 
 #include "client/api/types.h"
@@ -38,6 +41,19 @@ struct ScoreFlags {
 };
 
 void addScoreFlags(CLI::App& command, ScoreFlags& flags);
+
+/// --verify, --no-verify and --candidates.
+struct VerifyFlags {
+    /// Nothing: yes, but not with profile `paper`.
+    std::optional<bool> verify;
+    std::uint32_t candidates = 64;  ///< that are verified at most
+
+    [[nodiscard]] bool resolve(Profile profile) const {
+        return verify.value_or(profile == Profile::kDefault);
+    }
+};
+
+void addVerifyFlags(CLI::App& command, VerifyFlags& flags);
 
 /// One member per parameter, by its name in the API.
 [[nodiscard]] nlohmann::json toJson(const ShapeParameters& parameters);

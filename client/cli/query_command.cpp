@@ -6,6 +6,7 @@
 
 #include "client/cli/connection.h"
 #include "client/cli/exit_code.h"
+#include "client/cli/fit_output.h"
 #include "client/cli/parameters.h"
 #include "client/cli/scan_source.h"
 #include "client/cli/session.h"
@@ -24,11 +25,21 @@ struct QueryFlags {
     std::string key;
     client::SearchOptions options;
     ScoreFlags score;
+    VerifyFlags verify;
     ScanFlags scan;
     bool includeSelf = false;
     bool explain = false;
     bool noExplanation = false;
 };
+
+/// From coordinates of the hit to those of the query as the user has them.
+std::optional<Motion> motionOf(const client::Hit& hit, const Point3& offset) {
+    std::optional<Motion> motion;
+    if (hit.explanation) motion = hit.explanation->motion;
+    if (hit.fit) motion = hit.fit->best.motion;
+    if (motion) motion->translation = motion->translation + offset;
+    return motion;
+}
 
 json replyJson(const client::SearchReply& reply) {
     json hits = json::array();
@@ -38,7 +49,11 @@ json replyJson(const client::SearchReply& reply) {
                       {"key", hit.shape.key},
                       {"label", labelOf(hit.shape)},
                       {"score", hit.score},
+                      {"signature_score", hit.signatureScore},
+                      {"verified", hit.fit.has_value()},
                       {"shape", toJson(hit.shape)}};
+        if (const auto motion = motionOf(hit, reply.offset)) entry["matrix"] = matrixOf(*motion);
+        if (hit.fit) entry["fit"] = toJson(*hit.fit);
         if (hit.explanation) entry["explanation"] = toJson(*hit.explanation);
         hits.push_back(std::move(entry));
     }
@@ -46,6 +61,9 @@ json replyJson(const client::SearchReply& reply) {
                      {"candidates", reply.candidates},
                      {"filtered", reply.filtered},
                      {"scored", reply.scored},
+                     {"candidates_verified", reply.verified},
+                     {"exact", reply.exact},
+                     {"pending", reply.pending},
                      {"query", toJson(reply.query)},
                      {"seconds_segment", reply.secondsSegment},
                      {"seconds_search", reply.secondsSearch}};
@@ -65,8 +83,14 @@ std::string replyText(const QueryFlags& flags, const client::SearchReply& reply)
     }
     text += formatCount(reply.candidates, "shape", "shapes") + " searched";
     if (reply.filtered != reply.candidates) text += ", " + formatCount(reply.filtered) + " pass the filter";
-    text += ", " + formatCount(reply.scored) + " scored in full, in " + formatSeconds(reply.secondsSearch) +
-            "\n\n";
+    text += ", " + formatCount(reply.scored) + " scored in full";
+    if (reply.verified > 0) text += ", " + formatCount(reply.verified) + " laid on the query";
+    text += ", in " + formatSeconds(reply.secondsSearch) + "\n";
+    if (reply.pending > 0) {
+        text += formatCount(reply.pending, "shape has", "shapes have") +
+                " no signature yet and could not be searched\n";
+    }
+    text += "\n";
     if (reply.hits.empty()) return text + "Nothing found.\n";
 
     const auto right = Table::Align::kRight;
@@ -83,6 +107,7 @@ std::string replyText(const QueryFlags& flags, const client::SearchReply& reply)
         if (!hit.explanation) continue;
         text += "\nWhy " + hit.shape.key + ": " +
                 explanationText(*hit.explanation, reply.query, queryName, hit.shape.key);
+        if (hit.fit) text += fitText(*hit.fit, queryName, hit.shape.key);
     }
     return text;
 }
@@ -97,6 +122,8 @@ CommandResult runQuery(Session& session, const QueryFlags& flags) {
     options.reflection = !flags.score.noReflection;
     options.keepScale = flags.score.keepScale;
     options.partial = flags.score.partial;
+    options.verify = flags.verify.verify;
+    options.verifyCandidates = flags.verify.candidates;
     options.explanation = !flags.noExplanation;
     const RunContext context = session.context();
     Scan scan;
@@ -135,6 +162,7 @@ void addQueryCommand(CLI::App& app, Session& session) {
     command->add_option("--filter", flags->options.filter,
                         "Only shapes with such metadata, e.g. 'label=cup'");
     addScoreFlags(*command, flags->score);
+    addVerifyFlags(*command, flags->verify);
     auto* none = command->add_flag("--no-explanation", flags->noExplanation, "Do not explain the hits");
     command->add_flag("--explain", flags->explain, "Explain every hit, not only the first")->excludes(none);
     addScanFlags(*command, flags->scan);

@@ -105,6 +105,7 @@ int run(int argc, const char* const* argv, Console& console, const std::atomic<b
         addAddCommand(app, session);
         addQueryCommand(app, session);
         addCompareCommand(app, session);
+        addAlignCommand(app, session);
         addShapeCommands(app, session);
         addCollectionCommands(app, session);
         addAdminCommands(app, session);

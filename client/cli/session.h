@@ -56,6 +56,7 @@ void addEvaluateCommand(CLI::App& app, Session& session);
 void addAddCommand(CLI::App& app, Session& session);
 void addQueryCommand(CLI::App& app, Session& session);
 void addCompareCommand(CLI::App& app, Session& session);
+void addAlignCommand(CLI::App& app, Session& session);
 void addShapeCommands(CLI::App& app, Session& session);
 void addCollectionCommands(CLI::App& app, Session& session);
 void addAdminCommands(CLI::App& app, Session& session);

@@ -197,6 +197,16 @@ class Catalog {
     /// The signature behind a hit, with what the index leaves out. Errors: kNotFound, kNotReady (also:
     /// of another generation than `searched`), kDataLoss.
     [[nodiscard]] Result<Signature> storedSignature(const index::Snapshot& searched, std::int64_t shapeId);
+    /// The surface points of a shape, null if it has none (yet). Errors: kDataLoss.
+    [[nodiscard]] Result<std::shared_ptr<const SurfacePoints>> surface(std::int64_t shapeId) {
+        return index_.surface(shapeId);
+    }
+    /// Shapes of the collection that wait for their signature.
+    [[nodiscard]] Result<std::uint64_t> pendingShapes(std::int64_t collectionId) {
+        store::ShapeFilter filter;
+        filter.state = store::ShapeState::kPending;
+        return store_->countShapes(collectionId, filter);
+    }
     /// `qualityIn` the shape's collection as it is searched now.
     [[nodiscard]] std::optional<double> servingQuality(const store::Shape& shape) const;
 

@@ -29,6 +29,8 @@ constexpr std::uint32_t kDefaultPageSize = 100;
 constexpr std::uint32_t kMaxPageSize = 1'000;
 /// A page ends early rather than exceed this: gRPC clients accept 4 MiB by default.
 constexpr std::size_t kMaxPageBytes = std::size_t{3} << 20;
+/// Candidates that one search may verify.
+constexpr std::uint32_t kMostVerified = 10'000;
 /// A larger answer to a search is refused.
 constexpr std::size_t kMaxAnswerBytes = std::size_t{64} << 20;
 

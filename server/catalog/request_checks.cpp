@@ -123,6 +123,12 @@ Result<void> checkBatchSize(std::uint64_t queries, std::uint32_t maxBatch) {
     return bad("queries: " + std::to_string(queries) + " is outside 1 to " + std::to_string(maxBatch));
 }
 
+Result<void> checkVerifyCandidates(std::uint32_t candidates) {
+    if (candidates <= kMostVerified) return {};
+    return bad("verify_candidates: " + std::to_string(candidates) + " is more than " +
+               std::to_string(kMostVerified));
+}
+
 Result<void> checkThreshold(double threshold) {
     if (threshold >= 0.0 && threshold <= 1.0) return {};
     return bad("threshold: " + std::to_string(threshold) + " is outside 0 to 1");

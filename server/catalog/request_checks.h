@@ -27,6 +27,8 @@ constexpr const char* kDefaultCollection = "default";
 [[nodiscard]] Result<void> checkK(std::uint32_t k, std::uint32_t maxK);
 /// 1 to `maxBatch` queries.
 [[nodiscard]] Result<void> checkBatchSize(std::uint64_t queries, std::uint32_t maxBatch);
+/// At most kMostVerified.
+[[nodiscard]] Result<void> checkVerifyCandidates(std::uint32_t candidates);
 /// [0, 1], not NaN.
 [[nodiscard]] Result<void> checkThreshold(double threshold);
 /// At most kMaxFilterBytes.

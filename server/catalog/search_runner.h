@@ -4,10 +4,11 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/base/error.h"
-#include "core/search/top_k.h"
+#include "core/search/verify.h"
 
 namespace shapedb::catalog {
 
@@ -18,15 +19,16 @@ class SearchRunner {
     explicit SearchRunner(int threads);
     ~SearchRunner();
 
-    /// As `shapedb::topK`.
-    [[nodiscard]] Result<SearchResult> run(const Signature& query, const SignatureSet& set,
-                                           const SearchOptions& options, const RunContext& context);
+    /// As `shapedb::topKVerified`, or as `shapedb::topK` without `verify` or for a query without surface.
+    [[nodiscard]] Result<VerifiedResult> run(const VerifiableQuery& query, const SignatureSet& set,
+                                             const SearchOptions& options,
+                                             const std::optional<VerifyOptions>& verify,
+                                             const SurfaceOf& surfaceOf, const RunContext& context);
 
-    /// As `shapedb::topKBatch`.
-    [[nodiscard]] Result<std::vector<SearchResult>> runBatch(const std::vector<BatchQuery>& queries,
-                                                             const SignatureSet& set,
-                                                             const SearchOptions& options,
-                                                             const RunContext& context);
+    /// The same for many; the first error ends all and names its query. Results in the order of the queries.
+    [[nodiscard]] Result<std::vector<VerifiedResult>> runBatch(
+        const std::vector<VerifiableQuery>& queries, const SignatureSet& set, const SearchOptions& options,
+        const std::optional<VerifyOptions>& verify, const SurfaceOf& surfaceOf, const RunContext& context);
 
     /// Successful searches since start.
     [[nodiscard]] std::uint64_t count() const { return count_.load(); }

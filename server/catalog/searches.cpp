@@ -10,6 +10,17 @@
 
 namespace shapedb::catalog {
 
+namespace {
+
+// The score of a verified hit: its signature's terms and how well it fits; the motion is the fit's.
+void verifiedBy(const FitResult& fit, double share, Explanation& explanation) {
+    explanation.motion = fit.best.motion;
+    for (ScoreTerm& term : explanation.terms) term.weight *= 1.0 - share;
+    if (!explanation.terms.empty()) explanation.terms.push_back({"fit", fit.misfit, share});
+}
+
+}  // namespace
+
 Result<void> AnswerRoom::take(std::size_t bytes) {
     if (bytes > left_) {
         return fail(ErrorCode::kInvalidArgument,
@@ -24,6 +35,7 @@ Result<PreparedSearch> Searches::prepare(index::SnapshotPtr collection, const Se
     RETURN_IF_ERROR(checkK(request.k, maxK_));
     RETURN_IF_ERROR(checkThreshold(request.threshold));
     RETURN_IF_ERROR(checkFilterLength(request.filter));
+    RETURN_IF_ERROR(checkVerifyCandidates(request.verifyCandidates));
     Result<Filter> filter = Filter::parse(request.filter);
     RETURN_IF_ERROR(filter);
     PreparedSearch prepared;
@@ -33,21 +45,30 @@ Result<PreparedSearch> Searches::prepare(index::SnapshotPtr collection, const Se
     prepared.options.filter = std::move(*filter);
     prepared.options.score = request.score;
     prepared.explain = request.explain;
+    if (request.verify.value_or(prepared.collection->parameters.profile == Profile::kDefault)) {
+        prepared.verify = VerifyOptions();
+        if (request.verifyCandidates > 0) prepared.verify->mostCandidates = request.verifyCandidates;
+    }
     return prepared;
 }
 
-Result<BatchQuery> Searches::storedQuery(const PreparedSearch& search, const std::string& key,
-                                         bool includeSelf) const {
+Result<VerifiableQuery> Searches::storedQuery(const PreparedSearch& search, const std::string& key,
+                                              bool includeSelf) const {
     const auto found = catalog_.findShape(search.collection, key);
     RETURN_IF_ERROR(found);
     auto signature = catalog_.signature(*found);
     RETURN_IF_ERROR(signature);
-    BatchQuery query{std::move(*signature), std::nullopt};
+    VerifiableQuery query{{std::move(*signature), std::nullopt}, nullptr};
     if (!includeSelf) query.excludeId = found->shape.id;
+    if (search.verify) {
+        auto surface = catalog_.surface(found->shape.id);
+        RETURN_IF_ERROR(surface);
+        query.surface = std::move(*surface);
+    }
     return query;
 }
 
-Result<BatchQuery> Searches::query(const PreparedSearch& search, const QuerySource& source) const {
+Result<VerifiableQuery> Searches::query(const PreparedSearch& search, const QuerySource& source) const {
     if (source.key && source.signature) {
         return fail(ErrorCode::kInvalidArgument, "both key and signature are set: leave one out");
     }
@@ -55,39 +76,50 @@ Result<BatchQuery> Searches::query(const PreparedSearch& search, const QuerySour
     if (!source.signature) return fail(ErrorCode::kInvalidArgument, "neither key nor signature is set");
     auto signature = decodeSignature(*source.signature);
     RETURN_IF_ERROR(signature);
-    return BatchQuery{std::move(*signature), std::nullopt};
+    return VerifiableQuery{{std::move(*signature), std::nullopt}, nullptr};
 }
 
-Result<Signature> Searches::compared(const char* which, const ShapeName& name) const {
-    const auto signatureOf = [&]() -> Result<Signature> {
+Result<Searches::Compared> Searches::compared(const char* which, const ShapeName& name) const {
+    const auto read = [&]() -> Result<Compared> {
         const auto collection = catalog_.collection(name.collection);
         RETURN_IF_ERROR(collection);
         const auto found = catalog_.findShape(*collection, name.key);
         RETURN_IF_ERROR(found);
-        return catalog_.signature(*found);
+        auto signature = catalog_.signature(*found);
+        RETURN_IF_ERROR(signature);
+        auto surface = catalog_.surface(found->shape.id);
+        RETURN_IF_ERROR(surface);
+        return Compared{std::move(*signature), std::move(*surface)};
     };
-    auto signature = signatureOf();
-    if (!signature) return fail(withContext(signature.error(), which + std::string(": ")));
-    return signature;
+    auto shape = read();
+    if (!shape) return fail(withContext(shape.error(), which + std::string(": ")));
+    return shape;
 }
 
 Result<Comparison> Searches::compare(const ShapeName& query, const ShapeName& other,
-                                     const ScoreOptions& options) const {
+                                     const ScoreOptions& options, const RunContext& context) const {
     auto first = compared("query", query);
     RETURN_IF_ERROR(first);
     auto second = compared("other", other);
     RETURN_IF_ERROR(second);
-    Explanation explanation = shapedb::explain(*first, *second, options);
-    return Comparison{std::move(*first), std::move(*second), std::move(explanation)};
+    Comparison comparison;
+    comparison.explanation = shapedb::explain(first->signature, second->signature, options);
+    if (first->surface && second->surface) {
+        const FitOptions fitted{kindsOfQuery(first->signature, options), options.keepScale,
+                                options.reflection};
+        auto fit = shapedb::fit(FitQuery(*first->surface), *second->surface, fitted, context);
+        RETURN_IF_ERROR(fit);
+        comparison.explanation.motion = fit->best.motion;
+        comparison.fit = std::move(*fit);
+    }
+    comparison.query = std::move(first->signature);
+    comparison.other = std::move(second->signature);
+    return comparison;
 }
 
-Error ofQuery(std::size_t i, Error error) {
-    return withContext(std::move(error), "query " + std::to_string(i) + ": ");
-}
-
-Result<std::vector<BatchQuery>> Searches::queries(const PreparedSearch& search,
-                                                  const std::vector<QuerySource>& sources) const {
-    std::vector<BatchQuery> queries;
+Result<std::vector<VerifiableQuery>> Searches::queries(const PreparedSearch& search,
+                                                       const std::vector<QuerySource>& sources) const {
+    std::vector<VerifiableQuery> queries;
     queries.reserve(sources.size());
     for (const QuerySource& source : sources) {
         auto one = query(search, source);
@@ -97,11 +129,10 @@ Result<std::vector<BatchQuery>> Searches::queries(const PreparedSearch& search,
     return queries;
 }
 
-Result<SearchResult> Searches::run(const PreparedSearch& search, const BatchQuery& query,
-                                   const RunContext& context) const {
-    SearchOptions options = search.options;
-    options.excludeId = query.excludeId;
-    return runner_.run(query.signature, search.collection->signatures, options, context);
+Result<VerifiedResult> Searches::run(const PreparedSearch& search, const VerifiableQuery& query,
+                                     const RunContext& context) const {
+    return runner_.run(query, search.collection->signatures, search.options, search.verify, surfaces(),
+                       context);
 }
 
 Result<ScanSearch> Searches::byScan(const PreparedSearch& search, const store::VerifiedScan& scan,
@@ -112,32 +143,52 @@ Result<ScanSearch> Searches::byScan(const PreparedSearch& search, const store::V
     };
     auto description = describe();
     RETURN_IF_ERROR(description);
-    auto found = runner_.run(description->signature, search.collection->signatures, search.options, context);
+    VerifiableQuery query{{description->signature, std::nullopt}, nullptr};
+    if (search.verify) {
+        auto surface = makeSurfacePoints(store::toCloud(scan.points()), context);
+        if (surface) {
+            query.surface = std::make_shared<const SurfacePoints>(std::move(*surface));
+        } else {
+            // One without surface points has a signature: searched without verifying.
+            RETURN_IF_ERROR(context.checkpoint());
+        }
+    }
+    auto found = run(search, query, context);
     RETURN_IF_ERROR(found);
     return ScanSearch{std::move(*description), std::move(*found)};
 }
 
-Result<std::vector<SearchResult>> Searches::runBatch(const PreparedSearch& search,
-                                                     const std::vector<BatchQuery>& queries,
-                                                     const RunContext& context) const {
-    return runner_.runBatch(queries, search.collection->signatures, search.options, context);
+Result<std::vector<VerifiedResult>> Searches::runBatch(const PreparedSearch& search,
+                                                       const std::vector<VerifiableQuery>& queries,
+                                                       const RunContext& context) const {
+    return runner_.runBatch(queries, search.collection->signatures, search.options, search.verify, surfaces(),
+                            context);
+}
+
+SurfaceOf Searches::surfaces() const {
+    return [this](std::int64_t id) { return catalog_.surface(id); };
+}
+
+Result<std::uint64_t> Searches::pending(const PreparedSearch& search) const {
+    return catalog_.pendingShapes(search.collection->collection.id);
 }
 
 Result<std::optional<Explanation>> Searches::explain(const PreparedSearch& search, const Scorer& scorer,
-                                                     const SearchHit& hit) const {
+                                                     const VerifiedHit& hit) const {
     const auto signature = catalog_.storedSignature(*search.collection, hit.id);
     if (!signature && signature.error().code == ErrorCode::kDataLoss) return fail(signature.error());
     // Deleted or replaced since the search, or not readable now: a hit without reasons.
     if (!signature) return std::optional<Explanation>();
     Explanation explanation = scorer.explain(*signature);
     // The shape has got another signature since the search.
-    if (explanation.score != hit.score) return std::optional<Explanation>();
+    if (explanation.score != hit.signatureScore) return std::optional<Explanation>();
+    if (hit.fit) verifiedBy(*hit.fit, hit.misfitShare, explanation);
     return std::optional<Explanation>(std::move(explanation));
 }
 
-Result<void> Searches::visitHits(const PreparedSearch& search, const SearchResult& found,
+Result<void> Searches::visitHits(const PreparedSearch& search, const VerifiedResult& found,
                                  const Visit& visit) const {
-    for (const SearchHit& hit : found.hits) {
+    for (const VerifiedHit& hit : found.hits) {
         auto shape = catalog_.shapeById(hit.id);
         if (!shape && shape.error().code == ErrorCode::kNotFound) continue;  // deleted meanwhile
         RETURN_IF_ERROR(shape);
@@ -145,6 +196,8 @@ Result<void> Searches::visitHits(const PreparedSearch& search, const SearchResul
         out.shape = std::move(*shape);
         out.quality = qualityIn(search.collection->signatures, hit.id);
         out.score = hit.score;
+        out.signatureScore = hit.signatureScore;
+        out.fit = hit.fit;
         if (search.explain) {
             auto explanation = explain(search, *found.scorer, hit);
             RETURN_IF_ERROR(explanation);

@@ -25,6 +25,8 @@ struct SearchRequest {
     std::string filter;
     ScoreOptions score;
     bool explain = true;
+    std::optional<bool> verify;          ///< nothing: yes, but not in collections of profile `paper`
+    std::uint32_t verifyCandidates = 0;  ///< 0: the default
 };
 
 /// Checked options, and the snapshot that all queries of the request read.
@@ -32,6 +34,7 @@ struct PreparedSearch {
     index::SnapshotPtr collection;
     SearchOptions options;
     bool explain = true;
+    std::optional<VerifyOptions> verify;
 };
 
 /// What a request names as a query: one of the two. Not owned.
@@ -49,7 +52,7 @@ struct ShapeName {
 /// The segmentation of a scan sent as a query, and what it found.
 struct ScanSearch {
     Description description;
-    SearchResult found;
+    VerifiedResult found;
 };
 
 /// Two stored shapes, compared.
@@ -57,13 +60,16 @@ struct Comparison {
     Signature query;
     Signature other;
     Explanation explanation;
+    std::optional<FitResult> fit;  ///< if both have surface points
 };
 
 struct FoundHit {
     store::Shape shape;
     std::optional<double> quality;  ///< as `qualityIn` the collection searched
     double score = 0.0;
-    std::optional<Explanation> explanation;
+    double signatureScore = 0.0;
+    std::optional<Explanation> explanation;  ///< its motion is that of `fit`, if there is one
+    std::shared_ptr<const FitResult> fit;    ///< null if it was not verified
 };
 
 /// How many bytes an answer may still grow by. One for each request.
@@ -76,62 +82,69 @@ class AnswerRoom {
     std::size_t left_ = kMaxAnswerBytes;
 };
 
-/// `error`, saying which query of a batch it is about, counted from 0.
-[[nodiscard]] Error ofQuery(std::size_t i, Error error);
-
 /// Thread-safe. The references must outlive it.
 class Searches {
   public:
     Searches(Catalog& catalog, SearchRunner& runner, std::uint32_t maxK)
         : catalog_(catalog), runner_(runner), maxK_(maxK) {}
 
-    /// Errors: kInvalidArgument (k, threshold), kMalformedFilter.
+    /// Errors: kInvalidArgument (k, threshold, candidates), kMalformedFilter.
     [[nodiscard]] Result<PreparedSearch> prepare(index::SnapshotPtr collection,
                                                  const SearchRequest& request) const;
 
     /// A stored shape as a query, which finds itself only with `includeSelf`. Errors: kInvalidArgument (key),
     /// kNotFound, kNotReady, kDataLoss.
-    [[nodiscard]] Result<BatchQuery> storedQuery(const PreparedSearch& search, const std::string& key,
-                                                 bool includeSelf = false) const;
+    [[nodiscard]] Result<VerifiableQuery> storedQuery(const PreparedSearch& search, const std::string& key,
+                                                      bool includeSelf = false) const;
 
     /// The query that `source` names; a stored shape as above. Errors: those of `storedQuery` and of
     /// decodeSignature; kInvalidArgument (not exactly one is set).
-    [[nodiscard]] Result<BatchQuery> query(const PreparedSearch& search, const QuerySource& source) const;
+    [[nodiscard]] Result<VerifiableQuery> query(const PreparedSearch& search,
+                                                const QuerySource& source) const;
 
     /// The queries of a batch. Errors: those of `query`, named by `ofQuery`.
-    [[nodiscard]] Result<std::vector<BatchQuery>> queries(const PreparedSearch& search,
-                                                          const std::vector<QuerySource>& sources) const;
+    [[nodiscard]] Result<std::vector<VerifiableQuery>> queries(const PreparedSearch& search,
+                                                               const std::vector<QuerySource>& sources) const;
 
     /// How alike two stored shapes are, and why. Errors, saying which of the two they are about:
-    /// kInvalidArgument (key), kNotFound, kNotReady, kDataLoss.
+    /// kInvalidArgument (key), kNotFound, kNotReady, kDataLoss; kCancelled, kDeadlineExceeded.
     [[nodiscard]] Result<Comparison> compare(const ShapeName& query, const ShapeName& other,
-                                             const ScoreOptions& options) const;
+                                             const ScoreOptions& options, const RunContext& context) const;
+
+    /// Shapes of the collection that have no signature yet. Errors: those of the store.
+    [[nodiscard]] Result<std::uint64_t> pending(const PreparedSearch& search) const;
 
     /// Calls `visit` with each hit, best first, leaving out shapes deleted meanwhile. An explanation is
     /// missing where the signature scored was replaced meanwhile. `found` by `run` or `runBatch`. Errors:
     /// those of topK and of `visit`; kDataLoss.
     using Visit = std::function<Result<void>(const FoundHit&)>;
-    [[nodiscard]] Result<void> visitHits(const PreparedSearch& search, const SearchResult& found,
+    [[nodiscard]] Result<void> visitHits(const PreparedSearch& search, const VerifiedResult& found,
                                          const Visit& visit) const;
 
-    /// As `topK`; `query.excludeId` holds.
-    [[nodiscard]] Result<SearchResult> run(const PreparedSearch& search, const BatchQuery& query,
-                                           const RunContext& context) const;
+    /// Verified if the request says so and the query has surface points (core/search/verify.h), otherwise as
+    /// `topK`; `query.excludeId` holds.
+    [[nodiscard]] Result<VerifiedResult> run(const PreparedSearch& search, const VerifiableQuery& query,
+                                             const RunContext& context) const;
     /// Segments `scan` with the parameters of the collection, holding one of the places for segmentations
     /// only meanwhile, and searches. Errors: those of Catalog::describe and of `run`.
     [[nodiscard]] Result<ScanSearch> byScan(const PreparedSearch& search, const store::VerifiedScan& scan,
                                             const RunContext& context) const;
-    /// As `topKBatch`.
-    [[nodiscard]] Result<std::vector<SearchResult>> runBatch(const PreparedSearch& search,
-                                                             const std::vector<BatchQuery>& queries,
-                                                             const RunContext& context) const;
+    /// As `run` of each; an error names its query.
+    [[nodiscard]] Result<std::vector<VerifiedResult>> runBatch(const PreparedSearch& search,
+                                                               const std::vector<VerifiableQuery>& queries,
+                                                               const RunContext& context) const;
     /// Successful searches since start.
     [[nodiscard]] std::uint64_t count() const { return runner_.count(); }
 
   private:
-    Result<Signature> compared(const char* which, const ShapeName& name) const;
+    struct Compared {
+        Signature signature;
+        std::shared_ptr<const SurfacePoints> surface;  ///< null if there are none
+    };
+    Result<Compared> compared(const char* which, const ShapeName& name) const;
     Result<std::optional<Explanation>> explain(const PreparedSearch& search, const Scorer& scorer,
-                                               const SearchHit& hit) const;
+                                               const VerifiedHit& hit) const;
+    SurfaceOf surfaces() const;
 
     Catalog& catalog_;
     SearchRunner& runner_;

@@ -34,15 +34,22 @@ Result<catalog::PreparedSearch> prepare(const Services& services, Call& call,
     request.filter = options.filter();
     request.score = scoreOptionsFrom(options);
     request.explain = !options.no_explanation();
+    if (options.has_verify()) request.verify = options.verify();
+    request.verifyCandidates = options.verify_candidates();
     return services.searches.prepare(*collection, request);
 }
 
 Result<void> answer(const Services& services, const catalog::PreparedSearch& prepared, const Signature& query,
-                    const SearchResult& found, catalog::AnswerRoom& room, pb::SearchResponse* response) {
+                    const VerifiedResult& found, catalog::AnswerRoom& room, pb::SearchResponse* response) {
     response->set_candidates(found.counts.candidates);
     response->set_filtered(found.counts.filtered);
     response->set_scored(found.counts.scored);
     response->set_seconds_search(found.seconds);
+    response->set_candidates_verified(found.verified);
+    response->set_not_exact(!found.exact);
+    const auto pending = services.searches.pending(prepared);
+    RETURN_IF_ERROR(pending);
+    response->set_pending(*pending);
     toProto(query, response->mutable_query());
     if (response->query().has_attributes()) {
         response->mutable_query()->mutable_attributes()->clear_statistics();
@@ -51,13 +58,15 @@ Result<void> answer(const Services& services, const catalog::PreparedSearch& pre
         pb::Hit* out = response->add_hits();
         toProto(hit.shape, prepared.collection->collection.name, hit.quality, out->mutable_shape());
         out->set_score(hit.score);
+        out->set_signature_score(hit.signatureScore);
+        if (hit.fit) toProto(*hit.fit, out->mutable_fit());
         if (hit.explanation) toProto(*hit.explanation, out->mutable_explanation());
         return room.take(out->ByteSizeLong());
     });
 }
 
 Result<void> search(const Services& services, const Call& call, const catalog::PreparedSearch& prepared,
-                    const BatchQuery& query, pb::SearchResponse* response) {
+                    const VerifiableQuery& query, pb::SearchResponse* response) {
     const auto found = services.searches.run(prepared, query, call.run());
     RETURN_IF_ERROR(found);
     catalog::AnswerRoom room;
@@ -84,7 +93,7 @@ Result<void> searchBatch(const Services& services, const Call& call, const catal
     for (std::size_t i = 0; i < queries->size(); ++i) {
         const auto done =
             answer(services, prepared, (*queries)[i].signature, (*found)[i], room, response->add_responses());
-        if (!done) return fail(catalog::ofQuery(i, done.error()));
+        if (!done) return fail(ofQuery(i, done.error()));
     }
     return {};
 }
@@ -137,7 +146,7 @@ grpc::Status SearchServiceHandler::SearchBySignature(grpc::ServerContext* contex
         RETURN_IF_ERROR(prepared);
         auto signature = decodeSignature(request->signature());
         RETURN_IF_ERROR(signature);
-        return search(services_, call, *prepared, {std::move(*signature), std::nullopt}, response);
+        return search(services_, call, *prepared, {{std::move(*signature), std::nullopt}, nullptr}, response);
     });
 }
 
@@ -165,10 +174,12 @@ grpc::Status SearchServiceHandler::Compare(grpc::ServerContext* context, const v
         };
         const catalog::ShapeName query = nameFrom(request->query());
         const catalog::ShapeName other = nameFrom(request->other());
-        const auto compared = services_.searches.compare(query, other, scoreOptionsFrom(*request));
+        const auto compared =
+            services_.searches.compare(query, other, scoreOptionsFrom(*request), call.run());
         RETURN_IF_ERROR(compared);
         response->set_score(compared->explanation.score);
         toProto(compared->explanation, response->mutable_explanation());
+        if (compared->fit) toProto(*compared->fit, response->mutable_fit());
         toProto(compared->query, response->mutable_query());
         toProto(compared->other, response->mutable_other());
         return {};

@@ -1,5 +1,6 @@
 // The default profile on a live server: quality of the interior, attributes, terms of a score.
 #include "core/matching/score.h"
+#include "core/matching/score_scale.h"
 #include "core/pipeline.h"
 #include "core/signature/signature_codec.h"
 #include "tests/integration/support/live_test.h"
@@ -140,7 +141,39 @@ TEST_F(AttributesRpc, TermsAddUpToTheScore) {
     const auto found = unary(*client.searches, &pb::SearchService::Stub::SearchByKey, search);
     ASSERT_TRUE(found.ok()) << found;
     ASSERT_EQ(found.value.hits_size(), 1);
-    EXPECT_EQ(found.value.hits(0).explanation().terms_size(), terms.size());
+    // The fit is one more term of a verified score, which follows from all of them.
+    const pb::Hit& hit = found.value.hits(0);
+    ASSERT_TRUE(hit.has_fit());
+    EXPECT_EQ(found.value.candidates_verified(), 1u);
+    EXPECT_EQ(hit.signature_score(), expected.score);
+    ASSERT_EQ(hit.explanation().terms_size(), terms.size() + 1);
+    EXPECT_EQ(hit.explanation().terms(terms.size()).name(), "fit");
+    double mean = 0.0;
+    for (const pb::ScoreTerm& term : hit.explanation().terms()) mean += term.weight() * term.distance();
+    EXPECT_NEAR(hit.score(), scoreOfDistance(mean), 1e-9);
+    EXPECT_EQ(hit.explanation().motion().SerializeAsString(), hit.fit().best().motion().SerializeAsString());
+
+    search.mutable_options()->set_verify(false);
+    const auto plain = unary(*client.searches, &pb::SearchService::Stub::SearchByKey, search);
+    ASSERT_TRUE(plain.ok()) << plain;
+    EXPECT_FALSE(plain.value.hits(0).has_fit());
+    EXPECT_EQ(plain.value.hits(0).score(), expected.score);
+    EXPECT_EQ(plain.value.hits(0).explanation().terms_size(), terms.size());
+    EXPECT_EQ(plain.value.candidates_verified(), 0u);
+}
+
+TEST_F(AttributesRpc, AVerifiedScanSaysHowItsHitLies) {
+    ASSERT_TRUE(addAndWait(client, recommended, "mug", familyScan("mug", 1, 1)).ok());
+    const auto found = searchByScan(client, searchOptions(recommended), familyScan("mug", 1, 2));
+    ASSERT_TRUE(found.ok()) << found;
+    ASSERT_EQ(found.value.hits_size(), 1);
+    const pb::Hit& hit = found.value.hits(0);
+    ASSERT_TRUE(hit.has_fit());
+    EXPECT_GT(hit.score(), 0.8);
+    EXPECT_GT(hit.fit().best().explained_query(), 0.7);
+    EXPECT_LT(hit.fit().best().residual(), 0.02);
+    EXPECT_FALSE(found.value.not_exact());
+    EXPECT_EQ(found.value.pending(), 0u);
 }
 
 // A view from one side is contained in the whole, not the other way round.
@@ -174,7 +207,8 @@ TEST_F(AttributesRpc, PartialOptionChangesTheScoreAndHasADirection) {
         const auto found = unary(*client.searches, &pb::SearchService::Stub::SearchByKey, search);
         ASSERT_TRUE(found.ok()) << found;
         ASSERT_EQ(found.value.hits_size(), 1);
-        EXPECT_EQ(found.value.hits(0).score(), expected) << keys[i];
+        EXPECT_EQ(found.value.hits(0).signature_score(), expected) << keys[i];
+        EXPECT_TRUE(found.value.hits(0).has_fit());
     }
 }
 

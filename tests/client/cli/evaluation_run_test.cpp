@@ -19,8 +19,8 @@ class EvaluationRun : public CommandTest {
 
     std::vector<EvaluatedShape> described(unsigned threads, const ScanFlags& flags = {}) {
         std::vector<EvaluatedShape> shapes = listed();
-        const auto done =
-            describeShapes(shapes, flags, parametersOf(Profile::kPaper), threads, [](std::size_t) {}, {});
+        const auto done = describeShapes(shapes, flags, parametersOf(Profile::kPaper), false, threads,
+                                         [](std::size_t) {}, {});
         EXPECT_TRUE(done) << done.error().message;
         return shapes;
     }
@@ -80,7 +80,7 @@ TEST_F(EvaluationRun, ProgressCountsEveryShapeOnce) {
     std::vector<EvaluatedShape> shapes = listed();
     std::mutex mutex;
     std::vector<std::size_t> counts;
-    const auto done = describeShapes(shapes, {}, parametersOf(Profile::kPaper), 3,
+    const auto done = describeShapes(shapes, {}, parametersOf(Profile::kPaper), false, 3,
                                      [&](std::size_t count) {
                                          const std::lock_guard<std::mutex> lock(mutex);
                                          counts.push_back(count);
@@ -96,7 +96,7 @@ TEST_F(EvaluationRun, StopsWhenCancelled) {
     RunContext context;
     context.cancel = &cancel;
     const auto done = describeShapes(
-        shapes, {}, parametersOf(Profile::kPaper), 2, [](std::size_t) {}, context);
+        shapes, {}, parametersOf(Profile::kPaper), false, 2, [](std::size_t) {}, context);
     ASSERT_FALSE(done);
     EXPECT_EQ(done.error().code, ErrorCode::kCancelled);
     const auto scores = scorePairs(

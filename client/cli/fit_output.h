@@ -1,0 +1,27 @@
+// How one shape lies on another, as text and as JSON, the same in every command.
+#pragma once
+
+#include <array>
+#include <string>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "client/api/types.h"
+
+namespace shapedb::cli {
+
+/// Row-major 4 x 4: takes a column (x, y, z, 1) of the shape to the query's coordinates.
+[[nodiscard]] std::array<double, 16> matrixOf(const Motion& motion);
+
+/// {matrix, score, residual, explained_query, explained_other, reflected, scale, ...}; with the members of
+/// the best pose at the top.
+[[nodiscard]] nlohmann::json toJson(const client::Fit& fit);
+
+/// What is done to the shape to lay it on the query, one line.
+[[nodiscard]] std::string fitMotionText(const Motion& motion, const std::string& name);
+
+/// How well the shape fits and how certain its pose is; a few lines.
+[[nodiscard]] std::string fitText(const client::Fit& fit, const std::string& queryName,
+                                  const std::string& otherName);
+
+}  // namespace shapedb::cli
