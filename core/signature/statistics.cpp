@@ -77,9 +77,10 @@ std::vector<double> centrality(const InnerDistances& inner) {
 void thicknessByCentrality(const InteriorView& view, const InnerDistances& inner, std::uint8_t* out) {
     const std::vector<double> central = centrality(inner);
     Histogram histogram(kThicknessBins, kPlaceBins);
-    for (std::size_t t = 0; t < view.volumes.size(); ++t) {
-        const SoftBin place = softBin(central[inner.cellOfTetrahedron[t]], 0.4, 1.8, kPlaceBins);
-        histogram.add(thicknessBin(view, t), place, view.volumes[t]);
+    for (const InnerDistances::Matter& m : inner.matter) {
+        if (m.cell == InnerDistances::kNoCell) continue;
+        const SoftBin place = softBin(central[m.cell], 0.4, 1.8, kPlaceBins);
+        histogram.add(thicknessBin(view, m.tetrahedron), place, 1.0);
     }
     histogram.writeLevels(out);
 }

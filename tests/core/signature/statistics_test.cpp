@@ -108,8 +108,8 @@ TEST(Statistics, ThicknessByCentralityMatchesItsDefinition) {
     for (const InteriorView& view : someViews()) {
         const InnerDistances inner = innerDistances(view).value();
         std::vector<double> sums(kThicknesses * kPlaces, 0.0);
-        for (std::size_t t = 0; t < view.volumes.size(); ++t) {
-            const std::uint32_t cell = inner.cellOfTetrahedron[t];
+        for (const auto& [t, cell] : inner.matter) {
+            ASSERT_NE(cell, InnerDistances::kNoCell);
             double sum = 0.0;
             int reached = 0;
             for (std::size_t s = 0; s < inner.sources.size(); ++s) {
@@ -122,8 +122,7 @@ TEST(Statistics, ThicknessByCentralityMatchesItsDefinition) {
             const double octaves = std::log2(view.radii[t] / view.meanSurfaceDistance);
             for (std::size_t row = 0; row < kThicknesses; ++row) {
                 for (std::size_t column = 0; column < kPlaces; ++column) {
-                    sums[row * kPlaces + column] += view.volumes[t] *
-                                                    triangle(octaves, -5.0, 0.5, kThicknesses, row) *
+                    sums[row * kPlaces + column] += triangle(octaves, -5.0, 0.5, kThicknesses, row) *
                                                     triangle(central, 0.4, 1.8, kPlaces, column);
                 }
             }
@@ -294,7 +293,7 @@ TEST(Statistics, AStraightRodIsLongerThanABentOne) {
     ASSERT_TRUE(straight && bent);
     const double ofStraight = mean(sharesOf(*straight, Statistic::kBending));
     const double ofBent = mean(sharesOf(*bent, Statistic::kBending));
-    // In units of the mean inner distance, which for a straight rod is the straight line apart from zigzag.
+    // In units of the mean inner distance, which for a straight rod is the straight line.
     EXPECT_GT(ofStraight, 0.7);
     EXPECT_LT(ofStraight, 1.02);
     EXPECT_LT(ofBent, 0.75 * ofStraight);
