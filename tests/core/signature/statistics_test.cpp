@@ -75,13 +75,15 @@ TEST(Statistics, LayoutHasNoGapsOrOverlaps) {
         names.insert(layout.name);
     }
     EXPECT_EQ(next, kStatisticBins);
-    EXPECT_EQ(kStatisticBins, 432U) << "persisted";
+    EXPECT_EQ(kStatisticBins, 448U) << "persisted";
+    EXPECT_EQ(kEarlierStatisticBins, 432U) << "persisted";
     EXPECT_EQ(names.size(), kStatisticKinds);
     EXPECT_STREQ(kStatistics[static_cast<std::size_t>(Statistic::kChords)].name, "chords");
     EXPECT_STREQ(kStatistics[static_cast<std::size_t>(Statistic::kSurfaceHarmonics)].name,
                  "surface harmonics");
     EXPECT_STREQ(kStatistics[static_cast<std::size_t>(Statistic::kFootprintDistances)].name,
                  "footprint distances");
+    EXPECT_STREQ(kStatistics[static_cast<std::size_t>(Statistic::kThicknessChange)].name, "thickness change");
 }
 
 TEST(Statistics, ThicknessByRadiusMatchesItsDefinition) {
@@ -151,6 +153,48 @@ TEST(Statistics, BendingMatchesItsDefinition) {
         ASSERT_TRUE(statistics);
         expectBins(binsOf(*statistics, Statistic::kBending), levelsOf(sums), "bending");
     }
+}
+
+TEST(Statistics, ThicknessChangeMatchesItsDefinition) {
+    for (const InteriorView& view : someViews()) {
+        const InnerDistances inner = innerDistances(view).value();
+        std::vector<double> octaves(inner.centres.size(), 0.0);
+        std::vector<int> points(inner.centres.size(), 0);
+        for (const auto& [t, cell] : inner.matter) {
+            octaves[cell] += std::log2(view.radii[t]);
+            ++points[cell];
+        }
+        std::vector<double> sums(16, 0.0);
+        for (std::size_t s = 0; s < inner.sources.size(); ++s) {
+            const std::size_t from = inner.sources[s];
+            for (std::size_t c = 0; c < inner.centres.size(); ++c) {
+                if (c == from || inner.distance[s][c] == InnerDistances::kUnreached) continue;
+                if (points[c] == 0 || points[from] == 0) continue;
+                const double change = std::abs(octaves[c] / points[c] - octaves[from] / points[from]);
+                for (std::size_t bin = 0; bin < sums.size(); ++bin) {
+                    sums[bin] += inner.volumes[c] * triangle(change, 0.0, 3.0, 16, bin);
+                }
+            }
+        }
+        const auto statistics = shapeStatistics(view);
+        ASSERT_TRUE(statistics);
+        expectBins(binsOf(*statistics, Statistic::kThicknessChange), levelsOf(sums), "thickness change");
+    }
+}
+
+TEST(Statistics, ThicknessChangesWherePartsDo) {
+    const auto mean = [](const Solid& solid) {
+        const auto shares = sharesOf(ofScan(solid), Statistic::kThicknessChange);
+        double sum = 0.0;
+        for (std::size_t i = 0; i < shares.size(); ++i) sum += shares[i] * (static_cast<double>(i) + 0.5);
+        return sum * 3.0 / 16.0;
+    };
+    const double ofBall = mean(makeSphere().solid);
+    const double ofTorus = mean(makeTorus().solid);
+    const double ofDumbbell = mean(makeDumbbell().solid);
+    EXPECT_LT(ofBall, 0.3);
+    EXPECT_LT(ofTorus, 0.3);
+    EXPECT_GT(ofDumbbell, 1.5 * ofBall);
 }
 
 TEST(Statistics, SurfaceDistancesAndHarmonicsMatchTheirDefinitions) {
