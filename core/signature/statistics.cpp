@@ -99,18 +99,14 @@ void bending(const InnerDistances& inner, std::uint8_t* out) {
     histogram.writeLevels(out);
 }
 
-// Mean thickness of each cell's matter, in octaves; kNoThickness where no point of matter is.
+// The largest ball at a point of matter of each cell, in octaves; kNoThickness where there is none. Small
+// balls between the points of a noisy surface do not count then.
 constexpr double kNoThickness = -1e300;
 std::vector<double> thicknessOfCells(const InteriorView& view, const InnerDistances& inner) {
-    std::vector<double> octaves(inner.centres.size(), 0.0);
-    std::vector<double> count(inner.centres.size(), 0.0);
+    std::vector<double> octaves(inner.centres.size(), kNoThickness);
     for (const InnerDistances::Matter& m : inner.matter) {
         if (m.cell == InnerDistances::kNoCell) continue;
-        octaves[m.cell] += std::log2(view.radii[m.tetrahedron]);
-        count[m.cell] += 1.0;
-    }
-    for (std::size_t c = 0; c < octaves.size(); ++c) {
-        octaves[c] = count[c] > 0.0 ? octaves[c] / count[c] : kNoThickness;
+        octaves[m.cell] = std::max(octaves[m.cell], std::log2(view.radii[m.tetrahedron]));
     }
     return octaves;
 }

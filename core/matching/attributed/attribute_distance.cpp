@@ -10,7 +10,7 @@ namespace {
 // What two unrelated shapes differ by: medians over pairs of different synthetic families
 // (`shapedb-bench typical`). It gives every term an equal say, whatever the number of its bins.
 constexpr std::array<double, kStatisticKinds> kTypical{2.17, 3.54, 3.93, 1.04, 4.62, 1.27,
-                                                       4.20, 1.69, 2.95, 0.76, 1.41};
+                                                       4.20, 1.69, 2.95, 0.76, 1.56};
 constexpr double kTypicalDisagreement = 0.9;
 
 // How much a term counts where the interior is reliable and where it is not: the scan then shows one
@@ -33,8 +33,8 @@ constexpr EvidenceWeight weightOf(Evidence evidence) {
     return {1.0, 1.0};
 }
 
-// Most shapes are straight, and thickness by centrality rests on the same paths.
-constexpr double kBendingWeight = 0.25;
+// Most shapes are straight, and thickness by centrality rests on the same paths. More costs retrieval.
+constexpr double kBendingWeight = 0.5;
 
 // Partial: how much the contained parts count against how much the two look alike. An unreliable
 // interior is cut into other segments than that of the whole.

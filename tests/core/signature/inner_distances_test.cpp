@@ -7,12 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "core/base/math.h"
-#include "core/base/random.h"
 #include "core/delaunay/delaunay.h"
-#include "core/pipeline.h"
-#include "core/synthetic/named_shapes.h"
-#include "core/synthetic/noise.h"
 #include "tests/core/signature/cube_views.h"
 
 namespace shapedb {
@@ -22,88 +17,6 @@ using testing_support::cubeBlock;
 using testing_support::horseshoe;
 using testing_support::together;
 using testing_support::viewOfCubes;
-
-// A bar of square section bent to half a ring about the z axis: shortest paths in closed form.
-constexpr double kInnerRadius = 0.75;
-constexpr double kOuterRadius = 1.25;
-constexpr double kHeight = 0.5;
-
-// In the plane straight, or two tangents to the inner wall and the arc between.
-double roundTheWall(double a, double b, double angle) {
-    const double tangents = std::acos(kInnerRadius / a) + std::acos(kInnerRadius / b);
-    if (angle <= tangents) return std::sqrt(a * a + b * b - 2.0 * a * b * std::cos(angle));
-    return std::sqrt(a * a - kInnerRadius * kInnerRadius) + std::sqrt(b * b - kInnerRadius * kInnerRadius) +
-           kInnerRadius * (angle - tangents);
-}
-
-double radiusInBar(Random& random) {
-    const double low = kInnerRadius * kInnerRadius;
-    return std::sqrt(low + random.uniform() * (kOuterRadius * kOuterRadius - low));
-}
-
-double meanInBentBar() {
-    Random random(4);
-    constexpr int kPairs = 200000;
-    double sum = 0.0;
-    for (int i = 0; i < kPairs; ++i) {
-        const double angle = kPi * std::abs(random.uniform() - random.uniform());
-        const double flat = roundTheWall(radiusInBar(random), radiusInBar(random), angle);
-        sum += std::hypot(flat, kHeight * (random.uniform() - random.uniform()));
-    }
-    return sum / kPairs;
-}
-
-// Uniform by area.
-PointCloud bentBar(std::size_t count) {
-    Random random(12);
-    PointCloud points;
-    const double flat = kPi / 2.0 * (kOuterRadius * kOuterRadius - kInnerRadius * kInnerRadius);
-    const double walls = kPi * kHeight * (kInnerRadius + kOuterRadius);
-    const double ends = 2.0 * kHeight * (kOuterRadius - kInnerRadius);
-    while (points.size() < count) {
-        const double which = random.uniform() * (2.0 * flat + walls + ends);
-        double angle = kPi * random.uniform();
-        double radius = radiusInBar(random);
-        double z = kHeight * random.uniform();
-        if (which < 2.0 * flat) {
-            z = which < flat ? 0.0 : kHeight;
-        } else if (which < 2.0 * flat + walls) {
-            const double share = (which - 2.0 * flat) / walls;
-            radius = share < kInnerRadius / (kInnerRadius + kOuterRadius) ? kInnerRadius : kOuterRadius;
-        } else {
-            radius = random.uniform(kInnerRadius, kOuterRadius);
-            angle = which < 2.0 * flat + walls + 0.5 * ends ? 0.0 : kPi;
-        }
-        points.push_back({radius * std::cos(angle), radius * std::sin(angle), z});
-    }
-    return points;
-}
-
-double meanOfScan(PointCloud points, double noise) {
-    EXPECT_TRUE(addGaussianNoise(points, noise, 8));
-    const auto description = describe(points, parametersOf(Profile::kDefault));
-    EXPECT_TRUE(description);
-    const auto inner = innerDistances(interiorView(description->segmentation));
-    EXPECT_TRUE(inner);
-    return inner->mean * description->segmentation.size;
-}
-
-void expectMean(const PointCloud& points, double expected, const char* what) {
-    const double clean = meanOfScan(points, 0.0);
-    EXPECT_NEAR(clean, expected, 0.03 * expected) << what;
-    for (const double noise : {0.002, 0.005, 0.01}) {
-        EXPECT_NEAR(meanOfScan(points, noise), clean, 0.05 * clean) << what << ", noise " << noise;
-    }
-}
-
-TEST(InnerDistances, HaveTheMeanOfTheClosedFormAtAnyNoise) {
-    for (const std::size_t count : {3000U, 12000U}) {
-        expectMean(sampleBoundary(makeSphere().solid, count, 7).value(), 36.0 / 35.0, "ball");
-        const Solid cube{{SolidPart{SolidBox{{0.5, 0.5, 0.5}}, {}}}};
-        expectMean(sampleBoundary(cube, count, 7).value(), 0.6617, "cube");
-        expectMean(bentBar(count), meanInBentBar(), "bent bar");
-    }
-}
 
 TEST(InnerDistances, CellsCoverTheInterior) {
     const InteriorView view = viewOfCubes(horseshoe(14, 4, 3), 0.04);

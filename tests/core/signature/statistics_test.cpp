@@ -158,19 +158,15 @@ TEST(Statistics, BendingMatchesItsDefinition) {
 TEST(Statistics, ThicknessChangeMatchesItsDefinition) {
     for (const InteriorView& view : someViews()) {
         const InnerDistances inner = innerDistances(view).value();
-        std::vector<double> octaves(inner.centres.size(), 0.0);
-        std::vector<int> points(inner.centres.size(), 0);
-        for (const auto& [t, cell] : inner.matter) {
-            octaves[cell] += std::log2(view.radii[t]);
-            ++points[cell];
-        }
+        std::vector<double> radii(inner.centres.size(), 0.0);
+        for (const auto& [t, cell] : inner.matter) radii[cell] = std::max(radii[cell], view.radii[t]);
         std::vector<double> sums(16, 0.0);
         for (std::size_t s = 0; s < inner.sources.size(); ++s) {
             const std::size_t from = inner.sources[s];
             for (std::size_t c = 0; c < inner.centres.size(); ++c) {
                 if (c == from || inner.distance[s][c] == InnerDistances::kUnreached) continue;
-                if (points[c] == 0 || points[from] == 0) continue;
-                const double change = std::abs(octaves[c] / points[c] - octaves[from] / points[from]);
+                if (radii[c] == 0.0 || radii[from] == 0.0) continue;
+                const double change = std::abs(std::log2(radii[c] / radii[from]));
                 for (std::size_t bin = 0; bin < sums.size(); ++bin) {
                     sums[bin] += inner.volumes[c] * triangle(change, 0.0, 3.0, 16, bin);
                 }
