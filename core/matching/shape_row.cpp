@@ -23,6 +23,7 @@ bool canonicalLessAttributed(const ShapeRow& a, const ShapeRow& b) {
         if (p.size != q.size) return p.size < q.size;
     }
     if (a.quality != b.quality) return a.quality < b.quality;
+    if (a.earlier != b.earlier) return b.earlier;
     // By the levels, not the packed bytes: the order must not depend on how they are packed.
     return statisticsOf(a) < statisticsOf(b);
 }
@@ -33,6 +34,7 @@ ShapeRow ShapeRows::operator[](std::size_t row) const {
     ShapeRow shape;
     shape.scale = scales[row];
     shape.quality = qualities[row];
+    shape.earlier = earlier[row] != 0;
     shape.points = points + beginOf(pointsEnd, row);
     shape.pointCount = pointsEnd[row] - beginOf(pointsEnd, row);
     shape.segments = segments + beginOf(segmentsEnd, row);
@@ -59,6 +61,7 @@ PackedShape::PackedShape(const Signature& signature)
     for (std::size_t i = 0; i < segmentCount_; ++i) segments_[i] = packed(segments[i]);
     packStatistics(signature.attributes->statistics, firstHalf_, secondHalf_);
     quality_ = signature.attributes->quality;
+    earlier_ = signature.attributes->earlier;
 }
 
 ShapeRow PackedShape::row() const {
@@ -73,6 +76,7 @@ ShapeRow PackedShape::row() const {
     shape.firstHalf = &firstHalf_;
     shape.secondHalf = &secondHalf_;
     shape.quality = quality_;
+    shape.earlier = earlier_;
     return shape;
 }
 
@@ -80,7 +84,7 @@ bool sameShape(const ShapeRow& a, const ShapeRow& b, bool keepScale) {
     if (keepScale && a.scale != b.scale) return false;
     if (a.attributed() != b.attributed()) return false;
     if (a.attributed()) {
-        return a.quality == b.quality && a.firstHalf->bytes == b.firstHalf->bytes &&
+        return a.quality == b.quality && a.earlier == b.earlier && a.firstHalf->bytes == b.firstHalf->bytes &&
                a.secondHalf->bytes == b.secondHalf->bytes &&
                std::equal(a.segments, a.segments + a.segmentCount, b.segments, b.segments + b.segmentCount);
     }

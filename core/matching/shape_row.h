@@ -38,6 +38,7 @@ struct ShapeRow {
     const HalfRow* firstHalf = nullptr;   ///< of the statistics; null without attributes
     const HalfRow* secondHalf = nullptr;  ///< likewise
     std::uint8_t quality = 0;             ///< of the interior, in steps of 1/255
+    bool earlier = false;                 ///< ShapeAttributes::earlier
     const Placement* placement = nullptr;
 
     [[nodiscard]] bool attributed() const { return segmentCount > 0; }
@@ -49,6 +50,7 @@ struct ShapeRows {
     std::size_t attributedCount = 0;
     const double* scales = nullptr;
     const std::uint8_t* qualities = nullptr;
+    const std::uint8_t* earlier = nullptr;  ///< 1: ShapeAttributes::earlier
     /// Statistics of all rows (zero where not attributed); null when no row is attributed.
     const HalfRow* firstHalves = nullptr;
     const HalfRow* secondHalves = nullptr;
@@ -84,6 +86,7 @@ class PackedShape {
     std::size_t pointCount_ = 0;
     std::size_t segmentCount_ = 0;
     std::uint8_t quality_ = 0;
+    bool earlier_ = false;
     Placement placement_;
     HalfRow firstHalf_, secondHalf_;
     std::array<PackedPoint, kMaxSignaturePoints> points_;

@@ -15,6 +15,7 @@ void SignatureBlock::reserve(std::size_t count) {
     ids_.reserve(count);
     scales_.reserve(count);
     qualities_.reserve(count);
+    earlier_.reserve(count);
     metadataOf_.reserve(count);
     segmentsEnd_.reserve(count);
     pointsEnd_.reserve(count);
@@ -57,6 +58,7 @@ void SignatureBlock::append(const IndexEntry& entry) {
     ids_.push_back(entry.id);
     scales_.push_back(signature.scale);
     qualities_.push_back(signature.attributes ? signature.attributes->quality : 0);
+    earlier_.push_back(signature.attributes && signature.attributes->earlier ? 1 : 0);
     appendMetadata(entry.metadata);
     if (signature.attributes) {
         HalfRow first, second;
@@ -78,6 +80,7 @@ void SignatureBlock::append(const SignatureBlock& from, std::size_t row) {
     ids_.push_back(from.ids_[row]);
     scales_.push_back(from.scales_[row]);
     qualities_.push_back(from.qualities_[row]);
+    earlier_.push_back(from.earlier_[row]);
     appendMetadata(from.metadata(row));
     if (from.attributed(row)) {
         appendStatistics(from.first_[row], from.second_[row]);
@@ -99,6 +102,7 @@ ShapeRows SignatureBlock::rows() const {
     rows.attributedCount = attributedCount_;
     rows.scales = scales_.data();
     rows.qualities = qualities_.data();
+    rows.earlier = earlier_.data();
     rows.firstHalves = first_.data();
     rows.secondHalves = second_.data();
     rows.segments = segments_.data();
@@ -110,8 +114,9 @@ ShapeRows SignatureBlock::rows() const {
 
 std::size_t SignatureBlock::memoryBytes() const {
     std::size_t bytes = sizeof *this + bytesOf(ids_) + bytesOf(scales_) + bytesOf(qualities_) +
-                        bytesOf(metadataOf_) + bytesOf(segmentsEnd_) + bytesOf(pointsEnd_) + bytesOf(first_) +
-                        bytesOf(second_) + bytesOf(segments_) + bytesOf(points_) + bytesOf(metadata_);
+                        bytesOf(earlier_) + bytesOf(metadataOf_) + bytesOf(segmentsEnd_) +
+                        bytesOf(pointsEnd_) + bytesOf(first_) + bytesOf(second_) + bytesOf(segments_) +
+                        bytesOf(points_) + bytesOf(metadata_);
     for (const Metadata& metadata : metadata_) {
         // A node of the tree: two strings, three pointers, a colour.
         constexpr std::size_t kNode = 2 * sizeof(std::string) + 32;

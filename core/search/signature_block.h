@@ -64,6 +64,7 @@ class SignatureBlock {
     std::vector<std::int64_t> ids_;
     std::vector<double> scales_;
     std::vector<std::uint8_t> qualities_;
+    std::vector<std::uint8_t> earlier_;  // 1: ShapeAttributes::earlier
     std::vector<std::uint16_t> metadataOf_;
     std::vector<std::uint16_t> segmentsEnd_;  // of each row, in segments_
     std::vector<std::uint16_t> pointsEnd_;    // of each row, in points_

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "core/base/error.h"
@@ -10,17 +11,23 @@
 
 namespace shapedb {
 
-/// The interior as a graph of about kCells cells, joined where they touch. A cell is a connected lump of
-/// tetrahedra within one cube of a grid, so limbs that pass close by each other stay separate. Lengths are in
-/// the view's unit.
+/// The interior as about kCells cells, joined where they touch. A cell is a connected lump of voxels within
+/// one cube of a grid, so limbs that pass close by each other stay separate. Lengths are in the view's unit.
 struct InnerDistances {
-    static constexpr std::size_t kCells = 1500;
-    static constexpr std::size_t kSources = 192;
+    static constexpr std::size_t kCells = 800;
+    static constexpr std::size_t kSources = 80;
     static constexpr double kUnreached = 1e300;  ///< distance between separate pieces of the interior
+    static constexpr std::uint32_t kNoCell = std::numeric_limits<std::uint32_t>::max();
 
-    std::vector<std::uint32_t> cellOfTetrahedron;
-    PointCloud centres;           ///< of the cells
+    PointCloud centres;           ///< of the cells, inside them: what distances are measured between
     std::vector<double> volumes;  ///< of the cells
+
+    /// Points spread evenly over the volume: all stand for the same share of it.
+    struct Matter {
+        std::uint32_t tetrahedron;
+        std::uint32_t cell;  ///< kNoCell for matter too thin to be near one
+    };
+    std::vector<Matter> matter;
 
     std::vector<std::uint32_t> sources;         ///< cells, evenly spread over the volume
     std::vector<std::vector<double>> distance;  ///< from each source to every cell, or kUnreached

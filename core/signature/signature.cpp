@@ -30,6 +30,7 @@ bool sameShape(const Signature& a, const Signature& b) noexcept {
     // With attributes, the points themselves enter no score.
     if (a.attributes) {
         return a.attributes->quality == b.attributes->quality &&
+               a.attributes->earlier == b.attributes->earlier &&
                a.attributes->statistics == b.attributes->statistics &&
                a.attributes->body.segments == b.attributes->body.segments;
     }

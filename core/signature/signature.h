@@ -47,7 +47,9 @@ struct WeightedPoint {
 struct ShapeAttributes {
     ShapeStatistics statistics{};
     std::uint8_t quality = 255;  ///< Segmentation::quality, in steps of 1/255
-    Body body;                   ///< bodyOf the signature's points; not persisted
+    /// Read from a version before 4: statistics of paths (StatisticLayout::ofPaths) are left out of scores.
+    bool earlier = false;
+    Body body;  ///< bodyOf the signature's points; not persisted
 };
 
 struct Signature {

@@ -17,6 +17,7 @@ constexpr char kMagic[4] = {'S', 'D', 'B', 'G'};
 constexpr std::uint16_t kPointsOnly = 1;  // version 1: points with their volume shares
 constexpr std::uint16_t kWithRoots = 2;   // version 2: statistics, one byte per bin; no volume shares
 constexpr std::uint16_t kWithLevels = 3;  // version 3: statistics as levels, two per byte
+constexpr std::uint16_t kWithChange = 4;  // version 4: inside distances are right; one statistic more
 constexpr std::size_t kHeaderBytes = 52;
 constexpr std::size_t kChecksumBytes = 4;
 
@@ -31,12 +32,13 @@ struct Layout {
 };
 constexpr Layout layoutOf(std::uint16_t version) {
     switch (version) {
-        case kWithRoots: return {44, kStatisticBins};
-        case kWithLevels: return {44, kStatisticBins / 2};
+        case kWithRoots: return {44, kEarlierStatisticBins};
+        case kWithLevels: return {44, kEarlierStatisticBins / 2};
+        case kWithChange: return {44, kStatisticBins / 2};
         default: return {48, 0};
     }
 }
-static_assert(kStatisticBins % 2 == 0, "two levels per byte");
+static_assert(kStatisticBins % 2 == 0 && kEarlierStatisticBins % 2 == 0, "two levels per byte");
 constexpr std::size_t kLeastBytes = layoutOf(kPointsOnly).size(1);
 
 // Scan units. No scan that `sanitise` accepts exceeds these, beyond which a motion between two shapes would
@@ -101,15 +103,19 @@ Result<void> checkNumbers(const Signature& signature, std::uint16_t version) {
     return {};
 }
 
-void putStatistics(std::string& out, const ShapeStatistics& levels) {
-    for (std::size_t i = 0; i < levels.size(); i += 2) {
+std::size_t binsOf(std::uint16_t version) {
+    return version == kWithChange ? kStatisticBins : kEarlierStatisticBins;
+}
+
+void putStatistics(std::string& out, const ShapeStatistics& levels, std::uint16_t version) {
+    for (std::size_t i = 0; i < binsOf(version); i += 2) {
         putUnsigned(out, static_cast<std::uint8_t>(levels[i] | (levels[i + 1] << 4)));
     }
 }
 
 ShapeStatistics takeStatistics(ByteReader& reader, std::uint16_t version) {
-    ShapeStatistics levels;
-    for (std::size_t i = 0; i < levels.size();) {
+    ShapeStatistics levels{};
+    for (std::size_t i = 0; i < binsOf(version);) {
         const auto byte = reader.takeUnsigned<std::uint8_t>();
         if (version == kWithRoots) {
             levels[i++] = levelOfRootByte(byte);
@@ -121,11 +127,16 @@ ShapeStatistics takeStatistics(ByteReader& reader, std::uint16_t version) {
     return levels;
 }
 
+std::uint16_t versionOf(const Signature& signature) {
+    if (!signature.attributes) return kPointsOnly;
+    return signature.attributes->earlier ? kWithLevels : kWithChange;
+}
+
 }  // namespace
 
 std::string encodeSignature(const Signature& signature) {
     std::string out(kMagic, sizeof kMagic);
-    const std::uint16_t version = signature.attributes ? kWithLevels : kPointsOnly;
+    const std::uint16_t version = versionOf(signature);
     out.reserve(layoutOf(version).size(signature.points.size()));
     putUnsigned(out, version);
     putUnsigned(out, static_cast<std::uint16_t>(signature.points.size()));
@@ -142,7 +153,7 @@ std::string encodeSignature(const Signature& signature) {
         putFloat(out, point.maximumRadius);
         for (const float v : point.covariance) putFloat(out, v);
     }
-    if (signature.attributes) putStatistics(out, signature.attributes->statistics);
+    if (signature.attributes) putStatistics(out, signature.attributes->statistics, version);
     putUnsigned(out, checksumOf(out.data(), out.size()));
     return out;
 }
@@ -161,7 +172,7 @@ Result<void> decodeSignature(const std::string& bytes, Signature& signature) {
         return malformed("it does not begin with SDBG");
     ByteReader reader(bytes.data() + sizeof kMagic);
     const auto version = reader.takeUnsigned<std::uint16_t>();
-    if (version < kPointsOnly || version > kWithLevels)
+    if (version < kPointsOnly || version > kWithChange)
         return malformed("version " + std::to_string(version) + " is unknown");
     const auto count = reader.takeUnsigned<std::uint16_t>();
     if (count < 1 || count > kMaxSignaturePoints)
@@ -194,6 +205,7 @@ Result<void> decodeSignature(const std::string& bytes, Signature& signature) {
             if (!signature.attributes) signature.attributes.emplace();
             ShapeAttributes& attributes = *signature.attributes;
             attributes.quality = static_cast<std::uint8_t>(quality);
+            attributes.earlier = version < kWithChange;
             attributes.statistics = takeStatistics(reader, version);
             setBody(signature.points, attributes.body);
         }

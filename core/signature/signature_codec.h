@@ -9,7 +9,8 @@
 
 namespace shapedb {
 
-/// Little-endian on every machine; 56 + 48 bytes per point, with attributes 272 + 44 bytes per point.
+/// Little-endian on every machine; 56 + 48 bytes per point, with attributes 280 + 44 bytes per point (those
+/// read from an earlier version 272: they are written in version 3).
 [[nodiscard]] std::string encodeSignature(const Signature& signature);
 
 /// The exact inverse for signatures from makeSignature. (With attributes, volume shares are not stored, since

@@ -23,6 +23,7 @@ constexpr std::size_t kPlaceBins = 10;
 constexpr std::size_t kChordLengths = 12;
 constexpr std::size_t kChordShares = 4;
 constexpr std::size_t kBendingBins = 24;
+constexpr std::size_t kChangeBins = 16;
 constexpr std::size_t kDistanceBins = 32;
 constexpr std::size_t kSpreadMiddles = 5;
 constexpr std::size_t kSpreadShortests = 4;
@@ -77,9 +78,10 @@ std::vector<double> centrality(const InnerDistances& inner) {
 void thicknessByCentrality(const InteriorView& view, const InnerDistances& inner, std::uint8_t* out) {
     const std::vector<double> central = centrality(inner);
     Histogram histogram(kThicknessBins, kPlaceBins);
-    for (std::size_t t = 0; t < view.volumes.size(); ++t) {
-        const SoftBin place = softBin(central[inner.cellOfTetrahedron[t]], 0.4, 1.8, kPlaceBins);
-        histogram.add(thicknessBin(view, t), place, view.volumes[t]);
+    for (const InnerDistances::Matter& m : inner.matter) {
+        if (m.cell == InnerDistances::kNoCell) continue;
+        const SoftBin place = softBin(central[m.cell], 0.4, 1.8, kPlaceBins);
+        histogram.add(thicknessBin(view, m.tetrahedron), place, 1.0);
     }
     histogram.writeLevels(out);
 }
@@ -92,6 +94,33 @@ void bending(const InnerDistances& inner, std::uint8_t* out) {
             if (c == inner.sources[s] || inner.distance[s][c] >= InnerDistances::kUnreached) continue;
             const double straight = distance(from, inner.centres[c]) / inner.mean;
             histogram.add(softBin(straight, 0.0, 2.6, kBendingBins), inner.volumes[c]);
+        }
+    }
+    histogram.writeLevels(out);
+}
+
+// The largest ball at a point of matter of each cell, in octaves; kNoThickness where there is none. Small
+// balls between the points of a noisy surface do not count then.
+constexpr double kNoThickness = -1e300;
+std::vector<double> thicknessOfCells(const InteriorView& view, const InnerDistances& inner) {
+    std::vector<double> octaves(inner.centres.size(), kNoThickness);
+    for (const InnerDistances::Matter& m : inner.matter) {
+        if (m.cell == InnerDistances::kNoCell) continue;
+        octaves[m.cell] = std::max(octaves[m.cell], std::log2(view.radii[m.tetrahedron]));
+    }
+    return octaves;
+}
+
+void thicknessChange(const InteriorView& view, const InnerDistances& inner, std::uint8_t* out) {
+    const std::vector<double> octaves = thicknessOfCells(view, inner);
+    Histogram histogram(1, kChangeBins);
+    for (std::size_t s = 0; s < inner.sources.size(); ++s) {
+        const double from = octaves[inner.sources[s]];
+        if (from == kNoThickness) continue;
+        for (std::size_t c = 0; c < inner.centres.size(); ++c) {
+            if (c == inner.sources[s] || inner.distance[s][c] >= InnerDistances::kUnreached) continue;
+            if (octaves[c] == kNoThickness) continue;
+            histogram.add(softBin(std::abs(octaves[c] - from), 0.0, 3.0, kChangeBins), inner.volumes[c]);
         }
     }
     histogram.writeLevels(out);
@@ -178,6 +207,7 @@ Result<ShapeStatistics> shapeStatistics(const InteriorView& view, const RunConte
         }
         thicknessByCentrality(view, *inner, bins(Statistic::kThicknessByCentrality));
         bending(*inner, bins(Statistic::kBending));
+        thicknessChange(view, *inner, bins(Statistic::kThicknessChange));
     };
     const auto lines = [&] {
         chords(view, bins(Statistic::kChords));

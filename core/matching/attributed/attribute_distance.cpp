@@ -11,8 +11,8 @@ namespace {
 
 // What two unrelated shapes differ by: medians over pairs of different synthetic families
 // (`shapedb-bench typical`). It gives every term an equal say, whatever the number of its bins.
-constexpr std::array<double, kStatisticKinds> kTypical{2.17, 3.24, 3.93, 1.10, 4.62,
-                                                       1.27, 4.20, 1.69, 2.95, 0.76};
+constexpr std::array<double, kStatisticKinds> kTypical{2.17, 3.54, 3.93, 1.04, 4.62, 1.27,
+                                                       4.20, 1.69, 2.95, 0.76, 1.56};
 constexpr double kTypicalDisagreement = 0.9;
 
 // How much a term counts where the interior is reliable and where it is not: the scan then shows one
@@ -35,6 +35,9 @@ constexpr EvidenceWeight weightOf(Evidence evidence) {
     return {1.0, 1.0};
 }
 
+// Most shapes are straight, and thickness by centrality rests on the same paths. More costs retrieval.
+constexpr double kBendingWeight = 0.5;
+
 // Partial: how much the contained parts count against how much the two look alike. An unreliable
 // interior is cut into other segments than that of the whole.
 constexpr EvidenceWeight kContainedWeight{0.5, 0.25};
@@ -51,8 +54,8 @@ constexpr double kDistanceSlack = 1e-7;
 // half makes its histograms useless.
 constexpr double kTrustedQuality = 0.5;
 
-double trust(std::uint8_t qualityA, std::uint8_t qualityB) {
-    const double worse = std::min(qualityA, qualityB) / 255.0;
+double trustIn(const Grounds& a, const Grounds& b) {
+    const double worse = std::min(a.quality, b.quality) / 255.0;
     const double share = std::min(1.0, worse / kTrustedQuality);
     return share * share * share * share;
 }
@@ -61,8 +64,19 @@ double between(const EvidenceWeight& weight, double trust) {
     return trust * weight.reliable + (1.0 - trust) * weight.unreliable;
 }
 
-double termWeight(std::size_t kind, double trust) {
-    return between(weightOf(kStatistics[kind].evidence), trust);
+// What the grounds of two shapes leave of the weights.
+struct Common {
+    Common(const Grounds& a, const Grounds& b) : trust(trustIn(a, b)), paths(!a.earlier && !b.earlier) {}
+
+    double trust;
+    bool paths;  // of both, so that they can be compared
+};
+
+double termWeight(std::size_t kind, const Common& common) {
+    const StatisticLayout& layout = kStatistics[kind];
+    if (layout.ofPaths && !common.paths) return 0.0;
+    const double say = kind == static_cast<std::size_t>(Statistic::kBending) ? kBendingWeight : 1.0;
+    return say * between(weightOf(layout.evidence), common.trust);
 }
 
 double termDistance(const LevelSums& sums, std::size_t kind) {
@@ -85,26 +99,25 @@ std::array<double, kStatisticKinds + 1> typicalDifferences() noexcept {
     return differences;
 }
 
-double statisticsDistance(const LevelSums& sums, std::uint8_t qualityA, std::uint8_t qualityB) {
-    const double interior = trust(qualityA, qualityB);
+double statisticsDistance(const LevelSums& sums, Grounds a, Grounds b) {
+    const Common common(a, b);
     double distance = 0.0;
     for (std::size_t kind = 0; kind < kStatisticKinds; ++kind) {
-        distance += termWeight(kind, interior) * termDistance(sums, kind);
+        distance += termWeight(kind, common) * termDistance(sums, kind);
     }
     return distance;
 }
 
-AttributeDistance attributeDistance(double statistics, std::uint8_t qualityA, std::uint8_t qualityB,
-                                    double octaves) {
-    const double interior = trust(qualityA, qualityB);
+AttributeDistance attributeDistance(double statistics, Grounds a, Grounds b, double octaves) {
+    const Common common(a, b);
     AttributeDistance result;
     result.statistics = statistics;
     for (std::size_t kind = 0; kind < kStatisticKinds; ++kind) {
-        result.totalWeight += termWeight(kind, interior);
+        result.totalWeight += termWeight(kind, common);
     }
-    result.partsWeight = kPartsWeight * between(weightOf(Evidence::kInside), interior);
+    result.partsWeight = kPartsWeight * between(weightOf(Evidence::kInside), common.trust);
     result.totalWeight += result.partsWeight;
-    result.containedWeight = between(kContainedWeight, interior);
+    result.containedWeight = between(kContainedWeight, common.trust);
     result.scale = octaves;
     return result;
 }
@@ -118,18 +131,18 @@ double partialScore(const AttributeDistance& distance, double agreement, double 
                            distance.containedWeight * disagreement(share));
 }
 
-LevelWeights levelWeights(std::uint8_t qualityA, std::uint8_t qualityB) {
-    const double interior = trust(qualityA, qualityB);
+LevelWeights levelWeights(Grounds a, Grounds b) {
+    const Common common(a, b);
     LevelWeights weights;
     // The total of attributeDistance. That it is summed in another order is within the margin of
     // maxDistanceForScore.
-    double total = kPartsWeight * between(weightOf(Evidence::kInside), interior);
+    double total = kPartsWeight * between(weightOf(Evidence::kInside), common.trust);
     for (std::size_t kind = 0; kind < kStatisticKinds; ++kind) {
-        weights.perLevel[kind] = termWeight(kind, interior) * kRootPerLevel / kTypical[kind];
-        total += termWeight(kind, interior);
+        weights.perLevel[kind] = termWeight(kind, common) * kRootPerLevel / kTypical[kind];
+        total += termWeight(kind, common);
     }
     for (double& weight : weights.perLevel) weight /= total;
-    weights.partial = 1.0 - between(kContainedWeight, interior);
+    weights.partial = 1.0 - between(kContainedWeight, common.trust);
     return weights;
 }
 
@@ -146,23 +159,22 @@ double octavesBetween(double scaleA, double scaleB) {
     return std::abs(std::log2(std::max(scaleA, scaleB) / std::min(scaleA, scaleB)));
 }
 
-std::vector<ScoreTerm> scoreTerms(const LevelSums& sums, std::uint8_t qualityA, std::uint8_t qualityB,
-                                  double agreement) {
-    const double interior = trust(qualityA, qualityB);
-    const AttributeDistance distance = attributeDistance(0.0, qualityA, qualityB, 0.0);
+std::vector<ScoreTerm> scoreTerms(const LevelSums& sums, Grounds a, Grounds b, double agreement) {
+    const Common common(a, b);
+    const AttributeDistance distance = attributeDistance(0.0, a, b, 0.0);
     std::vector<ScoreTerm> terms;
     for (std::size_t kind = 0; kind < kStatisticKinds; ++kind) {
         terms.push_back({kStatistics[kind].name, termDistance(sums, kind),
-                         termWeight(kind, interior) / distance.totalWeight});
+                         termWeight(kind, common) / distance.totalWeight});
     }
     terms.push_back({"parts", disagreement(agreement), distance.partsWeight / distance.totalWeight});
     return terms;
 }
 
-std::vector<ScoreTerm> partialTerms(const LevelSums& sums, std::uint8_t qualityA, std::uint8_t qualityB,
-                                    double agreement, double share) {
-    std::vector<ScoreTerm> terms = scoreTerms(sums, qualityA, qualityB, agreement);
-    const double contained = between(kContainedWeight, trust(qualityA, qualityB));
+std::vector<ScoreTerm> partialTerms(const LevelSums& sums, Grounds a, Grounds b, double agreement,
+                                    double share) {
+    std::vector<ScoreTerm> terms = scoreTerms(sums, a, b, agreement);
+    const double contained = between(kContainedWeight, trustIn(a, b));
     for (ScoreTerm& term : terms) term.weight *= 1.0 - contained;
     terms.push_back({"contained parts", disagreement(share), contained});
     return terms;

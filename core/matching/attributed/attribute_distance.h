@@ -30,12 +30,19 @@ struct AttributeDistance {
     double containedWeight = 0.0;  ///< partial: of the contained parts against all of the above, [0, 1]
 };
 
-/// AttributeDistance::statistics of two shapes whose interiors have these qualities (0 to 255).
-[[nodiscard]] double statisticsDistance(const LevelSums& sums, std::uint8_t qualityA, std::uint8_t qualityB);
+/// What about a shape decides how much each statistic counts.
+struct Grounds {
+    Grounds(std::uint8_t ofInterior, bool ofEarlier = false) : quality(ofInterior), earlier(ofEarlier) {}
+
+    std::uint8_t quality;  ///< of the interior, 0 to 255
+    bool earlier;          ///< ShapeAttributes::earlier: statistics of paths count for nothing
+};
+
+/// AttributeDistance::statistics of two shapes with these grounds.
+[[nodiscard]] double statisticsDistance(const LevelSums& sums, Grounds a, Grounds b);
 
 /// Everything but the parts. `octaves`: what goes into `scale`.
-[[nodiscard]] AttributeDistance attributeDistance(double statistics, std::uint8_t qualityA,
-                                                  std::uint8_t qualityB, double octaves);
+[[nodiscard]] AttributeDistance attributeDistance(double statistics, Grounds a, Grounds b, double octaves);
 
 /// 1 / (1 + (2 D)^2), in (0, 1], where the parts agree by `agreement` and D is the mean of all
 /// distances. Rises with the agreement. Unrelated shapes (D = 1) typically score 0.2.
@@ -45,13 +52,13 @@ struct AttributeDistance {
 /// whole, and by up to a half the share of the piece that the whole does not contain. Rises with both.
 [[nodiscard]] double partialScore(const AttributeDistance& distance, double agreement, double share);
 
-/// For bounds of many candidates: what one level of difference in each statistic adds to D, of shapes
-/// whose interiors have these qualities.
+/// For bounds of many candidates: what one level of difference in each statistic adds to D, of shapes with
+/// these grounds.
 struct LevelWeights {
     std::array<double, kStatisticKinds> perLevel{};
     double partial = 1.0;  ///< partial: the weight of D beside the contained parts
 };
-[[nodiscard]] LevelWeights levelWeights(std::uint8_t qualityA, std::uint8_t qualityB);
+[[nodiscard]] LevelWeights levelWeights(Grounds a, Grounds b);
 
 /// The largest mean distance at which a score of at least `score` (in [0, 1]) is possible, a little
 /// more for rounding; infinite for 0.
@@ -64,11 +71,11 @@ struct LevelWeights {
 [[nodiscard]] double octavesBetween(double scaleA, double scaleB);
 
 /// Name, distance and weight of every term, in a fixed order; the weights sum to 1.
-[[nodiscard]] std::vector<ScoreTerm> scoreTerms(const LevelSums& sums, std::uint8_t qualityA,
-                                                std::uint8_t qualityB, double agreement);
+[[nodiscard]] std::vector<ScoreTerm> scoreTerms(const LevelSums& sums, Grounds a, Grounds b,
+                                                double agreement);
 
 /// Of a piece and its whole: also the term of what the whole contains of it.
-[[nodiscard]] std::vector<ScoreTerm> partialTerms(const LevelSums& sums, std::uint8_t qualityA,
-                                                  std::uint8_t qualityB, double agreement, double share);
+[[nodiscard]] std::vector<ScoreTerm> partialTerms(const LevelSums& sums, Grounds a, Grounds b,
+                                                  double agreement, double share);
 
 }  // namespace shapedb

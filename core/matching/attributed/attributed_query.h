@@ -20,6 +20,8 @@ namespace shapedb {
     return sums;
 }
 
+[[nodiscard]] inline Grounds groundsOf(const ShapeRow& shape) { return {shape.quality, shape.earlier}; }
+
 /// Immutable, thread-safe.
 class AttributedQuery {
   public:
@@ -31,7 +33,7 @@ class AttributedQuery {
     /// With points and placement.
     [[nodiscard]] ShapeRow row() const { return packed_.row(); }
     [[nodiscard]] const SegmentArray& segments() const { return segments_; }
-    [[nodiscard]] std::uint8_t quality() const { return packed_.row().quality; }
+    [[nodiscard]] Grounds grounds() const { return groundsOf(packed_.row()); }
     [[nodiscard]] double scale() const { return packed_.row().scale; }
     [[nodiscard]] const StatisticsDifference& difference() const { return difference_; }
 

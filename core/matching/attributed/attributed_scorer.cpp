@@ -70,8 +70,8 @@ AttributedScorer::Pair::Pair(const AttributedQuery& query, const ShapeRow& row, 
     : segments(row),
       exchanged(canonicalLess(row, query.row())),
       comparison(exchanged ? segments : query.segments(), exchanged ? query.segments() : segments, options),
-      distance(attributeDistance(statisticsDistance(sums, query.quality(), row.quality), query.quality(),
-                                 row.quality,
+      distance(attributeDistance(statisticsDistance(sums, query.grounds(), groundsOf(row)), query.grounds(),
+                                 groundsOf(row),
                                  options.keepScale ? octavesBetween(query.scale(), row.scale) : 0.0)),
       knownScale(options.keepScale ? query.scale() / row.scale : 0.0) {}
 
@@ -137,7 +137,7 @@ Explanation WholeScorer::explain(const ShapeRow& shape) const {
     result.dissimilarity = std::max(0.0, 1.0 - match.agreement);
     result.degenerate = a.pointCount == 1 || b.pointCount == 1;
     result.motion = bodyMotion(a, b, match.rotation, match.reflected, options().keepScale);
-    result.terms = scoreTerms(sums, query().quality(), shape.quality, match.agreement);
+    result.terms = scoreTerms(sums, query().grounds(), groundsOf(shape), match.agreement);
     addMatches(pair.comparison.pairs(match), match.agreement, result);
     listUnmatched(result, a.pointCount, b.pointCount);
     // Each side's distances are in its own units.
@@ -185,7 +185,7 @@ Explanation PartialScorer::explain(const ShapeRow& shape) const {
     result.dissimilarity = 1.0 - found.share;
     result.degenerate = piece.pointCount == 1 || shape.pointCount == 1;
     result.motion = pieceMotion(piece, shape, found, options().keepScale);
-    result.terms = partialTerms(sums, query().quality(), shape.quality, agreement, found.share);
+    result.terms = partialTerms(sums, query().grounds(), groundsOf(shape), agreement, found.share);
     addMatches(containedPairs(query().segments(), pair.segments, found, options()), found.share, result);
     listUnmatched(result, piece.pointCount, shape.pointCount);
     return result;

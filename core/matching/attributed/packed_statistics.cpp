@@ -16,13 +16,17 @@ namespace shapedb {
 
 namespace {
 
-// Where a half keeps its five statistics: three of up to 64 levels, two of up to 32. So the differences of a
-// whole statistic are summed in one or two machine instructions.
+// Where a half keeps its statistics: five slots, three of up to 64 levels and two of up to 32, so that the
+// differences of a whole statistic are summed in one or two machine instructions. The last quarter of the
+// first slot of the first half, a sum of its own, is a sixth slot.
 struct Slot {
     std::size_t offset;
     std::size_t bytes;
 };
-constexpr std::array<Slot, kKindsPerHalf> kSlots{{{0, 32}, {32, 32}, {64, 32}, {96, 16}, {112, 16}}};
+constexpr std::array<Slot, kKindsPerHalf> kFirstSlots{
+    {{0, 24}, {32, 32}, {64, 32}, {96, 16}, {112, 16}, {24, 8}}};
+constexpr std::array<Slot, kKindsInSecondHalf> kSecondSlots{
+    {{0, 32}, {32, 32}, {64, 32}, {96, 16}, {112, 16}}};
 constexpr std::size_t kReversibleSlot = 2;
 
 constexpr const StatisticLayout& layoutOf(Statistic kind) {
@@ -30,15 +34,17 @@ constexpr const StatisticLayout& layoutOf(Statistic kind) {
 }
 
 template <std::size_t kKinds>
-constexpr bool fits(const std::array<Statistic, kKinds>& half, bool mayReverse) {
+constexpr bool fits(const std::array<Statistic, kKinds>& half, const std::array<Slot, kKinds>& slots,
+                    bool mayReverse) {
     for (std::size_t s = 0; s < kKinds; ++s) {
         const StatisticLayout& layout = layoutOf(half[s]);
-        if (layout.count % 2 != 0 || layout.count / 2 > kSlots[s].bytes) return false;
+        if (layout.count % 2 != 0 || layout.count / 2 > slots[s].bytes) return false;
         if (layout.reversibleRows > 0 && !(mayReverse && s == kReversibleSlot)) return false;
     }
     return true;
 }
-static_assert(fits(kFirstHalf, false) && fits(kSecondHalf, true), "a statistic does not fit its slot");
+static_assert(fits(kFirstHalf, kFirstSlots, false) && fits(kSecondHalf, kSecondSlots, true),
+              "a statistic does not fit its slot");
 
 constexpr bool eachIsHeldOnce() {
     std::array<int, kStatisticKinds> held{};
@@ -52,12 +58,13 @@ constexpr bool eachIsHeldOnce() {
 static_assert(eachIsHeldOnce(), "each statistic belongs to one half");
 
 template <std::size_t kKinds>
-void packHalf(const std::uint8_t* levels, const std::array<Statistic, kKinds>& kinds, HalfRow& row) {
+void packHalf(const std::uint8_t* levels, const std::array<Statistic, kKinds>& kinds,
+              const std::array<Slot, kKinds>& slots, HalfRow& row) {
     HalfRow packed;  // a local one may be vectorised: nothing else points to it
     for (std::size_t s = 0; s < kKinds; ++s) {
         const StatisticLayout& layout = layoutOf(kinds[s]);
         const std::uint8_t* from = levels + layout.offset;
-        std::uint8_t* to = packed.bytes.data() + kSlots[s].offset;
+        std::uint8_t* to = packed.bytes.data() + slots[s].offset;
         for (std::size_t i = 0; i < layout.count / 2u; ++i) {
             const std::uint8_t low = std::min(from[2 * i], kTopLevel);
             const std::uint8_t high = std::min(from[2 * i + 1], kTopLevel);
@@ -68,11 +75,12 @@ void packHalf(const std::uint8_t* levels, const std::array<Statistic, kKinds>& k
 }
 
 template <std::size_t kKinds>
-void unpackHalf(const HalfRow& row, const std::array<Statistic, kKinds>& kinds, std::uint8_t* levels) {
+void unpackHalf(const HalfRow& row, const std::array<Statistic, kKinds>& kinds,
+                const std::array<Slot, kKinds>& slots, std::uint8_t* levels) {
     for (std::size_t s = 0; s < kKinds; ++s) {
         const StatisticLayout& layout = layoutOf(kinds[s]);
         for (std::size_t i = 0; i < layout.count; i += 2) {
-            const std::uint8_t byte = row.bytes[kSlots[s].offset + i / 2];
+            const std::uint8_t byte = row.bytes[slots[s].offset + i / 2];
             levels[layout.offset + i] = byte & 0x0fu;
             levels[layout.offset + i + 1] = byte >> 4;
         }
@@ -84,7 +92,7 @@ HalfRow withRowsReversed(HalfRow half) {
     constexpr StatisticLayout kLayout = layoutOf(kSecondHalf[kReversibleSlot]);
     constexpr std::size_t kRowBytes = kLayout.count / kLayout.reversibleRows / 2;
     static_assert(kRowBytes * 2 * kLayout.reversibleRows == kLayout.count, "rows are not whole bytes");
-    std::uint8_t* bytes = half.bytes.data() + kSlots[kReversibleSlot].offset;
+    std::uint8_t* bytes = half.bytes.data() + kSecondSlots[kReversibleSlot].offset;
     for (std::size_t low = 0, high = kLayout.count / 2 - kRowBytes; low < high;
          low += kRowBytes, high -= kRowBytes) {
         std::swap_ranges(bytes + low, bytes + low + kRowBytes, bytes + high);
@@ -94,18 +102,19 @@ HalfRow withRowsReversed(HalfRow half) {
 
 // The L1 distance of levels, which are square roots of shares (Hellinger's distance is the L2 distance of the
 // roots). Roots make a rare bin that is there or not matter as much as a small change of a full one.
-std::uint32_t slotSum(const HalfRow& a, const HalfRow& b, std::size_t slot) {
+std::uint32_t slotSum(const HalfRow& a, const HalfRow& b, const Slot& slot) {
     std::uint32_t sum = 0;
-    for (std::size_t i = kSlots[slot].offset; i < kSlots[slot].offset + kSlots[slot].bytes; ++i) {
+    for (std::size_t i = slot.offset; i < slot.offset + slot.bytes; ++i) {
         sum += static_cast<std::uint32_t>(std::abs((a.bytes[i] & 0x0f) - (b.bytes[i] & 0x0f)));
         sum += static_cast<std::uint32_t>(std::abs((a.bytes[i] >> 4) - (b.bytes[i] >> 4)));
     }
     return sum;
 }
 
-HalfSums portableSums(const HalfRow& query, const HalfRow& row) {
-    HalfSums sums;
-    for (std::size_t s = 0; s < kKindsPerHalf; ++s) sums[s] = slotSum(query, row, s);
+template <std::size_t kKinds>
+HalfSums portableSums(const HalfRow& query, const HalfRow& row, const std::array<Slot, kKinds>& slots) {
+    HalfSums sums{};
+    for (std::size_t s = 0; s < kKinds; ++s) sums[s] = slotSum(query, row, slots[s]);
     return sums;
 }
 
@@ -134,10 +143,16 @@ SHAPEDB_WIDE inline std::uint32_t lane(__m128i partial) {
     return static_cast<std::uint32_t>(_mm_cvtsi128_si32(partial) + _mm_extract_epi16(partial, 4));
 }
 
+// The sixth sum is that of the last quarter of the first slot. With `kSixth` it is not in the first one.
+template <bool kSixth>
 SHAPEDB_WIDE void wideSums(const HalfRow& query, const HalfRow* rows, std::size_t count, HalfSums* sums) {
     for (std::size_t r = 0; r < count; ++r) {
         const std::uint8_t* row = rows[r].bytes.data();
-        for (std::size_t s = 0; s < 3; ++s) {
+        const __m256i start = differences(query.bytes.data(), row);
+        const auto quarter = static_cast<std::uint32_t>(_mm256_extract_epi16(start, 12));
+        sums[r][0] = whole(start) - (kSixth ? quarter : 0);
+        sums[r][5] = kSixth ? quarter : 0;
+        for (std::size_t s = 1; s < 3; ++s) {
             sums[r][s] = whole(differences(query.bytes.data() + 32 * s, row + 32 * s));
         }
         const __m256i last = differences(query.bytes.data() + 96, row + 96);
@@ -152,6 +167,7 @@ SHAPEDB_WIDE std::uint32_t wideSlotSum(const HalfRow& a, const HalfRow& b) {
 
 #else
 
+template <bool kSixth>
 void wideSums(const HalfRow&, const HalfRow*, std::size_t, HalfSums*) {}
 std::uint32_t wideSlotSum(const HalfRow&, const HalfRow&) { return 0; }
 
@@ -160,13 +176,13 @@ std::uint32_t wideSlotSum(const HalfRow&, const HalfRow&) { return 0; }
 }  // namespace
 
 void packStatistics(const ShapeStatistics& levels, HalfRow& first, HalfRow& second) noexcept {
-    packHalf(levels.data(), kFirstHalf, first);
-    packHalf(levels.data(), kSecondHalf, second);
+    packHalf(levels.data(), kFirstHalf, kFirstSlots, first);
+    packHalf(levels.data(), kSecondHalf, kSecondSlots, second);
 }
 
 void unpackStatistics(const HalfRow& first, const HalfRow& second, ShapeStatistics& levels) noexcept {
-    unpackHalf(first, kFirstHalf, levels.data());
-    unpackHalf(second, kSecondHalf, levels.data());
+    unpackHalf(first, kFirstHalf, kFirstSlots, levels.data());
+    unpackHalf(second, kSecondHalf, kSecondSlots, levels.data());
 }
 
 StatisticsDifference::StatisticsDifference(const HalfRow& first, const HalfRow& second, Instructions use)
@@ -176,18 +192,19 @@ StatisticsDifference::StatisticsDifference(const HalfRow& first, const HalfRow& 
       wide_(use == Instructions::kBest && processorIsWide()) {}
 
 void StatisticsDifference::first(const HalfRow* rows, std::size_t count, HalfSums* sums) const noexcept {
-    if (wide_) return wideSums(first_, rows, count, sums);
-    for (std::size_t r = 0; r < count; ++r) sums[r] = portableSums(first_, rows[r]);
+    if (wide_) return wideSums<true>(first_, rows, count, sums);
+    for (std::size_t r = 0; r < count; ++r) sums[r] = portableSums(first_, rows[r], kFirstSlots);
 }
 
 HalfSums StatisticsDifference::second(const HalfRow& row) const noexcept {
     HalfSums sums;
     if (wide_) {
-        wideSums(second_, &row, 1, &sums);
+        wideSums<false>(second_, &row, 1, &sums);
         sums[kReversibleSlot] = std::min(sums[kReversibleSlot], wideSlotSum(reversed_, row));
     } else {
-        sums = portableSums(second_, row);
-        sums[kReversibleSlot] = std::min(sums[kReversibleSlot], slotSum(reversed_, row, kReversibleSlot));
+        sums = portableSums(second_, row, kSecondSlots);
+        sums[kReversibleSlot] =
+            std::min(sums[kReversibleSlot], slotSum(reversed_, row, kSecondSlots[kReversibleSlot]));
     }
     return sums;
 }

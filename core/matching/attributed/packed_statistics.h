@@ -24,8 +24,8 @@ constexpr std::size_t kKindsInSecondHalf = kStatisticKinds - kKindsPerHalf;
 /// Which statistics a half holds, in the order of HalfSums. The first half was chosen to tell most
 /// shapes apart.
 constexpr std::array<Statistic, kKindsPerHalf> kFirstHalf{
-    Statistic::kChords, Statistic::kThicknessByCentrality, Statistic::kThicknessByRadius, Statistic::kBending,
-    Statistic::kSurfaceDistances};
+    Statistic::kChords,  Statistic::kThicknessByCentrality, Statistic::kThicknessByRadius,
+    Statistic::kBending, Statistic::kSurfaceDistances,      Statistic::kThicknessChange};
 constexpr std::array<Statistic, kKindsInSecondHalf> kSecondHalf{
     Statistic::kInteriorHarmonics, Statistic::kSurfaceHarmonics, Statistic::kFootprint, Statistic::kSpread,
     Statistic::kFootprintDistances};

@@ -40,7 +40,7 @@ class StatisticsBound {
     const AttributedQuery& query_;
     double queryScale_;
     bool compareSizes_;
-    std::vector<HalfWeights> first_, second_;  // by the quality of the row
+    std::vector<HalfWeights> first_, second_;  // by the grounds of the row
 };
 
 }  // namespace shapedb

@@ -53,6 +53,7 @@ Signature randomAttributed(Random& random, std::size_t maxPoints) {
     for (std::uint8_t& bin : attributes.statistics) {
         bin = random.below(2) == 0 ? 0 : static_cast<std::uint8_t>(random.below(8));
     }
+    attributes.earlier = random.below(8) == 0;
     updateBody(signature);
     return signature;
 }

@@ -120,6 +120,7 @@ InteriorView viewOfCubes(const std::vector<Cube>& cubes, double side) {
                 ++at[axes[step]];
                 vertices[step + 1] = corner(at);
             }
+            if (sixfoldVolume(cornersOf(view.sites, vertices)) < 0.0) std::swap(vertices[2], vertices[3]);
             view.vertices.push_back(vertices);
         } while (std::next_permutation(axes.begin(), axes.end()));
     }

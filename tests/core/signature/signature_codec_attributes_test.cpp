@@ -1,4 +1,4 @@
-// Versions 2 and 3 of the format: signatures with attributes.
+// Versions 2 to 4 of the format: signatures with attributes.
 #include <cmath>
 #include <cstdint>
 #include <string>
@@ -90,16 +90,43 @@ std::string goldenHead(const std::string& version) {
     return bytes;
 }
 
+// The same, as read from version 3.
+Signature onePointOfVersion3() {
+    Signature signature = onePoint();
+    signature.attributes->earlier = true;
+    for (std::size_t i = kEarlierStatisticBins; i < kStatisticBins; ++i) {
+        signature.attributes->statistics[i] = 0;
+    }
+    return signature;
+}
+
 TEST(SignatureCodecAttributes, ReadsAndWritesTheGoldenBytes) {
+    std::string golden = goldenHead("0400");
+    for (int i = 0; i < 448; i += 2) {
+        golden.push_back(static_cast<char>((7 * i + 3) % 16 + 16 * ((7 * (i + 1) + 3) % 16)));
+    }
+    for (const int byte : {0xf5, 0x46, 0x37, 0xb8}) golden.push_back(static_cast<char>(byte));
+    EXPECT_EQ(encodeSignature(onePoint()), golden);
+    const auto decoded = decodeSignature(golden);
+    ASSERT_TRUE(decoded) << decoded.error().message;
+    EXPECT_TRUE(sameShape(*decoded, onePoint()));
+    EXPECT_FALSE(decoded->attributes->earlier);
+    EXPECT_EQ(decoded->attributes->quality, 200);
+}
+
+// Version 3 has other inside distances and a statistic less; it stays what it is when written again.
+TEST(SignatureCodecAttributes, ReadsAndRewritesGoldenBytesOfVersion3) {
     std::string golden = goldenHead("0300");
     for (int i = 0; i < 432; i += 2) {
         golden.push_back(static_cast<char>((7 * i + 3) % 16 + 16 * ((7 * (i + 1) + 3) % 16)));
     }
     for (const int byte : {0x4c, 0x15, 0xed, 0xb2}) golden.push_back(static_cast<char>(byte));
-    EXPECT_EQ(encodeSignature(onePoint()), golden);
+    EXPECT_EQ(encodeSignature(onePointOfVersion3()), golden);
     const auto decoded = decodeSignature(golden);
     ASSERT_TRUE(decoded) << decoded.error().message;
-    EXPECT_TRUE(sameShape(*decoded, onePoint()));
+    EXPECT_TRUE(sameShape(*decoded, onePointOfVersion3()));
+    EXPECT_FALSE(sameShape(*decoded, onePoint()));
+    EXPECT_TRUE(decoded->attributes->earlier);
     EXPECT_EQ(decoded->attributes->quality, 200);
     EXPECT_FLOAT_EQ(decoded->points[0].volumeShare, 0.5208333f);
 }
@@ -125,7 +152,7 @@ TEST(SignatureCodecAttributes, DecodeIsTheInverse) {
     for (std::size_t count = 1; count <= kMaxSignaturePoints; ++count) {
         const Signature signature = randomAttributed(random, count);
         const std::string bytes = encodeSignature(signature);
-        EXPECT_EQ(bytes.size(), 56U + 44U * count + 216U);
+        EXPECT_EQ(bytes.size(), 56U + 44U * count + 224U);
         const auto decoded = decodeSignature(bytes);
         ASSERT_TRUE(decoded) << decoded.error().message;
         ASSERT_TRUE(decoded->attributes);
@@ -187,7 +214,7 @@ TEST(SignatureCodecAttributes, DetectsDamage) {
 }
 
 TEST(SignatureCodecAttributes, ChecksTheHeader) {
-    const std::string bytes = encodeSignature(onePoint());  // version 3
+    const std::string bytes = encodeSignature(onePoint());  // version 4
     const auto changed = [&](std::size_t at, int value) {
         std::string other = bytes;
         other[at] = static_cast<char>(value);
@@ -202,13 +229,14 @@ TEST(SignatureCodecAttributes, ChecksTheHeader) {
     for (const std::size_t at : {9U, 10U, 11U}) expectMalformed(changed(at, 1), "reserved");
     expectMalformed(changed(4, 1), "do not fit");
     expectMalformed(changed(4, 2), "do not fit");
-    expectMalformed(changed(4, 4), "version 4 is unknown");
+    expectMalformed(changed(4, 3), "do not fit");
+    expectMalformed(changed(4, 5), "version 5 is unknown");
     expectMalformed(changed(4, 0), "version 0 is unknown");
     expectMalformed(changed(5, 2), "unknown");
     expectMalformed(changed(6, 0), "0 points");
     expectMalformed(changed(6, 2), "do not fit");
     expectMalformed(changed(6, 17), "17 points");
-    // 216 bytes of statistics are not points of version 1.
+    // 224 bytes of statistics are not points of version 1.
     for (int count = 2; count <= 16; ++count) expectMalformed(changed(6, count), "do not fit");
 }
 

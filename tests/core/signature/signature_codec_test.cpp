@@ -151,7 +151,7 @@ TEST(SignatureCodec, ChecksTheHeader) {
     expectMalformed(changed(0, 'X'), "SDBG");
     expectMalformed(changed(4, 2), "do not fit");  // version 2 without its statistics
     expectMalformed(changed(4, 3), "do not fit");
-    expectMalformed(changed(4, 4), "version 4 is unknown");
+    expectMalformed(changed(4, 5), "version 5 is unknown");
     expectMalformed(changed(4, 0), "version 0 is unknown");
     expectMalformed(changed(6, 0), "0 points");
     expectMalformed(changed(6, 17), "17 points");

@@ -75,13 +75,15 @@ TEST(Statistics, LayoutHasNoGapsOrOverlaps) {
         names.insert(layout.name);
     }
     EXPECT_EQ(next, kStatisticBins);
-    EXPECT_EQ(kStatisticBins, 432U) << "persisted";
+    EXPECT_EQ(kStatisticBins, 448U) << "persisted";
+    EXPECT_EQ(kEarlierStatisticBins, 432U) << "persisted";
     EXPECT_EQ(names.size(), kStatisticKinds);
     EXPECT_STREQ(kStatistics[static_cast<std::size_t>(Statistic::kChords)].name, "chords");
     EXPECT_STREQ(kStatistics[static_cast<std::size_t>(Statistic::kSurfaceHarmonics)].name,
                  "surface harmonics");
     EXPECT_STREQ(kStatistics[static_cast<std::size_t>(Statistic::kFootprintDistances)].name,
                  "footprint distances");
+    EXPECT_STREQ(kStatistics[static_cast<std::size_t>(Statistic::kThicknessChange)].name, "thickness change");
 }
 
 TEST(Statistics, ThicknessByRadiusMatchesItsDefinition) {
@@ -108,8 +110,8 @@ TEST(Statistics, ThicknessByCentralityMatchesItsDefinition) {
     for (const InteriorView& view : someViews()) {
         const InnerDistances inner = innerDistances(view).value();
         std::vector<double> sums(kThicknesses * kPlaces, 0.0);
-        for (std::size_t t = 0; t < view.volumes.size(); ++t) {
-            const std::uint32_t cell = inner.cellOfTetrahedron[t];
+        for (const auto& [t, cell] : inner.matter) {
+            ASSERT_NE(cell, InnerDistances::kNoCell);
             double sum = 0.0;
             int reached = 0;
             for (std::size_t s = 0; s < inner.sources.size(); ++s) {
@@ -122,8 +124,7 @@ TEST(Statistics, ThicknessByCentralityMatchesItsDefinition) {
             const double octaves = std::log2(view.radii[t] / view.meanSurfaceDistance);
             for (std::size_t row = 0; row < kThicknesses; ++row) {
                 for (std::size_t column = 0; column < kPlaces; ++column) {
-                    sums[row * kPlaces + column] += view.volumes[t] *
-                                                    triangle(octaves, -5.0, 0.5, kThicknesses, row) *
+                    sums[row * kPlaces + column] += triangle(octaves, -5.0, 0.5, kThicknesses, row) *
                                                     triangle(central, 0.4, 1.8, kPlaces, column);
                 }
             }
@@ -152,6 +153,44 @@ TEST(Statistics, BendingMatchesItsDefinition) {
         ASSERT_TRUE(statistics);
         expectBins(binsOf(*statistics, Statistic::kBending), levelsOf(sums), "bending");
     }
+}
+
+TEST(Statistics, ThicknessChangeMatchesItsDefinition) {
+    for (const InteriorView& view : someViews()) {
+        const InnerDistances inner = innerDistances(view).value();
+        std::vector<double> radii(inner.centres.size(), 0.0);
+        for (const auto& [t, cell] : inner.matter) radii[cell] = std::max(radii[cell], view.radii[t]);
+        std::vector<double> sums(16, 0.0);
+        for (std::size_t s = 0; s < inner.sources.size(); ++s) {
+            const std::size_t from = inner.sources[s];
+            for (std::size_t c = 0; c < inner.centres.size(); ++c) {
+                if (c == from || inner.distance[s][c] == InnerDistances::kUnreached) continue;
+                if (radii[c] == 0.0 || radii[from] == 0.0) continue;
+                const double change = std::abs(std::log2(radii[c] / radii[from]));
+                for (std::size_t bin = 0; bin < sums.size(); ++bin) {
+                    sums[bin] += inner.volumes[c] * triangle(change, 0.0, 3.0, 16, bin);
+                }
+            }
+        }
+        const auto statistics = shapeStatistics(view);
+        ASSERT_TRUE(statistics);
+        expectBins(binsOf(*statistics, Statistic::kThicknessChange), levelsOf(sums), "thickness change");
+    }
+}
+
+TEST(Statistics, ThicknessChangesWherePartsDo) {
+    const auto mean = [](const Solid& solid) {
+        const auto shares = sharesOf(ofScan(solid), Statistic::kThicknessChange);
+        double sum = 0.0;
+        for (std::size_t i = 0; i < shares.size(); ++i) sum += shares[i] * (static_cast<double>(i) + 0.5);
+        return sum * 3.0 / 16.0;
+    };
+    const double ofBall = mean(makeSphere().solid);
+    const double ofTorus = mean(makeTorus().solid);
+    const double ofDumbbell = mean(makeDumbbell().solid);
+    EXPECT_LT(ofBall, 0.3);
+    EXPECT_LT(ofTorus, 0.3);
+    EXPECT_GT(ofDumbbell, 1.5 * ofBall);
 }
 
 TEST(Statistics, SurfaceDistancesAndHarmonicsMatchTheirDefinitions) {
@@ -294,7 +333,7 @@ TEST(Statistics, AStraightRodIsLongerThanABentOne) {
     ASSERT_TRUE(straight && bent);
     const double ofStraight = mean(sharesOf(*straight, Statistic::kBending));
     const double ofBent = mean(sharesOf(*bent, Statistic::kBending));
-    // In units of the mean inner distance, which for a straight rod is the straight line apart from zigzag.
+    // In units of the mean inner distance, which for a straight rod is the straight line.
     EXPECT_GT(ofStraight, 0.7);
     EXPECT_LT(ofStraight, 1.02);
     EXPECT_LT(ofBent, 0.75 * ofStraight);

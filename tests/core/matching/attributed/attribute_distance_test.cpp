@@ -36,7 +36,8 @@ double containedWeightOf(const Signature& a, const Signature& b) {
 TEST(AttributeDistance, FallsAsAnyStatisticDiffersMore) {
     Random random(6);
     for (const StatisticLayout& layout : kStatistics) {
-        const Signature a = randomAttributed(random);
+        Signature a = randomAttributed(random);
+        a.attributes->earlier = false;
         double before = 1.0;
         for (int step = 1; step <= 5; ++step) {
             Signature b = a;
@@ -71,6 +72,40 @@ TEST(AttributeDistance, ScoreRisesWithTheAgreement) {
         EXPECT_EQ(attributeScore(distance, 1.0), attributeScore(distance, 1.0 + 1e-7))
             << "shares are rounded";
     }
+}
+
+// Statistics of paths of an earlier version mean something else.
+TEST(AttributeDistance, PathsOfEarlierVersionsAreLeftOut) {
+    Random random(9);
+    Signature a = randomAttributed(random);
+    Signature b = randomAttributed(random);
+    const auto before = termsOf(a, b, 0.5);
+    const auto sums = sumsOf(a, b);
+    const Grounds now(a.attributes->quality);
+    const Grounds earlier(b.attributes->quality, true);
+    for (const auto& terms : {scoreTerms(sums, now, earlier, 0.5), scoreTerms(sums, earlier, now, 0.5),
+                              scoreTerms(sums, earlier, earlier, 0.5)}) {
+        double total = 0.0;
+        for (std::size_t kind = 0; kind < kStatisticKinds; ++kind) {
+            if (kStatistics[kind].ofPaths) {
+                EXPECT_GT(before[kind].weight, 0.0);
+                EXPECT_EQ(terms[kind].weight, 0.0);
+            }
+            total += terms[kind].weight;
+        }
+        EXPECT_NEAR(total + terms.back().weight, 1.0, 1e-12);
+    }
+    // Whatever they say, the score is the same.
+    b.attributes->earlier = true;
+    const double left = score(a, b, {});
+    for (const StatisticLayout& layout : kStatistics) {
+        if (!layout.ofPaths) continue;
+        for (std::size_t i = layout.offset; i < layout.offset + layout.count; ++i) {
+            b.attributes->statistics[i] = static_cast<std::uint8_t>((b.attributes->statistics[i] + 5) % 16);
+        }
+    }
+    EXPECT_EQ(score(a, b, {}), left);
+    EXPECT_EQ(score(b, a, {}), left);
 }
 
 // What depends on the interior weighs less, the less reliable it is, than what the surface shows.

@@ -30,9 +30,12 @@ void expectTermsMakeTheScore(const Signature& a, const Signature& b, const Score
     double weight = 0.0;
     double mean = 0.0;
     std::set<std::string> names;
-    for (const ScoreTerm& term : why.terms) {
+    const bool paths = !a.attributes->earlier && !b.attributes->earlier;
+    for (std::size_t i = 0; i < why.terms.size(); ++i) {
+        const ScoreTerm& term = why.terms[i];
         EXPECT_GE(term.distance, 0.0);
-        EXPECT_GT(term.weight, 0.0);
+        const bool leftOut = i < kStatisticKinds && kStatistics[i].ofPaths && !paths;
+        EXPECT_EQ(term.weight > 0.0, !leftOut) << term.name;
         weight += term.weight;
         mean += term.weight * term.distance;
         names.insert(term.name);

@@ -102,16 +102,18 @@ TEST(PackedStatistics, WeightedSumsEqualTheMeanDistance) {
     for (int round = 0; round < 500; ++round) {
         const Signature a = testing_support::randomAttributed(random);
         const Signature b = testing_support::randomAttributed(random);
-        const LevelWeights weights = levelWeights(a.attributes->quality, b.attributes->quality);
+        const LevelWeights weights =
+            levelWeights(groundsOf(PackedShape(a).row()), groundsOf(PackedShape(b).row()));
         double mean = 0.0;
         for (std::size_t kind = 0; kind < kStatisticKinds; ++kind) {
             mean += weights.perLevel[kind] * plainSum(a.attributes->statistics, b.attributes->statistics,
                                                       static_cast<Statistic>(kind));
         }
-        const double statistics = statisticsDistance(AttributedQuery(a).levelSums(PackedShape(b).row()),
-                                                     a.attributes->quality, b.attributes->quality);
-        const AttributeDistance distance =
-            attributeDistance(statistics, a.attributes->quality, b.attributes->quality, 0.0);
+        const double statistics =
+            statisticsDistance(AttributedQuery(a).levelSums(PackedShape(b).row()),
+                               groundsOf(PackedShape(a).row()), groundsOf(PackedShape(b).row()));
+        const AttributeDistance distance = attributeDistance(statistics, groundsOf(PackedShape(a).row()),
+                                                             groundsOf(PackedShape(b).row()), 0.0);
         EXPECT_NEAR(mean, distance.statistics / distance.totalWeight, 1e-12);
         EXPECT_NEAR(weights.partial, 1.0 - distance.containedWeight, 1e-12);
 
