@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/geometry/box.h"
-#include "core/geometry/motion.h"
+#include "core/geometry/depth_buffer.h"
 
 namespace shapedb {
 
@@ -22,29 +22,17 @@ constexpr std::size_t kMostPixels = std::size_t{1} << 22;
 
 PointCloud seenFrom(const PointCloud& points, const Point3& towards) {
     if (points.empty()) return {};
-    const Point3 right = anyPerpendicular(towards);
-    const Point3 up = cross(towards, right);
-    PointCloud viewed;
-    viewed.reserve(points.size());
-    for (const Point3& p : points) viewed.push_back({dot(p, right), dot(p, up), dot(p, towards)});
+    const PointCloud viewed = alongView(points, towards);
     const Box box = boxOf(viewed);
     const Point3 extent = box.extent();
-    const double area = std::max(extent.x, 1e-3 * extent.y) * std::max(extent.y, 1e-3 * extent.x);
-    const double pixel = std::max(std::sqrt(kPointsPerPixel * area / static_cast<double>(points.size())),
+    const double pixel = std::max(pixelFor(extent, kPointsPerPixel, points.size()),
                                   std::max(extent.x, extent.y) / std::sqrt(static_cast<double>(kMostPixels)));
     if (!(pixel > 0.0)) return points;
-    const auto columns = static_cast<std::size_t>(extent.x / pixel) + 1;
-    const auto rows = static_cast<std::size_t>(extent.y / pixel) + 1;
-    std::vector<double> nearest(columns * rows, -INFINITY);
-    const auto pixelOf = [&](const Point3& p) {
-        const auto column = static_cast<std::size_t>((p.x - box.low.x) / pixel);
-        const auto row = static_cast<std::size_t>((p.y - box.low.y) / pixel);
-        return row * columns + column;
-    };
-    for (const Point3& p : viewed) nearest[pixelOf(p)] = std::max(nearest[pixelOf(p)], p.z);
+    DepthBuffer buffer(box, pixel);
+    for (const Point3& p : viewed) buffer.add(p);
     PointCloud seen;
     for (std::size_t i = 0; i < points.size(); ++i) {
-        if (viewed[i].z >= nearest[pixelOf(viewed[i])] - kBehindPixels * pixel) seen.push_back(points[i]);
+        if (!buffer.hides(viewed[i], kBehindPixels * pixel)) seen.push_back(points[i]);
     }
     return seen;
 }

@@ -3,9 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
-
 #include "core/geometry/motion.h"
+#include "core/geometry/principal_axes.h"
 
 namespace shapedb {
 
@@ -56,18 +55,8 @@ std::uint8_t levelFor(double share, double levels) {
 }
 
 Point3 thirdAxis(const PointCloud& points) {
-    Point3 mean;
-    for (const Point3& p : points) mean = mean + p;
-    mean = (1.0 / static_cast<double>(points.size())) * mean;
-    Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
-    for (const Point3& p : points) {
-        const Point3 d = p - mean;
-        const Eigen::Vector3d v(d.x, d.y, d.z);
-        spread += v * v.transpose();
-    }
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(spread);
-    const Eigen::Vector3d least = solver.eigenvectors().col(0);
-    return {least.x(), least.y(), least.z()};
+    const std::array<double, 3> axis = principalAxes(points)[2];
+    return {axis[0], axis[1], axis[2]};
 }
 
 // The points along the view: long axis, short axis, depth towards the viewer, in units of the size.

@@ -4,9 +4,8 @@
 #include <cmath>
 #include <new>
 
-#include <Eigen/Eigenvalues>
-
 #include "core/base/return_if_error.h"
+#include "core/geometry/principal_axes.h"
 #include "core/views/visible_points.h"
 
 namespace shapedb {
@@ -32,24 +31,17 @@ SeenSurface inOwnFrame(const SurfacePoints& surface) {
     return all;
 }
 
-// Columns: the principal axes, shortest first.
-Eigen::Matrix3d principalAxes(const PointCloud& points) {
-    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-    for (const Point3& p : points) mean += Eigen::Vector3d(p.x, p.y, p.z);
-    mean /= static_cast<double>(points.size());
-    Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
-    for (const Point3& p : points) {
-        const Eigen::Vector3d v = Eigen::Vector3d(p.x, p.y, p.z) - mean;
-        spread += v * v.transpose();
-    }
-    return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors();
+// A direction given along the principal axes, shortest first.
+Point3 alongAxes(const Matrix3& axes, const Point3& direction) {
+    const auto axis = [&](std::size_t row) { return Point3{axes[row][0], axes[row][1], axes[row][2]}; };
+    return direction.x * axis(2) + direction.y * axis(1) + direction.z * axis(0);
 }
 
 // The corners of a dodecahedron. Changing the sign of an axis permutes them, so that it makes no difference
 // which end of a principal axis is which.
-std::array<Eigen::Vector3d, kViews> corners() {
+std::array<Point3, kViews> corners() {
     const double golden = 0.5 * (1.0 + std::sqrt(5.0));
-    std::array<Eigen::Vector3d, kViews> found;
+    std::array<Point3, kViews> found;
     std::size_t i = 0;
     for (const double a : {-1.0, 1.0}) {
         for (const double b : {-1.0, 1.0}) {
@@ -60,7 +52,7 @@ std::array<Eigen::Vector3d, kViews> corners() {
             found[i++] = {a, b, 1.0};
         }
     }
-    for (Eigen::Vector3d& corner : found) corner.normalize();
+    for (Point3& corner : found) corner = (1.0 / length(corner)) * corner;
     return found;
 }
 
@@ -72,14 +64,13 @@ Result<ViewSet> makeViews(const SurfacePoints& surface, const PointCloud& scan, 
         PointCloud hiding;
         hiding.reserve(scan.size());
         for (const Point3& p : scan) hiding.push_back((1.0 / surface.unit) * (p - surface.centre));
-        const Eigen::Matrix3d axes = principalAxes(all.points);
+        const Matrix3 axes = principalAxes(all.points);
         const auto directions = corners();
         ViewSet set;
         for (std::size_t i = 0; i < kViews; ++i) {
             RETURN_IF_ERROR(context.checkpoint());
             context.report(kStage, i, kViews);
-            const Eigen::Vector3d direction = axes * directions[i];
-            const Point3 towards{direction.x(), direction.y(), direction.z()};
+            const Point3 towards = alongAxes(axes, directions[i]);
             const SeenSurface seen = hiding.empty()
                                          ? visiblePoints(all, all.points, towards, kSurfacePerPixel)
                                          : visiblePoints(all, hiding, towards, kScanPerPixel);
@@ -102,15 +93,14 @@ Result<ViewSignature> makeViewOfScan(const SurfacePoints& surface, const Point3&
 Result<double> seenShare(const SurfacePoints& surface) {
     try {
         const SeenSurface all = inOwnFrame(surface);
-        const Eigen::Matrix3d axes = principalAxes(all.points);
+        const Matrix3 axes = principalAxes(all.points);
         std::size_t most = 0;
-        const auto look = [&](const Eigen::Vector3d& direction) {
-            const Point3 towards{direction.x(), direction.y(), direction.z()};
+        const auto look = [&](const Point3& towards) {
             most = std::max(most, visiblePoints(all, all.points, towards, kSurfacePerPixel).points.size());
         };
-        for (const Eigen::Vector3d& corner : corners()) look(axes * corner);
-        look(axes.col(0));
-        look(-axes.col(0));
+        for (const Point3& corner : corners()) look(alongAxes(axes, corner));
+        look(alongAxes(axes, {1, 0, 0}));
+        look(alongAxes(axes, {-1, 0, 0}));
         return static_cast<double>(most) / static_cast<double>(all.points.size());
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::kOutOfMemory, "not enough memory to look at a scan");
