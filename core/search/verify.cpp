@@ -48,7 +48,7 @@ class Verifier {
     Result<VerifiedResult> run(const std::vector<SearchHit>& candidates, std::size_t most, bool all) {
         for (const SearchHit& candidate : candidates) {
             hits_.push_back(
-                {candidate.id, scoreOf(candidate.score, kUnverifiedMisfit), candidate.score, nullptr, 0.0});
+                {candidate.id, scoreOf(candidate.score, kUnverifiedMisfit), candidate.score, nullptr});
         }
         const std::size_t limit = std::min(most, hits_.size());
         std::size_t done = 0;
@@ -62,6 +62,7 @@ class Verifier {
         }
         context_.report("verify", limit, limit);
         VerifiedResult result;
+        result.misfitShare = misfitShare(kinds_, options_.score);
         result.verified = static_cast<std::size_t>(std::count_if(
             hits_.begin(), hits_.end(), [](const VerifiedHit& hit) { return hit.fit != nullptr; }));
         result.exact = exact || (all && done == hits_.size());
@@ -108,7 +109,6 @@ class Verifier {
         RETURN_IF_ERROR(fitted);
         hit.score = scoreOf(hit.signatureScore, fitted->misfit);
         hit.fit = std::make_shared<const FitResult>(std::move(*fitted));
-        hit.misfitShare = misfitShare(kinds_, options_.score);
         return {};
     }
 
@@ -134,8 +134,7 @@ double misfitShare(const FitKinds& kinds, const ScoreOptions& score) noexcept {
 
 VerifiedResult unverified(SearchResult found) {
     VerifiedResult result;
-    for (const SearchHit& hit : found.hits)
-        result.hits.push_back({hit.id, hit.score, hit.score, nullptr, 0.0});
+    for (const SearchHit& hit : found.hits) result.hits.push_back({hit.id, hit.score, hit.score, nullptr});
     result.exact = true;
     result.counts = found.counts;
     result.seconds = found.seconds;

@@ -37,12 +37,12 @@ struct VerifiedHit {
     double score = 0.0;
     double signatureScore = 0.0;           ///< as topK gives it
     std::shared_ptr<const FitResult> fit;  ///< null if it was not verified
-    double misfitShare = 0.0;              ///< weight of the misfit in the score, if it was verified
 };
 
 struct VerifiedResult {
     std::vector<VerifiedHit> hits;  ///< in descending order of score, ties in ascending order of id
     std::size_t verified = 0;       ///< candidates that were laid on the query
+    double misfitShare = 0.0;       ///< weight of the misfit in the scores; 0 of an unverified search
     /// Whether verifying more candidates could change no hit.
     bool exact = false;
     SearchCounts counts;   ///< of the search for candidates

@@ -38,7 +38,10 @@ Result<PreparedSearch> Searches::prepare(index::SnapshotPtr collection, const Se
     RETURN_IF_ERROR(checkVerifyCandidates(request.verifyCandidates));
     Result<Filter> filter = Filter::parse(request.filter);
     RETURN_IF_ERROR(filter);
+    const auto pending = catalog_.pendingShapes(collection->collection.id);
+    RETURN_IF_ERROR(pending);
     PreparedSearch prepared;
+    prepared.pending = *pending;
     prepared.collection = std::move(collection);
     prepared.options.k = request.k;
     prepared.options.threshold = request.threshold;
@@ -169,20 +172,17 @@ SurfaceOf Searches::surfaces() const {
     return [this](std::int64_t id) { return catalog_.surface(id); };
 }
 
-Result<std::uint64_t> Searches::pending(const PreparedSearch& search) const {
-    return catalog_.pendingShapes(search.collection->collection.id);
-}
-
-Result<std::optional<Explanation>> Searches::explain(const PreparedSearch& search, const Scorer& scorer,
+Result<std::optional<Explanation>> Searches::explain(const PreparedSearch& search,
+                                                     const VerifiedResult& found,
                                                      const VerifiedHit& hit) const {
     const auto signature = catalog_.storedSignature(*search.collection, hit.id);
     if (!signature && signature.error().code == ErrorCode::kDataLoss) return fail(signature.error());
     // Deleted or replaced since the search, or not readable now: a hit without reasons.
     if (!signature) return std::optional<Explanation>();
-    Explanation explanation = scorer.explain(*signature);
+    Explanation explanation = found.scorer->explain(*signature);
     // The shape has got another signature since the search.
     if (explanation.score != hit.signatureScore) return std::optional<Explanation>();
-    if (hit.fit) verifiedBy(*hit.fit, hit.misfitShare, explanation);
+    if (hit.fit) verifiedBy(*hit.fit, found.misfitShare, explanation);
     return std::optional<Explanation>(std::move(explanation));
 }
 
@@ -199,7 +199,7 @@ Result<void> Searches::visitHits(const PreparedSearch& search, const VerifiedRes
         out.signatureScore = hit.signatureScore;
         out.fit = hit.fit;
         if (search.explain) {
-            auto explanation = explain(search, *found.scorer, hit);
+            auto explanation = explain(search, found, hit);
             RETURN_IF_ERROR(explanation);
             out.explanation = std::move(*explanation);
         }

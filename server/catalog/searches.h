@@ -35,6 +35,7 @@ struct PreparedSearch {
     SearchOptions options;
     bool explain = true;
     std::optional<VerifyOptions> verify;
+    std::uint64_t pending = 0;  ///< shapes of the collection that have no signature yet
 };
 
 /// What a request names as a query: one of the two. Not owned.
@@ -88,7 +89,7 @@ class Searches {
     Searches(Catalog& catalog, SearchRunner& runner, std::uint32_t maxK)
         : catalog_(catalog), runner_(runner), maxK_(maxK) {}
 
-    /// Errors: kInvalidArgument (k, threshold, candidates), kMalformedFilter.
+    /// Errors: kInvalidArgument (k, threshold, candidates), kMalformedFilter; those of the store.
     [[nodiscard]] Result<PreparedSearch> prepare(index::SnapshotPtr collection,
                                                  const SearchRequest& request) const;
 
@@ -110,9 +111,6 @@ class Searches {
     /// kInvalidArgument (key), kNotFound, kNotReady, kDataLoss; kCancelled, kDeadlineExceeded.
     [[nodiscard]] Result<Comparison> compare(const ShapeName& query, const ShapeName& other,
                                              const ScoreOptions& options, const RunContext& context) const;
-
-    /// Shapes of the collection that have no signature yet. Errors: those of the store.
-    [[nodiscard]] Result<std::uint64_t> pending(const PreparedSearch& search) const;
 
     /// Calls `visit` with each hit, best first, leaving out shapes deleted meanwhile. An explanation is
     /// missing where the signature scored was replaced meanwhile. `found` by `run` or `runBatch`. Errors:
@@ -142,7 +140,7 @@ class Searches {
         std::shared_ptr<const SurfacePoints> surface;  ///< null if there are none
     };
     Result<Compared> compared(const char* which, const ShapeName& name) const;
-    Result<std::optional<Explanation>> explain(const PreparedSearch& search, const Scorer& scorer,
+    Result<std::optional<Explanation>> explain(const PreparedSearch& search, const VerifiedResult& found,
                                                const VerifiedHit& hit) const;
     SurfaceOf surfaces() const;
 

@@ -47,9 +47,7 @@ Result<void> answer(const Services& services, const catalog::PreparedSearch& pre
     response->set_seconds_search(found.seconds);
     response->set_candidates_verified(found.verified);
     response->set_not_exact(!found.exact);
-    const auto pending = services.searches.pending(prepared);
-    RETURN_IF_ERROR(pending);
-    response->set_pending(*pending);
+    response->set_pending(prepared.pending);
     toProto(query, response->mutable_query());
     if (response->query().has_attributes()) {
         response->mutable_query()->mutable_attributes()->clear_statistics();

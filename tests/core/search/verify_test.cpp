@@ -143,7 +143,7 @@ TEST(Verify, PutsTheSameObjectFirstAndSaysHowItLies) {
     EXPECT_GT(first.score, 0.9);
     ASSERT_TRUE(first.fit);
     EXPECT_GT(first.fit->best.explainedQuery, 0.9);
-    EXPECT_EQ(first.misfitShare, 0.5);
+    EXPECT_EQ(result->misfitShare, 0.5);
 }
 
 TEST(Verify, NamesAnAnswerThatTheCapMadeInexact) {
