@@ -14,7 +14,6 @@ namespace {
 TEST(Typical, CommittedConstantsFollowFromSyntheticFamilies) {
     TypicalSettings settings;
     settings.perFamily = 2;
-    settings.points = 6000;
     const auto result = measureTypical(settings, {});
     ASSERT_TRUE(result) << result.error().message;
     EXPECT_EQ(result->shapes, 26u);
