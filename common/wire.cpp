@@ -148,6 +148,7 @@ void toProto(const ShapeParameters& parameters, v1::SegmentationParameters* segm
     segmentation->set_interior_method(toProto(parameters.segmentation.interiorMethod));
     signature->set_max_points(parameters.signature.maxPoints);
     signature->set_attributes(parameters.signature.attributes);
+    signature->set_views(parameters.views);
 }
 
 }  // namespace shapedb::wire

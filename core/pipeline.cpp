@@ -23,6 +23,7 @@ void recommend(ShapeParameters& parameters) {
     segmentation.maxSegments = 12;
     parameters.signature.maxPoints = 12;
     parameters.signature.attributes = true;
+    parameters.views = true;
 }
 
 }  // namespace

@@ -18,11 +18,14 @@ namespace shapedb {
 /// Errors: kInvalidArgument listing the names.
 [[nodiscard]] Result<Profile> profileFromName(const std::string& name);
 
-/// All parameters that the signature of a scan depends on.
+/// All parameters of what is made of a scan.
 struct ShapeParameters {
     Profile profile = Profile::kDefault;
     SegmentationOptions segmentation;
     SignatureOptions signature;
+    /// Whether a collection keeps views of its shapes (core/views/views.h), so that queries of one side find
+    /// them.
+    bool views = false;
 };
 
 [[nodiscard]] ShapeParameters parametersOf(Profile profile);

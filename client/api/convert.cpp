@@ -6,6 +6,12 @@ namespace shapedb::client {
 
 namespace {
 
+void fill(const Point3& from, v1::Vector3* to) {
+    to->set_x(from.x);
+    to->set_y(from.y);
+    to->set_z(from.z);
+}
+
 Point3 fromWire(const v1::Vector3& from) { return {from.x(), from.y(), from.z()}; }
 
 Timestamp fromWire(const google::protobuf::Timestamp& from) {
@@ -74,6 +80,8 @@ void fill(const SearchOptions& from, v1::SearchOptions* to) {
     to->set_no_explanation(!from.explanation);
     if (from.verify) to->set_verify(*from.verify);
     to->set_verify_candidates(from.verifyCandidates);
+    if (from.oneSided) to->set_one_sided(*from.oneSided);
+    if (from.viewpoint) fill(*from.viewpoint, to->mutable_viewpoint());
 }
 
 v1::AddMode toWire(AddMode mode) {
@@ -274,6 +282,7 @@ Collection fromWire(const v1::Collection& from) {
         wire::fromProto(segmentation.interior_method()).value_or(InteriorMethod::kWalk);
     to.parameters.maxPoints = from.signature().max_points();
     to.parameters.attributes = from.signature().attributes();
+    to.parameters.views = from.signature().views();
     to.generation = from.generation();
     to.created = fromWire(from.created());
     to.shapes = from.shapes();

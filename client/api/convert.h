@@ -35,6 +35,7 @@ void fillParameters(const Parameters& from, Message* to) {
     }
     if (from.maxPoints) to->mutable_signature()->set_max_points(*from.maxPoints);
     if (from.attributes) to->mutable_signature()->set_attributes(*from.attributes);
+    if (from.views) to->mutable_signature()->set_views(*from.views);
 }
 
 [[nodiscard]] v1::AddMode toWire(AddMode mode);

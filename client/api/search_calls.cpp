@@ -25,7 +25,9 @@ Result<SearchReply> Client::searchByScan(const SearchOptions& options, const Poi
     RETURN_IF_ERROR(packed);
     v1::SearchByScanRequest request;
     v1::SearchByScanHeader* header = request.mutable_header();
-    fill(options, header->mutable_options());
+    SearchOptions moved = options;
+    if (moved.viewpoint) moved.viewpoint = *moved.viewpoint - packed->offset;
+    fill(moved, header->mutable_options());
     header->set_point_count(packed->count);
     header->set_sha256(packed->sha256);
     v1::SearchResponse response;

@@ -48,6 +48,7 @@ struct Parameters {
     std::optional<InteriorMethod> interiorMethod;
     std::optional<std::uint32_t> maxPoints;  ///< heaviest segments kept, 1 to 16
     std::optional<bool> attributes;          ///< false: points and weights alone, as published
+    std::optional<bool> views;               ///< keep views, so that scans of one side find the shape
 };
 
 /// Names one shape. An empty collection is "default".
@@ -217,6 +218,8 @@ struct SearchOptions {
     /// `paper`.
     std::optional<bool> verify;
     std::uint32_t verifyCandidates = 0;  ///< how many at most; 0: the server's default
+    std::optional<bool> oneSided;        ///< a camera saw the query from one place; nothing: judged
+    std::optional<Point3> viewpoint;     ///< where it stood, in coordinates of the query
 };
 
 struct CompareOptions {

@@ -69,16 +69,17 @@ json failuresJson(const std::vector<const EvaluatedShape*>& failures) {
 }
 
 json settingsJson(const EvaluateFlags& flags, const ShapeParameters& parameters) {
-    json settings = {{"parameters", toJson(parameters)},
-                     {"noise", flags.scan.noise},
-                     {"seed", flags.scan.seed},
-                     {"points", flags.scan.points ? json(*flags.scan.points) : json(nullptr)},
-                     {"threads", flags.threads},
-                     {"reflection", !flags.score.noReflection},
-                     {"keep_scale", flags.score.keepScale},
-                     {"partial", flags.score.partial},
-                     {"verify", flags.verify.resolve(parameters.profile)},
-                     {"candidates", flags.verify.candidates}};
+    json settings = {
+        {"parameters", toJson(parameters)},
+        {"noise", flags.scan.noise},
+        {"seed", flags.scan.seed},
+        {"points", flags.scan.points ? json(*flags.scan.points) : json(nullptr)},
+        {"threads", flags.threads},
+        {"reflection", !flags.score.noReflection},
+        {"keep_scale", flags.score.keepScale},
+        {"partial", flags.score.partial},
+        {"verify", flags.verify.resolve(parameters.profile)},
+        {"candidates", flags.verify.candidates > 0 ? json(flags.verify.candidates) : json(nullptr)}};
     if (!flags.task.classes.only.empty()) settings["only_classes"] = flags.task.classes.only;
     if (!flags.task.classes.except.empty()) settings["except_classes"] = flags.task.classes.except;
     return settings;
@@ -90,9 +91,10 @@ std::string settingsText(const EvaluateFlags& flags, const ShapeParameters& para
                                          " of the diagonal (seed " + std::to_string(flags.scan.seed) + ")"
                                    : ", no noise added";
     if (flags.scan.points) text += ", " + formatCount(*flags.scan.points) + " points each";
-    text += flags.verify.resolve(parameters.profile)
+    if (!flags.verify.resolve(parameters.profile)) return text + ", not verified";
+    text += flags.verify.candidates > 0
                 ? ", up to " + formatCount(flags.verify.candidates, "candidate", "candidates") + " verified"
-                : ", not verified";
+                : ", verified";
     return text;
 }
 
@@ -138,7 +140,7 @@ Result<ScoreMatrix> scoresOf(Session& session, const std::vector<EvaluatedShape>
     if (!flags.verify.resolve(parameters.profile)) {
         return scorePairs(queries, candidates, options, flags.threads, progress, session.context());
     }
-    return verifyPairs(queries, candidates, options, {flags.verify.candidates}, flags.threads, progress,
+    return verifyPairs(queries, candidates, options, flags.verify.options(), flags.threads, progress,
                        session.context());
 }
 

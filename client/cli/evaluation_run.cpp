@@ -11,6 +11,7 @@
 
 #include "core/base/return_if_error.h"
 #include "core/matching/scorer.h"
+#include "core/views/views.h"
 
 namespace shapedb::cli {
 
@@ -25,9 +26,13 @@ bool endsTheRun(const Error& error) {
 std::int64_t idOf(std::size_t column) { return static_cast<std::int64_t>(column) + 1; }
 std::size_t columnOf(std::int64_t id) { return static_cast<std::size_t>(id - 1); }
 
-void addSurface(EvaluatedShape& shape, const PointCloud& points, const RunContext& context) {
+void addSurface(EvaluatedShape& shape, const PointCloud& points, bool withViews, const RunContext& context) {
     auto surface = makeSurfacePoints(points, context);
     if (surface) {
+        if (withViews) {
+            const auto views = makeViews(*surface, points, context);
+            if (views) shape.views = std::make_shared<const ShapeViews>(*views);
+        }
         shape.surface = std::make_shared<const SurfacePoints>(std::move(*surface));
     } else {
         shape.signature.reset();
@@ -96,7 +101,7 @@ Result<void> describeShapes(std::vector<EvaluatedShape>& shapes, const ScanFlags
             shape.failure = description.error();
         } else {
             shape.signature = std::move(description->signature);
-            if (withSurface) addSurface(shape, scan->points, quiet);
+            if (withSurface) addSurface(shape, scan->points, parameters.views, quiet);
         }
         shape.seconds = std::chrono::duration<double>(RunContext::Clock::now() - start).count();
         if (shape.failure && endsTheRun(*shape.failure)) return shape.failure;
@@ -138,7 +143,7 @@ Result<ScoreMatrix> verifyPairs(const std::vector<EvaluatedShape>& rows,
     const std::size_t width = columns.size();
     std::vector<IndexEntry> entries;
     for (std::size_t c = 0; c < width; ++c) {
-        if (columns[c].signature) entries.push_back({idOf(c), {}, *columns[c].signature});
+        if (columns[c].signature) entries.push_back({idOf(c), {}, *columns[c].signature, columns[c].views});
     }
     const SignatureSet set = SignatureSet().with(entries, {});
     const SurfaceOf surfaceOf = [&](std::int64_t id) -> Result<std::shared_ptr<const SurfacePoints>> {
@@ -156,9 +161,8 @@ Result<ScoreMatrix> verifyPairs(const std::vector<EvaluatedShape>& rows,
             if (&rows == &columns) search.excludeId = idOf(r);
             if (rows[r].signature) {
                 if (search.excludeId) scores[r * width + r] = 1.0;
-                const FitQuery query(*rows[r].surface);
                 const auto found =
-                    topKVerified(*rows[r].signature, query, set, search, verify, surfaceOf, quiet);
+                    topKVerified(*rows[r].signature, *rows[r].surface, set, search, verify, surfaceOf, quiet);
                 if (!found) return found.error();
                 for (const VerifiedHit& hit : found->hits) {
                     scores[r * width + columnOf(hit.id)] = hit.score;

@@ -18,6 +18,7 @@
 #include "core/matching/score.h"
 #include "core/pipeline.h"
 #include "core/search/verify.h"
+#include "core/views/view_distance.h"
 
 namespace shapedb::cli {
 
@@ -25,6 +26,7 @@ struct EvaluatedShape : CollectionScan {
     /// Set unless `failure` is. A shape without a signature scores 0 against everything.
     std::optional<Signature> signature;
     std::shared_ptr<const SurfacePoints> surface;  ///< with the signature, if asked for
+    std::shared_ptr<const ShapeViews> views;       ///< likewise
     std::optional<Error> failure;
     double seconds = 0.0;  ///< for reading, noise and segmentation together
 };
@@ -43,9 +45,9 @@ struct EvaluatedShape : CollectionScan {
 /// Shapes with nothing computed yet.
 [[nodiscard]] std::vector<EvaluatedShape> shapesOf(const std::vector<CollectionScan>& scans);
 
-/// Sets `signature` (`withSurface`: and `surface`) or `failure` of each shape, on `threads` threads, at
-/// least 1. Noise and subset are seeded with fileSeed(flags.seed, name). A file that cannot be read or
-/// segmented is a `failure`, not an error.
+/// Sets `signature` (`withSurface`: and `surface` and `views`) or `failure` of each shape, on `threads`
+/// threads, at least 1. Noise and subset are seeded with fileSeed(flags.seed, name). A file that cannot be
+/// read or segmented is a `failure`, not an error.
 ///
 /// Errors: kCancelled, kDeadlineExceeded; kInvalidArgument (flags).
 [[nodiscard]] Result<void> describeShapes(std::vector<EvaluatedShape>& shapes, const ScanFlags& flags,

@@ -111,7 +111,7 @@ void addNumberFlags(CLI::App& group, client::Parameters& given, const ShapeParam
 }  // namespace
 
 bool ParameterFlags::any() const {
-    bool found = given.profile || given.interiorMethod || given.maxPoints || given.attributes;
+    bool found = given.profile || given.interiorMethod || given.maxPoints || given.attributes || given.views;
     visitNumbers(
         [&](const char*, auto member, auto, const char*) { found = found || (given.*member).has_value(); });
     return found;
@@ -125,6 +125,7 @@ Result<ShapeParameters> ParameterFlags::resolve() const {
     if (given.interiorMethod) parameters.segmentation.interiorMethod = *given.interiorMethod;
     if (given.maxPoints) parameters.signature.maxPoints = *given.maxPoints;
     if (given.attributes) parameters.signature.attributes = *given.attributes;
+    if (given.views) parameters.views = *given.views;
     RETURN_IF_ERROR(validate(parameters));
     return parameters;
 }
@@ -159,6 +160,10 @@ void addParameterFlags(CLI::App& command, ParameterFlags& flags) {
         "--attributes,!--no-attributes", [&given](std::int64_t count) { given.attributes = count > 0; },
         "Also keep and score statistics of the whole shape" +
             defaults(onOrOff(standard.signature.attributes), onOrOff(paper.signature.attributes)));
+    group->add_flag_function(
+        "--views,!--no-views", [&given](std::int64_t count) { given.views = count > 0; },
+        "Also keep views of the shape, so that scans of one side find it" +
+            defaults(onOrOff(standard.views), onOrOff(paper.views)));
 }
 
 ScoreOptions ScoreFlags::resolve() const {
@@ -177,6 +182,17 @@ void addScoreFlags(CLI::App& command, ScoreFlags& flags) {
                      "shape contains");
 }
 
+VerifyOptions VerifyFlags::options() const {
+    VerifyOptions options;
+    options.mostCandidates = candidates;
+    options.oneSided = oneSided;
+    if (viewpoint.size() == 3) {
+        options.viewpoint = Point3{viewpoint[0], viewpoint[1], viewpoint[2]};
+        options.oneSided = true;
+    }
+    return options;
+}
+
 void addVerifyFlags(CLI::App& command, VerifyFlags& flags) {
     const auto set = [&flags](bool value) { return [&flags, value](std::int64_t) { flags.verify = value; }; };
     auto* on = command.add_flag(
@@ -184,9 +200,24 @@ void addVerifyFlags(CLI::App& command, VerifyFlags& flags) {
         "Lay the best candidates on the query and let the fit count in their scores (default, except with "
         "profile paper)");
     command.add_flag("--no-verify", set(false), "Rank by the signatures alone")->excludes(on);
-    command.add_option("--candidates", flags.candidates, "Verify at most so many candidates")
-        ->check(CLI::Range(1, 10000))
-        ->capture_default_str();
+    command
+        .add_option("--candidates", flags.candidates,
+                    "Verify at most so many candidates [32; open and incomplete queries 64]")
+        ->check(CLI::Range(1, 10000));
+    auto* allSides = command.add_flag_function(
+        "--all-sides", [&flags](std::int64_t) { flags.oneSided = false; },
+        "The query shows all sides of its object; by default judged from the points");
+    command
+        .add_flag_function(
+            "--one-sided", [&flags](std::int64_t) { flags.oneSided = true; },
+            "The query is what a camera saw from one place")
+        ->excludes(allSides);
+    command
+        .add_option("--viewpoint", flags.viewpoint,
+                    "Where that camera stood: X,Y,Z in the coordinates of the query")
+        ->delimiter(',')
+        ->expected(3)
+        ->excludes(allSides);
 }
 
 nlohmann::json toJson(const ShapeParameters& parameters) {
@@ -198,6 +229,7 @@ nlohmann::json toJson(const ShapeParameters& parameters) {
     all.interiorMethod = parameters.segmentation.interiorMethod;
     all.maxPoints = parameters.signature.maxPoints;
     all.attributes = parameters.signature.attributes;
+    all.views = parameters.views;
     return toJson(all);
 }
 
@@ -206,7 +238,8 @@ nlohmann::json toJson(const client::Parameters& parameters) {
         {"profile", profileName(parameters.profile.value_or(Profile::kDefault))},
         {"interior_method", interiorMethodName(parameters.interiorMethod.value_or(InteriorMethod::kWalk))},
         {"max_points", parameters.maxPoints.value_or(0)},
-        {"attributes", parameters.attributes.value_or(false)}};
+        {"attributes", parameters.attributes.value_or(false)},
+        {"views", parameters.views.value_or(false)}};
     visitNumbers([&](const char* name, auto member, auto, const char*) {
         out[name] = (parameters.*member).value_or(0);
     });

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -10,6 +11,7 @@
 #include "core/base/error.h"
 #include "core/matching/score_options.h"
 #include "core/pipeline.h"
+#include "core/search/verify.h"
 
 namespace CLI {
 class App;
@@ -42,15 +44,18 @@ struct ScoreFlags {
 
 void addScoreFlags(CLI::App& command, ScoreFlags& flags);
 
-/// --verify, --no-verify and --candidates.
+/// --verify, --no-verify, --candidates, --one-sided, --all-sides and --viewpoint.
 struct VerifyFlags {
     /// Nothing: yes, but not with profile `paper`.
     std::optional<bool> verify;
-    std::uint32_t candidates = 64;  ///< that are verified at most
+    std::uint32_t candidates = 0;   ///< that are verified at most; 0: as many as the query needs
+    std::optional<bool> oneSided;   ///< nothing: judged from the points
+    std::vector<double> viewpoint;  ///< x, y, z; or empty
 
     [[nodiscard]] bool resolve(Profile profile) const {
         return verify.value_or(profile == Profile::kDefault);
     }
+    [[nodiscard]] VerifyOptions options() const;
 };
 
 void addVerifyFlags(CLI::App& command, VerifyFlags& flags);

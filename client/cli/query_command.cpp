@@ -123,7 +123,10 @@ CommandResult runQuery(Session& session, const QueryFlags& flags) {
     options.keepScale = flags.score.keepScale;
     options.partial = flags.score.partial;
     options.verify = flags.verify.verify;
+    const VerifyOptions verify = flags.verify.options();
     options.verifyCandidates = flags.verify.candidates;
+    options.oneSided = verify.oneSided;
+    options.viewpoint = verify.viewpoint;
     options.explanation = !flags.noExplanation;
     const RunContext context = session.context();
     Scan scan;

@@ -29,6 +29,7 @@ void SignatureBlock::shrink() {
     metadata_.shrink_to_fit();
     first_.shrink_to_fit();
     second_.shrink_to_fit();
+    views_.shrink_to_fit();
 }
 
 void SignatureBlock::appendMetadata(const Metadata& metadata) {
@@ -53,6 +54,12 @@ void SignatureBlock::appendStatistics(const HalfRow& first, const HalfRow& secon
     ++attributedCount_;
 }
 
+void SignatureBlock::appendViews(const std::shared_ptr<const ShapeViews>& views) {
+    if (!views && views_.empty()) return;
+    views_.resize(ids_.size() - 1);
+    views_.push_back(views);
+}
+
 void SignatureBlock::append(const IndexEntry& entry) {
     const Signature& signature = entry.signature;
     ids_.push_back(entry.id);
@@ -60,6 +67,7 @@ void SignatureBlock::append(const IndexEntry& entry) {
     qualities_.push_back(signature.attributes ? signature.attributes->quality : 0);
     earlier_.push_back(signature.attributes && signature.attributes->earlier ? 1 : 0);
     appendMetadata(entry.metadata);
+    appendViews(entry.views);
     if (signature.attributes) {
         HalfRow first, second;
         packStatistics(signature.attributes->statistics, first, second);
@@ -82,6 +90,7 @@ void SignatureBlock::append(const SignatureBlock& from, std::size_t row) {
     qualities_.push_back(from.qualities_[row]);
     earlier_.push_back(from.earlier_[row]);
     appendMetadata(from.metadata(row));
+    appendViews(from.views_.empty() ? nullptr : from.views_[row]);
     if (from.attributed(row)) {
         appendStatistics(from.first_[row], from.second_[row]);
     } else {
@@ -116,7 +125,8 @@ std::size_t SignatureBlock::memoryBytes() const {
     std::size_t bytes = sizeof *this + bytesOf(ids_) + bytesOf(scales_) + bytesOf(qualities_) +
                         bytesOf(earlier_) + bytesOf(metadataOf_) + bytesOf(segmentsEnd_) +
                         bytesOf(pointsEnd_) + bytesOf(first_) + bytesOf(second_) + bytesOf(segments_) +
-                        bytesOf(points_) + bytesOf(metadata_);
+                        bytesOf(points_) + bytesOf(metadata_) + bytesOf(views_);
+    for (const auto& views : views_) bytes += views ? sizeof *views : 0;
     for (const Metadata& metadata : metadata_) {
         // A node of the tree: two strings, three pointers, a colour.
         constexpr std::size_t kNode = 2 * sizeof(std::string) + 32;

@@ -1,15 +1,17 @@
 // What a search reads of up to a thousand shapes, in arrays: all that enters a score and nothing else, at
-// most 512 bytes a shape.
+// most 512 bytes a shape, and 1,700 more for one with views.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "core/base/metadata.h"
 #include "core/matching/shape_row.h"
 #include "core/signature/signature.h"
+#include "core/views/view_distance.h"
 
 namespace shapedb {
 
@@ -17,6 +19,7 @@ struct IndexEntry {
     std::int64_t id = 0;  ///< > 0, unique in the set; breaks ties
     Metadata metadata;
     Signature signature;
+    std::shared_ptr<const ShapeViews> views{};  ///< null: none, a scan of one side is compared otherwise
 };
 
 /// Signatures in ascending order of id. Immutable once shared: const members from any thread.
@@ -48,6 +51,11 @@ class SignatureBlock {
     /// Of attributed rows.
     [[nodiscard]] std::uint8_t quality(std::size_t row) const { return qualities_[row]; }
 
+    /// Null for a row without views.
+    [[nodiscard]] const ShapeViews* views(std::size_t row) const {
+        return views_.empty() ? nullptr : views_[row].get();
+    }
+
     /// What scorers read, with the bits of the signatures that were appended: of attributed ones the
     /// segments, statistics and quality, of others the points. Valid while the block lives unchanged.
     [[nodiscard]] ShapeRows rows() const;
@@ -58,6 +66,8 @@ class SignatureBlock {
     std::size_t segmentsBegin(std::size_t row) const { return row == 0 ? 0 : segmentsEnd_[row - 1]; }
     std::size_t pointsBegin(std::size_t row) const { return row == 0 ? 0 : pointsEnd_[row - 1]; }
     void appendMetadata(const Metadata& metadata);
+    // Those of the row that was begun last; null: none.
+    void appendViews(const std::shared_ptr<const ShapeViews>& views);
     // Both halves of the row that was begun last.
     void appendStatistics(const HalfRow& first, const HalfRow& second);
 
@@ -70,7 +80,8 @@ class SignatureBlock {
     std::vector<std::uint16_t> pointsEnd_;    // of each row, in points_
     std::vector<HalfRow> first_, second_;     // empty or one a row
     std::vector<PackedSegmentDescriptor> segments_;
-    std::vector<PackedPoint> points_;  // of rows without attributes
+    std::vector<PackedPoint> points_;                       // of rows without attributes
+    std::vector<std::shared_ptr<const ShapeViews>> views_;  // empty or one a row
     std::vector<Metadata> metadata_;
     std::size_t attributedCount_ = 0;
 };

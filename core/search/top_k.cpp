@@ -14,6 +14,7 @@
 #include <tbb/task_arena.h>
 
 #include "core/base/return_if_error.h"
+#include "core/search/wanted_rows.h"
 
 namespace shapedb {
 
@@ -137,26 +138,9 @@ class Searcher {
         return result_.hits.size() == options_.k ? result_.hits.back().score : options_.threshold;
     }
 
-    // Which rows pass filter and exclusion; empty: all.
-    std::vector<std::uint8_t> wantedRows(const SignatureBlock& block) const {
-        const bool excludes = options_.excludeId && block.id(0) <= *options_.excludeId &&
-                              *options_.excludeId <= block.id(block.size() - 1);
-        if (options_.filter.acceptsAll() && !excludes) return {};
-        // Rows share metadata, so the filter is asked once for each that occurs.
-        constexpr std::uint8_t kUnknown = 2;
-        std::vector<std::uint8_t> passes(block.metadataCount(), kUnknown);
-        std::vector<std::uint8_t> wanted(block.size());
-        for (std::size_t row = 0; row < block.size(); ++row) {
-            std::uint8_t& pass = passes[block.metadataNumber(row)];
-            if (pass == kUnknown) pass = options_.filter.matches(block.metadata(row)) ? 1 : 0;
-            wanted[row] = excludes && block.id(row) == *options_.excludeId ? 0 : pass;
-        }
-        return wanted;
-    }
-
     BlockScan scanBlock(const SignatureBlock& block, double least) const {
         BlockScan scan;
-        const std::vector<std::uint8_t> wanted = wantedRows(block);
+        const std::vector<std::uint8_t> wanted = wantedRows(block, options_.filter, options_.excludeId);
         scan.filtered = wanted.empty()
                             ? block.size()
                             : static_cast<std::uint64_t>(std::count(wanted.begin(), wanted.end(), 1));

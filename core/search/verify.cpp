@@ -8,6 +8,8 @@
 #include "core/base/return_if_error.h"
 #include "core/matching/kernel.h"
 #include "core/matching/score_scale.h"
+#include "core/search/view_search.h"
+#include "core/views/views.h"
 
 namespace shapedb {
 
@@ -19,9 +21,19 @@ namespace {
 constexpr double kMisfitShare = 0.5;
 constexpr double kMisfitShareUnsure = 0.75;
 
+// Candidates of a query unless the caller says how many: an unreliable signature ranks the right one lower.
+constexpr std::size_t kCandidates = 32;
+constexpr std::size_t kCandidatesUnsure = 64;
+
 // A query whose interior is less reliable may be a scan from one side. Whole scans with 0.5 % noise have 0.69
 // to 0.95 (nine tenths of them), scans from one side 0.15 to 0.68.
 constexpr double kReliableQuality = 0.69;
+
+// Of a query of one side at least this share of the surface is seen from one place.
+constexpr double kSeenShare = 0.80;
+
+// Of the candidates of a query of one side this share is taken by views, the others by signatures.
+constexpr double kShareOfViews = 0.75;
 
 // What an unverified candidate counts as: typical of unrelated shapes.
 constexpr double kUnverifiedMisfit = 1.0;
@@ -36,15 +48,20 @@ bool verifiedRanksBefore(const VerifiedHit& a, const VerifiedHit& b) {
 
 class Verifier {
   public:
-    Verifier(const FitQuery& query, const FitKinds& kinds, const SearchOptions& options,
+    Verifier(FitQuery query, const QueryTraits& traits, const SearchOptions& options,
              const SurfaceOf& surfaceOf, const RunContext& context)
-        : query_(query), kinds_(kinds), options_(options), surfaceOf_(surfaceOf), context_(context) {
-        fit_.kinds = kinds;
+        : query_(std::move(query)),
+          share_(misfitShare(traits, options.score)),
+          options_(options),
+          surfaceOf_(surfaceOf),
+          context_(context) {
+        fit_.kinds = kindsOfQuery(traits);
         fit_.keepScale = options.score.keepScale;
         fit_.reflection = options.score.reflection;
     }
 
-    // Of `candidates`, ranked by their signatures, verifies at most `most`; `all`: there are no others.
+    // Verifies `candidates` in their order, at most `most`; `all`: there are no others. A candidate that is
+    // not among them has no better signature score than the last of them.
     Result<VerifiedResult> run(const std::vector<SearchHit>& candidates, std::size_t most, bool all) {
         for (const SearchHit& candidate : candidates) {
             hits_.push_back(
@@ -58,11 +75,11 @@ class Verifier {
             const std::size_t end = std::min(limit, done + kChunk);
             RETURN_IF_ERROR(verify(done, end));
             done = end;
-            exact = done < hits_.size() && !reachable(hits_[done].signatureScore, done);
+            exact = done < hits_.size() && !reachable(bestAfter(done), done);
         }
         context_.report("verify", limit, limit);
         VerifiedResult result;
-        result.misfitShare = misfitShare(kinds_, options_.score);
+        result.misfitShare = share_;
         result.verified = static_cast<std::size_t>(std::count_if(
             hits_.begin(), hits_.end(), [](const VerifiedHit& hit) { return hit.fit != nullptr; }));
         result.exact = exact || (all && done == hits_.size());
@@ -77,7 +94,13 @@ class Verifier {
 
   private:
     double scoreOf(double signatureScore, double misfit) const {
-        return verifiedScore(signatureScore, misfit, kinds_, options_.score);
+        return verifiedScore(signatureScore, misfit, share_);
+    }
+
+    double bestAfter(std::size_t done) const {
+        double best = 0.0;
+        for (std::size_t i = done; i < hits_.size(); ++i) best = std::max(best, hits_[i].signatureScore);
+        return best;
     }
 
     // Whether a candidate that the signatures score so may become one of the hits, given the first `done`.
@@ -112,8 +135,8 @@ class Verifier {
         return {};
     }
 
-    const FitQuery& query_;
-    const FitKinds kinds_;
+    const FitQuery query_;
+    const double share_;
     const SearchOptions& options_;
     const SurfaceOf& surfaceOf_;
     const RunContext& context_;
@@ -123,13 +146,22 @@ class Verifier {
 
 }  // namespace
 
-FitKinds kindsOfQuery(const Signature& query, const ScoreOptions& score) {
-    const bool reliable = !query.attributes || query.attributes->quality >= 255.0 * kReliableQuality;
-    return {true, !reliable, score.partial};
+Result<QueryTraits> traitsOf(const Signature& query, const SurfacePoints& surface,
+                             std::optional<bool> oneSided) {
+    if (oneSided.value_or(false)) return QueryTraits{false, true};
+    QueryTraits traits;
+    traits.reliable = !query.attributes || query.attributes->quality >= 255.0 * kReliableQuality;
+    if (traits.reliable || oneSided) return traits;
+    const auto seen = seenShare(surface);
+    RETURN_IF_ERROR(seen);
+    traits.ofOneSide = *seen >= kSeenShare;
+    return traits;
 }
 
-double misfitShare(const FitKinds& kinds, const ScoreOptions& score) noexcept {
-    return kinds.oneSided || kinds.piece || !score.reflection ? kMisfitShareUnsure : kMisfitShare;
+FitKinds kindsOfQuery(const QueryTraits& traits) noexcept { return {true, !traits.reliable, true}; }
+
+double misfitShare(const QueryTraits& traits, const ScoreOptions& score) noexcept {
+    return !traits.reliable || score.partial || !score.reflection ? kMisfitShareUnsure : kMisfitShare;
 }
 
 VerifiedResult unverified(SearchResult found) {
@@ -142,33 +174,78 @@ VerifiedResult unverified(SearchResult found) {
     return result;
 }
 
-double verifiedScore(double signatureScore, double misfit, const FitKinds& kinds, const ScoreOptions& score) {
+double verifiedScore(double signatureScore, double misfit, double share) {
     if (signatureScore >= 1.0) return 1.0;
-    const double share = misfitShare(kinds, score);
-    const double distance = distanceOfScore(signatureScore);
-    return belowOne(scoreOfDistance((1.0 - share) * distance + share * misfit));
+    return belowOne(scoreOfDistance((1.0 - share) * distanceOfScore(signatureScore) + share * misfit));
 }
 
-Result<VerifiedResult> topKVerified(const Signature& query, const FitQuery& querySurface,
+namespace {
+
+// Those that views rank first before the others, after a few that signatures rank first.
+Result<std::vector<SearchHit>> withViewsFirst(const SearchResult& found, const SurfacePoints& surface,
+                                              const SignatureSet& set, const SearchOptions& options,
+                                              const VerifyOptions& verify, std::size_t most,
+                                              const RunContext& context) {
+    const Point3 towards = verify.viewpoint ? *verify.viewpoint - surface.centre : Point3{};
+    const auto view = makeViewOfScan(surface, towards);
+    RETURN_IF_ERROR(view);
+    const ViewOptions compared{options.score.reflection, options.score.keepScale,
+                               verify.viewpoint.has_value()};
+    // Some are among those of the signatures: then further ones take their places.
+    const auto byViews =
+        nearestByViews(ViewQuery(*view, compared), set, most, options.filter, options.excludeId, context);
+    RETURN_IF_ERROR(byViews);
+    const auto ofViews = static_cast<std::size_t>(kShareOfViews * static_cast<double>(most));
+    const auto ofSignatures = std::min(found.hits.size(), most - ofViews);
+    std::vector<SearchHit> order(found.hits.begin(),
+                                 found.hits.begin() + static_cast<std::ptrdiff_t>(ofSignatures));
+    const auto isTaken = [&](std::int64_t id) {
+        return std::any_of(order.begin(), order.end(), [&](const SearchHit& hit) { return hit.id == id; });
+    };
+    for (const ViewHit& hit : *byViews) {
+        if (order.size() >= most) break;
+        const SignatureSet::Place place = set.find(hit.id);
+        const ShapeRow row = place.block->rows()[place.row];
+        if (!isTaken(hit.id) && found.scorer->compares(row)) {
+            order.push_back({hit.id, found.scorer->score(row)});
+        }
+    }
+    for (auto hit = found.hits.begin() + static_cast<std::ptrdiff_t>(ofSignatures); hit != found.hits.end();
+         ++hit) {
+        if (!isTaken(hit->id)) order.push_back(*hit);
+    }
+    return order;
+}
+
+}  // namespace
+
+Result<VerifiedResult> topKVerified(const Signature& query, const SurfacePoints& surface,
                                     const SignatureSet& set, const SearchOptions& options,
                                     const VerifyOptions& verify, const SurfaceOf& surfaceOf,
                                     const RunContext& context) {
     RETURN_IF_ERROR(validate(options));
-    if (verify.mostCandidates == 0) {
-        return fail(ErrorCode::kInvalidArgument, "at least 1 candidate must be verified");
-    }
     const auto began = RunContext::Clock::now();
-    SearchOptions wide = options;
-    // One more than are verified, to see whether it could reach the hits.
-    wide.k = std::max(options.k, verify.mostCandidates + 1);
-    // Candidates below the threshold may reach it by fitting well.
-    wide.threshold = 0.0;
-    auto found = topK(query, set, wide, context);
-    RETURN_IF_ERROR(found);
     try {
-        const FitKinds kinds = kindsOfQuery(query, options.score);
-        auto result = Verifier(querySurface, kinds, options, surfaceOf, context)
-                          .run(found->hits, verify.mostCandidates, found->hits.size() < wide.k);
+        const auto traits = traitsOf(query, surface, verify.oneSided);
+        RETURN_IF_ERROR(traits);
+        const std::size_t most = verify.mostCandidates > 0 ? verify.mostCandidates
+                                 : traits->reliable        ? kCandidates
+                                                           : kCandidatesUnsure;
+        SearchOptions wide = options;
+        // One more than are verified, to see whether it could reach the hits.
+        wide.k = std::max(options.k, most + 1);
+        // Candidates below the threshold may reach it by fitting well.
+        wide.threshold = 0.0;
+        auto found = topK(query, set, wide, context);
+        RETURN_IF_ERROR(found);
+        const bool all = found->hits.size() < wide.k;
+        if (traits->ofOneSide) {
+            auto ordered = withViewsFirst(*found, surface, set, options, verify, most, context);
+            RETURN_IF_ERROR(ordered);
+            found->hits = std::move(*ordered);
+        }
+        auto result =
+            Verifier(FitQuery(surface), *traits, options, surfaceOf, context).run(found->hits, most, all);
         RETURN_IF_ERROR(result);
         result->counts = found->counts;
         result->scorer = std::move(found->scorer);

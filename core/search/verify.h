@@ -15,15 +15,22 @@
 #include "core/base/error.h"
 #include "core/base/run_context.h"
 #include "core/fit/fit.h"
+#include "core/geometry/point.h"
 #include "core/search/top_k.h"
 
 namespace shapedb {
 
 /// How candidates are verified.
 struct VerifyOptions {
-    /// At most so many candidates are laid on the query, those that the signatures rank first; at least 1.
-    /// With fewer shapes in the collection, or when no other can reach the hits, the answer is exact.
-    std::size_t mostCandidates = 64;
+    /// At most so many candidates are laid on the query: those that the signatures rank first; of a query of
+    /// one side mostly those that views rank first (docs/views.md). With fewer shapes in the collection, or
+    /// when no other can reach the hits, the answer is exact. 0: 32 for a reliable query, 64 for others.
+    std::size_t mostCandidates = 0;
+    /// Whether a camera saw the query from one place; nothing: judged from the points.
+    std::optional<bool> oneSided{};
+    /// Where that camera stood, in coordinates of the query: tells front from back. Not read of queries that
+    /// are not of one side.
+    std::optional<Point3> viewpoint{};
 };
 
 /// The surface points of a shape; null for one that has none (yet). Called from several threads at once.
@@ -58,29 +65,37 @@ struct VerifiableQuery : BatchQuery {
 /// What topK found, as hits that were not verified: their scores are those of the signatures.
 [[nodiscard]] VerifiedResult unverified(SearchResult found);
 
-/// What the query may be a scan of: whole, and one-sided too if its interior is unreliable, for a camera that
-/// sees one side leaves it open; with `score.partial` also a piece. `quality`: of the query's attributes, 0
-/// to 255; a signature without attributes counts as reliable.
-[[nodiscard]] FitKinds kindsOfQuery(const Signature& query, const ScoreOptions& score);
+/// What is known of a query before it is laid on anything.
+struct QueryTraits {
+    /// The quality of its interior is that of a whole scan. One without attributes counts as reliable.
+    bool reliable = true;
+    /// It is not reliable, and most of its surface can be seen from one place.
+    bool ofOneSide = false;
+};
+
+/// Judged from the points, or as `oneSided` says. Errors: kOutOfMemory.
+[[nodiscard]] Result<QueryTraits> traitsOf(const Signature& query, const SurfacePoints& surface,
+                                           std::optional<bool> oneSided = std::nullopt);
+
+/// What the query may be a scan of: whole or a piece, and of one side too unless it is reliable.
+[[nodiscard]] FitKinds kindsOfQuery(const QueryTraits& traits) noexcept;
 
 /// The score of a candidate whose signature scores `signatureScore` and whose misfit is `misfit`
 /// (FitResult::misfit). Falls with the misfit, rises with the signature's score, and is 1 for the same
 /// signature whatever the misfit.
 ///
 /// It is scoreOfDistance of the mean of distanceOfScore(signatureScore) and `misfit`, the latter weighted by
-/// misfitShare.
-[[nodiscard]] double verifiedScore(double signatureScore, double misfit, const FitKinds& kinds,
-                                   const ScoreOptions& score);
+/// `share`, in [0, 1].
+[[nodiscard]] double verifiedScore(double signatureScore, double misfit, double share);
 
 /// The weight of the misfit, in (0, 1).
-[[nodiscard]] double misfitShare(const FitKinds& kinds, const ScoreOptions& score) noexcept;
+[[nodiscard]] double misfitShare(const QueryTraits& traits, const ScoreOptions& score) noexcept;
 
-/// The `options.k` best scores of a snapshot, verified. Uses the threads of the caller's oneTBB arena;
-/// neither their number nor the order of candidates changes a bit. Reports progress as stages "search" and
-/// "verify".
+/// The `options.k` best scores of a snapshot, verified. Uses the threads of the caller's oneTBB arena; their
+/// number does not change a bit. Reports progress as stages "search", "views" and "verify".
 ///
 /// Errors: those of topK and of `surfaceOf`; kCancelled, kDeadlineExceeded, kOutOfMemory.
-[[nodiscard]] Result<VerifiedResult> topKVerified(const Signature& query, const FitQuery& querySurface,
+[[nodiscard]] Result<VerifiedResult> topKVerified(const Signature& query, const SurfacePoints& surface,
                                                   const SignatureSet& set, const SearchOptions& options,
                                                   const VerifyOptions& verify, const SurfaceOf& surfaceOf,
                                                   const RunContext& context = {});

@@ -47,6 +47,10 @@ CoarseView coarseView(const ViewSignature& view) {
     return coarse;
 }
 
+ShapeViews::ShapeViews(const ViewSet& views) : set(views) {
+    std::transform(views.views.begin(), views.views.end(), coarse.begin(), coarseView);
+}
+
 ViewQuery::ViewQuery(const ViewSignature& view, const ViewOptions& options)
     : coarse_(coarseView(view)), octaves_(octavesOf(view.size)), keepScale_(options.keepScale) {
     for (unsigned i = 0; i < 8; ++i) {
@@ -99,6 +103,16 @@ std::uint32_t ViewQuery::bound(const CoarseView& coarse) const {
 std::uint32_t ViewQuery::distance(const ViewSet& set) const {
     std::uint32_t least = UINT32_MAX;
     for (const ViewSignature& view : set.views) least = std::min(least, distance(view));
+    return least;
+}
+
+std::uint32_t ViewQuery::distance(const ShapeViews& shape, std::uint32_t most) const {
+    std::uint32_t least = UINT32_MAX;
+    for (std::size_t i = 0; i < kViews; ++i) {
+        if (bound(shape.coarse[i]) > most) continue;
+        least = std::min(least, distance(shape.set.views[i]));
+        most = std::min(most, least);
+    }
     return least;
 }
 

@@ -28,6 +28,14 @@ struct CoarseView {
 };
 [[nodiscard]] CoarseView coarseView(const ViewSignature& view);
 
+/// The views of a shape with their coarse forms, as a search keeps them: 1,680 bytes.
+struct ShapeViews {
+    explicit ShapeViews(const ViewSet& set);
+
+    ViewSet set;
+    std::array<CoarseView, kViews> coarse;
+};
+
 /// A query made ready once for any number of comparisons. Immutable.
 class ViewQuery {
   public:
@@ -44,6 +52,9 @@ class ViewQuery {
 
     /// The least distance over all views of a shape.
     [[nodiscard]] std::uint32_t distance(const ViewSet& set) const;
+
+    /// The same where it is at most `most`; otherwise any value above `most`, sooner.
+    [[nodiscard]] std::uint32_t distance(const ShapeViews& shape, std::uint32_t most) const;
 
   private:
     // Levels one a byte: those of the low halves, then those of the high halves.

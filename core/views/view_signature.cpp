@@ -24,8 +24,8 @@ constexpr double kLayerReach = 1.1;
 // In units of the mean distance.
 constexpr double kDistanceReach = 2.6;
 
-// A share of one quarter, or of one half of the distances, and all above have the top level.
-constexpr double kCellLevels = 2.0 * kTopViewLevel;
+// A share of 0.15, or of one half of the distances, and all above have the top level.
+constexpr double kCellLevels = 2.6 * kTopViewLevel;
 constexpr double kDistanceLevels = 1.4142135623730951 * kTopViewLevel;
 
 // The two bins whose middles a place lies between, and its share of each.

@@ -29,6 +29,7 @@ Result<ShapeParameters> ParameterOverrides::applyTo(const ShapeParameters& curre
     overrideBy(interiorMethod, segmentation.interiorMethod);
     overrideBy(maxPoints, parameters.signature.maxPoints);
     overrideBy(attributes, parameters.signature.attributes);
+    overrideBy(views, parameters.views);
     RETURN_IF_ERROR(validate(parameters));
     return parameters;
 }

@@ -27,6 +27,7 @@ struct ParameterOverrides {
     std::optional<InteriorMethod> interiorMethod;
     std::optional<std::uint32_t> maxPoints;
     std::optional<bool> attributes;
+    std::optional<bool> views;
 
     /// Of something that has parameters already. Errors: kInvalidArgument (names parameter, value and range).
     [[nodiscard]] Result<ShapeParameters> applyTo(const ShapeParameters& current) const;

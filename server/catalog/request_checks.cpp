@@ -1,6 +1,7 @@
 #include "server/catalog/request_checks.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "server/catalog/limits.h"
 
@@ -123,10 +124,18 @@ Result<void> checkBatchSize(std::uint64_t queries, std::uint32_t maxBatch) {
     return bad("queries: " + std::to_string(queries) + " is outside 1 to " + std::to_string(maxBatch));
 }
 
-Result<void> checkVerifyCandidates(std::uint32_t candidates) {
-    if (candidates <= kMostVerified) return {};
-    return bad("verify_candidates: " + std::to_string(candidates) + " is more than " +
-               std::to_string(kMostVerified));
+Result<void> checkVerifyOptions(const VerifyOptions& options) {
+    if (options.mostCandidates > kMostVerified) {
+        return bad("verify_candidates: " + std::to_string(options.mostCandidates) + " is more than " +
+                   std::to_string(kMostVerified));
+    }
+    if (!options.viewpoint) return {};
+    const Point3& p = *options.viewpoint;
+    if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
+        return bad("viewpoint: a coordinate is not finite");
+    }
+    if (!options.oneSided.value_or(true)) return bad("viewpoint: given for a query that is not one-sided");
+    return {};
 }
 
 Result<void> checkThreshold(double threshold) {

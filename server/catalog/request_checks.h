@@ -7,6 +7,7 @@
 
 #include "core/base/error.h"
 #include "core/base/metadata.h"
+#include "core/search/verify.h"
 
 namespace shapedb::catalog {
 
@@ -27,8 +28,8 @@ constexpr const char* kDefaultCollection = "default";
 [[nodiscard]] Result<void> checkK(std::uint32_t k, std::uint32_t maxK);
 /// 1 to `maxBatch` queries.
 [[nodiscard]] Result<void> checkBatchSize(std::uint64_t queries, std::uint32_t maxBatch);
-/// At most kMostVerified.
-[[nodiscard]] Result<void> checkVerifyCandidates(std::uint32_t candidates);
+/// At most kMostVerified candidates; a viewpoint is finite and not of a query that is not of one side.
+[[nodiscard]] Result<void> checkVerifyOptions(const VerifyOptions& options);
 /// [0, 1], not NaN.
 [[nodiscard]] Result<void> checkThreshold(double threshold);
 /// At most kMaxFilterBytes.

@@ -25,8 +25,7 @@ Result<VerifiedResult> SearchRunner::run(const VerifiableQuery& query, const Sig
     own.excludeId = query.excludeId;
     auto result = arena_->tasks.execute([&]() -> Result<VerifiedResult> {
         if (verify && query.surface) {
-            return topKVerified(query.signature, FitQuery(*query.surface), set, own, *verify, surfaceOf,
-                                context);
+            return topKVerified(query.signature, *query.surface, set, own, *verify, surfaceOf, context);
         }
         auto found = topK(query.signature, set, own, context);
         RETURN_IF_ERROR(found);

@@ -35,7 +35,7 @@ Result<PreparedSearch> Searches::prepare(index::SnapshotPtr collection, const Se
     RETURN_IF_ERROR(checkK(request.k, maxK_));
     RETURN_IF_ERROR(checkThreshold(request.threshold));
     RETURN_IF_ERROR(checkFilterLength(request.filter));
-    RETURN_IF_ERROR(checkVerifyCandidates(request.verifyCandidates));
+    RETURN_IF_ERROR(checkVerifyOptions(request.verifyOptions));
     Result<Filter> filter = Filter::parse(request.filter);
     RETURN_IF_ERROR(filter);
     const auto pending = catalog_.pendingShapes(collection->collection.id);
@@ -49,8 +49,8 @@ Result<PreparedSearch> Searches::prepare(index::SnapshotPtr collection, const Se
     prepared.options.score = request.score;
     prepared.explain = request.explain;
     if (request.verify.value_or(prepared.collection->parameters.profile == Profile::kDefault)) {
-        prepared.verify = VerifyOptions();
-        if (request.verifyCandidates > 0) prepared.verify->mostCandidates = request.verifyCandidates;
+        prepared.verify = request.verifyOptions;
+        if (request.verifyOptions.viewpoint) prepared.verify->oneSided = true;
     }
     return prepared;
 }
@@ -108,8 +108,9 @@ Result<Comparison> Searches::compare(const ShapeName& query, const ShapeName& ot
     Comparison comparison;
     comparison.explanation = shapedb::explain(first->signature, second->signature, options);
     if (first->surface && second->surface) {
-        const FitOptions fitted{kindsOfQuery(first->signature, options), options.keepScale,
-                                options.reflection};
+        const auto traits = traitsOf(first->signature, *first->surface);
+        RETURN_IF_ERROR(traits);
+        const FitOptions fitted{kindsOfQuery(*traits), options.keepScale, options.reflection};
         auto fit = shapedb::fit(FitQuery(*first->surface), *second->surface, fitted, context);
         RETURN_IF_ERROR(fit);
         comparison.explanation.motion = fit->best.motion;

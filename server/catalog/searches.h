@@ -25,8 +25,8 @@ struct SearchRequest {
     std::string filter;
     ScoreOptions score;
     bool explain = true;
-    std::optional<bool> verify;          ///< nothing: yes, but not in collections of profile `paper`
-    std::uint32_t verifyCandidates = 0;  ///< 0: the default
+    std::optional<bool> verify;  ///< nothing: yes, but not in collections of profile `paper`
+    VerifyOptions verifyOptions;
 };
 
 /// Checked options, and the snapshot that all queries of the request read.
@@ -89,7 +89,7 @@ class Searches {
     Searches(Catalog& catalog, SearchRunner& runner, std::uint32_t maxK)
         : catalog_(catalog), runner_(runner), maxK_(maxK) {}
 
-    /// Errors: kInvalidArgument (k, threshold, candidates), kMalformedFilter; those of the store.
+    /// Errors: kInvalidArgument (k, threshold, what verifying takes), kMalformedFilter; those of the store.
     [[nodiscard]] Result<PreparedSearch> prepare(index::SnapshotPtr collection,
                                                  const SearchRequest& request) const;
 

@@ -11,6 +11,7 @@
 #include "core/base/parallel.h"
 #include "core/base/return_if_error.h"
 #include "core/signature/signature_codec.h"
+#include "core/views/views_codec.h"
 #include "server/store/parameters_codec.h"
 
 namespace shapedb::index {
@@ -36,6 +37,16 @@ bool toEntry(store::IndexRow&& row, IndexEntry& entry, store::Store& store, tele
     }
     entry.id = row.shapeId;
     entry.metadata = std::move(row.metadata);
+    entry.views = nullptr;
+    if (row.signature.views.empty()) return true;
+    if (const auto views = decodeViews(row.signature.views)) {
+        entry.views = std::make_shared<const ShapeViews>(*views);
+    } else {
+        auto fields = telemetry::fieldsOf(views.error());
+        fields.push_back({"shape", row.shapeId});
+        log.error("stored views are damaged: scans of one side may not find this shape until a rebuild",
+                  fields);
+    }
     return true;
 }
 

@@ -6,6 +6,8 @@
 #include "core/fit/surface_points.h"
 #include "core/fit/surface_points_codec.h"
 #include "core/signature/signature_codec.h"
+#include "core/views/views.h"
+#include "core/views/views_codec.h"
 #include "server/ingest/background_thread.h"
 
 namespace shapedb::ingest {
@@ -36,19 +38,24 @@ PipelineOutcome runOrThrow(const Describe& describe, store::Store& store, std::i
     }
     Result<Description> description = fail(ErrorCode::kInternal, "not described");
     Result<SurfacePoints> surface = fail(ErrorCode::kInternal, "no surface points");
+    Result<ViewSet> views = fail(ErrorCode::kInternal, "no views");
     onThisThreadAlone([&] {
         description = describe(cloud, parameters, context);
         if (description) surface = makeSurfacePoints(cloud, context);
+        if (surface && parameters.views) views = makeViews(*surface, cloud, context);
     });
-    const bool cancelled = !description && description.error().code == ErrorCode::kCancelled;
-    if (cancelled || (!surface && surface.error().code == ErrorCode::kCancelled)) {
-        return failed(Kind::kCancelled, cancelled ? description.error() : surface.error());
-    }
+    const auto isCancelled = [](const auto& result) {
+        return !result && result.error().code == ErrorCode::kCancelled;
+    };
+    if (isCancelled(description)) return failed(Kind::kCancelled, description.error());
+    if (isCancelled(surface)) return failed(Kind::kCancelled, surface.error());
+    if (isCancelled(views)) return failed(Kind::kCancelled, views.error());
     if (!description) return failed(Kind::kScanFailed, description.error());
     PipelineOutcome outcome;
     outcome.signature = encodeSignature(description->signature);
     // A scan that has a signature but no surface points is searched all the same.
     if (surface) outcome.surface = encodeSurfacePoints(*surface);
+    if (views) outcome.views = encodeViews(*views);
     outcome.seconds = description->segmentation.totalSeconds;
     return outcome;
 }

@@ -29,6 +29,7 @@ struct PipelineOutcome {
     Kind kind = Kind::kSignature;
     std::string signature;  ///< encoded
     std::string surface;    ///< encoded surface points; empty if the scan has none
+    std::string views;      ///< encoded; empty if the parameters or the scan have none
     double seconds = 0.0;   ///< of the segmentation
     Error why{ErrorCode::kInternal, ""};
 };

@@ -300,8 +300,12 @@ WorkerPool::Outcome WorkerPool::cancelled(const Running& running) {
 WorkerPool::Outcome WorkerPool::commit(const Running& running, std::int64_t generation,
                                        PipelineOutcome made) {
     const store::Job& job = running.job;
-    const store::SignatureRow row{job.shapeId, job.pointsVersion, generation, std::move(made.signature),
-                                  std::move(made.surface)};
+    const store::SignatureRow row{job.shapeId,
+                                  job.pointsVersion,
+                                  generation,
+                                  std::move(made.signature),
+                                  std::move(made.surface),
+                                  std::move(made.views)};
     Result<std::optional<store::Shape>> finished = std::optional<store::Shape>();
     const bool current =
         index_.whileGeneration(job.collectionId, generation, [&] { finished = store_.finishJob(job, row); });

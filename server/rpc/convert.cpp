@@ -106,6 +106,7 @@ Result<catalog::ParameterOverrides> overridesFrom(pb::Profile profile,
     }
     if (signature.has_max_points()) overrides.maxPoints = signature.max_points();
     if (signature.has_attributes()) overrides.attributes = signature.attributes();
+    if (signature.has_views()) overrides.views = signature.views();
     return overrides;
 }
 

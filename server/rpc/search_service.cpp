@@ -35,7 +35,12 @@ Result<catalog::PreparedSearch> prepare(const Services& services, Call& call,
     request.score = scoreOptionsFrom(options);
     request.explain = !options.no_explanation();
     if (options.has_verify()) request.verify = options.verify();
-    request.verifyCandidates = options.verify_candidates();
+    request.verifyOptions.mostCandidates = options.verify_candidates();
+    if (options.has_one_sided()) request.verifyOptions.oneSided = options.one_sided();
+    if (options.has_viewpoint()) {
+        const pb::Vector3& viewpoint = options.viewpoint();
+        request.verifyOptions.viewpoint = {viewpoint.x(), viewpoint.y(), viewpoint.z()};
+    }
     return services.searches.prepare(*collection, request);
 }
 

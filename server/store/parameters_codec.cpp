@@ -150,6 +150,7 @@ std::string encodeParameters(const ShapeParameters& parameters) {
                             {"interior_method", interiorMethodName(segmentation.interiorMethod)}};
     json["signature"] = {{"max_points", parameters.signature.maxPoints},
                          {"attributes", parameters.signature.attributes}};
+    json["views"] = parameters.views;
     return json.dump();
 }
 
@@ -162,12 +163,16 @@ Result<ShapeParameters> decodeParameters(const std::string& text) {
         const Json empty = Json::object();
         const Json* segmentationJson = top.find("segmentation");
         const Json* signatureJson = top.find("signature");
+        std::optional<bool> views;
+        if (top.find("views") != nullptr) top.read("views", views.emplace());
         if (const std::string problem = top.problem(); !problem.empty()) return damagedParameters(problem);
 
         const Result<Profile> profile = profileFromName(name);
         if (!profile) return damagedParameters(profile.error().message);
         ShapeParameters parameters = parametersOf(Profile::kPaper);
         parameters.profile = *profile;
+        // Collections from before there were views get them with their next rebuild.
+        parameters.views = views.value_or(parametersOf(*profile).views);
         if (const auto read = readSegmentation(segmentationJson != nullptr ? *segmentationJson : empty,
                                                parameters.segmentation);
             !read) {

@@ -130,6 +130,7 @@ struct SignatureRow {
     /// When written: the surface points (core/fit/surface_points_codec.h), stored beside the signature; empty
     /// leaves those of the shape as they are. Never read: see getSurface.
     std::string surface{};
+    std::string views{};  ///< core/views/views_codec.h; empty: none
 };
 
 /// What verifying a shape needs.

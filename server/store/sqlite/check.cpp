@@ -20,7 +20,7 @@ constexpr char kAllPoints[] =
     "SELECT s.key, s.point_count, s.checksum, p.points, p.point_bytes, p.stored_bytes FROM shape s "
     "LEFT JOIN shape_points p ON p.shape_id = s.id ORDER BY s.id";
 constexpr char kAllSignatures[] =
-    "SELECT g.shape_id, g.points_version, g.generation, g.digest, g.bytes FROM signature g "
+    "SELECT g.shape_id, g.points_version, g.generation, g.digest, g.bytes, g.views FROM signature g "
     "JOIN shape s ON s.id = g.shape_id";
 constexpr char kAllSurfaces[] =
     "SELECT s.key, f.points_version, f.digest, f.bytes FROM shape_surface f JOIN shape s ON s.id = "

@@ -96,6 +96,14 @@ std::optional<Collection> findCollection(Connection& connection, const std::stri
     return readCollection(query);
 }
 
+namespace {
+
+std::string bytesOf(const BlobView& blob) {
+    return {static_cast<const char*>(blob.size > 0 ? blob.data : ""), blob.size};
+}
+
+}  // namespace
+
 std::int64_t digestOf(const std::string& bytes) {
     const Sha256Digest digest = sha256(bytes.data(), bytes.size());
     std::uint64_t value = 0;
@@ -108,9 +116,9 @@ SignatureRow readSignature(Connection& connection, const Query& query, int colum
     row.shapeId = shapeId;
     row.pointsVersion = query.integer(column);
     row.generation = query.integer(column + 1);
-    const BlobView blob = query.blob(column + 3);
-    row.bytes.assign(static_cast<const char*>(blob.size > 0 ? blob.data : ""), blob.size);
-    if (digestOf(row.bytes) != query.integer(column + 2)) {
+    row.bytes = bytesOf(query.blob(column + 3));
+    if (!query.isNull(column + 4)) row.views = bytesOf(query.blob(column + 4));
+    if (digestOf(row.bytes + row.views) != query.integer(column + 2)) {
         const auto shape = findShapeById(connection, shapeId);
         raise(ErrorCode::kDataLoss,
               "the stored signature of shape " + (shape ? quoted(shape->key) : std::to_string(shapeId)) +
@@ -121,7 +129,9 @@ SignatureRow readSignature(Connection& connection, const Query& query, int colum
 
 void putSignature(Connection& connection, const SignatureRow& signature) {
     Query(connection, sql::kPutSignature, signature.shapeId, signature.generation, signature.pointsVersion,
-          digestOf(signature.bytes), BlobView{signature.bytes.data(), signature.bytes.size()})
+          digestOf(signature.bytes + signature.views),
+          BlobView{signature.bytes.data(), signature.bytes.size()},
+          BlobView{signature.views.data(), signature.views.size()})
         .run();
     if (signature.surface.empty()) return;
     Query(connection, sql::kPutSurface, signature.shapeId, signature.pointsVersion,
@@ -131,10 +141,9 @@ void putSignature(Connection& connection, const SignatureRow& signature) {
 
 std::optional<SurfaceRow> readSurface(const Query& query) {
     if (query.isNull(1)) return std::nullopt;
-    const BlobView blob = query.blob(3);
     SurfaceRow row;
     row.pointsVersion = query.integer(1);
-    row.bytes.assign(static_cast<const char*>(blob.size > 0 ? blob.data : ""), blob.size);
+    row.bytes = bytesOf(query.blob(3));
     if (digestOf(row.bytes) != query.integer(2)) {
         raise(ErrorCode::kDataLoss, "the stored surface points of shape " + quoted(query.text(0)) +
                                         " are damaged; rebuild the collection");

@@ -42,7 +42,7 @@ Collection requireCollection(Connection& connection, std::int64_t collectionId);
 std::optional<Collection> findCollection(Connection& connection, const std::string& name);
 Collection readCollection(const Query& query);
 
-/// Reads points_version, generation, digest and bytes from `column` on and verifies the digest. Throws
+/// Reads points_version, generation, digest, bytes and views from `column` on and verifies the digest. Throws
 /// Failure kDataLoss, naming the shape.
 SignatureRow readSignature(Connection& connection, const Query& query, int column, std::int64_t shapeId);
 

@@ -35,6 +35,7 @@ TEST(Parameters, EachFlagOverridesOnlyItsField) {
     flags.given.thinning = 1.5;
     flags.given.maxPoints = 9;
     flags.given.attributes = true;
+    flags.given.views = true;
     const auto resolved = flags.resolve();
     ASSERT_TRUE(resolved) << resolved.error().message;
     EXPECT_EQ(toJson(*resolved), nlohmann::json({{"profile", "paper"},
@@ -53,7 +54,8 @@ TEST(Parameters, EachFlagOverridesOnlyItsField) {
                                                  {"even_spacing", 1.5},  // former name of thinning
                                                  {"interior_method", "adaptive"},
                                                  {"max_points", 9},
-                                                 {"attributes", true}}));
+                                                 {"attributes", true},
+                                                 {"views", true}}));
     EXPECT_EQ(toJson(flags.given), toJson(*resolved)) << "a collection shows what a scan here would get";
 }
 
@@ -128,7 +130,7 @@ TEST(Parameters, ZeroTurnsOffWhatTheProfileTurnsOn) {
     ASSERT_TRUE(resolved) << resolved.error().message;
     nlohmann::json expected = toJson(parametersOf(Profile::kPaper));
     expected["profile"] = "default";
-    for (const char* name : {"min_segment_share", "max_segments", "max_points"}) {
+    for (const char* name : {"min_segment_share", "max_segments", "max_points", "views"}) {
         expected[name] = toJson(*resolved)[name];
     }
     EXPECT_EQ(toJson(*resolved), expected);

@@ -15,6 +15,7 @@
 #include "core/pipeline.h"
 #include "core/synthetic/families.h"
 #include "core/synthetic/partial.h"
+#include "core/views/views.h"
 
 namespace shapedb {
 namespace {
@@ -71,13 +72,12 @@ const SurfaceOf kStored = [](std::int64_t id) -> Result<std::shared_ptr<const Su
 
 Result<VerifiedResult> searched(const Scanned& query, const SearchOptions& options, std::size_t most,
                                 const RunContext& context = {}) {
-    return topKVerified(query.signature, FitQuery(*query.surface), gallery().set, options, {most}, kStored,
-                        context);
+    return topKVerified(query.signature, *query.surface, gallery().set, options, {most}, kStored, context);
 }
 
 // Fits everything, one after another, and sorts.
 std::vector<VerifiedHit> bruteForce(const Scanned& query, const SearchOptions& options) {
-    const FitKinds kinds = kindsOfQuery(query.signature, options.score);
+    const QueryTraits traits = traitsOf(query.signature, *query.surface).value();
     std::vector<VerifiedHit> hits;
     for (const auto& [id, shape] : gallery().shapes) {
         VerifiedHit hit;
@@ -85,10 +85,11 @@ std::vector<VerifiedHit> bruteForce(const Scanned& query, const SearchOptions& o
         hit.signatureScore = makeScorer(query.signature, options.score)->score(shape.signature);
         double misfit = 1.0;
         if (shape.surface) {
-            const FitOptions fitOptions{kinds, options.score.keepScale, options.score.reflection};
+            const FitOptions fitOptions{kindsOfQuery(traits), options.score.keepScale,
+                                        options.score.reflection};
             misfit = fit(FitQuery(*query.surface), *shape.surface, fitOptions).value().misfit;
         }
-        hit.score = verifiedScore(hit.signatureScore, misfit, kinds, options.score);
+        hit.score = verifiedScore(hit.signatureScore, misfit, misfitShare(traits, options.score));
         if (hit.score >= options.threshold) hits.push_back(hit);
     }
     std::sort(hits.begin(), hits.end(), [](const VerifiedHit& a, const VerifiedHit& b) {
@@ -157,8 +158,7 @@ TEST(Verify, NamesAnAnswerThatTheCapMadeInexact) {
     for (const VerifiedHit& hit : capped->hits) {
         if (hit.fit) continue;
         EXPECT_EQ(hit.score,
-                  verifiedScore(hit.signatureScore, 1.0,
-                                kindsOfQuery(gallery().query.signature, options.score), options.score));
+                  verifiedScore(hit.signatureScore, 1.0, misfitShare(QueryTraits(), options.score)));
     }
 }
 
@@ -184,42 +184,45 @@ TEST(Verify, KeepsAScoreOfOneForTheSameSignature) {
 }
 
 TEST(Verify, ScoreFallsWithTheMisfitAndRisesWithTheSignatures) {
-    for (const FitKinds kinds : {FitKinds{true, false, false}, FitKinds{true, true, true}}) {
-        const double share = misfitShare(kinds, {});
+    for (const QueryTraits traits : {QueryTraits{true, false}, QueryTraits{false, true}}) {
+        const double share = misfitShare(traits, {});
         double last = 1.0;
         for (const double misfit : {0.0, 0.2, 0.5, 1.0, 1.4}) {
-            const double score = verifiedScore(0.6, misfit, kinds, {});
+            const double score = verifiedScore(0.6, misfit, share);
             EXPECT_LT(score, last);
             EXPECT_NEAR(score, scoreOfDistance((1.0 - share) * distanceOfScore(0.6) + share * misfit), 1e-12);
-            EXPECT_GT(verifiedScore(0.7, misfit, kinds, {}), score);
+            EXPECT_GT(verifiedScore(0.7, misfit, share), score);
             last = score;
         }
-        EXPECT_LT(verifiedScore(0.999999, 0.0, kinds, {}), 1.0) << "1 is for the same shape alone";
+        EXPECT_LT(verifiedScore(0.999999, 0.0, share), 1.0) << "1 is for the same shape alone";
     }
     ScoreOptions handed;
     handed.reflection = false;
-    EXPECT_GT(misfitShare({true, false, false}, handed), misfitShare({true, false, false}, {}))
-        << "signatures do not tell left from right";
+    EXPECT_GT(misfitShare({}, handed), misfitShare({}, {})) << "signatures do not tell left from right";
 }
 
-TEST(Verify, TakesOpenScansForOneSided) {
-    const PointCloud whole = scanOfFamily("animal", 1, 9);
-    const Signature open = describe(seenFrom(whole, {0, 0, 1}), parametersOf(Profile::kDefault))->signature;
-    EXPECT_TRUE(kindsOfQuery(open, {}).oneSided);
-    EXPECT_FALSE(kindsOfQuery(open, {}).piece);
-    const Signature& closed = gallery().query.signature;
-    EXPECT_FALSE(kindsOfQuery(closed, {}).oneSided);
-    ScoreOptions partial;
-    partial.partial = true;
-    EXPECT_TRUE(kindsOfQuery(closed, partial).piece);
-    EXPECT_TRUE(kindsOfQuery(closed, partial).whole);
+TEST(Verify, KnowsScansOfOneSide) {
+    const Scanned open = scanned(seenFrom(scanOfFamily("animal", 1, 9), {0, 0, 1}));
+    const QueryTraits judged = traitsOf(open.signature, *open.surface).value();
+    EXPECT_FALSE(judged.reliable);
+    EXPECT_TRUE(judged.ofOneSide);
+    const Scanned& whole = gallery().query;
+    EXPECT_TRUE(traitsOf(whole.signature, *whole.surface)->reliable);
+    EXPECT_FALSE(traitsOf(whole.signature, *whole.surface)->ofOneSide);
+    // What the caller knows counts.
+    EXPECT_FALSE(traitsOf(open.signature, *open.surface, false)->ofOneSide);
+    EXPECT_FALSE(traitsOf(open.signature, *open.surface, false)->reliable);
+    EXPECT_TRUE(traitsOf(whole.signature, *whole.surface, true)->ofOneSide);
+    EXPECT_TRUE(kindsOfQuery(judged).oneSided);
+    EXPECT_FALSE(kindsOfQuery(QueryTraits()).oneSided);
+    EXPECT_TRUE(kindsOfQuery(QueryTraits()).piece);
 }
 
 TEST(Verify, EndsWithTheErrorOfASurfaceOrTheContext) {
     SearchOptions options;
     const auto broken =
-        topKVerified(gallery().query.signature, FitQuery(*gallery().query.surface), gallery().set, options,
-                     {}, [](std::int64_t) -> Result<std::shared_ptr<const SurfacePoints>> {
+        topKVerified(gallery().query.signature, *gallery().query.surface, gallery().set, options, {},
+                     [](std::int64_t) -> Result<std::shared_ptr<const SurfacePoints>> {
                          return fail(ErrorCode::kDataLoss, "damaged");
                      });
     ASSERT_FALSE(broken);
@@ -237,8 +240,44 @@ TEST(Verify, EndsWithTheErrorOfASurfaceOrTheContext) {
 
     options.k = 0;
     EXPECT_EQ(searched(gallery().query, options, 100).error().code, ErrorCode::kInvalidArgument);
-    options.k = 1;
-    EXPECT_EQ(searched(gallery().query, options, 0).error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST(Verify, TakesTheCandidatesOfAScanOfOneSideFromItsViews) {
+    // Signatures that rank the right shape last: only its views can bring it among four candidates.
+    std::vector<IndexEntry> entries;
+    const PointCloud whole = scanOfFamily("animal", 1, 9);
+    const Scanned open = scanned(seenFrom(whole, {0, 0, 1}));
+    for (const auto& [id, shape] : gallery().shapes) {
+        IndexEntry entry{id, {}, id == 30 ? gallery().query.signature : open.signature};
+        const auto views = makeViews(*gallery().shapes.at(id == 80 ? 70 : id).surface, {});
+        entry.views = std::make_shared<const ShapeViews>(views.value());
+        if (id == 30) {
+            const SurfacePoints surface = makeSurfacePoints(whole).value();
+            entry.views = std::make_shared<const ShapeViews>(makeViews(surface, whole).value());
+        }
+        entries.push_back(std::move(entry));
+    }
+    const SignatureSet set = SignatureSet().with(entries, {});
+    const auto verifiedOf = [&](const VerifyOptions& verify) {
+        std::vector<std::int64_t> ids;
+        SearchOptions options;
+        options.k = 8;
+        const auto found = topKVerified(open.signature, *open.surface, set, options, verify, kStored);
+        EXPECT_TRUE(found);
+        EXPECT_EQ(found->hits.size(), 8u);
+        for (const VerifiedHit& hit : found->hits) {
+            if (hit.fit) ids.push_back(hit.id);
+        }
+        std::sort(ids.begin(), ids.end());
+        return ids;
+    };
+    EXPECT_EQ(verifiedOf({4, false, {}}), (std::vector<std::int64_t>{10, 20, 40, 50})) << "by signature";
+    for (const VerifyOptions& verify : {VerifyOptions{4, {}, {}}, VerifyOptions{4, true, Point3{0, 0, 9}}}) {
+        const auto ids = verifiedOf(verify);
+        ASSERT_EQ(ids.size(), 4u);
+        EXPECT_EQ(ids.front(), 10) << "the first by signature stays";
+        EXPECT_EQ(std::count(ids.begin(), ids.end(), 30), 1) << "by its views";
+    }
 }
 
 TEST(ScoreScale, DistanceAndScoreAreInverse) {

@@ -58,6 +58,7 @@ TEST(ParametersFrom, ConvertsEveryField) {
     pb::SignatureParameters signature;
     signature.set_max_points(11);
     signature.set_attributes(true);
+    signature.set_views(true);
     const auto parameters = parametersFrom(pb::PROFILE_PAPER, segmentation, signature, {});
     ASSERT_TRUE(parameters);
     // And back: the collection message has the same values.

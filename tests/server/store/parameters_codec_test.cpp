@@ -23,6 +23,7 @@ void expectSame(const ShapeParameters& a, const ShapeParameters& b) {
     EXPECT_EQ(a.segmentation.interiorMethod, b.segmentation.interiorMethod);
     EXPECT_EQ(a.signature.maxPoints, b.signature.maxPoints);
     EXPECT_EQ(a.signature.attributes, b.signature.attributes);
+    EXPECT_EQ(a.views, b.views);
 }
 
 // The text is persisted: these names never change.
@@ -32,7 +33,7 @@ TEST(ParametersCodec, TextIsFrozen) {
               R"("hull_angle_degrees":5.0,"merge_ratio":1.5,"decimate_to":0,"merge_contrast":0.0,)"
               R"("min_segment_share":0.004,"max_segments":16,"stray_ratio":0.0,"smoothing_reach":0.0,)"
               R"("even_spacing":0.0,"interior_method":"walk"},"signature":{"max_points":7,)"
-              R"("attributes":false}})");
+              R"("attributes":false},"views":false})");
 }
 
 // Text written before outliers and smoothing existed: such collections keep working as they did, though
@@ -48,6 +49,8 @@ TEST(ParametersCodec, ReadsTextOfOlderServers) {
         ShapeParameters expected = parametersOf(Profile::kPaper);
         expected.profile = *profileFromName(name);
         expected.segmentation.preparation.decimateTo = 50'000;
+        // Views change no signature: these collections get them with their next rebuild.
+        expected.views = parametersOf(expected.profile).views;
         expectSame(*decoded, expected);
         EXPECT_EQ(decoded->segmentation.mergeContrast, 0.0);
         EXPECT_EQ(decoded->segmentation.preparation.outlierRatio, 0.0);
@@ -86,13 +89,14 @@ TEST(ParametersCodec, RoundTripIsExact) {
     }
 }
 
-TEST(ParametersCodec, MissingFieldsAreOff) {
+TEST(ParametersCodec, MissingFieldsAreOffButForViews) {
     for (const Profile profile : {Profile::kPaper, Profile::kDefault}) {
         const auto decoded =
             decodeParameters(std::string(R"({"profile":")") + profileName(profile) + R"("})");
         ASSERT_TRUE(decoded) << decoded.error().message;
         ShapeParameters expected = parametersOf(Profile::kPaper);
         expected.profile = profile;
+        expected.views = parametersOf(profile).views;
         expectSame(*decoded, expected);
     }
     const auto partly = decodeParameters(R"({"profile":"paper","segmentation":{"merge_ratio":2}})");

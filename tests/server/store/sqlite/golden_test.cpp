@@ -40,7 +40,7 @@ void fill(Store& store) {
 
 class EachGoldenTest : public GoldenTest, public ::testing::WithParamInterface<int> {};
 
-INSTANTIATE_TEST_SUITE_P(Versions, EachGoldenTest, ::testing::Values(1, 2));
+INSTANTIATE_TEST_SUITE_P(Versions, EachGoldenTest, ::testing::Values(1, 2, 3));
 
 TEST_F(GoldenTest, CanBeWritten) {
     const char* target = std::getenv("SHAPEDB_WRITE_GOLDEN");
@@ -75,6 +75,7 @@ TEST_P(EachGoldenTest, OpensAndAnswers) {
     EXPECT_EQ(ready.metadata, (Metadata{{"label", "tetrahedron"}, {"n", "4"}}));
     EXPECT_EQ(store_->loadPoints(ready.id).value(), kTetrahedron);
     EXPECT_EQ(store_->getSignature(ready.id)->bytes, "signature of 1/1/1");
+    EXPECT_EQ(store_->getSignature(ready.id)->views, GetParam() >= 3 ? "views of 1/1" : "");
     const auto surface = store_->getSurface(ready.id).value();
     ASSERT_EQ(surface.has_value(), GetParam() >= 2) << "older shapes have none until they are rebuilt";
     if (surface) {

@@ -39,6 +39,7 @@ TEST_F(SqliteJobsTest, FinishMakesTheShapeReady) {
     EXPECT_EQ(done->version, 1);
     EXPECT_EQ(done->metadata, shape.metadata);
     EXPECT_EQ(store_->getSignature(shape.id)->bytes, signatureFor(job).bytes);
+    EXPECT_EQ(store_->getSignature(shape.id)->views, signatureFor(job).views);
     EXPECT_EQ(store_->getSurface(shape.id).value()->bytes, signatureFor(job).surface);
     EXPECT_EQ(store_->getSurface(shape.id).value()->pointsVersion, 1);
     EXPECT_EQ(store_->queueDepth()->jobs, 0u);

@@ -287,6 +287,8 @@ class ModelTest : public StoreTest, public ::testing::WithParamInterface<int> {
             if (!signature) continue;
             ++serving;
             EXPECT_EQ(signature->bytes, model.serving->bytes);
+            EXPECT_EQ(signature->views, model.serving->views);
+            EXPECT_EQ(index.at(shape.id).views, model.serving->views);
             EXPECT_TRUE(store_->getSurface(shape.id).value()) << "every signature came with a surface";
             EXPECT_EQ(index.at(shape.id).bytes, model.serving->bytes);
         }

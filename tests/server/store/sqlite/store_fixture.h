@@ -39,10 +39,13 @@ inline PutRequest request(std::int64_t collectionId, const std::string& key, con
 
 /// Names what it was made of, so that a mix-up shows.
 inline SignatureRow signatureFor(std::int64_t shapeId, std::int64_t pointsVersion, std::int64_t generation) {
-    return {shapeId, pointsVersion, generation,
+    return {shapeId,
+            pointsVersion,
+            generation,
             "signature of " + std::to_string(shapeId) + "/" + std::to_string(pointsVersion) + "/" +
                 std::to_string(generation),
-            "surface of " + std::to_string(shapeId) + "/" + std::to_string(pointsVersion)};
+            "surface of " + std::to_string(shapeId) + "/" + std::to_string(pointsVersion),
+            "views of " + std::to_string(shapeId) + "/" + std::to_string(pointsVersion)};
 }
 inline SignatureRow signatureFor(const Job& job) {
     return signatureFor(job.shapeId, job.pointsVersion, job.generation);
