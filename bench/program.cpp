@@ -53,6 +53,7 @@ int run(int argc, const char* const* argv, cli::Console& console, const std::ato
         addJobOperation(app, bench);
         addSegmentOperation(app, bench);
         addTypicalOperation(app, bench);
+        addVerdictsOperation(app, bench);
         addFingerprintOperation(app, bench);
         try {
             app.parse(argc, argv);

@@ -3,8 +3,10 @@
 
 #include <optional>
 
+#include "core/fit/verdict_kinds.h"
 #include "core/profile.h"
 #include "core/segmentation/interior_kinds.h"
+#include "shapedb/v1/search_service.pb.h"
 #include "shapedb/v1/types.pb.h"
 
 namespace shapedb::wire {
@@ -24,6 +26,18 @@ namespace shapedb::wire {
         case InteriorSource::kThickened: return v1::INTERIOR_SOURCE_THICKENED;
     }
     return v1::INTERIOR_SOURCE_UNSPECIFIED;
+}
+
+[[nodiscard]] inline v1::Verdict toProto(Verdict verdict) {
+    switch (verdict) {
+        case Verdict::kNone: return v1::VERDICT_UNSPECIFIED;
+        case Verdict::kSameObject: return v1::VERDICT_SAME_OBJECT;
+        case Verdict::kSameObjectBent: return v1::VERDICT_SAME_OBJECT_BENT;
+        case Verdict::kPart: return v1::VERDICT_PART;
+        case Verdict::kSameKind: return v1::VERDICT_SAME_KIND;
+        case Verdict::kUnrelated: return v1::VERDICT_UNRELATED;
+    }
+    return v1::VERDICT_UNSPECIFIED;
 }
 
 // The way back: empty for UNSPECIFIED and for numbers that only a newer version knows.
@@ -50,6 +64,18 @@ namespace shapedb::wire {
         case v1::INTERIOR_SOURCE_POTENTIAL: return InteriorSource::kPotential;
         case v1::INTERIOR_SOURCE_THICKENED: return InteriorSource::kThickened;
         default: return std::nullopt;
+    }
+}
+
+/// kNone for UNSPECIFIED and for numbers that only a newer version knows.
+[[nodiscard]] inline Verdict fromProto(v1::Verdict verdict) {
+    switch (verdict) {
+        case v1::VERDICT_SAME_OBJECT: return Verdict::kSameObject;
+        case v1::VERDICT_SAME_OBJECT_BENT: return Verdict::kSameObjectBent;
+        case v1::VERDICT_PART: return Verdict::kPart;
+        case v1::VERDICT_SAME_KIND: return Verdict::kSameKind;
+        case v1::VERDICT_UNRELATED: return Verdict::kUnrelated;
+        default: return Verdict::kNone;
     }
 }
 

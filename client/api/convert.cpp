@@ -237,6 +237,18 @@ Fit fromWire(const v1::Fit& from) {
     return to;
 }
 
+Comparison fromWire(const v1::CompareResponse& from) {
+    Comparison to;
+    to.score = from.score();
+    to.explanation = fromWire(from.explanation());
+    to.query = fromWire(from.query());
+    to.other = fromWire(from.other());
+    if (from.has_fit()) to.fit = fromWire(from.fit());
+    to.verdict = wire::fromProto(from.verdict());
+    to.verdictReliability = from.verdict_reliability();
+    return to;
+}
+
 SearchReply fromWire(const v1::SearchResponse& from) {
     SearchReply to;
     for (const v1::Hit& hit : from.hits()) {
@@ -246,6 +258,8 @@ SearchReply fromWire(const v1::SearchResponse& from) {
         out.signatureScore = hit.signature_score();
         if (hit.has_explanation()) out.explanation = fromWire(hit.explanation());
         if (hit.has_fit()) out.fit = fromWire(hit.fit());
+        out.verdict = wire::fromProto(hit.verdict());
+        out.verdictReliability = hit.verdict_reliability();
         to.hits.push_back(std::move(out));
     }
     to.candidates = from.candidates();

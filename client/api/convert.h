@@ -48,7 +48,8 @@ void fillParameters(const Parameters& from, Message* to) {
 [[nodiscard]] SegmentationReport fromWire(const v1::SegmentationReport& from);
 [[nodiscard]] Explanation fromWire(const v1::Explanation& from);
 [[nodiscard]] Fit fromWire(const v1::Fit& from);
-[[nodiscard]] SearchReply fromWire(const v1::SearchResponse& from);
+[[nodiscard]] Comparison fromWire(const v1::CompareResponse& from);
+SearchReply fromWire(const v1::SearchResponse& from);
 [[nodiscard]] Collection fromWire(const v1::Collection& from);
 [[nodiscard]] RebuildProgress fromWire(const v1::RebuildProgress& from);
 [[nodiscard]] Stats fromWire(const v1::StatsResponse& from);

@@ -87,8 +87,7 @@ Result<Comparison> Client::compare(const ShapeRef& query, const ShapeRef& other,
     const auto response = callUnary(impl_->options, context, kIdempotent, *impl_->search,
                                     &v1::SearchService::Stub::Compare, request);
     RETURN_IF_ERROR(response);
-    return Comparison{response->score(), fromWire(response->explanation()), fromWire(response->query()),
-                      fromWire(response->other())};
+    return fromWire(*response);
 }
 
 }  // namespace shapedb::client

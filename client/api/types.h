@@ -11,6 +11,7 @@
 
 #include "core/base/error.h"
 #include "core/base/metadata.h"
+#include "core/fit/verdict_kinds.h"
 #include "core/geometry/motion.h"
 #include "core/geometry/point.h"
 #include "core/profile.h"
@@ -293,6 +294,8 @@ struct Hit {
     double signatureScore = 0.0;             ///< what the signatures alone say; the same if not verified
     std::optional<Explanation> explanation;  ///< unless the options leave it out
     std::optional<Fit> fit;                  ///< if it was verified
+    Verdict verdict = Verdict::kNone;        ///< what the hit is to the query
+    double verdictReliability = 0.0;  ///< how often such a verdict was right where it was measured, [0, 1]
 };
 
 struct SearchReply {
@@ -317,10 +320,13 @@ struct BatchQuery {
 };
 
 struct Comparison {
-    double score = 0.0;
+    double score = 0.0;  ///< of the signatures
     Explanation explanation;
     Signature query;
     Signature other;
+    std::optional<Fit> fit{};  ///< how `other` lies on `query`, if both have surface points
+    Verdict verdict = Verdict::kNone;
+    double verdictReliability = 0.0;  ///< as in Hit
 };
 
 struct Collection {

@@ -33,6 +33,7 @@ struct AddFlags {
     bool insertOnly = false;
     bool updateOnly = false;
     bool wait = false;
+    bool each = false;
     unsigned jobs = 1;
     ScanFlags scan;
 };
@@ -42,6 +43,7 @@ struct Upload {
     std::string name;  ///< relative to the given path; decides key and seed
     std::string key;
     std::string label;
+    std::optional<std::size_t> object;  ///< --each: which of the objects of the scan
     std::optional<client::AddReply> reply;
     std::optional<Error> failure;
 };
@@ -79,6 +81,27 @@ Result<std::vector<Upload>> listUploads(const AddFlags& flags) {
     return uploads;
 }
 
+/// --each: one upload for each object of a scan, with keys KEY/1, KEY/2, ... if there are several. A file
+/// that cannot be read is left as it is: its upload says why.
+Result<std::vector<Upload>> oneForEachObject(std::vector<Upload> files, const AddFlags& flags,
+                                             const RunContext& context) {
+    std::vector<Upload> uploads;
+    for (Upload& file : files) {
+        RETURN_IF_ERROR(context.checkpoint());
+        const auto scan =
+            loadScan(file.path, flags.scan, fileSeed(flags.scan.seed, file.name), context, true);
+        const std::size_t objects = scan ? scan->scene->objects.size() : 0;
+        if (objects == 0) uploads.push_back(file);
+        for (std::size_t i = 0; i < objects; ++i) {
+            Upload one = file;
+            one.object = i;
+            if (objects > 1) one.key += "/" + std::to_string(i + 1);
+            uploads.push_back(std::move(one));
+        }
+    }
+    return uploads;
+}
+
 client::AddRequest requestFor(const AddFlags& flags, const client::Metadata& metadata, const Upload& upload) {
     client::AddRequest request;
     request.shape = {flags.collection, upload.key};
@@ -91,11 +114,13 @@ client::AddRequest requestFor(const AddFlags& flags, const client::Metadata& met
 
 void uploadOne(const client::Client& client, const AddFlags& flags, const client::Metadata& metadata,
                Upload& upload, const RunContext& context) {
-    const auto scan = loadScan(upload.path, flags.scan, fileSeed(flags.scan.seed, upload.name), context);
+    auto scan = loadScan(upload.path, flags.scan, fileSeed(flags.scan.seed, upload.name), context,
+                         upload.object.has_value());
     if (!scan) {
         upload.failure = scan.error();
         return;
     }
+    if (upload.object) scan->points = pointsOfObject(scan->points, *scan->scene, *upload.object);
     auto reply = client.addShape(requestFor(flags, metadata, upload), scan->points, context);
     if (!reply) {
         upload.failure = reply.error();
@@ -250,6 +275,10 @@ CommandResult runAdd(Session& session, const AddFlags& flags) {
     RETURN_IF_ERROR(metadata);
     auto uploads = listUploads(flags);
     RETURN_IF_ERROR(uploads);
+    if (flags.each) {
+        uploads = oneForEachObject(std::move(*uploads), flags, session.context());
+        RETURN_IF_ERROR(uploads);
+    }
     const auto client = connectToServer(session, Work::kHeavy);
     RETURN_IF_ERROR(client);
     uploadAll(session, *client, flags, *metadata, *uploads);
@@ -281,7 +310,13 @@ void addAddCommand(CLI::App& app, Session& session) {
                      "Files sent at the same time; with 1 their ids follow the order of the files")
         ->check(CLI::Range(1, 64))
         ->capture_default_str();
+    auto* each = command->add_flag("--each", flags->each,
+                                   "Store each of several separate objects of a scan, without the plane that "
+                                   "they stand on, as KEY/1, KEY/2, ...");
     addScanFlags(*command, flags->scan);
+    for (const char* other : {"--drop-plane", "--largest", "--points"}) {
+        each->excludes(command->get_option(other));
+    }
     command->callback(
         [&session, flags] { session.action = [&session, flags] { return runAdd(session, *flags); }; });
 }

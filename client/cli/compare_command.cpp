@@ -6,6 +6,7 @@
 
 #include "client/cli/connection.h"
 #include "client/cli/exit_code.h"
+#include "client/cli/fit_output.h"
 #include "client/cli/local_result.h"
 #include "client/cli/parameters.h"
 #include "client/cli/scan_source.h"
@@ -14,6 +15,7 @@
 #include "client/cli/text.h"
 #include "core/base/return_if_error.h"
 #include "core/matching/score.h"
+#include "core/search/verify.h"
 
 namespace shapedb::cli {
 
@@ -29,14 +31,24 @@ struct CompareFlags {
     ParameterFlags parameters;
 };
 
-Result<Signature> describeFile(Session& session, const CompareFlags& flags, const ShapeParameters& parameters,
+struct Described {
+    Signature signature;
+    std::optional<SurfacePoints> surface;
+};
+
+Result<Described> describeFile(Session& session, const CompareFlags& flags, const ShapeParameters& parameters,
                                const std::string& path) {
     const RunContext context = session.context();
     const auto scan = loadScan(path, flags.scan, flags.scan.seed, context);
     RETURN_IF_ERROR(scan);
-    const auto description = describe(scan->points, parameters, context);
+    auto description = describe(scan->points, parameters, context);
     if (!description) return fail(withContext(description.error(), path + ": "));
-    return description->signature;
+    Described described{std::move(description->signature), std::nullopt};
+    // Without surface points signatures alone are compared.
+    auto surface = makeSurfacePoints(scan->points, context);
+    if (surface) described.surface = std::move(*surface);
+    RETURN_IF_ERROR(context.checkpoint());
+    return described;
 }
 
 Result<client::Comparison> compareFiles(Session& session, const CompareFlags& flags) {
@@ -46,8 +58,25 @@ Result<client::Comparison> compareFiles(Session& session, const CompareFlags& fl
     RETURN_IF_ERROR(a);
     const auto b = describeFile(session, flags, *parameters, flags.b);
     RETURN_IF_ERROR(b);
-    const Explanation explanation = explain(*a, *b, flags.score.resolve());
-    return client::Comparison{explanation.score, toClient(explanation), toClient(*a), toClient(*b)};
+    const ScoreOptions options = flags.score.resolve();
+    client::Comparison comparison;
+    if (a->surface && b->surface) {
+        const auto verified =
+            explainVerified(a->signature, *a->surface, b->signature, *b->surface, options, session.context());
+        RETURN_IF_ERROR(verified);
+        comparison.score = verified->explanation.score;
+        comparison.explanation = toClient(verified->explanation);
+        comparison.fit = toClient(verified->fit);
+        comparison.verdict = verified->verdict;
+        comparison.verdictReliability = reliabilityOf(verified->verdict);
+    } else {
+        const Explanation explanation = explain(a->signature, b->signature, options);
+        comparison.score = explanation.score;
+        comparison.explanation = toClient(explanation);
+    }
+    comparison.query = toClient(a->signature);
+    comparison.other = toClient(b->signature);
+    return comparison;
 }
 
 Result<client::Comparison> compareStored(Session& session, const CompareFlags& flags) {
@@ -70,12 +99,17 @@ CommandResult runCompare(Session& session, const CompareFlags& flags) {
                                {"score", comparison->score},
                                {"explanation", toJson(comparison->explanation)},
                                {"query", toJson(comparison->query)},
-                               {"other", toJson(comparison->other)}};
+                               {"other", toJson(comparison->other)},
+                               {"verdict", verdictJson(comparison->verdict)},
+                               {"verdict_reliability", comparison->verdictReliability}};
+    if (comparison->fit) document["fit"] = toJson(*comparison->fit);
     session.console().document(document);
-    session.console().text(
-        "score " + formatFixed(comparison->score, 3) + "  " + bar(comparison->score, 20) + "\n\n" +
-        explanationText(comparison->explanation, comparison->query, flags.a, flags.b) + "\n" + flags.a +
-        "\n" + signatureTable(comparison->query) + "\n" + flags.b + "\n" + signatureTable(comparison->other));
+    session.console().text("score " + formatFixed(comparison->score, 3) + "  " + bar(comparison->score, 20) +
+                           "  " + verdictText(comparison->verdict) + "\n\n" +
+                           explanationText(comparison->explanation, comparison->query, flags.a, flags.b) +
+                           (comparison->fit ? fitText(*comparison->fit, flags.a, flags.b) : "") + "\n" +
+                           flags.a + "\n" + signatureTable(comparison->query) + "\n" + flags.b + "\n" +
+                           signatureTable(comparison->other));
     return kOk;
 }
 

@@ -88,6 +88,22 @@ std::string fitMotionText(const Motion& motion, const std::string& name) {
     return text + " and moved by " + formatPoint(motion.translation) + ".\n";
 }
 
+std::string verdictText(Verdict verdict) {
+    switch (verdict) {
+        case Verdict::kNone: return "";
+        case Verdict::kSameObject: return "same object";
+        case Verdict::kSameObjectBent: return "same object, bent";
+        case Verdict::kPart: return "query is part of it";
+        case Verdict::kSameKind: return "same kind";
+        case Verdict::kUnrelated: return "unrelated";
+    }
+    return "";
+}
+
+json verdictJson(Verdict verdict) {
+    return verdict == Verdict::kNone ? json(nullptr) : json(verdictName(verdict));
+}
+
 std::string fitText(const client::Fit& fit, const std::string& queryName, const std::string& otherName) {
     const client::FitPose& best = fit.best;
     std::string text = formatPercent(best.explainedQuery) + " of " + queryName + " lies on " + otherName +

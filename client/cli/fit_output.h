@@ -20,6 +20,11 @@ namespace shapedb::cli {
 /// What is done to the shape to lay it on the query, one line.
 [[nodiscard]] std::string fitMotionText(const Motion& motion, const std::string& name);
 
+/// "same object, bent", and so on; "" for none.
+[[nodiscard]] std::string verdictText(Verdict verdict);
+/// verdictName, or null for none.
+[[nodiscard]] nlohmann::json verdictJson(Verdict verdict);
+
 /// How well the shape fits and how certain its pose is; a few lines.
 [[nodiscard]] std::string fitText(const client::Fit& fit, const std::string& queryName,
                                   const std::string& otherName);

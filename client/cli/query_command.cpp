@@ -51,6 +51,8 @@ json replyJson(const client::SearchReply& reply) {
                       {"score", hit.score},
                       {"signature_score", hit.signatureScore},
                       {"verified", hit.fit.has_value()},
+                      {"verdict", verdictJson(hit.verdict)},
+                      {"verdict_reliability", hit.verdictReliability},
                       {"shape", toJson(hit.shape)}};
         if (const auto motion = motionOf(hit, reply.offset)) entry["matrix"] = matrixOf(*motion);
         if (hit.fit) entry["fit"] = toJson(*hit.fit);
@@ -86,6 +88,7 @@ std::string replyText(const QueryFlags& flags, const client::SearchReply& reply)
     text += ", " + formatCount(reply.scored) + " scored in full";
     if (reply.verified > 0) text += ", " + formatCount(reply.verified) + " laid on the query";
     text += ", in " + formatSeconds(reply.secondsSearch) + "\n";
+    if (!reply.exact) text += "others might fit as well: --candidates lays more on the query\n";
     if (reply.pending > 0) {
         text += formatCount(reply.pending, "shape has", "shapes have") +
                 " no signature yet and could not be searched\n";
@@ -94,11 +97,11 @@ std::string replyText(const QueryFlags& flags, const client::SearchReply& reply)
     if (reply.hits.empty()) return text + "Nothing found.\n";
 
     const auto right = Table::Align::kRight;
-    Table table({{"rank", right}, {"score", right}, {""}, {"label"}, {"key"}});
+    Table table({{"rank", right}, {"score", right}, {""}, {"verdict"}, {"label"}, {"key"}});
     for (std::size_t i = 0; i < reply.hits.size(); ++i) {
         const client::Hit& hit = reply.hits[i];
-        table.add({std::to_string(i + 1), formatFixed(hit.score, 3), bar(hit.score, 20), labelOf(hit.shape),
-                   hit.shape.key});
+        table.add({std::to_string(i + 1), formatFixed(hit.score, 3), bar(hit.score, 20),
+                   verdictText(hit.verdict), labelOf(hit.shape), hit.shape.key});
     }
     text += table.render();
     const std::size_t explained = flags.explain ? reply.hits.size() : 1;
@@ -129,9 +132,9 @@ CommandResult runQuery(Session& session, const QueryFlags& flags) {
     options.viewpoint = verify.viewpoint;
     options.explanation = !flags.noExplanation;
     const RunContext context = session.context();
-    Scan scan;
+    LoadedScan scan;
     if (!flags.path.empty()) {
-        auto loaded = loadScan(flags.path, flags.scan, flags.scan.seed, context);
+        auto loaded = loadScan(flags.path, flags.scan, flags.scan.seed, context, true);
         RETURN_IF_ERROR(loaded);
         scan = std::move(*loaded);
     }
@@ -144,8 +147,14 @@ CommandResult runQuery(Session& session, const QueryFlags& flags) {
         if (flags.path.empty()) return fail(reply.error());
         return fail(reply.error().code, flags.path + ": " + reply.error().message);
     }
-    session.console().document(replyJson(*reply));
-    session.console().text(replyText(flags, *reply));
+    json document = replyJson(*reply);
+    std::string text = replyText(flags, *reply);
+    if (scan.scene) {
+        document["scene"] = sceneJson(*scan.scene, scan.pointsInScene, flags.scan.isolate);
+        text = sceneText(*scan.scene, scan.pointsInScene, flags.scan.isolate) + text;
+    }
+    session.console().document(document);
+    session.console().text(text);
     return kOk;
 }
 

@@ -3,8 +3,10 @@
 #include <filesystem>
 
 #include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
 
 #include "client/cli/checks.h"
+#include "client/cli/text.h"
 #include "core/base/random.h"
 #include "core/base/return_if_error.h"
 #include "core/synthetic/noise.h"
@@ -30,7 +32,59 @@ CLI::App& addScanFlagsButNoise(CLI::App& command, ScanFlags& flags) {
         ->add_option("--mesh-samples", flags.meshSamples,
                      "Points to sample from the surface of a mesh [20000]")
         ->check(aboveZero());
+    group->add_flag("--drop-plane", flags.isolate.dropPlane,
+                    "Leave out the plane that the objects stand on, if there is one");
+    group->add_flag("--largest", flags.isolate.largest,
+                    "Keep the largest of several separate objects, without the plane");
     return *group;
+}
+
+namespace {
+
+double shareOf(std::uint64_t part, std::size_t points) {
+    return points > 0 ? static_cast<double>(part) / static_cast<double>(points) : 0.0;
+}
+
+Result<void> isolate(const std::string& path, const ScanFlags& flags, LoadedScan& scan,
+                     const RunContext& context) {
+    auto scene = findScene(scan.points, context);
+    if (!scene) return fail(withContext(scene.error(), path + ": "));
+    scan.pointsInScene = scan.points.size();
+    if (flags.isolate.any()) scan.points = isolated(scan.points, *scene, flags.isolate);
+    scan.scene = std::move(*scene);
+    return {};
+}
+
+}  // namespace
+
+std::string sceneText(const Scene& scene, std::size_t points, const IsolateOptions& isolate) {
+    std::string text;
+    if (scene.plane) {
+        text += formatPercent(shareOf(scene.plane->points, points)) + " of the points lie on one plane" +
+                (isolate.any() ? ", left out\n" : ": --drop-plane leaves them out\n");
+    }
+    if (scene.objects.size() > 1) {
+        text += std::to_string(scene.objects.size()) + " separate objects (";
+        for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+            text += (i > 0 ? ", " : "") + formatPercent(shareOf(scene.objects[i], points));
+        }
+        text += isolate.largest ? "), only the largest is kept\n" : "): --largest keeps the first\n";
+    }
+    return text;
+}
+
+nlohmann::json sceneJson(const Scene& scene, std::size_t points, const IsolateOptions& isolate) {
+    nlohmann::json plane;
+    if (scene.plane) {
+        const SupportPlane& found = *scene.plane;
+        plane = {{"share", shareOf(found.points, points)},
+                 {"point", {found.point.x, found.point.y, found.point.z}},
+                 {"normal", {found.normal.x, found.normal.y, found.normal.z}},
+                 {"removed", isolate.any()}};
+    }
+    nlohmann::json objects = nlohmann::json::array();
+    for (const std::uint64_t object : scene.objects) objects.push_back(shareOf(object, points));
+    return {{"plane", plane}, {"objects", objects}};
 }
 
 std::uint64_t fileSeed(std::uint64_t seed, const std::string& name) {
@@ -42,8 +96,8 @@ std::uint64_t fileSeed(std::uint64_t seed, const std::string& name) {
     return Random(seed ^ hash).next();
 }
 
-Result<Scan> loadScan(const std::string& path, const ScanFlags& flags, std::uint64_t seed,
-                      const RunContext& context) {
+Result<LoadedScan> loadScan(const std::string& path, const ScanFlags& flags, std::uint64_t seed,
+                            const RunContext& context, bool look) {
     if (flags.points && *flags.points < 4) {
         return fail(ErrorCode::kInvalidArgument,
                     "--points is " + std::to_string(*flags.points) + "; a shape needs at least 4");
@@ -51,8 +105,10 @@ Result<Scan> loadScan(const std::string& path, const ScanFlags& flags, std::uint
     ReadOptions options;
     options.meshSamples = flags.meshSamples;
     options.seed = flags.seed;
-    auto scan = readScan(path, options, context);
-    RETURN_IF_ERROR(scan);
+    auto read = readScan(path, options, context);
+    RETURN_IF_ERROR(read);
+    Result<LoadedScan> scan = LoadedScan{std::move(*read), std::nullopt, 0};
+    if (look || flags.isolate.any()) RETURN_IF_ERROR(isolate(path, flags, *scan, context));
     // Two streams, so that the subset does not depend on the noise.
     Random random(seed);
     const std::uint64_t noiseSeed = random.next();

@@ -5,9 +5,12 @@
 #include <optional>
 #include <string>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "client/io/scan_reader.h"
 #include "core/base/error.h"
 #include "core/base/run_context.h"
+#include "core/preparation/scene.h"
 
 namespace CLI {
 class App;
@@ -15,12 +18,13 @@ class App;
 
 namespace shapedb::cli {
 
-/// --noise, --points, --seed and --mesh-samples.
+/// --noise, --points, --seed, --mesh-samples, --drop-plane and --largest.
 struct ScanFlags {
     double noise = 0.0;                   ///< standard deviation, as a share of the bounding-box diagonal
     std::optional<std::uint64_t> points;  ///< size of a random subset
     std::uint64_t seed = 1;
     std::uint64_t meshSamples = ReadOptions{}.meshSamples;
+    IsolateOptions isolate;
 };
 
 /// `flags` must outlive the parsing.
@@ -33,12 +37,26 @@ CLI::App& addScanFlagsButNoise(CLI::App& command, ScanFlags& flags);
 /// order of files, the number of threads or the other files.
 [[nodiscard]] std::uint64_t fileSeed(std::uint64_t seed, const std::string& name);
 
-/// Reads `path`, adds noise to all points, then takes the subset, with random numbers from `seed`. Points
-/// sampled from a mesh depend on flags.seed alone.
+/// What a scan shows besides its object, for people: a table under it, several objects, and what of them was
+/// left out. Empty if there is nothing to say.
+[[nodiscard]] std::string sceneText(const Scene& scene, std::size_t points, const IsolateOptions& isolate);
+/// {plane: null or {share, point, normal, removed}, objects: [shares]}.
+[[nodiscard]] nlohmann::json sceneJson(const Scene& scene, std::size_t points, const IsolateOptions& isolate);
+
+/// A scan as the commands use it.
+struct LoadedScan : Scan {
+    std::optional<Scene> scene;     ///< of the file, if it was looked at
+    std::size_t pointsInScene = 0;  ///< before any were left out
+};
+
+/// Reads `path`, leaves out what flags.isolate says, adds noise to all points, then takes the subset, with
+/// random numbers from `seed`. Points sampled from a mesh depend on flags.seed alone.
 ///
-/// Errors: those of readScan; kInvalidArgument if fewer than 4 points are asked for.
-[[nodiscard]] Result<Scan> loadScan(const std::string& path, const ScanFlags& flags, std::uint64_t seed,
-                                    const RunContext& context = {});
+/// `look`: finds the scene also when nothing is left out.
+///
+/// Errors: those of readScan and findScene; kInvalidArgument if fewer than 4 points are asked for.
+[[nodiscard]] Result<LoadedScan> loadScan(const std::string& path, const ScanFlags& flags, std::uint64_t seed,
+                                          const RunContext& context = {}, bool look = false);
 
 /// `path` relative to `folder`, with '/' as separator; the file name if `folder` is the file itself.
 [[nodiscard]] std::string relativeName(const std::string& path, const std::string& folder);

@@ -25,11 +25,13 @@ struct SegmentFlags {
     ParameterFlags parameters;
 };
 
-nlohmann::json segmentJson(const SegmentFlags& flags, const Scan& scan, const ShapeParameters& parameters,
-                           const client::SegmentationReport& report, const client::Signature& signature) {
+nlohmann::json segmentJson(const SegmentFlags& flags, const LoadedScan& scan,
+                           const ShapeParameters& parameters, const client::SegmentationReport& report,
+                           const client::Signature& signature) {
     nlohmann::json document = toJson(report);
     document["file"] = flags.file;
     document["format"] = scan.format;
+    document["scene"] = sceneJson(*scan.scene, scan.pointsInScene, flags.scan.isolate);
     document["sampled_from_mesh"] = scan.sampledFromMesh;
     document["skipped_non_finite"] = scan.skippedNonFinite;
     document["noise"] = flags.scan.noise;
@@ -42,7 +44,7 @@ nlohmann::json segmentJson(const SegmentFlags& flags, const Scan& scan, const Sh
     return document;
 }
 
-std::string segmentText(const SegmentFlags& flags, const Scan& scan, const ShapeParameters& parameters,
+std::string segmentText(const SegmentFlags& flags, const LoadedScan& scan, const ShapeParameters& parameters,
                         const client::SegmentationReport& report, const client::Signature& signature) {
     std::string text = flags.file + ": " + scan.format + ", " +
                        formatCount(report.points, "point", "points") +
@@ -50,6 +52,7 @@ std::string segmentText(const SegmentFlags& flags, const Scan& scan, const Shape
     if (scan.skippedNonFinite > 0) {
         text += formatCount(scan.skippedNonFinite, "point", "points") + " without a measurement skipped\n";
     }
+    text += sceneText(*scan.scene, scan.pointsInScene, flags.scan.isolate);
     text += preparationText(report);
     text += formatCount(report.segments, "part", "parts") + ", volume " + formatNumber(report.volume) + "; " +
             formatCount(report.tetrahedra) + " tetrahedra, profile " + profileName(parameters.profile) +
@@ -67,7 +70,7 @@ CommandResult runSegment(Session& session, const SegmentFlags& flags) {
     const auto parameters = flags.parameters.resolve();
     RETURN_IF_ERROR(parameters);
     const RunContext context = session.context();
-    const auto scan = loadScan(flags.file, flags.scan, flags.scan.seed, context);
+    const auto scan = loadScan(flags.file, flags.scan, flags.scan.seed, context, true);
     RETURN_IF_ERROR(scan);
     const auto description = describe(scan->points, *parameters, context);
     if (!description) {

@@ -58,6 +58,9 @@ constexpr double kHandsAlike = 0.99;
 constexpr std::array<double, 3> kTypicalMisfit{0.70, 0.65, 0.60};
 constexpr std::array<FitKind, 3> kKinds{FitKind::kWhole, FitKind::kOneSided, FitKind::kPiece};
 
+// What 1 - F of two clean scans of one object is at least.
+constexpr double kScansApart = 0.06;
+
 // A score of whole shapes from which on no other kind is tried.
 constexpr double kWholeEnough = 0.85;
 
@@ -141,7 +144,10 @@ Result<std::vector<Candidate>> candidatesOf(Comparison& comparison, FitKind kind
     return distinct(candidates, candidates.size(), kDifferent, comparison);
 }
 
-double misfitOf(const Candidate& c) { return (1.0 - c.score()) / typicalMisfit(c.view.kind); }
+double misfitOf(double score, FitKind kind) {
+    return std::max(0.0, 1.0 - score - kScansApart) / (typicalMisfit(kind) - kScansApart);
+}
+double misfitOf(const Candidate& c) { return misfitOf(c.score(), c.view.kind); }
 
 FitPose poseOf(const Candidate& c, Comparison& comparison, bool keepScale) {
     FitPose pose;
@@ -196,7 +202,7 @@ FitResult unlike(const FitQuery& query, const FitPoints& other, const FitOptions
     FitResult result;
     result.kind =
         *std::find_if(kKinds.begin(), kKinds.end(), [&](FitKind kind) { return options.kinds.allows(kind); });
-    result.misfit = 1.0 / typicalMisfit(result.kind);
+    result.misfit = misfitOf(0.0, result.kind);
     result.best.motion.translation = query.points().toScan.translation - other.toScan.translation;
     return result;
 }

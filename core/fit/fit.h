@@ -65,7 +65,8 @@ struct FreeAxis {
 struct FitResult {
     FitPose best;
     FitKind kind = FitKind::kWhole;  ///< as what the query was fitted
-    /// (1 - F of the best) / typicalMisfit(kind): 0 if the shapes coincide, about 1 if they are unrelated.
+    /// (1 - F - e) / (typicalMisfit(kind) - e) of the best, at least 0, where e = 0.06 is what two scans of
+    /// one object differ by at best: 0 if the shapes coincide, about 1 if they are unrelated.
     double misfit = 1.0;
     /// 1 - F of the best clearly different pose / F of the best: 0 when another is as good, 1 when there is
     /// no other comes near: poses that fall below 0.85 of the best before the last stage are not followed,

@@ -11,62 +11,27 @@
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
 
-#include "core/base/disjoint_sets.h"
-#include "core/base/parallel.h"
 #include "core/base/return_if_error.h"
+#include "core/preparation/surroundings.h"
 
 namespace shapedb {
 
 namespace {
 
-constexpr std::size_t kNeighbours = 8;
 constexpr std::size_t kSurroundings = 12;  // enough to tell a surface from a haze
-constexpr double kCommonShare = 0.9;
 constexpr double kHazeReach = 2.5;
 // Spread across the local plane over spread along it: below this on a surface, unless its radius of
 // curvature is as small as its spacing.
 constexpr double kHazeFlatness = 0.25;
-constexpr double kLinkInReaches = 3.0;     // of the common reach
-constexpr double kOwnLinkInReaches = 1.5;  // of the mean reach of the two ends
 constexpr double kSmallGroupShare = 0.01;
 constexpr double kRareShare = 0.05;         // of the points: groups of like size hold less
 constexpr std::size_t kFewestOfABody = 24;  // points; a smaller group shows no surface
 constexpr std::size_t kCluster = 9;         // points; fewer are single outliers, not a cluster
 
-// Each point's nearest neighbours, without itself.
-struct Surroundings {
-    std::vector<std::uint32_t> near;  // kNeighbours per point, nearest first
-    std::vector<double> reach;
-    double common = 0.0;  // the reach that kCommonShare of the points stay within
-
-    std::uint32_t neighbour(std::size_t point, std::size_t rank) const {
-        return near[point * kNeighbours + rank];
-    }
-};
-
-Result<Surroundings> measureReaches(const PointCloud& points, const NeighbourIndex& index,
-                                    const RunContext& context) {
-    Surroundings around;
-    around.near.resize(points.size() * kNeighbours);
-    around.reach.resize(points.size());
-    const auto measureOne = [&, found = std::vector<Neighbour>()](std::uint32_t i) mutable {
-        index.nearest(points[i], kNeighbours + 1, found);  // the first is the point itself
-        for (std::size_t k = 0; k < kNeighbours; ++k) around.near[i * kNeighbours + k] = found[k + 1].point;
-        around.reach[i] = std::sqrt(found.back().squaredDistance);
-    };
-    RETURN_IF_ERROR(parallelForPoints(index.order(), context, measureOne));
-    std::vector<double> sorted = around.reach;
-    const auto common =
-        sorted.begin() + static_cast<std::ptrdiff_t>(kCommonShare * static_cast<double>(sorted.size() - 1));
-    std::nth_element(sorted.begin(), common, sorted.end());
-    around.common = *common;
-    return around;
-}
-
 bool standsOff(const Surroundings& around, std::size_t i, double ratio) {
     double sum = 0.0;
-    for (std::size_t k = 0; k < kNeighbours; ++k) sum += around.reach[around.neighbour(i, k)];
-    return around.reach[i] * static_cast<double>(kNeighbours) > ratio * sum;
+    for (std::size_t k = 0; k < kReachNeighbours; ++k) sum += around.reach[around.neighbour(i, k)];
+    return around.reach[i] * static_cast<double>(kReachNeighbours) > ratio * sum;
 }
 
 bool liesInHaze(const PointCloud& points, const NeighbourIndex& index, const Point3& p,
@@ -123,16 +88,7 @@ class Debris {
 // A group: points connected by short links between neighbours.
 void markDebris(const PointCloud& points, const Surroundings& around, Outliers& found) {
     std::vector<std::uint8_t>& outlier = found.isOutlier;
-    DisjointSets groups(points.size());
-    for (std::uint32_t i = 0; i < points.size(); ++i) {
-        for (std::size_t k = 0; !outlier[i] && k < kNeighbours; ++k) {
-            const std::uint32_t j = around.neighbour(i, k);
-            if (outlier[j]) continue;
-            const double link = std::max(kLinkInReaches * around.common,
-                                         kOwnLinkInReaches * 0.5 * (around.reach[i] + around.reach[j]));
-            if (squaredDistance(points[i], points[j]) <= link * link) groups.unite(i, j);
-        }
-    }
+    DisjointSets groups = linkedGroups(points, around, outlier);
     std::vector<std::uint32_t> size(points.size(), 0);
     // An outlier is joined to nothing: it neither bridges two groups nor makes one large.
     for (std::uint32_t i = 0; i < points.size(); ++i) ++size[groups.find(i)];

@@ -7,6 +7,7 @@
 #include "core/base/parallel.h"
 #include "core/base/return_if_error.h"
 #include "core/matching/kernel.h"
+#include "core/matching/score.h"
 #include "core/matching/score_scale.h"
 #include "core/search/view_search.h"
 #include "core/views/views.h"
@@ -64,8 +65,8 @@ class Verifier {
     // not among them has no better signature score than the last of them.
     Result<VerifiedResult> run(const std::vector<SearchHit>& candidates, std::size_t most, bool all) {
         for (const SearchHit& candidate : candidates) {
-            hits_.push_back(
-                {candidate.id, scoreOf(candidate.score, kUnverifiedMisfit), candidate.score, nullptr});
+            hits_.push_back({candidate.id, scoreOf(candidate.score, kUnverifiedMisfit), candidate.score,
+                             nullptr, Verdict::kNone});
         }
         const std::size_t limit = std::min(most, hits_.size());
         std::size_t done = 0;
@@ -131,6 +132,7 @@ class Verifier {
         auto fitted = fit(query_, **surface, fit_, quiet);
         RETURN_IF_ERROR(fitted);
         hit.score = scoreOf(hit.signatureScore, fitted->misfit);
+        hit.verdict = verdictOf(distanceOfScore(hit.signatureScore), *fitted);
         hit.fit = std::make_shared<const FitResult>(std::move(*fitted));
         return {};
     }
@@ -166,7 +168,8 @@ double misfitShare(const QueryTraits& traits, const ScoreOptions& score) noexcep
 
 VerifiedResult unverified(SearchResult found) {
     VerifiedResult result;
-    for (const SearchHit& hit : found.hits) result.hits.push_back({hit.id, hit.score, hit.score, nullptr});
+    for (const SearchHit& hit : found.hits)
+        result.hits.push_back({hit.id, hit.score, hit.score, nullptr, Verdict::kNone});
     result.exact = true;
     result.counts = found.counts;
     result.seconds = found.seconds;
@@ -177,6 +180,22 @@ VerifiedResult unverified(SearchResult found) {
 double verifiedScore(double signatureScore, double misfit, double share) {
     if (signatureScore >= 1.0) return 1.0;
     return belowOne(scoreOfDistance((1.0 - share) * distanceOfScore(signatureScore) + share * misfit));
+}
+
+Result<VerifiedExplanation> explainVerified(const Signature& query, const SurfacePoints& querySurface,
+                                            const Signature& other, const SurfacePoints& otherSurface,
+                                            const ScoreOptions& options, const RunContext& context) {
+    const auto traits = traitsOf(query, querySurface);
+    RETURN_IF_ERROR(traits);
+    auto fitted = fit(FitQuery(querySurface), otherSurface,
+                      {kindsOfQuery(*traits), options.keepScale, options.reflection}, context);
+    RETURN_IF_ERROR(fitted);
+    VerifiedExplanation result;
+    result.explanation = explain(query, other, options);
+    result.explanation.motion = fitted->best.motion;
+    result.verdict = verdictOf(distanceOfScore(result.explanation.score), *fitted);
+    result.fit = std::move(*fitted);
+    return result;
 }
 
 namespace {

@@ -15,6 +15,7 @@
 #include "core/base/error.h"
 #include "core/base/run_context.h"
 #include "core/fit/fit.h"
+#include "core/fit/verdict.h"
 #include "core/geometry/point.h"
 #include "core/search/top_k.h"
 
@@ -44,6 +45,7 @@ struct VerifiedHit {
     double score = 0.0;
     double signatureScore = 0.0;           ///< as topK gives it
     std::shared_ptr<const FitResult> fit;  ///< null if it was not verified
+    Verdict verdict = Verdict::kNone;
 };
 
 struct VerifiedResult {
@@ -90,6 +92,18 @@ struct QueryTraits {
 
 /// The weight of the misfit, in (0, 1).
 [[nodiscard]] double misfitShare(const QueryTraits& traits, const ScoreOptions& score) noexcept;
+
+/// Two shapes compared, and one laid on the other.
+struct VerifiedExplanation {
+    Explanation explanation;  ///< of the signatures; its motion is that of the fit
+    FitResult fit;
+    Verdict verdict = Verdict::kNone;
+};
+
+/// As for a hit of a search. Reports progress as stage "fit". Errors: those of fit.
+[[nodiscard]] Result<VerifiedExplanation> explainVerified(
+    const Signature& query, const SurfacePoints& querySurface, const Signature& other,
+    const SurfacePoints& otherSurface, const ScoreOptions& options, const RunContext& context = {});
 
 /// The `options.k` best scores of a snapshot, verified. Uses the threads of the caller's oneTBB arena; their
 /// number does not change a bit. Reports progress as stages "search", "views" and "verify".

@@ -76,4 +76,21 @@ Result<store::VerifiedScan> ScanUpload::finish() {
     return verifier_.finish(expected_ ? &*expected_ : nullptr);
 }
 
+Result<store::VerifiedScan> isolated(store::VerifiedScan scan, const IsolateOptions& options,
+                                     const RunContext& context) {
+    if (!options.any()) return scan;
+    const auto scene = findScene(store::toCloud(scan.points()), context);
+    RETURN_IF_ERROR(scene);
+    std::vector<float> kept;
+    for (std::size_t i = 0; i < scene->objectOfPoint.size(); ++i) {
+        if (!options.keeps(scene->objectOfPoint[i])) continue;
+        const auto first = scan.points().begin() + static_cast<std::ptrdiff_t>(3 * i);
+        kept.insert(kept.end(), first, first + 3);
+    }
+    if (kept.size() == scan.points().size()) return scan;
+    auto rest = store::VerifiedScan::verify(std::move(kept));
+    if (!rest) return fail(withContext(rest.error(), "without its plane and other objects: "));
+    return rest;
+}
+
 }  // namespace shapedb::catalog

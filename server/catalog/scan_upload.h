@@ -7,6 +7,8 @@
 #include <string>
 
 #include "core/base/error.h"
+#include "core/base/run_context.h"
+#include "core/preparation/scene.h"
 #include "server/catalog/gates.h"
 #include "server/store/verified_scan.h"
 
@@ -44,5 +46,10 @@ class ScanUpload {
     std::optional<store::Checksum> expected_;
     store::ScanVerifier verifier_;
 };
+
+/// The part of a scan that `options` keep; the scan itself if that is all of it. Errors: those of findScene
+/// and of store::ScanVerifier::finish (too few points are left).
+[[nodiscard]] Result<store::VerifiedScan> isolated(store::VerifiedScan scan, const IsolateOptions& options,
+                                                   const RunContext& context);
 
 }  // namespace shapedb::catalog

@@ -106,15 +106,15 @@ Result<Comparison> Searches::compare(const ShapeName& query, const ShapeName& ot
     auto second = compared("other", other);
     RETURN_IF_ERROR(second);
     Comparison comparison;
-    comparison.explanation = shapedb::explain(first->signature, second->signature, options);
     if (first->surface && second->surface) {
-        const auto traits = traitsOf(first->signature, *first->surface);
-        RETURN_IF_ERROR(traits);
-        const FitOptions fitted{kindsOfQuery(*traits), options.keepScale, options.reflection};
-        auto fit = shapedb::fit(FitQuery(*first->surface), *second->surface, fitted, context);
-        RETURN_IF_ERROR(fit);
-        comparison.explanation.motion = fit->best.motion;
-        comparison.fit = std::move(*fit);
+        auto verified = explainVerified(first->signature, *first->surface, second->signature,
+                                        *second->surface, options, context);
+        RETURN_IF_ERROR(verified);
+        comparison.explanation = std::move(verified->explanation);
+        comparison.fit = std::move(verified->fit);
+        comparison.verdict = verified->verdict;
+    } else {
+        comparison.explanation = shapedb::explain(first->signature, second->signature, options);
     }
     comparison.query = std::move(first->signature);
     comparison.other = std::move(second->signature);
@@ -199,6 +199,7 @@ Result<void> Searches::visitHits(const PreparedSearch& search, const VerifiedRes
         out.score = hit.score;
         out.signatureScore = hit.signatureScore;
         out.fit = hit.fit;
+        out.verdict = hit.verdict;
         if (search.explain) {
             auto explanation = explain(search, found, hit);
             RETURN_IF_ERROR(explanation);

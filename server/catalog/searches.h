@@ -62,6 +62,7 @@ struct Comparison {
     Signature other;
     Explanation explanation;
     std::optional<FitResult> fit;  ///< if both have surface points
+    Verdict verdict = Verdict::kNone;
 };
 
 struct FoundHit {
@@ -71,6 +72,7 @@ struct FoundHit {
     double signatureScore = 0.0;
     std::optional<Explanation> explanation;  ///< its motion is that of `fit`, if there is one
     std::shared_ptr<const FitResult> fit;    ///< null if it was not verified
+    Verdict verdict = Verdict::kNone;
 };
 
 /// How many bytes an answer may still grow by. One for each request.

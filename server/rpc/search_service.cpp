@@ -63,6 +63,8 @@ Result<void> answer(const Services& services, const catalog::PreparedSearch& pre
         out->set_score(hit.score);
         out->set_signature_score(hit.signatureScore);
         if (hit.fit) toProto(*hit.fit, out->mutable_fit());
+        out->set_verdict(wire::toProto(hit.verdict));
+        out->set_verdict_reliability(reliabilityOf(hit.verdict));
         if (hit.explanation) toProto(*hit.explanation, out->mutable_explanation());
         return room.take(out->ByteSizeLong());
     });
@@ -183,6 +185,8 @@ grpc::Status SearchServiceHandler::Compare(grpc::ServerContext* context, const v
         response->set_score(compared->explanation.score);
         toProto(compared->explanation, response->mutable_explanation());
         if (compared->fit) toProto(*compared->fit, response->mutable_fit());
+        response->set_verdict(wire::toProto(compared->verdict));
+        response->set_verdict_reliability(reliabilityOf(compared->verdict));
         toProto(compared->query, response->mutable_query());
         toProto(compared->other, response->mutable_other());
         return {};

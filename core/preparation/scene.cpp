@@ -1,0 +1,361 @@
+#include "core/preparation/scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <new>
+#include <numeric>
+#include <utility>
+
+#include "core/base/random.h"
+#include "core/base/return_if_error.h"
+#include "core/geometry/box.h"
+#include "core/geometry/neighbours.h"
+#include "core/geometry/principal_axes.h"
+#include "core/preparation/surroundings.h"
+
+namespace shapedb {
+
+namespace {
+
+// More points than this are represented by so many.
+constexpr std::size_t kMostPoints = 20000;
+constexpr std::size_t kFewestPoints = 16;
+
+// Planes through three points; one that holds a fifth of the points is drawn with them all but certainly.
+constexpr int kDraws = 1500;
+constexpr std::size_t kCountedPoints = 2000;  // among which the points of a drawn plane are counted
+constexpr int kPlanes = 3;                    // looked at, most points first
+
+// Shares of the diagonal of the scan: points so near are counted, and belong to the fitted plane at least and
+// at most so near.
+constexpr double kCountedWithin = 0.006;
+constexpr double kLeastWithin = 0.002;
+constexpr double kWithinDeviations = 3.0;  // of its own points
+
+constexpr double kLeastPlaneShare = 0.1;
+constexpr double kLeastRestShare = 0.03;
+constexpr double kOneSideShare = 0.95;
+
+// The plane and what stands on it are compared in cells of this share of the diagonal. The plane reaches
+// beyond if it has so many cells with nothing above, for one with something above.
+constexpr double kCell = 1.0 / 48.0;
+constexpr double kBeyond = 0.3;
+// And so much of what is above is above the convex hull of the plane's points: a handle is not above a blade.
+constexpr double kAbovePlane = 0.8;
+
+constexpr double kLeastObject = 0.02;
+
+struct Plane {
+    Point3 point;
+    Point3 normal;
+
+    double height(const Point3& p) const { return dot(normal, p - point); }
+};
+
+std::optional<Plane> through(const Point3& a, const Point3& b, const Point3& c) {
+    const Point3 n = cross(b - a, c - a);
+    const double area = length(n);
+    if (!(area > 0.0)) return std::nullopt;
+    return Plane{a, (1.0 / area) * n};
+}
+
+std::size_t countNear(const PointCloud& points, const std::vector<std::uint32_t>& among, const Plane& plane,
+                      double within) {
+    return static_cast<std::size_t>(std::count_if(among.begin(), among.end(), [&](std::uint32_t i) {
+        return std::abs(plane.height(points[i])) <= within;
+    }));
+}
+
+// By least squares to the points of `among` that are near.
+Plane fitted(const PointCloud& points, const std::vector<std::uint32_t>& among, const Plane& plane,
+             double within) {
+    PointCloud near;
+    for (const std::uint32_t i : among) {
+        if (std::abs(plane.height(points[i])) <= within) near.push_back(points[i]);
+    }
+    if (near.size() < 3) return plane;
+    Point3 sum;
+    for (const Point3& p : near) sum = sum + p;
+    const std::array<double, 3> normal = principalAxes(near)[2];
+    return {(1.0 / static_cast<double>(near.size())) * sum, {normal[0], normal[1], normal[2]}};
+}
+
+// Cells of the plane, each once.
+class Footprint {
+  public:
+    Footprint(const Plane& plane, double cell) : plane_(plane), cell_(cell) {
+        const Point3 n = plane.normal;
+        const Point3 other = std::abs(n.x) < 0.6 ? Point3{1, 0, 0} : Point3{0, 1, 0};
+        u_ = cross(n, other);
+        u_ = (1.0 / length(u_)) * u_;
+        v_ = cross(n, u_);
+    }
+    using Cell = std::pair<int, int>;
+    Cell cellOf(const Point3& p) const {
+        const Point3 d = p - plane_.point;
+        return {static_cast<int>(std::floor(dot(d, u_) / cell_)),
+                static_cast<int>(std::floor(dot(d, v_) / cell_))};
+    }
+
+  private:
+    Plane plane_;
+    double cell_;
+    Point3 u_, v_;
+};
+
+// Corners of the convex hull of sorted cells, counter-clockwise (Andrew's monotone chain).
+std::vector<Footprint::Cell> hullOf(const std::vector<Footprint::Cell>& sorted) {
+    using Cell = Footprint::Cell;
+    const auto turn = [](const Cell& a, const Cell& b, const Cell& c) {
+        return static_cast<long>(b.first - a.first) * (c.second - a.second) -
+               static_cast<long>(b.second - a.second) * (c.first - a.first);
+    };
+    std::vector<Cell> hull;
+    const auto chain = [&](auto begin, auto end) {
+        const std::size_t first = hull.size();
+        for (auto cell = begin; cell != end; ++cell) {
+            while (hull.size() >= first + 2 && turn(hull[hull.size() - 2], hull.back(), *cell) <= 0)
+                hull.pop_back();
+            hull.push_back(*cell);
+        }
+        hull.pop_back();  // it begins the other chain
+    };
+    chain(sorted.begin(), sorted.end());
+    chain(sorted.rbegin(), sorted.rend());
+    return hull;
+}
+
+bool isInside(const Footprint::Cell& cell, const std::vector<Footprint::Cell>& hull) {
+    for (std::size_t i = 0; i < hull.size(); ++i) {
+        const Footprint::Cell& a = hull[i];
+        const Footprint::Cell& b = hull[(i + 1) % hull.size()];
+        if (static_cast<long>(b.first - a.first) * (cell.second - a.second) <
+            static_cast<long>(b.second - a.second) * (cell.first - a.first)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+// Whether what is not on the plane stands on it; turns the normal towards it.
+bool supports(const PointCloud& points, Plane& plane, double within, double diagonal) {
+    std::size_t above = 0;
+    std::size_t below = 0;
+    for (const Point3& p : points) {
+        const double height = plane.height(p);
+        above += height > within ? 1 : 0;
+        below += height < -within ? 1 : 0;
+    }
+    const auto all = static_cast<double>(points.size());
+    const auto rest = static_cast<double>(above + below);
+    if (rest < kLeastRestShare * all || rest > (1.0 - kLeastPlaneShare) * all) return false;
+    if (static_cast<double>(std::max(above, below)) < kOneSideShare * rest) return false;
+    if (below > above) plane.normal = -1.0 * plane.normal;
+
+    const Footprint footprint(plane, kCell * diagonal);
+    std::vector<Footprint::Cell> flat;
+    std::vector<Footprint::Cell> covered;
+    for (const Point3& p : points) {
+        const Footprint::Cell cell = footprint.cellOf(p);
+        if (std::abs(plane.height(p)) <= within) {
+            flat.push_back(cell);
+        } else {
+            // Its neighbours too, so that the rim of what stands there does not count as beyond it.
+            for (const int dx : {-1, 0, 1}) {
+                for (const int dy : {-1, 0, 1}) covered.emplace_back(cell.first + dx, cell.second + dy);
+            }
+        }
+    }
+    for (auto* cells : {&flat, &covered}) {
+        std::sort(cells->begin(), cells->end());
+        cells->erase(std::unique(cells->begin(), cells->end()), cells->end());
+    }
+    const auto beyond = std::count_if(flat.begin(), flat.end(), [&](const Footprint::Cell& cell) {
+        return !std::binary_search(covered.begin(), covered.end(), cell);
+    });
+    if (static_cast<double>(beyond) < kBeyond * static_cast<double>(covered.size())) return false;
+    const std::vector<Footprint::Cell> hull = hullOf(flat);
+    const auto inside = std::count_if(points.begin(), points.end(), [&](const Point3& p) {
+        return plane.height(p) > within && isInside(footprint.cellOf(p), hull);
+    });
+    return static_cast<double>(inside) >= kAbovePlane * static_cast<double>(std::max(above, below));
+}
+
+Plane mostPopular(const PointCloud& points, const std::vector<std::uint32_t>& among, double within,
+                  Random& random) {
+    std::vector<std::uint32_t> counted;
+    const std::size_t step = std::max<std::size_t>(1, among.size() / kCountedPoints);
+    for (std::size_t i = 0; i < among.size(); i += step) counted.push_back(among[i]);
+    Plane best{points[among.front()], {0, 0, 1}};
+    std::size_t most = 0;
+    for (int draw = 0; draw < kDraws; ++draw) {
+        const auto pick = [&] { return points[among[random.below(among.size())]]; };
+        const Point3 a = pick();
+        const Point3 b = pick();
+        const auto plane = through(a, b, pick());
+        if (!plane) continue;
+        const std::size_t count = countNear(points, counted, *plane, within);
+        if (count > most) {
+            most = count;
+            best = *plane;
+        }
+    }
+    return best;
+}
+
+std::optional<SupportPlane> findPlane(const PointCloud& points) {
+    const double diagonal = boxOf(points).diagonal();
+    if (!(diagonal > 0.0)) return std::nullopt;
+    const double within = kCountedWithin * diagonal;
+    std::vector<std::uint32_t> among(points.size());
+    std::iota(among.begin(), among.end(), 0u);
+    Random random(1);
+    for (int i = 0; i < kPlanes && among.size() >= kFewestPoints; ++i) {
+        Plane plane = mostPopular(points, among, within, random);
+        for (int step = 0; step < 3; ++step) plane = fitted(points, among, plane, within);
+        if (static_cast<double>(countNear(points, among, plane, within)) <
+            kLeastPlaneShare * static_cast<double>(points.size())) {
+            return std::nullopt;
+        }
+        double squares = 0.0;
+        double count = 0.0;
+        for (const std::uint32_t j : among) {
+            const double height = plane.height(points[j]);
+            if (std::abs(height) > within) continue;
+            squares += height * height;
+            count += 1.0;
+        }
+        const double own =
+            std::clamp(kWithinDeviations * std::sqrt(squares / count), kLeastWithin * diagonal, within);
+        if (supports(points, plane, own, diagonal)) return SupportPlane{plane.point, plane.normal, own, 0};
+        among.erase(
+            std::remove_if(among.begin(), among.end(),
+                           [&](std::uint32_t j) { return std::abs(plane.height(points[j])) <= within; }),
+            among.end());
+    }
+    return std::nullopt;
+}
+
+// Sets objects and objectOfPoint of a scene whose points on the plane are marked.
+Result<void> findObjects(const PointCloud& points, Scene& scene, const RunContext& context) {
+    std::vector<std::uint32_t> beside;
+    PointCloud cloud;
+    for (std::uint32_t i = 0; i < points.size(); ++i) {
+        if (scene.objectOfPoint[i] == kOnPlane) continue;
+        beside.push_back(i);
+        cloud.push_back(points[i]);
+    }
+    if (cloud.size() <= kFewestPoints) {
+        for (const std::uint32_t i : beside) scene.objectOfPoint[i] = 0;
+        if (!beside.empty()) scene.objects = {beside.size()};
+        return {};
+    }
+    const NeighbourIndex index(cloud);
+    const auto around = measureReaches(cloud, index, context);
+    RETURN_IF_ERROR(around);
+    DisjointSets groups = linkedGroups(cloud, *around, std::vector<std::uint8_t>(cloud.size(), 0));
+    std::vector<std::uint64_t> size(cloud.size(), 0);
+    for (std::uint32_t i = 0; i < cloud.size(); ++i) ++size[groups.find(i)];
+    std::vector<std::uint32_t> order;
+    for (std::uint32_t i = 0; i < cloud.size(); ++i) {
+        if (static_cast<double>(size[i]) >= kLeastObject * static_cast<double>(cloud.size()))
+            order.push_back(i);
+    }
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::uint32_t a, std::uint32_t b) { return size[a] > size[b]; });
+    std::vector<std::int32_t> number(cloud.size(), kNoObject);
+    for (std::size_t k = 0; k < order.size(); ++k) number[order[k]] = static_cast<std::int32_t>(k);
+    scene.objects.assign(order.size(), 0);
+    for (std::uint32_t i = 0; i < cloud.size(); ++i) {
+        const std::int32_t object = number[groups.find(i)];
+        scene.objectOfPoint[beside[i]] = object;
+        if (object >= 0) ++scene.objects[static_cast<std::size_t>(object)];
+    }
+    return {};
+}
+
+Result<Scene> sceneOf(const PointCloud& points, const RunContext& context) {
+    Scene scene;
+    scene.objectOfPoint.assign(points.size(), 0);
+    if (points.size() < kFewestPoints) {
+        if (!points.empty()) scene.objects = {points.size()};
+        return scene;
+    }
+    scene.plane = findPlane(points);
+    RETURN_IF_ERROR(context.checkpoint());
+    if (scene.plane) {
+        const Plane plane{scene.plane->point, scene.plane->normal};
+        for (std::size_t i = 0; i < points.size(); ++i) {
+            // What is behind the plane does not stand on it.
+            if (plane.height(points[i]) > scene.plane->within) continue;
+            scene.objectOfPoint[i] = kOnPlane;
+            ++scene.plane->points;
+        }
+    }
+    RETURN_IF_ERROR(findObjects(points, scene, context));
+    return scene;
+}
+
+// The scene of all points, given that of some of them.
+Result<Scene> spread(const PointCloud& points, const PointCloud& some, Scene ofSome,
+                     const RunContext& context) {
+    Scene scene = std::move(ofSome);
+    const std::vector<std::int32_t> known = std::exchange(scene.objectOfPoint, {});
+    scene.objectOfPoint.assign(points.size(), kNoObject);
+    std::fill(scene.objects.begin(), scene.objects.end(), 0);
+    if (scene.plane) scene.plane->points = 0;
+    const NeighbourIndex index(some);
+    std::vector<Neighbour> found;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        if (i % 4096 == 0) RETURN_IF_ERROR(context.checkpoint());
+        std::int32_t object = kOnPlane;
+        const bool onPlane =
+            scene.plane && dot(scene.plane->normal, points[i] - scene.plane->point) <= scene.plane->within;
+        if (!onPlane) {
+            index.nearest(points[i], 1, found);
+            object = known[found.front().point];
+            // Beside the plane, but nearest to a point on it.
+            if (object == kOnPlane) object = kNoObject;
+        }
+        scene.objectOfPoint[i] = object;
+        if (object >= 0) ++scene.objects[static_cast<std::size_t>(object)];
+        if (object == kOnPlane) ++scene.plane->points;
+    }
+    return scene;
+}
+
+template <typename Keep>
+PointCloud kept(const PointCloud& points, const Scene& scene, const Keep& keep) {
+    PointCloud result;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        if (keep(scene.objectOfPoint[i])) result.push_back(points[i]);
+    }
+    return result;
+}
+
+}  // namespace
+
+Result<Scene> findScene(const PointCloud& points, const RunContext& context) {
+    try {
+        if (points.size() <= kMostPoints) return sceneOf(points, context);
+        // Every so-many-th: scans are stored line by line, so that these are even.
+        PointCloud some;
+        some.reserve(kMostPoints);
+        for (std::size_t k = 0; k < kMostPoints; ++k) some.push_back(points[k * points.size() / kMostPoints]);
+        auto scene = sceneOf(some, context);
+        RETURN_IF_ERROR(scene);
+        return spread(points, some, std::move(*scene), context);
+    } catch (const std::bad_alloc&) {
+        return fail(ErrorCode::kOutOfMemory, "not enough memory to look for a table and objects");
+    }
+}
+
+PointCloud isolated(const PointCloud& points, const Scene& scene, const IsolateOptions& options) {
+    return kept(points, scene, [&](std::int32_t of) { return options.keeps(of); });
+}
+
+PointCloud pointsOfObject(const PointCloud& points, const Scene& scene, std::size_t object) {
+    return kept(points, scene, [&](std::int32_t of) { return of == static_cast<std::int32_t>(object); });
+}
+
+}  // namespace shapedb
