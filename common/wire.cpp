@@ -149,6 +149,7 @@ void toProto(const ShapeParameters& parameters, v1::SegmentationParameters* segm
     signature->set_max_points(parameters.signature.maxPoints);
     signature->set_attributes(parameters.signature.attributes);
     signature->set_views(parameters.views);
+    signature->set_unit(toProto(parameters.unit));
 }
 
 }  // namespace shapedb::wire

@@ -3,6 +3,7 @@
 
 #include <optional>
 
+#include "core/base/length_unit.h"
 #include "core/fit/verdict_kinds.h"
 #include "core/profile.h"
 #include "core/segmentation/interior_kinds.h"
@@ -40,6 +41,17 @@ namespace shapedb::wire {
     return v1::VERDICT_UNSPECIFIED;
 }
 
+[[nodiscard]] inline v1::LengthUnit toProto(LengthUnit unit) {
+    switch (unit) {
+        case LengthUnit::kNone: return v1::LENGTH_UNIT_NONE;
+        case LengthUnit::kMillimetre: return v1::LENGTH_UNIT_MILLIMETRE;
+        case LengthUnit::kCentimetre: return v1::LENGTH_UNIT_CENTIMETRE;
+        case LengthUnit::kMetre: return v1::LENGTH_UNIT_METRE;
+        case LengthUnit::kInch: return v1::LENGTH_UNIT_INCH;
+    }
+    return v1::LENGTH_UNIT_UNSPECIFIED;
+}
+
 // The way back: empty for UNSPECIFIED and for numbers that only a newer version knows.
 
 [[nodiscard]] inline std::optional<Profile> fromProto(v1::Profile profile) {
@@ -63,6 +75,17 @@ namespace shapedb::wire {
         case v1::INTERIOR_SOURCE_WALK: return InteriorSource::kWalk;
         case v1::INTERIOR_SOURCE_POTENTIAL: return InteriorSource::kPotential;
         case v1::INTERIOR_SOURCE_THICKENED: return InteriorSource::kThickened;
+        default: return std::nullopt;
+    }
+}
+
+[[nodiscard]] inline std::optional<LengthUnit> fromProto(v1::LengthUnit unit) {
+    switch (unit) {
+        case v1::LENGTH_UNIT_NONE: return LengthUnit::kNone;
+        case v1::LENGTH_UNIT_MILLIMETRE: return LengthUnit::kMillimetre;
+        case v1::LENGTH_UNIT_CENTIMETRE: return LengthUnit::kCentimetre;
+        case v1::LENGTH_UNIT_METRE: return LengthUnit::kMetre;
+        case v1::LENGTH_UNIT_INCH: return LengthUnit::kInch;
         default: return std::nullopt;
     }
 }

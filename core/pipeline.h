@@ -8,6 +8,7 @@
 #include <string>
 
 #include "core/base/error.h"
+#include "core/base/length_unit.h"
 #include "core/base/run_context.h"
 #include "core/profile.h"
 #include "core/segmentation/segmentation.h"
@@ -26,6 +27,8 @@ struct ShapeParameters {
     /// Whether a collection keeps views of its shapes (core/views/views.h), so that queries of one side find
     /// them.
     bool views = false;
+    /// Of the scans of a collection. With a unit sizes count in searches unless they say otherwise.
+    LengthUnit unit = LengthUnit::kNone;
 };
 
 [[nodiscard]] ShapeParameters parametersOf(Profile profile);

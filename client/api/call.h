@@ -13,6 +13,7 @@
 #include "core/base/return_if_error.h"
 #include "core/base/run_context.h"
 #include "shapedb/v1/admin_service.grpc.pb.h"
+#include "shapedb/v1/align_service.grpc.pb.h"
 #include "shapedb/v1/collection_service.grpc.pb.h"
 #include "shapedb/v1/search_service.grpc.pb.h"
 #include "shapedb/v1/shape_service.grpc.pb.h"
@@ -24,6 +25,7 @@ struct Client::Impl {
     std::shared_ptr<grpc::Channel> channel;
     std::unique_ptr<v1::ShapeService::Stub> shapes;
     std::unique_ptr<v1::SearchService::Stub> search;
+    std::unique_ptr<v1::AlignService::Stub> align;
     std::unique_ptr<v1::CollectionService::Stub> collections;
     std::unique_ptr<v1::AdminService::Stub> admin;
 };

@@ -76,6 +76,7 @@ Result<Client> Client::connect(ClientOptions options) {
                                                   channelArguments());
         impl->shapes = v1::ShapeService::NewStub(impl->channel);
         impl->search = v1::SearchService::NewStub(impl->channel);
+        impl->align = v1::AlignService::NewStub(impl->channel);
         impl->collections = v1::CollectionService::NewStub(impl->channel);
         impl->admin = v1::AdminService::NewStub(impl->channel);
         return Client(std::move(impl));

@@ -142,6 +142,14 @@ class Client {
                                              const CompareOptions& options = {},
                                              const RunContext& context = {}) const;
 
+    /// Lays a stored shape, or another scan, on a scan; nothing is stored. Motions lead from the coordinates
+    /// of the other (of a stored shape relative to its offset) to those of `query`. Errors: kNotFound;
+    /// kNotReady (the shape has no surface points yet).
+    [[nodiscard]] Result<Fit> align(const PointCloud& query, const ShapeRef& other,
+                                    const CompareOptions& options = {}, const RunContext& context = {}) const;
+    [[nodiscard]] Result<Fit> align(const PointCloud& query, const PointCloud& other,
+                                    const CompareOptions& options = {}, const RunContext& context = {}) const;
+
     // ------------------------------------------------------------------------------- collections
 
     /// Not retried. Errors: kAlreadyExists, kInvalidArgument.

@@ -76,6 +76,7 @@ void fill(const SearchOptions& from, v1::SearchOptions* to) {
     to->set_filter(from.filter);
     to->set_forbid_reflection(!from.reflection);
     to->set_keep_scale(from.keepScale);
+    to->set_free_scale(from.freeScale);
     to->set_partial(from.partial);
     to->set_no_explanation(!from.explanation);
     if (from.verify) to->set_verify(*from.verify);
@@ -297,6 +298,7 @@ Collection fromWire(const v1::Collection& from) {
     to.parameters.maxPoints = from.signature().max_points();
     to.parameters.attributes = from.signature().attributes();
     to.parameters.views = from.signature().views();
+    to.parameters.unit = wire::fromProto(from.signature().unit()).value_or(LengthUnit::kNone);
     to.generation = from.generation();
     to.created = fromWire(from.created());
     to.shapes = from.shapes();

@@ -36,6 +36,7 @@ void fillParameters(const Parameters& from, Message* to) {
     if (from.maxPoints) to->mutable_signature()->set_max_points(*from.maxPoints);
     if (from.attributes) to->mutable_signature()->set_attributes(*from.attributes);
     if (from.views) to->mutable_signature()->set_views(*from.views);
+    if (from.unit) to->mutable_signature()->set_unit(wire::toProto(*from.unit));
 }
 
 [[nodiscard]] v1::AddMode toWire(AddMode mode);

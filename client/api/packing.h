@@ -31,19 +31,24 @@ struct PackedPoints {
 /// the whole scan too small for one). The message names the first such point.
 [[nodiscard]] Result<PackedPoints> packPoints(const PointCloud& points);
 
-/// Writes `header`, then the points in chunks. Stops early if the server has already answered; the status of
-/// the call then says why. `Request` has the oneof {header, chunk}.
+/// Writes the points in chunks. False, early, if the server has already answered. `Request` has a chunk.
 template <typename Request, typename Stream>
-void writeScan(Stream& stream, const Request& header, const PackedPoints& points, const RunContext& context) {
-    if (!stream.Write(header)) return;
+bool writeChunks(Stream& stream, const PackedPoints& points, const RunContext& context) {
     for (std::size_t at = 0; at < points.bytes.size(); at += kChunkBytes) {
         const std::size_t size = std::min(kChunkBytes, points.bytes.size() - at);
         Request message;
         message.mutable_chunk()->set_xyz(points.bytes.data() + at, size);
-        if (!stream.Write(message)) return;
+        if (!stream.Write(message)) return false;
         context.report("upload", at + size, points.bytes.size());
     }
-    stream.WritesDone();
+    return true;
+}
+
+/// Writes `header`, then the points in chunks. Stops early if the server has already answered; the status of
+/// the call then says why. `Request` has the oneof {header, chunk}.
+template <typename Request, typename Stream>
+void writeScan(Stream& stream, const Request& header, const PackedPoints& points, const RunContext& context) {
+    if (stream.Write(header) && writeChunks<Request>(stream, points, context)) stream.WritesDone();
 }
 
 /// Appends to `points`. Errors: kMalformedStream (not a multiple of kPointBytes).

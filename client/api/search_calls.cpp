@@ -90,4 +90,68 @@ Result<Comparison> Client::compare(const ShapeRef& query, const ShapeRef& other,
     return fromWire(*response);
 }
 
+namespace {
+
+// `other`: null for a stored shape, which the header names.
+Result<Fit> alignScans(const ClientOptions& options, v1::AlignService::Stub& stub, v1::AlignRequest request,
+                       const PackedPoints& query, const PackedPoints* other, const RunContext& context) {
+    v1::AlignHeader* header = request.mutable_header();
+    header->set_query_points(query.count);
+    header->set_query_sha256(query.sha256);
+    if (other != nullptr) {
+        header->set_other_points(other->count);
+        header->set_other_sha256(other->sha256);
+    }
+    v1::AlignResponse response;
+    const auto made = makeCall(options, context, kIdempotent, [&](grpc::ClientContext& rpc, Result<void>&) {
+        response.Clear();
+        const auto stream = stub.Align(&rpc, &response);
+        if (stream->Write(request) && writeChunks<v1::AlignRequest>(*stream, query, context) &&
+            (other == nullptr || writeChunks<v1::AlignRequest>(*stream, *other, context))) {
+            stream->WritesDone();
+        }
+        return stream->Finish();
+    });
+    RETURN_IF_ERROR(made);
+    Fit fit = fromWire(response.fit());
+    // From and to the coordinates that the caller knows.
+    const Point3 from = other != nullptr ? other->offset : Point3{};
+    const auto shift = [&](FitPose& pose) {
+        pose.motion.translation =
+            pose.motion.translation + query.offset - pose.motion.scale * rotate(pose.motion.rotation, from);
+    };
+    shift(fit.best);
+    for (FitPose& pose : fit.alternatives) shift(pose);
+    for (FreeAxis& axis : fit.axes) axis.point = axis.point + query.offset;
+    return fit;
+}
+
+v1::AlignRequest alignRequest(const CompareOptions& options) {
+    v1::AlignRequest request;
+    request.mutable_header()->set_keep_scale(options.keepScale);
+    request.mutable_header()->set_forbid_reflection(!options.reflection);
+    request.mutable_header()->set_partial(options.partial);
+    return request;
+}
+
+}  // namespace
+
+Result<Fit> Client::align(const PointCloud& query, const ShapeRef& other, const CompareOptions& options,
+                          const RunContext& context) const {
+    const auto packed = packPoints(query);
+    RETURN_IF_ERROR(packed);
+    v1::AlignRequest request = alignRequest(options);
+    fill(other, request.mutable_header()->mutable_key());
+    return alignScans(impl_->options, *impl_->align, std::move(request), *packed, nullptr, context);
+}
+
+Result<Fit> Client::align(const PointCloud& query, const PointCloud& other, const CompareOptions& options,
+                          const RunContext& context) const {
+    const auto packed = packPoints(query);
+    RETURN_IF_ERROR(packed);
+    const auto packedOther = packPoints(other);
+    RETURN_IF_ERROR(packedOther);
+    return alignScans(impl_->options, *impl_->align, alignRequest(options), *packed, &*packedOther, context);
+}
+
 }  // namespace shapedb::client

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/length_unit.h"
 #include "core/base/metadata.h"
 #include "core/fit/verdict_kinds.h"
 #include "core/geometry/motion.h"
@@ -50,6 +51,7 @@ struct Parameters {
     std::optional<std::uint32_t> maxPoints;  ///< heaviest segments kept, 1 to 16
     std::optional<bool> attributes;          ///< false: points and weights alone, as published
     std::optional<bool> views;               ///< keep views, so that scans of one side find the shape
+    std::optional<LengthUnit> unit;          ///< of the scans of a collection: with one, sizes count
 };
 
 /// Names one shape. An empty collection is "default".
@@ -212,7 +214,8 @@ struct SearchOptions {
     double threshold = 0.0;   ///< lowest score of a hit, [0, 1]
     std::string filter{};     ///< applied first: the k best of those that pass
     bool reflection = true;   ///< false: a mirror image is another shape
-    bool keepScale = false;   ///< true: size matters
+    bool keepScale = false;   ///< true: size matters, as it does anyway in a collection with a unit
+    bool freeScale = false;   ///< true: not there either
     bool partial = false;     ///< true: the query may be a one-sided scan or a broken piece of a hit
     bool explanation = true;  ///< false: no motion and no matches with the hits
     /// Whether the best candidates are laid on the query; nothing: yes, but not in collections of profile

@@ -9,10 +9,12 @@
 
 #include "client/cli/connection.h"
 #include "client/cli/exit_code.h"
+#include "client/cli/parameters.h"
 #include "client/cli/scan_source.h"
 #include "client/cli/session.h"
 #include "client/cli/shape_output.h"
 #include "client/cli/text.h"
+#include "client/cli/units.h"
 #include "core/base/return_if_error.h"
 
 namespace shapedb::cli {
@@ -36,6 +38,7 @@ struct AddFlags {
     bool each = false;
     unsigned jobs = 1;
     ScanFlags scan;
+    std::optional<LengthUnit> unit;
 };
 
 struct Upload {
@@ -112,8 +115,14 @@ client::AddRequest requestFor(const AddFlags& flags, const client::Metadata& met
     return request;
 }
 
-void uploadOne(const client::Client& client, const AddFlags& flags, const client::Metadata& metadata,
-               Upload& upload, const RunContext& context) {
+/// What all uploads of a command have in common.
+struct Terms {
+    client::Metadata metadata;
+    double factor = 1.0;  ///< to the unit of the collection
+};
+
+void uploadOne(const client::Client& client, const AddFlags& flags, const Terms& terms, Upload& upload,
+               const RunContext& context) {
     auto scan = loadScan(upload.path, flags.scan, fileSeed(flags.scan.seed, upload.name), context,
                          upload.object.has_value());
     if (!scan) {
@@ -121,7 +130,8 @@ void uploadOne(const client::Client& client, const AddFlags& flags, const client
         return;
     }
     if (upload.object) scan->points = pointsOfObject(scan->points, *scan->scene, *upload.object);
-    auto reply = client.addShape(requestFor(flags, metadata, upload), scan->points, context);
+    if (terms.factor != 1.0) scaleBy(terms.factor, scan->points);
+    auto reply = client.addShape(requestFor(flags, terms.metadata, upload), scan->points, context);
     if (!reply) {
         upload.failure = reply.error();
     } else {
@@ -136,8 +146,8 @@ bool endsTheRun(const Error& error) {
 }
 
 /// `jobs` threads take one file after the other until all are done or the server is gone.
-void uploadAll(Session& session, const client::Client& client, const AddFlags& flags,
-               const client::Metadata& metadata, std::vector<Upload>& uploads) {
+void uploadAll(Session& session, const client::Client& client, const AddFlags& flags, const Terms& terms,
+               std::vector<Upload>& uploads) {
     RunContext context = session.context();
     context.progress = nullptr;  // progress counts files
     std::atomic<std::size_t> next{0};
@@ -153,7 +163,7 @@ void uploadAll(Session& session, const client::Client& client, const AddFlags& f
                     continue;
                 }
             }
-            uploadOne(client, flags, metadata, uploads[i], context);
+            uploadOne(client, flags, terms, uploads[i], context);
             if (uploads[i].failure && endsTheRun(*uploads[i].failure)) {
                 const std::lock_guard<std::mutex> lock(mutex);
                 if (!stop) stop = uploads[i].failure;
@@ -281,7 +291,9 @@ CommandResult runAdd(Session& session, const AddFlags& flags) {
     }
     const auto client = connectToServer(session, Work::kHeavy);
     RETURN_IF_ERROR(client);
-    uploadAll(session, *client, flags, *metadata, *uploads);
+    const auto factor = factorToCollection(*client, flags.collection, flags.unit, session.context());
+    RETURN_IF_ERROR(factor);
+    uploadAll(session, *client, flags, {*metadata, *factor}, *uploads);
     if (flags.wait) waitForAll(session, *client, flags, *uploads);
     session.console().document(uploadsJson(*uploads));
     session.console().text(uploadsText(*uploads));
@@ -314,6 +326,7 @@ void addAddCommand(CLI::App& app, Session& session) {
                                    "Store each of several separate objects of a scan, without the plane that "
                                    "they stand on, as KEY/1, KEY/2, ...");
     addScanFlags(*command, flags->scan);
+    addUnitFlag(*command, flags->unit);
     for (const char* other : {"--drop-plane", "--largest", "--points"}) {
         each->excludes(command->get_option(other));
     }

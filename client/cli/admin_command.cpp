@@ -190,6 +190,7 @@ void addRebuild(CLI::App& group, Session& session) {
                       "Only reload the signatures from the database into the cache");
     command->add_flag("--detach", flags->request.detach, "Start the rebuild and return");
     addParameterFlags(*command, flags->parameters);
+    addUnitsFlag(*command, flags->parameters);
     command->callback(
         [&session, flags] { session.action = [&session, flags] { return runRebuild(session, *flags); }; });
 }

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "client/cli/connection.h"
 #include "client/cli/exit_code.h"
 #include "client/cli/fit_output.h"
 #include "client/cli/local_result.h"
@@ -20,6 +21,8 @@ namespace {
 struct AlignFlags {
     std::string query;
     std::string other;
+    std::string key;
+    std::string collection;
     bool keepScale = false;
     bool noReflection = false;
     bool partial = false;
@@ -42,22 +45,41 @@ Result<SurfacePoints> surfaceOf(const std::string& path, const ScanFlags& flags,
     return surface;
 }
 
-CommandResult runAlign(Session& session, const AlignFlags& flags) {
-    const RunContext context = session.context();
+Result<client::Fit> alignFiles(const AlignFlags& flags, const RunContext& context) {
     const auto query = surfaceOf(flags.query, flags.scan, context);
     RETURN_IF_ERROR(query);
     const auto other = surfaceOf(flags.other, flags.scan, context);
     RETURN_IF_ERROR(other);
     const auto found = fit(FitQuery(*query), *other, flags.resolve(), context);
     RETURN_IF_ERROR(found);
-    const client::Fit shown = toClient(*found);
-    nlohmann::json document = toJson(shown);
+    return toClient(*found);
+}
+
+Result<client::Fit> alignStored(const Session& session, const AlignFlags& flags, const RunContext& context) {
+    const auto scan = loadScan(flags.query, flags.scan, flags.scan.seed, context);
+    RETURN_IF_ERROR(scan);
+    const auto client = connectToServer(session, Work::kHeavy);
+    RETURN_IF_ERROR(client);
+    return client->align(scan->points, client::ShapeRef{flags.collection, flags.key},
+                         {!flags.noReflection, flags.keepScale, flags.partial}, context);
+}
+
+CommandResult runAlign(Session& session, const AlignFlags& flags) {
+    if (flags.other.empty() == flags.key.empty()) {
+        return fail(ErrorCode::kInvalidArgument, "give a second scan, or --key with a stored shape" +
+                                                     std::string(flags.key.empty() ? "" : ", not both"));
+    }
+    const RunContext context = session.context();
+    const auto found = flags.key.empty() ? alignFiles(flags, context) : alignStored(session, flags, context);
+    RETURN_IF_ERROR(found);
+    const std::string name = flags.key.empty() ? flags.other : flags.key;
+    nlohmann::json document = toJson(*found);
     document["query"] = flags.query;
-    document["other"] = flags.other;
+    document["other"] = name;
     session.console().document(document);
-    session.console().text("score " + formatFixed(shown.best.score, 3) + "  " + bar(shown.best.score, 20) +
-                           "\n\n" + fitMotionText(shown.best.motion, flags.other) +
-                           fitText(shown, flags.query, flags.other));
+    session.console().text("score " + formatFixed(found->best.score, 3) + "  " + bar(found->best.score, 20) +
+                           "\n\n" + fitMotionText(found->best.motion, name) +
+                           fitText(*found, flags.query, name));
     return kOk;
 }
 
@@ -67,10 +89,12 @@ void addAlignCommand(CLI::App& app, Session& session) {
     auto flags = std::make_shared<AlignFlags>();
     CLI::App* command = app.add_subcommand(
         "align",
-        "Lay one scan on another: the motion, how well they fit and which other poses fit as well "
-        "(needs no server)");
+        "Lay a scan or a stored shape on a scan: the motion, how well they fit and which other poses fit as "
+        "well (two files need no server)");
     command->add_option("QUERY", flags->query, "Scan that stays where it is")->required();
-    command->add_option("OTHER", flags->other, "Scan of a whole object that is laid on it")->required();
+    command->add_option("OTHER", flags->other, "Scan of a whole object that is laid on it");
+    command->add_option("--key", flags->key, "Lay this stored shape on it instead");
+    addCollectionOption(*command, flags->collection);
     command->add_flag("--keep-scale", flags->keepScale, "Both have the same unit of length: do not scale");
     command->add_flag("--no-reflection", flags->noReflection, "Do not mirror");
     command->add_flag("--partial", flags->partial, "QUERY shows one side or a piece, not all of the object");

@@ -43,11 +43,13 @@ std::string collectionsText(const std::vector<client::Collection>& collections) 
                  {"failed", right},
                  {"generation", right},
                  {"profile"},
+                 {"unit"},
                  {"description"}});
     for (const client::Collection& one : collections) {
         table.add({one.name, formatCount(one.shapes), formatCount(one.shapesReady),
                    formatCount(one.shapesFailed), std::to_string(one.generation),
-                   profileName(one.parameters.profile.value_or(Profile::kDefault)), one.description});
+                   profileName(one.parameters.profile.value_or(Profile::kDefault)),
+                   lengthUnitName(one.parameters.unit.value_or(LengthUnit::kNone)), one.description});
     }
     return table.render();
 }
@@ -120,6 +122,7 @@ void addCollectionCommands(CLI::App& app, Session& session) {
     addName(create);
     create->add_option("--description", flags->description, "What the collection is for");
     addParameterFlags(*create, flags->parameters);
+    addUnitsFlag(*create, flags->parameters);
     addName(addOne(*group, session, "get", "Show one collection", flags, &runGet));
     addOne(*group, session, "list", "List all collections", flags, &runList);
     CLI::App* remove = addOne(*group, session, "delete", "Delete a collection", flags, &runDelete);

@@ -27,6 +27,7 @@ struct EvaluateFlags {
     bool perClass = false;
     unsigned threads = defaultThreads();
     ScanFlags scan;
+    std::optional<LengthUnit> unit;
     ParameterFlags parameters;
     ScoreFlags score;
     VerifyFlags verify;
@@ -68,6 +69,14 @@ json failuresJson(const std::vector<const EvaluatedShape*>& failures) {
     return list;
 }
 
+/// As in a collection with that unit, sizes count if the files have one.
+ScoreOptions scoreOptions(const EvaluateFlags& flags) {
+    ScoreOptions options = flags.score.resolve();
+    const bool haveUnit = flags.unit.value_or(LengthUnit::kNone) != LengthUnit::kNone;
+    if (haveUnit && !flags.score.freeScale) options.keepScale = true;
+    return options;
+}
+
 json settingsJson(const EvaluateFlags& flags, const ShapeParameters& parameters) {
     json settings = {
         {"parameters", toJson(parameters)},
@@ -76,7 +85,7 @@ json settingsJson(const EvaluateFlags& flags, const ShapeParameters& parameters)
         {"points", flags.scan.points ? json(*flags.scan.points) : json(nullptr)},
         {"threads", flags.threads},
         {"reflection", !flags.score.noReflection},
-        {"keep_scale", flags.score.keepScale},
+        {"keep_scale", scoreOptions(flags).keepScale},
         {"partial", flags.score.partial},
         {"verify", flags.verify.resolve(parameters.profile)},
         {"candidates", flags.verify.candidates > 0 ? json(flags.verify.candidates) : json(nullptr)}};
@@ -136,7 +145,7 @@ Result<ScoreMatrix> scoresOf(Session& session, const std::vector<EvaluatedShape>
     const auto progress = [&](std::size_t done) {
         session.console().progress("match", done, queries.size());
     };
-    const ScoreOptions options = flags.score.resolve();
+    const ScoreOptions options = scoreOptions(flags);
     if (!flags.verify.resolve(parameters.profile)) {
         return scorePairs(queries, candidates, options, flags.threads, progress, session.context());
     }
@@ -417,7 +426,9 @@ void addEvaluateCommand(CLI::App& app, Session& session) {
         ->capture_default_str();
     addScanFlags(*command, flags->scan);
     addParameterFlags(*command, flags->parameters);
+    addUnitFlag(*command, flags->unit);
     addScoreFlags(*command, flags->score);
+    addFreeScaleFlag(*command, flags->score);
     addVerifyFlags(*command, flags->verify);
     command->callback([&session, flags] {
         session.action = [&session, flags] {

@@ -111,7 +111,8 @@ void addNumberFlags(CLI::App& group, client::Parameters& given, const ShapeParam
 }  // namespace
 
 bool ParameterFlags::any() const {
-    bool found = given.profile || given.interiorMethod || given.maxPoints || given.attributes || given.views;
+    bool found = given.profile || given.interiorMethod || given.maxPoints || given.attributes ||
+                 given.views || given.unit;
     visitNumbers(
         [&](const char*, auto member, auto, const char*) { found = found || (given.*member).has_value(); });
     return found;
@@ -126,6 +127,7 @@ Result<ShapeParameters> ParameterFlags::resolve() const {
     if (given.maxPoints) parameters.signature.maxPoints = *given.maxPoints;
     if (given.attributes) parameters.signature.attributes = *given.attributes;
     if (given.views) parameters.views = *given.views;
+    if (given.unit) parameters.unit = *given.unit;
     RETURN_IF_ERROR(validate(parameters));
     return parameters;
 }
@@ -164,6 +166,39 @@ void addParameterFlags(CLI::App& command, ParameterFlags& flags) {
         "--views,!--no-views", [&given](std::int64_t count) { given.views = count > 0; },
         "Also keep views of the shape, so that scans of one side find it" +
             defaults(onOrOff(standard.views), onOrOff(paper.views)));
+}
+
+namespace {
+
+std::vector<std::string> unitNames() {
+    std::vector<std::string> names;
+    for (const LengthUnit unit : kLengthUnits) names.emplace_back(lengthUnitName(unit));
+    return names;
+}
+
+void addUnitOption(CLI::App& command, const char* flag, std::optional<LengthUnit>& unit, const char* help) {
+    command
+        .add_option_function<std::string>(
+            flag, [&unit](const std::string& name) { unit = lengthUnitFromName(name); }, help)
+        ->check(CLI::IsMember(unitNames()));
+}
+
+}  // namespace
+
+void addUnitsFlag(CLI::App& command, ParameterFlags& flags) {
+    addUnitOption(command, "--units", flags.given.unit,
+                  "Unit of length of the scans: with one, sizes count in searches [none]");
+}
+
+void addUnitFlag(CLI::App& command, std::optional<LengthUnit>& unit) {
+    addUnitOption(command, "--unit", unit,
+                  "Unit of length of the files [that of the collection]; scans are converted");
+}
+
+void addFreeScaleFlag(CLI::App& command, ScoreFlags& flags) {
+    command
+        .add_flag("--free-scale", flags.freeScale, "Do not compare sizes, although there is a unit of length")
+        ->excludes(command.get_option("--keep-scale"));
 }
 
 ScoreOptions ScoreFlags::resolve() const {
@@ -230,6 +265,7 @@ nlohmann::json toJson(const ShapeParameters& parameters) {
     all.maxPoints = parameters.signature.maxPoints;
     all.attributes = parameters.signature.attributes;
     all.views = parameters.views;
+    all.unit = parameters.unit;
     return toJson(all);
 }
 
@@ -239,7 +275,8 @@ nlohmann::json toJson(const client::Parameters& parameters) {
         {"interior_method", interiorMethodName(parameters.interiorMethod.value_or(InteriorMethod::kWalk))},
         {"max_points", parameters.maxPoints.value_or(0)},
         {"attributes", parameters.attributes.value_or(false)},
-        {"views", parameters.views.value_or(false)}};
+        {"views", parameters.views.value_or(false)},
+        {"unit", lengthUnitName(parameters.unit.value_or(LengthUnit::kNone))}};
     visitNumbers([&](const char* name, auto member, auto, const char*) {
         out[name] = (parameters.*member).value_or(0);
     });

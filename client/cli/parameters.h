@@ -33,16 +33,25 @@ struct ParameterFlags {
 /// `flags` must outlive the parsing.
 void addParameterFlags(CLI::App& command, ParameterFlags& flags);
 
+/// --units, for commands that set the parameters of a collection.
+void addUnitsFlag(CLI::App& command, ParameterFlags& flags);
+
+/// --unit: of the files that a command reads.
+void addUnitFlag(CLI::App& command, std::optional<LengthUnit>& unit);
+
 /// --no-reflection, --keep-scale and --partial.
 struct ScoreFlags {
     bool noReflection = false;
     bool keepScale = false;
     bool partial = false;
+    bool freeScale = false;  ///< --free-scale, of commands that have it
 
     [[nodiscard]] ScoreOptions resolve() const;
 };
 
 void addScoreFlags(CLI::App& command, ScoreFlags& flags);
+/// --free-scale, beside those of addScoreFlags.
+void addFreeScaleFlag(CLI::App& command, ScoreFlags& flags);
 
 /// --verify, --no-verify, --candidates, --one-sided, --all-sides and --viewpoint.
 struct VerifyFlags {

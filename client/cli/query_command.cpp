@@ -12,6 +12,7 @@
 #include "client/cli/session.h"
 #include "client/cli/shape_output.h"
 #include "client/cli/text.h"
+#include "client/cli/units.h"
 #include "core/base/return_if_error.h"
 
 namespace shapedb::cli {
@@ -27,6 +28,7 @@ struct QueryFlags {
     ScoreFlags score;
     VerifyFlags verify;
     ScanFlags scan;
+    std::optional<LengthUnit> unit;
     bool includeSelf = false;
     bool explain = false;
     bool noExplanation = false;
@@ -124,6 +126,7 @@ CommandResult runQuery(Session& session, const QueryFlags& flags) {
     client::SearchOptions options = flags.options;
     options.reflection = !flags.score.noReflection;
     options.keepScale = flags.score.keepScale;
+    options.freeScale = flags.score.freeScale;
     options.partial = flags.score.partial;
     options.verify = flags.verify.verify;
     const VerifyOptions verify = flags.verify.options();
@@ -140,14 +143,21 @@ CommandResult runQuery(Session& session, const QueryFlags& flags) {
     }
     const auto client = connectToServer(session, Work::kHeavy);
     RETURN_IF_ERROR(client);
-    const auto reply = flags.path.empty()
-                           ? client->searchByKey(options, flags.key, flags.includeSelf, context)
-                           : client->searchByScan(options, scan.points, context);
+    const auto factor = factorToCollection(*client, options.collection, flags.unit, context);
+    RETURN_IF_ERROR(factor);
+    if (*factor != 1.0) {
+        scaleBy(*factor, scan.points);
+        if (options.viewpoint) options.viewpoint = *factor * *options.viewpoint;
+    }
+    auto reply = flags.path.empty() ? client->searchByKey(options, flags.key, flags.includeSelf, context)
+                                    : client->searchByScan(options, scan.points, context);
     if (!reply) {
         if (flags.path.empty()) return fail(reply.error());
         return fail(reply.error().code, flags.path + ": " + reply.error().message);
     }
+    if (*factor != 1.0) scaleBy(1.0 / *factor, *reply);
     json document = replyJson(*reply);
+    if (flags.unit) document["unit"] = lengthUnitName(*flags.unit);
     std::string text = replyText(flags, *reply);
     if (scan.scene) {
         document["scene"] = sceneJson(*scan.scene, scan.pointsInScene, flags.scan.isolate);
@@ -174,6 +184,8 @@ void addQueryCommand(CLI::App& app, Session& session) {
     command->add_option("--filter", flags->options.filter,
                         "Only shapes with such metadata, e.g. 'label=cup'");
     addScoreFlags(*command, flags->score);
+    addFreeScaleFlag(*command, flags->score);
+    addUnitFlag(*command, flags->unit);
     addVerifyFlags(*command, flags->verify);
     auto* none = command->add_flag("--no-explanation", flags->noExplanation, "Do not explain the hits");
     command->add_flag("--explain", flags->explain, "Explain every hit, not only the first")->excludes(none);

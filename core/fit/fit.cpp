@@ -112,7 +112,8 @@ void addTurned(std::vector<Candidate>& sorted, Comparison& comparison, const Sta
     sortByScore(sorted);
 }
 
-// All stages for one kind: fitted poses, best first, none less than kDifferent from a better one.
+// All stages for one kind: fitted poses, best first, none less than kDifferent from a better one. None at all
+// where no pose that was tried brings the shapes near each other, as of very different sizes that are kept.
 Result<std::vector<Candidate>> candidatesOf(Comparison& comparison, FitKind kind, const FitOptions& options,
                                             const RunContext& context) {
     const auto promising =
@@ -120,6 +121,7 @@ Result<std::vector<Candidate>> candidatesOf(Comparison& comparison, FitKind kind
     RETURN_IF_ERROR(promising);
     RETURN_IF_ERROR(context.checkpoint());
     std::vector<Candidate> candidates;
+    if (promising->empty()) return candidates;
     for (const Hypothesis& h : *promising) {
         candidates.push_back(
             {h.pose, h.view, comparison.shares(h.pose, h.view, kPromisingPoints, kPromisingWidth)});
@@ -196,8 +198,8 @@ FitResult resultOf(std::vector<Candidate> candidates, Comparison& comparison, co
     return result;
 }
 
-// Sizes so different that neither is more than a point on the other, and that single precision may not hold
-// both: middle on middle.
+// Shapes that no pose brings near each other, or sizes so different that neither is more than a point on the
+// other, and that single precision may not hold both: middle on middle.
 FitResult unlike(const FitQuery& query, const FitPoints& other, const FitOptions& options) {
     FitResult result;
     result.kind =
@@ -224,10 +226,12 @@ Result<FitResult> fitOrThrow(const FitQuery& query, const SurfacePoints& other, 
         context.report("fit", i, kinds.size());
         auto found = candidatesOf(comparison, kinds[i], options, context);
         RETURN_IF_ERROR(found);
+        if (found->empty()) continue;
         if (best.empty() || misfitOf(found->front()) < misfitOf(best.front())) best = std::move(*found);
         if (kinds[i] == FitKind::kWhole && best.front().score() >= kWholeEnough) break;
     }
     context.report("fit", kinds.size(), kinds.size());
+    if (best.empty()) return unlike(query, candidate, options);
     return resultOf(std::move(best), comparison, options);
 }
 

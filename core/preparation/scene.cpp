@@ -52,6 +52,17 @@ struct Plane {
     double height(const Point3& p) const { return dot(normal, p - point); }
 };
 
+// `most` of `count` numbers from 0, or all, in ascending order, each as likely as any other (selection
+// sampling, Knuth 3.4.2 S). Every so-many-th would not do: points may come in turns from table and object.
+std::vector<std::size_t> someOf(std::size_t count, std::size_t most, Random& random) {
+    std::vector<std::size_t> some;
+    const std::size_t wanted = std::min(most, count);
+    for (std::size_t i = 0; some.size() < wanted; ++i) {
+        if (random.below(count - i) < wanted - some.size()) some.push_back(i);
+    }
+    return some;
+}
+
 std::optional<Plane> through(const Point3& a, const Point3& b, const Point3& c) {
     const Point3 n = cross(b - a, c - a);
     const double area = length(n);
@@ -184,8 +195,7 @@ bool supports(const PointCloud& points, Plane& plane, double within, double diag
 Plane mostPopular(const PointCloud& points, const std::vector<std::uint32_t>& among, double within,
                   Random& random) {
     std::vector<std::uint32_t> counted;
-    const std::size_t step = std::max<std::size_t>(1, among.size() / kCountedPoints);
-    for (std::size_t i = 0; i < among.size(); i += step) counted.push_back(among[i]);
+    for (const std::size_t i : someOf(among.size(), kCountedPoints, random)) counted.push_back(among[i]);
     Plane best{points[among.front()], {0, 0, 1}};
     std::size_t most = 0;
     for (int draw = 0; draw < kDraws; ++draw) {
@@ -338,10 +348,10 @@ PointCloud kept(const PointCloud& points, const Scene& scene, const Keep& keep) 
 Result<Scene> findScene(const PointCloud& points, const RunContext& context) {
     try {
         if (points.size() <= kMostPoints) return sceneOf(points, context);
-        // Every so-many-th: scans are stored line by line, so that these are even.
+        Random random(1);
         PointCloud some;
         some.reserve(kMostPoints);
-        for (std::size_t k = 0; k < kMostPoints; ++k) some.push_back(points[k * points.size() / kMostPoints]);
+        for (const std::size_t i : someOf(points.size(), kMostPoints, random)) some.push_back(points[i]);
         auto scene = sceneOf(some, context);
         RETURN_IF_ERROR(scene);
         return spread(points, some, std::move(*scene), context);

@@ -14,6 +14,7 @@ void overrideBy(const std::optional<Wanted>& wanted, Value& value) {
 
 Result<ShapeParameters> ParameterOverrides::applyTo(const ShapeParameters& current) const {
     ShapeParameters parameters = profile ? parametersOf(*profile) : current;
+    parameters.unit = unit.value_or(current.unit);
     SegmentationOptions& segmentation = parameters.segmentation;
     overrideBy(bigBallRatio, segmentation.bigBallRatio);
     overrideBy(deepAngleDegrees, segmentation.deepAngleDegrees);

@@ -12,7 +12,8 @@ namespace shapedb::catalog {
 /// A profile and single values, each only if the request sets it. Units and ranges:
 /// core/segmentation/options.h and core/signature/signature.h.
 struct ParameterOverrides {
-    std::optional<Profile> profile;  ///< replaces all parameters before the others change single ones
+    std::optional<Profile>
+        profile;  ///< replaces all parameters but the unit before the others change single ones
     std::optional<double> bigBallRatio;
     std::optional<double> deepAngleDegrees;
     std::optional<double> hullAngleDegrees;
@@ -28,6 +29,7 @@ struct ParameterOverrides {
     std::optional<std::uint32_t> maxPoints;
     std::optional<bool> attributes;
     std::optional<bool> views;
+    std::optional<LengthUnit> unit;
 
     /// Of something that has parameters already. Errors: kInvalidArgument (names parameter, value and range).
     [[nodiscard]] Result<ShapeParameters> applyTo(const ShapeParameters& current) const;

@@ -35,6 +35,9 @@ Result<PreparedSearch> Searches::prepare(index::SnapshotPtr collection, const Se
     RETURN_IF_ERROR(checkK(request.k, maxK_));
     RETURN_IF_ERROR(checkThreshold(request.threshold));
     RETURN_IF_ERROR(checkFilterLength(request.filter));
+    if (request.score.keepScale && request.freeScale) {
+        return fail(ErrorCode::kInvalidArgument, "keep_scale and free_scale exclude each other");
+    }
     RETURN_IF_ERROR(checkVerifyOptions(request.verifyOptions));
     Result<Filter> filter = Filter::parse(request.filter);
     RETURN_IF_ERROR(filter);
@@ -47,6 +50,9 @@ Result<PreparedSearch> Searches::prepare(index::SnapshotPtr collection, const Se
     prepared.options.threshold = request.threshold;
     prepared.options.filter = std::move(*filter);
     prepared.options.score = request.score;
+    if (prepared.collection->parameters.unit != LengthUnit::kNone && !request.freeScale) {
+        prepared.options.score.keepScale = true;
+    }
     prepared.explain = request.explain;
     if (request.verify.value_or(prepared.collection->parameters.profile == Profile::kDefault)) {
         prepared.verify = request.verifyOptions;
@@ -97,6 +103,39 @@ Result<Searches::Compared> Searches::compared(const char* which, const ShapeName
     auto shape = read();
     if (!shape) return fail(withContext(shape.error(), which + std::string(": ")));
     return shape;
+}
+
+Result<std::shared_ptr<const SurfacePoints>> Searches::surfaceOf(const ShapeName& name) const {
+    const auto collection = catalog_.collection(name.collection);
+    RETURN_IF_ERROR(collection);
+    const auto found = catalog_.findShape(*collection, name.key);
+    RETURN_IF_ERROR(found);
+    auto surface = catalog_.surface(found->shape.id);
+    RETURN_IF_ERROR(surface);
+    if (!*surface) {
+        return fail(ErrorCode::kNotReady, "shape '" + name.key +
+                                              "' has no surface points (yet): it is pending, failed, or was "
+                                              "stored by an older version; rebuild the collection");
+    }
+    return surface;
+}
+
+Result<FitResult> Searches::align(const store::VerifiedScan& query,
+                                  const std::variant<ShapeName, const store::VerifiedScan*>& other,
+                                  const FitOptions& options, const RunContext& context) const {
+    SegmentationSlots::Slot slot(catalog_.segmentationSlots());
+    RETURN_IF_ERROR(slot.acquire(context));
+    const auto surface = makeSurfacePoints(store::toCloud(query.points()), context);
+    if (!surface) return fail(withContext(surface.error(), "query: "));
+    if (const auto* name = std::get_if<ShapeName>(&other)) {
+        const auto stored = surfaceOf(*name);
+        if (!stored) return fail(withContext(stored.error(), "other: "));
+        return fit(FitQuery(*surface), **stored, options, context);
+    }
+    const store::VerifiedScan& scan = *std::get<const store::VerifiedScan*>(other);
+    const auto sent = makeSurfacePoints(store::toCloud(scan.points()), context);
+    if (!sent) return fail(withContext(sent.error(), "other: "));
+    return fit(FitQuery(*surface), *sent, options, context);
 }
 
 Result<Comparison> Searches::compare(const ShapeName& query, const ShapeName& other,

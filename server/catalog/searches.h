@@ -6,6 +6,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "core/base/error.h"
@@ -23,7 +24,8 @@ struct SearchRequest {
     std::uint32_t k = 0;
     double threshold = 0.0;
     std::string filter;
-    ScoreOptions score;
+    ScoreOptions score;      ///< keepScale: also where the collection has no unit
+    bool freeScale = false;  ///< sizes do not count, although the collection has a unit
     bool explain = true;
     std::optional<bool> verify;  ///< nothing: yes, but not in collections of profile `paper`
     VerifyOptions verifyOptions;
@@ -95,6 +97,12 @@ class Searches {
     [[nodiscard]] Result<PreparedSearch> prepare(index::SnapshotPtr collection,
                                                  const SearchRequest& request) const;
 
+    /// Lays a scan or a stored shape on a scan; stores nothing. Errors: those of makeSurfacePoints and fit;
+    /// kInvalidArgument (key), kNotFound, kNotReady (no surface points yet), kDataLoss.
+    [[nodiscard]] Result<FitResult> align(const store::VerifiedScan& query,
+                                          const std::variant<ShapeName, const store::VerifiedScan*>& other,
+                                          const FitOptions& options, const RunContext& context) const;
+
     /// A stored shape as a query, which finds itself only with `includeSelf`. Errors: kInvalidArgument (key),
     /// kNotFound, kNotReady, kDataLoss.
     [[nodiscard]] Result<VerifiableQuery> storedQuery(const PreparedSearch& search, const std::string& key,
@@ -145,6 +153,7 @@ class Searches {
     Result<std::optional<Explanation>> explain(const PreparedSearch& search, const VerifiedResult& found,
                                                const VerifiedHit& hit) const;
     SurfaceOf surfaces() const;
+    Result<std::shared_ptr<const SurfacePoints>> surfaceOf(const ShapeName& name) const;
 
     Catalog& catalog_;
     SearchRunner& runner_;

@@ -107,6 +107,13 @@ Result<catalog::ParameterOverrides> overridesFrom(pb::Profile profile,
     if (signature.has_max_points()) overrides.maxPoints = signature.max_points();
     if (signature.has_attributes()) overrides.attributes = signature.attributes();
     if (signature.has_views()) overrides.views = signature.views();
+    if (signature.unit() != pb::LENGTH_UNIT_UNSPECIFIED) {
+        overrides.unit = fromProto(signature.unit());
+        if (!overrides.unit) {
+            return fail(ErrorCode::kInvalidArgument,
+                        "unit: unknown value " + std::to_string(static_cast<int>(signature.unit())));
+        }
+    }
     return overrides;
 }
 

@@ -8,6 +8,7 @@
 #include <grpcpp/health_check_service_interface.h>
 
 #include "server/rpc/admin_service.h"
+#include "server/rpc/align_service.h"
 #include "server/rpc/cancel_watcher.h"
 #include "server/rpc/collection_service.h"
 #include "server/rpc/message_limits.h"
@@ -23,7 +24,8 @@ constexpr std::chrono::milliseconds kToLearnOfCancellation{200};
 
 /// Names the health service answers for.
 constexpr const char* kServiceNames[] = {"shapedb.v1.ShapeService", "shapedb.v1.SearchService",
-                                         "shapedb.v1.CollectionService", "shapedb.v1.AdminService"};
+                                         "shapedb.v1.CollectionService", "shapedb.v1.AlignService",
+                                         "shapedb.v1.AdminService"};
 
 }  // namespace
 
@@ -42,6 +44,7 @@ struct GrpcServer::Parts {
                    std::chrono::system_clock::now()},
           shapeService(services),
           searchService(services),
+          alignService(services),
           collectionService(services),
           adminService(services) {}
 
@@ -49,6 +52,7 @@ struct GrpcServer::Parts {
     Services services;
     ShapeServiceHandler shapeService;
     SearchServiceHandler searchService;
+    AlignServiceHandler alignService;
     CollectionServiceHandler collectionService;
     AdminServiceHandler adminService;
     config::Endpoint endpoint;
@@ -72,6 +76,7 @@ Result<void> GrpcServer::listen(const config::Endpoint& wanted) {
     builder.AddListeningPort(parts_->endpoint.text(), grpc::InsecureServerCredentials(), &port);
     builder.RegisterService(&parts_->shapeService);
     builder.RegisterService(&parts_->searchService);
+    builder.RegisterService(&parts_->alignService);
     builder.RegisterService(&parts_->collectionService);
     builder.RegisterService(&parts_->adminService);
     builder.SetMaxReceiveMessageSize(kMaxReceiveBytes);

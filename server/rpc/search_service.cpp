@@ -33,6 +33,7 @@ Result<catalog::PreparedSearch> prepare(const Services& services, Call& call,
     request.threshold = options.threshold();
     request.filter = options.filter();
     request.score = scoreOptionsFrom(options);
+    request.freeScale = options.free_scale();
     request.explain = !options.no_explanation();
     if (options.has_verify()) request.verify = options.verify();
     request.verifyOptions.mostCandidates = options.verify_candidates();

@@ -151,6 +151,7 @@ std::string encodeParameters(const ShapeParameters& parameters) {
     json["signature"] = {{"max_points", parameters.signature.maxPoints},
                          {"attributes", parameters.signature.attributes}};
     json["views"] = parameters.views;
+    json["unit"] = lengthUnitName(parameters.unit);
     return json.dump();
 }
 
@@ -165,6 +166,8 @@ Result<ShapeParameters> decodeParameters(const std::string& text) {
         const Json* signatureJson = top.find("signature");
         std::optional<bool> views;
         if (top.find("views") != nullptr) top.read("views", views.emplace());
+        std::string unit = lengthUnitName(LengthUnit::kNone);
+        top.read("unit", unit);
         if (const std::string problem = top.problem(); !problem.empty()) return damagedParameters(problem);
 
         const Result<Profile> profile = profileFromName(name);
@@ -173,6 +176,9 @@ Result<ShapeParameters> decodeParameters(const std::string& text) {
         parameters.profile = *profile;
         // Collections from before there were views get them with their next rebuild.
         parameters.views = views.value_or(parametersOf(*profile).views);
+        const auto knownUnit = lengthUnitFromName(unit);
+        if (!knownUnit) return damagedParameters("'unit' is '" + unit + "'");
+        parameters.unit = *knownUnit;
         if (const auto read = readSegmentation(segmentationJson != nullptr ? *segmentationJson : empty,
                                                parameters.segmentation);
             !read) {

@@ -18,11 +18,12 @@ using grpc::health::v1::HealthCheckResponse;
 using StandardServices = LiveTest;
 
 constexpr const char* kServices[] = {"shapedb.v1.ShapeService", "shapedb.v1.SearchService",
-                                     "shapedb.v1.CollectionService", "shapedb.v1.AdminService"};
+                                     "shapedb.v1.CollectionService", "shapedb.v1.AdminService",
+                                     "shapedb.v1.AlignService"};
 
 TEST_F(StandardServices, HealthCheckKnowsEachService) {
     HealthCheckRequest request;
-    for (const char* service : {"", kServices[0], kServices[1], kServices[2], kServices[3]}) {
+    for (const char* service : {"", kServices[0], kServices[1], kServices[2], kServices[3], kServices[4]}) {
         request.set_service(service);
         const auto reply = unary(*client.health, &Health::Stub::Check, request);
         ASSERT_TRUE(reply.ok()) << reply;

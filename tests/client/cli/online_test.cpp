@@ -3,6 +3,8 @@
 #include <fstream>
 
 #include "client/io/scan_reader.h"
+#include "core/base/random.h"
+#include "core/geometry/motion.h"
 #include "tests/client/cli/run_command.h"
 #include "tests/integration/support/server_process.h"
 
@@ -186,6 +188,81 @@ TEST_F(Online, QueryTextRanksAndExplains) {
     }
     const CommandRun every = online({"query", "--key", "human/human_01", "--collection", "why", "--explain"});
     EXPECT_NE(every.out.find("Why fish/fish_01"), std::string::npos) << every.out;
+}
+
+TEST_F(Online, UnitsConvertScansAndAnswersAndMakeSizesCount) {
+    onlineJson({"collection", "create", "metres", "--units", "m"});
+    onlineJson({"add", scans(), "--collection", "metres", "--wait"});
+    const std::string file = scans() + "/mug/mug_01.ply";
+    // The same numbers taken for millimetres: a thousandth of the size.
+    const json tiny = onlineJson({"query", file, "--collection", "metres", "-k", "1", "--unit", "mm"});
+    EXPECT_LT(tiny["hits"][0]["score"], 0.3) << "sizes count";
+    const json free =
+        onlineJson({"query", file, "--collection", "metres", "-k", "1", "--unit", "mm", "--free-scale"});
+    EXPECT_EQ(free["hits"][0]["key"], "mug/mug_01");
+    EXPECT_GT(free["hits"][0]["score"], 0.9);
+    EXPECT_EQ(free["hits"][0]["verdict"], "same_object");
+    EXPECT_GT(free["hits"][0]["verdict_reliability"], 0.5);
+    EXPECT_EQ(free["unit"], "mm");
+    const json plain = onlineJson({"query", file, "--collection", "metres", "-k", "1"});
+    EXPECT_GT(plain["hits"][0]["score"], 0.9);
+    EXPECT_NEAR(free["query"]["scale"].get<double>(), plain["query"]["scale"].get<double>(),
+                1e-4 * plain["query"]["scale"].get<double>())
+        << "lengths come back in millimetres";
+    EXPECT_EQ(onlineJson({"collection", "get", "metres"})["parameters"]["unit"], "m");
+
+    onlineJson({"collection", "create", "unknown-unit"});
+    const CommandRun refused = online({"query", file, "--collection", "unknown-unit", "--unit", "mm"});
+    EXPECT_EQ(refused.exitCode, kUsage);
+    EXPECT_NE(refused.err.find("no unit"), std::string::npos) << refused.err;
+}
+
+TEST_F(Online, AddEachStoresTheObjectsOfATable) {
+    // Two balls of different sizes on a table.
+    PointCloud points;
+    Random random(3);
+    for (int i = 0; i < 6000; ++i) {
+        const Point3 direction = randomDirection(random);
+        const bool large = i % 3 != 0;
+        points.push_back((large ? 1.0 : 0.6) * direction + Point3{large ? 0.0 : 4.0, 0.0, large ? 1.0 : 0.6});
+        points.push_back({random.uniform(-4.0, 8.0), random.uniform(-4.0, 4.0), 0.002 * random.normal()});
+    }
+    const std::string file = data()->path() + "/table.xyz";
+    std::ofstream out(file);
+    for (const Point3& p : points) out << p.x << " " << p.y << " " << p.z << "\n";
+    out.close();
+    onlineJson({"collection", "create", "table"});
+    const json added = onlineJson({"add", file, "--collection", "table", "--each", "--wait"});
+    ASSERT_EQ(added["added"].size(), 2u) << added;
+    EXPECT_EQ(added["added"][0]["key"], "table/1");
+    EXPECT_EQ(added["added"][1]["key"], "table/2");
+    EXPECT_NEAR(added["added"][0]["points"].get<double>(), 4000.0, 200.0);
+    const json found = onlineJson({"query", file, "--collection", "table", "--largest", "-k", "1"});
+    EXPECT_NEAR(found["scene"]["plane"]["share"].get<double>(), 0.5, 0.03);
+    EXPECT_EQ(found["scene"]["plane"]["removed"], true);
+    EXPECT_EQ(found["scene"]["objects"].size(), 2u);
+    const CommandRun text = online({"query", file, "--collection", "table", "-k", "1"});
+    EXPECT_NE(text.out.find("of the points lie on one plane: --drop-plane"), std::string::npos) << text.out;
+}
+
+TEST_F(Online, AlignAgreesForStoredShapesAndFiles) {
+    fill("align");
+    const std::string query = scans() + "/mug/mug_01.ply";
+    const json stored = onlineJson({"align", query, "--key", "mug/mug_02", "--collection", "align"});
+    const json files = onlineJson({"align", query, scans() + "/mug/mug_02.ply"});
+    for (const char* name : {"score", "residual", "explained_query", "explained_other", "scale"}) {
+        EXPECT_NEAR(stored[name].get<double>(), files[name].get<double>(), 0.02) << name;
+    }
+    EXPECT_EQ(stored["matrix"].size(), 16u);
+    EXPECT_EQ(stored["matrix"][15], 1.0);
+    EXPECT_TRUE(stored["alternatives"].is_array());
+    const json same =
+        onlineJson({"align", query, "--key", "mug/mug_01", "--collection", "align", "--keep-scale"});
+    EXPECT_GT(same["score"], 0.97);
+    EXPECT_EQ(same["scale"], 1.0);
+    EXPECT_EQ(online({"align", query, "--key", "none", "--collection", "align"}).exitCode, kWrongState);
+    EXPECT_EQ(online({"align", query}).exitCode, kUsage);
+    EXPECT_EQ(online({"align", query, query, "--key", "mug/mug_01"}).exitCode, kUsage);
 }
 
 TEST_F(Online, QueryReportsServerErrors) {

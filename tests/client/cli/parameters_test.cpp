@@ -36,6 +36,7 @@ TEST(Parameters, EachFlagOverridesOnlyItsField) {
     flags.given.maxPoints = 9;
     flags.given.attributes = true;
     flags.given.views = true;
+    flags.given.unit = LengthUnit::kMillimetre;
     const auto resolved = flags.resolve();
     ASSERT_TRUE(resolved) << resolved.error().message;
     EXPECT_EQ(toJson(*resolved), nlohmann::json({{"profile", "paper"},
@@ -55,7 +56,8 @@ TEST(Parameters, EachFlagOverridesOnlyItsField) {
                                                  {"interior_method", "adaptive"},
                                                  {"max_points", 9},
                                                  {"attributes", true},
-                                                 {"views", true}}));
+                                                 {"views", true},
+                                                 {"unit", "mm"}}));
     EXPECT_EQ(toJson(flags.given), toJson(*resolved)) << "a collection shows what a scan here would get";
 }
 

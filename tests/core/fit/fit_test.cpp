@@ -322,5 +322,25 @@ TEST(Fit, ReportsProgress) {
     EXPECT_EQ(last, total);
 }
 
+TEST(Fit, AnyRatioOfSizesThatAreKeptHasAResult) {
+    const PointCloud query = scanOf(makeMember("animal", 1, 1).value(), {}).value();
+    for (const double ratio : {1e-6, 1e-3, 0.002, 0.01, 0.1, 10.0, 100.0, 300.0, 990.0, 1e3, 1e6}) {
+        Motion motion;
+        motion.scale = ratio;
+        const SurfacePoints other = surfaceOf(applyToCloud(motion, query));
+        for (const FitKind kind : {FitKind::kWhole, FitKind::kOneSided, FitKind::kPiece}) {
+            FitOptions options;
+            options.kinds = FitKinds::only(kind);
+            options.keepScale = true;
+            const auto found = fit(FitQuery(surfaceOf(query)), other, options);
+            ASSERT_TRUE(found) << ratio;
+            EXPECT_EQ(found->best.motion.scale, 1.0) << ratio;
+            if (ratio <= 0.01 || ratio >= 100.0) {
+                EXPECT_LT(found->best.score, 0.3) << ratio;
+            }
+        }
+    }
+}
+
 }  // namespace
 }  // namespace shapedb

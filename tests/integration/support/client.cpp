@@ -32,6 +32,7 @@ Client::Client(const std::string& address) {
     channel = grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
     shapes = pb::ShapeService::NewStub(channel);
     searches = pb::SearchService::NewStub(channel);
+    aligns = pb::AlignService::NewStub(channel);
     collections = pb::CollectionService::NewStub(channel);
     admin = pb::AdminService::NewStub(channel);
     health = grpc::health::v1::Health::NewStub(channel);

@@ -12,6 +12,7 @@
 
 #include "health.grpc.pb.h"
 #include "shapedb/v1/admin_service.grpc.pb.h"
+#include "shapedb/v1/align_service.grpc.pb.h"
 #include "shapedb/v1/collection_service.grpc.pb.h"
 #include "shapedb/v1/search_service.grpc.pb.h"
 #include "shapedb/v1/shape_service.grpc.pb.h"
@@ -51,6 +52,7 @@ struct Client {
     std::shared_ptr<grpc::Channel> channel;
     std::unique_ptr<pb::ShapeService::Stub> shapes;
     std::unique_ptr<pb::SearchService::Stub> searches;
+    std::unique_ptr<pb::AlignService::Stub> aligns;
     std::unique_ptr<pb::CollectionService::Stub> collections;
     std::unique_ptr<pb::AdminService::Stub> admin;
     std::unique_ptr<grpc::health::v1::Health::Stub> health;

@@ -59,6 +59,7 @@ TEST(ParametersFrom, ConvertsEveryField) {
     signature.set_max_points(11);
     signature.set_attributes(true);
     signature.set_views(true);
+    signature.set_unit(pb::LENGTH_UNIT_INCH);
     const auto parameters = parametersFrom(pb::PROFILE_PAPER, segmentation, signature, {});
     ASSERT_TRUE(parameters);
     // And back: the collection message has the same values.

@@ -24,6 +24,7 @@ void expectSame(const ShapeParameters& a, const ShapeParameters& b) {
     EXPECT_EQ(a.signature.maxPoints, b.signature.maxPoints);
     EXPECT_EQ(a.signature.attributes, b.signature.attributes);
     EXPECT_EQ(a.views, b.views);
+    EXPECT_EQ(a.unit, b.unit);
 }
 
 // The text is persisted: these names never change.
@@ -33,7 +34,7 @@ TEST(ParametersCodec, TextIsFrozen) {
               R"("hull_angle_degrees":5.0,"merge_ratio":1.5,"decimate_to":0,"merge_contrast":0.0,)"
               R"("min_segment_share":0.004,"max_segments":16,"stray_ratio":0.0,"smoothing_reach":0.0,)"
               R"("even_spacing":0.0,"interior_method":"walk"},"signature":{"max_points":7,)"
-              R"("attributes":false},"views":false})");
+              R"("attributes":false},"views":false,"unit":"none"})");
 }
 
 // Text written before outliers and smoothing existed: such collections keep working as they did, though

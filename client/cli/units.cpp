@@ -1,0 +1,64 @@
+#include "client/cli/units.h"
+
+#include "core/base/return_if_error.h"
+
+namespace shapedb::cli {
+
+namespace {
+
+void scaleBy(double factor, client::Signature& signature) {
+    const double cube = factor * factor * factor;
+    for (client::WeightedPoint& point : signature.points) {
+        point.position = factor * point.position;
+        point.weight *= cube;
+        point.maximumRadius *= factor;
+        for (double& extent : point.extents) extent *= factor;
+    }
+    signature.scale *= factor;
+    signature.volume *= cube;
+}
+
+// With both shapes in the other unit, rotation and scale stay.
+void scaleBy(double factor, Motion& motion) { motion.translation = factor * motion.translation; }
+
+void scaleBy(double factor, client::Fit& fit) {
+    scaleBy(factor, fit.best.motion);
+    for (client::FitPose& pose : fit.alternatives) scaleBy(factor, pose.motion);
+    for (client::FreeAxis& axis : fit.axes) axis.point = factor * axis.point;
+}
+
+}  // namespace
+
+Result<double> factorToCollection(const client::Client& client, const std::string& collection,
+                                  std::optional<LengthUnit> unit, const RunContext& context) {
+    if (!unit || *unit == LengthUnit::kNone) return 1.0;
+    const auto found = client.getCollection(collection, context);
+    RETURN_IF_ERROR(found);
+    const LengthUnit own = found->parameters.unit.value_or(LengthUnit::kNone);
+    if (own == LengthUnit::kNone) {
+        return fail(ErrorCode::kInvalidArgument,
+                    "--unit: collection '" + found->name +
+                        "' has no unit of length; create it with --units, or set it by a rebuild");
+    }
+    return metresIn(*unit) / metresIn(own);
+}
+
+void scaleBy(double factor, PointCloud& points) {
+    for (Point3& point : points) point = factor * point;
+}
+
+void scaleBy(double factor, client::SearchReply& reply) {
+    const double cube = factor * factor * factor;
+    for (client::Hit& hit : reply.hits) {
+        if (hit.explanation) scaleBy(factor, hit.explanation->motion);
+        if (hit.fit) scaleBy(factor, *hit.fit);
+    }
+    scaleBy(factor, reply.query);
+    if (reply.report) {
+        reply.report->volume *= cube;
+        reply.report->noise *= factor;
+    }
+    reply.offset = factor * reply.offset;
+}
+
+}  // namespace shapedb::cli

@@ -1,0 +1,112 @@
+#include "server/rpc/align_service.h"
+
+#include <optional>
+#include <variant>
+
+#include "common/point_stream.h"
+#include "core/base/return_if_error.h"
+#include "server/catalog/scan_upload.h"
+#include "server/rpc/call.h"
+#include "server/rpc/convert.h"
+
+namespace shapedb::rpc {
+
+namespace {
+
+// The one or two scans of a call.
+class Uploads {
+  public:
+    Uploads(const Services& services, Call& call)
+        : call_(call),
+          query_(services.config.limits.maxPoints, services.admission.uploads),
+          other_(services.config.limits.maxPoints, services.admission.uploads) {}
+
+    Result<void> take(const v1::AlignRequest& message) {
+        if (message.has_header()) return begin(message.header());
+        if (!message.has_chunk()) {
+            return fail(ErrorCode::kMalformedStream, "message with neither header nor chunk");
+        }
+        const std::string& xyz = message.chunk().xyz();
+        const bool ofQuery =
+            !header_ || header_->other_points() == 0 || query_.points() < header_->query_points();
+        RETURN_IF_ERROR((ofQuery ? query_ : other_).add(xyz));
+        call_.addPoints(xyz.size() / kPointBytes, xyz.size());
+        return {};
+    }
+
+    Result<store::VerifiedScan> query() { return finished("query: ", query_); }
+    Result<store::VerifiedScan> other() { return finished("other: ", other_); }
+    /// Null if none arrived.
+    const v1::AlignHeader* header() const { return header_ ? &*header_ : nullptr; }
+
+  private:
+    Result<void> begin(const v1::AlignHeader& header) {
+        auto begun = query_.begin(header.query_points(), header.query_sha256());
+        if (!begun) return fail(withContext(begun.error(), "query: "));
+        if (header.other_case() == v1::AlignHeader::OTHER_NOT_SET) {
+            return fail(ErrorCode::kInvalidArgument, "other: give a key, or other_points and a second scan");
+        }
+        if (header.has_other_points()) {
+            begun = other_.begin(header.other_points(), header.other_sha256());
+            if (!begun) return fail(withContext(begun.error(), "other: "));
+        }
+        header_ = header;
+        return {};
+    }
+
+    static Result<store::VerifiedScan> finished(const char* which, catalog::ScanUpload& upload) {
+        auto scan = upload.finish();
+        if (!scan) return fail(withContext(scan.error(), which));
+        return scan;
+    }
+
+    Call& call_;
+    catalog::ScanUpload query_;
+    catalog::ScanUpload other_;
+    std::optional<v1::AlignHeader> header_;
+};
+
+FitOptions optionsFrom(const v1::AlignHeader& header) {
+    FitOptions options;
+    options.keepScale = header.keep_scale();
+    options.reflection = !header.forbid_reflection();
+    options.kinds.whole = !header.partial();
+    return options;
+}
+
+}  // namespace
+
+grpc::Status AlignServiceHandler::Align(grpc::ServerContext* context,
+                                        grpc::ServerReader<v1::AlignRequest>* reader,
+                                        v1::AlignResponse* response) {
+    return handle(services_, context, "Align", [&](Call& call) -> Result<void> {
+        Uploads uploads(services_, call);
+        v1::AlignRequest message;
+        while (call.read(*reader, &message)) {
+            RETURN_IF_ERROR(call.run().checkpoint());
+            RETURN_IF_ERROR(uploads.take(message));
+        }
+        if (call.clientGone()) return fail(ErrorCode::kCancelled, "the client cancelled the upload");
+        const auto query = uploads.query();
+        RETURN_IF_ERROR(query);
+        const v1::AlignHeader& header = *uploads.header();
+        const auto align = [&](const std::variant<catalog::ShapeName, const store::VerifiedScan*>& other) {
+            return services_.searches.align(*query, other, optionsFrom(header), call.run());
+        };
+        Result<FitResult> fitted = fail(ErrorCode::kInternal, "not aligned");
+        if (header.has_key()) {
+            call.noteCollection(header.key().collection());
+            call.noteKey(header.key().key());
+            fitted = align(catalog::ShapeName{header.key().collection(), header.key().key()});
+        } else {
+            const auto other = uploads.other();
+            RETURN_IF_ERROR(other);
+            fitted = align(&*other);
+        }
+        RETURN_IF_ERROR(fitted);
+        toProto(*fitted, response->mutable_fit());
+        return {};
+    });
+}
+
+}  // namespace shapedb::rpc
