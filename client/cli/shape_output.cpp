@@ -24,6 +24,8 @@ constexpr double kManyOutliers = 0.05;  // of the points: worth a warning
 constexpr std::size_t kListedPairs = 3;
 /// Pairs that contribute less of the similarity are not worth a line.
 constexpr double kShareWorthListing = 0.01;
+/// Parts of a pair whose centres are further apart, in units of the common size, do not lie on each other.
+constexpr double kElsewhere = 0.1;
 
 json pointJson(const Point3& p) { return json::array({p.x, p.y, p.z}); }
 
@@ -64,7 +66,8 @@ std::string pairsText(const client::Explanation& explanation) {
     for (const client::SegmentMatch& match : explanation.matches) {
         if (listed == kListedPairs || (listed > 0 && match.share < kShareWorthListing)) break;
         text += "  part " + std::to_string(match.query + 1) + " <-> part " + std::to_string(match.hit + 1) +
-                ": " + formatPercent(match.share) + " of the match, centres " +
+                ": " + formatPercent(match.share) + " of the match, " +
+                (match.distance > kElsewhere ? "similar but elsewhere: " : "") + "centres " +
                 formatPercent(match.distance) + " apart\n";
         ++listed;
     }
@@ -222,7 +225,8 @@ json toJson(const client::Explanation& explanation) {
         matches.push_back({{"query", match.query},
                            {"hit", match.hit},
                            {"share", match.share},
-                           {"distance", match.distance}});
+                           {"distance", match.distance},
+                           {"elsewhere", match.distance > kElsewhere}});
     }
     json terms = json::array();
     for (const client::ScoreTerm& term : explanation.terms) {

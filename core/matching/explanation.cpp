@@ -24,6 +24,14 @@ void listUnmatched(Explanation& explanation, std::size_t countA, std::size_t cou
     explanation.unmatchedB = missing(countB, explanation.matches, &PointMatch::b);
 }
 
+void setMotion(const Motion& motion, const Signature& a, const Signature& b, Explanation& explanation) {
+    explanation.motion = motion;
+    for (PointMatch& match : explanation.matches) {
+        const Point3 there = apply(motion, pointPosition(b, match.b));
+        match.distance = length(pointPosition(a, match.a) - there) / a.scale;
+    }
+}
+
 Explanation exchanged(Explanation explanation, double unit) {
     explanation.motion = inverse(explanation.motion);
     for (PointMatch& match : explanation.matches) {

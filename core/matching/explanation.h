@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/geometry/motion.h"
+#include "core/signature/signature.h"
 
 namespace shapedb {
 
@@ -42,6 +43,10 @@ struct Explanation {
 
 /// Fills in the unmatched points of shapes with `countA` and `countB` points. Scorers end with it.
 void listUnmatched(Explanation& explanation, std::size_t countA, std::size_t countB);
+
+/// Replaces the motion, and the distances of the matches by those under it. `a` and `b` are the signatures
+/// that the explanation is of.
+void setMotion(const Motion& motion, const Signature& a, const Signature& b, Explanation& explanation);
 
 /// The same of b against a, where a length 1 in units of a's scale is `unit` in those of b's.
 [[nodiscard]] Explanation exchanged(Explanation explanation, double unit);

@@ -192,7 +192,7 @@ Result<VerifiedExplanation> explainVerified(const Signature& query, const Surfac
     RETURN_IF_ERROR(fitted);
     VerifiedExplanation result;
     result.explanation = explain(query, other, options);
-    result.explanation.motion = fitted->best.motion;
+    setMotion(fitted->best.motion, query, other, result.explanation);
     result.verdict = verdictOf(distanceOfScore(result.explanation.score), *fitted);
     result.fit = std::move(*fitted);
     return result;

@@ -12,9 +12,8 @@ namespace shapedb::catalog {
 
 namespace {
 
-// The score of a verified hit: its signature's terms and how well it fits; the motion is the fit's.
-void verifiedBy(const FitResult& fit, double share, Explanation& explanation) {
-    explanation.motion = fit.best.motion;
+// The score of a verified hit: its signature's terms and how well it fits.
+void addFit(const FitResult& fit, double share, Explanation& explanation) {
     for (ScoreTerm& term : explanation.terms) term.weight *= 1.0 - share;
     if (!explanation.terms.empty()) explanation.terms.push_back({"fit", fit.misfit, share});
 }
@@ -212,7 +211,7 @@ SurfaceOf Searches::surfaces() const {
     return [this](std::int64_t id) { return catalog_.surface(id); };
 }
 
-Result<std::optional<Explanation>> Searches::explain(const PreparedSearch& search,
+Result<std::optional<Explanation>> Searches::explain(const PreparedSearch& search, const Signature& query,
                                                      const VerifiedResult& found,
                                                      const VerifiedHit& hit) const {
     const auto signature = catalog_.storedSignature(*search.collection, hit.id);
@@ -222,12 +221,15 @@ Result<std::optional<Explanation>> Searches::explain(const PreparedSearch& searc
     Explanation explanation = found.scorer->explain(*signature);
     // The shape has got another signature since the search.
     if (explanation.score != hit.signatureScore) return std::optional<Explanation>();
-    if (hit.fit) verifiedBy(*hit.fit, found.misfitShare, explanation);
+    if (hit.fit) {
+        setMotion(hit.fit->best.motion, query, *signature, explanation);
+        addFit(*hit.fit, found.misfitShare, explanation);
+    }
     return std::optional<Explanation>(std::move(explanation));
 }
 
-Result<void> Searches::visitHits(const PreparedSearch& search, const VerifiedResult& found,
-                                 const Visit& visit) const {
+Result<void> Searches::visitHits(const PreparedSearch& search, const Signature& query,
+                                 const VerifiedResult& found, const Visit& visit) const {
     for (const VerifiedHit& hit : found.hits) {
         auto shape = catalog_.shapeById(hit.id);
         if (!shape && shape.error().code == ErrorCode::kNotFound) continue;  // deleted meanwhile
@@ -240,7 +242,7 @@ Result<void> Searches::visitHits(const PreparedSearch& search, const VerifiedRes
         out.fit = hit.fit;
         out.verdict = hit.verdict;
         if (search.explain) {
-            auto explanation = explain(search, found, hit);
+            auto explanation = explain(search, query, found, hit);
             RETURN_IF_ERROR(explanation);
             out.explanation = std::move(*explanation);
         }

@@ -126,8 +126,8 @@ class Searches {
     /// missing where the signature scored was replaced meanwhile. `found` by `run` or `runBatch`. Errors:
     /// those of topK and of `visit`; kDataLoss.
     using Visit = std::function<Result<void>(const FoundHit&)>;
-    [[nodiscard]] Result<void> visitHits(const PreparedSearch& search, const VerifiedResult& found,
-                                         const Visit& visit) const;
+    [[nodiscard]] Result<void> visitHits(const PreparedSearch& search, const Signature& query,
+                                         const VerifiedResult& found, const Visit& visit) const;
 
     /// Verified if the request says so and the query has surface points (core/search/verify.h), otherwise as
     /// `topK`; `query.excludeId` holds.
@@ -150,8 +150,8 @@ class Searches {
         std::shared_ptr<const SurfacePoints> surface;  ///< null if there are none
     };
     Result<Compared> compared(const char* which, const ShapeName& name) const;
-    Result<std::optional<Explanation>> explain(const PreparedSearch& search, const VerifiedResult& found,
-                                               const VerifiedHit& hit) const;
+    Result<std::optional<Explanation>> explain(const PreparedSearch& search, const Signature& query,
+                                               const VerifiedResult& found, const VerifiedHit& hit) const;
     SurfaceOf surfaces() const;
     Result<std::shared_ptr<const SurfacePoints>> surfaceOf(const ShapeName& name) const;
 

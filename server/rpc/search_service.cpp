@@ -58,7 +58,7 @@ Result<void> answer(const Services& services, const catalog::PreparedSearch& pre
     if (response->query().has_attributes()) {
         response->mutable_query()->mutable_attributes()->clear_statistics();
     }
-    return services.searches.visitHits(prepared, found, [&](const catalog::FoundHit& hit) {
+    return services.searches.visitHits(prepared, query, found, [&](const catalog::FoundHit& hit) {
         pb::Hit* out = response->add_hits();
         toProto(hit.shape, prepared.collection->collection.name, hit.quality, out->mutable_shape());
         out->set_score(hit.score);

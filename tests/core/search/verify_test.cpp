@@ -147,6 +147,22 @@ TEST(Verify, PutsTheSameObjectFirstAndSaysHowItLies) {
     EXPECT_EQ(result->misfitShare, 0.5);
 }
 
+TEST(Verify, MeasuresPairsOfPartsUnderTheMotionOfTheFit) {
+    const Scanned& query = gallery().query;
+    const Scanned& same = gallery().shapes.at(10);
+    const auto found =
+        explainVerified(query.signature, *query.surface, same.signature, *same.surface, ScoreOptions());
+    ASSERT_TRUE(found);
+    EXPECT_EQ(found->verdict, Verdict::kSameObject);
+    ASSERT_FALSE(found->explanation.matches.empty());
+    for (const PointMatch& match : found->explanation.matches) {
+        const Point3 there = apply(found->fit.best.motion, pointPosition(same.signature, match.b));
+        EXPECT_EQ(match.distance,
+                  length(pointPosition(query.signature, match.a) - there) / query.signature.scale);
+    }
+    EXPECT_LT(found->explanation.matches.front().distance, 0.05);
+}
+
 TEST(Verify, NamesAnAnswerThatTheCapMadeInexact) {
     SearchOptions options;
     options.k = 8;

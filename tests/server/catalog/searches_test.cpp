@@ -105,7 +105,7 @@ TEST_F(SearchesTest, AnswersExplainHitsAndLeaveOutDeletedShapes) {
     ASSERT_EQ(found.hits.size(), 2u);
     const auto keysOf = [&](const VerifiedResult& result) {
         std::vector<std::string> keys;
-        EXPECT_TRUE(searches().visitHits(*prepared, result, [&](const FoundHit& hit) {
+        EXPECT_TRUE(searches().visitHits(*prepared, query->signature, result, [&](const FoundHit& hit) {
             EXPECT_TRUE(hit.explanation) << hit.shape.key;
             EXPECT_EQ(hit.explanation.value_or(Explanation{}).score, hit.signatureScore);
             keys.push_back(hit.shape.key);
@@ -115,7 +115,7 @@ TEST_F(SearchesTest, AnswersExplainHitsAndLeaveOutDeletedShapes) {
     };
     EXPECT_EQ(keysOf(found), (std::vector<std::string>{"cup", "jug"}));
     found.hits[1].signatureScore /= 2.0;  // as if the signature had been replaced after the search
-    EXPECT_TRUE(searches().visitHits(*prepared, found, [&](const FoundHit& hit) {
+    EXPECT_TRUE(searches().visitHits(*prepared, query->signature, found, [&](const FoundHit& hit) {
         EXPECT_EQ(hit.explanation.has_value(), hit.shape.key == "cup");
         return Result<void>();
     }));
