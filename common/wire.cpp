@@ -52,6 +52,7 @@ void toProto(const Segmentation& segmentation, v1::SegmentationReport* out) {
     out->set_interior_source(toProto(segmentation.interiorSource));
     out->set_angle_degrees(segmentation.angleDegrees);
     out->set_noise(segmentation.noise);
+    out->set_doubt(toProto(segmentation.doubt));
     out->set_tetrahedra(segmentation.tetrahedra.size());
     out->set_interior_tetrahedra(segmentation.interiorTetrahedra);
     out->set_maxima(segmentation.maxima);

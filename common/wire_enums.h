@@ -52,6 +52,15 @@ namespace shapedb::wire {
     return v1::LENGTH_UNIT_UNSPECIFIED;
 }
 
+[[nodiscard]] inline v1::InteriorDoubt toProto(InteriorDoubt doubt) {
+    switch (doubt) {
+        case InteriorDoubt::kNone: return v1::INTERIOR_DOUBT_NONE;
+        case InteriorDoubt::kNoSurface: return v1::INTERIOR_DOUBT_NO_SURFACE;
+        case InteriorDoubt::kThinWalls: return v1::INTERIOR_DOUBT_THIN_WALLS;
+    }
+    return v1::INTERIOR_DOUBT_UNSPECIFIED;
+}
+
 // The way back: empty for UNSPECIFIED and for numbers that only a newer version knows.
 
 [[nodiscard]] inline std::optional<Profile> fromProto(v1::Profile profile) {
@@ -87,6 +96,14 @@ namespace shapedb::wire {
         case v1::LENGTH_UNIT_METRE: return LengthUnit::kMetre;
         case v1::LENGTH_UNIT_INCH: return LengthUnit::kInch;
         default: return std::nullopt;
+    }
+}
+
+[[nodiscard]] inline InteriorDoubt fromProto(v1::InteriorDoubt doubt) {
+    switch (doubt) {
+        case v1::INTERIOR_DOUBT_NO_SURFACE: return InteriorDoubt::kNoSurface;
+        case v1::INTERIOR_DOUBT_THIN_WALLS: return InteriorDoubt::kThinWalls;
+        default: return InteriorDoubt::kNone;
     }
 }
 

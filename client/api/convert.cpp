@@ -176,6 +176,7 @@ SegmentationReport fromWire(const v1::SegmentationReport& from) {
     to.outliers = from.outliers();
     to.outlierClusters = from.outlier_clusters();
     if (from.has_quality()) to.quality = from.quality();
+    to.doubt = wire::fromProto(from.doubt());
     to.interiorSource = wire::fromProto(from.interior_source()).value_or(InteriorSource::kWalk);
     to.angleDegrees = from.angle_degrees();
     to.noise = from.noise();

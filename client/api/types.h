@@ -20,6 +20,7 @@
 
 namespace shapedb::client {
 
+using shapedb::InteriorDoubt;
 using shapedb::InteriorMethod;
 using shapedb::InteriorSource;
 using shapedb::Metadata;
@@ -188,6 +189,8 @@ struct SegmentationReport {
     /// How certain the interior is, [0, 1]. InteriorMethod::kWalk does not assess it: always 1.
     double quality = 1.0;
     InteriorSource interiorSource = InteriorSource::kWalk;
+    InteriorDoubt doubt =
+        InteriorDoubt::kNone;   ///< why the interior is not to be trusted, beyond its quality
     double angleDegrees = 0.0;  ///< deep angle of the walk; 0 for other sources
     double noise = 0.0;  ///< standard deviation estimated before smoothing, scan units; 0: not measured
     std::uint64_t tetrahedra = 0;

@@ -153,6 +153,7 @@ json toJson(const client::SegmentationReport& report) {
             {"outlier_clusters", report.outlierClusters},
             {"quality", report.quality},
             {"interior_source", interiorSourceName(report.interiorSource)},
+            {"doubt", interiorDoubtName(report.doubt)},
             {"angle_degrees", report.angleDegrees},
             {"estimated_noise", report.noise},
             {"tetrahedra", report.tetrahedra},
@@ -211,6 +212,15 @@ std::string interiorText(const client::SegmentationReport& report, double scale)
         text += report.interiorSource == InteriorSource::kWalk ? ", " + noise : " (" + noise + ")";
     }
     text += "\n" + qualityText(report.quality);
+    switch (report.doubt) {
+        case InteriorDoubt::kNone: break;
+        case InteriorDoubt::kNoSurface:
+            text += "the points show no surface: they fill space, or the noise is as thick as the parts\n";
+            break;
+        case InteriorDoubt::kThinWalls:
+            text += "walls are as thin as the points resolve: scan more densely, or with less noise\n";
+            break;
+    }
     const double dropped = static_cast<double>(report.outliers) / static_cast<double>(report.points);
     if (report.points > 0 && dropped > kManyOutliers) {
         text += formatFixed(100.0 * dropped, 0) +

@@ -18,6 +18,11 @@ struct NoiseEstimate {
     /// Edge of the square of surface that holds one point, as it would be without the noise. On the
     /// low side: up to a third too small on clean scans.
     double spacing = 0.0;
+    /// Spread of neighbourhoods across their plane over that along it, at the size where this is least: near
+    /// 0 on a surface, 0.8 and more where points fill space, or where noise is as thick as the parts.
+    double flatness = 0.0;
+    /// What was taken for noise has two layers: the sides of walls about as thin as the sampling resolves.
+    bool layered = false;
 };
 
 /// `mostNeighbours`: the largest neighbourhood to look at. It must not hold most of a separate body, whose

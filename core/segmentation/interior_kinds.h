@@ -20,6 +20,24 @@ enum class InteriorSource : int {
     kThickened = 2,  ///< no side can be told: all tetrahedra close to the points
 };
 
+/// Why the interior is not to be trusted, beyond what its quality says.
+enum class InteriorDoubt : int {
+    kNone = 0,
+    kNoSurface =
+        1,  ///< the points fill space, or noise is as thick as the parts: there is no surface to be inside of
+    kThinWalls = 2,  ///< walls as thin as the sampling resolves: their sides cannot be told apart
+};
+
+/// "none", "no_surface" or "thin_walls".
+[[nodiscard]] inline const char* interiorDoubtName(InteriorDoubt doubt) noexcept {
+    switch (doubt) {
+        case InteriorDoubt::kNone: return "none";
+        case InteriorDoubt::kNoSurface: return "no_surface";
+        case InteriorDoubt::kThinWalls: return "thin_walls";
+    }
+    return "none";
+}
+
 /// "walk" or "adaptive".
 [[nodiscard]] inline const char* interiorMethodName(InteriorMethod method) noexcept {
     switch (method) {

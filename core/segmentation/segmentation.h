@@ -58,8 +58,9 @@ struct Segmentation {
     /// that no interior tetrahedron touches do not count.
     double size = 0.0;
     InteriorSource interiorSource = InteriorSource::kWalk;
-    double quality = 1.0;       ///< how far the interior can be trusted, [0, 1]; kWalk: 1
-    double angleDegrees = 0.0;  ///< deep angle of the walk; 0 for other sources
+    double quality = 1.0;                        ///< how far the interior can be trusted, [0, 1]; kWalk: 1
+    InteriorDoubt doubt = InteriorDoubt::kNone;  ///< kAdaptive only, if noise was measured
+    double angleDegrees = 0.0;                   ///< deep angle of the walk; 0 for other sources
     double noise = 0.0;  ///< estimated standard deviation before smoothing, scan units; 0: not measured
 
     std::uint64_t duplicates = 0;       ///< input points that repeated another; see PreparedPoints
