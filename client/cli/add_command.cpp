@@ -72,15 +72,6 @@ Result<std::vector<Upload>> listUploads(const AddFlags& flags) {
         }
         uploads.front().key = flags.key;
     }
-    std::map<std::string, std::string> taken;
-    for (const Upload& upload : uploads) {
-        const auto [other, isNew] = taken.emplace(upload.key, upload.path);
-        if (!isNew) {
-            return fail(ErrorCode::kInvalidArgument,
-                        other->second + " and " + upload.path + " would both get the key '" + upload.key +
-                            "'; add them separately with --key, or add a folder above both");
-        }
-    }
     return uploads;
 }
 
@@ -103,6 +94,20 @@ Result<std::vector<Upload>> oneForEachObject(std::vector<Upload> files, const Ad
         }
     }
     return uploads;
+}
+
+/// Errors: kInvalidArgument naming two files with one key.
+Result<void> checkKeys(const std::vector<Upload>& uploads) {
+    std::map<std::string, std::string> taken;
+    for (const Upload& upload : uploads) {
+        const auto [other, isNew] = taken.emplace(upload.key, upload.path);
+        if (!isNew) {
+            return fail(ErrorCode::kInvalidArgument,
+                        other->second + " and " + upload.path + " would both get the key '" + upload.key +
+                            "'; add them separately with --key, or add a folder above both");
+        }
+    }
+    return {};
 }
 
 client::AddRequest requestFor(const AddFlags& flags, const client::Metadata& metadata, const Upload& upload) {
@@ -289,6 +294,7 @@ CommandResult runAdd(Session& session, const AddFlags& flags) {
         uploads = oneForEachObject(std::move(*uploads), flags, session.context());
         RETURN_IF_ERROR(uploads);
     }
+    RETURN_IF_ERROR(checkKeys(*uploads));
     const auto client = connectToServer(session, Work::kHeavy);
     RETURN_IF_ERROR(client);
     const auto factor = factorToCollection(*client, flags.collection, flags.unit, session.context());

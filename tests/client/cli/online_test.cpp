@@ -237,6 +237,11 @@ TEST_F(Online, AddEachStoresTheObjectsOfATable) {
     EXPECT_EQ(added["added"][0]["key"], "table/1");
     EXPECT_EQ(added["added"][1]["key"], "table/2");
     EXPECT_NEAR(added["added"][0]["points"].get<double>(), 4000.0, 200.0);
+    fs::create_directories(data()->path() + "/mixed/table");
+    fs::copy_file(file, data()->path() + "/mixed/table.xyz");
+    fs::copy_file(scans() + "/mug/mug_01.ply", data()->path() + "/mixed/table/1.ply");
+    const CommandRun twice = online({"add", data()->path() + "/mixed", "--collection", "table", "--each"});
+    EXPECT_EQ(twice.exitCode, kUsage) << "an object and a file would share the key table/1";
     const json found = onlineJson({"query", file, "--collection", "table", "--largest", "-k", "1"});
     EXPECT_NEAR(found["scene"]["plane"]["share"].get<double>(), 0.5, 0.03);
     EXPECT_EQ(found["scene"]["plane"]["removed"], true);
