@@ -10,6 +10,7 @@
 
 #include "bench/align.h"
 #include "bench/environment.h"
+#include "bench/models.h"
 #include "bench/operations.h"
 #include "bench/output.h"
 #include "bench/quantiles.h"
@@ -167,9 +168,8 @@ Result<AlignOutcome> measureAlignment(const PointCloud& model, const AlignCondit
     PointCloud query = model;
     PointCloud other = model;
     if (model.size() >= kLeastToHalve) {
-        query.clear();
-        other.clear();
-        for (std::size_t i = 0; i < model.size(); ++i) (i % 2 == 0 ? query : other).push_back(model[i]);
+        query = halfOf(model, 0);
+        other = halfOf(model, 1);
     }
     const double diagonal = boxOf(model).diagonal();
     const Point3 direction = randomDirection(random);

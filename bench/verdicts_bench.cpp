@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -12,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bench/environment.h"
+#include "bench/models.h"
 #include "bench/one_sided.h"
 #include "bench/operations.h"
 #include "bench/output.h"
@@ -28,7 +28,6 @@
 #include "core/pipeline.h"
 #include "core/search/verify.h"
 #include "core/synthetic/bend.h"
-#include "core/synthetic/families.h"
 #include "core/synthetic/noise.h"
 #include "core/synthetic/partial.h"
 #include "core/views/views.h"
@@ -55,6 +54,9 @@ enum class Relation { kSame, kBent, kPart, kKind, kUnrelated };
 constexpr std::array<const char*, 5> kRelationNames{"same object", "bent", "part of it", "same kind",
                                                     "unrelated"};
 
+// Half of them are the gallery's, the others the query's.
+constexpr std::size_t kPointsOfMember = 32000;
+
 struct VerdictsFlags {
     std::vector<std::string> gallery;
     std::size_t members = 6;
@@ -63,14 +65,15 @@ struct VerdictsFlags {
     unsigned threads = cli::defaultThreads();
 };
 
-struct Model {
+struct LabelledModel {
     std::string label;
     PointCloud points;
 };
 
-struct Described {
+struct DescribedModel {
     std::optional<Signature> signature;
     std::shared_ptr<const SurfacePoints> surface;
+    std::shared_ptr<const ShapeViews> views;  // of the gallery
 };
 
 struct Judged {
@@ -80,24 +83,16 @@ struct Judged {
     bool present = true;  // the query's own shape is in the gallery
     double score = 0.0;
     double distance = 0.0;  // of the signatures
+    Verdict verdict = Verdict::kNone;
     FitResult fit;
 };
 
-Result<std::vector<Model>> modelsOf(const VerdictsFlags& flags, const RunContext& context) {
-    std::vector<Model> models;
+Result<std::vector<LabelledModel>> modelsOf(const VerdictsFlags& flags, const RunContext& context) {
+    std::vector<LabelledModel> models;
     if (flags.gallery.empty()) {
-        for (const FamilyInfo& family : listFamilies()) {
-            for (std::size_t i = 0; i < flags.members; ++i) {
-                const auto solid = makeMember(family.name, i, flags.seed);
-                RETURN_IF_ERROR(solid);
-                ScanOptions options;
-                options.count = 32000;
-                options.seed = flags.seed + i;
-                auto scan = scanOf(*solid, options);
-                RETURN_IF_ERROR(scan);
-                models.push_back({family.name, std::move(*scan)});
-            }
-        }
+        auto members = scansOfFamilies(flags.members, kPointsOfMember, flags.seed);
+        RETURN_IF_ERROR(members);
+        for (FamilyScan& one : *members) models.push_back({one.family, std::move(one.points)});
         return models;
     }
     const auto scans = cli::listCollection(flags.gallery);
@@ -110,16 +105,10 @@ Result<std::vector<Model>> modelsOf(const VerdictsFlags& flags, const RunContext
     return models;
 }
 
-PointCloud half(const PointCloud& points, std::size_t which) {
-    PointCloud some;
-    for (std::size_t i = which; i < points.size(); i += 2) some.push_back(points[i]);
-    return some;
-}
-
 Result<PointCloud> queryOf(const PointCloud& points, Change change, std::uint64_t seed,
                            const RunContext& context) {
     Random random(seed);
-    PointCloud cloud = half(points, 1);
+    PointCloud cloud = halfOf(points, 1);
     double noise = 0.003;
     switch (change) {
         case Change::kRescan: cloud = subsample(cloud, cloud.size() * 6 / 10, seed); break;
@@ -142,11 +131,17 @@ Result<PointCloud> queryOf(const PointCloud& points, Change change, std::uint64_
     return applyToCloud(motion, cloud);
 }
 
-std::optional<Error> describeOne(const PointCloud& points, Described& into, const RunContext& context) {
+std::optional<Error> describeOne(const PointCloud& points, bool withViews, DescribedModel& into,
+                                 const RunContext& context) {
     auto description = describe(points, parametersOf(Profile::kDefault), context);
     if (!description) return std::nullopt;
     auto surface = makeSurfacePoints(points, context);
     if (!surface) return surface.error();
+    if (withViews) {
+        const auto views = makeViews(*surface, points, context);
+        if (!views) return views.error();
+        into.views = std::make_shared<const ShapeViews>(*views);
+    }
     into.signature = std::move(description->signature);
     into.surface = std::make_shared<const SurfacePoints>(std::move(*surface));
     return std::nullopt;
@@ -165,68 +160,83 @@ struct Study {
     std::size_t failures = 0;
 };
 
+// The gallery, in the order of the models; ids begin with 1.
+struct Gallery {
+    std::vector<DescribedModel> shapes;
+    SignatureSet set;
+};
+
+Result<Gallery> galleryOf(const std::vector<LabelledModel>& models, const VerdictsFlags& flags,
+                          const RunContext& context) {
+    Gallery gallery;
+    gallery.shapes.resize(models.size());
+    RETURN_IF_ERROR(cli::forEachItem(models.size(), flags.threads, context, [&](std::size_t i) {
+        return describeOne(halfOf(models[i].points, 0), true, gallery.shapes[i], context);
+    }));
+    std::vector<IndexEntry> entries;
+    for (std::size_t i = 0; i < models.size(); ++i) {
+        const DescribedModel& shape = gallery.shapes[i];
+        if (!shape.signature) continue;
+        entries.push_back({static_cast<std::int64_t>(i) + 1, {}, *shape.signature, shape.views});
+    }
+    gallery.set = SignatureSet().with(entries, {});
+    return gallery;
+}
+
+// Query `q` of all: every model changed in every way. Sets `hits`, empty if it cannot be described.
+std::optional<Error> searchOne(std::size_t q, const std::vector<LabelledModel>& models,
+                               const Gallery& gallery, const VerdictsFlags& flags, const RunContext& context,
+                               std::optional<std::vector<Judged>>& hits) {
+    const std::size_t model = q / kChanges.size();
+    const Change change = kChanges[q % kChanges.size()];
+    const auto cloud = queryOf(models[model].points, change, flags.seed + 1000 * q, context);
+    if (!cloud) return cloud.error();
+    DescribedModel query;
+    if (auto error = describeOne(*cloud, false, query, context)) return error;
+    if (!query.signature) return std::nullopt;
+    // Every other query is of a shape that the gallery does not have.
+    const bool present = (model + q % kChanges.size()) % 2 == 0;
+    SearchOptions options;
+    options.k = 10;
+    if (!present) options.excludeId = static_cast<std::int64_t>(model) + 1;
+    const SurfaceOf surfaceOf = [&](std::int64_t id) -> Result<std::shared_ptr<const SurfacePoints>> {
+        return gallery.shapes[static_cast<std::size_t>(id) - 1].surface;
+    };
+    const auto found =
+        topKVerified(*query.signature, *query.surface, gallery.set, options, {}, surfaceOf, context);
+    if (!found) return found.error();
+    hits.emplace();
+    for (std::size_t rank = 0; rank < found->hits.size(); ++rank) {
+        const VerifiedHit& hit = found->hits[rank];
+        if (!hit.fit) continue;
+        const auto other = static_cast<std::size_t>(hit.id) - 1;
+        const Relation relation =
+            relationOf(change, other == model, models[other].label == models[model].label);
+        hits->push_back({change, relation, rank, present, hit.score, distanceOfScore(hit.signatureScore),
+                         hit.verdict, *hit.fit});
+    }
+    return std::nullopt;
+}
+
 Result<Study> study(const VerdictsFlags& flags, Bench& bench) {
     const RunContext context = bench.context();
     const auto models = modelsOf(flags, context);
     RETURN_IF_ERROR(models);
+    const auto gallery = galleryOf(*models, flags, context);
+    RETURN_IF_ERROR(gallery);
+    std::vector<std::optional<std::vector<Judged>>> found(models->size() * kChanges.size());
+    std::atomic<std::size_t> done{0};
+    RETURN_IF_ERROR(cli::forEachItem(found.size(), flags.threads, context, [&](std::size_t q) {
+        auto error = searchOne(q, *models, *gallery, flags, context, found[q]);
+        bench.console.progress("searches", ++done, found.size());
+        return error;
+    }));
     Study result;
     result.shapes = models->size();
-    std::vector<Described> gallery(models->size());
-    RETURN_IF_ERROR(cli::forEachItem(models->size(), flags.threads, context, [&](std::size_t i) {
-        return describeOne(half((*models)[i].points, 0), gallery[i], context);
-    }));
-    std::vector<IndexEntry> entries;
-    for (std::size_t i = 0; i < gallery.size(); ++i) {
-        if (!gallery[i].signature) continue;
-        IndexEntry entry{static_cast<std::int64_t>(i) + 1, {}, *gallery[i].signature, {}};
-        const auto views = makeViews(*gallery[i].surface, half((*models)[i].points, 0), context);
-        RETURN_IF_ERROR(views);
-        entry.views = std::make_shared<const ShapeViews>(*views);
-        entries.push_back(std::move(entry));
+    for (const auto& hits : found) {
+        ++(hits ? result.queries : result.failures);
+        if (hits) result.judged.insert(result.judged.end(), hits->begin(), hits->end());
     }
-    const SignatureSet set = SignatureSet().with(entries, {});
-    const SurfaceOf surfaceOf = [&](std::int64_t id) -> Result<std::shared_ptr<const SurfacePoints>> {
-        return gallery[static_cast<std::size_t>(id) - 1].surface;
-    };
-    const std::size_t count = models->size() * kChanges.size();
-    std::vector<std::vector<Judged>> found(count);
-    std::atomic<std::size_t> failures{0};
-    std::atomic<std::size_t> done{0};
-    RETURN_IF_ERROR(
-        cli::forEachItem(count, flags.threads, context, [&](std::size_t q) -> std::optional<Error> {
-            const std::size_t model = q / kChanges.size();
-            const Change change = kChanges[q % kChanges.size()];
-            const auto cloud = queryOf((*models)[model].points, change, flags.seed + 1000 * q, context);
-            if (!cloud) return cloud.error();
-            Described query;
-            if (auto error = describeOne(*cloud, query, context)) return error;
-            bench.console.progress("searches", ++done, count);
-            if (!query.signature) {
-                ++failures;
-                return std::nullopt;
-            }
-            // Every other query is of a shape that the gallery does not have.
-            const bool present = (model + q % kChanges.size()) % 2 == 0;
-            SearchOptions options;
-            options.k = 10;
-            if (!present) options.excludeId = static_cast<std::int64_t>(model) + 1;
-            const auto hits =
-                topKVerified(*query.signature, *query.surface, set, options, {}, surfaceOf, context);
-            if (!hits) return hits.error();
-            for (std::size_t rank = 0; rank < hits->hits.size(); ++rank) {
-                const VerifiedHit& hit = hits->hits[rank];
-                if (!hit.fit) continue;
-                const auto other = static_cast<std::size_t>(hit.id) - 1;
-                found[q].push_back(
-                    {change,
-                     relationOf(change, other == model, (*models)[other].label == (*models)[model].label),
-                     rank, present, hit.score, distanceOfScore(hit.signatureScore), *hit.fit});
-            }
-            return std::nullopt;
-        }));
-    result.queries = count - failures;
-    result.failures = failures;
-    for (auto& hits : found) result.judged.insert(result.judged.end(), hits.begin(), hits.end());
     return result;
 }
 
@@ -249,8 +259,7 @@ nlohmann::json rowsOf(const Study& study) {
     return rows;
 }
 
-// Whether a verdict is true. A scan of one side or a noisy one is of the same object; what is bent is that
-// too.
+// Whether a verdict is true. Scans of one side, sparse and noisy ones are of the same object.
 bool isTrue(Verdict verdict, Relation relation) {
     switch (verdict) {
         case Verdict::kNone: return false;
@@ -297,7 +306,7 @@ std::string verdictTable(const Study& study) {
         std::size_t hits = 0;
         std::size_t right = 0;
         for (const Judged& one : study.judged) {
-            if (verdictOf(one.distance, one.fit) != verdict) continue;
+            if (one.verdict != verdict) continue;
             ++hits;
             ++relations[static_cast<std::size_t>(one.relation)];
             right += isTrue(verdict, one.relation) ? 1 : 0;

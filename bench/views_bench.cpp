@@ -12,6 +12,7 @@
 #include <CLI/CLI.hpp>
 
 #include "bench/environment.h"
+#include "bench/models.h"
 #include "bench/one_sided.h"
 #include "bench/operations.h"
 #include "bench/output.h"
@@ -25,7 +26,6 @@
 #include "core/fit/surface_points.h"
 #include "core/matching/scorer.h"
 #include "core/pipeline.h"
-#include "core/synthetic/families.h"
 #include "core/synthetic/noise.h"
 #include "core/views/view_distance.h"
 #include "core/views/views.h"
@@ -88,28 +88,18 @@ Result<std::vector<Model>> readModels(const std::vector<std::string>& folders, c
 }
 
 Result<void> addFamilies(std::vector<Model>& models, std::size_t members, std::uint64_t seed) {
-    if (members == 0) return {};
-    for (const FamilyInfo& family : listFamilies()) {
-        for (std::size_t i = 0; i < members; ++i) {
-            const auto solid = makeMember(family.name, i, seed);
-            RETURN_IF_ERROR(solid);
-            ScanOptions options;
-            options.seed = seed + i;
-            auto scan = scanOf(*solid, options);
-            RETURN_IF_ERROR(scan);
-            const std::string name = family.name + std::to_string(i);
-            models.push_back({name, name, std::move(*scan)});
-        }
+    auto scans = scansOfFamilies(members, kPointsOfQuery, seed);
+    RETURN_IF_ERROR(scans);
+    for (FamilyScan& scan : *scans) {
+        const std::string name = scan.family + std::to_string(scan.member);
+        models.push_back({name, name, std::move(scan.points)});
     }
     return {};
 }
 
-// Every other point, so that gallery and query share none.
+// So that gallery and query share no point, if there are enough.
 PointCloud half(const PointCloud& points, std::size_t which) {
-    if (points.size() < kLeastToHalve) return points;
-    PointCloud some;
-    for (std::size_t i = which; i < points.size(); i += 2) some.push_back(points[i]);
-    return some;
+    return points.size() < kLeastToHalve ? points : halfOf(points, which);
 }
 
 std::optional<Error> describeShape(const PointCloud& points, const ViewsFlags& flags, bool whole,

@@ -20,12 +20,6 @@ void toProto(const ShapeAttributes& attributes, v1::ShapeAttributes* out) {
 
 }  // namespace
 
-void toProto(const Point3& p, v1::Vector3* out) {
-    out->set_x(p.x);
-    out->set_y(p.y);
-    out->set_z(p.z);
-}
-
 void toProto(const Signature& signature, v1::Signature* out) {
     for (std::size_t i = 0; i < signature.points.size(); ++i) {
         const WeightedPoint& point = signature.points[i];

@@ -5,6 +5,7 @@
 #pragma once
 
 #include "common/wire_enums.h"
+#include "common/wire_vector.h"
 #include "core/fit/fit.h"
 #include "core/geometry/point.h"
 #include "core/matching/score.h"
@@ -17,7 +18,6 @@
 namespace shapedb::wire {
 
 // Each fills an empty message.
-void toProto(const Point3& point, v1::Vector3* out);
 void toProto(const Signature& signature, v1::Signature* out);
 void toProto(const Segmentation& segmentation, v1::SegmentationReport* out);
 void toProto(const Explanation& explanation, v1::Explanation* out);

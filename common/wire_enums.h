@@ -99,6 +99,8 @@ namespace shapedb::wire {
     }
 }
 
+// kNone for these.
+
 [[nodiscard]] inline InteriorDoubt fromProto(v1::InteriorDoubt doubt) {
     switch (doubt) {
         case v1::INTERIOR_DOUBT_NO_SURFACE: return InteriorDoubt::kNoSurface;
@@ -107,7 +109,6 @@ namespace shapedb::wire {
     }
 }
 
-/// kNone for UNSPECIFIED and for numbers that only a newer version knows.
 [[nodiscard]] inline Verdict fromProto(v1::Verdict verdict) {
     switch (verdict) {
         case v1::VERDICT_SAME_OBJECT: return Verdict::kSameObject;

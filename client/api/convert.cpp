@@ -6,14 +6,6 @@ namespace shapedb::client {
 
 namespace {
 
-void fill(const Point3& from, v1::Vector3* to) {
-    to->set_x(from.x);
-    to->set_y(from.y);
-    to->set_z(from.z);
-}
-
-Point3 fromWire(const v1::Vector3& from) { return {from.x(), from.y(), from.z()}; }
-
 Timestamp fromWire(const google::protobuf::Timestamp& from) {
     return Timestamp(std::chrono::duration_cast<Timestamp::duration>(std::chrono::seconds(from.seconds()) +
                                                                      std::chrono::nanoseconds(from.nanos())));
@@ -33,7 +25,7 @@ Motion fromWire(const v1::Motion& from) {
     Motion motion;
     motion.scale = from.scale();
     motion.reflected = from.reflected();
-    motion.translation = fromWire(from.translation());
+    motion.translation = wire::fromProto(from.translation());
     if (from.rotation_size() == 9) {
         for (int i = 0; i < 9; ++i) {
             motion.rotation[static_cast<std::size_t>(i / 3)][static_cast<std::size_t>(i % 3)] =
@@ -82,7 +74,7 @@ void fill(const SearchOptions& from, v1::SearchOptions* to) {
     if (from.verify) to->set_verify(*from.verify);
     to->set_verify_candidates(from.verifyCandidates);
     if (from.oneSided) to->set_one_sided(*from.oneSided);
-    if (from.viewpoint) fill(*from.viewpoint, to->mutable_viewpoint());
+    if (from.viewpoint) wire::toProto(*from.viewpoint, to->mutable_viewpoint());
 }
 
 v1::AddMode toWire(AddMode mode) {
@@ -148,7 +140,7 @@ Signature fromWire(const v1::Signature& from) {
     to.encoded = from.encoded();
     for (const v1::WeightedPoint& point : from.points()) {
         WeightedPoint out;
-        out.position = fromWire(point.position());
+        out.position = wire::fromProto(point.position());
         out.weight = point.weight();
         out.volumeShare = point.volume_share();
         out.maximumRadius = point.peak_radius();
@@ -234,7 +226,7 @@ Fit fromWire(const v1::Fit& from) {
     to.handednessOpen = from.left_right_open();
     for (const v1::FitPose& pose : from.alternatives()) to.alternatives.push_back(fromWire(pose));
     for (const v1::FreeAxis& axis : from.axes()) {
-        to.axes.push_back({fromWire(axis.point()), fromWire(axis.direction())});
+        to.axes.push_back({wire::fromProto(axis.point()), wire::fromProto(axis.direction())});
     }
     return to;
 }

@@ -5,6 +5,7 @@
 
 #include "client/api/types.h"
 #include "common/wire_enums.h"
+#include "common/wire_vector.h"
 #include "shapedb/v1/admin_service.pb.h"
 #include "shapedb/v1/collection_service.pb.h"
 #include "shapedb/v1/search_service.pb.h"
@@ -50,7 +51,7 @@ void fillParameters(const Parameters& from, Message* to) {
 [[nodiscard]] Explanation fromWire(const v1::Explanation& from);
 [[nodiscard]] Fit fromWire(const v1::Fit& from);
 [[nodiscard]] Comparison fromWire(const v1::CompareResponse& from);
-SearchReply fromWire(const v1::SearchResponse& from);
+[[nodiscard]] SearchReply fromWire(const v1::SearchResponse& from);
 [[nodiscard]] Collection fromWire(const v1::Collection& from);
 [[nodiscard]] RebuildProgress fromWire(const v1::RebuildProgress& from);
 [[nodiscard]] Stats fromWire(const v1::StatsResponse& from);

@@ -92,14 +92,6 @@ Result<Comparison> Client::compare(const ShapeRef& query, const ShapeRef& other,
 
 namespace {
 
-// `rotate` of core/geometry is not in the installed library.
-Point3 turned(const Matrix3& rotation, const Point3& p) {
-    const auto along = [&](std::size_t row) {
-        return rotation[row][0] * p.x + rotation[row][1] * p.y + rotation[row][2] * p.z;
-    };
-    return {along(0), along(1), along(2)};
-}
-
 // `other`: null for a stored shape, which the header names.
 Result<Fit> alignScans(const ClientOptions& options, v1::AlignService::Stub& stub, v1::AlignRequest request,
                        const PackedPoints& query, const PackedPoints* other, const RunContext& context) {
@@ -126,7 +118,7 @@ Result<Fit> alignScans(const ClientOptions& options, v1::AlignService::Stub& stu
     const Point3 from = other != nullptr ? other->offset : Point3{};
     const auto shift = [&](FitPose& pose) {
         pose.motion.translation =
-            pose.motion.translation + query.offset - pose.motion.scale * turned(pose.motion.rotation, from);
+            pose.motion.translation + query.offset - pose.motion.scale * rotate(pose.motion.rotation, from);
     };
     shift(fit.best);
     for (FitPose& pose : fit.alternatives) shift(pose);

@@ -189,8 +189,8 @@ struct SegmentationReport {
     /// How certain the interior is, [0, 1]. InteriorMethod::kWalk does not assess it: always 1.
     double quality = 1.0;
     InteriorSource interiorSource = InteriorSource::kWalk;
-    InteriorDoubt doubt =
-        InteriorDoubt::kNone;   ///< why the interior is not to be trusted, beyond its quality
+    /// Why the interior is not to be trusted, beyond its quality.
+    InteriorDoubt doubt = InteriorDoubt::kNone;
     double angleDegrees = 0.0;  ///< deep angle of the walk; 0 for other sources
     double noise = 0.0;  ///< standard deviation estimated before smoothing, scan units; 0: not measured
     std::uint64_t tetrahedra = 0;

@@ -14,7 +14,6 @@
 #include "client/cli/shape_output.h"
 #include "client/cli/text.h"
 #include "core/base/return_if_error.h"
-#include "core/matching/score.h"
 #include "core/search/verify.h"
 
 namespace shapedb::cli {
@@ -59,21 +58,16 @@ Result<client::Comparison> compareFiles(Session& session, const CompareFlags& fl
     const auto b = describeFile(session, flags, *parameters, flags.b);
     RETURN_IF_ERROR(b);
     const ScoreOptions options = flags.score.resolve();
+    const auto surfaceOf = [](const Described& one) { return one.surface ? &*one.surface : nullptr; };
+    const auto verified =
+        explainVerified(a->signature, surfaceOf(*a), b->signature, surfaceOf(*b), options, session.context());
+    RETURN_IF_ERROR(verified);
     client::Comparison comparison;
-    if (a->surface && b->surface) {
-        const auto verified =
-            explainVerified(a->signature, *a->surface, b->signature, *b->surface, options, session.context());
-        RETURN_IF_ERROR(verified);
-        comparison.score = verified->explanation.score;
-        comparison.explanation = toClient(verified->explanation);
-        comparison.fit = toClient(verified->fit);
-        comparison.verdict = verified->verdict;
-        comparison.verdictReliability = reliabilityOf(verified->verdict);
-    } else {
-        const Explanation explanation = explain(a->signature, b->signature, options);
-        comparison.score = explanation.score;
-        comparison.explanation = toClient(explanation);
-    }
+    comparison.score = verified->explanation.score;
+    comparison.explanation = toClient(verified->explanation);
+    if (verified->fit) comparison.fit = toClient(*verified->fit);
+    comparison.verdict = verified->verdict;
+    comparison.verdictReliability = reliabilityOf(verified->verdict);
     comparison.query = toClient(a->signature);
     comparison.other = toClient(b->signature);
     return comparison;

@@ -221,10 +221,7 @@ VerifyOptions VerifyFlags::options() const {
     VerifyOptions options;
     options.mostCandidates = candidates;
     options.oneSided = oneSided;
-    if (viewpoint.size() == 3) {
-        options.viewpoint = Point3{viewpoint[0], viewpoint[1], viewpoint[2]};
-        options.oneSided = true;
-    }
+    if (viewpoint.size() == 3) options.viewpoint = Point3{viewpoint[0], viewpoint[1], viewpoint[2]};
     return options;
 }
 

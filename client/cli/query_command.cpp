@@ -129,8 +129,8 @@ CommandResult runQuery(Session& session, const QueryFlags& flags) {
     options.freeScale = flags.score.freeScale;
     options.partial = flags.score.partial;
     options.verify = flags.verify.verify;
-    const VerifyOptions verify = flags.verify.options();
     options.verifyCandidates = flags.verify.candidates;
+    const VerifyOptions verify = flags.verify.options();
     options.oneSided = verify.oneSided;
     options.viewpoint = verify.viewpoint;
     options.explanation = !flags.noExplanation;

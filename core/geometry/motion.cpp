@@ -14,11 +14,6 @@ constexpr double kShortestQuaternion = 1e-6;
 
 }  // namespace
 
-Point3 rotate(const Matrix3& r, const Point3& v) {
-    return {r[0][0] * v.x + r[0][1] * v.y + r[0][2] * v.z, r[1][0] * v.x + r[1][1] * v.y + r[1][2] * v.z,
-            r[2][0] * v.x + r[2][1] * v.y + r[2][2] * v.z};
-}
-
 Matrix3 multiply(const Matrix3& a, const Matrix3& b) {
     Matrix3 product;
     for (std::size_t row = 0; row < 3; ++row) {

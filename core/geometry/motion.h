@@ -23,7 +23,12 @@ struct Motion {
 };
 
 /// R v: rotates (and reflects) a direction.
-[[nodiscard]] Point3 rotate(const Matrix3& rotation, const Point3& v);
+[[nodiscard]] inline Point3 rotate(const Matrix3& rotation, const Point3& v) {
+    const auto along = [&](const std::array<double, 3>& row) {
+        return row[0] * v.x + row[1] * v.y + row[2] * v.z;
+    };
+    return {along(rotation[0]), along(rotation[1]), along(rotation[2])};
+}
 
 /// a b: first b, then a.
 [[nodiscard]] Matrix3 multiply(const Matrix3& a, const Matrix3& b);

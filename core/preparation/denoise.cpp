@@ -74,6 +74,10 @@ struct Spreads {
     std::array<std::vector<double>, kNeighbourhoods.size()> across;
     std::array<std::vector<double>, kNeighbourhoods.size()> along;
     std::size_t sizes = 0;  // how many of kNeighbourhoods the cloud is large enough for
+    std::vector<std::uint32_t> sample;
+    std::vector<std::uint32_t> near;  // the largest neighbourhood of each sampled point, nearest first
+
+    std::size_t largest() const { return kNeighbourhoods[sizes - 1]; }
 };
 
 Eigen::Vector3d toEigen(const Point3& p) { return {p.x, p.y, p.z}; }
@@ -100,61 +104,67 @@ void measureSpread(const PointCloud& points, std::uint32_t centre, const std::ve
     }
 }
 
-Spreads measureSpreads(const PointCloud& points, const NeighbourIndex& index,
-                       const std::vector<std::uint32_t>& sample, std::size_t mostNeighbours) {
+Spreads measureSpreads(const PointCloud& points, const NeighbourIndex& index, std::size_t mostNeighbours) {
     Spreads spreads;
     while (spreads.sizes < kNeighbourhoods.size() && kNeighbourhoods[spreads.sizes] <= mostNeighbours) {
         ++spreads.sizes;
     }
     if (spreads.sizes == 0) return spreads;
+    spreads.sample = samplePoints(points);
+    spreads.near.resize(spreads.sample.size() * spreads.largest());
     for (std::size_t s = 0; s < spreads.sizes; ++s) {
-        spreads.across[s].resize(sample.size());
-        spreads.along[s].resize(sample.size());
+        spreads.across[s].resize(spreads.sample.size());
+        spreads.along[s].resize(spreads.sample.size());
     }
     const auto measure = [&](std::size_t from, std::size_t to) {
         std::vector<Neighbour> found;
         for (std::size_t i = from; i < to; ++i) {
-            index.nearest(points[sample[i]], kNeighbourhoods[spreads.sizes - 1], found);
-            measureSpread(points, sample[i], found, i, spreads);
+            index.nearest(points[spreads.sample[i]], spreads.largest(), found);
+            measureSpread(points, spreads.sample[i], found, i, spreads);
+            std::uint32_t* near = spreads.near.data() + i * spreads.largest();
+            for (const Neighbour& n : found) *near++ = n.point;
         }
     };
     // Nothing can stop it: there is no context.
-    static_cast<void>(parallelFor(sample.size(), kSamplesAtOnce, {}, measure));
+    static_cast<void>(parallelFor(spreads.sample.size(), kSamplesAtOnce, {}, measure));
     return spreads;
 }
 
-// Median over the sample of the kurtosis of the heights of `count` neighbours above their plane.
-double heightKurtosis(const PointCloud& points, const NeighbourIndex& index,
-                      const std::vector<std::uint32_t>& sample, std::size_t count) {
-    std::vector<double> values(sample.size());
+// Kurtosis of the heights of points above the plane that fits them best.
+double heightKurtosis(const PointCloud& points, const std::uint32_t* near, std::size_t count) {
+    const auto place = [&](std::size_t k) { return toEigen(points[near[k]] - points[near[0]]); };
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+    for (std::size_t k = 0; k < count; ++k) mean += place(k);
+    mean /= static_cast<double>(count);
+    Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
+    for (std::size_t k = 0; k < count; ++k) {
+        const Eigen::Vector3d d = place(k) - mean;
+        second += d * d.transpose();
+    }
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+    solver.computeDirect(second);
+    const Eigen::Vector3d normal = solver.eigenvectors().col(0);
+    double squares = 0.0;
+    double fourths = 0.0;
+    for (std::size_t k = 0; k < count; ++k) {
+        const double height = (place(k) - mean).dot(normal);
+        squares += height * height;
+        fourths += height * height * height * height;
+    }
+    return squares > 0.0 ? fourths * static_cast<double>(count) / (squares * squares) : 3.0;
+}
+
+// Whether neighbourhoods of `count` points have two layers.
+bool haveTwoSheets(const PointCloud& points, const Spreads& spreads, std::size_t count) {
+    std::vector<double> kurtosis(spreads.sample.size());
     const auto measure = [&](std::size_t from, std::size_t to) {
-        std::vector<Neighbour> found;
         for (std::size_t i = from; i < to; ++i) {
-            index.nearest(points[sample[i]], count, found);
-            Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-            for (const Neighbour& n : found) mean += toEigen(points[n.point] - points[sample[i]]);
-            mean /= static_cast<double>(count);
-            Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
-            for (const Neighbour& n : found) {
-                const Eigen::Vector3d d = toEigen(points[n.point] - points[sample[i]]) - mean;
-                second += d * d.transpose();
-            }
-            Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
-            solver.computeDirect(second);
-            const Eigen::Vector3d normal = solver.eigenvectors().col(0);
-            double squares = 0.0;
-            double fourths = 0.0;
-            for (const Neighbour& n : found) {
-                const double height = (toEigen(points[n.point] - points[sample[i]]) - mean).dot(normal);
-                squares += height * height;
-                fourths += height * height * height * height;
-            }
-            values[i] = squares > 0.0 ? fourths * static_cast<double>(count) / (squares * squares) : 3.0;
+            kurtosis[i] = heightKurtosis(points, spreads.near.data() + i * spreads.largest(), count);
         }
     };
     // Nothing can stop it: there is no context.
-    static_cast<void>(parallelFor(sample.size(), kSamplesAtOnce, {}, measure));
-    return median(std::move(values));
+    static_cast<void>(parallelFor(kurtosis.size(), kSamplesAtOnce, {}, measure));
+    return median(std::move(kurtosis)) < kTwoSheetsKurtosis;
 }
 
 // A disc of radius r has a standard deviation of r / 2 along either axis.
@@ -249,9 +259,7 @@ Result<PointCloud> smoothOnce(const PointCloud& points, const NeighbourIndex& in
 
 NoiseEstimate estimateNoise(const PointCloud& points, const NeighbourIndex& index,
                             std::size_t mostNeighbours) {
-    if (points.empty()) return {};
-    const std::vector<std::uint32_t> sample = samplePoints(points);
-    const Spreads spreads = measureSpreads(points, index, sample, std::min(mostNeighbours, points.size()));
+    const Spreads spreads = measureSpreads(points, index, std::min(mostNeighbours, points.size()));
     if (spreads.sizes == 0) return {};
     std::vector<double> across;
     std::vector<double> along;
@@ -276,7 +284,7 @@ NoiseEstimate estimateNoise(const PointCloud& points, const NeighbourIndex& inde
     if (plateau == 0) return estimate;
     estimate.sigma = across[plateau];
     estimate.spacing = spacingFrom(along[plateau], kNeighbourhoods[plateau]);
-    estimate.layered = heightKurtosis(points, index, sample, kNeighbourhoods[plateau]) < kTwoSheetsKurtosis;
+    estimate.layered = haveTwoSheets(points, spreads, kNeighbourhoods[plateau]);
     return estimate;
 }
 

@@ -7,8 +7,10 @@
 #include <utility>
 
 #include "core/base/random.h"
+#include "core/base/random_subset.h"
 #include "core/base/return_if_error.h"
 #include "core/geometry/box.h"
+#include "core/geometry/motion.h"
 #include "core/geometry/neighbours.h"
 #include "core/geometry/principal_axes.h"
 #include "core/preparation/surroundings.h"
@@ -52,17 +54,6 @@ struct Plane {
     double height(const Point3& p) const { return dot(normal, p - point); }
 };
 
-// `most` of `count` numbers from 0, or all, in ascending order, each as likely as any other (selection
-// sampling, Knuth 3.4.2 S). Every so-many-th would not do: points may come in turns from table and object.
-std::vector<std::size_t> someOf(std::size_t count, std::size_t most, Random& random) {
-    std::vector<std::size_t> some;
-    const std::size_t wanted = std::min(most, count);
-    for (std::size_t i = 0; some.size() < wanted; ++i) {
-        if (random.below(count - i) < wanted - some.size()) some.push_back(i);
-    }
-    return some;
-}
-
 std::optional<Plane> through(const Point3& a, const Point3& b, const Point3& c) {
     const Point3 n = cross(b - a, c - a);
     const double area = length(n);
@@ -94,13 +85,8 @@ Plane fitted(const PointCloud& points, const std::vector<std::uint32_t>& among, 
 // Cells of the plane, each once.
 class Footprint {
   public:
-    Footprint(const Plane& plane, double cell) : plane_(plane), cell_(cell) {
-        const Point3 n = plane.normal;
-        const Point3 other = std::abs(n.x) < 0.6 ? Point3{1, 0, 0} : Point3{0, 1, 0};
-        u_ = cross(n, other);
-        u_ = (1.0 / length(u_)) * u_;
-        v_ = cross(n, u_);
-    }
+    Footprint(const Plane& plane, double cell)
+        : plane_(plane), cell_(cell), u_(anyPerpendicular(plane.normal)), v_(cross(plane.normal, u_)) {}
     using Cell = std::pair<int, int>;
     Cell cellOf(const Point3& p) const {
         const Point3 d = p - plane_.point;
@@ -195,7 +181,9 @@ bool supports(const PointCloud& points, Plane& plane, double within, double diag
 Plane mostPopular(const PointCloud& points, const std::vector<std::uint32_t>& among, double within,
                   Random& random) {
     std::vector<std::uint32_t> counted;
-    for (const std::size_t i : someOf(among.size(), kCountedPoints, random)) counted.push_back(among[i]);
+    // Every so-many-th would not do: points may come in turns from table and object.
+    for (const std::size_t i : randomSubset(among.size(), kCountedPoints, random))
+        counted.push_back(among[i]);
     Plane best{points[among.front()], {0, 0, 1}};
     std::size_t most = 0;
     for (int draw = 0; draw < kDraws; ++draw) {
@@ -223,10 +211,6 @@ std::optional<SupportPlane> findPlane(const PointCloud& points) {
     for (int i = 0; i < kPlanes && among.size() >= kFewestPoints; ++i) {
         Plane plane = mostPopular(points, among, within, random);
         for (int step = 0; step < 3; ++step) plane = fitted(points, among, plane, within);
-        if (static_cast<double>(countNear(points, among, plane, within)) <
-            kLeastPlaneShare * static_cast<double>(points.size())) {
-            return std::nullopt;
-        }
         double squares = 0.0;
         double count = 0.0;
         for (const std::uint32_t j : among) {
@@ -235,6 +219,7 @@ std::optional<SupportPlane> findPlane(const PointCloud& points) {
             squares += height * height;
             count += 1.0;
         }
+        if (count < kLeastPlaneShare * static_cast<double>(points.size())) return std::nullopt;
         const double own =
             std::clamp(kWithinDeviations * std::sqrt(squares / count), kLeastWithin * diagonal, within);
         if (supports(points, plane, own, diagonal)) return SupportPlane{plane.point, plane.normal, own, 0};
@@ -244,6 +229,11 @@ std::optional<SupportPlane> findPlane(const PointCloud& points) {
             among.end());
     }
     return std::nullopt;
+}
+
+// What is behind the plane does not stand on it.
+bool belongsTo(const SupportPlane& plane, const Point3& p) {
+    return Plane{plane.point, plane.normal}.height(p) <= plane.within;
 }
 
 // Sets objects and objectOfPoint of a scene whose points on the plane are marked.
@@ -293,14 +283,10 @@ Result<Scene> sceneOf(const PointCloud& points, const RunContext& context) {
     }
     scene.plane = findPlane(points);
     RETURN_IF_ERROR(context.checkpoint());
-    if (scene.plane) {
-        const Plane plane{scene.plane->point, scene.plane->normal};
-        for (std::size_t i = 0; i < points.size(); ++i) {
-            // What is behind the plane does not stand on it.
-            if (plane.height(points[i]) > scene.plane->within) continue;
-            scene.objectOfPoint[i] = kOnPlane;
-            ++scene.plane->points;
-        }
+    for (std::size_t i = 0; scene.plane && i < points.size(); ++i) {
+        if (!belongsTo(*scene.plane, points[i])) continue;
+        scene.objectOfPoint[i] = kOnPlane;
+        ++scene.plane->points;
     }
     RETURN_IF_ERROR(findObjects(points, scene, context));
     return scene;
@@ -319,9 +305,7 @@ Result<Scene> spread(const PointCloud& points, const PointCloud& some, Scene ofS
     for (std::size_t i = 0; i < points.size(); ++i) {
         if (i % 4096 == 0) RETURN_IF_ERROR(context.checkpoint());
         std::int32_t object = kOnPlane;
-        const bool onPlane =
-            scene.plane && dot(scene.plane->normal, points[i] - scene.plane->point) <= scene.plane->within;
-        if (!onPlane) {
+        if (!scene.plane || !belongsTo(*scene.plane, points[i])) {
             index.nearest(points[i], 1, found);
             object = known[found.front().point];
             // Beside the plane, but nearest to a point on it.
@@ -351,7 +335,8 @@ Result<Scene> findScene(const PointCloud& points, const RunContext& context) {
         Random random(1);
         PointCloud some;
         some.reserve(kMostPoints);
-        for (const std::size_t i : someOf(points.size(), kMostPoints, random)) some.push_back(points[i]);
+        for (const std::size_t i : randomSubset(points.size(), kMostPoints, random))
+            some.push_back(points[i]);
         auto scene = sceneOf(some, context);
         RETURN_IF_ERROR(scene);
         return spread(points, some, std::move(*scene), context);

@@ -182,16 +182,17 @@ double verifiedScore(double signatureScore, double misfit, double share) {
     return belowOne(scoreOfDistance((1.0 - share) * distanceOfScore(signatureScore) + share * misfit));
 }
 
-Result<VerifiedExplanation> explainVerified(const Signature& query, const SurfacePoints& querySurface,
-                                            const Signature& other, const SurfacePoints& otherSurface,
+Result<VerifiedExplanation> explainVerified(const Signature& query, const SurfacePoints* querySurface,
+                                            const Signature& other, const SurfacePoints* otherSurface,
                                             const ScoreOptions& options, const RunContext& context) {
-    const auto traits = traitsOf(query, querySurface);
-    RETURN_IF_ERROR(traits);
-    auto fitted = fit(FitQuery(querySurface), otherSurface,
-                      {kindsOfQuery(*traits), options.keepScale, options.reflection}, context);
-    RETURN_IF_ERROR(fitted);
     VerifiedExplanation result;
     result.explanation = explain(query, other, options);
+    if (querySurface == nullptr || otherSurface == nullptr) return result;
+    const auto traits = traitsOf(query, *querySurface);
+    RETURN_IF_ERROR(traits);
+    auto fitted = fit(FitQuery(*querySurface), *otherSurface,
+                      {kindsOfQuery(*traits), options.keepScale, options.reflection}, context);
+    RETURN_IF_ERROR(fitted);
     setMotion(fitted->best.motion, query, other, result.explanation);
     result.verdict = verdictOf(distanceOfScore(result.explanation.score), *fitted);
     result.fit = std::move(*fitted);
@@ -245,7 +246,7 @@ Result<VerifiedResult> topKVerified(const Signature& query, const SurfacePoints&
     RETURN_IF_ERROR(validate(options));
     const auto began = RunContext::Clock::now();
     try {
-        const auto traits = traitsOf(query, surface, verify.oneSided);
+        const auto traits = traitsOf(query, surface, verify.viewpoint ? true : verify.oneSided);
         RETURN_IF_ERROR(traits);
         const std::size_t most = verify.mostCandidates > 0 ? verify.mostCandidates
                                  : traits->reliable        ? kCandidates

@@ -29,8 +29,8 @@ struct VerifyOptions {
     std::size_t mostCandidates = 0;
     /// Whether a camera saw the query from one place; nothing: judged from the points.
     std::optional<bool> oneSided{};
-    /// Where that camera stood, in coordinates of the query: tells front from back. Not read of queries that
-    /// are not of one side.
+    /// Where that camera stood, in coordinates of the query: tells front from back. One that has it is of one
+    /// side, whatever `oneSided` says.
     std::optional<Point3> viewpoint{};
 };
 
@@ -95,15 +95,16 @@ struct QueryTraits {
 
 /// Two shapes compared, and one laid on the other.
 struct VerifiedExplanation {
-    Explanation explanation;  ///< of the signatures; its motion is that of the fit
-    FitResult fit;
+    Explanation explanation;       ///< of the signatures; its motion is that of the fit, if there is one
+    std::optional<FitResult> fit;  ///< if both have surface points
     Verdict verdict = Verdict::kNone;
 };
 
-/// As for a hit of a search. Reports progress as stage "fit". Errors: those of fit.
+/// As for a hit of a search. Surface points may be null. Reports progress as stage "fit". Errors: those of
+/// fit.
 [[nodiscard]] Result<VerifiedExplanation> explainVerified(
-    const Signature& query, const SurfacePoints& querySurface, const Signature& other,
-    const SurfacePoints& otherSurface, const ScoreOptions& options, const RunContext& context = {});
+    const Signature& query, const SurfacePoints* querySurface, const Signature& other,
+    const SurfacePoints* otherSurface, const ScoreOptions& options, const RunContext& context = {});
 
 /// The `options.k` best scores of a snapshot, verified. Uses the threads of the caller's oneTBB arena; their
 /// number does not change a bit. Reports progress as stages "search", "views" and "verify".

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/base/random.h"
+#include "core/base/random_subset.h"
 #include "core/geometry/box.h"
 
 namespace shapedb {
@@ -59,11 +60,7 @@ PointCloud subsample(const PointCloud& points, std::size_t count, std::uint64_t 
     PointCloud chosen;
     chosen.reserve(count);
     Random random(seed);
-    // Selection sampling (Knuth, algorithm S): each point is taken with probability wanted / remaining, which
-    // makes all subsets equally likely.
-    for (std::size_t i = 0; i < points.size() && chosen.size() < count; ++i) {
-        if (random.below(points.size() - i) < count - chosen.size()) chosen.push_back(points[i]);
-    }
+    for (const std::size_t i : randomSubset(points.size(), count, random)) chosen.push_back(points[i]);
     return chosen;
 }
 

@@ -12,8 +12,8 @@ namespace shapedb::catalog {
 /// A profile and single values, each only if the request sets it. Units and ranges:
 /// core/segmentation/options.h and core/signature/signature.h.
 struct ParameterOverrides {
-    std::optional<Profile>
-        profile;  ///< replaces all parameters but the unit before the others change single ones
+    /// Replaces all parameters but the unit, before the others change single ones.
+    std::optional<Profile> profile;
     std::optional<double> bigBallRatio;
     std::optional<double> deepAngleDegrees;
     std::optional<double> hullAngleDegrees;

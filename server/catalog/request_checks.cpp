@@ -1,7 +1,6 @@
 #include "server/catalog/request_checks.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "server/catalog/limits.h"
 
@@ -130,10 +129,7 @@ Result<void> checkVerifyOptions(const VerifyOptions& options) {
                    std::to_string(kMostVerified));
     }
     if (!options.viewpoint) return {};
-    const Point3& p = *options.viewpoint;
-    if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
-        return bad("viewpoint: a coordinate is not finite");
-    }
+    if (!isFinite(*options.viewpoint)) return bad("viewpoint: a coordinate is not finite");
     if (!options.oneSided.value_or(true)) return bad("viewpoint: given for a query that is not one-sided");
     return {};
 }

@@ -55,7 +55,6 @@ Result<PreparedSearch> Searches::prepare(index::SnapshotPtr collection, const Se
     prepared.explain = request.explain;
     if (request.verify.value_or(prepared.collection->parameters.profile == Profile::kDefault)) {
         prepared.verify = request.verifyOptions;
-        if (request.verifyOptions.viewpoint) prepared.verify->oneSided = true;
     }
     return prepared;
 }
@@ -87,11 +86,15 @@ Result<VerifiableQuery> Searches::query(const PreparedSearch& search, const Quer
     return VerifiableQuery{{std::move(*signature), std::nullopt}, nullptr};
 }
 
+Result<FoundShape> Searches::shapeNamed(const ShapeName& name) const {
+    const auto collection = catalog_.collection(name.collection);
+    RETURN_IF_ERROR(collection);
+    return catalog_.findShape(*collection, name.key);
+}
+
 Result<Searches::Compared> Searches::compared(const char* which, const ShapeName& name) const {
     const auto read = [&]() -> Result<Compared> {
-        const auto collection = catalog_.collection(name.collection);
-        RETURN_IF_ERROR(collection);
-        const auto found = catalog_.findShape(*collection, name.key);
+        const auto found = shapeNamed(name);
         RETURN_IF_ERROR(found);
         auto signature = catalog_.signature(*found);
         RETURN_IF_ERROR(signature);
@@ -105,9 +108,7 @@ Result<Searches::Compared> Searches::compared(const char* which, const ShapeName
 }
 
 Result<std::shared_ptr<const SurfacePoints>> Searches::surfaceOf(const ShapeName& name) const {
-    const auto collection = catalog_.collection(name.collection);
-    RETURN_IF_ERROR(collection);
-    const auto found = catalog_.findShape(*collection, name.key);
+    const auto found = shapeNamed(name);
     RETURN_IF_ERROR(found);
     auto surface = catalog_.surface(found->shape.id);
     RETURN_IF_ERROR(surface);
@@ -143,17 +144,11 @@ Result<Comparison> Searches::compare(const ShapeName& query, const ShapeName& ot
     RETURN_IF_ERROR(first);
     auto second = compared("other", other);
     RETURN_IF_ERROR(second);
+    auto verified = explainVerified(first->signature, first->surface.get(), second->signature,
+                                    second->surface.get(), options, context);
+    RETURN_IF_ERROR(verified);
     Comparison comparison;
-    if (first->surface && second->surface) {
-        auto verified = explainVerified(first->signature, *first->surface, second->signature,
-                                        *second->surface, options, context);
-        RETURN_IF_ERROR(verified);
-        comparison.explanation = std::move(verified->explanation);
-        comparison.fit = std::move(verified->fit);
-        comparison.verdict = verified->verdict;
-    } else {
-        comparison.explanation = shapedb::explain(first->signature, second->signature, options);
-    }
+    comparison.verified = std::move(*verified);
     comparison.query = std::move(first->signature);
     comparison.other = std::move(second->signature);
     return comparison;

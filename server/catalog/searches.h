@@ -62,9 +62,7 @@ struct ScanSearch {
 struct Comparison {
     Signature query;
     Signature other;
-    Explanation explanation;
-    std::optional<FitResult> fit;  ///< if both have surface points
-    Verdict verdict = Verdict::kNone;
+    VerifiedExplanation verified;
 };
 
 struct FoundHit {
@@ -149,6 +147,7 @@ class Searches {
         Signature signature;
         std::shared_ptr<const SurfacePoints> surface;  ///< null if there are none
     };
+    Result<FoundShape> shapeNamed(const ShapeName& name) const;
     Result<Compared> compared(const char* which, const ShapeName& name) const;
     Result<std::optional<Explanation>> explain(const PreparedSearch& search, const Signature& query,
                                                const VerifiedResult& found, const VerifiedHit& hit) const;

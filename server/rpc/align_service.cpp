@@ -3,11 +3,9 @@
 #include <optional>
 #include <variant>
 
-#include "common/point_stream.h"
 #include "core/base/return_if_error.h"
-#include "server/catalog/scan_upload.h"
-#include "server/rpc/call.h"
 #include "server/rpc/convert.h"
+#include "server/rpc/receive_scan.h"
 
 namespace shapedb::rpc {
 
@@ -23,15 +21,9 @@ class Uploads {
 
     Result<void> take(const v1::AlignRequest& message) {
         if (message.has_header()) return begin(message.header());
-        if (!message.has_chunk()) {
-            return fail(ErrorCode::kMalformedStream, "message with neither header nor chunk");
-        }
-        const std::string& xyz = message.chunk().xyz();
         const bool ofQuery =
             !header_ || header_->other_points() == 0 || query_.points() < header_->query_points();
-        RETURN_IF_ERROR((ofQuery ? query_ : other_).add(xyz));
-        call_.addPoints(xyz.size() / kPointBytes, xyz.size());
-        return {};
+        return receiveChunk(message.chunk().xyz(), ofQuery ? query_ : other_, call_);
     }
 
     Result<store::VerifiedScan> query() { return finished("query: ", query_); }
@@ -81,12 +73,8 @@ grpc::Status AlignServiceHandler::Align(grpc::ServerContext* context,
                                         v1::AlignResponse* response) {
     return handle(services_, context, "Align", [&](Call& call) -> Result<void> {
         Uploads uploads(services_, call);
-        v1::AlignRequest message;
-        while (call.read(*reader, &message)) {
-            RETURN_IF_ERROR(call.run().checkpoint());
-            RETURN_IF_ERROR(uploads.take(message));
-        }
-        if (call.clientGone()) return fail(ErrorCode::kCancelled, "the client cancelled the upload");
+        const auto take = [&](const v1::AlignRequest& message) { return uploads.take(message); };
+        RETURN_IF_ERROR(receiveMessages<v1::AlignRequest>(*reader, call, take));
         const auto query = uploads.query();
         RETURN_IF_ERROR(query);
         const v1::AlignHeader& header = *uploads.header();

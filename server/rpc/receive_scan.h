@@ -1,5 +1,7 @@
-// Reads an upload from a gRPC stream: AddShape, SearchByScan and Segment share it.
+// Reads uploads from a gRPC stream: AddShape, SearchByScan, Segment and Align share it.
 #pragma once
+
+#include <string>
 
 #include "common/point_stream.h"
 #include "core/base/return_if_error.h"
@@ -8,33 +10,46 @@
 
 namespace shapedb::rpc {
 
+/// Calls `take(message)` with each message of an upload, which has a header or a chunk, until the client has
+/// sent all. Errors: those of `take`; kMalformedStream (neither of the two); kCancelled, kDeadlineExceeded.
+template <typename Request, typename Reader, typename Take>
+Result<void> receiveMessages(Reader& reader, Call& call, Take&& take) {
+    Request request;
+    while (call.read(reader, &request)) {
+        RETURN_IF_ERROR(call.run().checkpoint());
+        if (!request.has_header() && !request.has_chunk()) {
+            return fail(ErrorCode::kMalformedStream, "message with neither header nor chunk");
+        }
+        RETURN_IF_ERROR(take(request));
+    }
+    // `Read` also returns false when the client has gone: then the upload is not complete.
+    if (call.clientGone()) return fail(ErrorCode::kCancelled, "the client cancelled the upload");
+    return {};
+}
+
+/// One chunk of an upload. Errors: those of ScanUpload::add.
+inline Result<void> receiveChunk(const std::string& xyz, catalog::ScanUpload& upload, Call& call) {
+    RETURN_IF_ERROR(upload.add(xyz));
+    call.addPoints(xyz.size() / kPointBytes, xyz.size());
+    return {};
+}
+
 /// `onHeader(header)` checks the other fields of the header as soon as it arrives, so that a hopeless
 /// upload is refused before its points are sent. What the header's isolation leaves out is gone. Errors:
 /// those of ScanUpload, of isolated and of `onHeader`; kCancelled, kDeadlineExceeded.
 template <typename Request, typename Reader, typename OnHeader>
 Result<store::VerifiedScan> receiveScan(Reader& reader, catalog::ScanUpload& upload, Call& call,
                                         OnHeader&& onHeader) {
-    Request request;
     IsolateOptions isolation;
-    while (call.read(reader, &request)) {
-        RETURN_IF_ERROR(call.run().checkpoint());
-        Result<void> taken;
-        if (request.has_header()) {
-            taken = upload.begin(request.header().point_count(), request.header().sha256());
-            isolation.dropPlane = request.header().isolation().drop_plane();
-            isolation.largest = request.header().isolation().largest_object();
-            if (taken) taken = onHeader(request.header());
-        } else if (request.has_chunk()) {
-            const std::string& xyz = request.chunk().xyz();
-            taken = upload.add(xyz);
-            if (taken) call.addPoints(xyz.size() / kPointBytes, xyz.size());
-        } else {
-            taken = fail(ErrorCode::kMalformedStream, "message with neither header nor chunk");
-        }
-        RETURN_IF_ERROR(taken);
-    }
-    // `Read` also returns false when the client has gone: then the upload is not complete.
-    if (call.clientGone()) return fail(ErrorCode::kCancelled, "the client cancelled the upload");
+    const auto take = [&](const Request& request) -> Result<void> {
+        if (request.has_chunk()) return receiveChunk(request.chunk().xyz(), upload, call);
+        const auto& header = request.header();
+        RETURN_IF_ERROR(upload.begin(header.point_count(), header.sha256()));
+        isolation.dropPlane = header.isolation().drop_plane();
+        isolation.largest = header.isolation().largest_object();
+        return onHeader(header);
+    };
+    RETURN_IF_ERROR(receiveMessages<Request>(reader, call, take));
     auto scan = upload.finish();
     RETURN_IF_ERROR(scan);
     return catalog::isolated(std::move(*scan), isolation, call.run());

@@ -38,10 +38,7 @@ Result<catalog::PreparedSearch> prepare(const Services& services, Call& call,
     if (options.has_verify()) request.verify = options.verify();
     request.verifyOptions.mostCandidates = options.verify_candidates();
     if (options.has_one_sided()) request.verifyOptions.oneSided = options.one_sided();
-    if (options.has_viewpoint()) {
-        const pb::Vector3& viewpoint = options.viewpoint();
-        request.verifyOptions.viewpoint = {viewpoint.x(), viewpoint.y(), viewpoint.z()};
-    }
+    if (options.has_viewpoint()) request.verifyOptions.viewpoint = fromProto(options.viewpoint());
     return services.searches.prepare(*collection, request);
 }
 
@@ -183,11 +180,12 @@ grpc::Status SearchServiceHandler::Compare(grpc::ServerContext* context, const v
         const auto compared =
             services_.searches.compare(query, other, scoreOptionsFrom(*request), call.run());
         RETURN_IF_ERROR(compared);
-        response->set_score(compared->explanation.score);
-        toProto(compared->explanation, response->mutable_explanation());
-        if (compared->fit) toProto(*compared->fit, response->mutable_fit());
-        response->set_verdict(wire::toProto(compared->verdict));
-        response->set_verdict_reliability(reliabilityOf(compared->verdict));
+        const VerifiedExplanation& verified = compared->verified;
+        response->set_score(verified.explanation.score);
+        toProto(verified.explanation, response->mutable_explanation());
+        if (verified.fit) toProto(*verified.fit, response->mutable_fit());
+        response->set_verdict(wire::toProto(verified.verdict));
+        response->set_verdict_reliability(reliabilityOf(verified.verdict));
         toProto(compared->query, response->mutable_query());
         toProto(compared->other, response->mutable_other());
         return {};

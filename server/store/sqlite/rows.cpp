@@ -104,8 +104,11 @@ std::string bytesOf(const BlobView& blob) {
 
 }  // namespace
 
-std::int64_t digestOf(const std::string& bytes) {
-    const Sha256Digest digest = sha256(bytes.data(), bytes.size());
+std::int64_t digestOf(const std::string& first, const std::string& second) {
+    Sha256 hash;
+    hash.update(first.data(), first.size());
+    hash.update(second.data(), second.size());
+    const Sha256Digest digest = hash.finish();
     std::uint64_t value = 0;
     for (int i = 7; i >= 0; --i) value = value << 8 | digest[static_cast<std::size_t>(i)];
     return static_cast<std::int64_t>(value);
@@ -118,7 +121,7 @@ SignatureRow readSignature(Connection& connection, const Query& query, int colum
     row.generation = query.integer(column + 1);
     row.bytes = bytesOf(query.blob(column + 3));
     if (!query.isNull(column + 4)) row.views = bytesOf(query.blob(column + 4));
-    if (digestOf(row.bytes + row.views) != query.integer(column + 2)) {
+    if (digestOf(row.bytes, row.views) != query.integer(column + 2)) {
         const auto shape = findShapeById(connection, shapeId);
         raise(ErrorCode::kDataLoss,
               "the stored signature of shape " + (shape ? quoted(shape->key) : std::to_string(shapeId)) +
@@ -129,7 +132,7 @@ SignatureRow readSignature(Connection& connection, const Query& query, int colum
 
 void putSignature(Connection& connection, const SignatureRow& signature) {
     Query(connection, sql::kPutSignature, signature.shapeId, signature.generation, signature.pointsVersion,
-          digestOf(signature.bytes + signature.views),
+          digestOf(signature.bytes, signature.views),
           BlobView{signature.bytes.data(), signature.bytes.size()},
           BlobView{signature.views.data(), signature.views.size()})
         .run();

@@ -53,8 +53,9 @@ void putSignature(Connection& connection, const SignatureRow& signature);
 /// naming the shape.
 std::optional<SurfaceRow> readSurface(const Query& query);
 
-/// Columns named digest: the first eight bytes of the SHA-256, little-endian. Persisted.
-std::int64_t digestOf(const std::string& bytes);
+/// Columns named digest: the first eight bytes of the SHA-256 of `first` followed by `second`, little-endian.
+/// Persisted.
+std::int64_t digestOf(const std::string& first, const std::string& second = {});
 
 /// Decodes the points of a kLoadPoints row and verifies their checksum. Throws Failure.
 std::vector<float> readPoints(const Query& query);

@@ -151,12 +151,13 @@ TEST(Verify, MeasuresPairsOfPartsUnderTheMotionOfTheFit) {
     const Scanned& query = gallery().query;
     const Scanned& same = gallery().shapes.at(10);
     const auto found =
-        explainVerified(query.signature, *query.surface, same.signature, *same.surface, ScoreOptions());
+        explainVerified(query.signature, query.surface.get(), same.signature, same.surface.get(), {});
     ASSERT_TRUE(found);
     EXPECT_EQ(found->verdict, Verdict::kSameObject);
+    ASSERT_TRUE(found->fit);
     ASSERT_FALSE(found->explanation.matches.empty());
     for (const PointMatch& match : found->explanation.matches) {
-        const Point3 there = apply(found->fit.best.motion, pointPosition(same.signature, match.b));
+        const Point3 there = apply(found->fit->best.motion, pointPosition(same.signature, match.b));
         EXPECT_EQ(match.distance,
                   length(pointPosition(query.signature, match.a) - there) / query.signature.scale);
     }

@@ -171,7 +171,8 @@ TEST_F(SearchesTest, AComparisonExplainsAndSaysWhichShapeIsMissing) {
     ASSERT_TRUE(compared);
     EXPECT_EQ(compared->query.volume, 5.0);
     EXPECT_EQ(compared->other.volume, 6.0);
-    EXPECT_EQ(compared->explanation.score, shapedb::explain(signatureOf(5.0), signatureOf(6.0), {}).score);
+    EXPECT_EQ(compared->verified.explanation.score,
+              shapedb::explain(signatureOf(5.0), signatureOf(6.0), {}).score);
     const auto first = searches().compare({"", "none"}, {"", "none"}, {}, {});
     ASSERT_FALSE(first);
     EXPECT_EQ(first.error().code, ErrorCode::kNotFound);
