@@ -45,6 +45,7 @@ void addJobOperation(CLI::App& app, Bench& bench);
 void addSegmentOperation(CLI::App& app, Bench& bench);
 void addTypicalOperation(CLI::App& app, Bench& bench);
 void addVerdictsOperation(CLI::App& app, Bench& bench);
+void addFindOperation(CLI::App& app, Bench& bench);
 void addFingerprintOperation(CLI::App& app, Bench& bench);
 
 }  // namespace shapedb::bench

@@ -54,6 +54,7 @@ int run(int argc, const char* const* argv, cli::Console& console, const std::ato
         addSegmentOperation(app, bench);
         addTypicalOperation(app, bench);
         addVerdictsOperation(app, bench);
+        addFindOperation(app, bench);
         addFingerprintOperation(app, bench);
         try {
             app.parse(argc, argv);

@@ -234,7 +234,7 @@ void addVerifyFlags(CLI::App& command, VerifyFlags& flags) {
     command.add_flag("--no-verify", set(false), "Rank by the signatures alone")->excludes(on);
     command
         .add_option("--candidates", flags.candidates,
-                    "Verify at most so many candidates [32; open and incomplete queries 64]")
+                    "Verify at most so many candidates [32; open and incomplete queries 64; --partial 128]")
         ->check(CLI::Range(1, 10000));
     auto* allSides = command.add_flag_function(
         "--all-sides", [&flags](std::int64_t) { flags.oneSided = false; },

@@ -21,10 +21,12 @@ namespace {
 // left and right.
 constexpr double kMisfitShare = 0.5;
 constexpr double kMisfitShareUnsure = 0.75;
+constexpr double kMisfitShareOfPiece = 0.85;
 
 // Candidates of a query unless the caller says how many: an unreliable signature ranks the right one lower.
 constexpr std::size_t kCandidates = 32;
 constexpr std::size_t kCandidatesUnsure = 64;
+constexpr std::size_t kCandidatesOfPiece = 128;
 
 // A query whose interior is less reliable may be a scan from one side. Whole scans with 0.5 % noise have 0.69
 // to 0.95 (nine tenths of them), scans from one side 0.15 to 0.68.
@@ -148,22 +150,31 @@ class Verifier {
 
 }  // namespace
 
-Result<QueryTraits> traitsOf(const Signature& query, const SurfacePoints& surface,
+Result<QueryTraits> traitsOf(const Signature& query, const SurfacePoints& surface, const ScoreOptions& score,
                              std::optional<bool> oneSided) {
-    if (oneSided.value_or(false)) return QueryTraits{false, true};
+    if (oneSided.value_or(false)) return QueryTraits{false, true, score.partial};
     QueryTraits traits;
+    traits.piece = score.partial;
     traits.reliable = !query.attributes || query.attributes->quality >= 255.0 * kReliableQuality;
-    if (traits.reliable || oneSided) return traits;
+    if (traits.reliable || traits.piece || oneSided) return traits;
     const auto seen = seenShare(surface);
     RETURN_IF_ERROR(seen);
     traits.ofOneSide = *seen >= kSeenShare;
     return traits;
 }
 
-FitKinds kindsOfQuery(const QueryTraits& traits) noexcept { return {true, !traits.reliable, true}; }
+FitKinds kindsOfQuery(const QueryTraits& traits) noexcept {
+    return {true, traits.ofOneSide || !(traits.reliable || traits.piece), true};
+}
 
 double misfitShare(const QueryTraits& traits, const ScoreOptions& score) noexcept {
-    return !traits.reliable || score.partial || !score.reflection ? kMisfitShareUnsure : kMisfitShare;
+    if (traits.piece) return kMisfitShareOfPiece;
+    return traits.reliable && score.reflection ? kMisfitShare : kMisfitShareUnsure;
+}
+
+std::size_t candidatesFor(const QueryTraits& traits) noexcept {
+    if (traits.piece) return kCandidatesOfPiece;
+    return traits.reliable ? kCandidates : kCandidatesUnsure;
 }
 
 VerifiedResult unverified(SearchResult found) {
@@ -188,7 +199,7 @@ Result<VerifiedExplanation> explainVerified(const Signature& query, const Surfac
     VerifiedExplanation result;
     result.explanation = explain(query, other, options);
     if (querySurface == nullptr || otherSurface == nullptr) return result;
-    const auto traits = traitsOf(query, *querySurface);
+    const auto traits = traitsOf(query, *querySurface, options);
     RETURN_IF_ERROR(traits);
     auto fitted = fit(FitQuery(*querySurface), *otherSurface,
                       {kindsOfQuery(*traits), options.keepScale, options.reflection}, context);
@@ -246,11 +257,10 @@ Result<VerifiedResult> topKVerified(const Signature& query, const SurfacePoints&
     RETURN_IF_ERROR(validate(options));
     const auto began = RunContext::Clock::now();
     try {
-        const auto traits = traitsOf(query, surface, verify.viewpoint ? true : verify.oneSided);
+        const auto traits =
+            traitsOf(query, surface, options.score, verify.viewpoint ? true : verify.oneSided);
         RETURN_IF_ERROR(traits);
-        const std::size_t most = verify.mostCandidates > 0 ? verify.mostCandidates
-                                 : traits->reliable        ? kCandidates
-                                                           : kCandidatesUnsure;
+        const std::size_t most = verify.mostCandidates > 0 ? verify.mostCandidates : candidatesFor(*traits);
         SearchOptions wide = options;
         // One more than are verified, to see whether it could reach the hits.
         wide.k = std::max(options.k, most + 1);

@@ -25,7 +25,8 @@ namespace shapedb {
 struct VerifyOptions {
     /// At most so many candidates are laid on the query: those that the signatures rank first; of a query of
     /// one side mostly those that views rank first (docs/views.md). With fewer shapes in the collection, or
-    /// when no other can reach the hits, the answer is exact. 0: 32 for a reliable query, 64 for others.
+    /// when no other can reach the hits, the answer is exact. 0: 32 for a reliable query, 64 for others, 128
+    /// for pieces (ScoreOptions::partial), of which signatures know least.
     std::size_t mostCandidates = 0;
     /// Whether a camera saw the query from one place; nothing: judged from the points.
     std::optional<bool> oneSided{};
@@ -73,13 +74,18 @@ struct QueryTraits {
     bool reliable = true;
     /// It is not reliable, and most of its surface can be seen from one place.
     bool ofOneSide = false;
+    /// The caller says that it is a piece.
+    bool piece = false;
 };
 
-/// Judged from the points, or as `oneSided` says. Errors: kOutOfMemory.
+/// Judged from the points, or as `oneSided` says. A piece (`score.partial`) is of one side only if
+/// `oneSided` says so: half of a shape is easily seen from one place. Errors: kOutOfMemory.
 [[nodiscard]] Result<QueryTraits> traitsOf(const Signature& query, const SurfacePoints& surface,
+                                           const ScoreOptions& score = {},
                                            std::optional<bool> oneSided = std::nullopt);
 
-/// What the query may be a scan of: whole or a piece, and of one side too unless it is reliable.
+/// What the query may be a scan of: whole or a piece. Of one side too if it is not reliable; a piece only if
+/// it is known to be of one side.
 [[nodiscard]] FitKinds kindsOfQuery(const QueryTraits& traits) noexcept;
 
 /// The score of a candidate whose signature scores `signatureScore` and whose misfit is `misfit`
@@ -92,6 +98,9 @@ struct QueryTraits {
 
 /// The weight of the misfit, in (0, 1).
 [[nodiscard]] double misfitShare(const QueryTraits& traits, const ScoreOptions& score) noexcept;
+
+/// How many candidates are verified unless the caller says so.
+[[nodiscard]] std::size_t candidatesFor(const QueryTraits& traits) noexcept;
 
 /// Two shapes compared, and one laid on the other.
 struct VerifiedExplanation {

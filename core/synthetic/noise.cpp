@@ -64,4 +64,15 @@ PointCloud subsample(const PointCloud& points, std::size_t count, std::uint64_t 
     return chosen;
 }
 
+void addTable(PointCloud& cloud, std::size_t count, double reach, double noise, std::uint64_t seed) {
+    const Box box = boxOf(cloud);
+    const Point3 middle = 0.5 * (box.low + box.high);
+    const double half = 0.5 * reach * std::max(box.extent().x, box.extent().y);
+    Random random(seed);
+    for (std::size_t i = 0; i < count; ++i) {
+        cloud.push_back({middle.x + random.uniform(-half, half), middle.y + random.uniform(-half, half),
+                         box.low.z - 0.002 * half + noise * random.normal()});
+    }
+}
+
 }  // namespace shapedb

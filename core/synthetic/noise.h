@@ -1,4 +1,4 @@
-// Degrading clean point clouds: adding Gaussian noise, dropping random points.
+// Degrading clean point clouds: Gaussian noise, fewer points, a table beneath.
 #pragma once
 
 #include <cstddef>
@@ -23,5 +23,10 @@ namespace shapedb {
 /// A uniformly random subset of `count` points (or all, if there are no more), in their original order. Same
 /// points, count and seed: same subset.
 [[nodiscard]] PointCloud subsample(const PointCloud& points, std::size_t count, std::uint64_t seed);
+
+/// Appends `count` points of a square table just below the cloud, which stands upright along z. The table is
+/// `reach` times as wide as the longer horizontal side of the cloud's box; its height has Gaussian noise of
+/// the standard deviation `noise`, scan units.
+void addTable(PointCloud& cloud, std::size_t count, double reach, double noise, std::uint64_t seed);
 
 }  // namespace shapedb

@@ -9,6 +9,7 @@
 #include "core/geometry/box.h"
 #include "core/geometry/motion.h"
 #include "core/synthetic/families.h"
+#include "core/synthetic/noise.h"
 #include "core/synthetic/partial.h"
 
 namespace shapedb {
@@ -20,17 +21,6 @@ PointCloud memberOf(const std::string& family, std::size_t index, std::size_t co
     options.randomPose = false;
     options.noise = 0.002;
     return scanOf(makeMember(family, index, 1).value(), options).value();
-}
-
-// Adds a square of points under the box of the cloud, `reach` times as wide as it.
-void addTable(PointCloud& cloud, std::size_t count, double reach, double noise, Random& random) {
-    const Box box = boxOf(cloud);
-    const Point3 middle = 0.5 * (box.low + box.high);
-    const double half = 0.5 * reach * std::max(box.extent().x, box.extent().y);
-    for (std::size_t i = 0; i < count; ++i) {
-        cloud.push_back({middle.x + random.uniform(-half, half), middle.y + random.uniform(-half, half),
-                         box.low.z - 0.002 * half + noise * random.normal()});
-    }
 }
 
 PointCloud turned(const PointCloud& cloud, std::uint64_t seed) {
@@ -68,7 +58,7 @@ TEST(Scene, FindsTheTableUnderEveryObjectInAnyPose) {
             PointCloud cloud = memberOf(family.name, 2, 6000);
             if (oneSided) cloud = seenFrom(cloud, {0.6, 0.0, 0.8});
             const std::size_t own = cloud.size();
-            addTable(cloud, 6000, 2.5, 0.002, random);
+            addTable(cloud, 6000, 2.5, 0.002, random.next());
             const auto scene = findScene(turned(cloud, seed));
             ASSERT_TRUE(scene) << family.name;
             ASSERT_TRUE(scene->plane) << family.name << (oneSided ? ", one side" : "");
@@ -106,7 +96,7 @@ TEST(Scene, TellsSeparateObjectsOnATableApart) {
         sizes.push_back(one.size());
     }
     const std::size_t own = cloud.size();
-    addTable(cloud, 30000, 1.5, 0.002, random);
+    addTable(cloud, 30000, 1.5, 0.002, random.next());
     const auto scene = findScene(cloud);
     ASSERT_TRUE(scene);
     ASSERT_TRUE(scene->plane);

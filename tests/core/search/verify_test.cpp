@@ -77,7 +77,7 @@ Result<VerifiedResult> searched(const Scanned& query, const SearchOptions& optio
 
 // Fits everything, one after another, and sorts.
 std::vector<VerifiedHit> bruteForce(const Scanned& query, const SearchOptions& options) {
-    const QueryTraits traits = traitsOf(query.signature, *query.surface).value();
+    const QueryTraits traits = traitsOf(query.signature, *query.surface, options.score).value();
     std::vector<VerifiedHit> hits;
     for (const auto& [id, shape] : gallery().shapes) {
         VerifiedHit hit;
@@ -227,12 +227,33 @@ TEST(Verify, KnowsScansOfOneSide) {
     EXPECT_TRUE(traitsOf(whole.signature, *whole.surface)->reliable);
     EXPECT_FALSE(traitsOf(whole.signature, *whole.surface)->ofOneSide);
     // What the caller knows counts.
-    EXPECT_FALSE(traitsOf(open.signature, *open.surface, false)->ofOneSide);
-    EXPECT_FALSE(traitsOf(open.signature, *open.surface, false)->reliable);
-    EXPECT_TRUE(traitsOf(whole.signature, *whole.surface, true)->ofOneSide);
+    EXPECT_FALSE(traitsOf(open.signature, *open.surface, {}, false)->ofOneSide);
+    EXPECT_FALSE(traitsOf(open.signature, *open.surface, {}, false)->reliable);
+    EXPECT_TRUE(traitsOf(whole.signature, *whole.surface, {}, true)->ofOneSide);
     EXPECT_TRUE(kindsOfQuery(judged).oneSided);
     EXPECT_FALSE(kindsOfQuery(QueryTraits()).oneSided);
     EXPECT_TRUE(kindsOfQuery(QueryTraits()).piece);
+}
+
+TEST(Verify, BelievesTheFitOfAPieceMostAndLooksFurther) {
+    ScoreOptions partial;
+    partial.partial = true;
+    // Half of a shape: most of it is seen from one place, but it is not a scan of one side.
+    const Scanned half = scanned(cutBelow(scanOfFamily("animal", 1, 9), {0, 0, 1}, 0.5));
+    const QueryTraits piece = traitsOf(half.signature, *half.surface, partial).value();
+    EXPECT_TRUE(piece.piece);
+    EXPECT_FALSE(piece.ofOneSide);
+    EXPECT_FALSE(kindsOfQuery(piece).oneSided);
+    EXPECT_TRUE(kindsOfQuery(traitsOf(half.signature, *half.surface, partial, true).value()).oneSided);
+    EXPECT_GT(misfitShare(piece, partial), misfitShare({false, true, false}, {}));
+    EXPECT_GT(candidatesFor(piece), candidatesFor({false, true, false}));
+    EXPECT_GT(candidatesFor({false, true, false}), candidatesFor({}));
+
+    SearchOptions options;
+    options.score = partial;
+    const auto found = searched(half, options, 100);
+    ASSERT_TRUE(found) << found.error().message;
+    expectSame(found->hits, bruteForce(half, options));
 }
 
 TEST(Verify, EndsWithTheErrorOfASurfaceOrTheContext) {
