@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "bench/peers.h"
 #include "core/base/error.h"
 #include "core/base/run_context.h"
 #include "core/fit/fit.h"
@@ -39,7 +40,7 @@ struct AlignOutcome {
     double error = 1.0;        ///< see motionError; 1 when no surface points could be made
     double bestOfEqual = 1.0;  ///< the smallest error of the answer and its alternatives
     double score = 0.0;
-    double seconds = 0.0;  ///< processor time of the fit, on one thread
+    double seconds = 0.0;  ///< processor time of one thread; of a fit without making the surface points
     FitKind kind = FitKind::kWhole;
 };
 
@@ -47,14 +48,28 @@ struct AlignOutcome {
 /// diagonal of its axis-aligned box: motions that a symmetry makes equal have no error.
 [[nodiscard]] double motionError(const PointCloud& model, const Motion& found, const Motion& truth);
 
+/// Two scans of a shape, one moved against the other.
+struct AlignCase {
+    PointCloud query;
+    PointCloud other;
+    Motion truth;  ///< takes `other` to `query`
+};
+
 /// Takes every other point of `model` for the query and the rest for the other shape (all for both, if there
 /// are less than 8,000), adds noise to the query, takes away what the condition says, and moves both at
 /// random: the query is also mirrored, in half of the cases, if reflection is allowed, and scaled by 1/2 to 2
 /// unless the scale is kept. All random numbers come from `seed`.
 ///
-/// Errors: kCancelled, kDeadlineExceeded; those of the noise.
-[[nodiscard]] Result<AlignOutcome> measureAlignment(const PointCloud& model, const AlignCondition& condition,
-                                                    const AlignSettings& settings, std::uint64_t seed,
-                                                    const RunContext& context);
+/// Errors: those of the noise.
+[[nodiscard]] Result<AlignCase> makeAlignCase(const PointCloud& model, const AlignCondition& condition,
+                                              const AlignSettings& settings, std::uint64_t seed);
+
+/// By fit. Errors: kCancelled, kDeadlineExceeded.
+[[nodiscard]] Result<AlignOutcome> measureAlignment(const AlignCase& one, const AlignCondition& condition,
+                                                    const AlignSettings& settings, const RunContext& context);
+
+/// By another aligner, from the points themselves. `score` and `kind` are not set. A failure to align counts
+/// as an error of 1.
+[[nodiscard]] AlignOutcome measureAlignment(const AlignCase& one, const PeerAligner& peer);
 
 }  // namespace shapedb::bench

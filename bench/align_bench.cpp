@@ -107,9 +107,34 @@ struct AlignFlags {
     bool automatic = false;
     bool noReflection = false;
     bool listMisses = false;
+    bool peers = false;
 };
 
+Result<std::vector<PeerAligner>> peersOf(const AlignFlags& flags) {
+    if (!flags.peers) return std::vector<PeerAligner>{};
+    auto peers = peerAligners();
+    if (peers.empty()) {
+        return fail(ErrorCode::kInvalidArgument,
+                    "--peers: built without the Point Cloud Library (preset peers)");
+    }
+    if (!flags.settings.fit.keepScale || !flags.noReflection) {
+        return fail(ErrorCode::kInvalidArgument,
+                    "--peers needs --keep-scale and --no-reflection: the peers find rigid motions only");
+    }
+    return peers;
+}
+
+std::string peerLine(const std::string& name, const char* condition, const Column& column) {
+    const auto n = static_cast<double>(std::max<std::size_t>(1, column.errors.size()));
+    return "| " + name + " | " + condition + " | " + std::to_string(column.errors.size()) + " | " +
+           numberText("%.3f", static_cast<double>(column.right) / n) + " | " +
+           numberText("%.2f", 100.0 * median(column.errors)) + " | " +
+           numberText("%.1f", 1e3 * column.seconds / n) + " |\n";
+}
+
 Result<int> runAlign(const AlignFlags& flags, Bench& bench) {
+    const auto peers = peersOf(flags);
+    RETURN_IF_ERROR(peers);
     AlignSettings settings = flags.settings;
     settings.toldKind = !flags.automatic;
     settings.fit.reflection = !flags.noReflection;
@@ -117,6 +142,7 @@ Result<int> runAlign(const AlignFlags& flags, Bench& bench) {
     RETURN_IF_ERROR(scans);
     std::map<std::string, std::size_t> taken;
     std::array<Column, kAlignConditions.size()> columns;
+    std::vector<std::array<Column, kAlignConditions.size()>> peerColumns(peers->size());
     std::string misses;
     for (const auto& scan : *scans) {
         if (flags.perFolder != 0 && taken[scan.label] == flags.perFolder) continue;
@@ -124,10 +150,16 @@ Result<int> runAlign(const AlignFlags& flags, Bench& bench) {
         const auto read = readScan(scan.path, {}, bench.context());
         RETURN_IF_ERROR(read);
         for (std::size_t i = 0; i < columns.size(); ++i) {
-            const auto outcome = measureAlignment(read->points, kAlignConditions[i], settings,
-                                                  cli::fileSeed(settings.seed, scan.name), bench.context());
+            const auto one = makeAlignCase(read->points, kAlignConditions[i], settings,
+                                           cli::fileSeed(settings.seed, scan.name));
+            RETURN_IF_ERROR(one);
+            const auto outcome = measureAlignment(*one, kAlignConditions[i], settings, bench.context());
             RETURN_IF_ERROR(outcome);
             columns[i].add(*outcome);
+            for (std::size_t p = 0; p < peers->size(); ++p) {
+                RETURN_IF_ERROR(bench.context().checkpoint());
+                peerColumns[p][i].add(measureAlignment(*one, (*peers)[p]));
+            }
             if (!flags.listMisses || outcome->error <= kRightWithin) continue;
             misses += "- " + scan.name + ", " + kAlignConditions[i].name + ": error " +
                       numberText("%.2f", 100.0 * outcome->error) + " %, score " +
@@ -145,6 +177,16 @@ Result<int> runAlign(const AlignFlags& flags, Bench& bench) {
         "median score | ms a fit | whole / one-sided / piece |\n|---|---|---|---|---|---|---|---|\n";
     for (std::size_t i = 0; i < columns.size(); ++i) text += line(kAlignConditions[i].name, columns[i]);
     if (!misses.empty()) text += "\n" + misses;
+    if (!peers->empty()) {
+        text +=
+            "\n" + peerLibrary() +
+            "\n\n| peer | query | scans | within 2 % | median error, % | ms |\n|---|---|---|---|---|---|\n";
+    }
+    for (std::size_t i = 0; i < columns.size(); ++i) {
+        for (std::size_t p = 0; p < peers->size(); ++p) {
+            text += peerLine((*peers)[p].name, kAlignConditions[i].name, peerColumns[p][i]);
+        }
+    }
     bench.console.text(text);
     return cli::kOk;
 }
@@ -161,9 +203,8 @@ double motionError(const PointCloud& model, const Motion& found, const Motion& t
     return std::sqrt(mean) / boxOf(b).diagonal();
 }
 
-Result<AlignOutcome> measureAlignment(const PointCloud& model, const AlignCondition& condition,
-                                      const AlignSettings& settings, std::uint64_t seed,
-                                      const RunContext& context) {
+Result<AlignCase> makeAlignCase(const PointCloud& model, const AlignCondition& condition,
+                                const AlignSettings& settings, std::uint64_t seed) {
     Random random(seed);
     PointCloud query = model;
     PointCloud other = model;
@@ -178,13 +219,15 @@ Result<AlignOutcome> measureAlignment(const PointCloud& model, const AlignCondit
     if (condition.kind == FitKind::kPiece) query = cutBelow(query, direction, condition.left);
     const Motion queryPose = randomMotion(random, diagonal, settings.fit.reflection, settings.fit.keepScale);
     const Motion otherPose = randomMotion(random, diagonal, false, true);
-    query = applyToCloud(queryPose, query);
-    other = applyToCloud(otherPose, other);
-    const Motion truth = compose(queryPose, inverse(otherPose));
+    return AlignCase{applyToCloud(queryPose, query), applyToCloud(otherPose, other),
+                     compose(queryPose, inverse(otherPose))};
+}
 
+Result<AlignOutcome> measureAlignment(const AlignCase& one, const AlignCondition& condition,
+                                      const AlignSettings& settings, const RunContext& context) {
     AlignOutcome outcome;
-    const auto querySurface = makeSurfacePoints(query, context);
-    const auto otherSurface = makeSurfacePoints(other, context);
+    const auto querySurface = makeSurfacePoints(one.query, context);
+    const auto otherSurface = makeSurfacePoints(one.other, context);
     for (const auto* surface : {&querySurface, &otherSurface}) {
         if (*surface) continue;
         if (stopped(surface->error())) return fail(surface->error());
@@ -199,11 +242,21 @@ Result<AlignOutcome> measureAlignment(const PointCloud& model, const AlignCondit
     RETURN_IF_ERROR(result);
     outcome.score = result->best.score;
     outcome.kind = result->kind;
-    outcome.error = motionError(other, result->best.motion, truth);
+    outcome.error = motionError(one.other, result->best.motion, one.truth);
     outcome.bestOfEqual = outcome.error;
     for (const FitPose& pose : result->alternatives) {
-        outcome.bestOfEqual = std::min(outcome.bestOfEqual, motionError(other, pose.motion, truth));
+        outcome.bestOfEqual = std::min(outcome.bestOfEqual, motionError(one.other, pose.motion, one.truth));
     }
+    return outcome;
+}
+
+AlignOutcome measureAlignment(const AlignCase& one, const PeerAligner& peer) {
+    AlignOutcome outcome;
+    const ThreadStopwatch watch;
+    const auto motion = peer.align(one.query, one.other);
+    outcome.seconds = watch.seconds();
+    if (motion) outcome.error = motionError(one.other, *motion, one.truth);
+    outcome.bestOfEqual = outcome.error;
     return outcome;
 }
 
@@ -221,6 +274,7 @@ void addAlignOperation(CLI::App& app, Bench& bench) {
     command->add_flag("--no-reflection", flags->noReflection, "Nothing is mirrored");
     command->add_flag("--automatic", flags->automatic, "Lets the fit find out what is missing");
     command->add_flag("--misses", flags->listMisses, "Lists the scans whose motion is not found");
+    command->add_flag("--peers", flags->peers, "Registration by the Point Cloud Library beside it");
     command->callback(
         [flags, &bench] { bench.action = [flags, &bench] { return runAlign(*flags, bench); }; });
 }

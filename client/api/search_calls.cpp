@@ -84,6 +84,7 @@ Result<Comparison> Client::compare(const ShapeRef& query, const ShapeRef& other,
     request.set_forbid_reflection(!options.reflection);
     request.set_keep_scale(options.keepScale);
     request.set_partial(options.partial);
+    request.set_free_scale(options.freeScale);
     const auto response = callUnary(impl_->options, context, kIdempotent, *impl_->search,
                                     &v1::SearchService::Stub::Compare, request);
     RETURN_IF_ERROR(response);
@@ -131,6 +132,7 @@ v1::AlignRequest alignRequest(const CompareOptions& options) {
     request.mutable_header()->set_keep_scale(options.keepScale);
     request.mutable_header()->set_forbid_reflection(!options.reflection);
     request.mutable_header()->set_partial(options.partial);
+    request.mutable_header()->set_free_scale(options.freeScale);
     return request;
 }
 

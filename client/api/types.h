@@ -231,7 +231,9 @@ struct SearchOptions {
 
 struct CompareOptions {
     bool reflection = true;  ///< false: a mirror image is another shape
-    bool keepScale = false;  ///< true: size matters
+    /// true: size matters, as it does anyway where all stored shapes are in collections with one unit
+    bool keepScale = false;
+    bool freeScale = false;  ///< true: not there either
     bool partial = false;    ///< true: score how much of the query the other contains
 };
 

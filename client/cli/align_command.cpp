@@ -8,9 +8,11 @@
 #include "client/cli/exit_code.h"
 #include "client/cli/fit_output.h"
 #include "client/cli/local_result.h"
+#include "client/cli/parameters.h"
 #include "client/cli/scan_source.h"
 #include "client/cli/session.h"
 #include "client/cli/text.h"
+#include "client/cli/units.h"
 #include "core/base/return_if_error.h"
 #include "core/fit/fit.h"
 
@@ -23,16 +25,15 @@ struct AlignFlags {
     std::string other;
     std::string key;
     std::string collection;
-    bool keepScale = false;
-    bool noReflection = false;
-    bool partial = false;
+    ScoreFlags score;
+    std::optional<LengthUnit> unit;  // with --key
     ScanFlags scan;
 
     [[nodiscard]] FitOptions resolve() const {
         FitOptions options;
-        options.keepScale = keepScale;
-        options.reflection = !noReflection;
-        options.kinds.whole = !partial;
+        options.keepScale = score.keepScale;
+        options.reflection = !score.noReflection;
+        options.kinds.whole = !score.partial;
         return options;
     }
 };
@@ -56,18 +57,27 @@ Result<client::Fit> alignFiles(const AlignFlags& flags, const RunContext& contex
 }
 
 Result<client::Fit> alignStored(const Session& session, const AlignFlags& flags, const RunContext& context) {
-    const auto scan = loadScan(flags.query, flags.scan, flags.scan.seed, context);
+    auto scan = loadScan(flags.query, flags.scan, flags.scan.seed, context);
     RETURN_IF_ERROR(scan);
     const auto client = connectToServer(session, Work::kHeavy);
     RETURN_IF_ERROR(client);
-    return client->align(scan->points, client::ShapeRef{flags.collection, flags.key},
-                         {!flags.noReflection, flags.keepScale, flags.partial}, context);
+    const auto factor = factorToCollection(*client, flags.collection, flags.unit, context);
+    RETURN_IF_ERROR(factor);
+    if (*factor != 1.0) scaleBy(*factor, scan->points);
+    auto found = client->align(scan->points, client::ShapeRef{flags.collection, flags.key},
+                               flags.score.forServer(), context);
+    RETURN_IF_ERROR(found);
+    if (*factor != 1.0) scaleBy(1.0 / *factor, *found);
+    return found;
 }
 
 CommandResult runAlign(Session& session, const AlignFlags& flags) {
     if (flags.other.empty() == flags.key.empty()) {
         return fail(ErrorCode::kInvalidArgument, "give a second scan, or --key with a stored shape" +
                                                      std::string(flags.key.empty() ? "" : ", not both"));
+    }
+    if (flags.key.empty() && (flags.unit || flags.score.freeScale)) {
+        return fail(ErrorCode::kInvalidArgument, "--unit and --free-scale need --key: files have no unit");
     }
     const RunContext context = session.context();
     const auto found = flags.key.empty() ? alignFiles(flags, context) : alignStored(session, flags, context);
@@ -95,9 +105,13 @@ void addAlignCommand(CLI::App& app, Session& session) {
     command->add_option("OTHER", flags->other, "Scan of a whole object that is laid on it");
     command->add_option("--key", flags->key, "Lay this stored shape on it instead");
     addCollectionOption(*command, flags->collection);
-    command->add_flag("--keep-scale", flags->keepScale, "Both have the same unit of length: do not scale");
-    command->add_flag("--no-reflection", flags->noReflection, "Do not mirror");
-    command->add_flag("--partial", flags->partial, "QUERY shows one side or a piece, not all of the object");
+    command->add_flag("--keep-scale", flags->score.keepScale,
+                      "Both have the same unit of length: do not scale");
+    command->add_flag("--no-reflection", flags->score.noReflection, "Do not mirror");
+    command->add_flag("--partial", flags->score.partial,
+                      "QUERY shows one side or a piece, not all of the object");
+    addUnitFlag(*command, flags->unit);
+    addFreeScaleFlag(*command, flags->score);
     addScanFlags(*command, flags->scan);
     command->callback(
         [&session, flags] { session.action = [&session, flags] { return runAlign(session, *flags); }; });

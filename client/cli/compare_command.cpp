@@ -80,8 +80,7 @@ Result<client::Comparison> compareStored(Session& session, const CompareFlags& f
     }
     const auto client = connectToServer(session);
     RETURN_IF_ERROR(client);
-    return client->compare({flags.collection, flags.a}, {flags.collection, flags.b},
-                           {!flags.score.noReflection, flags.score.keepScale, flags.score.partial},
+    return client->compare({flags.collection, flags.a}, {flags.collection, flags.b}, flags.score.forServer(),
                            session.context());
 }
 
@@ -118,6 +117,7 @@ void addCompareCommand(CLI::App& app, Session& session) {
     command->add_flag("--files", flags->files, "A and B are scan files; needs no server");
     addCollectionOption(*command, flags->collection);
     addScoreFlags(*command, flags->score);
+    addFreeScaleFlag(*command, flags->score);
     addScanFlags(*command, flags->scan);
     addParameterFlags(*command, flags->parameters);
     command->callback(

@@ -47,6 +47,10 @@ struct ScoreFlags {
     bool freeScale = false;  ///< --free-scale, of commands that have it
 
     [[nodiscard]] ScoreOptions resolve() const;
+    /// For a server.
+    [[nodiscard]] client::CompareOptions forServer() const {
+        return {!noReflection, keepScale, freeScale, partial};
+    }
 };
 
 void addScoreFlags(CLI::App& command, ScoreFlags& flags);

@@ -21,12 +21,6 @@ void scaleBy(double factor, client::Signature& signature) {
 // With both shapes in the other unit, rotation and scale stay.
 void scaleBy(double factor, Motion& motion) { motion.translation = factor * motion.translation; }
 
-void scaleBy(double factor, client::Fit& fit) {
-    scaleBy(factor, fit.best.motion);
-    for (client::FitPose& pose : fit.alternatives) scaleBy(factor, pose.motion);
-    for (client::FreeAxis& axis : fit.axes) axis.point = factor * axis.point;
-}
-
 }  // namespace
 
 Result<double> factorToCollection(const client::Client& client, const std::string& collection,
@@ -45,6 +39,12 @@ Result<double> factorToCollection(const client::Client& client, const std::strin
 
 void scaleBy(double factor, PointCloud& points) {
     for (Point3& point : points) point = factor * point;
+}
+
+void scaleBy(double factor, client::Fit& fit) {
+    scaleBy(factor, fit.best.motion);
+    for (client::FitPose& pose : fit.alternatives) scaleBy(factor, pose.motion);
+    for (client::FreeAxis& axis : fit.axes) axis.point = factor * axis.point;
 }
 
 void scaleBy(double factor, client::SearchReply& reply) {

@@ -19,6 +19,9 @@ namespace shapedb::cli {
 /// Multiplies all coordinates.
 void scaleBy(double factor, PointCloud& points);
 
+/// Multiplies all lengths of motions, both shapes being in the other unit.
+void scaleBy(double factor, client::Fit& fit);
+
 /// Multiplies all lengths of an answer, its motions and the coordinates that they take to each other.
 void scaleBy(double factor, client::SearchReply& reply);
 

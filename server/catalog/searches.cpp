@@ -18,6 +18,14 @@ void addFit(const FitResult& fit, double share, Explanation& explanation) {
     if (!explanation.terms.empty()) explanation.terms.push_back({"fit", fit.misfit, share});
 }
 
+// Whether sizes are compared, of shapes in collections with this unit.
+Result<bool> sizesCount(bool keepScale, bool freeScale, LengthUnit unit) {
+    if (keepScale && freeScale) {
+        return fail(ErrorCode::kInvalidArgument, "keep_scale and free_scale exclude each other");
+    }
+    return keepScale || (unit != LengthUnit::kNone && !freeScale);
+}
+
 }  // namespace
 
 Result<void> AnswerRoom::take(std::size_t bytes) {
@@ -34,10 +42,10 @@ Result<PreparedSearch> Searches::prepare(index::SnapshotPtr collection, const Se
     RETURN_IF_ERROR(checkK(request.k, maxK_));
     RETURN_IF_ERROR(checkThreshold(request.threshold));
     RETURN_IF_ERROR(checkFilterLength(request.filter));
-    if (request.score.keepScale && request.freeScale) {
-        return fail(ErrorCode::kInvalidArgument, "keep_scale and free_scale exclude each other");
-    }
     RETURN_IF_ERROR(checkVerifyOptions(request.verifyOptions));
+    const auto keepScale =
+        sizesCount(request.score.keepScale, request.freeScale, collection->parameters.unit);
+    RETURN_IF_ERROR(keepScale);
     Result<Filter> filter = Filter::parse(request.filter);
     RETURN_IF_ERROR(filter);
     const auto pending = catalog_.pendingShapes(collection->collection.id);
@@ -49,9 +57,7 @@ Result<PreparedSearch> Searches::prepare(index::SnapshotPtr collection, const Se
     prepared.options.threshold = request.threshold;
     prepared.options.filter = std::move(*filter);
     prepared.options.score = request.score;
-    if (prepared.collection->parameters.unit != LengthUnit::kNone && !request.freeScale) {
-        prepared.options.score.keepScale = true;
-    }
+    prepared.options.score.keepScale = *keepScale;
     prepared.explain = request.explain;
     if (request.verify.value_or(prepared.collection->parameters.profile == Profile::kDefault)) {
         prepared.verify = request.verifyOptions;
@@ -92,6 +98,12 @@ Result<FoundShape> Searches::shapeNamed(const ShapeName& name) const {
     return catalog_.findShape(*collection, name.key);
 }
 
+Result<LengthUnit> Searches::unitOf(const ShapeName& name) const {
+    const auto collection = catalog_.collection(name.collection);
+    RETURN_IF_ERROR(collection);
+    return (*collection)->parameters.unit;
+}
+
 Result<Searches::Compared> Searches::compared(const char* which, const ShapeName& name) const {
     const auto read = [&]() -> Result<Compared> {
         const auto found = shapeNamed(name);
@@ -122,7 +134,16 @@ Result<std::shared_ptr<const SurfacePoints>> Searches::surfaceOf(const ShapeName
 
 Result<FitResult> Searches::align(const store::VerifiedScan& query,
                                   const std::variant<ShapeName, const store::VerifiedScan*>& other,
-                                  const FitOptions& options, const RunContext& context) const {
+                                  FitOptions options, bool freeScale, const RunContext& context) const {
+    auto unit = LengthUnit::kNone;
+    if (const auto* name = std::get_if<ShapeName>(&other)) {
+        const auto own = unitOf(*name);
+        if (!own) return fail(withContext(own.error(), "other: "));
+        unit = *own;
+    }
+    const auto keepScale = sizesCount(options.keepScale, freeScale, unit);
+    RETURN_IF_ERROR(keepScale);
+    options.keepScale = *keepScale;
     SegmentationSlots::Slot slot(catalog_.segmentationSlots());
     RETURN_IF_ERROR(slot.acquire(context));
     const auto surface = makeSurfacePoints(store::toCloud(query.points()), context);
@@ -138,12 +159,25 @@ Result<FitResult> Searches::align(const store::VerifiedScan& query,
     return fit(FitQuery(*surface), *sent, options, context);
 }
 
-Result<Comparison> Searches::compare(const ShapeName& query, const ShapeName& other,
-                                     const ScoreOptions& options, const RunContext& context) const {
+Result<Comparison> Searches::compare(const ShapeName& query, const ShapeName& other, ScoreOptions options,
+                                     bool freeScale, const RunContext& context) const {
     auto first = compared("query", query);
     RETURN_IF_ERROR(first);
     auto second = compared("other", other);
     RETURN_IF_ERROR(second);
+    const auto unit = unitOf(query);
+    RETURN_IF_ERROR(unit);
+    const auto otherUnit = unitOf(other);
+    RETURN_IF_ERROR(otherUnit);
+    if (options.keepScale && *unit != *otherUnit) {
+        return fail(ErrorCode::kInvalidArgument, "keep_scale: the shapes have different units of length, " +
+                                                     std::string(lengthUnitName(*unit)) + " and " +
+                                                     lengthUnitName(*otherUnit));
+    }
+    const auto keepScale =
+        sizesCount(options.keepScale, freeScale, *unit == *otherUnit ? *unit : LengthUnit::kNone);
+    RETURN_IF_ERROR(keepScale);
+    options.keepScale = *keepScale;
     auto verified = explainVerified(first->signature, first->surface.get(), second->signature,
                                     second->surface.get(), options, context);
     RETURN_IF_ERROR(verified);

@@ -95,11 +95,13 @@ class Searches {
     [[nodiscard]] Result<PreparedSearch> prepare(index::SnapshotPtr collection,
                                                  const SearchRequest& request) const;
 
-    /// Lays a scan or a stored shape on a scan; stores nothing. Errors: those of makeSurfacePoints and fit;
-    /// kInvalidArgument (key), kNotFound, kNotReady (no surface points yet), kDataLoss.
+    /// Lays a scan or a stored shape on a scan; stores nothing. With a stored shape `query` is taken to be in
+    /// the unit of its collection; sizes then count as in a search. Errors: those of makeSurfacePoints and
+    /// fit; kInvalidArgument (key), kNotFound, kNotReady (no surface points yet), kDataLoss.
     [[nodiscard]] Result<FitResult> align(const store::VerifiedScan& query,
                                           const std::variant<ShapeName, const store::VerifiedScan*>& other,
-                                          const FitOptions& options, const RunContext& context) const;
+                                          FitOptions options, bool freeScale,
+                                          const RunContext& context) const;
 
     /// A stored shape as a query, which finds itself only with `includeSelf`. Errors: kInvalidArgument (key),
     /// kNotFound, kNotReady, kDataLoss.
@@ -115,10 +117,12 @@ class Searches {
     [[nodiscard]] Result<std::vector<VerifiableQuery>> queries(const PreparedSearch& search,
                                                                const std::vector<QuerySource>& sources) const;
 
-    /// How alike two stored shapes are, and why. Errors, saying which of the two they are about:
-    /// kInvalidArgument (key), kNotFound, kNotReady, kDataLoss; kCancelled, kDeadlineExceeded.
+    /// How alike two stored shapes are, and why. Sizes count as in a search, if both collections have the
+    /// same unit. Errors, saying which of the two they are about: kInvalidArgument (key), kNotFound,
+    /// kNotReady, kDataLoss; kCancelled, kDeadlineExceeded.
     [[nodiscard]] Result<Comparison> compare(const ShapeName& query, const ShapeName& other,
-                                             const ScoreOptions& options, const RunContext& context) const;
+                                             ScoreOptions options, bool freeScale,
+                                             const RunContext& context) const;
 
     /// Calls `visit` with each hit, best first, leaving out shapes deleted meanwhile. An explanation is
     /// missing where the signature scored was replaced meanwhile. `found` by `run` or `runBatch`. Errors:
@@ -148,6 +152,7 @@ class Searches {
         std::shared_ptr<const SurfacePoints> surface;  ///< null if there are none
     };
     Result<FoundShape> shapeNamed(const ShapeName& name) const;
+    Result<LengthUnit> unitOf(const ShapeName& name) const;
     Result<Compared> compared(const char* which, const ShapeName& name) const;
     Result<std::optional<Explanation>> explain(const PreparedSearch& search, const Signature& query,
                                                const VerifiedResult& found, const VerifiedHit& hit) const;

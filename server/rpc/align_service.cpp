@@ -26,8 +26,12 @@ class Uploads {
         return receiveChunk(message.chunk().xyz(), ofQuery ? query_ : other_, call_);
     }
 
-    Result<store::VerifiedScan> query() { return finished("query: ", query_); }
-    Result<store::VerifiedScan> other() { return finished("other: ", other_); }
+    Result<store::VerifiedScan> query() {
+        return finished("query: ", query_, isolationFrom(header_->query_isolation()));
+    }
+    Result<store::VerifiedScan> other() {
+        return finished("other: ", other_, isolationFrom(header_->other_isolation()));
+    }
     /// Null if none arrived.
     const v1::AlignHeader* header() const { return header_ ? &*header_ : nullptr; }
 
@@ -46,8 +50,10 @@ class Uploads {
         return {};
     }
 
-    static Result<store::VerifiedScan> finished(const char* which, catalog::ScanUpload& upload) {
+    Result<store::VerifiedScan> finished(const char* which, catalog::ScanUpload& upload,
+                                         const IsolateOptions& isolation) {
         auto scan = upload.finish();
+        if (scan) scan = catalog::isolated(std::move(*scan), isolation, call_.run());
         if (!scan) return fail(withContext(scan.error(), which));
         return scan;
     }
@@ -79,7 +85,8 @@ grpc::Status AlignServiceHandler::Align(grpc::ServerContext* context,
         RETURN_IF_ERROR(query);
         const v1::AlignHeader& header = *uploads.header();
         const auto align = [&](const std::variant<catalog::ShapeName, const store::VerifiedScan*>& other) {
-            return services_.searches.align(*query, other, optionsFrom(header), call.run());
+            return services_.searches.align(*query, other, optionsFrom(header), header.free_scale(),
+                                            call.run());
         };
         Result<FitResult> fitted = fail(ErrorCode::kInternal, "not aligned");
         if (header.has_key()) {

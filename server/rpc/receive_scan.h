@@ -34,6 +34,10 @@ inline Result<void> receiveChunk(const std::string& xyz, catalog::ScanUpload& up
     return {};
 }
 
+[[nodiscard]] inline IsolateOptions isolationFrom(const v1::Isolation& message) {
+    return {message.drop_plane(), message.largest_object()};
+}
+
 /// `onHeader(header)` checks the other fields of the header as soon as it arrives, so that a hopeless
 /// upload is refused before its points are sent. What the header's isolation leaves out is gone. Errors:
 /// those of ScanUpload, of isolated and of `onHeader`; kCancelled, kDeadlineExceeded.
@@ -45,8 +49,7 @@ Result<store::VerifiedScan> receiveScan(Reader& reader, catalog::ScanUpload& upl
         if (request.has_chunk()) return receiveChunk(request.chunk().xyz(), upload, call);
         const auto& header = request.header();
         RETURN_IF_ERROR(upload.begin(header.point_count(), header.sha256()));
-        isolation.dropPlane = header.isolation().drop_plane();
-        isolation.largest = header.isolation().largest_object();
+        isolation = isolationFrom(header.isolation());
         return onHeader(header);
     };
     RETURN_IF_ERROR(receiveMessages<Request>(reader, call, take));

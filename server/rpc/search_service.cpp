@@ -177,8 +177,8 @@ grpc::Status SearchServiceHandler::Compare(grpc::ServerContext* context, const v
         };
         const catalog::ShapeName query = nameFrom(request->query());
         const catalog::ShapeName other = nameFrom(request->other());
-        const auto compared =
-            services_.searches.compare(query, other, scoreOptionsFrom(*request), call.run());
+        const auto compared = services_.searches.compare(query, other, scoreOptionsFrom(*request),
+                                                         request->free_scale(), call.run());
         RETURN_IF_ERROR(compared);
         const VerifiedExplanation& verified = compared->verified;
         response->set_score(verified.explanation.score);

@@ -28,16 +28,38 @@ TEST(Align, AnErrorIsMeasuredFromBothSidesAndModuloSymmetry) {
 TEST(Align, FindsTheMotionsOfASyntheticShape) {
     const PointCloud shape = model("animal");
     for (const AlignCondition& condition : kAlignConditions) {
-        const auto outcome = measureAlignment(shape, condition, {}, 5, {});
+        const auto one = makeAlignCase(shape, condition, {}, 5);
+        ASSERT_TRUE(one) << one.error().message;
+        const auto outcome = measureAlignment(*one, condition, {}, {});
         ASSERT_TRUE(outcome) << outcome.error().message;
         EXPECT_LT(outcome->error, 0.02) << condition.name;
         EXPECT_LE(outcome->bestOfEqual, outcome->error);
         EXPECT_EQ(outcome->kind, condition.kind);
         EXPECT_GT(outcome->seconds, 0.0);
-        const auto again = measureAlignment(shape, condition, {}, 5, {});
+        const auto again = measureAlignment(*one, condition, {}, {});
         ASSERT_TRUE(again);
         EXPECT_EQ(again->error, outcome->error);
         EXPECT_EQ(again->score, outcome->score);
+    }
+}
+
+TEST(Align, APeerIsMeasuredOnTheSameScans) {
+    AlignSettings settings;
+    settings.fit.keepScale = true;
+    settings.fit.reflection = false;
+    const auto one = makeAlignCase(model("animal"), kAlignConditions[0], settings, 5);
+    ASSERT_TRUE(one) << one.error().message;
+    const PeerAligner knowing{
+        "told", [&](const PointCloud&, const PointCloud&) -> Result<Motion> { return one->truth; }};
+    EXPECT_EQ(measureAlignment(*one, knowing).error, 0.0);
+    const PeerAligner failing{"failing", [](const PointCloud&, const PointCloud&) -> Result<Motion> {
+                                  return fail(ErrorCode::kInternal, "no");
+                              }};
+    EXPECT_EQ(measureAlignment(*one, failing).error, 1.0);
+    const auto ours = measureAlignment(*one, kAlignConditions[0], settings, {});
+    ASSERT_TRUE(ours);
+    for (const PeerAligner& peer : peerAligners()) {
+        EXPECT_LT(ours->error, measureAlignment(*one, peer).error + 1e-3) << peer.name;
     }
 }
 

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "core/geometry/motion.h"
+#include "core/synthetic/noise.h"
 #include "tests/integration/support/live_test.h"
 
 namespace shapedb::testing {
@@ -75,6 +76,28 @@ TEST_F(AlignRpc, LaysAStoredShapeOnAScan) {
     EXPECT_GT(found.value.fit().best().score(), 0.8);
     header.mutable_key()->set_key("absent");
     EXPECT_EQ(align(header, {query}).error, "not_found");
+}
+
+TEST_F(AlignRpc, LeavesOutTheTableThatAScanStandsOn) {
+    const PointCloud alone = unpack(familyScan("hammer", 1));
+    PointCloud points = alone;
+    addTable(points, alone.size() / 2, 2.5, 0.0, 1);
+    const Scan onTable = pack(points);
+    const Scan other = pack(alone);
+    pb::AlignHeader header = headerOf(onTable);
+    header.set_other_points(other.size() / 3);
+    const auto with = align(header, {onTable, other});
+    ASSERT_TRUE(with.ok()) << with;
+    EXPECT_LT(with.value.fit().best().score(), 0.8);
+    header.mutable_query_isolation()->set_drop_plane(true);
+    const auto without = align(header, {onTable, other});
+    ASSERT_TRUE(without.ok()) << without;
+    EXPECT_GT(without.value.fit().best().score(), 0.9);
+
+    pb::AlignHeader turned = headerOf(other);
+    turned.set_other_points(onTable.size() / 3);
+    turned.mutable_other_isolation()->set_largest_object(true);
+    EXPECT_GT(align(turned, {other, onTable}).value.fit().best().score(), 0.9);
 }
 
 TEST_F(AlignRpc, NamesTheScanThatIsWrong) {

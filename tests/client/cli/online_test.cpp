@@ -211,6 +211,27 @@ TEST_F(Online, UnitsConvertScansAndAnswersAndMakeSizesCount) {
         << "lengths come back in millimetres";
     EXPECT_EQ(onlineJson({"collection", "get", "metres"})["parameters"]["unit"], "m");
 
+    // A shape against itself a thousand times smaller: sizes count in compare and align as in a search.
+    const auto aligned = [&](const std::vector<std::string>& flags) {
+        std::vector<std::string> command = {"align", file, "--key", "mug/mug_01", "--collection", "metres"};
+        command.insert(command.end(), flags.begin(), flags.end());
+        return onlineJson(command);
+    };
+    EXPECT_LT(aligned({"--unit", "mm"})["score"], 0.3);
+    const json freed = aligned({"--unit", "mm", "--free-scale"});
+    EXPECT_GT(freed["score"], 0.9);
+    EXPECT_NEAR(freed["scale"], 1e-3, 1e-5) << "from metres of the shape to metres of the scan";
+    EXPECT_GT(aligned({})["score"], 0.9);
+    EXPECT_EQ(aligned({})["scale"], 1.0) << "not scaled";
+    EXPECT_EQ(online({"align", file, file, "--unit", "mm"}).exitCode, kUsage) << "files have no unit";
+    const auto compared = [&](const std::vector<std::string>& flags) {
+        std::vector<std::string> command = {"compare", "mug/mug_01", "mug/mug_02", "--collection", "metres"};
+        command.insert(command.end(), flags.begin(), flags.end());
+        return onlineJson(command)["fit"]["scale"].get<double>();
+    };
+    EXPECT_EQ(compared({}), 1.0);
+    EXPECT_NE(compared({"--free-scale"}), 1.0);
+
     onlineJson({"collection", "create", "unknown-unit"});
     const CommandRun refused = online({"query", file, "--collection", "unknown-unit", "--unit", "mm"});
     EXPECT_EQ(refused.exitCode, kUsage);

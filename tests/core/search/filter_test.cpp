@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/base/metadata.h"
 #include "core/base/random.h"
 
 namespace shapedb {

@@ -167,17 +167,17 @@ TEST_F(SearchesTest, ABatchSaysWhichOfItsQueriesIsWrong) {
 TEST_F(SearchesTest, AComparisonExplainsAndSaysWhichShapeIsMissing) {
     putAndWait("cup", 5.0f);
     putAndWait("jug", 6.0f);
-    const auto compared = searches().compare({"", "cup"}, {"default", "jug"}, {}, {});
+    const auto compared = searches().compare({"", "cup"}, {"default", "jug"}, {}, false, {});
     ASSERT_TRUE(compared);
     EXPECT_EQ(compared->query.volume, 5.0);
     EXPECT_EQ(compared->other.volume, 6.0);
     EXPECT_EQ(compared->verified.explanation.score,
               shapedb::explain(signatureOf(5.0), signatureOf(6.0), {}).score);
-    const auto first = searches().compare({"", "none"}, {"", "none"}, {}, {});
+    const auto first = searches().compare({"", "none"}, {"", "none"}, {}, false, {});
     ASSERT_FALSE(first);
     EXPECT_EQ(first.error().code, ErrorCode::kNotFound);
     EXPECT_EQ(first.error().message, "query: there is no shape 'none' in collection 'default'");
-    const auto second = searches().compare({"", "cup"}, {"", "none"}, {}, {});
+    const auto second = searches().compare({"", "cup"}, {"", "none"}, {}, false, {});
     ASSERT_FALSE(second);
     EXPECT_EQ(second.error().message, "other: there is no shape 'none' in collection 'default'");
 }
