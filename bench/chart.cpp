@@ -149,8 +149,9 @@ std::string drawCharts(const std::vector<Panel>& panels, std::size_t columns) {
         "<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n";
     for (std::size_t i = 0; i < panels.size(); ++i) {
         const Scale scale{panels[i]};
+        const std::size_t row = i / across;
         svg += "<g transform=\"translate(" + number(static_cast<double>(i % across) * kPanelWidth) + " " +
-               number(static_cast<double>(i / across) * kPanelHeight) + ")\">\n" + axes(panels[i], scale);
+               number(static_cast<double>(row) * kPanelHeight) + ")\">\n" + axes(panels[i], scale);
         for (const bool emphasised : {false, true}) {  // those in front
             for (const Series& series : panels[i].series) {
                 if (series.emphasised != emphasised) continue;
@@ -161,7 +162,8 @@ std::string drawCharts(const std::vector<Panel>& panels, std::size_t columns) {
     }
     for (std::size_t i = 0; i < legend.size(); ++i) {
         const double x = kLeft + static_cast<double>(i % perLine) * kLegendEntry;
-        const double y = legendTop + kLegendLine * (static_cast<double>(i / perLine) + 0.5);
+        const std::size_t row = i / perLine;
+        const double y = legendTop + kLegendLine * (static_cast<double>(row) + 0.5);
         svg += line(x, y, x + 22.0, y, "stroke-width=\"2.6\" stroke=\"" + colourOf(legend, legend[i]) + "\"");
         svg += textAt(x + 28.0, y + 4.0, "", legend[i]);
     }

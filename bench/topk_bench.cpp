@@ -133,7 +133,7 @@ class TopKRun {
             const double value = score(generator_->make(a), generator_->make(b), {});
             kind.push_back(0.5 * std::sqrt(1.0 / value - 1.0));
         }
-        const auto quantiles = [](std::vector<double> values) {
+        const auto quantiles = [](const std::vector<double>& values) {
             nlohmann::json out;
             for (const double q : {0.01, 0.05, 0.25, 0.5, 0.75, 0.95}) {
                 out[std::to_string(q).substr(0, 4)] = percentile(values, q);

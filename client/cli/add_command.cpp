@@ -77,10 +77,10 @@ Result<std::vector<Upload>> listUploads(const AddFlags& flags) {
 
 /// --each: one upload for each object of a scan, with keys KEY/1, KEY/2, ... if there are several. A file
 /// that cannot be read is left as it is: its upload says why.
-Result<std::vector<Upload>> oneForEachObject(std::vector<Upload> files, const AddFlags& flags,
+Result<std::vector<Upload>> oneForEachObject(const std::vector<Upload>& files, const AddFlags& flags,
                                              const RunContext& context) {
     std::vector<Upload> uploads;
-    for (Upload& file : files) {
+    for (const Upload& file : files) {
         RETURN_IF_ERROR(context.checkpoint());
         const auto scan =
             loadScan(file.path, flags.scan, fileSeed(flags.scan.seed, file.name), context, true);

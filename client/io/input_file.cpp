@@ -124,7 +124,7 @@ bool InputFile::skip(std::uint64_t bytes) {
 bool InputFile::onlyPaddingLeft() {
     do {
         for (; begin_ < end_; ++begin_) {
-            if (std::memchr("\0 \t\r\n", buffer_[begin_], 5) == nullptr) return false;
+            if (buffer_[begin_] != '\0' && std::strchr(" \t\r\n", buffer_[begin_]) == nullptr) return false;
         }
     } while (readMore());
     return true;

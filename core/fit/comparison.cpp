@@ -169,7 +169,8 @@ void Comparison::weighFront(const Motion& pose, const FitView& view, std::size_t
     const auto pixelOf = [&](std::size_t i) {
         const int column = static_cast<int>((x[i] - lowX) * perPixel);
         const int row = static_cast<int>((y[i] - lowY) * perPixel);
-        return static_cast<std::size_t>(row * columns + column);
+        const int pixelIndex = row * columns + column;
+        return static_cast<std::size_t>(pixelIndex);
     };
     for (std::size_t i = 0; i < count; ++i) {
         float& depth = depth_[pixelOf(i)];

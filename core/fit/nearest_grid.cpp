@@ -57,7 +57,8 @@ void NearestGrid::fillNearest(const Point3& low) {
     const auto lowY = static_cast<float>(low.y) + 0.5f;
     const auto lowZ = static_cast<float>(low.z) + 0.5f;
     const auto at = [&](std::int32_t x, std::int32_t y, std::int32_t z) {
-        return static_cast<std::size_t>((z * n[1] + y) * n[0] + x);
+        const std::int32_t cell = (z * n[1] + y) * n[0] + x;
+        return static_cast<std::size_t>(cell);
     };
     const auto offer = [&](std::int32_t x, std::int32_t y, std::int32_t z, std::uint16_t point) {
         const std::size_t cell = at(x, y, z);

@@ -227,7 +227,7 @@ Result<PreparedPoints> prepare(const PointCloud& points, const SegmentationOptio
 }
 
 // Puts neighbours in space next to each other in memory, for the sake of all later stages.
-HilbertSortedCloud sortSites(PointCloud sites, std::vector<std::uint32_t>& siteOfPoint) {
+HilbertSortedCloud sortSites(const PointCloud& sites, std::vector<std::uint32_t>& siteOfPoint) {
     HilbertSortedCloud sorted(sites);
     std::vector<std::uint32_t> rank(sites.size());
     for (std::uint32_t i = 0; i < rank.size(); ++i) rank[sorted.order()[i]] = i;
@@ -295,7 +295,8 @@ Result<Segmentation> segmentOrThrow(const PointCloud& points, const Segmentation
     auto prepared = prepare(points, options, context, clock, result);
     RETURN_IF_ERROR(prepared);
     RETURN_IF_ERROR(clock.begin("delaunay"));
-    HilbertSortedCloud sorted = sortSites(std::move(prepared->sites), result.siteOfPoint);
+    HilbertSortedCloud sorted = sortSites(prepared->sites, result.siteOfPoint);
+    prepared->sites = PointCloud();  // their memory is wanted meanwhile
     auto tetrahedra = triangulate(sorted, context);
     prepared->sites = std::move(sorted).takePoints();
     RETURN_IF_ERROR(tetrahedra);

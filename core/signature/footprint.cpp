@@ -27,7 +27,7 @@ struct Range {
 // The range of the values without the tails: a few outlying points do not set the length.
 Range spanOf(std::vector<double> values) {
     const auto at = [&](double share) {
-        const auto n = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1) + 0.5);
+        const auto n = std::lround(share * static_cast<double>(values.size() - 1));
         std::nth_element(values.begin(), values.begin() + n, values.end());
         return values[static_cast<std::size_t>(n)];
     };
@@ -114,7 +114,7 @@ void turnToAxes(std::vector<OutlinePoint>& cells) {
         moments += unit * d * d.transpose();
     }
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(moments);
-    const Eigen::Matrix2d axes = solver.eigenvectors();
+    const Eigen::Matrix2d& axes = solver.eigenvectors();
     for (OutlinePoint& c : cells) {
         const Eigen::Vector2d d(c[0] - centre[0], c[1] - centre[1]);
         c = {axes.col(1).dot(d), axes.col(0).dot(d)};

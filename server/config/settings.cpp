@@ -112,7 +112,7 @@ Setting number(const std::string& key, SettingKind kind, std::uint64_t low, std:
 }
 
 template <typename Field>
-Setting choice(const std::string& key, std::vector<std::string> names, Field field, std::string help) {
+Setting choice(const std::string& key, const std::vector<std::string>& names, Field field, std::string help) {
     std::string list;
     for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
     Setting setting = named(key, SettingKind::kText, list, std::move(help));

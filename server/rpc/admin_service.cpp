@@ -2,7 +2,6 @@
 
 #include <chrono>
 #include <string>
-#include <utility>
 
 #include "core/base/return_if_error.h"
 #include "server/catalog/limits.h"
@@ -24,7 +23,7 @@ Result<catalog::RebuildRequest> rebuildRequestFrom(const v1::RebuildRequest& req
         request.profile() != v1::PROFILE_UNSPECIFIED) {
         auto change = overridesFrom(request.profile(), request.segmentation(), request.signature());
         RETURN_IF_ERROR(change);
-        wanted.change = std::move(*change);
+        wanted.change = *change;
     }
     return wanted;
 }
