@@ -1,4 +1,4 @@
-// Registration as users of the Point Cloud Library and of Open3D do it; docs/fit.md gives the settings.
+// Registration as users of the Point NormalCloud Library and of Open3D do it; docs/fit.md gives the settings.
 #include <new>
 #include <utility>
 
@@ -21,13 +21,13 @@ namespace shapedb::bench {
 namespace {
 
 using Plain = pcl::PointCloud<pcl::PointXYZ>;
-using Cloud = pcl::PointCloud<pcl::PointNormal>;
+using NormalCloud = pcl::PointCloud<pcl::PointNormal>;
 using Features = pcl::PointCloud<pcl::FPFHSignature33>;
 
 // The proportions of Open3D's tutorial on global registration. A voxel is 2 % of the other's diagonal.
 constexpr double kVoxel = 0.02;
-constexpr double kNormalRadius = 2.0;    // voxels
-constexpr double kFeatureRadius = 5.0;   // voxels
+constexpr double kNormalVoxels = 2.0;    // voxels
+constexpr double kFeatureVoxels = 5.0;   // voxels
 constexpr double kWithin = 1.5;          // voxels: distance of a correspondence
 constexpr float kSampleDistance = 5.0F;  // voxels
 constexpr int kSacIterations = 1000;
@@ -36,7 +36,7 @@ constexpr float kSimilarity = 0.9F;  // of edges, as in PCL's tutorial and Open3
 constexpr float kInliers = 0.25F;    // of the query's points, as in PCL's tutorial
 
 struct Prepared {
-    Cloud::Ptr points;
+    NormalCloud::Ptr points;
     Features::Ptr features;
 };
 
@@ -52,12 +52,12 @@ Prepared prepare(const PointCloud& points, const Point3& centre, double voxel) {
     grid.setLeafSize(1.0F, 1.0F, 1.0F);
     grid.setInputCloud(plain);
     grid.filter(reduced);
-    Prepared made{pcl::make_shared<Cloud>(), pcl::make_shared<Features>()};
+    Prepared made{pcl::make_shared<NormalCloud>(), pcl::make_shared<Features>()};
     pcl::copyPointCloud(reduced, *made.points);
     pcl::NormalEstimation<pcl::PointNormal, pcl::PointNormal> normals;
     normals.setInputCloud(made.points);
     normals.setSearchMethod(pcl::make_shared<pcl::search::KdTree<pcl::PointNormal>>());
-    normals.setRadiusSearch(kNormalRadius);
+    normals.setRadiusSearch(kNormalVoxels);
     // Of a closed shape seen from its centre all normals point inwards, of a scan of one side nearly so.
     normals.setViewPoint(0.0F, 0.0F, 0.0F);
     normals.compute(*made.points);
@@ -65,7 +65,7 @@ Prepared prepare(const PointCloud& points, const Point3& centre, double voxel) {
     features.setInputCloud(made.points);
     features.setInputNormals(made.points);
     features.setSearchMethod(pcl::make_shared<pcl::search::KdTree<pcl::PointNormal>>());
-    features.setRadiusSearch(kFeatureRadius);
+    features.setRadiusSearch(kFeatureVoxels);
     features.compute(*made.features);
     return made;
 }
@@ -79,7 +79,7 @@ Eigen::Matrix4f sampleConsensus(const Prepared& query, const Prepared& other) {
     search.setMinSampleDistance(kSampleDistance);
     search.setMaxCorrespondenceDistance(kWithin);
     search.setMaximumIterations(kSacIterations);
-    Cloud moved;
+    NormalCloud moved;
     search.align(moved);
     return search.getFinalTransformation();
 }
@@ -96,7 +96,7 @@ Eigen::Matrix4f prerejective(const Prepared& query, const Prepared& other) {
     search.setSimilarityThreshold(kSimilarity);
     search.setMaxCorrespondenceDistance(kWithin);
     search.setInlierFraction(kInliers);
-    Cloud moved;
+    NormalCloud moved;
     search.align(moved);
     return search.getFinalTransformation();
 }
@@ -107,7 +107,7 @@ Eigen::Matrix4f refined(const Prepared& query, const Prepared& other, const Eige
     icp.setInputTarget(other.points);
     icp.setMaxCorrespondenceDistance(kWithin);
     icp.setMaximumIterations(50);
-    Cloud moved;
+    NormalCloud moved;
     icp.align(moved, start);
     return icp.getFinalTransformation();
 }
