@@ -1,3 +1,4 @@
+#include "server/store/sqlite/connection.h"
 #include "tests/server/store/sqlite/store_fixture.h"
 
 namespace shapedb::store {
