@@ -1,6 +1,5 @@
 #include "server/rpc/align_service.h"
 
-#include <optional>
 #include <variant>
 
 #include "core/base/return_if_error.h"
@@ -21,19 +20,17 @@ class Uploads {
 
     Result<void> take(const v1::AlignRequest& message) {
         if (message.has_header()) return begin(message.header());
-        const bool ofQuery =
-            !header_ || header_->other_points() == 0 || query_.points() < header_->query_points();
+        const bool ofQuery = header_.other_points() == 0 || query_.points() < header_.query_points();
         return receiveChunk(message.chunk().xyz(), ofQuery ? query_ : other_, call_);
     }
 
     Result<store::VerifiedScan> query() {
-        return finished("query: ", query_, isolationFrom(header_->query_isolation()));
+        return finished("query: ", query_, isolationFrom(header_.query_isolation()));
     }
     Result<store::VerifiedScan> other() {
-        return finished("other: ", other_, isolationFrom(header_->other_isolation()));
+        return finished("other: ", other_, isolationFrom(header_.other_isolation()));
     }
-    /// Null if none arrived.
-    const v1::AlignHeader* header() const { return header_ ? &*header_ : nullptr; }
+    const v1::AlignHeader& header() const { return header_; }
 
   private:
     Result<void> begin(const v1::AlignHeader& header) {
@@ -61,7 +58,7 @@ class Uploads {
     Call& call_;
     catalog::ScanUpload query_;
     catalog::ScanUpload other_;
-    std::optional<v1::AlignHeader> header_;
+    v1::AlignHeader header_;  // empty until it arrives
 };
 
 FitOptions optionsFrom(const v1::AlignHeader& header) {
@@ -83,7 +80,7 @@ grpc::Status AlignServiceHandler::Align(grpc::ServerContext* context,
         RETURN_IF_ERROR(receiveMessages<v1::AlignRequest>(*reader, call, take));
         const auto query = uploads.query();
         RETURN_IF_ERROR(query);
-        const v1::AlignHeader& header = *uploads.header();
+        const v1::AlignHeader& header = uploads.header();
         const auto align = [&](const std::variant<catalog::ShapeName, const store::VerifiedScan*>& other) {
             return services_.searches.align(*query, other, optionsFrom(header), header.free_scale(),
                                             call.run());

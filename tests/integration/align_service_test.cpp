@@ -105,6 +105,11 @@ TEST_F(AlignRpc, NamesTheScanThatIsWrong) {
     pb::AlignHeader header = headerOf(scan);
     EXPECT_EQ(align(header, {scan}).error, "invalid_argument") << "nothing to lay on it";
     header.set_other_points(scan.size() / 3);
+    CallContext context;
+    pb::AlignResponse none;
+    const auto empty = client.aligns->Align(&context, &none);
+    empty->WritesDone();
+    EXPECT_EQ(context.outcome(empty->Finish()).error, "malformed_stream") << "no message at all";
     const auto missing = align(header, {scan});
     EXPECT_EQ(missing.error, "count_mismatch") << missing;
     EXPECT_NE(missing.status.error_message().find("other: "), std::string::npos) << missing;
