@@ -85,6 +85,9 @@ Result<client::Comparison> compareStored(Session& session, const CompareFlags& f
 }
 
 CommandResult runCompare(Session& session, const CompareFlags& flags) {
+    if (flags.files && flags.score.freeScale) {
+        return fail(ErrorCode::kInvalidArgument, "--free-scale is for stored shapes: files have no unit");
+    }
     const auto comparison = flags.files ? compareFiles(session, flags) : compareStored(session, flags);
     RETURN_IF_ERROR(comparison);
     nlohmann::json document = {{"query_name", flags.a},

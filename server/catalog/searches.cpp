@@ -106,13 +106,15 @@ Result<LengthUnit> Searches::unitOf(const ShapeName& name) const {
 
 Result<Searches::Compared> Searches::compared(const char* which, const ShapeName& name) const {
     const auto read = [&]() -> Result<Compared> {
-        const auto found = shapeNamed(name);
+        const auto collection = catalog_.collection(name.collection);
+        RETURN_IF_ERROR(collection);
+        const auto found = catalog_.findShape(*collection, name.key);
         RETURN_IF_ERROR(found);
         auto signature = catalog_.signature(*found);
         RETURN_IF_ERROR(signature);
         auto surface = catalog_.surface(found->shape.id);
         RETURN_IF_ERROR(surface);
-        return Compared{std::move(*signature), std::move(*surface)};
+        return Compared{std::move(*signature), std::move(*surface), (*collection)->parameters.unit};
     };
     auto shape = read();
     if (!shape) return fail(withContext(shape.error(), which + std::string(": ")));
@@ -165,17 +167,14 @@ Result<Comparison> Searches::compare(const ShapeName& query, const ShapeName& ot
     RETURN_IF_ERROR(first);
     auto second = compared("other", other);
     RETURN_IF_ERROR(second);
-    const auto unit = unitOf(query);
-    RETURN_IF_ERROR(unit);
-    const auto otherUnit = unitOf(other);
-    RETURN_IF_ERROR(otherUnit);
-    if (options.keepScale && *unit != *otherUnit) {
+    const bool sameUnit = first->unit == second->unit;
+    if (options.keepScale && !sameUnit) {
         return fail(ErrorCode::kInvalidArgument, "keep_scale: the shapes have different units of length, " +
-                                                     std::string(lengthUnitName(*unit)) + " and " +
-                                                     lengthUnitName(*otherUnit));
+                                                     std::string(lengthUnitName(first->unit)) + " and " +
+                                                     lengthUnitName(second->unit));
     }
     const auto keepScale =
-        sizesCount(options.keepScale, freeScale, *unit == *otherUnit ? *unit : LengthUnit::kNone);
+        sizesCount(options.keepScale, freeScale, sameUnit ? first->unit : LengthUnit::kNone);
     RETURN_IF_ERROR(keepScale);
     options.keepScale = *keepScale;
     auto verified = explainVerified(first->signature, first->surface.get(), second->signature,

@@ -150,6 +150,7 @@ class Searches {
     struct Compared {
         Signature signature;
         std::shared_ptr<const SurfacePoints> surface;  ///< null if there are none
+        LengthUnit unit = LengthUnit::kNone;           ///< of its collection
     };
     Result<FoundShape> shapeNamed(const ShapeName& name) const;
     Result<LengthUnit> unitOf(const ShapeName& name) const;

@@ -225,6 +225,7 @@ TEST_F(Online, UnitsConvertScansAndAnswersAndMakeSizesCount) {
     EXPECT_GT(aligned({})["score"], 0.9);
     EXPECT_EQ(aligned({})["scale"], 1.0) << "not scaled";
     EXPECT_EQ(online({"align", file, file, "--unit", "mm"}).exitCode, kUsage) << "files have no unit";
+    EXPECT_EQ(online({"compare", "--files", file, file, "--free-scale"}).exitCode, kUsage);
     const auto compared = [&](const std::vector<std::string>& flags) {
         std::vector<std::string> command = {"compare", "mug/mug_01", "mug/mug_02", "--collection", "metres"};
         command.insert(command.end(), flags.begin(), flags.end());

@@ -26,8 +26,9 @@ class SearchesTest : public ::testing::Test {
     }
     ~SearchesTest() override { EXPECT_TRUE(catalog->stop()); }
 
-    store::Shape putAndWait(const std::string& key, float tag) {
+    store::Shape putAndWait(const std::string& key, float tag, const std::string& collection = "") {
         ShapeHeader header;
+        header.collection = collection;
         header.key = key;
         const auto added = catalog->put(header, store::VerifiedScan::verify(taggedPoints(tag)).value());
         return catalog->awaitIngest(added.value().shape, [] { return Result<void>(); }).value();
@@ -180,6 +181,26 @@ TEST_F(SearchesTest, AComparisonExplainsAndSaysWhichShapeIsMissing) {
     const auto second = searches().compare({"", "cup"}, {"", "none"}, {}, false, {});
     ASSERT_FALSE(second);
     EXPECT_EQ(second.error().message, "other: there is no shape 'none' in collection 'default'");
+}
+
+TEST_F(SearchesTest, AComparisonRefusesToKeepSizesInDifferentUnits) {
+    for (const LengthUnit unit : {LengthUnit::kMillimetre, LengthUnit::kMetre}) {
+        ShapeParameters parameters = parametersOf(Profile::kDefault);
+        parameters.unit = unit;
+        ASSERT_TRUE(catalog->createCollection(lengthUnitName(unit), "", parameters));
+        putAndWait("cup", 5.0f, lengthUnitName(unit));
+    }
+    ScoreOptions kept;
+    kept.keepScale = true;
+    const auto refused = searches().compare({"mm", "cup"}, {"m", "cup"}, kept, false, {});
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
+    EXPECT_EQ(refused.error().message, "keep_scale: the shapes have different units of length, mm and m");
+    EXPECT_TRUE(searches().compare({"mm", "cup"}, {"m", "cup"}, {}, false, {}));
+    EXPECT_TRUE(searches().compare({"mm", "cup"}, {"mm", "cup"}, kept, false, {}));
+    EXPECT_EQ(searches().compare({"mm", "cup"}, {"mm", "cup"}, kept, true, {}).error().code,
+              ErrorCode::kInvalidArgument)
+        << "keep_scale and free_scale";
 }
 
 TEST(AnswerRoom, RefusesWhatDoesNotFit) {
