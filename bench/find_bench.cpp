@@ -35,8 +35,7 @@ struct FindFlags {
     std::uint64_t fill = 0;
     std::uint64_t seed = 1;
     std::size_t candidates = 0;
-    SearchOptions search;
-    bool pieces = false;
+    ScoreOptions score;
     bool noReflection = false;
     std::string json;
     unsigned threads = cli::defaultThreads();
@@ -79,8 +78,8 @@ Result<SignatureSet> setOf(Gallery& gallery, const FindFlags& flags, const RunCo
 
 Result<Found> findOne(const DescribedModel& query, std::size_t model, Change change, const Gallery& gallery,
                       const SignatureSet& set, const FindFlags& flags, const RunContext& context) {
-    SearchOptions options = flags.search;
-    options.score.partial = flags.pieces;
+    SearchOptions options;
+    options.score = flags.score;
     options.score.reflection = !flags.noReflection;
     options.k = 10;
     VerifyOptions verify;
@@ -123,7 +122,7 @@ std::vector<Change> chosenChanges(const FindFlags& flags) {
 
 Result<Study> study(const FindFlags& flags, Bench& bench) {
     const RunContext context = bench.context();
-    const auto models = labelledModels(flags.gallery, 0, flags.members, flags.seed, context);
+    const auto models = labelledModels(flags.gallery, flags.members, flags.seed, context);
     RETURN_IF_ERROR(models);
     auto gallery = describeGallery(*models, flags.threads, context);
     RETURN_IF_ERROR(gallery);
@@ -200,7 +199,7 @@ std::string table(const Study& study) {
 nlohmann::json rowsOf(const Study& study) {
     nlohmann::json rows = nlohmann::json::array();
     for (const Found& one : study.found) {
-        rows.push_back({{"change", kChanges[static_cast<std::size_t>(one.change)].flag},
+        rows.push_back({{"change", infoOf(one.change).flag},
                         {"model", one.model},
                         {"rank", one.rank},
                         {"exact", one.exact},
@@ -239,8 +238,8 @@ void addFindOperation(CLI::App& app, Bench& bench) {
                         "Make queries of so many shapes of a class; 0: of all");
     command->add_option("--fill", flags->fill, "Add so many generated shapes to the gallery");
     command->add_option("--candidates", flags->candidates, "Verify at most so many; 0: as the server does");
-    command->add_flag("--partial", flags->pieces, "Tell the search that queries are pieces");
-    command->add_flag("--keep-scale", flags->search.score.keepScale, "Let sizes count");
+    command->add_flag("--partial", flags->score.partial, "Tell the search that queries are pieces");
+    command->add_flag("--keep-scale", flags->score.keepScale, "Let sizes count");
     command->add_flag("--no-reflection", flags->noReflection, "A mirror image is another shape");
     command->add_option("--seed", flags->seed, "Seed for everything")->capture_default_str();
     command->add_option("--threads", flags->threads, "Number of threads")->capture_default_str();

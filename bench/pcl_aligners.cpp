@@ -1,5 +1,7 @@
-// Registration as users of the Point NormalCloud Library and of Open3D do it; docs/fit.md gives the settings.
+// Registration as users of the Point Cloud Library and of Open3D do it; docs/fit.md gives the settings.
+#include <exception>
 #include <new>
+#include <string>
 #include <utility>
 
 #include <pcl/common/transforms.h>
@@ -13,7 +15,6 @@
 #include <pcl/search/kdtree.h>
 
 #include "bench/peers.h"
-#include "core/base/return_if_error.h"
 #include "core/geometry/box.h"
 
 namespace shapedb::bench {
@@ -70,35 +71,34 @@ Prepared prepare(const PointCloud& points, const Point3& centre, double voxel) {
     return made;
 }
 
-Eigen::Matrix4f sampleConsensus(const Prepared& query, const Prepared& other) {
-    pcl::SampleConsensusInitialAlignment<pcl::PointNormal, pcl::PointNormal, pcl::FPFHSignature33> search;
+// The motion that `search` finds, of the query onto the other shape.
+template <typename Search>
+Eigen::Matrix4f found(Search& search, const Prepared& query, const Prepared& other) {
     search.setInputSource(query.points);
     search.setSourceFeatures(query.features);
     search.setInputTarget(other.points);
     search.setTargetFeatures(other.features);
-    search.setMinSampleDistance(kSampleDistance);
     search.setMaxCorrespondenceDistance(kWithin);
-    search.setMaximumIterations(kSacIterations);
     NormalCloud moved;
     search.align(moved);
     return search.getFinalTransformation();
 }
 
+Eigen::Matrix4f sampleConsensus(const Prepared& query, const Prepared& other) {
+    pcl::SampleConsensusInitialAlignment<pcl::PointNormal, pcl::PointNormal, pcl::FPFHSignature33> search;
+    search.setMinSampleDistance(kSampleDistance);
+    search.setMaximumIterations(kSacIterations);
+    return found(search, query, other);
+}
+
 Eigen::Matrix4f prerejective(const Prepared& query, const Prepared& other) {
     pcl::SampleConsensusPrerejective<pcl::PointNormal, pcl::PointNormal, pcl::FPFHSignature33> search;
-    search.setInputSource(query.points);
-    search.setSourceFeatures(query.features);
-    search.setInputTarget(other.points);
-    search.setTargetFeatures(other.features);
     search.setMaximumIterations(kRansacIterations);
     search.setNumberOfSamples(3);
     search.setCorrespondenceRandomness(5);
     search.setSimilarityThreshold(kSimilarity);
-    search.setMaxCorrespondenceDistance(kWithin);
     search.setInlierFraction(kInliers);
-    NormalCloud moved;
-    search.align(moved);
-    return search.getFinalTransformation();
+    return found(search, query, other);
 }
 
 Eigen::Matrix4f refined(const Prepared& query, const Prepared& other, const Eigen::Matrix4f& start) {
@@ -132,9 +132,9 @@ PeerAligner aligner(std::string name, Eigen::Matrix4f (*search)(const Prepared&,
     return {std::move(name), [search](const PointCloud& query, const PointCloud& other) -> Result<Motion> {
                 try {
                     const Box box = boxOf(query);
-                    const double voxel = kVoxel * boxOf(other).diagonal();
-                    const Point3 centre = 0.5 * (box.low + box.high);
                     const Box otherBox = boxOf(other);
+                    const double voxel = kVoxel * otherBox.diagonal();
+                    const Point3 centre = 0.5 * (box.low + box.high);
                     const Point3 otherCentre = 0.5 * (otherBox.low + otherBox.high);
                     const Prepared a = prepare(query, centre, voxel);
                     const Prepared b = prepare(other, otherCentre, voxel);

@@ -1,6 +1,5 @@
 #include "bench/simulated_searches.h"
 
-#include <map>
 #include <utility>
 
 #include "bench/models.h"
@@ -31,13 +30,11 @@ constexpr double kWidthOfTable = 2.5;
 
 }  // namespace
 
-const char* descriptionOf(Change change) noexcept {
-    return kChanges[static_cast<std::size_t>(change)].description;
-}
+const ChangeInfo& infoOf(Change change) noexcept { return kChanges[static_cast<std::size_t>(change)]; }
 
 Result<std::vector<LabelledModel>> labelledModels(const std::vector<std::string>& folders,
-                                                  std::size_t perClass, std::size_t members,
-                                                  std::uint64_t seed, const RunContext& context) {
+                                                  std::size_t members, std::uint64_t seed,
+                                                  const RunContext& context) {
     std::vector<LabelledModel> models;
     if (folders.empty()) {
         auto scans = scansOfFamilies(members, kPointsOfMember, seed);
@@ -47,9 +44,7 @@ Result<std::vector<LabelledModel>> labelledModels(const std::vector<std::string>
     }
     const auto scans = cli::listCollection(folders);
     RETURN_IF_ERROR(scans);
-    std::map<std::string, std::size_t> taken;
     for (const auto& scan : *scans) {
-        if (perClass > 0 && taken[scan.label]++ >= perClass) continue;
         auto read = readScan(scan.path, {}, context);
         RETURN_IF_ERROR(read);
         models.push_back({scan.label, std::move(read->points)});

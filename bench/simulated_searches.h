@@ -37,18 +37,17 @@ constexpr std::array<ChangeInfo, 8> kChanges{{
     {Change::kBent, "bent", "bent by 20 to 70 degrees"},
     {Change::kTable, "table", "on a table, which is dropped"},
 }};
-[[nodiscard]] const char* descriptionOf(Change change) noexcept;
+[[nodiscard]] const ChangeInfo& infoOf(Change change) noexcept;
 
 struct LabelledModel {
     std::string label;
     PointCloud points;
 };
 
-/// The models in folders of class folders, at most `perClass` of each (0: all); without folders `members` of
-/// each synthetic family. Errors: those of the readers, and kCancelled.
+/// The models in folders of class folders; without folders `members` of each synthetic family. Errors: those
+/// of the readers, and kCancelled.
 [[nodiscard]] Result<std::vector<LabelledModel>> labelledModels(const std::vector<std::string>& folders,
-                                                                std::size_t perClass, std::size_t members,
-                                                                std::uint64_t seed,
+                                                                std::size_t members, std::uint64_t seed,
                                                                 const RunContext& context);
 
 /// A query of the model's second half (models.h), changed and turned at random. Noise is 0.3 % of the

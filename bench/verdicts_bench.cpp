@@ -103,7 +103,7 @@ std::optional<Error> searchOne(std::size_t q, const std::vector<LabelledModel>& 
 
 Result<Study> study(const VerdictsFlags& flags, Bench& bench) {
     const RunContext context = bench.context();
-    const auto models = labelledModels(flags.gallery, 0, flags.members, flags.seed, context);
+    const auto models = labelledModels(flags.gallery, flags.members, flags.seed, context);
     RETURN_IF_ERROR(models);
     const auto gallery = describeGallery(*models, flags.threads, context);
     RETURN_IF_ERROR(gallery);
@@ -127,7 +127,7 @@ Result<Study> study(const VerdictsFlags& flags, Bench& bench) {
 nlohmann::json rowsOf(const Study& study) {
     nlohmann::json rows = nlohmann::json::array();
     for (const Judged& one : study.judged) {
-        rows.push_back({{"change", descriptionOf(one.change)},
+        rows.push_back({{"change", infoOf(one.change).description},
                         {"relation", kRelationNames[static_cast<std::size_t>(one.relation)]},
                         {"rank", one.rank},
                         {"present", one.present},
@@ -159,22 +159,22 @@ bool isTrue(Verdict verdict, Relation relation) {
 std::string scoreTable(const Study& study) {
     std::string text =
         "| query | hits | 5 % below | median | 95 % below | 0.9 or more |\n|---|---:|---:|---:|---:|---:|\n";
-    for (std::size_t change = 0; change < kJudged.size(); ++change) {
+    for (const Change change : kJudged) {
         for (std::size_t relation = 0; relation < kRelationNames.size(); ++relation) {
             std::vector<double> scores;
             for (const Judged& one : study.judged) {
-                if (one.change == kJudged[change] && one.relation == static_cast<Relation>(relation)) {
+                if (one.change == change && one.relation == static_cast<Relation>(relation)) {
                     scores.push_back(one.score);
                 }
             }
             if (scores.empty()) continue;
             const auto high = std::count_if(scores.begin(), scores.end(), [](double s) { return s >= 0.9; });
-            text +=
-                std::string("| ") + descriptionOf(kJudged[change]) + ": " + kRelationNames[relation] + " | " +
-                std::to_string(scores.size()) + " | " + numberText("%.2f", percentile(scores, 0.05)) + " | " +
-                numberText("%.2f", median(scores)) + " | " + numberText("%.2f", percentile(scores, 0.95)) +
-                " | " + numberText("%.3f", static_cast<double>(high) / static_cast<double>(scores.size())) +
-                " |\n";
+            text += std::string("| ") + infoOf(change).description + ": " + kRelationNames[relation] + " | " +
+                    std::to_string(scores.size()) + " | " + numberText("%.2f", percentile(scores, 0.05)) +
+                    " | " + numberText("%.2f", median(scores)) + " | " +
+                    numberText("%.2f", percentile(scores, 0.95)) + " | " +
+                    numberText("%.3f", static_cast<double>(high) / static_cast<double>(scores.size())) +
+                    " |\n";
         }
     }
     return text;
@@ -207,19 +207,19 @@ std::string verdictTable(const Study& study) {
 // Of the queries whose own shape is in the gallery.
 std::string firstTable(const Study& study) {
     std::string text = "| query | its own shape first | among the first ten |\n|---|---:|---:|\n";
-    for (std::size_t change = 0; change < kJudged.size(); ++change) {
+    for (const Change change : kJudged) {
         std::size_t first = 0;
         std::size_t listed = 0;
         std::size_t queries = 0;
         for (const Judged& one : study.judged) {
-            if (one.change != kJudged[change] || !one.present) continue;
+            if (one.change != change || !one.present) continue;
             queries += one.rank == 0 ? 1 : 0;
             const bool own = one.relation == relationOf(one.change, true, true);
             listed += own ? 1 : 0;
             first += own && one.rank == 0 ? 1 : 0;
         }
         const double all = std::max<double>(1.0, static_cast<double>(queries));
-        text += std::string("| ") + descriptionOf(kJudged[change]) + " (" + std::to_string(queries) + ") | " +
+        text += std::string("| ") + infoOf(change).description + " (" + std::to_string(queries) + ") | " +
                 numberText("%.3f", static_cast<double>(first) / all) + " | " +
                 numberText("%.3f", static_cast<double>(listed) / all) + " |\n";
     }
