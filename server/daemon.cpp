@@ -1,8 +1,6 @@
 #include "server/daemon.h"
 
 #include <chrono>
-#include <filesystem>
-#include <system_error>
 #include <utility>
 
 #include "core/base/return_if_error.h"
@@ -10,32 +8,21 @@
 #include "server/catalog/gates.h"
 #include "server/catalog/search_runner.h"
 #include "server/catalog/searches.h"
-#include "server/catalog/temporary_file.h"
 #include "server/config/settings.h"
+#include "server/files/data_directory.h"
 #include "server/rpc/grpc_server.h"
 #include "server/store/sqlite/sqlite_store.h"
 
 namespace shapedb {
 namespace {
 
-constexpr const char* kDatabaseFile = "shapedb.sqlite";
 constexpr const char* kTemporaryFolder = "tmp";
 constexpr const char* kRebuildJournal = "rebuild.journal";
 
 Result<std::unique_ptr<store::Store>> openStore(const config::ServerConfig& config) {
-    namespace fs = std::filesystem;
-    std::error_code error;
-    // Private to its owner; an existing directory keeps its permissions.
-    if (fs::create_directories(config.data, error)) {
-        fs::permissions(config.data, fs::perms::owner_all, error);
-    }
-    if (!error && !fs::is_directory(config.data)) error = std::make_error_code(std::errc::not_a_directory);
-    if (error) {
-        return fail(ErrorCode::kFileNotWritable,
-                    "data directory " + config.data + " cannot be created: " + error.message());
-    }
+    RETURN_IF_ERROR(files::prepareDataDirectory(config.data));
     store::SqliteOptions options;
-    options.path = config.data + "/" + kDatabaseFile;
+    options.path = config.data + "/" + files::kDatabaseName;
     options.readers = config.store.readers;
     options.pointCompressionLevel = config.store.compressionLevel;
     return store::openSqliteStore(options);
@@ -83,7 +70,7 @@ struct Daemon::Parts {
 };
 
 Result<void> Daemon::Parts::serve() {
-    RETURN_IF_ERROR(catalog::prepareTemporaryDirectory(temporaryDirectory()));
+    RETURN_IF_ERROR(files::prepareTemporaryDirectory(temporaryDirectory()));
     RETURN_IF_ERROR(catalog.start());
     const auto wanted = config::parseEndpoint(config.listen);
     RETURN_IF_ERROR(wanted);

@@ -5,8 +5,8 @@
 
 #include "core/base/return_if_error.h"
 #include "server/catalog/limits.h"
-#include "server/catalog/temporary_file.h"
 #include "server/config/load.h"
+#include "server/files/temporary_file.h"
 #include "server/rpc/backup_stream.h"
 #include "server/rpc/call.h"
 #include "server/rpc/convert.h"
@@ -68,7 +68,7 @@ grpc::Status AdminServiceHandler::CancelRebuild(grpc::ServerContext* context,
 grpc::Status AdminServiceHandler::Backup(grpc::ServerContext* context, const v1::BackupRequest*,
                                          grpc::ServerWriter<v1::BackupChunk>* writer) {
     return handle(services_, context, "Backup", [&](Call& call) -> Result<void> {
-        const auto file = catalog::TemporaryFile::create(services_.temporaryDirectory);
+        const auto file = files::TemporaryFile::create(services_.temporaryDirectory);
         RETURN_IF_ERROR(file);
         RETURN_IF_ERROR(services_.catalog.backup(file->path(), call.run()));
         return sendFile(file->path(), call.run(),
@@ -81,7 +81,7 @@ grpc::Status AdminServiceHandler::Restore(grpc::ServerContext* context,
                                           v1::RestoreResponse* response) {
     return handle(services_, context, "Restore", [&](Call& call) -> Result<void> {
         call.frame().expectRestore();
-        const auto file = catalog::TemporaryFile::create(services_.temporaryDirectory);
+        const auto file = files::TemporaryFile::create(services_.temporaryDirectory);
         RETURN_IF_ERROR(file);
         auto receiver = FileReceiver::create(file->path());
         RETURN_IF_ERROR(receiver);

@@ -8,7 +8,8 @@
 #include <unistd.h>
 
 #include "core/base/random.h"
-#include "server/catalog/temporary_file.h"
+#include "server/files/data_directory.h"
+#include "server/files/temporary_file.h"
 
 namespace shapedb::rpc {
 namespace {
@@ -16,7 +17,7 @@ namespace {
 class BackupStream : public ::testing::Test {
   protected:
     BackupStream() : directory(::testing::TempDir() + "shapedb-backup-" + std::to_string(::getpid())) {
-        EXPECT_TRUE(catalog::prepareTemporaryDirectory(directory));
+        EXPECT_TRUE(files::prepareTemporaryDirectory(directory));
     }
     ~BackupStream() override { std::filesystem::remove_all(directory); }
 
@@ -53,7 +54,7 @@ TEST_F(BackupStream, ReceivesWhatWasSent) {
         const auto chunks = chunksOf(content);
         EXPECT_EQ(chunks.front().total_bytes(), size);
         EXPECT_EQ(chunks.back().sha256().size(), 32u);
-        const auto file = catalog::TemporaryFile::create(directory);
+        const auto file = files::TemporaryFile::create(directory);
         ASSERT_TRUE(file);
         auto receiver = FileReceiver::create(file->path());
         ASSERT_TRUE(receiver);
@@ -72,7 +73,7 @@ TEST_F(BackupStream, ChecksumMayComeWithTheLastData) {
     const auto chunks = chunksOf(noise(100));
     v1::BackupChunk one = chunks[0];
     one.set_sha256(chunks[1].sha256());
-    const auto file = catalog::TemporaryFile::create(directory);
+    const auto file = files::TemporaryFile::create(directory);
     auto receiver = FileReceiver::create(file->path());
     ASSERT_TRUE(receiver->add(one));
     EXPECT_TRUE(receiver->finish());
@@ -95,31 +96,6 @@ TEST_F(BackupStream, DoesNotOverwriteAFile) {
     std::ofstream(directory + "/there") << "precious";
     EXPECT_FALSE(FileReceiver::create(directory + "/there"));
     EXPECT_EQ(contentOf(directory + "/there"), "precious");
-}
-
-TEST_F(BackupStream, TemporaryFileIsRemovedWithItsOwner) {
-    std::string path;
-    {
-        auto file = catalog::TemporaryFile::create(directory);
-        ASSERT_TRUE(file);
-        path = file->path();
-        std::ofstream(path) << "x";
-        std::ofstream(path + "-wal") << "y";
-        catalog::TemporaryFile moved = std::move(*file);
-        EXPECT_EQ(moved.path(), path);
-        EXPECT_TRUE(std::filesystem::exists(path));
-    }
-    EXPECT_FALSE(std::filesystem::exists(path));
-    EXPECT_TRUE(std::filesystem::is_empty(directory));
-    EXPECT_FALSE(catalog::TemporaryFile::create(directory + "/none"));
-}
-
-TEST_F(BackupStream, PreparingTheDirectoryRemovesLeftovers) {
-    std::filesystem::create_directories(directory + "/a/b");
-    std::ofstream(directory + "/a/b/c") << "x";
-    ASSERT_TRUE(catalog::prepareTemporaryDirectory(directory));
-    EXPECT_TRUE(std::filesystem::is_empty(directory));
-    EXPECT_FALSE(catalog::prepareTemporaryDirectory("/proc/none/at/all"));
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "server/catalog/temporary_file.h"
+#include "server/files/temporary_file.h"
 
 #include <cerrno>
 #include <filesystem>
@@ -7,10 +7,10 @@
 
 #include <stdlib.h>
 
-namespace shapedb::catalog {
+namespace shapedb::files {
 
 Result<TemporaryFile> TemporaryFile::create(const std::string& directory) {
-    std::string folder = directory + "/XXXXXX";
+    std::string folder = directory + "/" + kFolderPrefix + "XXXXXX";
     if (::mkdtemp(folder.data()) == nullptr) {
         return fail(ErrorCode::kFileNotWritable, "cannot create a temporary file in " + directory + ": " +
                                                      std::generic_category().message(errno));
@@ -25,19 +25,4 @@ TemporaryFile::~TemporaryFile() {
 
 TemporaryFile::TemporaryFile(TemporaryFile&& other) noexcept : folder_(std::exchange(other.folder_, {})) {}
 
-Result<void> prepareTemporaryDirectory(const std::string& directory) {
-    std::error_code error;
-    std::filesystem::create_directories(directory, error);
-    std::filesystem::directory_iterator at(directory, error);
-    for (; !error && at != std::filesystem::directory_iterator(); at.increment(error)) {
-        std::filesystem::remove_all(at->path(), error);
-        if (error) break;
-    }
-    if (error) {
-        return fail(ErrorCode::kFileNotWritable,
-                    "directory " + directory + " cannot be prepared: " + error.message());
-    }
-    return {};
-}
-
-}  // namespace shapedb::catalog
+}  // namespace shapedb::files

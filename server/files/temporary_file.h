@@ -2,14 +2,19 @@
 #pragma once
 
 #include <string>
+#include <utility>
 
 #include "core/base/error.h"
 
-namespace shapedb::catalog {
+namespace shapedb::files {
 
 /// A path for one new file in a folder of its own; both are removed when this is destroyed.
 class TemporaryFile {
   public:
+    /// How the names of the folders begin, and of the files in them.
+    static constexpr const char* kFolderPrefix = "shapedb-";
+    static constexpr const char* kFileName = "database";
+
     /// Creates the folder inside `directory`, which must exist. Errors: kFileNotWritable.
     [[nodiscard]] static Result<TemporaryFile> create(const std::string& directory);
     ~TemporaryFile();
@@ -17,7 +22,7 @@ class TemporaryFile {
     TemporaryFile& operator=(TemporaryFile&&) = delete;
 
     /// The file does not exist at first.
-    [[nodiscard]] std::string path() const { return folder_ + "/database"; }
+    [[nodiscard]] std::string path() const { return folder_ + "/" + kFileName; }
 
   private:
     explicit TemporaryFile(std::string folder) : folder_(std::move(folder)) {}
@@ -25,8 +30,4 @@ class TemporaryFile {
     std::string folder_;  ///< empty when moved from
 };
 
-/// Creates the directory if it is missing and removes what a dead process left in it.
-/// Errors: kFileNotWritable.
-[[nodiscard]] Result<void> prepareTemporaryDirectory(const std::string& directory);
-
-}  // namespace shapedb::catalog
+}  // namespace shapedb::files
