@@ -50,7 +50,7 @@ struct Daemon::Parts {
         : config(configuration),
           log(std::move(logger)),
           catalog(std::move(store), std::move(pipeline), log, catalogOptions(config)),
-          admission(config.limits.maxUploadBytes),
+          admission(config.limits.maxUploadBytes, config.limits.maxUploads),
           runner(config::threadsOrProcessors(config.search.threads)),
           searches(catalog, runner, config.limits.maxK),
           grpc(config, catalog, admission, searches, log, temporaryDirectory()) {}

@@ -4,6 +4,7 @@
 #include <new>
 #include <string>
 
+#include "core/base/return_if_error.h"
 #include "server/catalog/limits.h"
 
 namespace shapedb::catalog {
@@ -17,12 +18,12 @@ CallFrame::CallFrame(const Catalog& catalog, Admission& admission, const RunCont
       whenQueueFull_(kBudgetRetry) {}
 
 CallFrame::~CallFrame() {
-    if (admitted_) admission_.calls.leave();
+    if (admitted_) admission_.calls.leave(*admitted_);
 }
 
-Result<void> CallFrame::admit() {
-    admitted_ = admission_.calls.enter();
-    if (!admitted_) return fail(ErrorCode::kUnavailable, "the server is shutting down: try again later");
+Result<void> CallFrame::admit(security::CallClass kind) {
+    RETURN_IF_ERROR(admission_.calls.enter(kind));
+    admitted_ = kind;
     return {};
 }
 

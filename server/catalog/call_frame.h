@@ -25,8 +25,8 @@ class CallFrame {
     /// The caller's cancellation and deadline.
     [[nodiscard]] const RunContext& run() const { return run_; }
 
-    /// First of all. Errors: kUnavailable (draining).
-    [[nodiscard]] Result<void> admit();
+    /// First of all. Errors: kUnavailable (draining), kQueueFull (too many calls of this kind).
+    [[nodiscard]] Result<void> admit(security::CallClass kind);
 
     /// Takes one of the places for calls that wait, until the call ends. Errors: kQueueFull.
     [[nodiscard]] Result<void> becomeFollower() { return follower_.take(1); }
@@ -53,7 +53,7 @@ class CallFrame {
     const RunContext& run_;
     Budget::Share follower_;
     std::uint64_t epoch_;
-    bool admitted_ = false;
+    std::optional<security::CallClass> admitted_;
     bool expectsRestore_ = false;
     std::chrono::milliseconds whenQueueFull_;
     std::optional<std::chrono::milliseconds> hint_;

@@ -7,16 +7,32 @@
 
 namespace shapedb::catalog {
 
-bool CallGate::enter() {
+Result<void> CallGate::enter(security::CallClass kind) {
+    const auto full = [](const char* what, int limit) {
+        return fail(ErrorCode::kQueueFull, "all of the " + std::to_string(limit) + " places for " + what +
+                                               " are taken: try again later");
+    };
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (draining_) return false;
-    ++calls_;
-    return true;
+    if (draining_) return fail(ErrorCode::kUnavailable, "the server is shutting down: try again later");
+    if (kind == security::CallClass::kAdmin) {
+        if (running_.admin >= limits_.admin) return full("calls of administrators", limits_.admin);
+        ++running_.admin;
+        return {};
+    }
+    if (running_.ordinary >= limits_.ordinary) return full("calls", limits_.ordinary);
+    if (kind == security::CallClass::kUpload) {
+        if (running_.uploads >= limits_.uploads) return full("uploads", limits_.uploads);
+        ++running_.uploads;
+    }
+    ++running_.ordinary;
+    return {};
 }
 
-void CallGate::leave() {
+void CallGate::leave(security::CallClass kind) {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (--calls_ == 0) changed_.notify_all();
+    if (kind == security::CallClass::kUpload) --running_.uploads;
+    --(kind == security::CallClass::kAdmin ? running_.admin : running_.ordinary);
+    if (running_.ordinary + running_.admin == 0) changed_.notify_all();
 }
 
 void CallGate::drain() {
@@ -26,7 +42,7 @@ void CallGate::drain() {
 
 bool CallGate::waitUntilEmpty(std::chrono::steady_clock::time_point until) {
     std::unique_lock<std::mutex> lock(mutex_);
-    return changed_.wait_until(lock, until, [this] { return calls_ == 0; });
+    return changed_.wait_until(lock, until, [this] { return running_.ordinary + running_.admin == 0; });
 }
 
 RestoreGate::Write::Write(RestoreGate& gate) : lock_(gate.mutex_, std::try_to_lock) {
@@ -78,8 +94,9 @@ Result<void> Budget::Share::take(std::uint64_t amount) {
     return {};
 }
 
-Admission::Admission(std::uint64_t uploadBytes)
-    : uploads(uploadBytes, "bytes of points that uploads in progress may hold"),
+Admission::Admission(std::uint64_t uploadBytes, int uploadCalls)
+    : calls({kMaxOrdinaryCalls, uploadCalls, kMaxAdminCalls}),
+      uploads(uploadBytes, "bytes of points that uploads in progress may hold"),
       followers(kMaxFollowers, "calls that may wait for shapes and rebuilds") {}
 
 }  // namespace shapedb::catalog

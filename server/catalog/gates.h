@@ -10,25 +10,37 @@
 
 #include "core/base/error.h"
 #include "core/base/run_context.h"
+#include "server/security/operation.h"
 
 namespace shapedb::catalog {
 
-/// Counts running calls; once draining, admits no more. Thread-safe.
+/// Most calls that may run at a time, streams included.
+struct CallLimits {
+    int ordinary = 0;  ///< all but those of administrators; uploads among them
+    int uploads = 0;
+    int admin = 0;
+};
+
+/// Counts running calls, and admits none beyond the limits of its kind, so that whoever fills one kind leaves
+/// room for the others; once draining, admits no more. Thread-safe.
 class CallGate {
   public:
-    /// False when draining; otherwise call `leave` at the end.
-    [[nodiscard]] bool enter();
-    void leave();
-    /// From now on `enter` returns false.
+    explicit CallGate(const CallLimits& limits) : limits_(limits) {}
+
+    /// Call `leave` at the end of an admitted call. Errors: kUnavailable (draining), kQueueFull.
+    [[nodiscard]] Result<void> enter(security::CallClass kind);
+    void leave(security::CallClass kind);
+    /// From now on `enter` fails.
     void drain();
     [[nodiscard]] bool draining() const { return draining_.load(); }
     /// Waits at most until `until`; true when no call is left.
     [[nodiscard]] bool waitUntilEmpty(std::chrono::steady_clock::time_point until);
 
   private:
+    const CallLimits limits_;
     std::mutex mutex_;
     std::condition_variable changed_;
-    int calls_ = 0;
+    CallLimits running_;
     std::atomic<bool> draining_{false};
 };
 
@@ -137,8 +149,8 @@ class Budget {
 
 /// What every call of every transport passes or draws on.
 struct Admission {
-    /// `uploadBytes`: config limits.max_upload_bytes.
-    explicit Admission(std::uint64_t uploadBytes);
+    /// `uploadBytes`, `uploadCalls`: config limits.max_upload_bytes and limits.max_uploads.
+    Admission(std::uint64_t uploadBytes, int uploadCalls);
 
     CallGate calls;
     Budget uploads;    ///< bytes of points being received

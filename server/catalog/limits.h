@@ -34,8 +34,14 @@ constexpr std::uint32_t kMostVerified = 10'000;
 /// A larger answer to a search is refused.
 constexpr std::size_t kMaxAnswerBytes = std::size_t{64} << 20;
 
-/// Calls that only wait for a shape or a rebuild: the other threads stay free for work.
-constexpr int kMaxFollowers = 192;
+// Calls at a time. A transport needs a thread for each, and some to refuse the rest.
+constexpr int kMaxOrdinaryCalls = 208;
+constexpr int kMaxAdminCalls = 16;
+/// Uploads: the default and the most of limits.max_uploads.
+constexpr int kMostUploads = 96;
+/// Calls that only wait for a shape or a rebuild. Together with all uploads they leave places for searches.
+constexpr int kMaxFollowers = 96;
+static_assert(kMostUploads + kMaxFollowers < kMaxOrdinaryCalls);
 
 // Waiting inside calls.
 constexpr std::chrono::milliseconds kLookForCancellation{20};

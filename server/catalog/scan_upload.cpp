@@ -29,8 +29,7 @@ Result<void> ScanUpload::begin(std::uint64_t announced, const std::string& sha25
         std::copy(sha256.begin(), sha256.end(), expected.begin());
     }
     announced_ = announced;
-    // Pages take no memory before points arrive, so `add` draws on the budget, not this.
-    verifier_.reserve(announced);
+    verifier_.expect(announced);
     return {};
 }
 

@@ -27,7 +27,11 @@ struct ServerConfig {
         std::uint32_t maxBatch = 1'000;       ///< queries of one SearchBatch
         /// Of the points of all uploads in progress.
         std::uint64_t maxUploadBytes = std::uint64_t{1} << 30;
+        int maxUploads = 64;    ///< uploads in progress
         int stallSeconds = 60;  ///< after which a client that neither sends nor reads is cut off
+        std::uint64_t minBytesPerSecond = 1'024;  ///< of a stream; slower clients are cut off. 0: any
+        std::uint32_t maxConnections = 1'000;     ///< network connections
+        int idleSeconds = 300;                    ///< after which a connection without calls is closed
     } limits;
 
     struct Store {

@@ -214,6 +214,20 @@ std::vector<Setting> makeSettings() {
             "limits.stall_seconds", kInteger, 1, 86'400, [](C& c) -> int& { return c.limits.stallSeconds; },
             "A stream is cut off when its client neither sends nor receives for this many seconds."),
         number(
+            "limits.max_uploads", kInteger, 1, 96, [](C& c) -> int& { return c.limits.maxUploads; },
+            "Most uploads in progress, searches by scan among them."),
+        number(
+            "limits.min_bytes_per_second", kInteger, 0, 1'000'000'000,
+            [](C& c) -> std::uint64_t& { return c.limits.minBytesPerSecond; },
+            "A stream is cut off when its client is slower than this in the long run. 0: never."),
+        number(
+            "limits.max_connections", kInteger, 1, 100'000,
+            [](C& c) -> std::uint32_t& { return c.limits.maxConnections; },
+            "Most network connections; more are closed at once."),
+        number(
+            "limits.idle_seconds", kInteger, 1, 86'400, [](C& c) -> int& { return c.limits.idleSeconds; },
+            "A connection without calls is closed after this many seconds."),
+        number(
             "store.readers", kInteger, 1, 64, [](C& c) -> int& { return c.store.readers; },
             "Pooled read connections to the database."),
         number(

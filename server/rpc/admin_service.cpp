@@ -43,7 +43,7 @@ v1::RebuildProgress progressFrom(const catalog::RebuildProgress& progress) {
 
 grpc::Status AdminServiceHandler::Rebuild(grpc::ServerContext* context, const v1::RebuildRequest* request,
                                           grpc::ServerWriter<v1::RebuildProgress>* writer) {
-    return handle(services_, context, "Rebuild", [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kRebuild, [&](Call& call) -> Result<void> {
         if (!request->collection().empty()) call.noteCollection(request->collection());
         const auto wanted = rebuildRequestFrom(*request);
         RETURN_IF_ERROR(wanted);
@@ -57,7 +57,7 @@ grpc::Status AdminServiceHandler::Rebuild(grpc::ServerContext* context, const v1
 grpc::Status AdminServiceHandler::CancelRebuild(grpc::ServerContext* context,
                                                 const v1::CancelRebuildRequest* request,
                                                 v1::CancelRebuildResponse*) {
-    return handle(services_, context, "CancelRebuild", [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kCancelRebuild, [&](Call& call) -> Result<void> {
         call.noteCollection(request->collection());
         return services_.catalog.cancelRebuild(request->collection());
     });
@@ -67,7 +67,7 @@ grpc::Status AdminServiceHandler::CancelRebuild(grpc::ServerContext* context,
 // the stream, and the rules about the database are in Catalog::backup and Catalog::restore.
 grpc::Status AdminServiceHandler::Backup(grpc::ServerContext* context, const v1::BackupRequest*,
                                          grpc::ServerWriter<v1::BackupChunk>* writer) {
-    return handle(services_, context, "Backup", [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kBackup, [&](Call& call) -> Result<void> {
         const auto file = files::TemporaryFile::create(services_.temporaryDirectory);
         RETURN_IF_ERROR(file);
         RETURN_IF_ERROR(services_.catalog.backup(file->path(), call.run()));
@@ -79,7 +79,7 @@ grpc::Status AdminServiceHandler::Backup(grpc::ServerContext* context, const v1:
 grpc::Status AdminServiceHandler::Restore(grpc::ServerContext* context,
                                           grpc::ServerReader<v1::BackupChunk>* reader,
                                           v1::RestoreResponse* response) {
-    return handle(services_, context, "Restore", [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kRestore, [&](Call& call) -> Result<void> {
         call.frame().expectRestore();
         const auto file = files::TemporaryFile::create(services_.temporaryDirectory);
         RETURN_IF_ERROR(file);
@@ -107,7 +107,7 @@ grpc::Status AdminServiceHandler::Restore(grpc::ServerContext* context,
 
 grpc::Status AdminServiceHandler::Check(grpc::ServerContext* context, const v1::CheckRequest*,
                                         grpc::ServerWriter<v1::CheckProgress>* writer) {
-    return handle(services_, context, "Check", [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kCheck, [&](Call& call) -> Result<void> {
         RunContext run = call.run();
         auto lastSent = RunContext::Clock::time_point();
         v1::CheckProgress progress;
@@ -135,7 +135,7 @@ grpc::Status AdminServiceHandler::Check(grpc::ServerContext* context, const v1::
 
 grpc::Status AdminServiceHandler::Stats(grpc::ServerContext* context, const v1::StatsRequest*,
                                         v1::StatsResponse* response) {
-    return handle(services_, context, "Stats", [&](Call&) -> Result<void> {
+    return handle(services_, context, operations::kStats, [&](Call&) -> Result<void> {
         const auto stats = services_.catalog.stats();
         RETURN_IF_ERROR(stats);
         const store::StoreStats& stored = stats->store;
@@ -162,7 +162,7 @@ grpc::Status AdminServiceHandler::Stats(grpc::ServerContext* context, const v1::
 
 grpc::Status AdminServiceHandler::ServerInfo(grpc::ServerContext* context, const v1::ServerInfoRequest*,
                                              v1::ServerInfoResponse* response) {
-    return handle(services_, context, "ServerInfo", [&](Call&) -> Result<void> {
+    return handle(services_, context, operations::kServerInfo, [&](Call&) -> Result<void> {
         const auto stats = services_.catalog.stats();
         RETURN_IF_ERROR(stats);
         response->set_version(config::version());

@@ -74,7 +74,7 @@ FitOptions optionsFrom(const v1::AlignHeader& header) {
 grpc::Status AlignServiceHandler::Align(grpc::ServerContext* context,
                                         grpc::ServerReader<v1::AlignRequest>* reader,
                                         v1::AlignResponse* response) {
-    return handle(services_, context, "Align", [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kAlign, [&](Call& call) -> Result<void> {
         Uploads uploads(services_, call);
         const auto take = [&](const v1::AlignRequest& message) { return uploads.take(message); };
         RETURN_IF_ERROR(receiveMessages<v1::AlignRequest>(*reader, call, take));

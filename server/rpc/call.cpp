@@ -51,10 +51,10 @@ telemetry::Level levelOf(grpc::StatusCode code) {
 
 }  // namespace
 
-Call::Call(const Services& services, grpc::ServerContext& context, const char* rpc)
+Call::Call(const Services& services, grpc::ServerContext& context, const security::Operation& operation)
     : services_(services),
       context_(context),
-      rpc_(rpc),
+      operation_(operation),
       peer_(context.peer()),
       began_(std::chrono::steady_clock::now()),
       cancellation_(services.cancellations, context),
@@ -79,11 +79,7 @@ void Call::noteCollection(const std::string& name) { collection_ = catalog::coll
 
 grpc::Status Call::finish(Result<void> result) {
     std::optional<Error> cutOff;
-    if (cancellation_.stalled()) {
-        cutOff = Error{ErrorCode::kCancelled, "the client neither sent nor read anything for " +
-                                                  std::to_string(services_.config.limits.stallSeconds) +
-                                                  " seconds"};
-    }
+    if (cancellation_.cutOff()) cutOff = Error{ErrorCode::kCancelled, *cancellation_.cutOff()};
     result = frame_.settle(std::move(result), cutOff);
     const grpc::Status status =
         result ? grpc::Status::OK : makeStatus(result.error(), context_, frame_.retryHint());
@@ -93,7 +89,7 @@ grpc::Status Call::finish(Result<void> result) {
 
 void Call::logLine(const grpc::Status& status, const Error* error) {
     const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - began_;
-    std::vector<telemetry::Field> fields = {{"rpc", std::string(rpc_)},
+    std::vector<telemetry::Field> fields = {{"rpc", std::string(operation_.name)},
                                             {"peer", peer_},
                                             {"code", std::string(statusName(status.error_code()))},
                                             {"ms", took.count()}};

@@ -15,14 +15,17 @@
 #include "core/base/run_context.h"
 #include "server/catalog/call_frame.h"
 #include "server/rpc/services.h"
+#include "server/security/operation.h"
 #include "shapedb/v1/shape_service.pb.h"
 
 namespace shapedb::rpc {
 
+namespace operations = security::operations;
+
 /// One call while it runs. Used by its own thread only.
 class Call {
   public:
-    Call(const Services& services, grpc::ServerContext& context, const char* rpc);
+    Call(const Services& services, grpc::ServerContext& context, const security::Operation& operation);
     Call(const Call&) = delete;
     Call& operator=(const Call&) = delete;
 
@@ -32,12 +35,13 @@ class Call {
     [[nodiscard]] const RunContext& run() const { return run_; }
 
     /// Reads one message of a stream. False at its end or when the client has gone. A client that makes
-    /// this block for limits.stall_seconds is cut off.
+    /// this block for limits.stall_seconds, or that is slower than limits.min_bytes_per_second in the
+    /// long run, is cut off.
     template <typename Reader, typename Message>
     bool read(Reader& reader, Message* message) {
         cancellation_.beginTransfer();
         const bool good = reader.Read(message);
-        cancellation_.endTransfer();
+        cancellation_.endTransfer(good ? message->ByteSizeLong() : 0);
         return good;
     }
     /// Errors: kCancelled (the client has gone or was cut off as above).
@@ -45,7 +49,7 @@ class Call {
     Result<void> write(Writer& writer, const Message& message) {
         cancellation_.beginTransfer();
         const bool good = writer.Write(message);
-        cancellation_.endTransfer();
+        cancellation_.endTransfer(message.ByteSizeLong());
         if (good) return {};
         return fail(ErrorCode::kCancelled, "the client has gone");
     }
@@ -74,7 +78,7 @@ class Call {
 
     const Services& services_;
     grpc::ServerContext& context_;
-    const char* rpc_;
+    const security::Operation& operation_;
     const std::string peer_;  ///< asked at the start: a cancelled call has none
     std::chrono::steady_clock::time_point began_;
     CancelWatcher::Registration cancellation_;
@@ -88,9 +92,10 @@ class Call {
 
 /// Runs `body(call)`, which returns Result<void>, as the handler of one call.
 template <typename Body>
-grpc::Status handle(const Services& services, grpc::ServerContext* context, const char* rpc, Body&& body) {
-    Call call(services, *context, rpc);
-    Result<void> result = call.frame().admit();
+grpc::Status handle(const Services& services, grpc::ServerContext* context,
+                    const security::Operation& operation, Body&& body) {
+    Call call(services, *context, operation);
+    Result<void> result = call.frame().admit(operation.callClass);
     if (result) result = catalog::guarded([&]() -> Result<void> { return body(call); });
     return call.finish(std::move(result));
 }

@@ -4,7 +4,8 @@
 
 namespace shapedb::rpc {
 
-CancelWatcher::CancelWatcher(std::chrono::milliseconds stall) : stall_(stall), thread_([this] { run(); }) {}
+CancelWatcher::CancelWatcher(std::chrono::milliseconds stall, std::uint64_t leastRate)
+    : stall_(stall), leastRate_(leastRate), thread_([this] { run(); }) {}
 
 CancelWatcher::~CancelWatcher() {
     {
@@ -34,9 +35,31 @@ void CancelWatcher::look(Registration& call) const {
         return;
     }
     const Clock::rep since = call.blockedSince_;
-    if (since == 0 || Clock::now() - Clock::time_point(Clock::duration(since)) < stall_) return;
-    call.stalled_ = true;
+    if (since == 0) return;
+    const auto now = Clock::now() - Clock::time_point(Clock::duration(since));
+    const auto altogether = now + Clock::duration(call.blocked_);
+    const std::chrono::duration<double> beyond = altogether - stall_;
+    if (now >= stall_) {
+        call.stalled_ = true;
+    } else if (beyond.count() * static_cast<double>(leastRate_) > static_cast<double>(call.bytes_)) {
+        call.tooSlow_ = true;
+    } else {
+        return;
+    }
     call.context_.TryCancel();
+}
+
+std::optional<std::string> CancelWatcher::Registration::cutOff() const {
+    if (stalled_) {
+        const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(watcher_.stall_);
+        return "the client neither sent nor read anything for " + std::to_string(seconds.count()) +
+               " seconds";
+    }
+    if (tooSlow_) {
+        return "the client sent or read less than " + std::to_string(watcher_.leastRate_) +
+               " bytes per second";
+    }
+    return std::nullopt;
 }
 
 CancelWatcher::Registration::Registration(CancelWatcher& watcher, grpc::ServerContext& context)

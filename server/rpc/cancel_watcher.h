@@ -1,12 +1,16 @@
 // Turns gRPC's "is this call cancelled?" into a flag for long-running work, and cuts off clients that
-// neither send nor read anything.
+// send or read nothing, or hardly anything: each holds a thread.
 #pragma once
 
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <cstddef>
+#include <cstdint>
 #include <mutex>
+#include <optional>
 #include <set>
+#include <string>
 #include <thread>
 
 #include <grpcpp/server_context.h>
@@ -21,8 +25,9 @@ class CancelWatcher {
   public:
     using Clock = std::chrono::steady_clock;
 
-    /// Cancels calls that are blocked in a read or write for longer than `stall`.
-    explicit CancelWatcher(std::chrono::milliseconds stall);
+    /// Cancels calls that are blocked in a read or write for longer than `stall`, and those that move fewer
+    /// than `leastRate` bytes in a second of being blocked, not counting the first `stall`. 0: any rate.
+    CancelWatcher(std::chrono::milliseconds stall, std::uint64_t leastRate);
     ~CancelWatcher();
     CancelWatcher(const CancelWatcher&) = delete;
     CancelWatcher& operator=(const CancelWatcher&) = delete;
@@ -40,9 +45,12 @@ class CancelWatcher {
 
         /// Called before and after each read or write of a stream.
         void beginTransfer() { blockedSince_ = Clock::now().time_since_epoch().count(); }
-        void endTransfer() { blockedSince_ = 0; }
-        /// True when the call was cancelled for being blocked too long.
-        [[nodiscard]] bool stalled() const { return stalled_; }
+        void endTransfer(std::size_t bytes) {
+            blocked_ += Clock::now().time_since_epoch().count() - blockedSince_.exchange(0);
+            bytes_ += bytes;
+        }
+        /// Why the call was cancelled here, if it was.
+        [[nodiscard]] std::optional<std::string> cutOff() const;
 
       private:
         friend class CancelWatcher;
@@ -51,7 +59,10 @@ class CancelWatcher {
         grpc::ServerContext& context_;
         std::atomic<bool> flag_{false};
         std::atomic<bool> stalled_{false};
+        std::atomic<bool> tooSlow_{false};
         std::atomic<Clock::rep> blockedSince_{0};  ///< 0: not blocked
+        std::atomic<Clock::rep> blocked_{0};       ///< in earlier transfers
+        std::atomic<std::uint64_t> bytes_{0};      ///< moved so far
     };
 
   private:
@@ -59,6 +70,7 @@ class CancelWatcher {
     void look(Registration& call) const;
 
     const std::chrono::milliseconds stall_;
+    const std::uint64_t leastRate_;
     std::mutex mutex_;
     std::condition_variable changed_;
     std::set<Registration*> calls_;

@@ -23,7 +23,7 @@ Result<void> fill(const Services& services, const index::Snapshot& snapshot, v1:
 grpc::Status CollectionServiceHandler::CreateCollection(grpc::ServerContext* context,
                                                         const v1::CreateCollectionRequest* request,
                                                         v1::Collection* response) {
-    return handle(services_, context, "CreateCollection", [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kCreateCollection, [&](Call& call) -> Result<void> {
         call.note({"collection", request->name()});
         const auto wanted = overridesFrom(request->profile(), request->segmentation(), request->signature());
         RETURN_IF_ERROR(wanted);
@@ -39,7 +39,7 @@ grpc::Status CollectionServiceHandler::CreateCollection(grpc::ServerContext* con
 grpc::Status CollectionServiceHandler::GetCollection(grpc::ServerContext* context,
                                                      const v1::GetCollectionRequest* request,
                                                      v1::Collection* response) {
-    return handle(services_, context, "GetCollection", [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kGetCollection, [&](Call& call) -> Result<void> {
         const auto found = call.collection(request->name());
         RETURN_IF_ERROR(found);
         return fill(services_, **found, response);
@@ -49,7 +49,7 @@ grpc::Status CollectionServiceHandler::GetCollection(grpc::ServerContext* contex
 grpc::Status CollectionServiceHandler::ListCollections(grpc::ServerContext* context,
                                                        const v1::ListCollectionsRequest*,
                                                        v1::ListCollectionsResponse* response) {
-    return handle(services_, context, "ListCollections", [&](Call&) -> Result<void> {
+    return handle(services_, context, operations::kListCollections, [&](Call&) -> Result<void> {
         const auto collections = services_.catalog.collections();
         RETURN_IF_ERROR(collections);
         for (const index::SnapshotPtr& snapshot : *collections) {
@@ -62,7 +62,7 @@ grpc::Status CollectionServiceHandler::ListCollections(grpc::ServerContext* cont
 grpc::Status CollectionServiceHandler::DeleteCollection(grpc::ServerContext* context,
                                                         const v1::DeleteCollectionRequest* request,
                                                         v1::DeleteCollectionResponse*) {
-    return handle(services_, context, "DeleteCollection", [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kDeleteCollection, [&](Call& call) -> Result<void> {
         call.noteCollection(request->name());
         return services_.catalog.deleteCollection(request->name(), request->force());
     });

@@ -1,12 +1,17 @@
 #include "server/rpc/grpc_server.h"
 
 #include <chrono>
+#include <mutex>
+#include <string>
 #include <utility>
 
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/grpcpp.h>
 #include <grpcpp/health_check_service_interface.h>
 
+#include "core/base/return_if_error.h"
+#include "server/net/descriptor_limit.h"
+#include "server/net/listener.h"
 #include "server/rpc/admin_service.h"
 #include "server/rpc/align_service.h"
 #include "server/rpc/cancel_watcher.h"
@@ -27,13 +32,36 @@ constexpr const char* kServiceNames[] = {"shapedb.v1.ShapeService", "shapedb.v1.
                                          "shapedb.v1.CollectionService", "shapedb.v1.AlignService",
                                          "shapedb.v1.AdminService"};
 
+void limitTransport(grpc::ServerBuilder& builder, const config::ServerConfig::Limits& limits) {
+    builder.SetMaxReceiveMessageSize(kMaxReceiveBytes);
+    builder.SetMaxSendMessageSize(-1);  // answers are bounded where they are built
+    // A compressed message may grow a thousandfold when it is inflated, which gRPC bounds by nothing.
+    for (const auto algorithm : {GRPC_COMPRESS_GZIP, GRPC_COMPRESS_DEFLATE}) {
+        builder.SetCompressionAlgorithmSupportStatus(algorithm, false);
+    }
+    const auto set = [&](const char* name, std::chrono::milliseconds time) {
+        builder.AddChannelArgument(name, static_cast<int>(time.count()));
+    };
+    set(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveTime);
+    set(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeout);
+    set(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, kShortestClientPing);
+    set(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeTime);
+    set(GRPC_ARG_MAX_CONNECTION_IDLE_MS, std::chrono::seconds(limits.idleSeconds));
+    builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
+    builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kMaxStreamsOfConnection);
+    grpc::ResourceQuota quota("shapedbd");
+    quota.SetMaxThreads(kMaxCallThreads);
+    quota.Resize(kTransportBytes);
+    builder.SetResourceQuota(quota);
+}
+
 }  // namespace
 
 /// In order of construction; destroyed in reverse.
 struct GrpcServer::Parts {
     Parts(const config::ServerConfig& config, catalog::Catalog& catalog, catalog::Admission& admission,
           catalog::Searches& searches, telemetry::LoggerPtr log, std::string temporaryDirectory)
-        : cancellations(std::chrono::seconds(config.limits.stallSeconds)),
+        : cancellations(std::chrono::seconds(config.limits.stallSeconds), config.limits.minBytesPerSecond),
           services{config,
                    catalog,
                    admission,
@@ -55,8 +83,16 @@ struct GrpcServer::Parts {
     AlignServiceHandler alignService;
     CollectionServiceHandler collectionService;
     AdminServiceHandler adminService;
-    config::Endpoint endpoint;
+
+    /// Reports NOT_SERVING from now on; whatever the listener reports later.
+    void reportNotServing();
+    void reportListening(const std::string& problem);
+
+    std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor;
     std::unique_ptr<grpc::Server> server;
+    net::Listener listener;
+    std::mutex healthMutex;
+    bool ending = false;
 };
 
 GrpcServer::GrpcServer(const config::ServerConfig& config, catalog::Catalog& catalog,
@@ -67,50 +103,74 @@ GrpcServer::GrpcServer(const config::ServerConfig& config, catalog::Catalog& cat
 
 GrpcServer::~GrpcServer() { shutDown(); }
 
+void GrpcServer::Parts::reportNotServing() {
+    const std::lock_guard<std::mutex> lock(healthMutex);
+    ending = true;
+    if (server) server->GetHealthCheckService()->SetServingStatus(false);
+}
+
+void GrpcServer::Parts::reportListening(const std::string& problem) {
+    const std::lock_guard<std::mutex> lock(healthMutex);
+    if (problem.empty()) {
+        services.log->info("connections are accepted again");
+    } else {
+        services.log->error("connections cannot be accepted", {{"reason", problem}});
+    }
+    if (!ending) server->GetHealthCheckService()->SetServingStatus(problem.empty());
+}
+
 Result<void> GrpcServer::listen(const config::Endpoint& wanted) {
-    parts_->endpoint = wanted;
+    RETURN_IF_ERROR(parts_->listener.open(wanted));
     grpc::EnableDefaultHealthCheckService(true);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
     grpc::ServerBuilder builder;
-    int port = 0;
-    builder.AddListeningPort(parts_->endpoint.text(), grpc::InsecureServerCredentials(), &port);
+    // Connections come from our own listener: see net/listener.h.
+    parts_->acceptor = builder.experimental().AddExternalConnectionAcceptor(
+        grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
+        grpc::InsecureServerCredentials());
     builder.RegisterService(&parts_->shapeService);
     builder.RegisterService(&parts_->searchService);
     builder.RegisterService(&parts_->alignService);
     builder.RegisterService(&parts_->collectionService);
     builder.RegisterService(&parts_->adminService);
-    builder.SetMaxReceiveMessageSize(kMaxReceiveBytes);
-    builder.SetMaxSendMessageSize(-1);  // answers are bounded where they are built
-    // With port reuse two servers on one port would each get half of the calls.
-    builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
-    const auto milliseconds = [](std::chrono::milliseconds time) { return static_cast<int>(time.count()); };
-    builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, milliseconds(kKeepaliveTime));
-    builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, milliseconds(kKeepaliveTimeout));
-    builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS,
-                               milliseconds(kShortestClientPing));
-    builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
-    grpc::ResourceQuota quota("shapedbd");
-    quota.SetMaxThreads(kMaxCallThreads);
-    builder.SetResourceQuota(quota);
+    limitTransport(builder, parts_->services.config.limits);
     parts_->server = builder.BuildAndStart();
-    if (!parts_->server || port == 0) {
-        return fail(ErrorCode::kUnavailable,
-                    "cannot listen on " + wanted.text() +
-                        ": the address is in use, does not belong to this machine, or is not permitted");
+    if (!parts_->server) {
+        return fail(ErrorCode::kUnavailable, "the gRPC server on " + wanted.text() + " cannot be started");
     }
-    parts_->endpoint.port = port;
     for (const char* name : kServiceNames)
         parts_->server->GetHealthCheckService()->SetServingStatus(name, true);
+    startListening();
     return {};
 }
 
-const config::Endpoint& GrpcServer::endpoint() const { return parts_->endpoint; }
-
-void GrpcServer::reportNotServing() {
-    if (parts_->server) parts_->server->GetHealthCheckService()->SetServingStatus(false);
+void GrpcServer::startListening() {
+    const std::size_t wanted = parts_->services.config.limits.maxConnections;
+    const std::size_t most = net::connectionsWithin(net::raiseDescriptorLimit(), wanted);
+    const telemetry::LoggerPtr& log = parts_->services.log;
+    if (most < wanted) {
+        log->warn("the limit of open files leaves room for fewer connections than limits.max_connections",
+                  {{"connections", std::uint64_t{most}}, {"wanted", std::uint64_t{wanted}}});
+    }
+    net::ListenerEvents events;
+    events.onConnection = [this](int socket) {
+        grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters connection;
+        connection.fd = socket;
+        parts_->acceptor->HandleNewConnection(&connection);
+    };
+    events.onProblem = [this](const std::string& problem) { parts_->reportListening(problem); };
+    events.onTooMany = [log](std::size_t open) {
+        log->warn("too many connections: more are closed at once", {{"open", std::uint64_t{open}}});
+    };
+    parts_->listener.start(most, std::move(events));
 }
 
+const config::Endpoint& GrpcServer::endpoint() const { return parts_->listener.endpoint(); }
+
+void GrpcServer::reportNotServing() { parts_->reportNotServing(); }
+
 void GrpcServer::shutDown() {
+    parts_->listener.stop();
     if (!parts_->server) return;
     // Also ends health and reflection streams, which never end by themselves.
     parts_->server->Shutdown(std::chrono::system_clock::now() + kToLearnOfCancellation);

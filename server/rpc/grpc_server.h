@@ -35,6 +35,8 @@ class GrpcServer {
     void shutDown();
 
   private:
+    void startListening();
+
     struct Parts;
     std::unique_ptr<Parts> parts_;
 };

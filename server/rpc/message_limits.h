@@ -4,10 +4,16 @@
 #include <chrono>
 #include <cstddef>
 
+#include "server/catalog/limits.h"
+
 namespace shapedb::rpc {
 
 constexpr int kMaxReceiveBytes = 4 << 20;
-constexpr int kMaxCallThreads = 256;                  ///< calls at a time, streams included
+/// More than the calls that may run (catalog/limits.h): the rest listen, and refuse calls by name.
+constexpr int kMaxCallThreads = 256;
+static_assert(kMaxCallThreads >= catalog::kMaxOrdinaryCalls + catalog::kMaxAdminCalls + 32);
+/// Memory that gRPC may use for connections and messages in transit, all together.
+constexpr std::size_t kTransportBytes = std::size_t{1} << 30;
 constexpr std::size_t kLabelledChunkPoints = 32'768;  ///< in one LabelledChunk
 /// Of an error message: it travels in a header, and headers are small.
 constexpr std::size_t kMaxErrorMessageBytes = 2'048;
@@ -15,5 +21,8 @@ constexpr std::size_t kMaxErrorMessageBytes = 2'048;
 constexpr std::chrono::milliseconds kKeepaliveTime{60'000};
 constexpr std::chrono::milliseconds kKeepaliveTimeout{20'000};
 constexpr std::chrono::milliseconds kShortestClientPing{10'000};
+/// A connection that says nothing intelligible within this time is closed.
+constexpr std::chrono::milliseconds kHandshakeTime{10'000};
+constexpr int kMaxStreamsOfConnection = 100;
 
 }  // namespace shapedb::rpc

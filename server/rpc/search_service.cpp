@@ -106,7 +106,7 @@ Result<void> searchBatch(const Services& services, const Call& call, const catal
 grpc::Status SearchServiceHandler::SearchByKey(grpc::ServerContext* context,
                                                const v1::SearchByKeyRequest* request,
                                                v1::SearchResponse* response) {
-    return handle(services_, context, "SearchByKey", [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kSearchByKey, [&](Call& call) -> Result<void> {
         call.noteKey(request->key());
         const auto prepared = prepare(services_, call, request->options());
         RETURN_IF_ERROR(prepared);
@@ -119,7 +119,7 @@ grpc::Status SearchServiceHandler::SearchByKey(grpc::ServerContext* context,
 grpc::Status SearchServiceHandler::SearchByScan(grpc::ServerContext* context,
                                                 grpc::ServerReader<v1::SearchByScanRequest>* reader,
                                                 v1::SearchResponse* response) {
-    return handle(services_, context, "SearchByScan", [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kSearchByScan, [&](Call& call) -> Result<void> {
         catalog::PreparedSearch prepared;
         catalog::ScanUpload upload(services_.config.limits.maxPoints, services_.admission.uploads);
         const auto checkSearchHeader = [&](const v1::SearchByScanHeader& header) -> Result<void> {
@@ -144,7 +144,7 @@ grpc::Status SearchServiceHandler::SearchByScan(grpc::ServerContext* context,
 grpc::Status SearchServiceHandler::SearchBySignature(grpc::ServerContext* context,
                                                      const v1::SearchBySignatureRequest* request,
                                                      v1::SearchResponse* response) {
-    return handle(services_, context, "SearchBySignature", [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kSearchBySignature, [&](Call& call) -> Result<void> {
         const auto prepared = prepare(services_, call, request->options());
         RETURN_IF_ERROR(prepared);
         auto signature = decodeSignature(request->signature());
@@ -156,7 +156,7 @@ grpc::Status SearchServiceHandler::SearchBySignature(grpc::ServerContext* contex
 grpc::Status SearchServiceHandler::SearchBatch(grpc::ServerContext* context,
                                                const v1::SearchBatchRequest* request,
                                                v1::SearchBatchResponse* response) {
-    return handle(services_, context, "SearchBatch", [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kSearchBatch, [&](Call& call) -> Result<void> {
         const int count = request->queries_size();
         call.note({"queries", std::int64_t{count}});
         RETURN_IF_ERROR(
@@ -169,7 +169,7 @@ grpc::Status SearchServiceHandler::SearchBatch(grpc::ServerContext* context,
 
 grpc::Status SearchServiceHandler::Compare(grpc::ServerContext* context, const v1::CompareRequest* request,
                                            v1::CompareResponse* response) {
-    return handle(services_, context, "Compare", [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kCompare, [&](Call& call) -> Result<void> {
         const auto nameFrom = [&](const pb::ShapeRef& ref) {
             call.noteKey(ref.key());
             call.noteCollection(ref.collection());

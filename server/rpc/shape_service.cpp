@@ -67,7 +67,7 @@ Result<void> sendSegments(Call& call, Writer& writer, const Description& descrip
 grpc::Status ShapeServiceHandler::AddShape(grpc::ServerContext* context,
                                            grpc::ServerReader<v1::AddShapeRequest>* reader,
                                            v1::AddShapeResponse* response) {
-    return handle(services_, context, "AddShape",
+    return handle(services_, context, operations::kAddShape,
                   [&](Call& call) { return addShape(call, *reader, *response); });
 }
 
@@ -94,7 +94,7 @@ Result<void> ShapeServiceHandler::addShape(Call& call, grpc::ServerReader<v1::Ad
 
 grpc::Status ShapeServiceHandler::GetShape(grpc::ServerContext* context, const v1::GetShapeRequest* request,
                                            v1::GetShapeResponse* response) {
-    return handle(services_, context, "GetShape", [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kGetShape, [&](Call& call) -> Result<void> {
         const auto found = call.shape(request->shape());
         RETURN_IF_ERROR(found);
         toProto(found->shape, found->collection->collection.name, found->quality(),
@@ -106,7 +106,7 @@ grpc::Status ShapeServiceHandler::GetShape(grpc::ServerContext* context, const v
 grpc::Status ShapeServiceHandler::ListShapes(grpc::ServerContext* context,
                                              const v1::ListShapesRequest* request,
                                              v1::ListShapesResponse* response) {
-    return handle(services_, context, "ListShapes", [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kListShapes, [&](Call& call) -> Result<void> {
         const auto collection = call.collection(request->collection());
         RETURN_IF_ERROR(collection);
         const auto state = fromProto(request->state());
@@ -128,7 +128,7 @@ grpc::Status ShapeServiceHandler::ListShapes(grpc::ServerContext* context,
 grpc::Status ShapeServiceHandler::CountShapes(grpc::ServerContext* context,
                                               const v1::CountShapesRequest* request,
                                               v1::CountShapesResponse* response) {
-    return handle(services_, context, "CountShapes", [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kCountShapes, [&](Call& call) -> Result<void> {
         const auto collection = call.collection(request->collection());
         RETURN_IF_ERROR(collection);
         const auto state = fromProto(request->state());
@@ -144,7 +144,7 @@ grpc::Status ShapeServiceHandler::CountShapes(grpc::ServerContext* context,
 grpc::Status ShapeServiceHandler::DeleteShape(grpc::ServerContext* context,
                                               const v1::DeleteShapeRequest* request,
                                               v1::DeleteShapeResponse* response) {
-    return handle(services_, context, "DeleteShape", [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kDeleteShape, [&](Call& call) -> Result<void> {
         const pb::ShapeRef& ref = request->shape();
         call.noteKey(ref.key());
         call.noteCollection(ref.collection());
@@ -161,7 +161,7 @@ grpc::Status ShapeServiceHandler::DeleteShape(grpc::ServerContext* context,
 grpc::Status ShapeServiceHandler::WatchIngest(grpc::ServerContext* context,
                                               const v1::WatchIngestRequest* request,
                                               grpc::ServerWriter<v1::IngestEvent>* writer) {
-    return handle(services_, context, "WatchIngest", [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kWatchIngest, [&](Call& call) -> Result<void> {
         const auto found = call.shape(request->shape());
         RETURN_IF_ERROR(found);
         RETURN_IF_ERROR(call.frame().becomeFollower());
@@ -183,7 +183,7 @@ grpc::Status ShapeServiceHandler::WatchIngest(grpc::ServerContext* context,
 grpc::Status ShapeServiceHandler::GetSignature(grpc::ServerContext* context,
                                                const v1::GetSignatureRequest* request,
                                                v1::GetSignatureResponse* response) {
-    return handle(services_, context, "GetSignature", [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kGetSignature, [&](Call& call) -> Result<void> {
         const auto found = call.shape(request->shape());
         RETURN_IF_ERROR(found);
         const auto signature = services_.catalog.signature(*found);
@@ -196,7 +196,7 @@ grpc::Status ShapeServiceHandler::GetSignature(grpc::ServerContext* context,
 grpc::Status ShapeServiceHandler::GetSegments(grpc::ServerContext* context,
                                               const v1::GetSegmentsRequest* request,
                                               grpc::ServerWriter<v1::SegmentedPoints>* writer) {
-    return handle(services_, context, "GetSegments", [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kGetSegments, [&](Call& call) -> Result<void> {
         const auto found = call.shape(request->shape());
         RETURN_IF_ERROR(found);
         catalog::SegmentationSlots::Slot slot(services_.catalog.segmentationSlots());
@@ -209,7 +209,7 @@ grpc::Status ShapeServiceHandler::GetSegments(grpc::ServerContext* context,
 
 grpc::Status ShapeServiceHandler::Segment(
     grpc::ServerContext* context, grpc::ServerReaderWriter<v1::SegmentedPoints, v1::SegmentRequest>* stream) {
-    return handle(services_, context, "Segment", [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kSegment, [&](Call& call) -> Result<void> {
         catalog::ScanUpload upload(services_.config.limits.maxPoints, services_.admission.uploads);
         ShapeParameters parameters;
         bool summaryOnly = false;

@@ -44,17 +44,13 @@ Result<VerifiedScan> VerifiedScan::verify(std::vector<float> xyz) {
     return verifier.finish();
 }
 
-void ScanVerifier::reserve(std::uint64_t points) {
-    try {
-        xyz_.reserve(3 * static_cast<std::size_t>(points));
-    } catch (const std::bad_alloc&) {
-        // A machine that does not overcommit: memory is then taken as points arrive.
-    }
-}
-
 Result<void> ScanVerifier::append(const void* bytes, std::size_t size) {
     const std::size_t first = xyz_.size();
-    xyz_.resize(first + size / sizeof(float));
+    const std::size_t needed = first + size / sizeof(float);
+    if (needed > xyz_.capacity()) {
+        xyz_.reserve(std::max(needed, std::min<std::size_t>(3 * expected_, 2 * xyz_.capacity())));
+    }
+    xyz_.resize(needed);
     std::memcpy(xyz_.data() + first, bytes, size);
     return take(first);
 }

@@ -45,8 +45,9 @@ class VerifiedScan {
 /// Checks a scan piece by piece while it arrives. Not thread-safe. After an error only destruction.
 class ScanVerifier {
   public:
-    /// Reserves address space, so that no growth copies the points; memory is taken by what arrives.
-    void reserve(std::uint64_t points);
+    /// How many points will come: memory grows no further than that. It is taken by what arrives, at most
+    /// twice that much, not by what is announced.
+    void expect(std::uint64_t points) { expected_ = points; }
 
     /// Whole points as bytes; `size` is a multiple of 12. Errors: kNonFiniteCoordinate, naming the
     /// index of the point from 0 and the axis. Throws std::bad_alloc.
@@ -65,6 +66,7 @@ class ScanVerifier {
     Result<void> checkUsable() const;
 
     std::vector<float> xyz_;
+    std::uint64_t expected_ = 0;  ///< points; 0: not known
     Sha256 hash_;
     std::array<std::size_t, 6> extremes_{};  ///< points with the lowest x, y, z; with the highest
 };

@@ -29,13 +29,13 @@ class CallFrameTest : public ::testing::Test {
 
     std::shared_ptr<RecordingLogger> log = std::make_shared<RecordingLogger>();
     Catalog catalog;
-    Admission admission{1'000};
+    Admission admission{1'000, 8};
     RunContext run;
 };
 
 TEST_F(CallFrameTest, KeepsResultsThatNothingContradicts) {
     CallFrame frame(catalog, admission, run);
-    ASSERT_TRUE(frame.admit());
+    ASSERT_TRUE(frame.admit(security::CallClass::kOrdinary));
     EXPECT_TRUE(frame.settle({}, std::nullopt));
     EXPECT_FALSE(frame.retryHint());
 
@@ -64,13 +64,13 @@ TEST_F(CallFrameTest, ACallFromBeforeARestoreIsToBeRepeated) {
 
 TEST_F(CallFrameTest, ADrainingServerAdmitsNobodyAndGivesNoHint) {
     CallFrame running(catalog, admission, run);
-    ASSERT_TRUE(running.admit());
+    ASSERT_TRUE(running.admit(security::CallClass::kOrdinary));
     ASSERT_TRUE(running.checkpointWhileFollowing());
     admission.calls.drain();
     EXPECT_EQ(running.checkpointWhileFollowing().error().code, ErrorCode::kUnavailable);
 
     CallFrame late(catalog, admission, run);
-    auto refused = late.admit();
+    auto refused = late.admit(security::CallClass::kOrdinary);
     EXPECT_EQ(refused.error().code, ErrorCode::kUnavailable);
     refused = late.settle(std::move(refused), std::nullopt);
     EXPECT_EQ(refused.error().code, ErrorCode::kUnavailable);
@@ -80,7 +80,7 @@ TEST_F(CallFrameTest, ADrainingServerAdmitsNobodyAndGivesNoHint) {
 TEST_F(CallFrameTest, LeavesTheGateOnlyIfAdmitted) {
     {
         CallFrame frame(catalog, admission, run);
-        ASSERT_TRUE(frame.admit());
+        ASSERT_TRUE(frame.admit(security::CallClass::kOrdinary));
         EXPECT_FALSE(admission.calls.waitUntilEmpty(std::chrono::steady_clock::now()));
         CallFrame other(catalog, admission, run);
     }

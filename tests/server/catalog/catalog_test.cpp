@@ -264,7 +264,7 @@ TEST_F(CatalogTest, RebuildsOfSeveralCollectionsBeginTogether) {
 TEST_F(CatalogTest, ARebuildTellsOfEachCollectionToItsEnd) {
     putAndWait("cup", 5.0f);
     ASSERT_TRUE(catalog->createCollection("parts", "", parametersOf(Profile::kPaper)));
-    Admission admission{1'000};
+    Admission admission{1'000, 8};
     const RunContext run;
     std::vector<RebuildProgress> told;
     const auto rebuild = [&](const RebuildRequest& request) {

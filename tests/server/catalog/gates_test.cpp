@@ -13,20 +13,43 @@ namespace {
 
 using namespace std::chrono_literals;
 
+using security::CallClass;
+
 TEST(CallGate, RefusesOnceDraining) {
-    CallGate gate;
-    ASSERT_TRUE(gate.enter());
+    CallGate gate({10, 10, 10});
+    ASSERT_TRUE(gate.enter(CallClass::kOrdinary));
     EXPECT_FALSE(gate.draining());
     gate.drain();
     EXPECT_TRUE(gate.draining());
-    EXPECT_FALSE(gate.enter());
+    EXPECT_EQ(gate.enter(CallClass::kAdmin).error().code, ErrorCode::kUnavailable);
     EXPECT_FALSE(gate.waitUntilEmpty(std::chrono::steady_clock::now() + 10ms));
     std::thread call([&] {
         std::this_thread::sleep_for(10ms);
-        gate.leave();
+        gate.leave(CallClass::kOrdinary);
     });
     EXPECT_TRUE(gate.waitUntilEmpty(std::chrono::steady_clock::now() + 10s));
     call.join();
+}
+
+TEST(CallGate, NoKindOfCallShutsTheOthersOut) {
+    CallGate gate({4, 2, 1});
+    ASSERT_TRUE(gate.enter(CallClass::kUpload));
+    ASSERT_TRUE(gate.enter(CallClass::kUpload));
+    const auto third = gate.enter(CallClass::kUpload);
+    ASSERT_FALSE(third);
+    EXPECT_EQ(third.error().code, ErrorCode::kQueueFull);
+    EXPECT_EQ(third.error().message, "all of the 2 places for uploads are taken: try again later");
+
+    ASSERT_TRUE(gate.enter(CallClass::kOrdinary));
+    ASSERT_TRUE(gate.enter(CallClass::kOrdinary));
+    EXPECT_FALSE(gate.enter(CallClass::kOrdinary)) << "uploads are ordinary calls too";
+    ASSERT_TRUE(gate.enter(CallClass::kAdmin)) << "administrators have places of their own";
+    EXPECT_FALSE(gate.enter(CallClass::kAdmin));
+
+    gate.leave(CallClass::kUpload);
+    EXPECT_TRUE(gate.enter(CallClass::kUpload));
+    gate.leave(CallClass::kAdmin);
+    EXPECT_TRUE(gate.enter(CallClass::kAdmin));
 }
 
 TEST(SegmentationSlots, LimitsConcurrentHolders) {

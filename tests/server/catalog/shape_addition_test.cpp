@@ -50,7 +50,7 @@ class ShapeAdditionTest : public ::testing::Test {
 
     std::atomic<bool> noJobs{false};
     std::unique_ptr<Catalog> catalog;
-    Admission admission{1'000};
+    Admission admission{1'000, 8};
     RunContext run;
 };
 

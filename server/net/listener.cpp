@@ -1,0 +1,223 @@
+#include "server/net/listener.h"
+
+#include <cerrno>
+#include <memory>
+#include <system_error>
+#include <utility>
+
+#include <fcntl.h>
+#include <netdb.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "core/base/return_if_error.h"
+
+namespace shapedb::net {
+
+namespace {
+
+constexpr int kBacklog = 1'024;
+/// How often connections that were closed are noticed.
+constexpr int kLookMs = 1'000;
+/// Between two attempts while connections cannot be accepted.
+constexpr int kRetryMs = 50;
+
+using Addresses = std::unique_ptr<addrinfo, void (*)(addrinfo*)>;
+
+std::string reason(int number) { return std::generic_category().message(number); }
+
+tl::unexpected<Error> cannotListen(const config::Endpoint& endpoint, const std::string& why) {
+    return fail(ErrorCode::kUnavailable, "cannot listen on " + endpoint.text() + ": " + why);
+}
+
+Result<Addresses> resolve(const config::Endpoint& endpoint) {
+    addrinfo hints{};
+    hints.ai_family = AF_UNSPEC;
+    hints.ai_socktype = SOCK_STREAM;
+    hints.ai_flags = AI_PASSIVE | AI_NUMERICSERV;
+    addrinfo* found = nullptr;
+    const int code =
+        ::getaddrinfo(endpoint.host.c_str(), std::to_string(endpoint.port).c_str(), &hints, &found);
+    if (code != 0) return cannotListen(endpoint, ::gai_strerror(code));
+    return Addresses(found, ::freeaddrinfo);
+}
+
+/// A bound and listening socket, or -1 with errno.
+int listenOn(const addrinfo& address) {
+    const int socket =
+        ::socket(address.ai_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, address.ai_protocol);
+    if (socket < 0) return -1;
+    const int on = 1;
+    const int off = 0;
+    // No SO_REUSEPORT: with it two servers on one port would each get half of the calls.
+    ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
+    if (address.ai_family == AF_INET6) ::setsockopt(socket, IPPROTO_IPV6, IPV6_V6ONLY, &off, sizeof off);
+    if (::bind(socket, address.ai_addr, address.ai_addrlen) == 0 && ::listen(socket, kBacklog) == 0) {
+        return socket;
+    }
+    const int why = errno;
+    ::close(socket);
+    errno = why;
+    return -1;
+}
+
+int portOf(int socket) {
+    sockaddr_storage address{};
+    socklen_t size = sizeof address;
+    if (::getsockname(socket, reinterpret_cast<sockaddr*>(&address), &size) != 0) return 0;
+    const auto port = address.ss_family == AF_INET6 ? reinterpret_cast<sockaddr_in6*>(&address)->sin6_port
+                                                    : reinterpret_cast<sockaddr_in*>(&address)->sin_port;
+    return ntohs(port);
+}
+
+void setPort(addrinfo& address, int port) {
+    const auto wire = htons(static_cast<std::uint16_t>(port));
+    if (address.ai_family == AF_INET6) {
+        reinterpret_cast<sockaddr_in6*>(address.ai_addr)->sin6_port = wire;
+    } else {
+        reinterpret_cast<sockaddr_in*>(address.ai_addr)->sin_port = wire;
+    }
+}
+
+int acceptOne(int listening) { return ::accept4(listening, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC); }
+
+int openSpare() { return ::open("/dev/null", O_RDONLY | O_CLOEXEC); }
+
+/// The connection had gone before it was accepted, or the network failed on its way: not our trouble.
+bool concernsOneConnection(int number) {
+    switch (number) {
+        case ECONNABORTED:
+        case EINTR:
+        case EPROTO:
+        case ENETDOWN:
+        case ENOPROTOOPT:
+        case EHOSTDOWN:
+        case ENONET:
+        case EHOSTUNREACH:
+        case EOPNOTSUPP:
+        case ENETUNREACH:
+        case EPERM: return true;
+        default: return false;
+    }
+}
+
+}  // namespace
+
+Listener::~Listener() {
+    stop();
+    for (const int socket : listening_) ::close(socket);
+    if (wake_ >= 0) ::close(wake_);
+    if (spare_ >= 0) ::close(spare_);
+}
+
+Result<void> Listener::open(const config::Endpoint& endpoint) {
+    endpoint_ = endpoint;
+    const auto addresses = resolve(endpoint);
+    RETURN_IF_ERROR(addresses);
+    int why = 0;
+    for (addrinfo* at = addresses->get(); at != nullptr; at = at->ai_next) {
+        if (endpoint_.port != 0) setPort(*at, endpoint_.port);  // all on the one that was picked
+        const int socket = listenOn(*at);
+        if (socket < 0) {
+            why = errno;
+            // A machine without IPv6 still has "localhost" in both families; an address in use is a mistake.
+            if (why == EADDRINUSE) break;
+            continue;
+        }
+        listening_.push_back(socket);
+        if (endpoint_.port == 0) endpoint_.port = portOf(socket);
+    }
+    if (listening_.empty() || why == EADDRINUSE) return cannotListen(endpoint, reason(why));
+    wake_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    spare_ = openSpare();
+    if (wake_ < 0 || spare_ < 0) return cannotListen(endpoint, reason(errno));
+    return {};
+}
+
+void Listener::start(std::size_t maxConnections, ListenerEvents events) {
+    maxConnections_ = maxConnections;
+    events_ = std::move(events);
+    thread_ = std::thread([this] { run(); });
+}
+
+void Listener::stop() {
+    if (!thread_.joinable()) return;
+    const std::uint64_t one = 1;
+    // An eventfd with room takes a write; this is its only one.
+    static_cast<void>(::write(wake_, &one, sizeof one) == sizeof one);
+    thread_.join();
+}
+
+void Listener::run() {
+    std::vector<pollfd> waiting = {{wake_, POLLIN, 0}};
+    for (const int socket : listening_) waiting.push_back({socket, POLLIN, 0});
+    while (true) {
+        const int ready = ::poll(waiting.data(), waiting.size(), inTrouble_ ? kRetryMs : kLookMs);
+        if ((waiting[0].revents & POLLIN) != 0) return;
+        connections_ = open_.count();
+        if (connections_ < maxConnections_) overCapacity_ = false;
+        if (ready <= 0 && !inTrouble_) continue;
+        bool good = true;
+        for (std::size_t i = 1; good && i < waiting.size(); ++i) good = acceptAll(waiting[i].fd);
+        if (good) {
+            reportProblem("");
+            continue;
+        }
+        reportProblem(reason(errno));
+        // What waits stays ready: without a pause this would spin.
+        ::poll(waiting.data(), 1, kRetryMs);
+    }
+}
+
+bool Listener::acceptAll(int listening) {
+    while (true) {
+        const int socket = acceptOne(listening);
+        if (socket >= 0) {
+            handOver(socket);
+            continue;
+        }
+        if (errno == EAGAIN || errno == EWOULDBLOCK) return true;
+        if (concernsOneConnection(errno)) continue;
+        const int why = errno;
+        if ((why == EMFILE || why == ENFILE) && spare_ >= 0) {
+            // Closes one connection that waits, so that its client tries elsewhere or later.
+            ::close(spare_);
+            const int unwanted = acceptOne(listening);
+            if (unwanted >= 0) {
+                ::close(unwanted);
+                ++refused_;
+            }
+            spare_ = openSpare();
+        } else if (spare_ < 0) {
+            spare_ = openSpare();
+        }
+        errno = why;
+        return false;
+    }
+}
+
+void Listener::handOver(int socket) {
+    if (connections_ >= maxConnections_) connections_ = open_.count();
+    if (connections_ >= maxConnections_) {
+        ::close(socket);
+        ++refused_;
+        if (!std::exchange(overCapacity_, true)) events_.onTooMany(connections_);
+        return;
+    }
+    const int on = 1;
+    ::setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+    open_.add(socket);
+    ++connections_;
+    events_.onConnection(socket);
+}
+
+void Listener::reportProblem(const std::string& problem) {
+    const bool trouble = !problem.empty();
+    if (std::exchange(inTrouble_, trouble) != trouble) events_.onProblem(problem);
+}
+
+}  // namespace shapedb::net

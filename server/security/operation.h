@@ -1,0 +1,108 @@
+// Every operation of the API, with the role it takes and the kind of work it is. A handler of any transport
+// names its operation here; there is no other way to run one.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+
+namespace shapedb::security {
+
+/// What a caller may do; each includes the ones before it.
+enum class Role : std::uint8_t {
+    kReader,  ///< read, search and compare
+    kWriter,  ///< add, change and delete shapes
+    kAdmin,   ///< create and delete collections, rebuild, back up, restore, keys
+};
+
+/// Which share of the threads a call may take, so that no kind of call can shut the others out.
+enum class CallClass : std::uint8_t {
+    kOrdinary,  ///< one request, and an answer as soon as it is computed
+    kUpload,    ///< lasts as long as the client sends
+    kAdmin,     ///< has places of its own
+};
+
+struct Operation {
+    const char* service;  ///< as in proto/, without the package
+    const char* name;     ///< as in proto/
+    Role role;
+    CallClass callClass;
+};
+
+namespace operations {
+
+// ShapeService
+inline constexpr Operation kAddShape{"ShapeService", "AddShape", Role::kWriter, CallClass::kUpload};
+inline constexpr Operation kGetShape{"ShapeService", "GetShape", Role::kReader, CallClass::kOrdinary};
+inline constexpr Operation kListShapes{"ShapeService", "ListShapes", Role::kReader, CallClass::kOrdinary};
+inline constexpr Operation kCountShapes{"ShapeService", "CountShapes", Role::kReader, CallClass::kOrdinary};
+inline constexpr Operation kDeleteShape{"ShapeService", "DeleteShape", Role::kWriter, CallClass::kOrdinary};
+inline constexpr Operation kWatchIngest{"ShapeService", "WatchIngest", Role::kReader, CallClass::kOrdinary};
+inline constexpr Operation kGetSignature{"ShapeService", "GetSignature", Role::kReader, CallClass::kOrdinary};
+inline constexpr Operation kGetSegments{"ShapeService", "GetSegments", Role::kReader, CallClass::kOrdinary};
+inline constexpr Operation kSegment{"ShapeService", "Segment", Role::kReader, CallClass::kUpload};
+
+// SearchService
+inline constexpr Operation kSearchByKey{"SearchService", "SearchByKey", Role::kReader, CallClass::kOrdinary};
+inline constexpr Operation kSearchByScan{"SearchService", "SearchByScan", Role::kReader, CallClass::kUpload};
+inline constexpr Operation kSearchBySignature{"SearchService", "SearchBySignature", Role::kReader,
+                                              CallClass::kOrdinary};
+inline constexpr Operation kSearchBatch{"SearchService", "SearchBatch", Role::kReader, CallClass::kOrdinary};
+inline constexpr Operation kCompare{"SearchService", "Compare", Role::kReader, CallClass::kOrdinary};
+
+// AlignService
+inline constexpr Operation kAlign{"AlignService", "Align", Role::kReader, CallClass::kUpload};
+
+// CollectionService
+inline constexpr Operation kCreateCollection{"CollectionService", "CreateCollection", Role::kAdmin,
+                                             CallClass::kOrdinary};
+inline constexpr Operation kGetCollection{"CollectionService", "GetCollection", Role::kReader,
+                                          CallClass::kOrdinary};
+inline constexpr Operation kListCollections{"CollectionService", "ListCollections", Role::kReader,
+                                            CallClass::kOrdinary};
+inline constexpr Operation kDeleteCollection{"CollectionService", "DeleteCollection", Role::kAdmin,
+                                             CallClass::kOrdinary};
+
+// AdminService
+inline constexpr Operation kRebuild{"AdminService", "Rebuild", Role::kAdmin, CallClass::kAdmin};
+inline constexpr Operation kCancelRebuild{"AdminService", "CancelRebuild", Role::kAdmin, CallClass::kAdmin};
+inline constexpr Operation kBackup{"AdminService", "Backup", Role::kAdmin, CallClass::kAdmin};
+inline constexpr Operation kRestore{"AdminService", "Restore", Role::kAdmin, CallClass::kAdmin};
+inline constexpr Operation kCheck{"AdminService", "Check", Role::kAdmin, CallClass::kAdmin};
+inline constexpr Operation kStats{"AdminService", "Stats", Role::kAdmin, CallClass::kAdmin};
+inline constexpr Operation kServerInfo{"AdminService", "ServerInfo", Role::kReader, CallClass::kAdmin};
+
+/// All of the above. A test compares it with the services in proto/.
+inline constexpr std::array<const Operation*, 26> kAll{&kAddShape,
+                                                       &kGetShape,
+                                                       &kListShapes,
+                                                       &kCountShapes,
+                                                       &kDeleteShape,
+                                                       &kWatchIngest,
+                                                       &kGetSignature,
+                                                       &kGetSegments,
+                                                       &kSegment,
+                                                       &kSearchByKey,
+                                                       &kSearchByScan,
+                                                       &kSearchBySignature,
+                                                       &kSearchBatch,
+                                                       &kCompare,
+                                                       &kAlign,
+                                                       &kCreateCollection,
+                                                       &kGetCollection,
+                                                       &kListCollections,
+                                                       &kDeleteCollection,
+                                                       &kRebuild,
+                                                       &kCancelRebuild,
+                                                       &kBackup,
+                                                       &kRestore,
+                                                       &kCheck,
+                                                       &kStats,
+                                                       &kServerInfo};
+
+}  // namespace operations
+
+/// "reader", "writer", "admin".
+[[nodiscard]] const char* roleName(Role role) noexcept;
+
+}  // namespace shapedb::security

@@ -1,0 +1,181 @@
+"""A server to attack, and a client without any of our code: grpcio and generated stubs."""
+
+import math
+import os
+import resource
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+import grpc
+import health_pb2
+import health_pb2_grpc
+from shapedb.v1 import admin_service_pb2 as admin
+from shapedb.v1 import admin_service_pb2_grpc as admin_grpc
+from shapedb.v1 import collection_service_pb2 as collections
+from shapedb.v1 import collection_service_pb2_grpc as collections_grpc
+from shapedb.v1 import search_service_pb2 as search
+from shapedb.v1 import search_service_pb2_grpc as search_grpc
+from shapedb.v1 import shape_service_pb2 as shapes
+from shapedb.v1 import shape_service_pb2_grpc as shapes_grpc
+from shapedb.v1 import types_pb2 as types
+
+MIB = 1 << 20
+CHUNK_POINTS = 80_000  # below the 1 MiB of a chunk
+
+
+class Server:
+    """shapedbd on a free port with a data directory of its own."""
+
+    def __init__(self, *flags, directory=None, open_files=None, memory=None):
+        self._own = tempfile.TemporaryDirectory(prefix="shapedb-attack-")
+        self.data = directory or os.path.join(self._own.name, "data")
+        self.log_path = os.path.join(self._own.name, "log")
+        self._flags = flags
+        self._limits = [(resource.RLIMIT_NOFILE, open_files), (resource.RLIMIT_AS, memory)]
+        self.process = None
+        self.start()
+
+    def start(self):
+        def limit():
+            for what, most in self._limits:
+                if most is not None:
+                    resource.setrlimit(what, (most, most))
+
+        with open(self.log_path, "a") as log:
+            self.process = subprocess.Popen(
+                [os.environ["SHAPEDBD"], "--data", self.data, "--listen", "127.0.0.1:0", *self._flags],
+                stdout=subprocess.PIPE, stderr=log, text=True, preexec_fn=limit)
+        banner = self.process.stdout.readline()
+        if not banner.startswith("listening on "):
+            self.process.wait()
+            raise RuntimeError("the server did not start: " + self.log())
+        self.address = banner.split()[-1]
+        self.port = int(self.address.rsplit(":", 1)[1])
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        if self.running():
+            self.process.kill()
+        self.process.wait()
+        self.process.stdout.close()
+        self._own.cleanup()
+
+    def kill(self):
+        self.process.kill()
+        self.process.wait()
+        self.process.stdout.close()
+
+    def stop(self):
+        self.process.send_signal(signal.SIGTERM)
+        self.process.wait(60)
+        self.process.stdout.close()
+        return self.process.returncode
+
+    def running(self):
+        return self.process.poll() is None
+
+    def log(self):
+        with open(self.log_path) as log:
+            return log.read()
+
+    def resident(self):
+        """Bytes of memory in use."""
+        with open(f"/proc/{self.process.pid}/statm") as statm:
+            return int(statm.read().split()[1]) * resource.getpagesize()
+
+    def peak(self):
+        """The most bytes of memory it has used."""
+        with open(f"/proc/{self.process.pid}/status") as status:
+            for line in status:
+                if line.startswith("VmHWM:"):
+                    return int(line.split()[1]) * 1024
+        raise RuntimeError("no VmHWM")
+
+    def connect(self, **options):
+        return Client(self.address, **options)
+
+
+class Client:
+    def __init__(self, address, compression=None):
+        # A channel of its own connection: by default channels to one address share one.
+        options = [("grpc.use_local_subchannel_pool", 1), ("grpc.max_send_message_length", -1)]
+        self.channel = grpc.insecure_channel(address, options=options, compression=compression)
+        self.shapes = shapes_grpc.ShapeServiceStub(self.channel)
+        self.search = search_grpc.SearchServiceStub(self.channel)
+        self.collections = collections_grpc.CollectionServiceStub(self.channel)
+        self.admin = admin_grpc.AdminServiceStub(self.channel)
+        self.health = health_pb2_grpc.HealthStub(self.channel)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        self.channel.close()
+
+    def serving(self, service=""):
+        reply = self.health.Check(health_pb2.HealthCheckRequest(service=service), timeout=10)
+        return reply.status == health_pb2.HealthCheckResponse.SERVING
+
+    def count(self, timeout=30):
+        return self.shapes.CountShapes(shapes.CountShapesRequest(), timeout=timeout).count
+
+    def add(self, key, points, wait=True, timeout=120, **header):
+        return self.shapes.AddShape(upload(key, points, wait=wait, **header), timeout=timeout)
+
+    def state(self, key):
+        request = shapes.GetShapeRequest(shape=shapes.ShapeRef(key=key))
+        return self.shapes.GetShape(request, timeout=30).shape.state
+
+
+def ball(points=2_000, stretch=1.0):
+    """Points on an ellipsoid, evenly, as a list of (x, y, z)."""
+    golden = math.pi * (3.0 - math.sqrt(5.0))
+    cloud = []
+    for i in range(points):
+        z = 1.0 - 2.0 * (i + 0.5) / points
+        r = math.sqrt(1.0 - z * z)
+        cloud.append((stretch * r * math.cos(golden * i), r * math.sin(golden * i), z))
+    return cloud
+
+
+def pack(points):
+    return b"".join(struct.pack("<fff", *p) for p in points)
+
+
+def upload(key, points, wait=False, **header):
+    """The messages of an AddShape."""
+    yield shapes.AddShapeRequest(
+        header=shapes.AddShapeHeader(key=key, point_count=len(points), wait=wait, **header))
+    for first in range(0, len(points), CHUNK_POINTS):
+        xyz = pack(points[first:first + CHUNK_POINTS])
+        yield shapes.AddShapeRequest(chunk=types.PointChunk(xyz=xyz))
+
+
+def reason(error):
+    """Our name of an error; None without one."""
+    for key, value in error.trailing_metadata() or ():
+        if key == "shapedb-error":
+            return value
+    return None
+
+
+def eventually(condition, seconds=60):
+    until = time.monotonic() + seconds
+    while not condition():
+        if time.monotonic() > until:
+            return False
+        time.sleep(0.05)
+    return True
+
+
+def main():
+    sys.stdout.reconfigure(line_buffering=True)
+    unittest.main(verbosity=2)

@@ -1,0 +1,184 @@
+"""Attacks on memory, descriptors and threads."""
+
+import queue
+import socket
+import threading
+import time
+import unittest
+
+import grpc
+
+from attacker import (MIB, Client, Server, admin, ball, collections, eventually, main, reason, shapes,
+                      types)
+
+
+class CompressedMessages(unittest.TestCase):
+    def test_are_refused_without_being_inflated(self):
+        with Server() as server, server.connect(compression=grpc.Compression.Gzip) as client:
+            before = server.peak()
+            for algorithm in (grpc.Compression.Gzip, grpc.Compression.Deflate):
+                request = collections.CreateCollectionRequest(name="a", description="\0" * (256 * MIB))
+                with self.assertRaises(grpc.RpcError) as failure:
+                    client.collections.CreateCollection(request, timeout=60, compression=algorithm)
+                self.assertIn(failure.exception.code(),
+                              (grpc.StatusCode.UNIMPLEMENTED, grpc.StatusCode.RESOURCE_EXHAUSTED))
+            self.assertLess(server.peak() - before, 32 * MIB)
+            with server.connect() as plain:
+                self.assertEqual(plain.count(), 0)
+
+    def test_many_at_once_do_not_end_the_process(self):
+        with Server(memory=3 * 1024 * MIB) as server:
+            request = collections.CreateCollectionRequest(name="a", description="\0" * (64 * MIB))
+            clients = [server.connect(compression=grpc.Compression.Gzip) for _ in range(4)]
+            calls = [client.collections.CreateCollection.future(request, timeout=60) for client in clients * 2]
+            for call in calls:
+                self.assertIsNotNone(call.exception())
+            self.assertTrue(server.running(), server.log())
+            for client in clients:
+                client.channel.close()
+
+
+class Announcements(unittest.TestCase):
+    def test_of_many_points_take_no_memory(self):
+        with Server("--limits-max-points", "50000000", "--limits-max-upload-bytes", "1GiB", memory=4096 * MIB) as server:
+            with server.connect() as client:
+                done = threading.Event()
+
+                def announce(i):
+                    yield shapes.AddShapeRequest(
+                        header=shapes.AddShapeHeader(key=f"k{i}", point_count=50_000_000))
+                    yield shapes.AddShapeRequest(chunk=types.PointChunk(xyz=b"\0" * 12))
+                    done.wait(20)
+
+                # 36 GB, if announcements were believed.
+                calls = [client.shapes.AddShape.future(announce(i), timeout=30) for i in range(60)]
+                time.sleep(2)
+                self.assertLess(server.resident(), 500 * MIB)
+                self.assertEqual(client.count(), 0)
+                done.set()
+                for call in calls:
+                    self.assertEqual(call.exception().code(), grpc.StatusCode.INVALID_ARGUMENT)
+                self.assertTrue(server.running())
+
+
+class Connections(unittest.TestCase):
+    def open(self, server, count):
+        opened = []
+        for _ in range(count):
+            opened.append(socket.create_connection(("127.0.0.1", server.port)))
+        return opened
+
+    def test_beyond_the_limit_of_open_files_do_not_deafen_the_server(self):
+        with Server(open_files=80) as server:
+            idle = self.open(server, 300)
+            for connection in idle:
+                connection.close()
+            with server.connect() as client:
+                self.assertTrue(eventually(lambda: answers(client)), server.log())
+                self.assertTrue(client.serving())
+
+    def test_beyond_their_number_are_closed_at_once(self):
+        with Server("--limits-max-connections", "20") as server:
+            idle = self.open(server, 60)
+            closed = 0
+            for connection in idle:
+                connection.settimeout(0.5)
+                try:
+                    # The server of HTTP/2 speaks first: a connection that is served has its settings.
+                    closed += connection.recv(1) == b""
+                except ConnectionResetError:
+                    closed += 1
+                except socket.timeout:
+                    pass
+            self.assertEqual(closed, 40)
+            for connection in idle:
+                connection.close()
+            with server.connect() as client:
+                self.assertTrue(eventually(lambda: answers(client)), server.log())
+            self.assertIn("too many connections", server.log())
+
+    def test_that_say_nothing_are_closed(self):
+        with Server("--limits-max-connections", "5") as server:
+            idle = self.open(server, 5)
+            with server.connect() as client:
+                self.assertTrue(eventually(lambda: answers(client), 40), "mute clients keep their places")
+            for connection in idle:
+                connection.close()
+
+
+def answers(client):
+    try:
+        client.count(timeout=2)
+        return True
+    except grpc.RpcError:
+        return False
+
+
+class SlowUploads(unittest.TestCase):
+    def drip(self, point_every, stop):
+        yield shapes.AddShapeRequest(header=shapes.AddShapeHeader(key="slow", point_count=100_000))
+        while not stop.wait(point_every):
+            yield shapes.AddShapeRequest(chunk=types.PointChunk(xyz=b"\0" * 12))
+
+    def test_leave_places_for_everything_else(self):
+        with Server("--limits-max-uploads", "32") as server:
+            stop = threading.Event()
+            clients = [server.connect() for _ in range(6)]
+            calls = [client.shapes.AddShape.future(self.drip(0.5, stop), timeout=60)
+                     for client in clients for _ in range(25)]
+            time.sleep(2)
+            refused = [call for call in calls if call.done()]
+            self.assertEqual(len(refused), 6 * 25 - 32)
+            for call in refused:
+                self.assertEqual(call.exception().code(), grpc.StatusCode.RESOURCE_EXHAUSTED)
+                self.assertIn("places for uploads", call.exception().details())
+                self.assertEqual(reason(call.exception()), "queue_full")
+            with server.connect() as other:
+                self.assertEqual(other.count(timeout=5), 0)
+                self.assertEqual(other.admin.Stats(admin.StatsRequest(), timeout=5).collections, 1)
+            stop.set()
+            for client in clients:
+                client.channel.close()
+
+    def test_are_cut_off(self):
+        with Server("--limits-stall-seconds", "2", "--limits-min-bytes-per-second", "1000") as server:
+            with server.connect() as client:
+                stop = threading.Event()
+                began = time.monotonic()
+                with self.assertRaises(grpc.RpcError) as failure:
+                    client.shapes.AddShape(self.drip(0.1, stop), timeout=60)
+                stop.set()
+                self.assertEqual(failure.exception.code(), grpc.StatusCode.CANCELLED)
+                self.assertLess(time.monotonic() - began, 15)
+            self.assertTrue(eventually(lambda: "less than 1000 bytes per second" in server.log()), server.log())
+
+
+class Floods(unittest.TestCase):
+    def test_of_calls_are_refused_by_name_and_pass(self):
+        with Server() as server, server.connect() as busy:
+            busy.add("ball", ball())
+            watch = shapes.WatchIngestRequest(shape=shapes.ShapeRef(key="ball"))
+            failures = queue.Queue()
+
+            def flood():
+                with server.connect() as client:
+                    calls = [client.shapes.CountShapes.future(shapes.CountShapesRequest(), timeout=60)
+                             for _ in range(300)]
+                    for call in calls:
+                        if call.exception() is not None:
+                            failures.put(call.exception())
+
+            threads = [threading.Thread(target=flood) for _ in range(8)]
+            for thread in threads:
+                thread.start()
+            for thread in threads:
+                thread.join()
+            while not failures.empty():
+                failure = failures.get()
+                self.assertEqual(failure.code(), grpc.StatusCode.RESOURCE_EXHAUSTED, failure)
+            self.assertEqual(busy.count(), 1)
+            self.assertTrue(list(busy.shapes.WatchIngest(watch, timeout=10)))
+
+
+if __name__ == "__main__":
+    main()
