@@ -10,6 +10,7 @@
 #include "server/catalog/searches.h"
 #include "server/config/settings.h"
 #include "server/files/data_directory.h"
+#include "server/ingest/crash_marker.h"
 #include "server/rpc/grpc_server.h"
 #include "server/store/sqlite/sqlite_store.h"
 
@@ -18,6 +19,7 @@ namespace {
 
 constexpr const char* kTemporaryFolder = "tmp";
 constexpr const char* kRebuildJournal = "rebuild.journal";
+constexpr const char* kCrashMarker = "crash.marker";
 
 Result<std::unique_ptr<store::Store>> openStore(const config::ServerConfig& config) {
     RETURN_IF_ERROR(files::prepareDataDirectory(config.data));
@@ -28,7 +30,8 @@ Result<std::unique_ptr<store::Store>> openStore(const config::ServerConfig& conf
     return store::openSqliteStore(options);
 }
 
-catalog::CatalogOptions catalogOptions(const config::ServerConfig& config) {
+catalog::CatalogOptions catalogOptions(const config::ServerConfig& config,
+                                       const std::vector<store::Crash>& crashes) {
     catalog::CatalogOptions options;
     options.maxQueuedJobs = config.ingest.maxQueuedJobs;
     options.maxQueuedBytes = config.ingest.maxQueuedBytes;
@@ -37,6 +40,8 @@ catalog::CatalogOptions catalogOptions(const config::ServerConfig& config) {
     options.workers.maxAttempts = config.ingest.maxAttempts;
     options.rebuilds.threads = config::threadsOrProcessors(config.rebuild.threads);
     options.rebuilds.maxAttempts = config.ingest.maxAttempts;
+    options.workers.crashes = crashes;
+    options.rebuilds.crashes = crashes;
     options.rebuilds.journalPath = config.data + "/" + kRebuildJournal;
     return options;
 }
@@ -46,10 +51,11 @@ catalog::CatalogOptions catalogOptions(const config::ServerConfig& config) {
 /// In order of construction; destroyed in reverse.
 struct Daemon::Parts {
     Parts(const config::ServerConfig& configuration, telemetry::LoggerPtr logger,
-          ingest::SignaturePipeline pipeline, std::unique_ptr<store::Store> store)
+          ingest::SignaturePipeline pipeline, std::unique_ptr<store::Store> store,
+          const std::vector<store::Crash>& crashes)
         : config(configuration),
           log(std::move(logger)),
-          catalog(std::move(store), std::move(pipeline), log, catalogOptions(config)),
+          catalog(std::move(store), std::move(pipeline), log, catalogOptions(config, crashes)),
           admission(config.limits.maxUploadBytes, config.limits.maxUploads),
           runner(config::threadsOrProcessors(config.search.threads)),
           searches(catalog, runner, config.limits.maxK),
@@ -100,7 +106,13 @@ Result<std::unique_ptr<Daemon>> Daemon::start(const config::ServerConfig& config
                                               ingest::SignaturePipeline pipeline) {
     auto opened = openStore(config);
     RETURN_IF_ERROR(opened);
-    auto parts = std::make_unique<Parts>(config, std::move(log), std::move(pipeline), std::move(*opened));
+    const auto crashes = ingest::installCrashMarker(config.data + "/" + kCrashMarker);
+    RETURN_IF_ERROR(crashes);
+    for (const store::Crash& crash : *crashes) {
+        log->error("the last process crashed while it segmented a scan", {{"shape", crash.shapeId}});
+    }
+    auto parts =
+        std::make_unique<Parts>(config, std::move(log), std::move(pipeline), std::move(*opened), *crashes);
     std::unique_ptr<Daemon> daemon(new Daemon(std::move(parts)));
     RETURN_IF_ERROR(daemon->parts_->serve());
     return daemon;

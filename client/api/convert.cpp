@@ -52,6 +52,7 @@ const char* outcomeName(AddOutcome outcome) noexcept {
         case AddOutcome::kReplaced: return "replaced";
         case AddOutcome::kMetadataChanged: return "metadata changed";
         case AddOutcome::kUnchanged: return "unchanged";
+        case AddOutcome::kRetried: return "retried";
     }
     return "created";
 }
@@ -118,6 +119,7 @@ AddOutcome fromWire(v1::AddShapeResponse::Outcome from) {
         case v1::AddShapeResponse::OUTCOME_REPLACED: return AddOutcome::kReplaced;
         case v1::AddShapeResponse::OUTCOME_METADATA_CHANGED: return AddOutcome::kMetadataChanged;
         case v1::AddShapeResponse::OUTCOME_UNCHANGED: return AddOutcome::kUnchanged;
+        case v1::AddShapeResponse::OUTCOME_RETRIED: return AddOutcome::kRetried;
         default: return AddOutcome::kCreated;
     }
 }

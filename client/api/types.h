@@ -109,9 +109,10 @@ enum class AddOutcome {
     kReplaced,         ///< new points: segmented again
     kMetadataChanged,  ///< same points, new metadata
     kUnchanged,        ///< same points, same metadata: a repeated request
+    kRetried,          ///< same points of a shape that had failed: segmented again
 };
 
-/// "created", "replaced", "metadata changed" or "unchanged".
+/// "created", "replaced", "metadata changed", "unchanged" or "retried".
 [[nodiscard]] const char* outcomeName(AddOutcome outcome) noexcept;
 
 struct AddReply {

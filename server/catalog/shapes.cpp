@@ -109,6 +109,7 @@ Result<AddedShape> Catalog::put(const ShapeHeader& header, store::VerifiedScan s
             workers_.wake();
             refreshOrLog(shape, "new metadata is not searched yet");
             break;
+        case store::PutOutcome::kRetried: workers_.wake(); break;
         case store::PutOutcome::kMetadataChanged:
             refreshOrLog(shape, "new metadata is not searched yet");
             break;

@@ -1,7 +1,7 @@
-// Which scans a rebuild was segmenting when the process died, and how often.
+// Which scans a rebuild was segmenting when the process ended, how often, and how.
 //
-// Ingest jobs count their attempts in the store, but a rebuild has no jobs: without this file, a
-// scan that crashes the server would do so again at every start.
+// Ingest jobs are counted in the store, but a rebuild has no jobs: without this file, a scan that crashes
+// the server would do so again at every start.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,9 @@
 #include <mutex>
 #include <string>
 #include <utility>
+#include <vector>
 
+#include "server/store/quarantine.h"
 #include "server/store/store.h"
 #include "server/telemetry/logger.h"
 
@@ -19,11 +21,12 @@ namespace shapedb::ingest {
 /// written, that is logged and the rebuild continues without it. Thread-safe.
 class CrashJournal {
   public:
-    /// Reads what a dead process left. With an empty path everything stays in memory.
-    CrashJournal(std::string path, telemetry::LoggerPtr log);
+    /// Reads what a dead process left; `crashes` tells which scans were to blame. With an empty path
+    /// everything stays in memory.
+    CrashJournal(std::string path, const std::vector<store::Crash>& crashes, telemetry::LoggerPtr log);
 
-    /// How often the process died while these points were segmented.
-    [[nodiscard]] int deaths(const store::Shape& shape) const;
+    /// How often the process ended while these points were segmented.
+    [[nodiscard]] store::Deaths deaths(const store::Shape& shape) const;
 
     /// The scan counts as being segmented until this is destroyed.
     class Entry {
@@ -46,11 +49,11 @@ class CrashJournal {
 
   private:
     struct State {
-        int deaths = 0;
+        store::Deaths deaths;
         bool inHand = false;
     };
 
-    void read();
+    void read(const std::vector<store::Crash>& crashes);
     void write();
 
     std::string path_;

@@ -6,6 +6,7 @@
 
 #include "core/base/return_if_error.h"
 #include "server/ingest/background_thread.h"
+#include "server/ingest/crash_marker.h"
 #include "server/ingest/quarantine_log.h"
 #include "server/store/parameters_codec.h"
 #include "server/store/quarantine.h"
@@ -46,7 +47,7 @@ RebuildDriver::RebuildDriver(store::Store& store, index::CollectionIndex& index,
       pipeline_(std::move(pipeline)),
       log_(std::move(log)),
       options_(std::move(options)),
-      journal_(options_.journalPath, log_) {}
+      journal_(options_.journalPath, options_.crashes, log_) {}
 
 RebuildDriver::~RebuildDriver() { stop(); }
 
@@ -318,19 +319,20 @@ void RebuildDriver::rebuildOne(const ActivePtr& active, std::unique_lock<std::mu
 
 /// A scan that was being segmented when the process died runs alone; after too many deaths it runs no more.
 Result<void> RebuildDriver::isolated(Active& active, const store::Shape& shape) {
-    const int deaths = journal_.deaths(shape);
+    const store::Deaths deaths = journal_.deaths(shape);
     if (store::isQuarantined(deaths, options_.maxAttempts)) {
-        logQuarantine(*log_, shape, deaths);
-        const auto stored = store_.putRebuildFailure(active.rebuild.id, shape.id, shape.pointsVersion,
-                                                     store::quarantineError(deaths));
+        const Error why = store::quarantineError(deaths);
+        logQuarantine(*log_, shape, why);
+        const auto stored = store_.putRebuildFailure(active.rebuild.id, shape.id, shape.pointsVersion, why);
         // Made only to be acquitted, which takes the deaths off the record.
         CrashJournal::Entry entry(journal_, shape);
         if (stored) entry.acquit();
         return stored;
     }
-    const CrashIsolation::Pass pass(isolation_, deaths > 0, active.cancel);
+    const CrashIsolation::Pass pass(isolation_, store::isSuspect(deaths), active.cancel);
     if (!pass.admitted()) return {};
     CrashJournal::Entry entry(journal_, shape);
+    const InHand inHand(shape.id, shape.pointsVersion);
     const Result<void> stored = process(active, shape);
     if (stored && !active.cancel) entry.acquit();
     return stored;
@@ -352,6 +354,9 @@ Result<void> RebuildDriver::process(Active& active, const store::Shape& shape) {
         case PipelineOutcome::Kind::kScanFailed: break;
     }
     if (made.why.code == ErrorCode::kNotFound) return {};  // deleted meanwhile
+    auto fields = fieldsOf(active.rebuild, made.why);
+    fields.push_back({"key", shape.key});
+    log_->warn("scan cannot be segmented again", fields);
     return store_.putRebuildFailure(active.rebuild.id, shape.id, shape.pointsVersion, made.why);
 }
 

@@ -37,6 +37,7 @@ struct RebuildOptions {
     /// While uploads are being segmented, each rebuild thread waits this long before its next
     /// shape: uploads come first, and the rebuild still ends.
     std::chrono::milliseconds yield{100};
+    std::vector<store::Crash> crashes;  ///< of the last process
     /// How long a thread waits after an error of the store.
     std::chrono::milliseconds backOff{1'000};
 };

@@ -6,7 +6,9 @@
 
 #include "core/base/return_if_error.h"
 #include "server/ingest/background_thread.h"
+#include "server/ingest/crash_marker.h"
 #include "server/ingest/quarantine_log.h"
+#include "server/store/quarantine.h"
 
 namespace shapedb::ingest {
 namespace {
@@ -34,15 +36,16 @@ WorkerPool::WorkerPool(store::Store& store, index::CollectionIndex& index, Progr
       isolation_(isolation),
       pipeline_(std::move(pipeline)),
       log_(std::move(log)),
-      options_(options) {}
+      options_(std::move(options)) {}
 
 WorkerPool::~WorkerPool() { stop(); }
 
 Result<void> WorkerPool::recover() {
-    const auto quarantined = store_.recoverJobs(options_.maxAttempts);
+    // Those of a restore are of another server: it did not die of them.
+    const auto quarantined = store_.recoverJobs(options_.maxAttempts, std::exchange(options_.crashes, {}));
     RETURN_IF_ERROR(quarantined);
     for (const store::Shape& shape : *quarantined) {
-        logQuarantine(*log_, shape, options_.maxAttempts);
+        if (shape.failure) logQuarantine(*log_, shape, *shape.failure);
         stopSearching(shape);
         board_.settled(shape.id);
     }
@@ -223,7 +226,8 @@ std::shared_ptr<WorkerPool::Running> WorkerPool::next(std::optional<CrashIsolati
         }
         const auto job = claim(lock);
         --claiming_;
-        const bool suspect = job && *job && (*job)->attempts > 1;
+        // This attempt is counted already.
+        const bool suspect = job && *job && store::isSuspect({(*job)->attempts - 1, (*job)->stops});
         if (job && !suspect) probing_ = false;
         changed_.notify_all();
         if (!suspect) pass.reset();
@@ -274,6 +278,7 @@ WorkerPool::Outcome WorkerPool::attempt(Running& running) {
         }();
         return gone ? giveUp(job, collection.error()) : Outcome::kStoreFailed;
     }
+    const InHand inHand(job.shapeId, job.pointsVersion);
     RunContext context;
     context.cancel = &running.cancel;
     context.progress = [this, &job](const char* stage, std::uint64_t done, std::uint64_t total) {

@@ -27,8 +27,9 @@
 namespace shapedb::ingest {
 
 struct WorkerOptions {
-    int threads = 1;      ///< at least 1
-    int maxAttempts = 2;  ///< as Store::recoverJobs
+    int threads = 1;                    ///< at least 1
+    int maxAttempts = 2;                ///< as Store::recoverJobs
+    std::vector<store::Crash> crashes;  ///< of the last process
     /// How long a worker waits after an error of the store.
     std::chrono::milliseconds backOff{1'000};
 };

@@ -23,6 +23,7 @@ pb::AddShapeResponse::Outcome outcomeOf(store::PutOutcome outcome) {
         case store::PutOutcome::kReplaced: return pb::AddShapeResponse::OUTCOME_REPLACED;
         case store::PutOutcome::kMetadataChanged: return pb::AddShapeResponse::OUTCOME_METADATA_CHANGED;
         case store::PutOutcome::kUnchanged: return pb::AddShapeResponse::OUTCOME_UNCHANGED;
+        case store::PutOutcome::kRetried: return pb::AddShapeResponse::OUTCOME_RETRIED;
     }
     return pb::AddShapeResponse::OUTCOME_UNSPECIFIED;
 }

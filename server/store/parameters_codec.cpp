@@ -199,4 +199,12 @@ Result<ShapeParameters> decodeParameters(const std::string& text) {
     }
 }
 
+bool sameProfile(const std::string& a, const std::string& b) {
+    if (a == b) return true;
+    const auto first = decodeParameters(a);
+    const auto second = decodeParameters(b);
+    return first && second && first->profile == second->profile &&
+           first->signature.attributes == second->signature.attributes;
+}
+
 }  // namespace shapedb::store

@@ -19,4 +19,8 @@ namespace shapedb::store {
 /// repeated key, wrong type, value out of range (names the field).
 [[nodiscard]] Result<ShapeParameters> decodeParameters(const std::string& text);
 
+/// Whether signatures made with one can be searched among those made with the other: the same text, or the
+/// same profile and kind of signature.
+[[nodiscard]] bool sameProfile(const std::string& a, const std::string& b);
+
 }  // namespace shapedb::store

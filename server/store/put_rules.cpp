@@ -17,9 +17,12 @@ Result<PutOutcome> decidePut(const PutRequest& request, const std::string& colle
                                                    " already exists in collection " + quoted(collectionName) +
                                                    " with other points or metadata");
     }
-    RETURN_IF_ERROR(
-        requireVersion(request.key, existing != nullptr ? existing->version : 0, request.expectedVersion));
+    const std::int64_t version = existing != nullptr ? existing->version : 0;
+    // Done before, and the client did not hear of it.
+    const bool repeated = identical && request.expectedVersion == version - 1;
+    if (!repeated) RETURN_IF_ERROR(requireVersion(request.key, version, request.expectedVersion));
     if (existing == nullptr) return PutOutcome::kCreated;
+    if (samePoints && existing->state == ShapeState::kFailed) return PutOutcome::kRetried;
     if (identical) return PutOutcome::kUnchanged;
     return samePoints ? PutOutcome::kMetadataChanged : PutOutcome::kReplaced;
 }
@@ -33,18 +36,17 @@ Result<void> requireVersion(const std::string& key, std::int64_t actual,
                                                  ", not the expected version " + std::to_string(*expected));
 }
 
-Result<void> requireRoom(const PutRequest& request, const QueueDepth& others) {
-    const std::uint64_t bytes = request.scan.bytes();
-    if (request.maxQueuedJobs > 0 && others.jobs >= request.maxQueuedJobs) {
+Result<void> requireRoom(std::uint64_t bytes, std::uint64_t maxQueuedJobs, std::uint64_t maxQueuedBytes,
+                         const QueueDepth& others) {
+    if (maxQueuedJobs > 0 && others.jobs >= maxQueuedJobs) {
         return fail(ErrorCode::kQueueFull, "the ingest queue is full (" + std::to_string(others.jobs) +
-                                               " of " + std::to_string(request.maxQueuedJobs) +
+                                               " of " + std::to_string(maxQueuedJobs) +
                                                " scans); retry later");
     }
-    if (request.maxQueuedBytes > 0 && others.bytes + bytes > request.maxQueuedBytes) {
+    if (maxQueuedBytes > 0 && others.bytes + bytes > maxQueuedBytes) {
         return fail(ErrorCode::kQueueFull, "the ingest queue has no room for " + std::to_string(bytes) +
                                                " more bytes (" + std::to_string(others.bytes) + " of " +
-                                               std::to_string(request.maxQueuedBytes) +
-                                               " bytes taken); retry later");
+                                               std::to_string(maxQueuedBytes) + " bytes taken); retry later");
     }
     return {};
 }

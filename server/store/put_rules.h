@@ -21,9 +21,10 @@ namespace shapedb::store {
 [[nodiscard]] Result<void> requireVersion(const std::string& key, std::int64_t actual,
                                           std::optional<std::int64_t> expected);
 
-/// Whether the scan's job fits into the queue beside `others`: all jobs but the one of the same shape,
-/// which it replaces. Errors: kQueueFull.
-[[nodiscard]] Result<void> requireRoom(const PutRequest& request, const QueueDepth& others);
+/// Whether the job of a scan of `bytes` fits into the queue beside `others`: all jobs but the one of the same
+/// shape, which it replaces. Bounds as in PutRequest. Errors: kQueueFull.
+[[nodiscard]] Result<void> requireRoom(std::uint64_t bytes, std::uint64_t maxQueuedJobs,
+                                       std::uint64_t maxQueuedBytes, const QueueDepth& others);
 
 /// kNotFound for a key.
 [[nodiscard]] Error noSuchShape(const std::string& collectionName, const std::string& key);

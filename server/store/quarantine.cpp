@@ -4,13 +4,17 @@
 
 namespace shapedb::store {
 
-bool isQuarantined(std::int64_t attempts, int maxAttempts) { return attempts >= maxAttempts; }
+bool isQuarantined(const Deaths& deaths, int maxAttempts) {
+    return deaths.crashes >= maxAttempts || deaths.stops >= kMostStops;
+}
 
-Error quarantineError(std::int64_t attempts) {
+Error quarantineError(const Deaths& deaths) {
+    const std::string what =
+        deaths.crashes > 0
+            ? "segmenting this scan crashed the server " + std::to_string(deaths.crashes) + " times"
+            : "the server was ended " + std::to_string(deaths.stops) + " times while it segmented this scan";
     return {ErrorCode::kInternal,
-            "the server stopped " + std::to_string(attempts) +
-                " times while it segmented this scan; it is quarantined. Replace its points, or rebuild "
-                "the collection, to try again"};
+            what + "; it is quarantined. Send it again, retry it or replace its points to try again"};
 }
 
 }  // namespace shapedb::store

@@ -1,5 +1,6 @@
-// Scans that bring the server down are not segmented for ever: after several deaths of the process a
-// scan is quarantined, which means failed until its points are replaced or its collection is rebuilt.
+// Scans that bring the server down are not segmented for ever: after several crashes a scan is quarantined,
+// which means failed until it is sent again, retried or replaced. A process that was killed proves nothing
+// against the scans it had in hand, unless that happens over and over.
 #pragma once
 
 #include <cstdint>
@@ -8,10 +9,22 @@
 
 namespace shapedb::store {
 
-/// Whether a scan that the process died over `attempts` times is tried no more.
-[[nodiscard]] bool isQuarantined(std::int64_t attempts, int maxAttempts);
+/// How the process ended while a scan was being segmented.
+struct Deaths {
+    std::int64_t crashes = 0;  ///< of the thread that segmented it
+    std::int64_t stops = 0;    ///< for another reason: a kill, a power failure, a crash elsewhere
+};
+
+/// So many stops are no accident: the scan may exhaust the machine's memory each time.
+constexpr std::int64_t kMostStops = 20;
+
+/// Whether a scan is segmented alone, since it may end the process.
+[[nodiscard]] inline bool isSuspect(const Deaths& deaths) { return deaths.crashes + deaths.stops > 0; }
+
+/// Whether a scan is tried no more. `maxAttempts`: crashes.
+[[nodiscard]] bool isQuarantined(const Deaths& deaths, int maxAttempts);
 
 /// Why its shape is failed: kInternal.
-[[nodiscard]] Error quarantineError(std::int64_t attempts);
+[[nodiscard]] Error quarantineError(const Deaths& deaths);
 
 }  // namespace shapedb::store

@@ -75,8 +75,8 @@ struct PutRequest {
     std::int64_t collectionId = 0;
     std::string key;
     PutMode mode = PutMode::kUpsert;
-    /// When set, the shape must have this version now; 0: the key must be free. Holds for repeated
-    /// requests too: a client that lost the reply reads the shape and compares.
+    /// When set, the shape must have this version now; 0: the key must be free. A repeated request whose
+    /// reply was lost is recognised: the shape is one version further and as requested.
     std::optional<std::int64_t> expectedVersion;
     Metadata metadata;
     /// Bounds of the job queue (queued and running) with this scan in it, checked in the same
@@ -91,6 +91,7 @@ enum class PutOutcome {
     kReplaced,         ///< other points, job queued
     kMetadataChanged,  ///< same points, other metadata: no job
     kUnchanged,        ///< same points and metadata, a repeated request: nothing written
+    kRetried,          ///< same points of a shape that had failed, job queued
 };
 
 struct PutResult {
@@ -113,8 +114,15 @@ struct Job {
     std::int64_t collectionId = 0;
     std::int64_t pointsVersion = 0;  ///< of the shape, when the job was queued
     std::int64_t generation = 0;     ///< of the collection, when the job was claimed
-    int attempts = 0;                ///< including this one
+    int attempts = 0;                ///< including this one, not counting `stops`
+    int stops = 0;                   ///< as Deaths::stops (quarantine.h)
     std::uint64_t pointBytes = 0;    ///< uncompressed
+};
+
+/// A scan whose segmentation crashed the process.
+struct Crash {
+    std::int64_t shapeId = 0;
+    std::int64_t pointsVersion = 0;
 };
 
 struct QueueDepth {
@@ -196,8 +204,8 @@ class Store {
 
     /// Stores a scan and queues its job in one transaction; durable when it returns.
     ///
-    /// The same checksum and metadata as stored: kUnchanged, also in insert-only mode and for a
-    /// failed shape. New metadata alone raise the version and leave state, job and signature alone.
+    /// The same checksum and metadata as stored: kUnchanged, also in insert-only mode. A failed shape is
+    /// tried again: kRetried. New metadata alone raise the version and leave state, job and signature alone.
     /// New points make the shape pending and replace its job; the old signature serves until
     /// finishJob replaces it or failJob removes it.
     ///
@@ -233,8 +241,8 @@ class Store {
     // generation (a rebuild has finished meanwhile) is dropped and its job is queued again as if it
     // had not been tried. finishJob looks at the generation of the signature, failJob at the job's.
 
-    /// The oldest queued job, now marked running; empty when there is none. A released job keeps its
-    /// place.
+    /// The oldest queued job of those that were stopped least often, now marked running; empty when there is
+    /// none. A released job keeps its place.
     [[nodiscard]] virtual Result<std::optional<Job>> claimJob() = 0;
     /// Stores the signature, marks the shape ready and removes the job, in one transaction. Returns
     /// the shape as it is now; empty when the result was dropped because the shape was deleted, its
@@ -250,10 +258,17 @@ class Store {
     /// Puts a claimed job back as if it had not been tried. No effect when the claim is no longer
     /// valid.
     [[nodiscard]] virtual Result<void> releaseJob(const Job& job) = 0;
-    /// At start: queues the running jobs of a dead process again, but quarantines those tried
-    /// `maxAttempts` times or more (as failJob, kInternal) and returns their shapes. Not while workers
-    /// hold jobs.
-    [[nodiscard]] virtual Result<std::vector<Shape>> recoverJobs(int maxAttempts) = 0;
+    /// At start: queues the running jobs of a dead process again. Those in `crashes` count as tried, the
+    /// others as stopped, and run after all other jobs. The shapes of those that isQuarantined (quarantine.h)
+    /// are failed (as failJob, kInternal) and returned. Not while workers hold jobs.
+    [[nodiscard]] virtual Result<std::vector<Shape>> recoverJobs(int maxAttempts,
+                                                                 const std::vector<Crash>& crashes) = 0;
+    /// Makes failed shapes pending again and queues their jobs, in one transaction, as far as there is room
+    /// in the queue (bounds as in PutRequest); returns how many. Ids of shapes that are not failed or not
+    /// there are passed over. Errors: kQueueFull (no room for the first).
+    [[nodiscard]] virtual Result<std::uint64_t> retryShapes(const std::vector<std::int64_t>& shapeIds,
+                                                            std::uint64_t maxQueuedJobs,
+                                                            std::uint64_t maxQueuedBytes) = 0;
     [[nodiscard]] virtual Result<QueueDepth> queueDepth() = 0;
 
     // Index ------------------------------------------------------------------------
@@ -294,7 +309,8 @@ class Store {
     /// If every shape without a job has a result: makes the target generation the serving one, sets
     /// shape states and the collection's parameters and deletes the old signatures in one
     /// transaction, and returns true. False when results are missing. A shape with a job stays
-    /// pending and serves nothing until that job has run with the new parameters.
+    /// pending and serves nothing until that job has run with the new parameters. A ready shape that could
+    /// not be segmented again keeps its signature and stays ready, if the profile is the same.
     [[nodiscard]] virtual Result<bool> finishRebuild(std::int64_t rebuildId) = 0;
     /// Ends a running rebuild as kCancelled or kFailed and deletes its results.
     /// Errors: kInvalidArgument (another state).

@@ -205,26 +205,33 @@ TEST_F(Lifecycle, KillDuringIngestLosesNothingAcknowledged) {
 }
 
 // To the server this scan looks guilty: it died twice while segmenting it.
-TEST_F(Lifecycle, QuarantinesAScanThatCrashesTheServerTwice) {
+TEST_F(Lifecycle, KillsFromOutsideFailNoScan) {
     const std::vector<std::string> oneWorker = {"--ingest-threads", "1", "--limits-max-points", "1000000"};
     start(oneWorker);
-    ASSERT_TRUE(add("poison", slowScan(5, 250'000)));
-    ASSERT_TRUE(add("innocent", dumbbell()));
-    for (int death = 0; death < 2; ++death) {
-        ASSERT_TRUE(eventually([&] { return beingSegmented("poison"); })) << death;
-        EXPECT_EQ(stateOf("innocent"), pb::SHAPE_STATE_PENDING);
+    ASSERT_TRUE(add("large", slowScan(5, 250'000)));
+    ASSERT_TRUE(add("small", dumbbell()));
+    ASSERT_TRUE(eventually([&] { return beingSegmented("large"); }));
+    server->kill();
+    start(oneWorker);
+    EXPECT_TRUE(eventually([&] { return stateOf("small") == pb::SHAPE_STATE_READY; }))
+        << "the one that was not in hand comes first";
+    for (int kill = 0; kill < 3; ++kill) {
+        ASSERT_TRUE(eventually([&] { return beingSegmented("large"); })) << kill;
         server->kill();
         start(oneWorker);
     }
-    const auto poison = getShape(*client, "", "poison");
-    EXPECT_EQ(poison.value.state(), pb::SHAPE_STATE_FAILED);
-    EXPECT_NE(poison.value.failure().message().find("2 times"), std::string::npos)
-        << poison.value.ShortDebugString();
-    EXPECT_TRUE(eventually([&] { return stateOf("innocent") == pb::SHAPE_STATE_READY; }))
-        << "everything else still works";
-    // New points under the same key are tried again.
-    const auto replaced = addAndWait(*client, "", "poison", dumbbell(2));
-    EXPECT_EQ(replaced.value.shape().state(), pb::SHAPE_STATE_READY) << replaced;
+    EXPECT_TRUE(eventually([&] { return stateOf("large") == pb::SHAPE_STATE_READY; }));
+}
+
+TEST_F(Lifecycle, AFailedScanIsTriedAgainWhenItIsSentAgain) {
+    start({});
+    ASSERT_TRUE(createCollection(*client, "shells").ok());
+    const Scan hollow = openSheet();
+    const auto failed = addAndWait(*client, "shells", "k", hollow);
+    ASSERT_EQ(failed.value.shape().state(), pb::SHAPE_STATE_FAILED) << failed;
+    const auto again = addAndWait(*client, "shells", "k", hollow);
+    EXPECT_EQ(again.value.outcome(), pb::AddShapeResponse::OUTCOME_RETRIED) << again;
+    EXPECT_EQ(again.value.shape().state(), pb::SHAPE_STATE_FAILED);
 }
 
 TEST_F(Lifecycle, FullQueueRefusesWithAHint) {
@@ -317,23 +324,23 @@ TEST_F(Lifecycle, RestartContinuesARebuild) {
 }
 
 // A rebuild has no jobs, but a scan that crashes the server must not do so at every start.
-TEST_F(Lifecycle, QuarantinesAScanThatCrashesRebuildsTwice) {
+TEST_F(Lifecycle, KillsDuringARebuildTakeNoShapeOutOfService) {
     const std::vector<std::string> arguments = {"--limits-max-points", "1000000"};
     start(arguments);
-    const auto poison = addAndWait(*client, "", "poison", slowScan(5, 150'000));
-    ASSERT_TRUE(poison.ok()) << poison;
+    const auto large = addAndWait(*client, "", "large", slowScan(5, 150'000));
+    ASSERT_TRUE(large.ok()) << large;
     for (int i = 0; i < 3; ++i) {
         ASSERT_TRUE(addAndWait(*client, "", std::to_string(i), dumbbell(static_cast<std::uint64_t>(i))).ok());
     }
     pb::RebuildRequest request;
     request.set_collection("default");
     request.set_detach(true);
-    for (int death = 0; death < 2; ++death) {
+    for (int kill = 0; kill < 3; ++kill) {
         CallContext context;
         const auto reader = client->admin->Rebuild(&context, request);
         ASSERT_TRUE(testing::drain(context, *reader).ok());
         const std::string inHand =
-            std::to_string(poison.value.shape().id()) + " 1 " + std::to_string(death) + " 1";
+            std::to_string(large.value.shape().id()) + " 1 0 " + std::to_string(kill) + " 1";
         ASSERT_TRUE(eventually([&] {
             return readFile(directory.path() + "/data/rebuild.journal").find(inHand) != std::string::npos;
         }));
@@ -345,8 +352,8 @@ TEST_F(Lifecycle, QuarantinesAScanThatCrashesRebuildsTwice) {
     const auto reader = client->admin->Rebuild(&context, request);
     const auto followed = testing::drain(context, *reader);
     ASSERT_TRUE(followed.ok()) << followed;
-    EXPECT_NE(server->log().find("scan set aside"), std::string::npos);
-    EXPECT_EQ(stateOf("0"), pb::SHAPE_STATE_READY);
+    EXPECT_EQ(server->log().find("scan set aside"), std::string::npos);
+    EXPECT_EQ(stateOf("large"), pb::SHAPE_STATE_READY);
 }
 
 TEST_F(Lifecycle, StalledUploadIsCutOff) {

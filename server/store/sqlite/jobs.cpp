@@ -1,9 +1,22 @@
 // The job queue.
+#include <algorithm>
+
+#include "server/store/put_rules.h"
 #include "server/store/quarantine.h"
 #include "server/store/sqlite/rows.h"
 #include "server/store/sqlite/sqlite_store_impl.h"
 
 namespace shapedb::store {
+
+namespace {
+
+bool contains(const std::vector<Crash>& crashes, std::int64_t shapeId, std::int64_t pointsVersion) {
+    return std::any_of(crashes.begin(), crashes.end(), [&](const Crash& crash) {
+        return crash.shapeId == shapeId && crash.pointsVersion == pointsVersion;
+    });
+}
+
+}  // namespace
 
 bool SqliteStore::jobIsCurrent(Connection& connection, const Job& job, std::int64_t generation) {
     std::int64_t serving = 0;
@@ -46,6 +59,7 @@ Result<std::optional<Job>> SqliteStore::claimJob() {
             job->attempts = static_cast<int>(query.integer(4)) + 1;
             job->pointBytes = static_cast<std::uint64_t>(query.integer(5));
             job->generation = query.integer(6);
+            job->stops = static_cast<int>(query.integer(7));
         }
         Query(connection, sql::kStartJob, job->id).run();
         return job;
@@ -79,26 +93,66 @@ Result<void> SqliteStore::releaseJob(const Job& job) {
     });
 }
 
-Result<std::vector<Shape>> SqliteStore::recoverJobs(int maxAttempts) {
+Result<std::vector<Shape>> SqliteStore::recoverJobs(int maxAttempts, const std::vector<Crash>& crashes) {
     return write("recover the jobs", [&](Connection& connection) {
         struct Lost {
             std::int64_t shapeId;
-            std::int64_t attempts;
+            Deaths deaths;
         };
         // All first, because markFailed deletes from the table that is read here.
         std::vector<Lost> lost;
         {
             Query query(connection, sql::kRunningJobs);
-            while (query.step()) lost.push_back({query.integer(0), query.integer(1)});
+            while (query.step()) {
+                Lost job{query.integer(0), {query.integer(2), query.integer(3)}};
+                if (!contains(crashes, job.shapeId, query.integer(1))) {
+                    --job.deaths.crashes;
+                    ++job.deaths.stops;
+                }
+                lost.push_back(job);
+            }
         }
         std::vector<Shape> quarantined;
         for (const Lost& job : lost) {
-            if (!isQuarantined(job.attempts, maxAttempts)) continue;
-            if (auto shape = markFailed(connection, job.shapeId, quarantineError(job.attempts)))
+            if (!isQuarantined(job.deaths, maxAttempts)) {
+                Query(connection, sql::kRequeueJob, job.shapeId, job.deaths.crashes, job.deaths.stops).run();
+            } else if (auto shape = markFailed(connection, job.shapeId, quarantineError(job.deaths))) {
                 quarantined.push_back(std::move(*shape));
+            }
         }
-        Query(connection, sql::kRequeueRunning).run();
         return quarantined;
+    });
+}
+
+void SqliteStore::queueAgain(Connection& connection, std::int64_t shapeId, std::int64_t pointsVersion,
+                             std::uint64_t bytes) {
+    Query(connection, sql::kSetPending, shapeId, now()).run();
+    // A running rebuild leaves shapes with a job to the job.
+    Query(connection, sql::kDeleteSignatures, shapeId).run();
+    Query(connection, sql::kDeleteRebuildFailuresOfShape, shapeId).run();
+    Query(connection, sql::kInsertJob, shapeId, pointsVersion, bytes, now()).run();
+}
+
+Result<std::uint64_t> SqliteStore::retryShapes(const std::vector<std::int64_t>& shapeIds,
+                                               std::uint64_t maxQueuedJobs, std::uint64_t maxQueuedBytes) {
+    return write("retry the shapes", [&](Connection& connection) {
+        std::uint64_t queued = 0;
+        for (const std::int64_t shapeId : shapeIds) {
+            std::int64_t pointsVersion = 0;
+            std::uint64_t bytes = 0;
+            {
+                Query query(connection, sql::kFailedShape, shapeId);
+                if (!query.step()) continue;
+                pointsVersion = query.integer(0);
+                bytes = static_cast<std::uint64_t>(query.integer(1));
+            }
+            const auto room = requireRoom(bytes, maxQueuedJobs, maxQueuedBytes, readTally(connection));
+            if (!room && queued == 0) throw Failure(room.error());
+            if (!room) break;
+            queueAgain(connection, shapeId, pointsVersion, bytes);
+            ++queued;
+        }
+        return queued;
     });
 }
 

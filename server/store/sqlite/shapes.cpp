@@ -51,7 +51,8 @@ BlobView view(const Checksum& checksum) { return {checksum.data(), checksum.size
 void SqliteStore::queueJob(Connection& connection, const PutRequest& request, std::int64_t shapeId,
                            std::int64_t pointsVersion) {
     // In the transaction of the upload, so that two cannot take the same last place.
-    orRaise(requireRoom(request, readTally(connection)));
+    orRaise(requireRoom(request.scan.bytes(), request.maxQueuedJobs, request.maxQueuedBytes,
+                        readTally(connection)));
     Query(connection, sql::kInsertJob, shapeId, pointsVersion, request.scan.bytes(), now()).run();
 }
 
@@ -72,6 +73,14 @@ PutResult SqliteStore::changeMetadata(Connection& connection, const PutRequest& 
     replaceMetadata(connection, existing, request.metadata);
     Query(connection, sql::kRaiseVersion, existing.id, now()).run();
     return {PutOutcome::kMetadataChanged, *findShapeById(connection, existing.id)};
+}
+
+PutResult SqliteStore::retryShape(Connection& connection, const PutRequest& request, const Shape& existing) {
+    if (existing.metadata != request.metadata) changeMetadata(connection, request, existing);
+    orRaise(requireRoom(request.scan.bytes(), request.maxQueuedJobs, request.maxQueuedBytes,
+                        readTally(connection)));
+    queueAgain(connection, existing.id, existing.pointsVersion, request.scan.bytes());
+    return {PutOutcome::kRetried, *findShapeById(connection, existing.id)};
 }
 
 PutResult SqliteStore::replacePoints(Connection& connection, const PutRequest& request,
@@ -106,6 +115,7 @@ Result<PutResult> SqliteStore::putShape(const PutRequest& request) {
             case PutOutcome::kCreated: return insertShape(connection, request, *encoding);
             case PutOutcome::kUnchanged: return {PutOutcome::kUnchanged, *existing};
             case PutOutcome::kMetadataChanged: return changeMetadata(connection, request, *existing);
+            case PutOutcome::kRetried: return retryShape(connection, request, *existing);
             case PutOutcome::kReplaced: break;
         }
         return replacePoints(connection, request, *encoding, *existing);

@@ -48,7 +48,9 @@ class SqliteStore final : public Store {
     Result<std::optional<Shape>> finishJob(const Job& job, const SignatureRow& signature) override;
     Result<std::optional<Shape>> failJob(const Job& job, const Error& why) override;
     Result<void> releaseJob(const Job& job) override;
-    Result<std::vector<Shape>> recoverJobs(int maxAttempts) override;
+    Result<std::vector<Shape>> recoverJobs(int maxAttempts, const std::vector<Crash>& crashes) override;
+    Result<std::uint64_t> retryShapes(const std::vector<std::int64_t>& shapeIds, std::uint64_t maxQueuedJobs,
+                                      std::uint64_t maxQueuedBytes) override;
     Result<QueueDepth> queueDepth() override;
 
     Result<std::vector<IndexRow>> loadIndex(std::int64_t collectionId, std::int64_t afterId,
@@ -113,11 +115,15 @@ class SqliteStore final : public Store {
 
     PutResult insertShape(Connection& connection, const PutRequest& request, const PointEncoding& encoding);
     PutResult changeMetadata(Connection& connection, const PutRequest& request, const Shape& existing);
+    PutResult retryShape(Connection& connection, const PutRequest& request, const Shape& existing);
     PutResult replacePoints(Connection& connection, const PutRequest& request, const PointEncoding& encoding,
                             const Shape& existing);
     void queueJob(Connection& connection, const PutRequest& request, std::int64_t shapeId,
                   std::int64_t pointsVersion);
     std::optional<Shape> markFailed(Connection& connection, std::int64_t shapeId, const Error& why);
+    /// Makes a failed shape pending and queues its job.
+    void queueAgain(Connection& connection, std::int64_t shapeId, std::int64_t pointsVersion,
+                    std::uint64_t bytes);
     bool jobIsCurrent(Connection& connection, const Job& job, std::int64_t generation);
 
     SqliteOptions options_;

@@ -51,6 +51,7 @@ class Driver : public ::testing::Test {
         options.backOff = 5ms;
         options.yield = 1ms;
         options.journalPath = journal;
+        options.crashes = crashes;
         driver = std::make_unique<RebuildDriver>(store, index, *pool, isolation, std::move(describe), log,
                                                  options);
         EXPECT_TRUE(driver->start());
@@ -119,6 +120,7 @@ class Driver : public ::testing::Test {
     std::unique_ptr<WorkerPool> pool;
     std::unique_ptr<RebuildDriver> driver;
     std::string journal;
+    std::vector<store::Crash> crashes;
     std::atomic<bool> closed{false};
     std::atomic<int> described{0};
     std::atomic<int> freeScans{0};
@@ -161,8 +163,10 @@ TEST_F(Driver, ExceptionsBecomeFailures) {
         return quickDescribe(points, parameters, context);
     });
     EXPECT_EQ(finished(begin()).failed, 2u);
-    EXPECT_EQ(store.getShape(parts.id, "1")->failure->code, ErrorCode::kOutOfMemory);
-    EXPECT_EQ(store.getShape(parts.id, "2")->failure->code, ErrorCode::kInternal);
+    EXPECT_NE(log->all().find("scan cannot be segmented again error=out_of_memory"), std::string::npos)
+        << log->all();
+    EXPECT_NE(log->all().find("surprise"), std::string::npos) << log->all();
+    EXPECT_EQ(store.getShape(parts.id, "1")->state, store::ShapeState::kReady) << "as found before";
 }
 
 TEST_F(Driver, FollowsARebuildWithTheSameParametersOnly) {
@@ -331,19 +335,24 @@ TEST_F(Driver, QuarantinesAScanThatCrashesTheServerTwice) {
     journal = ::testing::TempDir() + "shapedb-rebuild-journal-" + std::to_string(::getpid());
     const auto guilty = *store.getShape(parts.id, "2");
     const auto suspected = *store.getShape(parts.id, "3");
-    std::ofstream(journal) << guilty.id << " 1 1 1\n" << suspected.id << " 1 0 1\n";
+    std::ofstream(journal) << "shapedb rebuild journal 2\n"
+                           << guilty.id << " 1 1 0 1\n"
+                           << suspected.id << " 1 0 0 1\n";
+    crashes = {{guilty.id, 1}};
     start(counting());
     const auto done = finished(begin());
     EXPECT_EQ(done.state, store::RebuildState::kDone);
     EXPECT_EQ(done.failed, 1u);
     EXPECT_EQ(described, 4) << "it was not tried again";
-    EXPECT_EQ(store.getShape(parts.id, "2")->state, store::ShapeState::kFailed);
-    EXPECT_NE(store.getShape(parts.id, "2")->failure->message.find("2 times"), std::string::npos);
+    EXPECT_EQ(store.getShape(parts.id, "2")->state, store::ShapeState::kReady) << "its old signature serves";
+    EXPECT_EQ(store.getSignature(guilty.id)->generation, 2);
+    EXPECT_NE(log->all().find("crashed the server 2 times"), std::string::npos) << log->all();
     EXPECT_EQ(store.getShape(parts.id, "3")->state, store::ShapeState::kReady);
     EXPECT_EQ(finished(begin(4)).failed, 0u) << "the next rebuild tries it again";
     driver.reset();
     std::ifstream left(journal);
-    EXPECT_EQ(left.peek(), std::ifstream::traits_type::eof());
+    std::string content{std::istreambuf_iterator<char>(left), {}};
+    EXPECT_EQ(content, "shapedb rebuild journal 2\n");
     std::remove(journal.c_str());
 }
 
@@ -351,8 +360,8 @@ TEST_F(Driver, OnlyReplacedContentForgetsDeaths) {
     fill(2);
     journal = ::testing::TempDir() + "shapedb-rebuild-journal-" + std::to_string(::getpid());
     const auto guilty = *store.getShape(parts.id, "1");
-    const auto deaths = [&] { return CrashJournal(journal, log).deaths(guilty); };
-    std::ofstream(journal) << guilty.id << " 1 1 0\n";
+    const auto deaths = [&] { return CrashJournal(journal, {}, log).deaths(guilty).crashes; };
+    std::ofstream(journal) << "shapedb rebuild journal 2\n" << guilty.id << " 1 1 0 0\n";
     start();
     driver->pause();
     ASSERT_TRUE(driver->resume(Content::kSame));

@@ -50,6 +50,7 @@ class Pool : public ::testing::Test {
         WorkerOptions options;
         options.threads = threads;
         options.backOff = backOff;
+        options.crashes = crashes;
         pool =
             std::make_unique<WorkerPool>(store, index, board, isolation, std::move(describe), log, options);
         EXPECT_TRUE(pool->start());
@@ -80,6 +81,7 @@ class Pool : public ::testing::Test {
     CrashIsolation isolation;
     store::Collection parts;
     std::chrono::milliseconds backOff{5};
+    std::vector<store::Crash> crashes;
     std::unique_ptr<WorkerPool> pool;
 };
 
@@ -201,7 +203,8 @@ class PoolThatCannotPutBack : public Pool {
   protected:
     PoolThatCannotPutBack() {
         put("k", 1.0f);
-        EXPECT_TRUE(*store.claimJob());  // one death, as every innocent scan may have
+        EXPECT_TRUE(*store.claimJob());  // one crash, as every innocent scan may have
+        crashes = {{shape("k").id, 1}};
         start(through(gate), 1);
         EXPECT_TRUE(eventually([&] { return gate.entered() == 1; }));
         store.fault = [](const std::string& function) -> std::optional<Error> {
@@ -228,17 +231,20 @@ TEST_F(PoolThatCannotPutBack, AStopTriesAgainAtItsEnd) {
     pool->pause();
     store.fault = nullptr;
     pool->stop();
-    EXPECT_TRUE(store.recoverJobs(2)->empty()) << "the next start sets nothing aside";
+    crashes = {{shape("k").id, shape("k").pointsVersion}};
+    EXPECT_TRUE(store.recoverJobs(2, crashes)->empty()) << "the next start sets nothing aside";
     EXPECT_EQ((*store.claimJob())->attempts, 2);
 }
 
 TEST_F(Pool, JobOfADeadProcessIsDoneAgainButNotForEver) {
     const auto quarantined = put("twice", 1.0f);
     ASSERT_TRUE(*store.claimJob());
-    ASSERT_TRUE(store.recoverJobs(2));
-    ASSERT_TRUE(*store.claimJob());  // second death
-    put("once", 2.0f);
-    ASSERT_TRUE(*store.claimJob());  // first death
+    crashes = {{quarantined.id, 1}};
+    ASSERT_TRUE(store.recoverJobs(2, crashes));
+    ASSERT_TRUE(*store.claimJob());  // second crash
+    const auto once = put("once", 2.0f);
+    ASSERT_TRUE(*store.claimJob());  // first crash
+    crashes.push_back({once.id, 1});
     start();
     EXPECT_EQ(shape("twice").state, store::ShapeState::kFailed);
     EXPECT_NE(log->all().find("key=twice"), std::string::npos) << log->all();
@@ -253,14 +259,26 @@ TEST_F(Pool, AScanSetAsideAtStartIsNotSearchedByItsOlderPoints) {
     pool.reset();
     put("k", 2.0f);
     ASSERT_TRUE(*store.claimJob());
-    ASSERT_TRUE(store.recoverJobs(2));
-    ASSERT_TRUE(*store.claimJob());  // second death
+    crashes = {{k.id, 2}};
+    ASSERT_TRUE(store.recoverJobs(2, crashes));
+    ASSERT_TRUE(*store.claimJob());  // second crash
     ASSERT_TRUE(index.loadAll());    // as a server does before it starts its workers
     ASSERT_TRUE((*index.byName("parts"))->signatures.find(k.id));
     start();
     EXPECT_EQ(shape("k").state, store::ShapeState::kFailed);
     EXPECT_EQ(store.getSignature(k.id).error().code, ErrorCode::kNotReady);
     EXPECT_FALSE((*index.byName("parts"))->signatures.find(k.id));
+}
+
+TEST_F(Pool, AServerThatIsKilledOverAndOverFailsNoScan) {
+    put("k", 1.0f);
+    for (int kill = 0; kill < 10; ++kill) {
+        ASSERT_TRUE(*store.claimJob());
+        EXPECT_TRUE(store.recoverJobs(2, {})->empty()) << kill;
+    }
+    start();
+    ASSERT_TRUE(eventually([&] { return settled("k"); }));
+    EXPECT_EQ(shape("k").state, store::ShapeState::kReady);
 }
 
 // Three scans were in hand when the server died. Run one at a time, they show which of them was the cause.

@@ -64,14 +64,34 @@ TEST_F(PutRules, UpdateOnlyNeedsTheShape) {
     EXPECT_EQ(onTakenKey().value(), PutOutcome::kReplaced);
 }
 
+TEST_F(PutRules, AFailedShapeIsTriedAgain) {
+    existing.state = ShapeState::kFailed;
+    EXPECT_EQ(onTakenKey().value(), PutOutcome::kRetried);
+    request.mode = PutMode::kInsertOnly;
+    EXPECT_EQ(onTakenKey().value(), PutOutcome::kRetried);
+    request.mode = PutMode::kUpsert;
+    otherMetadata();
+    EXPECT_EQ(onTakenKey().value(), PutOutcome::kRetried) << "with its new metadata";
+    otherPoints();
+    EXPECT_EQ(onTakenKey().value(), PutOutcome::kReplaced);
+}
+
+TEST_F(PutRules, ARepeatedRequestWhoseReplyWasLostIsRecognised) {
+    request.expectedVersion = 2;
+    EXPECT_EQ(onTakenKey().value(), PutOutcome::kUnchanged) << "it made version 3";
+    otherMetadata();
+    expectError(onTakenKey().error(), ErrorCode::kVersionConflict,
+                "shape 'cup' has version 3, not the expected version 2");
+}
+
 TEST_F(PutRules, ExpectedVersionHoldsForRepeatedRequestsToo) {
     request.expectedVersion = 3;
     EXPECT_EQ(onTakenKey().value(), PutOutcome::kUnchanged);
     expectError(onFreeKey().error(), ErrorCode::kVersionConflict,
                 "shape 'cup' does not exist (version 0), not the expected version 3");
-    request.expectedVersion = 2;
+    request.expectedVersion = 1;
     expectError(onTakenKey().error(), ErrorCode::kVersionConflict,
-                "shape 'cup' has version 3, not the expected version 2");
+                "shape 'cup' has version 3, not the expected version 1");
     request.expectedVersion = 0;
     EXPECT_EQ(onFreeKey().value(), PutOutcome::kCreated);
     EXPECT_EQ(onTakenKey().error().code, ErrorCode::kVersionConflict);
@@ -87,15 +107,18 @@ TEST_F(PutRules, TheModeIsLookedAtBeforeTheVersion) {
 }
 
 TEST_F(PutRules, TheQueueHoldsAtMostItsLimits) {
+    const auto room = [&](const QueueDepth& others) {
+        return requireRoom(request.scan.bytes(), request.maxQueuedJobs, request.maxQueuedBytes, others);
+    };
     ASSERT_EQ(request.scan.bytes(), 48u);
-    EXPECT_TRUE(requireRoom(request, {1000, 1000})) << "no limits";
+    EXPECT_TRUE(room({1000, 1000})) << "no limits";
     request.maxQueuedJobs = 3;
-    EXPECT_TRUE(requireRoom(request, {2, 1000}));
-    expectError(requireRoom(request, {3, 0}).error(), ErrorCode::kQueueFull,
+    EXPECT_TRUE(room({2, 1000}));
+    expectError(room({3, 0}).error(), ErrorCode::kQueueFull,
                 "the ingest queue is full (3 of 3 scans); retry later");
     request.maxQueuedBytes = 100;
-    EXPECT_TRUE(requireRoom(request, {2, 52}));
-    expectError(requireRoom(request, {2, 53}).error(), ErrorCode::kQueueFull,
+    EXPECT_TRUE(room({2, 52}));
+    expectError(room({2, 53}).error(), ErrorCode::kQueueFull,
                 "the ingest queue has no room for 48 more bytes (53 of 100 bytes taken); retry later");
 }
 

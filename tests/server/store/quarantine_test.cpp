@@ -5,19 +5,30 @@
 namespace shapedb::store {
 namespace {
 
-TEST(Quarantine, TakesScansThatWereTriedAsOftenAsAllowed) {
-    EXPECT_FALSE(isQuarantined(1, 2));
-    EXPECT_TRUE(isQuarantined(2, 2));
-    EXPECT_TRUE(isQuarantined(3, 2)) << "the limit was lowered";
-    EXPECT_TRUE(isQuarantined(1, 1));
+TEST(Quarantine, BeginsAfterAsManyCrashesAsAllowed) {
+    EXPECT_FALSE(isQuarantined({0, 0}, 1));
+    EXPECT_FALSE(isQuarantined({1, 0}, 2));
+    EXPECT_TRUE(isQuarantined({2, 0}, 2));
+    EXPECT_TRUE(isQuarantined({3, 0}, 2)) << "the limit was lowered";
+    EXPECT_TRUE(isQuarantined({1, 0}, 1));
 }
 
-TEST(Quarantine, SaysHowOftenAndWhatToDo) {
-    const Error error = quarantineError(2);
-    EXPECT_EQ(error.code, ErrorCode::kInternal);
-    EXPECT_EQ(error.message,
-              "the server stopped 2 times while it segmented this scan; it is quarantined. Replace its "
-              "points, or rebuild the collection, to try again");
+TEST(Quarantine, KillsAreNoProofUntilTheyAreMany) {
+    EXPECT_FALSE(isQuarantined({0, 5}, 1));
+    EXPECT_FALSE(isQuarantined({0, kMostStops - 1}, 1));
+    EXPECT_TRUE(isQuarantined({0, kMostStops}, 1));
+    EXPECT_FALSE(isSuspect({0, 0}));
+    EXPECT_TRUE(isSuspect({0, 1})) << "segmented alone";
+    EXPECT_TRUE(isSuspect({1, 0}));
+}
+
+TEST(Quarantine, SaysWhatHappenedAndWhatToDo) {
+    const Error crashed = quarantineError({2, 1});
+    EXPECT_EQ(crashed.code, ErrorCode::kInternal);
+    EXPECT_NE(crashed.message.find("crashed the server 2 times"), std::string::npos) << crashed.message;
+    EXPECT_NE(crashed.message.find("Send it again"), std::string::npos) << crashed.message;
+    const Error ended = quarantineError({0, 20});
+    EXPECT_NE(ended.message.find("ended 20 times"), std::string::npos) << ended.message;
 }
 
 }  // namespace

@@ -136,7 +136,8 @@ Result<PutResult> MemoryStore::putShape(const PutRequest& request) {
         if (!outcome) return fail(outcome.error());
         if (*outcome == PutOutcome::kUnchanged) return PutResult{*outcome, *existing};
         if (*outcome != PutOutcome::kMetadataChanged) {
-            const auto room = requireRoom(request, queueWithout(existing != nullptr ? existing->id : 0));
+            const auto room = requireRoom(request.scan.bytes(), request.maxQueuedJobs, request.maxQueuedBytes,
+                                          queueWithout(existing != nullptr ? existing->id : 0));
             if (!room) return fail(room.error());
         }
         if (existing == nullptr) {
@@ -147,6 +148,12 @@ Result<PutResult> MemoryStore::putShape(const PutRequest& request) {
             existing->key = request.key;
             existing->version = 0;
             existing->createdAt = now();
+        }
+        if (*outcome == PutOutcome::kRetried) {
+            if (existing->metadata != request.metadata) ++existing->version;
+            existing->metadata = request.metadata;
+            retry(*existing);
+            return PutResult{*outcome, *existing};
         }
         existing->version += 1;
         existing->updatedAt = now();
@@ -251,14 +258,16 @@ void MemoryStore::putSurface(const SignatureRow& row) {
 
 Result<std::optional<Job>> MemoryStore::claimJob() {
     return guarded("claimJob", [&]() -> Result<std::optional<Job>> {
+        QueuedJob* next = nullptr;
         for (auto& [id, queued] : content_.jobs) {
-            if (queued.running) continue;
-            queued.running = true;
-            ++queued.job.attempts;
-            queued.job.generation = content_.collections.at(queued.job.collectionId).generation;
-            return std::optional<Job>(queued.job);
+            if (queued.running || (next != nullptr && next->job.stops <= queued.job.stops)) continue;
+            next = &queued;
         }
-        return std::optional<Job>();
+        if (next == nullptr) return std::optional<Job>();
+        next->running = true;
+        ++next->job.attempts;
+        next->job.generation = content_.collections.at(next->job.collectionId).generation;
+        return std::optional<Job>(next->job);
     });
 }
 
@@ -334,19 +343,53 @@ Result<void> MemoryStore::releaseJob(const Job& job) {
     });
 }
 
-Result<std::vector<Shape>> MemoryStore::recoverJobs(int maxAttempts) {
+Result<std::vector<Shape>> MemoryStore::recoverJobs(int maxAttempts, const std::vector<Crash>& crashes) {
     return guarded("recoverJobs", [&]() -> Result<std::vector<Shape>> {
         std::vector<Shape> quarantined;
         for (auto at = content_.jobs.begin(); at != content_.jobs.end();) {
             QueuedJob& queued = (at++)->second;
             if (!queued.running) continue;
             queued.running = false;
-            if (!isQuarantined(queued.job.attempts, maxAttempts)) continue;
+            const bool crashed = std::any_of(crashes.begin(), crashes.end(), [&](const Crash& crash) {
+                return crash.shapeId == queued.job.shapeId && crash.pointsVersion == queued.job.pointsVersion;
+            });
+            if (!crashed) {
+                --queued.job.attempts;
+                ++queued.job.stops;
+            }
+            const Deaths deaths{queued.job.attempts, queued.job.stops};
+            if (!isQuarantined(deaths, maxAttempts)) continue;
             Shape& shape = content_.shapes.at(queued.job.shapeId);
-            markFailed(shape, quarantineError(queued.job.attempts));
+            markFailed(shape, quarantineError(deaths));
             quarantined.push_back(shape);
         }
         return quarantined;
+    });
+}
+
+void MemoryStore::retry(Shape& shape) {
+    for (auto& [id, results] : content_.rebuilt) results.erase(shape.id);
+    shape.state = ShapeState::kPending;
+    shape.failure.reset();
+    shape.updatedAt = now();
+    queueJob(shape);
+}
+
+Result<std::uint64_t> MemoryStore::retryShapes(const std::vector<std::int64_t>& shapeIds,
+                                               std::uint64_t maxQueuedJobs, std::uint64_t maxQueuedBytes) {
+    return guarded("retryShapes", [&]() -> Result<std::uint64_t> {
+        std::uint64_t queued = 0;
+        for (const std::int64_t id : shapeIds) {
+            const auto found = content_.shapes.find(id);
+            if (found == content_.shapes.end() || found->second.state != ShapeState::kFailed) continue;
+            const std::uint64_t bytes = content_.points.at(id).size() * sizeof(float);
+            const auto room = requireRoom(bytes, maxQueuedJobs, maxQueuedBytes, queueWithout(0));
+            if (!room && queued == 0) return fail(room.error());
+            if (!room) break;
+            retry(found->second);
+            ++queued;
+        }
+        return queued;
     });
 }
 

@@ -44,7 +44,10 @@ class MemoryStore : public store::Store {
                                                   const store::SignatureRow& signature) override;
     Result<std::optional<store::Shape>> failJob(const store::Job& job, const Error& why) override;
     Result<void> releaseJob(const store::Job& job) override;
-    Result<std::vector<store::Shape>> recoverJobs(int maxAttempts) override;
+    Result<std::vector<store::Shape>> recoverJobs(int maxAttempts,
+                                                  const std::vector<store::Crash>& crashes) override;
+    Result<std::uint64_t> retryShapes(const std::vector<std::int64_t>& shapeIds, std::uint64_t maxQueuedJobs,
+                                      std::uint64_t maxQueuedBytes) override;
     Result<store::QueueDepth> queueDepth() override;
 
     Result<std::vector<store::IndexRow>> loadIndex(std::int64_t collectionId, std::int64_t afterId,
@@ -114,6 +117,7 @@ class MemoryStore : public store::Store {
     /// The job's shape; null when a result no longer counts. One of an older generation puts the job back.
     Result<store::Shape*> current(const store::Job& job, std::int64_t generation);
     void markFailed(store::Shape& shape, const Error& why);
+    void retry(store::Shape& shape);
     void putSurface(const store::SignatureRow& row);
     void release(const store::Job& job);
 

@@ -1,4 +1,5 @@
 // Rebuilds in the memory store.
+#include "server/store/parameters_codec.h"
 #include "tests/server/support/memory_store.h"
 
 namespace shapedb::testing {
@@ -140,12 +141,21 @@ Result<bool> MemoryStore::finishRebuild(std::int64_t rebuildId) {
         Rebuild& rebuild = **found;
         if (!missing(rebuild, 0, 1).empty()) return false;
         Collection& collection = content_.collections.at(rebuild.collectionId);
+        const bool comparable = sameProfile(collection.parameters, rebuild.parameters);
+        const std::int64_t before = collection.generation;
         collection.generation = rebuild.targetGeneration;
         collection.parameters = rebuild.parameters;
         const auto results = content_.rebuilt[rebuildId];
         end(rebuild, RebuildState::kDone);
         for (auto& [id, shape] : content_.shapes) {
             if (shape.collectionId != rebuild.collectionId) continue;
+            const auto old = content_.signatures.find(id);
+            const bool serves = old != content_.signatures.end() && old->second.generation == before;
+            if (!hasJob(id) && comparable && serves && shape.state == ShapeState::kReady &&
+                results.at(id).failure) {
+                old->second.generation = collection.generation;
+                continue;
+            }
             content_.signatures.erase(id);
             if (hasJob(id)) continue;
             const Rebuilt& result = results.at(id);

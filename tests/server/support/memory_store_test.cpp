@@ -87,7 +87,7 @@ std::string put(Side& side, Random random) {
 }
 
 std::string work(Side& side, Random random) {
-    const std::uint64_t what = random.below(6);
+    const std::uint64_t what = random.below(7);
     if (what == 0 || side.jobs.empty()) {
         const auto job = side.store.claimJob();
         if (job && *job) side.jobs.push_back(**job);
@@ -103,7 +103,11 @@ std::string work(Side& side, Random random) {
         case 2: return textOf(side.store.finishJob(job, row));
         case 3: return textOf(side.store.failJob(job, {ErrorCode::kNoInterior, "hollow"}));
         case 4: return textOf(side.store.releaseJob(job));
-        default: return textOf(side.store.recoverJobs(2));
+        case 5: return textOf(side.store.retryShapes({job.shapeId, 1, 2, 3}, random.below(4), 0));
+        default:
+            return textOf(side.store.recoverJobs(2, random.below(2) == 0
+                                                        ? std::vector<Crash>{{job.shapeId, job.pointsVersion}}
+                                                        : std::vector<Crash>{}));
     }
 }
 

@@ -66,7 +66,7 @@ TEST_F(CrashTest, KillDuringWritesKeepsEverythingAcknowledged) {
         ASSERT_TRUE(WIFSIGNALED(status)) << "the child ended by itself: " << WEXITSTATUS(status);
 
         open();
-        ASSERT_TRUE(store_->recoverJobs(2));
+        ASSERT_TRUE(store_->recoverJobs(2, {}));
         for (int i = 0; i <= last; ++i) {
             const auto shape = store_->getShape(id, "k" + std::to_string(i));
             ASSERT_TRUE(shape) << i << " of " << last << ": " << shape.error().message;
@@ -129,7 +129,7 @@ class DamageTest : public StoreTest {
         const auto job = store.claimJob();
         if (job && *job) static_cast<void>(store.finishJob(**job, signatureFor(**job)));
         static_cast<void>(store.deleteShape(id_, "k3", {}));
-        static_cast<void>(store.recoverJobs(1));
+        static_cast<void>(store.recoverJobs(1, {}));
     }
 
     std::int64_t id_ = 0;

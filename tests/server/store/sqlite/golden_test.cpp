@@ -92,7 +92,7 @@ TEST_P(EachGoldenTest, OpensAndAnswers) {
     EXPECT_EQ(store_->loadIndex(c.id, 0, 10)->size(), 2u);
 
     // Work continues: the interrupted job and the rebuild finish.
-    ASSERT_TRUE(store_->recoverJobs(2)->empty());
+    ASSERT_TRUE(store_->recoverJobs(2, {})->empty());
     EXPECT_EQ(store_->queueDepth()->jobs, 1u);
     finishAll();
     const Rebuild rebuild = store_->runningRebuilds()->front();

@@ -1,3 +1,4 @@
+#include "server/store/quarantine.h"
 #include "server/store/sqlite/connection.h"
 #include "tests/server/store/sqlite/store_fixture.h"
 
@@ -137,7 +138,7 @@ TEST_F(SqliteJobsTest, QuarantinesJobsThatCrashTheServer) {
         EXPECT_EQ(job.shapeId, bad.id);
         EXPECT_EQ(job.attempts, life);
         open();  // the process dies with the job
-        const auto quarantined = store_->recoverJobs(2).value();
+        const auto quarantined = store_->recoverJobs(2, {{bad.id, 2}}).value();
         ASSERT_EQ(quarantined.size(), life == 2 ? 1u : 0u);
         if (life == 2) {
             EXPECT_EQ(quarantined[0].id, bad.id);
@@ -150,6 +151,48 @@ TEST_F(SqliteJobsTest, QuarantinesJobsThatCrashTheServer) {
     EXPECT_EQ(job.shapeId, good.id);
     EXPECT_TRUE(store_->finishJob(job, signatureFor(job)).value());
     EXPECT_FALSE(store_->claimJob().value());
+    expectSound();
+}
+
+TEST_F(SqliteJobsTest, KilledProcessesFailNoScanUntilTheyAreMany) {
+    const Collection c = collection();
+    const Shape first = put(c.id, "first", 1);
+    const Shape second = put(c.id, "second", 2);
+    for (int kill = 0; kill < kMostStops; ++kill) {
+        Job job = claim();
+        if (kill > 0 && job.shapeId == second.id) {
+            EXPECT_EQ(kill, 1) << "it waits behind jobs that were stopped less often";
+            EXPECT_TRUE(store_->finishJob(job, signatureFor(job)).value());
+            job = claim();
+        }
+        EXPECT_EQ(job.shapeId, first.id);
+        EXPECT_EQ(job.attempts, 1);
+        EXPECT_EQ(job.stops, kill);
+        open();
+        EXPECT_EQ(store_->recoverJobs(1, {}).value().size(), kill + 1 == kMostStops ? 1u : 0u) << kill;
+    }
+    EXPECT_EQ(store_->getShapeById(first.id)->state, ShapeState::kFailed);
+    expectSound();
+}
+
+TEST_F(SqliteJobsTest, FailedShapesAreTriedAgainAsFarAsThereIsRoom) {
+    const Collection c = collection();
+    std::vector<std::int64_t> ids;
+    for (int i = 0; i < 4; ++i) ids.push_back(put(c.id, std::to_string(i), i).id);
+    for (int i = 0; i < 3; ++i) {
+        const Job job = claim();
+        ASSERT_TRUE(store_->failJob(job, {ErrorCode::kNoInterior, "hollow"}).value());
+    }
+    finishAll();
+    EXPECT_EQ(store_->retryShapes({ids[3], 999}, 0, 0).value(), 0u) << "ready, or not there";
+    EXPECT_EQ(store_->retryShapes(ids, 2, 0).value(), 2u);
+    EXPECT_FAILS(store_->retryShapes(ids, 2, 0), ErrorCode::kQueueFull);
+    EXPECT_EQ(store_->getShapeById(ids[0])->state, ShapeState::kPending);
+    EXPECT_FALSE(store_->getShapeById(ids[0])->failure);
+    finishAll();
+    EXPECT_EQ(store_->retryShapes(ids, 2, 0).value(), 1u);
+    finishAll();
+    EXPECT_EQ(store_->getShapeById(ids[2])->state, ShapeState::kReady);
     expectSound();
 }
 

@@ -4,6 +4,7 @@
 #include <set>
 
 #include "tests/server/store/sqlite/store_fixture.h"
+#include "tests/support/scale.h"
 
 namespace shapedb::store {
 namespace {
@@ -17,6 +18,7 @@ struct ModelShape {
     bool hasJob = false;
     bool running = false;
     int attempts = 0;
+    int stops = 0;
 };
 
 class ModelTest : public StoreTest, public ::testing::WithParamInterface<int> {
@@ -59,6 +61,13 @@ class ModelTest : public StoreTest, public ::testing::WithParamInterface<int> {
             return;
         }
         ModelShape& model = found->second;
+        if (model.seed == seed && model.shape.state == ShapeState::kFailed) {
+            EXPECT_EQ(result->outcome, PutOutcome::kRetried);
+            if (model.shape.metadata != metadata) ++model.shape.version;
+            model.shape.metadata = metadata;
+            requeue(key);
+            return;
+        }
         if (model.seed == seed && model.shape.metadata == metadata) {
             EXPECT_EQ(result->outcome, PutOutcome::kUnchanged);
             return;
@@ -78,10 +87,29 @@ class ModelTest : public StoreTest, public ::testing::WithParamInterface<int> {
         model.rebuilt.reset();
         model.rebuildFailure.reset();
         unqueue(key);
+        requeue(key);
+    }
+
+    void requeue(const std::string& key) {
+        ModelShape& model = model_[key];
+        model.shape.state = ShapeState::kPending;
+        model.shape.failure.reset();
         model.hasJob = true;
         model.running = false;
         model.attempts = 0;
+        model.stops = 0;
+        model.rebuilt.reset();
+        model.rebuildFailure.reset();
         queue_.push_back(key);
+    }
+
+    void doRetry() {
+        const std::string key = randomKey();
+        const auto found = model_.find(key);
+        const bool failed = found != model_.end() && found->second.shape.state == ShapeState::kFailed;
+        const std::int64_t id = found != model_.end() ? found->second.shape.id : 1;
+        EXPECT_EQ(store_->retryShapes({id, id + 100'000}, 0, 0).value(), failed ? 1u : 0u);
+        if (failed) requeue(key);
     }
 
     void unqueue(const std::string& key) {
@@ -109,10 +137,8 @@ class ModelTest : public StoreTest, public ::testing::WithParamInterface<int> {
         ASSERT_TRUE(job) << job.error().message;
         const std::string* oldest = nullptr;
         for (const auto& key : queue_) {
-            if (!model_[key].running) {
-                oldest = &key;
-                break;
-            }
+            if (model_[key].running) continue;
+            if (oldest == nullptr || model_[key].stops < model_[*oldest].stops) oldest = &key;
         }
         ASSERT_EQ(job->has_value(), oldest != nullptr);
         if (oldest == nullptr) return;
@@ -179,7 +205,8 @@ class ModelTest : public StoreTest, public ::testing::WithParamInterface<int> {
 
     void doRebuild() {
         if (!rebuild_) {
-            const auto started = store_->startRebuild(collection_.id, "p" + std::to_string(generation_));
+            const auto started = store_->startRebuild(
+                collection_.id, random_.below(2) == 0 ? parameters_ : "p" + std::to_string(generation_));
             ASSERT_TRUE(started) << started.error().message;
             rebuild_ = *started;
             EXPECT_EQ(rebuild_->targetGeneration, generation_ + 1);
@@ -227,8 +254,15 @@ class ModelTest : public StoreTest, public ::testing::WithParamInterface<int> {
         if (!complete) return;
         ++flips_;
         ++generation_;
+        const bool sameParameters = rebuild_->parameters == parameters_;
+        parameters_ = rebuild_->parameters;
         for (auto& entry : model_) {
             ModelShape& model = entry.second;
+            if (sameParameters && !model.hasJob && model.rebuildFailure &&
+                model.shape.state == ShapeState::kReady) {
+                model.serving->generation = generation_;  // the old one serves on
+                continue;
+            }
             model.serving = model.rebuilt;
             if (model.hasJob) continue;
             model.shape.state = model.rebuilt ? ShapeState::kReady : ShapeState::kFailed;
@@ -247,13 +281,26 @@ class ModelTest : public StoreTest, public ::testing::WithParamInterface<int> {
 
     void doReopen() {
         open();
-        const auto quarantined = store_->recoverJobs(3);
+        std::vector<Crash> crashes;
+        for (const auto& entry : model_) {
+            if (entry.second.running && random_.below(2) == 0) {
+                crashes.push_back({entry.second.shape.id, entry.second.shape.pointsVersion});
+            }
+        }
+        const auto quarantined = store_->recoverJobs(3, crashes);
         ASSERT_TRUE(quarantined);
         std::set<std::string> expected;
         for (auto& entry : model_) {
             ModelShape& model = entry.second;
             if (!model.running) continue;
             model.running = false;
+            const bool crashed = std::any_of(crashes.begin(), crashes.end(), [&](const Crash& crash) {
+                return crash.shapeId == model.shape.id;
+            });
+            if (!crashed) {
+                --model.attempts;
+                ++model.stops;
+            }
             if (model.attempts < 3) continue;
             model.hasJob = false;
             model.serving.reset();
@@ -301,6 +348,7 @@ class ModelTest : public StoreTest, public ::testing::WithParamInterface<int> {
     Random random_{0};
     Collection collection_;
     std::int64_t generation_ = 1;
+    std::string parameters_;
     std::int64_t lastId_ = 0;
     int flips_ = 0;
     int quarantines_ = 0;
@@ -313,11 +361,14 @@ class ModelTest : public StoreTest, public ::testing::WithParamInterface<int> {
 TEST_P(ModelTest, BehavesLikeAMap) {
     random_ = Random(static_cast<std::uint64_t>(GetParam()));
     collection_ = collection();
-    for (int step = 0; step < 500 && !HasFatalFailure(); ++step) {
+    parameters_ = collection_.parameters;
+    for (int step = 0; step < 900 * testing::testScale() && !HasFatalFailure(); ++step) {
         const std::uint64_t dice = random_.below(100);
         SCOPED_TRACE("step " + std::to_string(step));
-        if (dice < 22) {
+        if (dice < 20) {
             doPut();
+        } else if (dice < 22) {
+            doRetry();
         } else if (dice < 27) {
             doDelete();
         } else if (dice < 50) {
@@ -337,7 +388,7 @@ TEST_P(ModelTest, BehavesLikeAMap) {
     EXPECT_GT(flips_, 0);
 }
 
-INSTANTIATE_TEST_SUITE_P(Seeds, ModelTest, ::testing::Range(1, 5));
+INSTANTIATE_TEST_SUITE_P(Seeds, ModelTest, ::testing::Range(1, 7));
 
 }  // namespace
 }  // namespace shapedb::store
