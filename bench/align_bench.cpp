@@ -237,7 +237,7 @@ Result<AlignOutcome> measureAlignment(const AlignCase& one, const AlignCondition
     if (settings.toldKind) options.kinds = FitKinds::only(condition.kind);
     const FitQuery prepared(*querySurface);
     const ThreadStopwatch watch;
-    const auto result = fit(prepared, *otherSurface, options, context);
+    const auto result = align(prepared, *otherSurface, options, context);
     outcome.seconds = watch.seconds();
     RETURN_IF_ERROR(result);
     outcome.score = result->best.score;

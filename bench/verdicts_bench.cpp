@@ -180,6 +180,34 @@ std::string scoreTable(const Study& study) {
     return text;
 }
 
+// What a hit with such a score is: shares of all ten hits of all queries. The changed query's own shape
+// counts as the same object, however it was changed.
+std::string meaningTable(const Study& study) {
+    constexpr std::array<double, 7> kFrom{0.9, 0.8, 0.7, 0.6, 0.5, 0.3, 0.0};
+    std::string text = "| score | hits | same object | same kind | unrelated |\n|---|---:|---:|---:|---:|\n";
+    double to = 1.0;
+    for (const double from : kFrom) {
+        std::size_t same = 0;
+        std::size_t kind = 0;
+        std::size_t hits = 0;
+        for (const Judged& one : study.judged) {
+            if (one.score < from || (one.score >= to && to < 1.0)) continue;
+            ++hits;
+            kind += one.relation == Relation::kKind ? 1 : 0;
+            same += one.relation != Relation::kKind && one.relation != Relation::kUnrelated ? 1 : 0;
+        }
+        const auto share = [&](std::size_t count) {
+            return numberText("%.2f",
+                              hits > 0 ? static_cast<double>(count) / static_cast<double>(hits) : 0.0);
+        };
+        text += "| " + numberText("%.1f", from) + " to " + numberText("%.1f", to) + " | " +
+                std::to_string(hits) + " | " + share(same) + " | " + share(kind) + " | " +
+                share(hits - same - kind) + " |\n";
+        to = from;
+    }
+    return text;
+}
+
 std::string verdictTable(const Study& study) {
     std::string text =
         "| verdict | hits | right | says | is the same object | bent | part | same kind | unrelated |\n"
@@ -231,7 +259,7 @@ std::string report(const Study& study, const VerdictsFlags& flags) {
            std::to_string(study.shapes) + " shapes, half of them without the query's own shape, seed " +
            std::to_string(flags.seed) + "; the ten best hits of each; " + std::to_string(study.failures) +
            " queries could not be described.\n\n" + firstTable(study) + "\n" + scoreTable(study) + "\n" +
-           verdictTable(study);
+           meaningTable(study) + "\n" + verdictTable(study);
 }
 
 Result<int> run(const VerdictsFlags& flags, Bench& bench) {

@@ -236,6 +236,7 @@ Fit fromWire(const v1::Fit& from) {
 Comparison fromWire(const v1::CompareResponse& from) {
     Comparison to;
     to.score = from.score();
+    to.signatureScore = from.signature_score();
     to.explanation = fromWire(from.explanation());
     to.query = fromWire(from.query());
     to.other = fromWire(from.other());

@@ -329,7 +329,8 @@ struct BatchQuery {
 };
 
 struct Comparison {
-    double score = 0.0;  ///< of the signatures
+    double score = 0.0;           ///< as that of a hit of a verified search
+    double signatureScore = 0.0;  ///< of the signatures
     Explanation explanation;
     Signature query;
     Signature other;

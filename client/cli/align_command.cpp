@@ -51,7 +51,7 @@ Result<client::Fit> alignFiles(const AlignFlags& flags, const RunContext& contex
     RETURN_IF_ERROR(query);
     const auto other = surfaceOf(flags.other, flags.scan, context);
     RETURN_IF_ERROR(other);
-    const auto found = fit(FitQuery(*query), *other, flags.resolve(), context);
+    const auto found = align(FitQuery(*query), *other, flags.resolve(), context);
     RETURN_IF_ERROR(found);
     return toClient(*found);
 }

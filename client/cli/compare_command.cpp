@@ -63,7 +63,8 @@ Result<client::Comparison> compareFiles(Session& session, const CompareFlags& fl
         explainVerified(a->signature, surfaceOf(*a), b->signature, surfaceOf(*b), options, session.context());
     RETURN_IF_ERROR(verified);
     client::Comparison comparison;
-    comparison.score = verified->explanation.score;
+    comparison.score = verified->score;
+    comparison.signatureScore = verified->signatureScore;
     comparison.explanation = toClient(verified->explanation);
     if (verified->fit) comparison.fit = toClient(*verified->fit);
     comparison.verdict = verified->verdict;
@@ -93,6 +94,7 @@ CommandResult runCompare(Session& session, const CompareFlags& flags) {
     nlohmann::json document = {{"query_name", flags.a},
                                {"other_name", flags.b},
                                {"score", comparison->score},
+                               {"signature_score", comparison->signatureScore},
                                {"explanation", toJson(comparison->explanation)},
                                {"query", toJson(comparison->query)},
                                {"other", toJson(comparison->other)},

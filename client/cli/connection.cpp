@@ -7,7 +7,7 @@ namespace shapedb::cli {
 namespace {
 
 constexpr std::chrono::hours kHeavyDeadline{1};
-/// Retries a full queue until the deadline; the server says how long to wait.
+/// Retries until the deadline.
 constexpr int kPatientAttempts = 1'000'000;
 
 }  // namespace
@@ -19,7 +19,12 @@ Result<client::Client> connectToServer(const Session& session, Work work) {
         options.deadline = kHeavyDeadline;
         options.retry.maxQueueAttempts = kPatientAttempts;
     }
-    if (session.options().timeoutSeconds) options.deadline = std::chrono::milliseconds(0);
+    if (session.options().timeoutSeconds) {
+        options.deadline = std::chrono::milliseconds(0);
+        // Whoever says how long to wait means it.
+        options.retry.maxAttempts = kPatientAttempts;
+        options.retry.maxQueueAttempts = kPatientAttempts;
+    }
     return client::Client::connect(std::move(options));
 }
 

@@ -1,5 +1,6 @@
 #include "client/cli/scan_source.h"
 
+#include <algorithm>
 #include <filesystem>
 
 #include <CLI/CLI.hpp>
@@ -41,6 +42,9 @@ CLI::App& addScanFlagsButNoise(CLI::App& command, ScanFlags& flags) {
 
 namespace {
 
+/// Groups of points whose shares are told.
+constexpr std::size_t kMostListed = 8;
+
 double shareOf(std::uint64_t part, std::size_t points) {
     return points > 0 ? static_cast<double>(part) / static_cast<double>(points) : 0.0;
 }
@@ -64,11 +68,14 @@ std::string sceneText(const Scene& scene, std::size_t points, const IsolateOptio
                 (isolate.any() ? ", left out\n" : ": --drop-plane leaves them out\n");
     }
     if (scene.objects.size() > 1) {
-        text += std::to_string(scene.objects.size()) + " separate objects (";
-        for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+        // They may be objects, or parts of one that a camera did not see as a whole.
+        text += std::to_string(scene.objects.size()) + " groups of points with gaps between them (";
+        for (std::size_t i = 0; i < std::min(kMostListed, scene.objects.size()); ++i) {
             text += (i > 0 ? ", " : "") + formatPercent(shareOf(scene.objects[i], points));
         }
-        text += isolate.largest ? "), only the largest is kept\n" : "): --largest keeps the first\n";
+        if (scene.objects.size() > kMostListed) text += ", ...";
+        text += isolate.largest ? "), only the largest is kept\n"
+                                : "): if they are separate objects, --largest keeps the first\n";
     }
     return text;
 }

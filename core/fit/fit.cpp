@@ -112,6 +112,23 @@ void addTurned(std::vector<Candidate>& sorted, Comparison& comparison, const Sta
     sortByScore(sorted);
 }
 
+// The poses that enter a stage: the best ones, and the best of the other hand if all of them are of one hand,
+// so that at the end it is known how much worse that is.
+std::vector<Candidate> enter(const Stage& stage, const std::vector<Candidate>& sorted,
+                             const Comparison& comparison) {
+    const double least = stage.leastShare * sorted.front().score();
+    const auto end =
+        std::find_if(sorted.begin(), sorted.end(), [&](const Candidate& c) { return !(c.score() >= least); });
+    auto chosen = distinct({sorted.begin(), end}, stage.poses, kApart, comparison);
+    const bool mirrored = chosen.front().pose.reflected;
+    const auto otherHand = [&](const Candidate& c) { return c.pose.reflected != mirrored; };
+    if (std::none_of(chosen.begin(), chosen.end(), otherHand)) {
+        const auto best = std::find_if(sorted.begin(), sorted.end(), otherHand);
+        if (best != sorted.end()) chosen.push_back(*best);
+    }
+    return chosen;
+}
+
 // All stages for one kind: fitted poses, best first, none less than kDifferent from a better one. None at all
 // where no pose that was tried brings the shapes near each other, as of very different sizes that are kept.
 Result<std::vector<Candidate>> candidatesOf(Comparison& comparison, FitKind kind, const FitOptions& options,
@@ -128,9 +145,7 @@ Result<std::vector<Candidate>> candidatesOf(Comparison& comparison, FitKind kind
     }
     sortByScore(candidates);
     for (const Stage& stage : kStages) {
-        const double least = stage.leastShare * candidates.front().score();
-        while (candidates.back().score() < least) candidates.pop_back();
-        candidates = distinct(candidates, stage.poses, kApart, comparison);
+        candidates = enter(stage, candidates, comparison);
         for (Candidate& c : candidates) {
             RETURN_IF_ERROR(context.checkpoint());
             c.pose = comparison.refined(c.pose, c.view, options.keepScale, stage.points, stage.steps,
@@ -164,7 +179,7 @@ FitPose poseOf(const Candidate& c, Comparison& comparison, bool keepScale) {
 
 // Where the points do not tell left from right, the best unmirrored pose comes first; returns whether that is
 // so.
-bool preferUnmirrored(std::vector<Candidate>& candidates) {
+bool unmirroredFirst(std::vector<Candidate>& candidates) {
     const bool mirrored = candidates.front().pose.reflected;
     const auto other = std::find_if(candidates.begin(), candidates.end(),
                                     [&](const Candidate& c) { return c.pose.reflected != mirrored; });
@@ -175,7 +190,7 @@ bool preferUnmirrored(std::vector<Candidate>& candidates) {
 
 FitResult resultOf(std::vector<Candidate> candidates, Comparison& comparison, const FitOptions& options) {
     FitResult result;
-    result.handednessOpen = preferUnmirrored(candidates);
+    result.handednessOpen = unmirroredFirst(candidates);
     const Candidate& best = candidates.front();
     result.kind = best.view.kind;
     result.best = poseOf(best, comparison, options.keepScale);
@@ -267,6 +282,27 @@ Result<FitResult> fit(const FitQuery& query, const SurfacePoints& other, const F
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::kOutOfMemory, "not enough memory to align two shapes");
     }
+}
+
+Result<FitResult> preferUnmirrored(FitResult found, const FitQuery& query, const SurfacePoints& other,
+                                   const FitOptions& options, const RunContext& context) {
+    if (!found.best.motion.reflected) return found;
+    FitOptions unmirrored = options;
+    unmirrored.reflection = false;
+    unmirrored.kinds = FitKinds::only(found.kind);
+    auto result = fit(query, other, unmirrored, context);
+    RETURN_IF_ERROR(result);
+    if (result->best.score < kHandsAlike * found.best.score) return found;
+    result->handednessOpen = true;
+    result->misfit = found.misfit;
+    return result;
+}
+
+Result<FitResult> align(const FitQuery& query, const SurfacePoints& other, const FitOptions& options,
+                        const RunContext& context) {
+    auto found = fit(query, other, options, context);
+    RETURN_IF_ERROR(found);
+    return preferUnmirrored(std::move(*found), query, other, options, context);
 }
 
 }  // namespace shapedb

@@ -76,7 +76,8 @@ struct FitResult {
     /// best, best first; at most kMostAlternatives.
     std::vector<FitPose> alternatives;
     /// A mirrored and an unmirrored pose are as good (both score within 1 % of the better): the points do not
-    /// tell left from right. `best` is then the unmirrored one. Never without FitOptions::reflection.
+    /// tell left from right. `best` is then the unmirrored one. Never without FitOptions::reflection. `fit`
+    /// may miss it, `align` does not.
     bool handednessOpen = false;
     std::vector<FreeAxis> axes;  ///< one for a bottle; three for a ball, which may be turned any way
 };
@@ -112,5 +113,16 @@ class FitQuery {
 /// Errors: kCancelled, kDeadlineExceeded, kOutOfMemory.
 [[nodiscard]] Result<FitResult> fit(const FitQuery& query, const SurfacePoints& other,
                                     const FitOptions& options = {}, const RunContext& context = {});
+
+/// Whether a mirrored result of `fit`, with the same arguments, had to be mirrored: fits once more without
+/// reflection, and returns that result, with handednessOpen and the misfit of `found`, if it is within 1 % of
+/// the score or better. Any other result comes back as it is. Errors: as `fit`.
+[[nodiscard]] Result<FitResult> preferUnmirrored(FitResult found, const FitQuery& query,
+                                                 const SurfacePoints& other, const FitOptions& options,
+                                                 const RunContext& context = {});
+
+/// `fit` and `preferUnmirrored`: what a user is shown. Errors: as `fit`.
+[[nodiscard]] Result<FitResult> align(const FitQuery& query, const SurfacePoints& other,
+                                      const FitOptions& options = {}, const RunContext& context = {});
 
 }  // namespace shapedb

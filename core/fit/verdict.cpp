@@ -19,12 +19,13 @@ constexpr double kKindDistance = 0.62;
 
 }  // namespace
 
-Verdict verdictOf(double signatureDistance, const FitResult& fit) noexcept {
+Verdict verdictOf(double signatureDistance, const FitResult& fit, bool reflection) noexcept {
     if (fit.misfit <= kSameMisfit) {
         const bool part = fit.kind == FitKind::kPiece && signatureDistance > kPartDistance;
         return part ? Verdict::kPart : Verdict::kSameObject;
     }
-    if (signatureDistance <= kBentDistance && fit.misfit <= kBentMisfit) return Verdict::kSameObjectBent;
+    const bool bent = signatureDistance <= kBentDistance && fit.misfit <= kBentMisfit;
+    if (bent && reflection) return Verdict::kSameObjectBent;
     const bool alike = 0.5 * (signatureDistance + fit.misfit) <= kKindDistance;
     return alike ? Verdict::kSameKind : Verdict::kUnrelated;
 }

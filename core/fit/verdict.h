@@ -6,8 +6,9 @@
 
 namespace shapedb {
 
-/// From the distance of the signatures (distanceOfScore) and the fit. docs/verify.md has the rule.
-[[nodiscard]] Verdict verdictOf(double signatureDistance, const FitResult& fit) noexcept;
+/// From the distance of the signatures (distanceOfScore) and the fit. docs/verify.md has the rule. Without
+/// `reflection` no bent object is recognised: signatures do not tell one from its mirror image.
+[[nodiscard]] Verdict verdictOf(double signatureDistance, const FitResult& fit, bool reflection) noexcept;
 
 /// The share of hits with this verdict for which it is true, in [0, 1]; 0 of kNone. Measured by
 /// `shapedb-bench verdicts` with searches of synthetic shapes, half of which are not in the gallery; another

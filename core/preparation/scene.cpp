@@ -45,7 +45,10 @@ constexpr double kBeyond = 0.3;
 // And so much of what is above is above the convex hull of the plane's points: a handle is not above a blade.
 constexpr double kAbovePlane = 0.8;
 
+// An object has so much of all points beside the plane, or of those of the largest: of a hundred equal ones
+// each has a hundredth.
 constexpr double kLeastObject = 0.02;
+constexpr double kLikeLargest = 0.25;
 
 struct Plane {
     Point3 point;
@@ -236,6 +239,49 @@ bool belongsTo(const SupportPlane& plane, const Point3& p) {
     return Plane{plane.point, plane.normal}.height(p) <= plane.within;
 }
 
+// Fills `places` with the distinct points in the order of their first; returns the index of each point's
+// place.
+std::vector<std::uint32_t> distinctPlaces(const PointCloud& points, PointCloud& places) {
+    std::vector<std::uint32_t> order(points.size());
+    std::iota(order.begin(), order.end(), 0u);
+    std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+        if (points[a] == points[b]) return a < b;
+        return lexicographicLess(points[a], points[b]);
+    });
+    std::vector<std::uint32_t> first(points.size());
+    for (std::size_t i = 0; i < order.size(); ++i) {
+        const bool known = i > 0 && points[order[i]] == points[order[i - 1]];
+        first[order[i]] = known ? first[order[i - 1]] : order[i];
+    }
+    std::vector<std::uint32_t> placeOf(points.size());
+    for (std::uint32_t i = 0; i < points.size(); ++i) {
+        if (first[i] == i) {
+            placeOf[i] = static_cast<std::uint32_t>(places.size());
+            places.push_back(points[i]);
+        } else {
+            placeOf[i] = placeOf[first[i]];
+        }
+    }
+    return placeOf;
+}
+
+// The number of each group of `size` points, most points first; kNoObject of those that are too small. There
+// is at least one object.
+std::vector<std::int32_t> numberObjects(const std::vector<std::uint64_t>& size, std::size_t points) {
+    const auto largest = static_cast<double>(*std::max_element(size.begin(), size.end()));
+    const double share = std::min(kLeastObject * static_cast<double>(points), kLikeLargest * largest);
+    const double least = std::min(largest, std::max(share, static_cast<double>(kFewestPoints)));
+    std::vector<std::uint32_t> order;
+    for (std::uint32_t i = 0; i < size.size(); ++i) {
+        if (size[i] > 0 && static_cast<double>(size[i]) >= least) order.push_back(i);
+    }
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::uint32_t a, std::uint32_t b) { return size[a] > size[b]; });
+    std::vector<std::int32_t> number(size.size(), kNoObject);
+    for (std::size_t k = 0; k < order.size(); ++k) number[order[k]] = static_cast<std::int32_t>(k);
+    return number;
+}
+
 // Sets objects and objectOfPoint of a scene whose points on the plane are marked.
 Result<void> findObjects(const PointCloud& points, Scene& scene, const RunContext& context) {
     std::vector<std::uint32_t> beside;
@@ -245,29 +291,24 @@ Result<void> findObjects(const PointCloud& points, Scene& scene, const RunContex
         beside.push_back(i);
         cloud.push_back(points[i]);
     }
-    if (cloud.size() <= kFewestPoints) {
+    // Between points in one place there are no gaps: each place counts once.
+    PointCloud places;
+    const std::vector<std::uint32_t> placeOf = distinctPlaces(cloud, places);
+    if (places.size() <= kFewestPoints) {
         for (const std::uint32_t i : beside) scene.objectOfPoint[i] = 0;
         if (!beside.empty()) scene.objects = {beside.size()};
         return {};
     }
-    const NeighbourIndex index(cloud);
-    const auto around = measureReaches(cloud, index, context);
+    const NeighbourIndex index(places);
+    const auto around = measureReaches(places, index, context);
     RETURN_IF_ERROR(around);
-    DisjointSets groups = linkedGroups(cloud, *around, std::vector<std::uint8_t>(cloud.size(), 0));
-    std::vector<std::uint64_t> size(cloud.size(), 0);
-    for (std::uint32_t i = 0; i < cloud.size(); ++i) ++size[groups.find(i)];
-    std::vector<std::uint32_t> order;
+    DisjointSets groups = linkedGroups(places, *around, std::vector<std::uint8_t>(places.size(), 0));
+    std::vector<std::uint64_t> size(places.size(), 0);
+    for (const std::uint32_t place : placeOf) ++size[groups.find(place)];
+    const std::vector<std::int32_t> number = numberObjects(size, cloud.size());
+    scene.objects.assign(static_cast<std::size_t>(*std::max_element(number.begin(), number.end()) + 1), 0);
     for (std::uint32_t i = 0; i < cloud.size(); ++i) {
-        if (static_cast<double>(size[i]) >= kLeastObject * static_cast<double>(cloud.size()))
-            order.push_back(i);
-    }
-    std::stable_sort(order.begin(), order.end(),
-                     [&](std::uint32_t a, std::uint32_t b) { return size[a] > size[b]; });
-    std::vector<std::int32_t> number(cloud.size(), kNoObject);
-    for (std::size_t k = 0; k < order.size(); ++k) number[order[k]] = static_cast<std::int32_t>(k);
-    scene.objects.assign(order.size(), 0);
-    for (std::uint32_t i = 0; i < cloud.size(); ++i) {
-        const std::int32_t object = number[groups.find(i)];
+        const std::int32_t object = number[groups.find(placeOf[i])];
         scene.objectOfPoint[beside[i]] = object;
         if (object >= 0) ++scene.objects[static_cast<std::size_t>(object)];
     }

@@ -26,7 +26,8 @@ struct SupportPlane {
 struct Scene {
     std::optional<SupportPlane> plane;
     /// Points of each object, most first: a group of points beside the plane with a gap to all others that is
-    /// wider than the gaps between its own, and at least 2 % of the points beside the plane.
+    /// wider than the gaps between its own, and at least 2 % of the points beside the plane or a quarter of
+    /// those of the largest group. At least one, unless all points are on the plane.
     std::vector<std::uint64_t> objects;
     /// Of each point: an index into `objects`, kOnPlane, or kNoObject where a smaller group was left out.
     std::vector<std::int32_t> objectOfPoint;

@@ -91,6 +91,7 @@ class Verifier {
                                       [&](const VerifiedHit& hit) { return hit.score < options_.threshold; });
         hits_.erase(end, hits_.end());
         if (hits_.size() > options_.k) hits_.resize(options_.k);
+        RETURN_IF_ERROR(settleHands());
         result.hits = std::move(hits_);
         return result;
     }
@@ -134,8 +135,30 @@ class Verifier {
         auto fitted = fit(query_, **surface, fit_, quiet);
         RETURN_IF_ERROR(fitted);
         hit.score = scoreOf(hit.signatureScore, fitted->misfit);
-        hit.verdict = verdictOf(distanceOfScore(hit.signatureScore), *fitted);
+        hit.verdict = verdictOf(distanceOfScore(hit.signatureScore), *fitted, fit_.reflection);
         hit.fit = std::make_shared<const FitResult>(std::move(*fitted));
+        return {};
+    }
+
+    // No hit is shown mirrored that need not be. Their scores stay.
+    Result<void> settleHands() {
+        std::vector<Result<void>> outcomes(hits_.size());
+        RETURN_IF_ERROR(parallelFor(hits_.size(), 1, context_,
+                                    [&](std::size_t i, std::size_t) { outcomes[i] = settleHand(hits_[i]); }));
+        for (Result<void>& outcome : outcomes) RETURN_IF_ERROR(outcome);
+        return {};
+    }
+
+    Result<void> settleHand(VerifiedHit& hit) const {
+        if (!hit.fit || !hit.fit->best.motion.reflected) return {};
+        const auto surface = surfaceOf_(hit.id);
+        RETURN_IF_ERROR(surface);
+        if (*surface == nullptr) return {};
+        RunContext quiet = context_;
+        quiet.progress = nullptr;
+        auto settled = preferUnmirrored(*hit.fit, query_, **surface, fit_, quiet);
+        RETURN_IF_ERROR(settled);
+        hit.fit = std::make_shared<const FitResult>(std::move(*settled));
         return {};
     }
 
@@ -193,19 +216,31 @@ double verifiedScore(double signatureScore, double misfit, double share) {
     return belowOne(scoreOfDistance((1.0 - share) * distanceOfScore(signatureScore) + share * misfit));
 }
 
+void addFit(const FitResult& fit, double share, Explanation& explanation) {
+    for (ScoreTerm& term : explanation.terms) term.weight *= 1.0 - share;
+    if (!explanation.terms.empty()) explanation.terms.push_back({"fit", fit.misfit, share});
+}
+
 Result<VerifiedExplanation> explainVerified(const Signature& query, const SurfacePoints* querySurface,
                                             const Signature& other, const SurfacePoints* otherSurface,
                                             const ScoreOptions& options, const RunContext& context) {
     VerifiedExplanation result;
     result.explanation = explain(query, other, options);
+    result.signatureScore = result.explanation.score;
+    result.score = result.signatureScore;
     if (querySurface == nullptr || otherSurface == nullptr) return result;
     const auto traits = traitsOf(query, *querySurface, options);
     RETURN_IF_ERROR(traits);
-    auto fitted = fit(FitQuery(*querySurface), *otherSurface,
-                      {kindsOfQuery(*traits), options.keepScale, options.reflection}, context);
+    auto fitted = align(FitQuery(*querySurface), *otherSurface,
+                        {kindsOfQuery(*traits), options.keepScale, options.reflection}, context);
     RETURN_IF_ERROR(fitted);
     setMotion(fitted->best.motion, query, other, result.explanation);
-    result.verdict = verdictOf(distanceOfScore(result.explanation.score), *fitted);
+    result.verdict = verdictOf(distanceOfScore(result.signatureScore), *fitted, options.reflection);
+    if (!result.explanation.terms.empty()) {
+        const double share = misfitShare(*traits, options);
+        result.score = verifiedScore(result.signatureScore, fitted->misfit, share);
+        addFit(*fitted, share, result.explanation);
+    }
     result.fit = std::move(*fitted);
     return result;
 }

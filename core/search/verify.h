@@ -104,13 +104,19 @@ struct QueryTraits {
 
 /// Two shapes compared, and one laid on the other.
 struct VerifiedExplanation {
-    Explanation explanation;       ///< of the signatures; its motion is that of the fit, if there is one
+    double score = 0.0;            ///< as VerifiedHit::score
+    double signatureScore = 0.0;   ///< of the signatures
+    Explanation explanation;       ///< with the motion and the term of the fit, if there is one
     std::optional<FitResult> fit;  ///< if both have surface points
     Verdict verdict = Verdict::kNone;
 };
 
-/// As for a hit of a search. Surface points may be null. Reports progress as stage "fit". Errors: those of
-/// fit.
+/// Adds the fit to the terms of a verified hit, whose misfit has the weight `share` in the score.
+void addFit(const FitResult& fit, double share, Explanation& explanation);
+
+/// As for a hit of a search. Surface points may be null; without them, and for signatures of profile `paper`,
+/// which a search does not verify by default, the score is that of the signatures. Reports progress as stage
+/// "fit". Errors: those of fit.
 [[nodiscard]] Result<VerifiedExplanation> explainVerified(
     const Signature& query, const SurfacePoints* querySurface, const Signature& other,
     const SurfacePoints* otherSurface, const ScoreOptions& options, const RunContext& context = {});

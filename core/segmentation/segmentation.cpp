@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <exception>
 #include <new>
 #include <numeric>
@@ -9,6 +10,7 @@
 #include <utility>
 
 #include "core/base/double2.h"
+#include "core/base/math.h"
 #include "core/base/return_if_error.h"
 #include "core/delaunay/hilbert_order.h"
 #include "core/geometry/bounding.h"
@@ -26,6 +28,9 @@ namespace {
 
 // A larger share of outliers makes the interior less certain: what was left out may be part of the shape.
 constexpr double kOrdinaryOutliers = 0.05;
+
+// Share of the ball of its maximum that a light segment must fill.
+constexpr double kLeastFilling = 0.01;
 
 // Above it there is no surface: a ball or a cube filled with points has 0.80 and more, scans without much
 // noise 0.53 at most.
@@ -101,14 +106,27 @@ struct Moments {
     }
 };
 
-Segment toSegment(const Moments& m, std::uint32_t maximum, const Tetrahedra& tetrahedra, const Frame& frame) {
+double ballVolume(double radius) { return 4.0 / 3.0 * kPi * radius * radius * radius; }
+
+/// A light segment that hardly fills the ball of its maximum: flat tetrahedra near the surface, whose
+/// circumspheres reach far out of the shape.
+bool isSliver(double volume, double radius, double totalVolume, double minShare) {
+    return volume < minShare * totalVolume && volume < kLeastFilling * ballVolume(radius);
+}
+
+// `mostRadius`: of a ball with the volume of the whole shape, unit frame.
+Segment toSegment(const Moments& m, std::uint32_t maximum, const Tetrahedra& tetrahedra, double mostRadius,
+                  const Frame& frame) {
     Segment segment;
     const double unit2 = frame.unit * frame.unit;
     const Point3 mean = (1.0 / m.volume) * m.first;
     segment.volume = m.volume * unit2 * frame.unit;
     segment.centroid = frame.toScan(mean);
-    segment.maximumRadius = tetrahedra.circumradii[maximum] * frame.unit;
-    segment.maximum = frame.toScan(tetrahedra.circumcentres[maximum]);
+    // The Delaunay ball of a flat tetrahedron may reach far out of the shape; one inside it cannot.
+    const double radius = tetrahedra.circumradii[maximum];
+    segment.maximumRadius = std::min(radius, mostRadius) * frame.unit;
+    segment.maximum =
+        radius <= mostRadius ? frame.toScan(tetrahedra.circumcentres[maximum]) : segment.centroid;
     const std::array<double, 6> square = {mean.x * mean.x, mean.x * mean.y, mean.x * mean.z,
                                           mean.y * mean.y, mean.y * mean.z, mean.z * mean.z};
     const std::array<double, 6> second = m.secondMoments();
@@ -116,9 +134,10 @@ Segment toSegment(const Moments& m, std::uint32_t maximum, const Tetrahedra& tet
     return segment;
 }
 
-// Fills result.segments, by falling volume, and result.tetrahedronSegment to match. Segments whose
-// tetrahedra are all flat to the last digit have no volume and are left out.
-void describeSegments(const PointCloud& points, SegmentLabels labels, const Frame& frame,
+// Fills result.segments, by falling volume, and result.tetrahedronSegment to match. The tetrahedra of slivers
+// join the segment whose centroid is nearest, without changing what is said of it; segments whose tetrahedra
+// are all flat to the last digit are left out. `sliverShare` as minShare of isSliver.
+void describeSegments(const PointCloud& points, SegmentLabels labels, const Frame& frame, double sliverShare,
                       Segmentation& result) {
     std::vector<Moments> moments(labels.maxima.size());
     for (std::size_t t = 0; t < result.tetrahedra.size(); ++t) {
@@ -127,9 +146,15 @@ void describeSegments(const PointCloud& points, SegmentLabels labels, const Fram
         moments[static_cast<std::size_t>(segment)].add(cornersOf(points, result.tetrahedra.vertices[t]));
         ++result.interiorTetrahedra;
     }
+    double total = 0.0;
+    for (const Moments& m : moments) total += m.volume;
+    const double mostRadius = std::cbrt(total / ballVolume(1.0));
     std::vector<std::uint32_t> order;
+    std::vector<std::uint32_t> slivers;
     for (std::uint32_t s = 0; s < moments.size(); ++s) {
-        if (moments[s].volume > 0.0) order.push_back(s);
+        if (!(moments[s].volume > 0.0)) continue;
+        const double radius = result.tetrahedra.circumradii[labels.maxima[s]];
+        (isSliver(moments[s].volume, radius, total, sliverShare) ? slivers : order).push_back(s);
     }
     std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
         if (moments[a].volume != moments[b].volume) return moments[a].volume > moments[b].volume;
@@ -140,8 +165,19 @@ void describeSegments(const PointCloud& points, SegmentLabels labels, const Fram
     for (std::size_t i = 0; i < order.size(); ++i) {
         const std::uint32_t s = order[i];
         rank[s] = static_cast<std::int32_t>(i);
-        result.segments.push_back(toSegment(moments[s], labels.maxima[s], result.tetrahedra, frame));
+        result.segments.push_back(
+            toSegment(moments[s], labels.maxima[s], result.tetrahedra, mostRadius, frame));
         result.volume += result.segments.back().volume;
+    }
+    for (const std::uint32_t s : slivers) {
+        const Point3 centroid = frame.toScan((1.0 / moments[s].volume) * moments[s].first);
+        const auto nearest = std::min_element(
+            result.segments.begin(), result.segments.end(), [&](const Segment& x, const Segment& y) {
+                return squaredDistance(x.centroid, centroid) < squaredDistance(y.centroid, centroid);
+            });
+        if (nearest != result.segments.end()) {
+            rank[s] = static_cast<std::int32_t>(nearest - result.segments.begin());
+        }
     }
     result.tetrahedronSegment = std::move(labels.ofTetrahedron);
     for (std::int32_t& segment : result.tetrahedronSegment) {
@@ -306,7 +342,9 @@ Result<Segmentation> segmentOrThrow(const PointCloud& points, const Segmentation
     auto labels = findSegments(prepared->sites, options, context, clock, result);
     RETURN_IF_ERROR(labels);
     RETURN_IF_ERROR(clock.begin("describe"));
-    describeSegments(prepared->sites, std::move(*labels), prepared->frame, result);
+    // The published method merges by a criterion of its own and keeps whatever is left.
+    const double sliverShare = options.mergeContrast > 0.0 ? options.minSegmentShare : 0.0;
+    describeSegments(prepared->sites, std::move(*labels), prepared->frame, sliverShare, result);
     if (result.segments.empty()) {
         return fail(ErrorCode::kNoInterior,
                     "no closed interior: the surface is open, too noisy or too thin for its sampling (" +

@@ -21,10 +21,12 @@ namespace shapedb {
 
 /// The stable manifold of a maximum of the distance function, after merging.
 struct Segment {
-    double volume = 0.0;         ///< of its tetrahedra, scan units cubed, > 0
-    Point3 centroid;             ///< volume-weighted mean of the tetrahedra's centroids (Section 4.1)
-    double maximumRadius = 0.0;  ///< circumradius of the largest Delaunay ball, scan units
-    Point3 maximum;              ///< centre of that ball
+    double volume = 0.0;  ///< of its tetrahedra, scan units cubed, > 0
+    Point3 centroid;      ///< volume-weighted mean of the tetrahedra's centroids (Section 4.1)
+    /// Circumradius of the largest Delaunay ball, scan units; at most the radius of a ball with the volume of
+    /// the whole shape.
+    double maximumRadius = 0.0;
+    Point3 maximum;  ///< centre of that ball; the centroid where the ball was too large
     /// Second central moments of its matter per volume: xx, xy, xz, yy, yz, zz, scan units squared.
     std::array<double, 6> covariance{};
 };

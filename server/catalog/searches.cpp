@@ -12,12 +12,6 @@ namespace shapedb::catalog {
 
 namespace {
 
-// The score of a verified hit: its signature's terms and how well it fits.
-void addFit(const FitResult& fit, double share, Explanation& explanation) {
-    for (ScoreTerm& term : explanation.terms) term.weight *= 1.0 - share;
-    if (!explanation.terms.empty()) explanation.terms.push_back({"fit", fit.misfit, share});
-}
-
 // Whether sizes are compared, of shapes in collections with this unit.
 Result<bool> sizesCount(bool keepScale, bool freeScale, LengthUnit unit) {
     if (keepScale && freeScale) {
@@ -153,12 +147,12 @@ Result<FitResult> Searches::align(const store::VerifiedScan& query,
     if (const auto* name = std::get_if<ShapeName>(&other)) {
         const auto stored = surfaceOf(*name);
         if (!stored) return fail(withContext(stored.error(), "other: "));
-        return fit(FitQuery(*surface), **stored, options, context);
+        return shapedb::align(FitQuery(*surface), **stored, options, context);
     }
     const store::VerifiedScan& scan = *std::get<const store::VerifiedScan*>(other);
     const auto sent = makeSurfacePoints(store::toCloud(scan.points()), context);
     if (!sent) return fail(withContext(sent.error(), "other: "));
-    return fit(FitQuery(*surface), *sent, options, context);
+    return shapedb::align(FitQuery(*surface), *sent, options, context);
 }
 
 Result<Comparison> Searches::compare(const ShapeName& query, const ShapeName& other, ScoreOptions options,

@@ -181,7 +181,8 @@ grpc::Status SearchServiceHandler::Compare(grpc::ServerContext* context, const v
                                                          request->free_scale(), call.run());
         RETURN_IF_ERROR(compared);
         const VerifiedExplanation& verified = compared->verified;
-        response->set_score(verified.explanation.score);
+        response->set_score(verified.score);
+        response->set_signature_score(verified.signatureScore);
         toProto(verified.explanation, response->mutable_explanation());
         if (verified.fit) toProto(*verified.fit, response->mutable_fit());
         response->set_verdict(wire::toProto(verified.verdict));

@@ -123,17 +123,20 @@ TEST_F(AttributesRpc, TermsAddUpToTheScore) {
         return *decodeSignature(signatureOf(recommended, key).value.signature().encoded());
     };
     const Explanation expected = explain(decoded("a"), decoded("b"), {});
-    EXPECT_EQ(compared.value.score(), expected.score);
+    EXPECT_EQ(compared.value.signature_score(), expected.score);
     const auto& terms = compared.value.explanation().terms();
-    ASSERT_EQ(static_cast<std::size_t>(terms.size()), expected.terms.size());
-    ASSERT_GT(terms.size(), 1);
-    double weights = 0.0;
-    for (int i = 0; i < terms.size(); ++i) {
+    ASSERT_EQ(static_cast<std::size_t>(terms.size()), expected.terms.size() + 1);
+    EXPECT_EQ(terms.rbegin()->name(), "fit");
+    double weights = terms.rbegin()->weight();
+    double distance = weights * terms.rbegin()->distance();
+    for (int i = 0; i + 1 < terms.size(); ++i) {
+        distance += terms[i].weight() * terms[i].distance();
         EXPECT_EQ(terms[i].name(), expected.terms[static_cast<std::size_t>(i)].name);
         EXPECT_EQ(terms[i].distance(), expected.terms[static_cast<std::size_t>(i)].distance);
         weights += terms[i].weight();
     }
     EXPECT_NEAR(weights, 1.0, 1e-9);
+    EXPECT_NEAR(compared.value.score(), 1.0 / (1.0 + 4.0 * distance * distance), 1e-9);
 
     pb::SearchByKeyRequest search;
     *search.mutable_options() = searchOptions(recommended);
@@ -198,7 +201,7 @@ TEST_F(AttributesRpc, PartialOptionChangesTheScoreAndHasADirection) {
         request.set_partial(true);
         const auto compared = unary(*client.searches, &pb::SearchService::Stub::Compare, request);
         ASSERT_TRUE(compared.ok()) << compared;
-        EXPECT_EQ(compared.value.score(), expected) << keys[i];
+        EXPECT_EQ(compared.value.signature_score(), expected) << keys[i];
 
         pb::SearchByKeyRequest search;
         *search.mutable_options() = searchOptions(recommended);

@@ -157,6 +157,25 @@ TEST(Fit, TellsMirroredTwinsApartWithoutReflection) {
     }
 }
 
+TEST(Fit, ShapesThatEqualTheirMirrorImageAreNotMirrored) {
+    FitOptions options;
+    options.kinds = FitKinds::only(FitKind::kWhole);
+    for (const Solid& solid : {makeBox().solid, makeSphere().solid}) {
+        for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+            const PointCloud query = *sampleBoundary(solid, 6000, seed);
+            const PointCloud other =
+                applyToCloud(anyMotion(seed, true, 1.0), *sampleBoundary(solid, 6000, seed + 100));
+            const FitResult result = *align(FitQuery(surfaceOf(query)), surfaceOf(other), options);
+            EXPECT_FALSE(result.best.motion.reflected) << seed;
+            EXPECT_TRUE(result.handednessOpen) << seed;
+            // Nothing better is found by who forbids reflection.
+            FitOptions unmirrored = options;
+            unmirrored.reflection = false;
+            EXPECT_GE(result.best.score, 0.98 * fitted(query, other, unmirrored).best.score) << seed;
+        }
+    }
+}
+
 TEST(Fit, ReportsTheAxisOfARotationalSymmetry) {
     Solid pin;
     pin.parts.push_back({SolidTube{0.3, 1.0, 0.0}, {}});

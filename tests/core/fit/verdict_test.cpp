@@ -32,9 +32,11 @@ TEST(Verdict, FollowsDistanceAndMisfit) {
         {0.8, 0.8, FitKind::kWhole, Verdict::kUnrelated},
     };
     for (const auto& one : cases) {
-        EXPECT_EQ(verdictOf(one.distance, fitted(one.misfit, one.kind)), one.verdict)
+        EXPECT_EQ(verdictOf(one.distance, fitted(one.misfit, one.kind), true), one.verdict)
             << one.distance << " " << one.misfit;
     }
+    EXPECT_EQ(verdictOf(0.1, fitted(0.35, FitKind::kWhole), false), Verdict::kSameKind)
+        << "a bent object, or a mirrored one";
 }
 
 TEST(Verdict, EachHasItsNameAndReliability) {

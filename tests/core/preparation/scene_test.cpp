@@ -9,7 +9,9 @@
 #include "core/geometry/box.h"
 #include "core/geometry/motion.h"
 #include "core/synthetic/families.h"
+#include "core/synthetic/named_shapes.h"
 #include "core/synthetic/noise.h"
+#include "core/synthetic/solid.h"
 #include "core/synthetic/partial.h"
 
 namespace shapedb {
@@ -113,6 +115,28 @@ TEST(Scene, TellsSeparateObjectsOnATableApart) {
     EXPECT_LT(above.size(), own + own / 50);
     EXPECT_GT(above.size(), own * 8 / 10);
     EXPECT_EQ(isolated(cloud, *scene, {}).size(), cloud.size());
+}
+
+TEST(Scene, OneOfAHundredEqualObjectsIsAnObject) {
+    const PointCloud ball = *sampleBoundary(makeSphere().solid, 300, 1);
+    const double step = 3.0 * boxOf(ball).diagonal();
+    PointCloud cloud;
+    for (int i = 0; i < 100; ++i) {
+        for (const Point3& p : ball) cloud.push_back(p + Point3{step * (i % 10), step * (i / 10), 0.0});
+    }
+    const auto scene = findScene(cloud);
+    ASSERT_TRUE(scene);
+    EXPECT_EQ(scene->objects.size(), 100u);
+    EXPECT_EQ(isolated(cloud, *scene, {false, true}).size(), ball.size());
+}
+
+TEST(Scene, PointsThatStandManyTimesAreNoObjectsOfTheirOwn) {
+    const PointCloud one = memberOf("hammer", 1, 1500);
+    PointCloud cloud;
+    for (std::size_t i = 0; i < one.size(); ++i) cloud.insert(cloud.end(), i % 3 == 0 ? 10 : 1, one[i]);
+    const auto scene = findScene(cloud);
+    ASSERT_TRUE(scene);
+    EXPECT_EQ(scene->objects, std::vector<std::uint64_t>{cloud.size()});
 }
 
 TEST(Scene, CopesWithFewAndDegeneratePoints) {

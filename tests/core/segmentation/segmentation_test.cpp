@@ -9,9 +9,11 @@
 
 #include <gtest/gtest.h>
 
+#include "core/base/math.h"
 #include "core/base/random.h"
 #include "core/geometry/bounding.h"
 #include "core/geometry/neighbours.h"
+#include "core/pipeline.h"
 #include "core/segmentation/interior.h"
 #include "core/synthetic/named_shapes.h"
 #include "core/synthetic/noise.h"
@@ -220,13 +222,31 @@ TEST(Segmentation, OfFourPointsIsTheirTetrahedron) {
     ASSERT_EQ(s->segments.size(), 1U);
     EXPECT_NEAR(s->volume, 8.0 / (6.0 * std::sqrt(2.0)), 1e-12);
     EXPECT_LT(length(s->segments[0].centroid), 1e-12);
-    EXPECT_NEAR(s->segments[0].maximumRadius, std::sqrt(1.5), 1e-12);
+    // Its circumsphere, of radius 1.22, is larger than a ball of its volume.
+    EXPECT_NEAR(s->segments[0].maximumRadius, std::cbrt(s->volume * 3.0 / (4.0 * kPi)), 1e-12);
     // Second moments of a regular tetrahedron with edge a: a^2 / 40 about every axis.
     EXPECT_NEAR(s->segments[0].covariance[0], 4.0 / 40.0, 1e-12);
     EXPECT_NEAR(s->segments[0].covariance[3], 4.0 / 40.0, 1e-12);
     EXPECT_NEAR(s->segments[0].covariance[5], 4.0 / 40.0, 1e-12);
     EXPECT_NEAR(s->segments[0].covariance[1], 0.0, 1e-12);
     EXPECT_EQ(s->pointSegment, (std::vector<std::int32_t>{0, 0, 0, 0}));
+}
+
+TEST(Segmentation, HasNoSliversAndNoRadiusBeyondTheShape) {
+    // Flat faces leave flat tetrahedra inside the surface, whose circumspheres reach far out.
+    for (const std::uint64_t seed : {1, 2, 3}) {
+        for (const NamedShape& shape : namedShapes()) {
+            const PointCloud points = sample(shape, 6000, 0.0, seed);
+            const auto s = segment(points, parametersOf(Profile::kDefault).segmentation);
+            ASSERT_TRUE(s) << shape.name;
+            for (const Segment& part : s->segments) {
+                EXPECT_LE(part.maximumRadius, std::cbrt(s->volume * 3.0 / (4.0 * kPi)) * 1.001) << shape.name;
+                const double ball = 4.0 / 3.0 * kPi * std::pow(part.maximumRadius, 3);
+                EXPECT_TRUE(part.volume > 0.004 * s->volume || part.volume > 0.005 * ball)
+                    << shape.name << ": " << part.volume / s->volume;
+            }
+        }
+    }
 }
 
 TEST(Segmentation, VolumeOfKnownSolidsWithinTwoPercent) {
