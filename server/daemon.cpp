@@ -106,6 +106,7 @@ Result<std::unique_ptr<Daemon>> Daemon::start(const config::ServerConfig& config
                                               ingest::SignaturePipeline pipeline) {
     auto opened = openStore(config);
     RETURN_IF_ERROR(opened);
+    for (const std::string& finding : (*opened)->findings()) log->error(finding);
     const auto crashes = ingest::installCrashMarker(config.data + "/" + kCrashMarker);
     RETURN_IF_ERROR(crashes);
     for (const store::Crash& crash : *crashes) {

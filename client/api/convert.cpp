@@ -320,6 +320,7 @@ Stats fromWire(const v1::StatsResponse& from) {
     to.runningJobs = from.running_jobs();
     to.databaseBytes = from.database_bytes();
     to.walBytes = from.wal_bytes();
+    to.missingCommits = from.missing_commits();
     to.pointBytes = from.point_bytes();
     to.storedPointBytes = from.stored_point_bytes();
     to.uptimeSeconds = from.uptime_seconds();

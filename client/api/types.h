@@ -395,6 +395,8 @@ struct Stats {
     std::uint64_t runningJobs = 0;
     std::uint64_t databaseBytes = 0;
     std::uint64_t walBytes = 0;
+    /// Acknowledged changes that were gone when the server started; 0 after a restore.
+    std::uint64_t missingCommits = 0;
     std::uint64_t pointBytes = 0;        ///< uncompressed
     std::uint64_t storedPointBytes = 0;  ///< compressed
     double uptimeSeconds = 0.0;

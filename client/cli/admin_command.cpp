@@ -126,6 +126,7 @@ CommandResult runStats(Session& session) {
                                 {"running_jobs", stats->runningJobs},
                                 {"database_bytes", stats->databaseBytes},
                                 {"wal_bytes", stats->walBytes},
+                                {"missing_commits", stats->missingCommits},
                                 {"point_bytes", stats->pointBytes},
                                 {"stored_point_bytes", stats->storedPointBytes},
                                 {"uptime_seconds", stats->uptimeSeconds},
@@ -141,6 +142,9 @@ CommandResult runStats(Session& session) {
                             formatBytes(stats->queuedBytes) + "; " + formatCount(stats->runningJobs) +
                             " running"});
     table.add({"database", formatBytes(stats->databaseBytes) + ", log " + formatBytes(stats->walBytes)});
+    if (stats->missingCommits > 0) {
+        table.add({"missing", formatCount(stats->missingCommits) + " acknowledged changes: see admin check"});
+    }
     table.add(
         {"points", formatBytes(stats->pointBytes) + ", compressed " + formatBytes(stats->storedPointBytes)});
     table.add({"uptime", formatSeconds(stats->uptimeSeconds) + ", " +

@@ -156,6 +156,7 @@ grpc::Status AdminServiceHandler::Stats(grpc::ServerContext* context, const v1::
         response->set_uptime_seconds(uptime.count());
         response->set_searches(services_.searches.count());
         response->set_ingested(stats->ingested);
+        response->set_missing_commits(stored.missingCommits);
         return {};
     });
 }

@@ -180,6 +180,8 @@ struct StoreStats {
     std::uint64_t storedPointBytes = 0;  ///< as compressed
     std::uint64_t databaseBytes = 0;
     std::uint64_t walBytes = 0;
+    /// Acknowledged changes that the database did not have when it was opened; 0 after a restore.
+    std::uint64_t missingCommits = 0;
     int schemaVersion = 0;
 };
 
@@ -343,6 +345,9 @@ class Store {
     /// Moves the write-ahead log into the database file (at shutdown). Errors: kStorage also when a
     /// read outlasts the busy timeout.
     [[nodiscard]] virtual Result<void> checkpoint() = 0;
+    /// What an operator must know of how the database was found when it was opened: acknowledged changes that
+    /// are missing, what was mended. One line each; `check` lists them too. Empty after a restore.
+    [[nodiscard]] virtual std::vector<std::string> findings() const = 0;
 };
 
 }  // namespace shapedb::store

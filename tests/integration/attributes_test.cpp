@@ -149,8 +149,8 @@ TEST_F(AttributesRpc, TermsAddUpToTheScore) {
     ASSERT_TRUE(hit.has_fit());
     EXPECT_EQ(found.value.candidates_verified(), 1u);
     EXPECT_EQ(hit.signature_score(), expected.score);
-    ASSERT_EQ(hit.explanation().terms_size(), terms.size() + 1);
-    EXPECT_EQ(hit.explanation().terms(terms.size()).name(), "fit");
+    ASSERT_EQ(hit.explanation().terms_size(), terms.size());
+    EXPECT_EQ(hit.explanation().terms(terms.size() - 1).name(), "fit");
     double mean = 0.0;
     for (const pb::ScoreTerm& term : hit.explanation().terms()) mean += term.weight() * term.distance();
     EXPECT_NEAR(hit.score(), scoreOfDistance(mean), 1e-9);

@@ -12,10 +12,10 @@ constexpr char kIntegrity[] = "PRAGMA integrity_check(100)";
 constexpr char kForeignKeys[] = "PRAGMA foreign_key_check";
 constexpr char kTallyProblems[] =
     "SELECT 1 FROM (SELECT 1) LEFT JOIN tally t ON t.id = 1 WHERE t.id IS NULL "
-    "OR t.jobs <> (SELECT count(*) FROM job) OR t.job_bytes <> (SELECT coalesce(sum(point_bytes), 0) FROM "
+    "OR t.jobs <> (SELECT count(*) FROM job) OR t.job_bytes <> (SELECT total(point_bytes) FROM "
     "job) "
-    "OR t.point_bytes <> (SELECT coalesce(sum(point_bytes), 0) FROM shape_points) "
-    "OR t.stored_point_bytes <> (SELECT coalesce(sum(stored_bytes), 0) FROM shape_points)";
+    "OR t.point_bytes <> (SELECT total(point_bytes) FROM shape_points) "
+    "OR t.stored_point_bytes <> (SELECT total(stored_bytes) FROM shape_points)";
 constexpr char kAllPoints[] =
     "SELECT s.key, s.point_count, s.checksum, p.points, p.point_bytes, p.stored_bytes FROM shape s "
     "LEFT JOIN shape_points p ON p.shape_id = s.id ORDER BY s.id";
@@ -32,7 +32,20 @@ struct Rule {
     const char* sql;
     const char* problem;
 };
+constexpr char kSequenceProblems[] =
+    "SELECT name, seq FROM sqlite_sequence WHERE typeof(seq) <> 'integer' OR seq < 0 OR seq > "
+    "4611686018427387904";  // kMostCounted
+constexpr char kCounterProblems[] =
+    "SELECT 'collection ' || name FROM collection WHERE max(id, generation) > 4611686018427387904 UNION ALL "
+    "SELECT 'shape ' || key FROM shape WHERE max(id, version) > 4611686018427387904 UNION ALL "
+    "SELECT 'job ' || id FROM job WHERE max(id, attempts, stops) > 4611686018427387904 UNION ALL "
+    "SELECT 'rebuild ' || id FROM rebuild WHERE max(id, target_generation) > 4611686018427387904 UNION ALL "
+    "SELECT 'table tally' FROM tally WHERE commits < 0 OR commits > 4611686018427387904";
 constexpr Rule kRules[] = {
+    {"SELECT s.key FROM shape s JOIN job j ON j.shape_id = s.id JOIN shape_points p ON p.shape_id = s.id "
+     "WHERE "
+     "j.point_bytes <> p.point_bytes",
+     "has a job that counts other bytes than its points have"},
     {"SELECT s.key FROM shape s JOIN collection c ON c.id = s.collection_id WHERE s.state = 1 AND NOT EXISTS "
      "(SELECT 1 FROM signature g WHERE g.shape_id = s.id AND g.generation = c.generation "
      "AND g.points_version = s.points_version)",
@@ -78,6 +91,7 @@ class Checker {
                 while (query.step()) add("shape " + quoted(query.text(0)) + " " + rule.problem);
             });
         }
+        section([&] { counters(); });
         section([&] {
             if (Query(connection_, kTallyProblems).step()) add("the sums in table tally are wrong");
         });
@@ -112,6 +126,17 @@ class Checker {
             const std::string line = query.text(0);
             if (line != "ok") add("database integrity: " + line);
         }
+    }
+
+    /// What counts up must never come to its end.
+    void counters() {
+        Query sequences(connection_, kSequenceProblems);
+        while (sequences.step()) {
+            add("the id sequence of table " + sequences.text(0) + " stands at " + sequences.text(1) +
+                ": no rows could be added any more");
+        }
+        Query counted(connection_, kCounterProblems);
+        while (counted.step()) add(counted.text(0) + " has an id, a version or a count beyond 2^62");
     }
 
     void foreignKeys() {

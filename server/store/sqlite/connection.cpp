@@ -141,6 +141,8 @@ void Connection::rollback() noexcept {
 
 std::int64_t Connection::changes() const noexcept { return sqlite3_changes64(db_); }
 
+std::int64_t Connection::totalChanges() const noexcept { return sqlite3_total_changes64(db_); }
+
 std::int64_t Connection::lastInsertId() const noexcept { return sqlite3_last_insert_rowid(db_); }
 
 bool Connection::truncateWal(int waitMs) {

@@ -47,6 +47,8 @@ class Connection {
     void rollback() noexcept;
     /// Rows changed by the last INSERT, UPDATE or DELETE, without triggers and cascades.
     std::int64_t changes() const noexcept;
+    /// Of all statements so far, triggers and cascades included.
+    std::int64_t totalChanges() const noexcept;
     std::int64_t lastInsertId() const noexcept;
     /// Writes the log back into the database and truncates it. Waits at most `waitMs` for readers; false
     /// when they kept it from finishing.

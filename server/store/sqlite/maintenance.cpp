@@ -10,6 +10,7 @@
 
 #include "server/store/sqlite/check.h"
 #include "server/store/sqlite/migrator.h"
+#include "server/store/sqlite/sequences.h"
 #include "server/store/sqlite/sqlite_store_impl.h"
 
 namespace shapedb::store {
@@ -182,20 +183,11 @@ void prepareCopy(Connection& copy, const RunContext& context, std::int64_t nowMs
     }
 }
 
-std::int64_t lastId(Connection& connection, const std::string& table) {
-    return connection.integer("SELECT seq FROM sqlite_sequence WHERE name = '" + table + "'");
-}
-
-void setLastId(Connection& connection, const std::string& table, std::int64_t id) {
-    connection.execute("DELETE FROM sqlite_sequence WHERE name = '" + table +
-                       "'; INSERT INTO sqlite_sequence (name, seq) VALUES ('" + table + "', " +
-                       std::to_string(id) + ")");
-}
-
 /// Ids are never reused, not even across a restore: new rows continue after both histories, and jobs
 /// and rebuilds of the file get ids that the running server has never given out, so that a result in
 /// flight cannot meet the wrong row.
 void separateIds(Connection& copy, Connection& live) {
+    const std::int64_t commits = std::max(countCommits(copy), countCommits(live));
     Transaction transaction(copy, Transaction::Kind::kWrite);
     for (const char* table : {"collection", "shape"}) {
         setLastId(copy, table, std::max(lastId(copy, table), lastId(live, table)));
@@ -206,6 +198,8 @@ void separateIds(Connection& copy, Connection& live) {
         copy.execute("UPDATE " + table + " SET id = id + " + std::to_string(offset));
         setLastId(copy, table, offset + lastId(copy, table));
     }
+    // No mark of an acknowledged change is ahead of the database that replaces this one.
+    copy.execute("UPDATE tally SET commits = " + std::to_string(commits + 1));
     // The server that made the backup did not die of the jobs it was running.
     copy.execute("UPDATE job SET state = 0, attempts = attempts - 1 WHERE state = 1");
     transaction.commit();
@@ -261,6 +255,12 @@ Result<void> SqliteStore::restore(const std::string& path, const RunContext& con
             context.report("restore", done, total);
             orRaise(context.checkpoint());
         });
+        mark_.write(countCommits(*writer_));
+        {
+            const std::lock_guard<std::mutex> known(findingsMutex_);
+            missingCommits_ = 0;
+            findings_.clear();
+        }
         boundWal();
     });
 }
@@ -269,7 +269,10 @@ Result<std::vector<std::string>> SqliteStore::check(const RunContext& context) {
     return guarded("check the database", [&] {
         const Counted longRead(longReads_);
         Connection connection(options_.path, OpenMode::kReadOnly, options_.busyTimeoutMs);
-        return checkDatabase(connection, context);
+        std::vector<std::string> problems = findings();
+        for (std::string& problem : checkDatabase(connection, context))
+            problems.push_back(std::move(problem));
+        return problems;
     });
 }
 

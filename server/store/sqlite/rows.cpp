@@ -172,6 +172,12 @@ std::vector<float> readPoints(const Query& query) {
     return std::move(*points);
 }
 
+std::int64_t countCommits(Connection& connection) {
+    Query tally(connection, sql::kCommits);
+    if (!tally.step()) raise(ErrorCode::kDataLoss, "the row of table tally is missing");
+    return tally.integer(0);
+}
+
 QueueDepth readTally(Connection& connection) {
     Query tally(connection, sql::kTally);
     if (!tally.step()) raise(ErrorCode::kDataLoss, "the row of table tally is missing");

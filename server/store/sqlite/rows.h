@@ -60,6 +60,9 @@ std::int64_t digestOf(const std::string& first, const std::string& second = {});
 /// Decodes the points of a kLoadPoints row and verifies their checksum. Throws Failure.
 std::vector<float> readPoints(const Query& query);
 
+/// Transactions that changed something, since the database was made. Throws Failure kDataLoss.
+std::int64_t countCommits(Connection& connection);
+
 /// Jobs queued and running. Throws Failure kDataLoss.
 QueueDepth readTally(Connection& connection);
 

@@ -1,5 +1,6 @@
 #include "server/store/sqlite/sqlite_store.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
@@ -10,6 +11,7 @@
 
 #include "server/store/sqlite/migrator.h"
 #include "server/store/sqlite/rows.h"
+#include "server/store/sqlite/sequences.h"
 #include "server/store/sqlite/sqlite_store_impl.h"
 
 namespace shapedb::store {
@@ -133,7 +135,37 @@ SqliteStore::SqliteStore(const SqliteOptions& options)
       lock_(options_.path),
       writer_(openWriter(options_)),
       readers_(std::make_unique<ReaderPool>(options_.path, options_.readers, options_.busyTimeoutMs)),
-      walAttemptAt_(kWalBoundBytes) {}
+      mark_(options_.path + ".commits"),
+      walAttemptAt_(kWalBoundBytes) {
+    findings_ = mendSequences(*writer_);
+    const std::int64_t commits = countCommits(*writer_);
+    missingCommits_ = std::max<std::int64_t>(0, mark_.read().value_or(0) - commits);
+    if (missingCommits_ > 0) {
+        findings_.push_back(
+            "the last " + std::to_string(missingCommits_) +
+            " acknowledged changes are missing: the write-ahead log was damaged or removed, or "
+            "an older copy of the database was put in its place; restore a backup, or send the "
+            "scans again");
+    }
+    mark_.write(commits);
+}
+
+void SqliteStore::commit(Transaction& transaction, std::int64_t changesBefore) {
+    if (writer_->totalChanges() == changesBefore) {
+        transaction.commit();
+        return;
+    }
+    Query(*writer_, sql::kCountCommit).run();
+    const std::int64_t commits = countCommits(*writer_);
+    transaction.commit();
+    mark_.write(commits);
+    boundWal();
+}
+
+std::vector<std::string> SqliteStore::findings() const {
+    const std::lock_guard<std::mutex> lock(findingsMutex_);
+    return findings_;
+}
 
 // SQLite writes the log back every thousand pages, but cannot start it from the beginning while reads overlap
 // without a gap. Past a bound this waits for a gap: not long, and not again before the log has grown further.
@@ -215,6 +247,8 @@ Result<StoreStats> SqliteStore::stats() {
         stats.databaseBytes = fileSize(options_.path);
         stats.walBytes = fileSize(options_.path + "-wal");
         stats.schemaVersion = schemaVersion(connection);
+        const std::lock_guard<std::mutex> lock(findingsMutex_);
+        stats.missingCommits = static_cast<std::uint64_t>(missingCommits_);
         return stats;
     });
 }

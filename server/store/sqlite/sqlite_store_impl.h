@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "server/store/point_blob.h"
+#include "server/store/sqlite/commit_mark.h"
 #include "server/store/sqlite/pool.h"
 #include "server/store/sqlite/process_lock.h"
 #include "server/store/sqlite/sqlite_store.h"
@@ -73,6 +74,7 @@ class SqliteStore final : public Store {
     Result<std::vector<std::string>> check(const RunContext& context) override;
     Result<StoreStats> stats() override;
     Result<void> checkpoint() override;
+    std::vector<std::string> findings() const override;
 
   private:
     /// Runs `body(connection)` in a write transaction and commits it, unless it throws.
@@ -83,14 +85,13 @@ class SqliteStore final : public Store {
         return guarded(operation, [&]() -> Value {
             const std::lock_guard<std::mutex> lock(writerMutex_);
             Transaction transaction(*writer_, Transaction::Kind::kWrite);
+            const std::int64_t before = writer_->totalChanges();
             if constexpr (std::is_void_v<Value>) {
                 body(*writer_);
-                transaction.commit();
-                boundWal();
+                commit(transaction, before);
             } else {
                 Value value = body(*writer_);
-                transaction.commit();
-                boundWal();
+                commit(transaction, before);
                 return value;
             }
         });
@@ -107,6 +108,9 @@ class SqliteStore final : public Store {
             return body(*lease);
         });
     }
+
+    /// Commits, counts the commit if anything changed since `changesBefore`, and leaves the mark.
+    void commit(Transaction& transaction, std::int64_t changesBefore);
 
     TimestampMs now() const { return options_.now(); }
 
@@ -132,6 +136,10 @@ class SqliteStore final : public Store {
     std::mutex writerMutex_;
     std::unique_ptr<Connection> writer_;
     std::unique_ptr<ReaderPool> readers_;
+    CommitMark mark_;
+    std::int64_t missingCommits_ = 0;    ///< under findingsMutex_, as the next
+    std::vector<std::string> findings_;  ///< what was noticed when the database was opened
+    mutable std::mutex findingsMutex_;
     std::uint64_t walAttemptAt_;  ///< log size at which to wait for readers; under writerMutex_
     /// Backups and checks, which hold a snapshot too long to wait for.
     std::atomic<int> longReads_{0};

@@ -70,6 +70,7 @@ class MemoryStore : public store::Store {
     Result<std::vector<std::string>> check(const RunContext& context) override;
     Result<store::StoreStats> stats() override;
     Result<void> checkpoint() override;
+    std::vector<std::string> findings() const override { return {}; }
 
   private:
     struct QueuedJob {

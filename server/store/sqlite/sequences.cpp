@@ -1,0 +1,44 @@
+#include "server/store/sqlite/sequences.h"
+
+namespace shapedb::store {
+
+namespace {
+
+std::int64_t storedLastId(Connection& connection, const std::string& table) {
+    Query query(connection, "SELECT seq FROM sqlite_sequence WHERE name = ?1", table);
+    return query.step() ? query.integer(0) : 0;
+}
+
+std::int64_t largestId(Connection& connection, const std::string& table) {
+    return connection.integer("SELECT coalesce(max(id), 0) FROM " + table);
+}
+
+}  // namespace
+
+std::int64_t lastId(Connection& connection, const std::string& table) {
+    const std::int64_t stored = storedLastId(connection, table);
+    return stored >= 0 && stored <= kMostCounted ? stored : largestId(connection, table);
+}
+
+void setLastId(Connection& connection, const std::string& table, std::int64_t id) {
+    connection.execute("DELETE FROM sqlite_sequence WHERE name = '" + table +
+                       "'; INSERT INTO sqlite_sequence (name, seq) VALUES ('" + table + "', " +
+                       std::to_string(id) + ")");
+}
+
+std::vector<std::string> mendSequences(Connection& connection) {
+    std::vector<std::string> mended;
+    for (const std::string table : {"collection", "shape", "job", "rebuild"}) {
+        const std::int64_t stored = storedLastId(connection, table);
+        const std::int64_t last = lastId(connection, table);
+        if (stored == last) continue;
+        Transaction transaction(connection, Transaction::Kind::kWrite);
+        setLastId(connection, table, last);
+        transaction.commit();
+        mended.push_back("the id sequence of table " + table + " stood at " + std::to_string(stored) +
+                         ", beyond all ids: it was set back to " + std::to_string(last));
+    }
+    return mended;
+}
+
+}  // namespace shapedb::store

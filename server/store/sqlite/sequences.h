@@ -1,0 +1,25 @@
+// The ids that AUTOINCREMENT gives out: never twice, and never to the end.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "server/store/sqlite/connection.h"
+
+namespace shapedb::store {
+
+/// No id, version or generation is larger: counting from here on takes for ever. A larger one was not made by
+/// a server, and one of 2^63 - 1 would make every insert fail.
+constexpr std::int64_t kMostCounted = std::int64_t{1} << 62;
+
+/// The last id given out; 0 before the first. One beyond kMostCounted is not believed: then the largest id in
+/// use.
+std::int64_t lastId(Connection& connection, const std::string& table);
+void setLastId(Connection& connection, const std::string& table, std::int64_t id);
+
+/// Sets sequences beyond kMostCounted back to the largest id in use. Returns what was mended, one line each.
+/// Throws Failure.
+std::vector<std::string> mendSequences(Connection& connection);
+
+}  // namespace shapedb::store
