@@ -5,7 +5,8 @@
 
 namespace shapedb::testing {
 
-/// SHAPEDB_TEST_SCALE, a number of at least 1; 1 by default, as CI runs them. Nightly lanes and people set more.
+/// SHAPEDB_TEST_SCALE, a number of at least 1; 1 by default, as CI runs them. Nightly lanes and people set
+/// more.
 inline int testScale() {
     const char* text = std::getenv("SHAPEDB_TEST_SCALE");
     const int scale = text != nullptr ? std::atoi(text) : 1;

@@ -11,8 +11,8 @@
 #include "core/synthetic/families.h"
 #include "core/synthetic/named_shapes.h"
 #include "core/synthetic/noise.h"
-#include "core/synthetic/solid.h"
 #include "core/synthetic/partial.h"
+#include "core/synthetic/solid.h"
 
 namespace shapedb {
 namespace {
