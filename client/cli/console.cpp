@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/cli/text.h"
+#include "common/safe_text.h"
 
 namespace shapedb::cli {
 
@@ -22,7 +23,7 @@ Console::Console(std::ostream& out, std::ostream& err, bool errorIsTerminal, std
 void Console::text(const std::string& text) {
     if (json_) return;
     clearProgress();
-    out_ << text;
+    out_ << escapeUnsafe(text, true);
 }
 
 void Console::document(const nlohmann::json& document) {
@@ -35,7 +36,7 @@ void Console::document(const nlohmann::json& document) {
 void Console::note(const std::string& message) {
     const std::lock_guard<std::mutex> lock(mutex_);
     clearProgressLocked();
-    err_ << program_ << ": " << message << '\n' << std::flush;
+    err_ << program_ << ": " << escapeUnsafe(message, true) << '\n' << std::flush;
 }
 
 void Console::failure(const Error& error) {
@@ -50,7 +51,7 @@ void Console::progress(const std::string& what, std::uint64_t done, std::uint64_
     if (barShown_ && now - lastBar_ < kBarInterval) return;
     lastBar_ = now;
     barShown_ = true;
-    std::string text = what + "  ";
+    std::string text = escapeUnsafe(what) + "  ";
     if (total > 0) {
         const double share = static_cast<double>(done) / static_cast<double>(total);
         text += bar(share, kBarWidth) + "  " + formatCount(done) + " / " + formatCount(total);
@@ -78,7 +79,7 @@ bool Console::flush() {
 }
 
 std::string dump(const nlohmann::json& document) {
-    return document.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
+    return escapeUnsafe(document.dump(2, ' ', false, nlohmann::json::error_handler_t::replace), true);
 }
 
 nlohmann::json toJson(const Error& error) {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "common/safe_text.h"
+
 namespace shapedb::cli {
 
 namespace {
@@ -106,6 +108,11 @@ std::string escapeXml(const std::string& text) {
 std::size_t displayWidth(const std::string& text) {
     return static_cast<std::size_t>(std::count_if(
         text.begin(), text.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xc0u) != 0x80u; }));
+}
+
+void Table::add(std::vector<std::string> cells) {
+    for (std::string& cell : cells) cell = escapeUnsafe(cell);
+    rows_.push_back(std::move(cells));
 }
 
 std::string Table::render() const {

@@ -56,8 +56,9 @@ class Table {
 
     explicit Table(std::vector<Column> columns) : columns_(std::move(columns)) {}
 
-    /// Missing cells are empty. At most one cell per column.
-    void add(std::vector<std::string> cells) { rows_.push_back(std::move(cells)); }
+    /// Missing cells are empty. At most one cell per column. What a stranger may have written into a cell is
+    /// escaped (common/safe_text.h), line ends too.
+    void add(std::vector<std::string> cells);
 
     [[nodiscard]] bool empty() const { return rows_.empty(); }
 

@@ -7,13 +7,14 @@
 #include <cstdint>
 
 #include "common/point_stream.h"
+#include "server/store/key_rules.h"
 
 namespace shapedb::catalog {
 
 // Names and text (repeated in the comments of proto/).
 constexpr std::size_t kMaxCollectionNameBytes = 128;
 constexpr std::size_t kMaxDescriptionBytes = 1'024;
-constexpr std::size_t kMaxKeyBytes = 512;
+using store::kMaxKeyBytes;
 constexpr std::size_t kMaxMetadataEntries = 64;
 constexpr std::size_t kMaxMetadataKeyBytes = 128;
 constexpr std::size_t kMaxMetadataValueBytes = 1'024;

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 
+#include "common/safe_text.h"
 #include "server/catalog/limits.h"
+#include "server/store/key_rules.h"
 
 namespace shapedb::catalog {
 namespace {
@@ -17,41 +19,7 @@ bool isAlphanumeric(char c) {
 
 bool isNameByte(char c) { return isAlphanumeric(c) || c == '_' || c == '.' || c == '-'; }
 
-/// Length in bytes of the UTF-8 character at `at`; 0 when it is invalid.
-std::size_t characterLength(const std::string& text, std::size_t at) noexcept {
-    const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
-    const unsigned char first = byte(at);
-    if (first < 0x80) return 1;
-    std::size_t length = 0;
-    std::uint32_t code = 0;
-    std::uint32_t smallest = 0;
-    if ((first & 0xe0) == 0xc0) {
-        length = 2, code = first & 0x1fu, smallest = 0x80;
-    } else if ((first & 0xf0) == 0xe0) {
-        length = 3, code = first & 0x0fu, smallest = 0x800;
-    } else if ((first & 0xf8) == 0xf0) {
-        length = 4, code = first & 0x07u, smallest = 0x10000;
-    }
-    if (length == 0 || at + length > text.size()) return 0;
-    for (std::size_t i = 1; i < length; ++i) {
-        if ((byte(at + i) & 0xc0) != 0x80) return 0;
-        code = (code << 6) | (byte(at + i) & 0x3fu);
-    }
-    const bool surrogate = code >= 0xd800 && code <= 0xdfff;
-    // Overlong forms would give one key several spellings.
-    return code < smallest || surrogate || code > 0x10ffff ? 0 : length;
-}
-
 }  // namespace
-
-bool isUtf8(const std::string& text) noexcept {
-    for (std::size_t i = 0; i < text.size();) {
-        const std::size_t length = characterLength(text, i);
-        if (length == 0) return false;
-        i += length;
-    }
-    return true;
-}
 
 std::string collectionNameOrDefault(const std::string& name) {
     return name.empty() ? kDefaultCollection : name;
@@ -78,18 +46,7 @@ Result<void> checkDescription(const std::string& description) {
 }
 
 Result<void> checkKey(const std::string& key) {
-    if (key.empty())
-        return bad("key: a shape needs a key of 1 to " + std::to_string(kMaxKeyBytes) + " bytes");
-    if (key.size() > kMaxKeyBytes) {
-        return bad("key: " + std::to_string(key.size()) + " bytes, at most " + std::to_string(kMaxKeyBytes) +
-                   " are allowed");
-    }
-    const auto isControl = [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; };
-    const auto control = std::find_if(key.begin(), key.end(), isControl);
-    if (control != key.end()) {
-        return bad("key: control character at byte " + std::to_string(control - key.begin()));
-    }
-    if (!isUtf8(key)) return bad("key: not valid UTF-8");
+    if (const auto problem = store::problemOfKey(key)) return bad("key: " + *problem);
     return {};
 }
 

@@ -37,7 +37,4 @@ constexpr const char* kDefaultCollection = "default";
 /// 0 (the default) to kMaxPageSize.
 [[nodiscard]] Result<void> checkPageSize(std::uint32_t pageSize);
 
-/// Valid UTF-8: no overlong forms, surrogates or code points past U+10FFFF.
-[[nodiscard]] bool isUtf8(const std::string& text) noexcept;
-
 }  // namespace shapedb::catalog

@@ -188,8 +188,8 @@ bool Listener::acceptAll(int listening) {
             ::close(spare_);
             const int unwanted = acceptOne(listening);
             if (unwanted >= 0) {
-                ::close(unwanted);
                 ++refused_;
+                ::close(unwanted);
             }
             spare_ = openSpare();
         } else if (spare_ < 0) {
@@ -203,9 +203,9 @@ bool Listener::acceptAll(int listening) {
 void Listener::handOver(int socket) {
     if (connections_ >= maxConnections_) connections_ = open_.count();
     if (connections_ >= maxConnections_) {
-        ::close(socket);
         ++refused_;
         if (!std::exchange(overCapacity_, true)) events_.onTooMany(connections_);
+        ::close(socket);
         return;
     }
     const int on = 1;

@@ -11,6 +11,8 @@
 #include <spdlog/sinks/basic_file_sink.h>
 #include <spdlog/sinks/stdout_sinks.h>
 
+#include "common/safe_text.h"
+
 namespace shapedb::telemetry {
 namespace {
 
@@ -18,7 +20,8 @@ using Value = decltype(Field::value);
 
 /// A JSON string literal; invalid UTF-8 becomes U+FFFD.
 std::string jsonString(const std::string& text) {
-    return nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+    // What JSON need not escape may still write on the terminal of whoever reads the log.
+    return escapeUnsafe(nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
 }
 
 std::string number(double value) {

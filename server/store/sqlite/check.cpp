@@ -1,5 +1,7 @@
 #include "server/store/sqlite/check.h"
 
+#include "common/safe_text.h"
+#include "server/store/key_rules.h"
 #include "server/store/sqlite/rows.h"
 
 namespace shapedb::store {
@@ -25,6 +27,7 @@ constexpr char kAllSignatures[] =
 constexpr char kAllSurfaces[] =
     "SELECT s.key, f.points_version, f.digest, f.bytes FROM shape_surface f JOIN shape s ON s.id = "
     "f.shape_id";
+constexpr char kAllKeys[] = "SELECT key FROM shape";
 constexpr char kShapesTotal[] = "SELECT count(*) FROM shape";
 
 /// A rule between tables; the statement lists the keys of shapes that break it.
@@ -92,6 +95,7 @@ class Checker {
             });
         }
         section([&] { counters(); });
+        section([&] { keys(); });
         section([&] {
             if (Query(connection_, kTallyProblems).step()) add("the sums in table tally are wrong");
         });
@@ -137,6 +141,16 @@ class Checker {
         }
         Query counted(connection_, kCounterProblems);
         while (counted.step()) add(counted.text(0) + " has an id, a version or a count beyond 2^62");
+    }
+
+    void keys() {
+        Query all(connection_, kAllKeys);
+        while (all.step()) {
+            orRaise(context_.checkpoint());
+            if (const auto problem = problemOfKey(all.text(0))) {
+                add("shape " + quoted(escapeUnsafe(all.text(0))) + " has a key that is none: " + *problem);
+            }
+        }
     }
 
     void foreignKeys() {

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "common/safe_text.h"
 #include "server/catalog/limits.h"
 
 namespace shapedb::catalog {

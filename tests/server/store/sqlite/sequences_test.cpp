@@ -51,6 +51,25 @@ TEST_F(SequencesTest, BackupsWhoseCountersAreAtTheirEndAreRefused) {
     expectSound();
 }
 
+TEST_F(SequencesTest, BackupsWithKeysThatNobodyCouldUploadAreRefused) {
+    const Collection c = collection();
+    put(c.id, "a", 1);
+    finishAll();
+    // A C1 control sequence, a line end, an override of the direction, nothing, and too much.
+    const std::vector<std::string> keys = {"char(155) || '2J'", "'a' || char(10)", "'a' || char(8238)", "''",
+                                           "printf('%0600d', 1)"};
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+        const std::string path = folder_.file("keys-" + std::to_string(i));
+        ASSERT_TRUE(store_->backup(path, {}));
+        change(path, "UPDATE shape SET key = " + keys[i]);
+        const auto restored = store_->restore(path, {}, {});
+        ASSERT_FALSE(restored) << keys[i];
+        EXPECT_NE(restored.error().message.find("has a key that is none"), std::string::npos)
+            << restored.error().message;
+        EXPECT_EQ(restored.error().message.find('\n'), std::string::npos);
+    }
+}
+
 TEST_F(SequencesTest, ADatabaseThatWasPoisonedBeforeIsMendedAtStart) {
     const Collection c = collection();
     const Shape a = put(c.id, "a", 1);

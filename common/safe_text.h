@@ -1,0 +1,23 @@
+// Text of strangers, made safe for terminals, logs and keys.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+
+namespace shapedb {
+
+/// Valid UTF-8 without overlong forms, which would give one text several spellings.
+[[nodiscard]] bool isUtf8(std::string_view text) noexcept;
+
+/// The byte at which the first character begins that changes how a terminal or a log shows the text, or that
+/// hides in it: control characters (C0, DEL, C1), marks that change the direction of writing, line and
+/// paragraph separators, invisible characters (zero width space, byte order mark; not the joiners that some
+/// scripts need), and bytes that are no UTF-8. npos: there is none.
+[[nodiscard]] std::size_t findUnsafe(std::string_view text) noexcept;
+
+/// Each of these characters as \uXXXX, as JSON spells them, and each invalid byte as \ufffd. `newlines`: keep
+/// line feeds.
+[[nodiscard]] std::string escapeUnsafe(std::string_view text, bool newlines = false);
+
+}  // namespace shapedb
