@@ -5,6 +5,7 @@
 // stopped at once by a second signal.
 
 #include <algorithm>
+#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <string>
@@ -91,6 +92,9 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+    // Beyond a limit of file sizes, writing fails with EFBIG, which is reported; the signal would end the
+    // process.
+    std::signal(SIGXFSZ, SIG_IGN);
     try {
         return run(argc, argv);
     } catch (const std::exception& error) {

@@ -97,6 +97,7 @@ Result<void> Budget::Share::take(std::uint64_t amount) {
 Admission::Admission(std::uint64_t uploadBytes, int uploadCalls)
     : calls({kMaxOrdinaryCalls, uploadCalls, kMaxAdminCalls}),
       uploads(uploadBytes, "bytes of points that uploads in progress may hold"),
-      followers(kMaxFollowers, "calls that may wait for shapes and rebuilds") {}
+      followers(kMaxFollowers, "calls that may wait for shapes and rebuilds"),
+      copies(kMaxCopies, "places for a backup or restore in transit") {}
 
 }  // namespace shapedb::catalog

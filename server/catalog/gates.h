@@ -155,6 +155,7 @@ struct Admission {
     CallGate calls;
     Budget uploads;    ///< bytes of points being received
     Budget followers;  ///< calls that wait for a shape or a rebuild
+    Budget copies;     ///< copies of the database on their way to or from a client
 };
 
 }  // namespace shapedb::catalog

@@ -42,6 +42,8 @@ constexpr int kMaxAdminCalls = 16;
 constexpr int kMostUploads = 96;
 /// Calls that only wait for a shape or a rebuild. Together with all uploads they leave places for searches.
 constexpr int kMaxFollowers = 96;
+/// Backups and restores: each holds a copy of the database on the disk for as long as its client takes.
+constexpr int kMaxCopies = 1;
 static_assert(kMostUploads + kMaxFollowers < kMaxOrdinaryCalls);
 
 // Waiting inside calls.

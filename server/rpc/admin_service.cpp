@@ -1,11 +1,13 @@
 #include "server/rpc/admin_service.h"
 
+#include <algorithm>
 #include <chrono>
 #include <string>
 
 #include "core/base/return_if_error.h"
 #include "server/catalog/limits.h"
 #include "server/config/load.h"
+#include "server/files/free_space.h"
 #include "server/files/temporary_file.h"
 #include "server/rpc/backup_stream.h"
 #include "server/rpc/call.h"
@@ -39,6 +41,14 @@ v1::RebuildProgress progressFrom(const catalog::RebuildProgress& progress) {
     return message;
 }
 
+/// The received file, its private copy that is checked, and the log that replaces the content.
+constexpr std::uint64_t kCopiesOfRestore = 3;
+
+Result<void> requireRoomForRestore(const std::string& directory, std::uint64_t announced) {
+    constexpr std::uint64_t kMost = ~std::uint64_t{0} / kCopiesOfRestore;
+    return files::requireFreeSpace(directory, kCopiesOfRestore * std::min(announced, kMost), "the restore");
+}
+
 }  // namespace
 
 grpc::Status AdminServiceHandler::Rebuild(grpc::ServerContext* context, const v1::RebuildRequest* request,
@@ -68,6 +78,12 @@ grpc::Status AdminServiceHandler::CancelRebuild(grpc::ServerContext* context,
 grpc::Status AdminServiceHandler::Backup(grpc::ServerContext* context, const v1::BackupRequest*,
                                          grpc::ServerWriter<v1::BackupChunk>* writer) {
     return handle(services_, context, operations::kBackup, [&](Call& call) -> Result<void> {
+        catalog::Budget::Share copy(services_.admission.copies);
+        RETURN_IF_ERROR(copy.take(1));
+        const auto stats = services_.catalog.stats();
+        RETURN_IF_ERROR(stats);
+        RETURN_IF_ERROR(
+            files::requireFreeSpace(services_.temporaryDirectory, stats->store.databaseBytes, "the backup"));
         const auto file = files::TemporaryFile::create(services_.temporaryDirectory);
         RETURN_IF_ERROR(file);
         RETURN_IF_ERROR(services_.catalog.backup(file->path(), call.run()));
@@ -81,6 +97,8 @@ grpc::Status AdminServiceHandler::Restore(grpc::ServerContext* context,
                                           v1::RestoreResponse* response) {
     return handle(services_, context, operations::kRestore, [&](Call& call) -> Result<void> {
         call.frame().expectRestore();
+        catalog::Budget::Share copy(services_.admission.copies);
+        RETURN_IF_ERROR(copy.take(1));
         const auto file = files::TemporaryFile::create(services_.temporaryDirectory);
         RETURN_IF_ERROR(file);
         auto receiver = FileReceiver::create(file->path());
@@ -88,6 +106,9 @@ grpc::Status AdminServiceHandler::Restore(grpc::ServerContext* context,
         v1::BackupChunk chunk;
         while (call.read(*reader, &chunk)) {
             RETURN_IF_ERROR(call.run().checkpoint());
+            if (chunk.total_bytes() > 0) {
+                RETURN_IF_ERROR(requireRoomForRestore(services_.temporaryDirectory, chunk.total_bytes()));
+            }
             RETURN_IF_ERROR(receiver->add(chunk));
         }
         if (call.clientGone()) return fail(ErrorCode::kCancelled, "the client cancelled the restore");

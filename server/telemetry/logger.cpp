@@ -68,13 +68,25 @@ spdlog::level::level_enum spdlogLevel(Level level) {
     return spdlog::level::err;
 }
 
+constexpr std::size_t kLevelWidth = 5;
+
+std::string levelName(Level level) {
+    switch (level) {
+        case Level::kTrace: return "trace";
+        case Level::kDebug: return "debug";
+        case Level::kInfo: return "info";
+        case Level::kWarn: return "warn";
+        case Level::kError: return "error";
+    }
+    return "error";
+}
+
 class SpdlogLogger : public Logger {
   public:
     SpdlogLogger(spdlog::sink_ptr sink, const LogOptions& options)
         : json_(options.json), logger_("shapedb", std::move(sink)) {
         // UTC, so that lines of several machines sort.
-        const char* pattern =
-            json_ ? R"({"time":"%Y-%m-%dT%H:%M:%S.%eZ","level":"%l",%v})" : "%Y-%m-%dT%H:%M:%S.%eZ %-5l %v";
+        const char* pattern = json_ ? R"({"time":"%Y-%m-%dT%H:%M:%S.%eZ",%v})" : "%Y-%m-%dT%H:%M:%S.%eZ %v";
         logger_.set_formatter(
             std::make_unique<spdlog::pattern_formatter>(pattern, spdlog::pattern_time_type::utc));
         logger_.set_level(spdlogLevel(options.level));
@@ -86,8 +98,12 @@ class SpdlogLogger : public Logger {
         const auto wanted = spdlogLevel(level);
         if (!logger_.should_log(wanted)) return;
         try {
-            logger_.log(wanted, spdlog::string_view_t(json_ ? formatJson(message, fields)
-                                                            : formatText(message, fields)));
+            // The level by our names: spdlog calls "warn" "warning".
+            std::string name = levelName(level);
+            const std::string line =
+                json_ ? "\"level\":\"" + name + "\"," + formatJson(message, fields)
+                      : name.append(kLevelWidth - name.size(), ' ') + " " + formatText(message, fields);
+            logger_.log(wanted, spdlog::string_view_t(line));
         } catch (const std::exception&) {
             // Out of memory for the line: it is lost, the call continues.
         }

@@ -32,12 +32,13 @@ CHUNK_POINTS = 80_000  # below the 1 MiB of a chunk
 class Server:
     """shapedbd on a free port with a data directory of its own."""
 
-    def __init__(self, *flags, directory=None, open_files=None, memory=None):
+    def __init__(self, *flags, directory=None, open_files=None, memory=None, file_size=None):
         self._own = tempfile.TemporaryDirectory(prefix="shapedb-attack-")
         self.data = directory or os.path.join(self._own.name, "data")
         self.log_path = os.path.join(self._own.name, "log")
         self._flags = flags
-        self._limits = [(resource.RLIMIT_NOFILE, open_files), (resource.RLIMIT_AS, memory)]
+        self._limits = [(resource.RLIMIT_NOFILE, open_files), (resource.RLIMIT_AS, memory),
+                        (resource.RLIMIT_FSIZE, file_size)]
         self.process = None
         self.start()
 
@@ -54,6 +55,7 @@ class Server:
         banner = self.process.stdout.readline()
         if not banner.startswith("listening on "):
             self.process.wait()
+            self.process.stdout.close()
             raise RuntimeError("the server did not start: " + self.log())
         self.address = banner.split()[-1]
         self.port = int(self.address.rsplit(":", 1)[1])

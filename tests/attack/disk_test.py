@@ -1,0 +1,130 @@
+"""Attacks on the disk and on what is kept there."""
+
+import os
+import tempfile
+import threading
+import time
+import unittest
+
+import grpc
+
+from attacker import MIB, Server, admin, ball, eventually, main, reason, shapes
+
+
+class DataDirectory(unittest.TestCase):
+    def test_of_others_is_refused_and_left_alone(self):
+        with tempfile.TemporaryDirectory() as directory:
+            os.makedirs(directory + "/tmp/photos")
+            with self.assertRaisesRegex(RuntimeError, "no ShapeDB database"):
+                Server(directory=directory)
+            self.assertTrue(os.path.isdir(directory + "/tmp/photos"))
+            self.assertEqual(os.listdir(directory), ["tmp"])
+
+    def test_links_in_it_are_not_followed(self):
+        with tempfile.TemporaryDirectory() as elsewhere:
+            os.makedirs(elsewhere + "/shapedb-AbCdEf")
+            open(elsewhere + "/shapedb-AbCdEf/database", "w").close()
+            with Server() as server:
+                server.stop()
+                os.rmdir(server.data + "/tmp")
+                os.symlink(elsewhere, server.data + "/tmp")
+                with self.assertRaisesRegex(RuntimeError, "is a link"):
+                    server.start()
+                self.assertTrue(os.path.exists(elsewhere + "/shapedb-AbCdEf/database"))
+                os.unlink(server.data + "/tmp")
+                server.start()
+
+    def test_nobody_else_can_read_what_the_server_writes(self):
+        with Server() as server, server.connect() as client:
+            client.add("ball", ball())
+            list(client.admin.Rebuild(admin.RebuildRequest(collection="default"), timeout=60))
+            for name in os.listdir(server.data):
+                mode = os.stat(os.path.join(server.data, name)).st_mode & 0o077
+                self.assertEqual(mode, 0, name)
+
+
+class Copies(unittest.TestCase):
+    def test_unread_backups_do_not_pile_up(self):
+        with Server() as server, server.connect() as client:
+            for i in range(20):
+                client.add(f"ball {i}", ball(20_000, 1 + i), wait=False)
+            self.assertTrue(eventually(lambda: client.admin.Stats(admin.StatsRequest()).shapes_pending == 0))
+            clients = [server.connect() for _ in range(8)]
+            streams = [other.admin.Backup(admin.BackupRequest(), timeout=60) for other in clients]
+            outcomes = []
+
+            def first(stream):
+                try:
+                    outcomes.append(next(stream) and None)
+                except grpc.RpcError as error:
+                    outcomes.append(error)
+
+            threads = [threading.Thread(target=first, args=(stream,)) for stream in streams]
+            for thread in threads:
+                thread.start()
+            for thread in threads:
+                thread.join()
+            refused = [error for error in outcomes if error is not None]
+            self.assertGreaterEqual(len(refused), 1)
+            for error in refused:
+                self.assertEqual(error.code(), grpc.StatusCode.RESOURCE_EXHAUSTED)
+                self.assertEqual(reason(error), "queue_full")
+            self.assertLessEqual(len(os.listdir(server.data + "/tmp")), 1)
+            for other in clients:
+                other.channel.close()
+            self.assertTrue(eventually(lambda: not os.listdir(server.data + "/tmp")), "copies are left")
+            received = sum(len(chunk.data) for chunk in client.admin.Backup(admin.BackupRequest(), timeout=60))
+            self.assertGreater(received, 0, "the place is free again")
+
+    def test_a_restore_that_announces_a_terabyte_is_refused_at_once(self):
+        with Server() as server, server.connect() as client:
+            def announce():
+                yield admin.BackupChunk(total_bytes=1 << 42, data=b"x" * MIB)
+                time.sleep(5)
+
+            began = time.monotonic()
+            with self.assertRaises(grpc.RpcError) as failure:
+                client.admin.Restore(announce(), timeout=30)
+            self.assertEqual(reason(failure.exception), "storage_full")
+            self.assertLess(time.monotonic() - began, 4)
+            self.assertEqual(os.listdir(server.data + "/tmp"), [])
+
+
+class FileSizes(unittest.TestCase):
+    def test_beyond_their_limit_end_an_upload_and_not_the_server(self):
+        with Server(file_size=6 * MIB) as server, server.connect() as client:
+            failure = None
+            for i in range(60):
+                try:
+                    client.add(f"ball {i}", ball(40_000, 1 + 0.1 * i), wait=False)
+                except grpc.RpcError as error:
+                    failure = error
+                    break
+            self.assertIsNotNone(failure, "the limit was not reached")
+            self.assertIn(reason(failure), ("storage_full", "storage"))
+            self.assertTrue(server.running(), server.log())
+            self.assertGreater(client.count(), 0)
+
+
+class Keys(unittest.TestCase):
+    def test_that_would_act_on_a_terminal_are_refused(self):
+        attacks = [chr(c) for c in [*range(0x20), *range(0x7f, 0xa0)]]
+        attacks += ["\u061c", "\u200e", "\u200f", "\u2028", "\u2029", "\u202e", "\u2066", "\u2069", "\ufeff"]
+        with Server() as server, server.connect() as client:
+            for attack in attacks:
+                with self.assertRaises(grpc.RpcError) as failure:
+                    client.add(f"evil{attack}[2Jkey", ball(100), wait=False)
+                self.assertEqual(reason(failure.exception), "invalid_argument", repr(attack))
+            log = server.log()
+            for attack in attacks:
+                if attack != "\n":
+                    self.assertNotIn(attack, log, repr(attack))
+            self.assertNotIn("\n[2J", log)
+            self.assertIn("\\u202e", log)
+            # Values may hold anything; what shows them escapes it.
+            client.add("good", ball(500), metadata={"note": "\x1b[2J\r\nnext \u202e"})
+            self.assertEqual(client.count(), 1)
+
+
+if __name__ == "__main__":
+    main()
