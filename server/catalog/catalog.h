@@ -191,9 +191,10 @@ class Catalog {
     /// the scan is stored.
     [[nodiscard]] Result<store::Shape> awaitIngest(const store::Shape& added, const Checkpoint& checkpoint);
 
-    /// The signature of a shape that searches of its collection find. Errors: kNotReady, saying whether
-    /// it is pending, why it failed, or that a rebuild is being put in place; kDataLoss.
-    [[nodiscard]] Result<Signature> signature(const FoundShape& found);
+    /// The signature of a shape that searches of its collection find. If a rebuild was put in place since the
+    /// collection was looked up, `found.collection` becomes the collection after it, and so does the
+    /// signature. Errors: kNotReady, saying whether it is pending or why it failed; kDataLoss.
+    [[nodiscard]] Result<Signature> signature(FoundShape& found);
     /// The signature behind a hit, with what the index leaves out. Errors: kNotFound, kNotReady (also:
     /// of another generation than `searched`), kDataLoss.
     [[nodiscard]] Result<Signature> storedSignature(const index::Snapshot& searched, std::int64_t shapeId);

@@ -59,12 +59,13 @@ Result<PreparedSearch> Searches::prepare(index::SnapshotPtr collection, const Se
     return prepared;
 }
 
-Result<VerifiableQuery> Searches::storedQuery(const PreparedSearch& search, const std::string& key,
+Result<VerifiableQuery> Searches::storedQuery(PreparedSearch& search, const std::string& key,
                                               bool includeSelf) const {
-    const auto found = catalog_.findShape(search.collection, key);
+    auto found = catalog_.findShape(search.collection, key);
     RETURN_IF_ERROR(found);
     auto signature = catalog_.signature(*found);
     RETURN_IF_ERROR(signature);
+    search.collection = found->collection;
     VerifiableQuery query{{std::move(*signature), std::nullopt}, nullptr};
     if (!includeSelf) query.excludeId = found->shape.id;
     if (search.verify) {
@@ -75,7 +76,7 @@ Result<VerifiableQuery> Searches::storedQuery(const PreparedSearch& search, cons
     return query;
 }
 
-Result<VerifiableQuery> Searches::query(const PreparedSearch& search, const QuerySource& source) const {
+Result<VerifiableQuery> Searches::query(PreparedSearch& search, const QuerySource& source) const {
     if (source.key && source.signature) {
         return fail(ErrorCode::kInvalidArgument, "both key and signature are set: leave one out");
     }
@@ -102,13 +103,13 @@ Result<Searches::Compared> Searches::compared(const char* which, const ShapeName
     const auto read = [&]() -> Result<Compared> {
         const auto collection = catalog_.collection(name.collection);
         RETURN_IF_ERROR(collection);
-        const auto found = catalog_.findShape(*collection, name.key);
+        auto found = catalog_.findShape(*collection, name.key);
         RETURN_IF_ERROR(found);
         auto signature = catalog_.signature(*found);
         RETURN_IF_ERROR(signature);
         auto surface = catalog_.surface(found->shape.id);
         RETURN_IF_ERROR(surface);
-        return Compared{std::move(*signature), std::move(*surface), (*collection)->parameters.unit};
+        return Compared{std::move(*signature), std::move(*surface), found->collection->parameters.unit};
     };
     auto shape = read();
     if (!shape) return fail(withContext(shape.error(), which + std::string(": ")));
@@ -181,16 +182,20 @@ Result<Comparison> Searches::compare(const ShapeName& query, const ShapeName& ot
     return comparison;
 }
 
-Result<std::vector<VerifiableQuery>> Searches::queries(const PreparedSearch& search,
+Result<std::vector<VerifiableQuery>> Searches::queries(PreparedSearch& search,
                                                        const std::vector<QuerySource>& sources) const {
-    std::vector<VerifiableQuery> queries;
-    queries.reserve(sources.size());
-    for (const QuerySource& source : sources) {
-        auto one = query(search, source);
-        if (!one) return fail(ofQuery(queries.size(), one.error()));
-        queries.push_back(std::move(*one));
+    while (true) {
+        const std::int64_t generation = search.collection->collection.generation;
+        std::vector<VerifiableQuery> queries;
+        queries.reserve(sources.size());
+        for (const QuerySource& source : sources) {
+            auto one = query(search, source);
+            if (!one) return fail(ofQuery(queries.size(), one.error()));
+            queries.push_back(std::move(*one));
+        }
+        // A rebuild put in place between two of them: all again, so that all are of one generation.
+        if (search.collection->collection.generation == generation) return queries;
     }
-    return queries;
 }
 
 Result<VerifiedResult> Searches::run(const PreparedSearch& search, const VerifiableQuery& query,

@@ -103,18 +103,18 @@ class Searches {
                                           FitOptions options, bool freeScale,
                                           const RunContext& context) const;
 
-    /// A stored shape as a query, which finds itself only with `includeSelf`. Errors: kInvalidArgument (key),
+    /// A stored shape as a query, which finds itself only with `includeSelf`. If a rebuild was put in place
+    /// since `search` was prepared, it searches the collection after it. Errors: kInvalidArgument (key),
     /// kNotFound, kNotReady, kDataLoss.
-    [[nodiscard]] Result<VerifiableQuery> storedQuery(const PreparedSearch& search, const std::string& key,
+    [[nodiscard]] Result<VerifiableQuery> storedQuery(PreparedSearch& search, const std::string& key,
                                                       bool includeSelf = false) const;
 
     /// The query that `source` names; a stored shape as above. Errors: those of `storedQuery` and of
     /// decodeSignature; kInvalidArgument (not exactly one is set).
-    [[nodiscard]] Result<VerifiableQuery> query(const PreparedSearch& search,
-                                                const QuerySource& source) const;
+    [[nodiscard]] Result<VerifiableQuery> query(PreparedSearch& search, const QuerySource& source) const;
 
     /// The queries of a batch. Errors: those of `query`, named by `ofQuery`.
-    [[nodiscard]] Result<std::vector<VerifiableQuery>> queries(const PreparedSearch& search,
+    [[nodiscard]] Result<std::vector<VerifiableQuery>> queries(PreparedSearch& search,
                                                                const std::vector<QuerySource>& sources) const;
 
     /// How alike two stored shapes are, and why. Sizes count as in a search, if both collections have the

@@ -84,7 +84,7 @@ catalog::QuerySource sourceFrom(const v1::SearchBatchRequest::Query& query) {
 }
 
 /// Reads all queries first and searches them together.
-Result<void> searchBatch(const Services& services, const Call& call, const catalog::PreparedSearch& prepared,
+Result<void> searchBatch(const Services& services, const Call& call, catalog::PreparedSearch& prepared,
                          const v1::SearchBatchRequest& request, v1::SearchBatchResponse* response) {
     std::vector<catalog::QuerySource> sources;
     for (const auto& query : request.queries()) sources.push_back(sourceFrom(query));
@@ -108,7 +108,7 @@ grpc::Status SearchServiceHandler::SearchByKey(grpc::ServerContext* context,
                                                v1::SearchResponse* response) {
     return handle(services_, context, operations::kSearchByKey, [&](Call& call) -> Result<void> {
         call.noteKey(request->key());
-        const auto prepared = prepare(services_, call, request->options());
+        auto prepared = prepare(services_, call, request->options());
         RETURN_IF_ERROR(prepared);
         const auto query = services_.searches.storedQuery(*prepared, request->key(), request->include_self());
         RETURN_IF_ERROR(query);
@@ -161,7 +161,7 @@ grpc::Status SearchServiceHandler::SearchBatch(grpc::ServerContext* context,
         call.note({"queries", std::int64_t{count}});
         RETURN_IF_ERROR(
             catalog::checkBatchSize(static_cast<std::uint64_t>(count), services_.config.limits.maxBatch));
-        const auto prepared = prepare(services_, call, request->options());
+        auto prepared = prepare(services_, call, request->options());
         RETURN_IF_ERROR(prepared);
         return searchBatch(services_, call, *prepared, *request, response);
     });

@@ -185,7 +185,7 @@ grpc::Status ShapeServiceHandler::GetSignature(grpc::ServerContext* context,
                                                const v1::GetSignatureRequest* request,
                                                v1::GetSignatureResponse* response) {
     return handle(services_, context, operations::kGetSignature, [&](Call& call) -> Result<void> {
-        const auto found = call.shape(request->shape());
+        auto found = call.shape(request->shape());
         RETURN_IF_ERROR(found);
         const auto signature = services_.catalog.signature(*found);
         RETURN_IF_ERROR(signature);

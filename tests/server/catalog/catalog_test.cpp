@@ -70,7 +70,7 @@ TEST_F(CatalogTest, AShapeIsSearchedOnceItIsReady) {
     const store::Shape shape = putAndWait("cup", 5.0f);
     EXPECT_EQ(shape.state, store::ShapeState::kReady);
     EXPECT_EQ(searched(shape.id), 5.0);
-    const auto found = catalog->findShape(catalog->collection("").value(), "cup");
+    auto found = catalog->findShape(catalog->collection("").value(), "cup");
     ASSERT_TRUE(found);
     EXPECT_EQ(catalog->signature(*found).value().volume, 5.0);
 }
@@ -193,6 +193,19 @@ TEST_F(CatalogTest, ARebuildIsFollowedToItsEnd) {
     EXPECT_EQ(done, 1u);
     EXPECT_EQ(catalog->collection("").value()->parameters.signature.maxPoints, 3u);
     EXPECT_EQ(catalog->cancelRebuild("").error().code, ErrorCode::kNotFound);
+}
+
+TEST_F(CatalogTest, ReadsThatBeganBeforeASwitchOfGenerationsGoOnAfterIt) {
+    putAndWait("cup", 5.0f);
+    auto before = catalog->findShape(catalog->collection("").value(), "cup");
+    ASSERT_TRUE(before);
+    const auto rebuilds = catalog->beginRebuilds({"default"}, withMaxPoints(3));
+    ASSERT_TRUE(catalog->followRebuild("default", rebuilds->front(), {}, goOn,
+                                       [](const store::Rebuild&) { return Result<void>(); }));
+    const auto signature = catalog->signature(*before);
+    ASSERT_TRUE(signature) << signature.error().message;
+    EXPECT_EQ(signature->scale, 3.0) << "made with the new parameters";
+    EXPECT_EQ(before->collection->collection.generation, 2) << "searched in the new collection";
 }
 
 TEST_F(CatalogTest, ARebuildThatWaitedForARestoreIsOneOfTheNewContent) {

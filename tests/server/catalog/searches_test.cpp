@@ -54,7 +54,7 @@ TEST_F(SearchesTest, RefusesOptionsOutOfRange) {
     request.filter = "=";
     EXPECT_EQ(prepare(request).error().code, ErrorCode::kMalformedFilter);
     request.filter = "label=cup";
-    const auto prepared = prepare(request);
+    auto prepared = prepare(request);
     ASSERT_TRUE(prepared);
     EXPECT_EQ(prepared->options.k, 50u);
     EXPECT_EQ(prepared->options.threshold, 0.5);
@@ -65,7 +65,7 @@ TEST_F(SearchesTest, AStoredShapeFindsOthersButNotItself) {
     const store::Shape jug = putAndWait("jug", 6.0f);
     SearchRequest request;
     request.k = 10;
-    const auto prepared = prepare(request);
+    auto prepared = prepare(request);
     ASSERT_TRUE(prepared);
     EXPECT_EQ(searches().storedQuery(*prepared, "none").error().code, ErrorCode::kNotFound);
     const auto query = searches().storedQuery(*prepared, "cup");
@@ -84,7 +84,7 @@ TEST_F(SearchesTest, AScanIsSegmentedAndSearched) {
     const store::Shape cup = putAndWait("cup", 5.0f);
     SearchRequest request;
     request.k = 10;
-    const auto prepared = prepare(request);
+    auto prepared = prepare(request);
     const auto scan = store::VerifiedScan::verify(taggedPoints(5.0f)).value();
     const auto searched = searches().byScan(*prepared, scan, {});
     ASSERT_TRUE(searched) << searched.error().message;
@@ -100,7 +100,7 @@ TEST_F(SearchesTest, AnswersExplainHitsAndLeaveOutDeletedShapes) {
     putAndWait("jug", 6.0f);
     SearchRequest request;
     request.k = 10;
-    const auto prepared = prepare(request);
+    auto prepared = prepare(request);
     const auto query = searches().storedQuery(*prepared, "cup");
     VerifiedResult found = searches().run(*prepared, {{query->signature, std::nullopt}, nullptr}, {}).value();
     ASSERT_EQ(found.hits.size(), 2u);
@@ -129,7 +129,7 @@ TEST_F(SearchesTest, AQueryIsAStoredShapeOrASignature) {
     const store::Shape cup = putAndWait("cup", 5.0f);
     SearchRequest request;
     request.k = 10;
-    const auto prepared = prepare(request);
+    auto prepared = prepare(request);
     const std::string key = "cup";
     const std::string bytes = encodeSignature(signatureOf(7.0));
     const std::string damaged = "damaged";
@@ -150,7 +150,7 @@ TEST_F(SearchesTest, ABatchSaysWhichOfItsQueriesIsWrong) {
     const store::Shape cup = putAndWait("cup", 5.0f);
     SearchRequest request;
     request.k = 10;
-    const auto prepared = prepare(request);
+    auto prepared = prepare(request);
     const std::string key = "cup";
     const std::string none = "none";
     const std::string bytes = encodeSignature(signatureOf(7.0));
