@@ -1,8 +1,12 @@
 #include "server/ingest/signature_pipeline.h"
 
+#include <algorithm>
+#include <chrono>
 #include <exception>
 #include <new>
+#include <thread>
 
+#include "core/base/return_if_error.h"
 #include "core/fit/surface_points.h"
 #include "core/fit/surface_points_codec.h"
 #include "core/signature/signature_codec.h"
@@ -21,6 +25,16 @@ PipelineOutcome failed(Kind kind, Error why) {
     outcome.kind = kind;
     outcome.why = std::move(why);
     return outcome;
+}
+
+/// Errors: those of the context, noticed within 20 ms.
+Result<void> waitFor(std::chrono::milliseconds time, const RunContext& context) {
+    const auto until = std::chrono::steady_clock::now() + time;
+    while (std::chrono::steady_clock::now() < until) {
+        RETURN_IF_ERROR(context.checkpoint());
+        std::this_thread::sleep_for(std::min(time, std::chrono::milliseconds(20)));
+    }
+    return context.checkpoint();
 }
 
 PipelineOutcome runOrThrow(const Describe& describe, store::Store& store, std::int64_t shapeId,
@@ -70,11 +84,22 @@ Result<Description> SignaturePipeline::describe(const std::vector<float>& points
 
 PipelineOutcome SignaturePipeline::run(store::Store& store, std::int64_t shapeId,
                                        const ShapeParameters& parameters, const RunContext& context) const {
-    try {
-        return runOrThrow(describe_, store, shapeId, parameters, context);
-    } catch (...) {
-        return failed(Kind::kScanFailed, errorOfException());
+    const auto attempt = [&] {
+        try {
+            return runOrThrow(describe_, store, shapeId, parameters, context);
+        } catch (...) {
+            return failed(Kind::kScanFailed, errorOfException());
+        }
+    };
+    PipelineOutcome outcome = attempt();
+    // Others may have had the memory: a scan fails only if there is none for it a while later either.
+    for (const auto pause : pausesWithoutMemory_) {
+        if (outcome.kind != Kind::kScanFailed || outcome.why.code != ErrorCode::kOutOfMemory) break;
+        if (const auto waited = waitFor(pause, context); !waited)
+            return failed(Kind::kCancelled, waited.error());
+        outcome = attempt();
     }
+    return outcome;
 }
 
 bool isTransient(ErrorCode code) noexcept {

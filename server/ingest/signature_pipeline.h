@@ -2,6 +2,7 @@
 // for scans in the store.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -47,13 +48,20 @@ class SignaturePipeline {
                                                const ShapeParameters& parameters,
                                                const RunContext& context) const;
 
-    /// Loads a stored scan, describes it on the calling thread alone and encodes its signature.
-    /// Throws nothing: exceptions become kScanFailed.
+    /// Loads a stored scan, describes it on the calling thread alone and encodes its signature. Where memory
+    /// is short it waits and tries again. Throws nothing: exceptions become kScanFailed.
     [[nodiscard]] PipelineOutcome run(store::Store& store, std::int64_t shapeId,
                                       const ShapeParameters& parameters, const RunContext& context) const;
 
+    /// How long to wait before each further try where memory is short; for tests.
+    void pauseWithoutMemory(std::vector<std::chrono::milliseconds> pauses) {
+        pausesWithoutMemory_ = std::move(pauses);
+    }
+
   private:
     Describe describe_;
+    std::vector<std::chrono::milliseconds> pausesWithoutMemory_{
+        std::chrono::milliseconds(500), std::chrono::milliseconds(2'000), std::chrono::milliseconds(8'000)};
 };
 
 /// Errors of the store or the machine, not of the scan: a later try may succeed.

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
+#include <limits>
 #include <new>
 #include <string>
 
@@ -16,6 +18,9 @@ static_assert(sizeof(float) == 4, "points travel as 32-bit floats");
 namespace shapedb::store {
 
 namespace {
+
+/// Steps of single precision across a scan: fewer are coarser than its noise.
+constexpr double kLeastSteps = 1'000.0;
 
 /// Enough that a sample of a real scan spans space.
 constexpr std::size_t kSamplePoints = 256;
@@ -77,9 +82,33 @@ Result<void> ScanVerifier::take(std::size_t first) {
 /// Looks at a sample first: adding points cannot flatten a sample that spans space, and the
 /// points at the extremes decide what is wrong with size or magnitude. Only when the sample is
 /// refused are all points looked at, which takes about 80 bytes a point.
+// A shape far from the origin loses its details in single precision.
+Result<void> ScanVerifier::checkResolution() const {
+    double squared = 0.0;
+    float largest = 0.0f;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        const float low = xyz_[3 * extremes_[axis] + axis];
+        const float high = xyz_[3 * extremes_[axis + 3] + axis];
+        const double extent = static_cast<double>(high) - static_cast<double>(low);
+        squared += extent * extent;
+        largest = std::max({largest, std::abs(low), std::abs(high)});
+    }
+    const double size = std::sqrt(squared);
+    const double step = std::nextafter(largest, std::numeric_limits<float>::infinity()) - largest;
+    if (!(size > 0.0) || step * kLeastSteps <= size) return {};
+    char text[256];
+    std::snprintf(
+        text, sizeof text,
+        "coordinates up to %.6g are %.3g apart in single precision, but the scan is only %.3g across: "
+        "subtract its middle from all points before sending them, and add it to what comes back",
+        static_cast<double>(largest), step, size);
+    return fail(ErrorCode::kCoordinateOutOfRange, text);
+}
+
 Result<void> ScanVerifier::checkUsable() const {
     const std::size_t count = xyz_.size() / 3;
     if (count > 0) {
+        RETURN_IF_ERROR(checkResolution());
         PointCloud sample;
         for (const std::size_t i : extremes_) sample.push_back(pointAt(xyz_, i));
         const std::size_t step = std::max<std::size_t>(1, count / kSamplePoints);

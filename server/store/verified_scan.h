@@ -55,7 +55,9 @@ class ScanVerifier {
 
     [[nodiscard]] std::uint64_t pointCount() const noexcept { return xyz_.size() / 3; }
 
-    /// `expected` is the checksum the sender announced; null: none. Errors: kChecksumMismatch; those of
+    /// `expected` is the checksum the sender announced; null: none. Errors: kChecksumMismatch;
+    /// kCoordinateOutOfRange (so far from the origin that single precision leaves fewer than a thousand steps
+    /// across the scan); those of
     /// `sanitise`: the points could never be segmented. What only the segmentation can see (no interior)
     /// is found later.
     [[nodiscard]] Result<VerifiedScan> finish(const Checksum* expected = nullptr);
@@ -64,6 +66,7 @@ class ScanVerifier {
     friend class VerifiedScan;
     Result<void> take(std::size_t first);
     Result<void> checkUsable() const;
+    Result<void> checkResolution() const;
 
     std::vector<float> xyz_;
     std::uint64_t expected_ = 0;  ///< points; 0: not known

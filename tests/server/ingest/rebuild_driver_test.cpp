@@ -52,6 +52,7 @@ class Driver : public ::testing::Test {
         options.yield = 1ms;
         options.journalPath = journal;
         options.crashes = crashes;
+        describe.pauseWithoutMemory({});
         driver = std::make_unique<RebuildDriver>(store, index, *pool, isolation, std::move(describe), log,
                                                  options);
         EXPECT_TRUE(driver->start());

@@ -51,6 +51,7 @@ class Pool : public ::testing::Test {
         options.threads = threads;
         options.backOff = backOff;
         options.crashes = crashes;
+        describe.pauseWithoutMemory({});
         pool =
             std::make_unique<WorkerPool>(store, index, board, isolation, std::move(describe), log, options);
         EXPECT_TRUE(pool->start());

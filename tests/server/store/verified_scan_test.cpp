@@ -133,5 +133,25 @@ TEST(ScanVerifier, PiecesGiveTheSameScan) {
     }
 }
 
+TEST(VerifiedScan, TooFarFromTheOriginForSinglePrecisionIsRefused) {
+    const auto at = [](float x) {
+        std::vector<float> xyz;
+        for (int i = 0; i < 1'000; ++i) {
+            const float t = static_cast<float>(i);
+            for (const float c : {x + std::sin(t), std::cos(3.0f * t), std::sin(7.0f * t)}) xyz.push_back(c);
+        }
+        return VerifiedScan::verify(std::move(xyz));
+    };
+    EXPECT_TRUE(at(0.0f));
+    EXPECT_TRUE(at(1e4f));
+    for (const float far : {4.4e6f, -4.4e6f, 1e5f, 3e38f}) {
+        const auto refused = at(far);
+        ASSERT_FALSE(refused) << far;
+        EXPECT_EQ(refused.error().code, ErrorCode::kCoordinateOutOfRange);
+        EXPECT_NE(refused.error().message.find("subtract its middle"), std::string::npos)
+            << refused.error().message;
+    }
+}
+
 }  // namespace
 }  // namespace shapedb::store
