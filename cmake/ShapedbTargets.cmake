@@ -52,7 +52,7 @@ endfunction()
 
 # shapedb_library(NAME SOURCES a.cpp ... [PUBLIC lib ...] [PRIVATE lib ...] [PCH header ... | PCH_OF target]
 #                 [FAST | SMALL])
-#   FAST    -O3: measured to be worth it
+#   FAST    -O3: for loops over arrays (docs/development.md)
 #   SMALL   -O1: runs once a command, compiles slowly
 #   PCH     headers parsed once for the whole target. Not CLI11: each source would compile its global validators (3 s)
 #   PCH_OF  the same, shared with a target of the same flags
