@@ -35,19 +35,15 @@ Result<std::uint64_t> Catalog::countShapes(std::int64_t collectionId, const stor
 
 Result<Signature> Catalog::signature(FoundShape& found) {
     while (found.collection->signatures.find(found.shape.id)) {
+        auto signature = storedSignature(*found.collection, found.shape.id);
+        if (signature || signature.error().code != ErrorCode::kNotReady) return signature;
+        // The store may have switched to the results of a rebuild: once the index has followed, again with
+        // them.
         const store::Collection& collection = found.collection->collection;
-        Result<Signature> signature = fail(ErrorCode::kInternal, "not read");
-        // Between a switch of generations in the store and in the index neither would have it.
-        const bool current = index_.whileGeneration(collection.id, collection.generation, [&] {
-            signature = storedSignature(*found.collection, found.shape.id);
-        });
-        if (current) return signature;
+        if (index_.whileGeneration(collection.id, collection.generation, [] {})) return signature;
         const auto now = index_.byId(collection.id);
         RETURN_IF_ERROR(now);
-        if ((*now)->collection.generation == collection.generation) {
-            return fail(ErrorCode::kUnavailable, "the signatures of collection '" + collection.name +
-                                                     "' cannot be read now: try again later");
-        }
+        if ((*now)->collection.generation == collection.generation) return signature;
         found.collection = *now;
     }
     const std::string name = "shape '" + found.shape.key + "' has no signature";
