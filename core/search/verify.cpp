@@ -117,49 +117,54 @@ class Verifier {
     }
 
     Result<void> verify(std::size_t begin, std::size_t end) {
+        return forEachHit(begin, end, [&](VerifiedHit& hit) -> Result<void> {
+            return withSurface(
+                hit, [&](const SurfacePoints& surface, const RunContext& quiet) -> Result<void> {
+                    auto fitted = fit(query_, surface, fit_, quiet);
+                    RETURN_IF_ERROR(fitted);
+                    hit.score = scoreOf(hit.signatureScore, fitted->misfit);
+                    hit.verdict = verdictOf(distanceOfScore(hit.signatureScore), *fitted, fit_.reflection);
+                    hit.fit = std::make_shared<const FitResult>(std::move(*fitted));
+                    return {};
+                });
+        });
+    }
+
+    // No hit is shown mirrored that need not be. Their scores stay.
+    Result<void> settleHands() {
+        return forEachHit(0, hits_.size(), [&](VerifiedHit& hit) -> Result<void> {
+            if (!hit.fit || !hit.fit->best.motion.reflected) return {};
+            return withSurface(hit,
+                               [&](const SurfacePoints& surface, const RunContext& quiet) -> Result<void> {
+                                   auto settled = preferUnmirrored(*hit.fit, query_, surface, fit_, quiet);
+                                   RETURN_IF_ERROR(settled);
+                                   hit.fit = std::make_shared<const FitResult>(std::move(*settled));
+                                   return {};
+                               });
+        });
+    }
+
+    // In parallel. Errors: the first in the order of the hits.
+    template <typename Body>
+    Result<void> forEachHit(std::size_t begin, std::size_t end, const Body& body) {
         std::vector<Result<void>> outcomes(end - begin);
         RETURN_IF_ERROR(parallelFor(end - begin, 1, context_, [&](std::size_t i, std::size_t) {
-            outcomes[i] = verifyOne(hits_[begin + i]);
+            outcomes[i] = body(hits_[begin + i]);
         }));
         for (Result<void>& outcome : outcomes) RETURN_IF_ERROR(outcome);
         return {};
     }
 
-    Result<void> verifyOne(VerifiedHit& hit) const {
+    // Does nothing for a hit without surface points.
+    template <typename Body>
+    Result<void> withSurface(const VerifiedHit& hit, const Body& body) const {
         const auto surface = surfaceOf_(hit.id);
         RETURN_IF_ERROR(surface);
         if (*surface == nullptr) return {};
         // Its own progress would run backwards beside that of the others.
         RunContext quiet = context_;
         quiet.progress = nullptr;
-        auto fitted = fit(query_, **surface, fit_, quiet);
-        RETURN_IF_ERROR(fitted);
-        hit.score = scoreOf(hit.signatureScore, fitted->misfit);
-        hit.verdict = verdictOf(distanceOfScore(hit.signatureScore), *fitted, fit_.reflection);
-        hit.fit = std::make_shared<const FitResult>(std::move(*fitted));
-        return {};
-    }
-
-    // No hit is shown mirrored that need not be. Their scores stay.
-    Result<void> settleHands() {
-        std::vector<Result<void>> outcomes(hits_.size());
-        RETURN_IF_ERROR(parallelFor(hits_.size(), 1, context_,
-                                    [&](std::size_t i, std::size_t) { outcomes[i] = settleHand(hits_[i]); }));
-        for (Result<void>& outcome : outcomes) RETURN_IF_ERROR(outcome);
-        return {};
-    }
-
-    Result<void> settleHand(VerifiedHit& hit) const {
-        if (!hit.fit || !hit.fit->best.motion.reflected) return {};
-        const auto surface = surfaceOf_(hit.id);
-        RETURN_IF_ERROR(surface);
-        if (*surface == nullptr) return {};
-        RunContext quiet = context_;
-        quiet.progress = nullptr;
-        auto settled = preferUnmirrored(*hit.fit, query_, **surface, fit_, quiet);
-        RETURN_IF_ERROR(settled);
-        hit.fit = std::make_shared<const FitResult>(std::move(*settled));
-        return {};
+        return body(**surface, quiet);
     }
 
     const FitQuery query_;

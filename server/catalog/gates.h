@@ -14,8 +14,8 @@
 
 namespace shapedb::catalog {
 
-/// Most calls that may run at a time, streams included.
-struct CallLimits {
+/// Calls at a time, streams included.
+struct CallCounts {
     int ordinary = 0;  ///< all but those of administrators; uploads among them
     int uploads = 0;
     int admin = 0;
@@ -25,7 +25,8 @@ struct CallLimits {
 /// room for the others; once draining, admits no more. Thread-safe.
 class CallGate {
   public:
-    explicit CallGate(const CallLimits& limits) : limits_(limits) {}
+    /// `limits`: the most that may run at a time.
+    explicit CallGate(const CallCounts& limits) : limits_(limits) {}
 
     /// Call `leave` at the end of an admitted call. Errors: kUnavailable (draining), kQueueFull.
     [[nodiscard]] Result<void> enter(security::CallClass kind);
@@ -37,10 +38,10 @@ class CallGate {
     [[nodiscard]] bool waitUntilEmpty(std::chrono::steady_clock::time_point until);
 
   private:
-    const CallLimits limits_;
+    const CallCounts limits_;
     std::mutex mutex_;
     std::condition_variable changed_;
-    CallLimits running_;
+    CallCounts running_;
     std::atomic<bool> draining_{false};
 };
 

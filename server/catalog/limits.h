@@ -38,13 +38,11 @@ constexpr std::size_t kMaxAnswerBytes = std::size_t{64} << 20;
 // Calls at a time. A transport needs a thread for each, and some to refuse the rest.
 constexpr int kMaxOrdinaryCalls = 208;
 constexpr int kMaxAdminCalls = 16;
-/// Uploads: the default and the most of limits.max_uploads.
-constexpr int kMostUploads = 96;
-/// Calls that only wait for a shape or a rebuild. Together with all uploads they leave places for searches.
+/// Calls that only wait for a shape or a rebuild. With all uploads (limits.max_uploads) they leave places for
+/// searches.
 constexpr int kMaxFollowers = 96;
 /// Backups and restores: each holds a copy of the database on the disk for as long as its client takes.
 constexpr int kMaxCopies = 1;
-static_assert(kMostUploads + kMaxFollowers < kMaxOrdinaryCalls);
 
 // Waiting inside calls.
 constexpr std::chrono::milliseconds kLookForCancellation{20};

@@ -7,6 +7,9 @@
 
 namespace shapedb::config {
 
+/// Most that limits.max_uploads may say.
+constexpr int kMostUploads = 96;
+
 struct ServerConfig {
     /// HOST:PORT; IPv6 hosts in brackets. Port 0 picks a free port.
     std::string listen = "127.0.0.1:7878";

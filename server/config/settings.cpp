@@ -214,7 +214,7 @@ std::vector<Setting> makeSettings() {
             "limits.stall_seconds", kInteger, 1, 86'400, [](C& c) -> int& { return c.limits.stallSeconds; },
             "A stream is cut off when its client neither sends nor receives for this many seconds."),
         number(
-            "limits.max_uploads", kInteger, 1, 96, [](C& c) -> int& { return c.limits.maxUploads; },
+            "limits.max_uploads", kInteger, 1, kMostUploads, [](C& c) -> int& { return c.limits.maxUploads; },
             "Most uploads in progress, searches by scan among them."),
         number(
             "limits.min_bytes_per_second", kInteger, 0, 1'000'000'000,

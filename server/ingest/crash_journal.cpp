@@ -1,6 +1,5 @@
 #include "server/ingest/crash_journal.h"
 
-#include <algorithm>
 #include <cstdio>
 #include <fstream>
 #include <sstream>
@@ -35,10 +34,7 @@ void CrashJournal::read(const std::vector<store::Crash>& crashes) {
     store::Deaths deaths;
     int inHand = 0;
     while (file >> id >> version >> deaths.crashes >> deaths.stops >> inHand) {
-        const bool crashed = std::any_of(crashes.begin(), crashes.end(), [&](const store::Crash& crash) {
-            return crash.shapeId == id && crash.pointsVersion == version;
-        });
-        if (inHand != 0) ++(crashed ? deaths.crashes : deaths.stops);
+        if (inHand != 0) ++(store::crashed(crashes, id, version) ? deaths.crashes : deaths.stops);
         states_[{id, version}].deaths = deaths;
     }
 }

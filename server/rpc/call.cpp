@@ -79,7 +79,7 @@ void Call::noteCollection(const std::string& name) { collection_ = catalog::coll
 
 grpc::Status Call::finish(Result<void> result) {
     std::optional<Error> cutOff;
-    if (cancellation_.cutOff()) cutOff = Error{ErrorCode::kCancelled, *cancellation_.cutOff()};
+    if (auto why = cancellation_.cutOff()) cutOff = Error{ErrorCode::kCancelled, std::move(*why)};
     result = frame_.settle(std::move(result), cutOff);
     const grpc::Status status =
         result ? grpc::Status::OK : makeStatus(result.error(), context_, frame_.retryHint());

@@ -5,12 +5,14 @@
 #include <cstddef>
 
 #include "server/catalog/limits.h"
+#include "server/config/server_config.h"
 
 namespace shapedb::rpc {
 
 constexpr int kMaxReceiveBytes = 4 << 20;
 /// More than the calls that may run (catalog/limits.h): the rest listen, and refuse calls by name.
 constexpr int kMaxCallThreads = 256;
+static_assert(config::kMostUploads + catalog::kMaxFollowers < catalog::kMaxOrdinaryCalls);
 static_assert(kMaxCallThreads >= catalog::kMaxOrdinaryCalls + catalog::kMaxAdminCalls + 32);
 /// Memory that gRPC may use for connections and messages in transit, all together.
 constexpr std::size_t kTransportBytes = std::size_t{1} << 30;

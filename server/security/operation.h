@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cstdint>
-#include <string>
 
 namespace shapedb::security {
 
@@ -101,8 +100,5 @@ inline constexpr std::array<const Operation*, 26> kAll{&kAddShape,
                                                        &kServerInfo};
 
 }  // namespace operations
-
-/// "reader", "writer", "admin".
-[[nodiscard]] const char* roleName(Role role) noexcept;
 
 }  // namespace shapedb::security

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "core/base/error.h"
 
@@ -14,6 +15,16 @@ struct Deaths {
     std::int64_t crashes = 0;  ///< of the thread that segmented it
     std::int64_t stops = 0;    ///< for another reason: a kill, a power failure, a crash elsewhere
 };
+
+/// A scan whose segmentation crashed the process.
+struct Crash {
+    std::int64_t shapeId = 0;
+    std::int64_t pointsVersion = 0;
+};
+
+/// Whether the scan is among those that crashed the process.
+[[nodiscard]] bool crashed(const std::vector<Crash>& crashes, std::int64_t shapeId,
+                           std::int64_t pointsVersion);
 
 /// So many stops are no accident: the scan may exhaust the machine's memory each time.
 constexpr std::int64_t kMostStops = 20;

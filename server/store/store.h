@@ -22,6 +22,7 @@
 #include "core/base/error.h"
 #include "core/base/metadata.h"
 #include "core/base/run_context.h"
+#include "server/store/quarantine.h"
 #include "server/store/verified_scan.h"
 
 namespace shapedb::store {
@@ -117,12 +118,6 @@ struct Job {
     int attempts = 0;                ///< including this one, not counting `stops`
     int stops = 0;                   ///< as Deaths::stops (quarantine.h)
     std::uint64_t pointBytes = 0;    ///< uncompressed
-};
-
-/// A scan whose segmentation crashed the process.
-struct Crash {
-    std::int64_t shapeId = 0;
-    std::int64_t pointsVersion = 0;
 };
 
 struct QueueDepth {

@@ -4,7 +4,6 @@ import math
 import os
 import resource
 import signal
-import socket
 import struct
 import subprocess
 import sys
@@ -70,11 +69,6 @@ class Server:
         self.process.stdout.close()
         self._own.cleanup()
 
-    def kill(self):
-        self.process.kill()
-        self.process.wait()
-        self.process.stdout.close()
-
     def stop(self):
         self.process.send_signal(signal.SIGTERM)
         self.process.wait(60)
@@ -131,10 +125,6 @@ class Client:
 
     def add(self, key, points, wait=True, timeout=120, **header):
         return self.shapes.AddShape(upload(key, points, wait=wait, **header), timeout=timeout)
-
-    def state(self, key):
-        request = shapes.GetShapeRequest(shape=shapes.ShapeRef(key=key))
-        return self.shapes.GetShape(request, timeout=30).shape.state
 
 
 def ball(points=2_000, stretch=1.0):

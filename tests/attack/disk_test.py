@@ -8,7 +8,7 @@ import unittest
 
 import grpc
 
-from attacker import MIB, Server, admin, ball, eventually, main, reason, shapes
+from attacker import MIB, Server, admin, ball, eventually, main, reason
 
 
 class DataDirectory(unittest.TestCase):

@@ -8,8 +8,7 @@ import unittest
 
 import grpc
 
-from attacker import (MIB, Client, Server, admin, ball, collections, eventually, main, reason, shapes,
-                      types)
+from attacker import MIB, Server, admin, ball, collections, eventually, main, reason, shapes, types
 
 
 class CompressedMessages(unittest.TestCase):

@@ -3,6 +3,7 @@
 #include "common/safe_text.h"
 #include "server/store/key_rules.h"
 #include "server/store/sqlite/rows.h"
+#include "server/store/sqlite/sequences.h"
 
 namespace shapedb::store {
 
@@ -36,14 +37,13 @@ struct Rule {
     const char* problem;
 };
 constexpr char kSequenceProblems[] =
-    "SELECT name, seq FROM sqlite_sequence WHERE typeof(seq) <> 'integer' OR seq < 0 OR seq > "
-    "4611686018427387904";  // kMostCounted
+    "SELECT name, seq FROM sqlite_sequence WHERE typeof(seq) <> 'integer' OR seq < 0 OR seq > ?1";
 constexpr char kCounterProblems[] =
-    "SELECT 'collection ' || name FROM collection WHERE max(id, generation) > 4611686018427387904 UNION ALL "
-    "SELECT 'shape ' || key FROM shape WHERE max(id, version) > 4611686018427387904 UNION ALL "
-    "SELECT 'job ' || id FROM job WHERE max(id, attempts, stops) > 4611686018427387904 UNION ALL "
-    "SELECT 'rebuild ' || id FROM rebuild WHERE max(id, target_generation) > 4611686018427387904 UNION ALL "
-    "SELECT 'table tally' FROM tally WHERE commits < 0 OR commits > 4611686018427387904";
+    "SELECT 'collection ' || name FROM collection WHERE max(id, generation) > ?1 UNION ALL "
+    "SELECT 'shape ' || key FROM shape WHERE max(id, version) > ?1 UNION ALL "
+    "SELECT 'job ' || id FROM job WHERE max(id, attempts, stops) > ?1 UNION ALL "
+    "SELECT 'rebuild ' || id FROM rebuild WHERE max(id, target_generation) > ?1 UNION ALL "
+    "SELECT 'table tally' FROM tally WHERE commits < 0 OR commits > ?1";
 constexpr Rule kRules[] = {
     {"SELECT s.key FROM shape s JOIN job j ON j.shape_id = s.id JOIN shape_points p ON p.shape_id = s.id "
      "WHERE "
@@ -134,12 +134,12 @@ class Checker {
 
     /// What counts up must never come to its end.
     void counters() {
-        Query sequences(connection_, kSequenceProblems);
+        Query sequences(connection_, kSequenceProblems, kMostCounted);
         while (sequences.step()) {
             add("the id sequence of table " + sequences.text(0) + " stands at " + sequences.text(1) +
                 ": no rows could be added any more");
         }
-        Query counted(connection_, kCounterProblems);
+        Query counted(connection_, kCounterProblems, kMostCounted);
         while (counted.step()) add(counted.text(0) + " has an id, a version or a count beyond 2^62");
     }
 

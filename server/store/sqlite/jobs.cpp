@@ -1,22 +1,10 @@
 // The job queue.
-#include <algorithm>
-
 #include "server/store/put_rules.h"
 #include "server/store/quarantine.h"
 #include "server/store/sqlite/rows.h"
 #include "server/store/sqlite/sqlite_store_impl.h"
 
 namespace shapedb::store {
-
-namespace {
-
-bool contains(const std::vector<Crash>& crashes, std::int64_t shapeId, std::int64_t pointsVersion) {
-    return std::any_of(crashes.begin(), crashes.end(), [&](const Crash& crash) {
-        return crash.shapeId == shapeId && crash.pointsVersion == pointsVersion;
-    });
-}
-
-}  // namespace
 
 bool SqliteStore::jobIsCurrent(Connection& connection, const Job& job, std::int64_t generation) {
     std::int64_t serving = 0;
@@ -105,7 +93,7 @@ Result<std::vector<Shape>> SqliteStore::recoverJobs(int maxAttempts, const std::
             Query query(connection, sql::kRunningJobs);
             while (query.step()) {
                 Lost job{query.integer(0), {query.integer(2), query.integer(3)}};
-                if (!contains(crashes, job.shapeId, query.integer(1))) {
+                if (!crashed(crashes, job.shapeId, query.integer(1))) {
                     --job.deaths.crashes;
                     ++job.deaths.stops;
                 }

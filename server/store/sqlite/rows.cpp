@@ -172,11 +172,18 @@ std::vector<float> readPoints(const Query& query) {
     return std::move(*points);
 }
 
-std::int64_t countCommits(Connection& connection) {
-    Query tally(connection, sql::kCommits);
+namespace {
+
+std::int64_t commitsOf(Query&& tally) {
     if (!tally.step()) raise(ErrorCode::kDataLoss, "the row of table tally is missing");
     return tally.integer(0);
 }
+
+}  // namespace
+
+std::int64_t countCommits(Connection& connection) { return commitsOf(Query(connection, sql::kCommits)); }
+
+std::int64_t addCommit(Connection& connection) { return commitsOf(Query(connection, sql::kCountCommit)); }
 
 QueueDepth readTally(Connection& connection) {
     Query tally(connection, sql::kTally);

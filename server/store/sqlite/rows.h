@@ -62,6 +62,8 @@ std::vector<float> readPoints(const Query& query);
 
 /// Transactions that changed something, since the database was made. Throws Failure kDataLoss.
 std::int64_t countCommits(Connection& connection);
+/// Counts one more and returns how many there are with it. Throws Failure kDataLoss.
+std::int64_t addCommit(Connection& connection);
 
 /// Jobs queued and running. Throws Failure kDataLoss.
 QueueDepth readTally(Connection& connection);

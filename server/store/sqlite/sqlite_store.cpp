@@ -155,8 +155,7 @@ void SqliteStore::commit(Transaction& transaction, std::int64_t changesBefore) {
         transaction.commit();
         return;
     }
-    Query(*writer_, sql::kCountCommit).run();
-    const std::int64_t commits = countCommits(*writer_);
+    const std::int64_t commits = addCommit(*writer_);
     transaction.commit();
     mark_.write(commits);
     boundWal();

@@ -350,10 +350,7 @@ Result<std::vector<Shape>> MemoryStore::recoverJobs(int maxAttempts, const std::
             QueuedJob& queued = (at++)->second;
             if (!queued.running) continue;
             queued.running = false;
-            const bool crashed = std::any_of(crashes.begin(), crashes.end(), [&](const Crash& crash) {
-                return crash.shapeId == queued.job.shapeId && crash.pointsVersion == queued.job.pointsVersion;
-            });
-            if (!crashed) {
+            if (!crashed(crashes, queued.job.shapeId, queued.job.pointsVersion)) {
                 --queued.job.attempts;
                 ++queued.job.stops;
             }
