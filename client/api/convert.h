@@ -43,6 +43,8 @@ void fillParameters(const Parameters& from, Message* to) {
 [[nodiscard]] v1::AddMode toWire(AddMode mode);
 [[nodiscard]] v1::ShapeState toWire(const std::optional<ShapeState>& state);
 
+[[nodiscard]] Timestamp fromWire(const google::protobuf::Timestamp& from);
+[[nodiscard]] google::protobuf::Timestamp toWire(Timestamp from);
 [[nodiscard]] Shape fromWire(const v1::Shape& from);
 [[nodiscard]] AddOutcome fromWire(v1::AddShapeResponse::Outcome from);
 [[nodiscard]] IngestEvent fromWire(const v1::IngestEvent& from);

@@ -39,9 +39,15 @@ class Uploads {
         if (header.other_case() == v1::AlignHeader::OTHER_NOT_SET) {
             return fail(ErrorCode::kInvalidArgument, "other: give a key, or other_points and a second scan");
         }
+        if (header.has_key()) {
+            call_.noteKey(header.key().key());
+            RETURN_IF_ERROR(call_.useCollection(header.key().collection()));
+        }
+        RETURN_IF_ERROR(call_.useScan(header.query_points()));
         if (header.has_other_points()) {
             begun = other_.begin(header.other_points(), header.other_sha256());
             if (!begun) return fail(withContext(begun.error(), "other: "));
+            RETURN_IF_ERROR(call_.useScan(header.other_points()));
         }
         header_ = header;
         return {};
@@ -87,8 +93,6 @@ grpc::Status AlignServiceHandler::Align(grpc::ServerContext* context,
         };
         Result<FitResult> fitted = fail(ErrorCode::kInternal, "not aligned");
         if (header.has_key()) {
-            call.noteCollection(header.key().collection());
-            call.noteKey(header.key().key());
             fitted = align(catalog::ShapeName{header.key().collection(), header.key().key()});
         } else {
             const auto other = uploads.other();

@@ -24,7 +24,7 @@ grpc::Status CollectionServiceHandler::CreateCollection(grpc::ServerContext* con
                                                         const v1::CreateCollectionRequest* request,
                                                         v1::Collection* response) {
     return handle(services_, context, operations::kCreateCollection, [&](Call& call) -> Result<void> {
-        call.note({"collection", request->name()});
+        RETURN_IF_ERROR(call.useCollection(request->name()));
         const auto wanted = overridesFrom(request->profile(), request->segmentation(), request->signature());
         RETURN_IF_ERROR(wanted);
         const auto parameters = wanted->ofNew();
@@ -49,10 +49,11 @@ grpc::Status CollectionServiceHandler::GetCollection(grpc::ServerContext* contex
 grpc::Status CollectionServiceHandler::ListCollections(grpc::ServerContext* context,
                                                        const v1::ListCollectionsRequest*,
                                                        v1::ListCollectionsResponse* response) {
-    return handle(services_, context, operations::kListCollections, [&](Call&) -> Result<void> {
+    return handle(services_, context, operations::kListCollections, [&](Call& call) -> Result<void> {
         const auto collections = services_.catalog.collections();
         RETURN_IF_ERROR(collections);
         for (const index::SnapshotPtr& snapshot : *collections) {
+            if (!call.authorization().sees(snapshot->collection.name)) continue;
             RETURN_IF_ERROR(fill(services_, *snapshot, response->add_collections()));
         }
         return {};
@@ -63,7 +64,7 @@ grpc::Status CollectionServiceHandler::DeleteCollection(grpc::ServerContext* con
                                                         const v1::DeleteCollectionRequest* request,
                                                         v1::DeleteCollectionResponse*) {
     return handle(services_, context, operations::kDeleteCollection, [&](Call& call) -> Result<void> {
-        call.noteCollection(request->name());
+        RETURN_IF_ERROR(call.useCollection(request->name()));
         return services_.catalog.deleteCollection(request->name(), request->force());
     });
 }

@@ -78,7 +78,7 @@ Result<void> ShapeServiceHandler::addShape(Call& call, grpc::ServerReader<v1::Ad
                                     services_.admission.uploads);
     const auto takeHeader = [&](const v1::AddShapeHeader& message) -> Result<void> {
         call.noteKey(message.key());
-        call.noteCollection(message.collection());
+        RETURN_IF_ERROR(call.useCollection(message.collection()));
         auto header = headerFrom(message);
         RETURN_IF_ERROR(header);
         return addition.begin(std::move(*header), message.wait());
@@ -148,7 +148,7 @@ grpc::Status ShapeServiceHandler::DeleteShape(grpc::ServerContext* context,
     return handle(services_, context, operations::kDeleteShape, [&](Call& call) -> Result<void> {
         const pb::ShapeRef& ref = request->shape();
         call.noteKey(ref.key());
-        call.noteCollection(ref.collection());
+        RETURN_IF_ERROR(call.useCollection(ref.collection()));
         std::optional<std::int64_t> expected;
         if (request->has_expected_version()) expected = request->expected_version();
         const auto deleted = services_.catalog.deleteShape(ref.collection(), ref.key(), expected);
