@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include "tests/server/security/self_signed.h"
+#include "tests/support/self_signed.h"
 #include "tests/support/temporary_directory.h"
 
 namespace shapedb::security {
