@@ -14,6 +14,7 @@
 #include "server/rpc/grpc_server.h"
 #include "server/security/authorization.h"
 #include "server/security/usage_saver.h"
+#include "server/server_samples.h"
 #include "server/store/sqlite/sqlite_key_store.h"
 #include "server/store/sqlite/sqlite_store.h"
 #include "server/telemetry/audit_log.h"
@@ -94,15 +95,17 @@ struct Daemon::Parts {
           admission(config.limits.maxUploadBytes, config.limits.maxUploads),
           runner(config::threadsOrProcessors(config.search.threads)),
           searches(catalog, runner, config.limits.maxK),
-          grpc({config, catalog, admission, searches, access, audit, log, temporaryDirectory()}) {}
+          grpc({config, catalog, admission, searches, access, audit, metrics, log, temporaryDirectory()}) {}
 
     std::string temporaryDirectory() const { return config.data + "/" + kTemporaryFolder; }
     Result<void> serve();
+    Result<void> serveMetrics();
     Result<void> drain();
 
     const config::ServerConfig config;
     telemetry::LoggerPtr log;
     telemetry::AuditLog audit;
+    telemetry::Metrics metrics;
     const std::unique_ptr<security::Keyring> keyring;
     security::UsageSaver usageSaver;
     const security::AccessPolicy access;
@@ -117,7 +120,20 @@ struct Daemon::Parts {
 Result<void> Daemon::Parts::serve() {
     RETURN_IF_ERROR(files::prepareTemporaryDirectory(temporaryDirectory()));
     RETURN_IF_ERROR(catalog.start());
-    return grpc.listen();
+    RETURN_IF_ERROR(grpc.listen());
+    return serveMetrics();
+}
+
+Result<void> Daemon::Parts::serveMetrics() {
+    if (config.metrics.listen.empty()) return {};
+    const auto started = std::chrono::system_clock::now();
+    metrics.setSampler([this, started] {
+        return sampleServer({catalog, admission, runner, grpc, config.data, started});
+    });
+    const auto port = metrics.serve(config.metrics.listen);
+    RETURN_IF_ERROR(port);
+    log->info("metrics are served", {{"address", config.metrics.listen}, {"port", std::int64_t{*port}}});
+    return {};
 }
 
 Result<void> Daemon::Parts::drain() {
@@ -126,6 +142,7 @@ Result<void> Daemon::Parts::drain() {
     grpc.reportNotServing();
     admission.calls.drain();
     const bool empty = admission.calls.waitUntilEmpty(until);
+    metrics.stop();
     if (!empty) log->warn("drain time has run out: cancelling the calls still running");
     grpc.shutDown();
     return catalog.stop();

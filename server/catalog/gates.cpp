@@ -35,6 +35,11 @@ void CallGate::leave(security::CallClass kind) {
     if (running_.ordinary + running_.admin == 0) changed_.notify_all();
 }
 
+CallCounts CallGate::running() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return running_;
+}
+
 void CallGate::drain() {
     const std::lock_guard<std::mutex> lock(mutex_);
     draining_ = true;

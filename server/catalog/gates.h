@@ -31,6 +31,7 @@ class CallGate {
     /// Call `leave` at the end of an admitted call. Errors: kUnavailable (draining), kQueueFull.
     [[nodiscard]] Result<void> enter(security::CallClass kind);
     void leave(security::CallClass kind);
+    [[nodiscard]] CallCounts running();
     /// From now on `enter` fails.
     void drain();
     [[nodiscard]] bool draining() const { return draining_.load(); }

@@ -70,6 +70,10 @@ struct ServerConfig {
         std::string file;             ///< empty: standard error
     } log;
 
+    struct Metrics {
+        std::string listen;  ///< HOST:PORT; empty: none
+    } metrics;
+
     struct Shutdown {
         int drainSeconds = 10;  ///< time for running calls to finish
     } shutdown;

@@ -147,6 +147,18 @@ Setting listenSetting() {
     return setting;
 }
 
+Setting metricsSetting() {
+    Setting setting = named("metrics.listen", SettingKind::kText, "HOST:PORT or empty",
+                            "Address to serve numbers for Prometheus on (http, /metrics). Empty: none.");
+    setting.assign = [](ServerConfig& config, const std::string& text) -> Result<void> {
+        if (!text.empty()) RETURN_IF_ERROR(parseEndpoint(text));
+        config.metrics.listen = text;
+        return {};
+    };
+    setting.show = [](const ServerConfig& config) { return config.metrics.listen; };
+    return setting;
+}
+
 Setting dataSetting() {
     Setting setting = named("data", SettingKind::kText, "a path",
                             "Directory of the database; created when missing. One server at a time.");
@@ -297,6 +309,7 @@ std::vector<Setting> makeSettings() {
         optionalPath(
             "log.file", [](C& c) -> std::string& { return c.log.file; },
             "File to append the log to. Empty: standard error."),
+        metricsSetting(),
         number(
             "shutdown.drain_seconds", kInteger, 0, 3'600,
             [](C& c) -> int& { return c.shutdown.drainSeconds; },

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <optional>
 #include <string_view>
 #include <utility>
 
@@ -72,6 +73,29 @@ std::string keyPresented(const grpc::ServerContext& context) {
     return std::string(bearer ? value.substr(kScheme.size()) : value);
 }
 
+/// The trace id in W3C's `traceparent` (version-trace-parent-flags, in hexadecimal digits), so that the log
+/// line of a call can be found from the client's; empty if there is none that is valid.
+std::optional<std::string> traceOf(const grpc::ServerContext& context) {
+    constexpr std::size_t kTraceAt = 3, kTraceDigits = 32, kParentAt = 36, kParentDigits = 16, kBytes = 55;
+    const auto found = context.client_metadata().find("traceparent");
+    if (found == context.client_metadata().end()) return std::nullopt;
+    const std::string_view value(found->second.data(), found->second.size());
+    // Later versions may append to it.
+    if (value.size() < kBytes || (value.size() > kBytes && value[kBytes] != '-')) return std::nullopt;
+    for (std::size_t i = 0; i < kBytes; ++i) {
+        const bool dash = i == 2 || i == kParentAt - 1 || i == kParentAt + kParentDigits;
+        const bool digit = std::string_view("0123456789abcdef").find(value[i]) != std::string_view::npos;
+        if (dash ? value[i] != '-' : !digit) return std::nullopt;
+    }
+    const std::string_view trace = value.substr(kTraceAt, kTraceDigits);
+    const std::string_view parent = value.substr(kParentAt, kParentDigits);
+    const auto allZero = [](std::string_view text) {
+        return text.find_first_not_of('0') == std::string_view::npos;
+    };
+    if (value.substr(0, 2) == "ff" || allZero(trace) || allZero(parent)) return std::nullopt;
+    return std::string(trace);
+}
+
 security::Credentials credentialsOf(const grpc::ServerContext& context) {
     security::Credentials credentials;
     credentials.key = keyPresented(context);
@@ -134,10 +158,13 @@ grpc::Status Call::finish(Result<void> result) {
 
 void Call::logLine(const grpc::Status& status, const Error* error) {
     const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - began_;
+    services_.metrics.recordCall(operation_.name, statusName(status.error_code()), took.count() / 1e3,
+                                 bytes_);
     std::vector<telemetry::Field> fields = {{"rpc", std::string(operation_.name)},
                                             {"peer", peer_},
                                             {"code", std::string(statusName(status.error_code()))},
                                             {"ms", took.count()}};
+    if (const auto trace = traceOf(context_)) fields.push_back({"trace", *trace});
     if (const std::string key = authorization_.keyId(); !key.empty()) {
         fields.push_back({"caller", key});
         fields.push_back({"caller_name", authorization_.keyName()});

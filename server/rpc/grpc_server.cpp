@@ -74,6 +74,7 @@ struct GrpcServer::Parts {
                    given.searches,
                    given.access,
                    given.audit,
+                   given.metrics,
                    std::move(given.log),
                    std::move(given.temporaryDirectory),
                    std::chrono::system_clock::now()},
@@ -205,6 +206,20 @@ void GrpcServer::Parts::open(Entrance& entrance, std::size_t maxConnections) {
         log->warn("too many connections: more are closed at once", {{"open", std::uint64_t{open}}});
     };
     entrance.listener.start(maxConnections, std::move(events));
+}
+
+GrpcServer::State GrpcServer::state() const {
+    State state;
+    for (const Parts::Entrance* entrance : {&parts_->network, &parts_->local}) {
+        state.connections += entrance->listener.connections();
+        state.connectionsRefused += entrance->listener.refused();
+    }
+    {
+        const std::lock_guard<std::mutex> lock(parts_->healthMutex);
+        state.accepting = parts_->inTrouble == 0;
+    }
+    if (parts_->tls) state.certificateExpires = parts_->tls->expires();
+    return state;
 }
 
 const config::Endpoint& GrpcServer::endpoint() const { return parts_->network.listener.endpoint(); }

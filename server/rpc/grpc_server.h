@@ -1,7 +1,10 @@
 // The gRPC server: its handlers, its health service, and where it listens.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "core/base/error.h"
@@ -12,6 +15,7 @@
 #include "server/security/authorization.h"
 #include "server/telemetry/audit_log.h"
 #include "server/telemetry/logger.h"
+#include "server/telemetry/metrics.h"
 
 namespace shapedb::rpc {
 
@@ -26,6 +30,7 @@ class GrpcServer {
         catalog::Searches& searches;
         const security::AccessPolicy& access;
         telemetry::AuditLog& audit;
+        telemetry::Metrics& metrics;
         telemetry::LoggerPtr log;
         std::string temporaryDirectory;  ///< must exist: backup and restore put their files there
     };
@@ -39,6 +44,15 @@ class GrpcServer {
 
     /// Where it listens: the host asked for and the port in use.
     [[nodiscard]] const config::Endpoint& endpoint() const;
+
+    /// How it is doing. From any thread between `listen` and `shutDown`.
+    struct State {
+        std::size_t connections = 0;
+        std::uint64_t connectionsRefused = 0;  ///< since start
+        bool accepting = true;                 ///< false: connections cannot be accepted
+        std::optional<security::UnixMs> certificateExpires;
+    };
+    [[nodiscard]] State state() const;
 
     /// Health says NOT_SERVING from now on; calls are still answered.
     void reportNotServing();

@@ -12,6 +12,7 @@
 #include "server/security/authorization.h"
 #include "server/telemetry/audit_log.h"
 #include "server/telemetry/logger.h"
+#include "server/telemetry/metrics.h"
 
 namespace shapedb::rpc {
 
@@ -24,6 +25,7 @@ struct Services {
     catalog::Searches& searches;
     const security::AccessPolicy& access;
     telemetry::AuditLog& audit;
+    telemetry::Metrics& metrics;
     telemetry::LoggerPtr log;
     std::string temporaryDirectory;  ///< exists; for backup and restore files
     std::chrono::system_clock::time_point started;

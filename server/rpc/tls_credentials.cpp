@@ -106,6 +106,7 @@ Result<void> TlsCredentials::use(const security::TlsIdentity& identity) {
     }
     RETURN_IF_ERROR(identity_.replace(identity.pem));
     used_ = identity.pem + identity.clientCas;
+    expires_ = identity.notAfter;
     problem_.clear();
     toldOfExpiry_ = false;
     log_->info("TLS certificate in use", {{"subject", identity.subject}, {"file", files_.certificate}});

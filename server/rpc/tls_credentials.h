@@ -1,6 +1,7 @@
 // gRPC's credentials for TLS from files that may be replaced while the server runs.
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <memory>
 #include <mutex>
@@ -33,6 +34,9 @@ class TlsCredentials {
     /// For the server that this outlives.
     [[nodiscard]] std::shared_ptr<grpc::ServerCredentials> credentials() const { return credentials_; }
 
+    /// When the certificate in use expires.
+    [[nodiscard]] security::UnixMs expires() const { return expires_.load(); }
+
   private:
     /// A file in memory that has a path of its own for as long as it lives.
     class MemoryFile {
@@ -60,6 +64,7 @@ class TlsCredentials {
     std::shared_ptr<grpc::ServerCredentials> credentials_;
     std::string used_;     ///< content in use
     std::string problem_;  ///< of the files, as last logged
+    std::atomic<security::UnixMs> expires_{0};
     bool toldOfExpiry_ = false;
     std::mutex mutex_;
     std::condition_variable wake_;

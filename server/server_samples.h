@@ -1,0 +1,30 @@
+// What the whole server tells of itself whenever Prometheus asks.
+#pragma once
+
+#include <chrono>
+#include <string>
+#include <vector>
+
+#include "server/catalog/catalog.h"
+#include "server/catalog/gates.h"
+#include "server/catalog/search_runner.h"
+#include "server/rpc/grpc_server.h"
+#include "server/telemetry/metrics.h"
+
+namespace shapedb {
+
+/// Where the numbers come from. Each outlives the metrics and is thread-safe.
+struct SampleSources {
+    catalog::Catalog& catalog;
+    catalog::Admission& admission;
+    const catalog::SearchRunner& searches;
+    const rpc::GrpcServer& grpc;
+    const std::string& dataDirectory;
+    std::chrono::system_clock::time_point started;
+};
+
+/// What cannot be told at the moment, as while the database is replaced, is left out; samples of one name
+/// follow one another.
+[[nodiscard]] std::vector<telemetry::Sample> sampleServer(const SampleSources& sources);
+
+}  // namespace shapedb
