@@ -30,7 +30,7 @@ constexpr double kMostStartSeconds = 5.0;
 constexpr double kMostResidentRatio = 1.3;
 constexpr std::int64_t kMostUploadGrowth = 64 << 20;
 
-constexpr std::array<const char*, 4> kParts = {"ingest", "latency", "startup", "upload"};
+constexpr std::array<const char*, 5> kParts = {"ingest", "latency", "batches", "startup", "upload"};
 
 struct LoadFlags {
     LoadSettings settings;
@@ -112,6 +112,35 @@ void report(const LatencyFigures& figures, const LoadSettings& settings, Report&
         {"ingest meanwhile", cli::formatFixed(figures.busyScansPerSecond, 2) + " scans/s", "", true});
 }
 
+void report(const BatchFigures& figures, const LoadSettings& settings, Report& report) {
+    const bool kept = figures.p99Ratio <= kMostP99Ratio;
+    report.parts["batches"] = {{"shapes", settings.batchShapes},
+                               {"clients", settings.batchClients},
+                               {"queries", settings.batchQueries},
+                               {"k", settings.k},
+                               {"idle", latencyJson(figures.idle)},
+                               {"busy", latencyJson(figures.busy)},
+                               {"p99_ratio", figures.p99Ratio},
+                               {"most_p99_ratio", kMostP99Ratio},
+                               {"kept", kept},
+                               {"batch_searches_per_second", figures.searchesPerSecond},
+                               {"peak_bytes", figures.peak}};
+    const auto both = [](const Latencies& latencies) {
+        return milliseconds(latencies.p50) + " / " + milliseconds(latencies.p99);
+    };
+    report.lines.push_back({"query of " + cli::formatCount(settings.batchShapes) + ", idle: p50 / p99",
+                            both(figures.idle), "", true});
+    report.lines.push_back({"query beside " + std::to_string(settings.batchClients) +
+                                " clients with batches of " + cli::formatCount(settings.batchQueries) +
+                                ": p50 / p99",
+                            both(figures.busy), "", true});
+    report.lines.push_back({"query: p99 beside batches / idle", cli::formatFixed(figures.p99Ratio, 2),
+                            "<= " + cli::formatFixed(kMostP99Ratio, 1), kept});
+    report.lines.push_back(
+        {"searches of batches meanwhile", cli::formatFixed(figures.searchesPerSecond, 0) + "/s", "", true});
+    report.lines.push_back({"peak memory of the server", cli::formatBytes(figures.peak), "", true});
+}
+
 void report(const StartFigures& figures, const LoadSettings&, Report& report) {
     const bool fast = figures.servingSeconds <= kMostStartSeconds;
     const bool small = figures.residentRatio <= kMostResidentRatio;
@@ -190,8 +219,9 @@ Result<int> runLoad(const LoadFlags& flags, Bench& bench) {
     Result<void> done;
     if (done && wanted(kParts[0])) done = add(measureIngest, settings, bench, all);
     if (done && wanted(kParts[1])) done = add(measureLatency, settings, bench, all);
-    if (done && wanted(kParts[2])) done = add(measureStart, settings, bench, all);
-    if (done && wanted(kParts[3])) done = add(measureUpload, settings, bench, all);
+    if (done && wanted(kParts[2])) done = add(measureBatches, settings, bench, all);
+    if (done && wanted(kParts[3])) done = add(measureStart, settings, bench, all);
+    if (done && wanted(kParts[4])) done = add(measureUpload, settings, bench, all);
     RETURN_IF_ERROR(done);
     const Environment here = environment();
     json document = {{"environment", environmentJson(here)},
@@ -221,7 +251,7 @@ void addLoadOperation(CLI::App& app, Bench& bench) {
     settings.threads = cli::defaultThreads();
     CLI::App* command = app.add_subcommand(
         "load", "A server under load: ingest beside core alone, searches during ingest, start, large upload");
-    command->add_option("--part", flags->parts, "Only these: ingest, latency, startup, upload")
+    command->add_option("--part", flags->parts, "Only these: ingest, latency, batches, startup, upload")
         ->delimiter(',')
         ->check(CLI::IsMember(std::vector<std::string>(kParts.begin(), kParts.end())))
         ->type_name("A,B,...");
@@ -253,6 +283,14 @@ void addLoadOperation(CLI::App& app, Bench& bench) {
     command->add_option("--queries", settings.queries, "latency: queries idle, and as many busy")
         ->check(CLI::Range(1, 1'000'000))
         ->capture_default_str();
+    command
+        ->add_option("--batch-clients", settings.batchClients,
+                     "batches: clients that send them without a pause")
+        ->check(CLI::Range(1u, 64u));
+    command->add_option("--batch-queries", settings.batchQueries, "batches: queries of each")
+        ->check(CLI::Range(1, 1'000));
+    command->add_option("--batch-shapes", settings.batchShapes, "batches: stored signatures")
+        ->check(CLI::Range(1, 100'000'000));
     command->add_option("--query-seconds", settings.querySeconds, "latency: time for either, at most")
         ->check(CLI::Range(0.1, 36'000.0))
         ->capture_default_str();

@@ -5,7 +5,6 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
-#include <mutex>
 #include <thread>
 
 #include <sys/resource.h>
@@ -13,6 +12,7 @@
 #include "bench/quantiles.h"
 #include "bench/server_process.h"
 #include "bench/stored_shapes.h"
+#include "bench/work_loop.h"
 #include "client/api/client.h"
 #include "core/base/return_if_error.h"
 #include "core/pipeline.h"
@@ -56,51 +56,6 @@ Result<ServerProcess> startServer(const LoadSettings& settings, const std::strin
     flags.insert(flags.end(), {"--ingest-threads", std::to_string(settings.threads)});
     return ServerProcess::start(settings.server, data, flags);
 }
-
-/// Runs `work(i)` for i = 0, 1, ... on that many threads until it returns false or fails; returns the first
-/// error. `work` must end soon after `stop` is set.
-class WorkLoop {
-  public:
-    using Work = std::function<Result<bool>(std::size_t i)>;
-
-    WorkLoop(unsigned threads, std::atomic<bool>& stop, Work work) : stop_(stop), work_(std::move(work)) {
-        for (unsigned t = 0; t < threads; ++t) threads_.emplace_back([this] { run(); });
-    }
-    ~WorkLoop() {
-        stop_ = true;
-        static_cast<void>(finish());
-    }
-    WorkLoop(const WorkLoop&) = delete;
-    WorkLoop& operator=(const WorkLoop&) = delete;
-
-    Result<void> finish() {
-        for (std::thread& thread : threads_) thread.join();
-        threads_.clear();
-        if (error_) return fail(*error_);
-        return {};
-    }
-
-  private:
-    void run() {
-        while (!stop_) {
-            const Result<bool> more = work_(next_.fetch_add(1));
-            if (more && *more) continue;
-            if (!more) {
-                const std::lock_guard<std::mutex> lock(mutex_);
-                if (!error_ && !stop_) error_ = more.error();
-                stop_ = true;
-            }
-            return;
-        }
-    }
-
-    std::atomic<bool>& stop_;
-    Work work_;
-    std::atomic<std::size_t> next_{0};
-    std::mutex mutex_;
-    std::optional<Error> error_;
-    std::vector<std::thread> threads_;
-};
 
 RunContext cancelledBy(const RunContext& context) {
     RunContext plain;
@@ -255,6 +210,57 @@ Result<LatencyFigures> measureLatencyOf(const LoadSettings& settings, const clie
     return figures;
 }
 
+/// As measureLatencyOf, beside clients that send large batches.
+Result<BatchFigures> measureBatchesOf(const LoadSettings& settings, const ServerProcess& server,
+                                      const client::Client& client, const std::vector<std::string>& queries,
+                                      const LoadProgress& progress, const RunContext& context) {
+    std::vector<client::BatchQuery> batch(settings.batchQueries);
+    for (std::size_t i = 0; i < batch.size(); ++i) batch[i].signature = queries[i % queries.size()];
+    client::SearchOptions options;
+    options.k = settings.k;
+    std::vector<double> idle, busy, warmUp;
+    const std::size_t share = (settings.queries + settings.rounds - 1) / settings.rounds;
+    const double seconds = settings.querySeconds / static_cast<double>(settings.rounds);
+    RETURN_IF_ERROR(ask(client, queries, settings.k, kWarmUpQueries, seconds, warmUp, context));
+    BatchFigures figures;
+    double busySeconds = 0.0;
+    for (std::size_t round = 0; round < settings.rounds; ++round) {
+        progress("queries beside batches", round, settings.rounds);
+        RETURN_IF_ERROR(ask(client, queries, settings.k, share, seconds, idle, context));
+        std::atomic<bool> stop{false};
+        RunContext stopped;
+        stopped.cancel = &stop;
+        WorkLoop loop(settings.batchClients, stop, [&](std::size_t) -> Result<bool> {
+            const auto own = connect(server);
+            RETURN_IF_ERROR(own);
+            RETURN_IF_ERROR(own->searchBatch(options, batch, stopped));
+            return true;
+        });
+        std::this_thread::sleep_for(kWarmUp);
+        const auto before = client.stats();
+        const std::size_t asked = busy.size();
+        const auto began = Clock::now();
+        RETURN_IF_ERROR(ask(client, queries, settings.k, share, seconds, busy, context));
+        busySeconds += since(began);
+        const auto after = client.stats();
+        stop = true;
+        RETURN_IF_ERROR(loop.finish());
+        if (!before || !after) return fail((before ? after : before).error());
+        figures.searchesPerSecond +=
+            static_cast<double>(after->searches - before->searches - (busy.size() - asked));
+        // What was interrupted ends before the next round.
+        std::this_thread::sleep_for(kWarmUp);
+    }
+    const auto memory = server.memory();
+    RETURN_IF_ERROR(memory);
+    figures.peak = memory->peak;
+    figures.idle = latenciesOf(idle);
+    figures.busy = latenciesOf(busy);
+    if (figures.idle.p99 > 0.0) figures.p99Ratio = figures.busy.p99 / figures.idle.p99;
+    if (busySeconds > 0.0) figures.searchesPerSecond /= busySeconds;
+    return figures;
+}
+
 /// `count` points on a lumpy ball, made quickly.
 Result<PointCloud> makeLargeScan(std::uint64_t count, const LoadSettings& settings,
                                  const RunContext& context) {
@@ -367,6 +373,22 @@ Result<LatencyFigures> measureLatency(const LoadSettings& settings, const LoadPr
     const auto uploader = connect(*server);
     RETURN_IF_ERROR(uploader);
     return measureLatencyOf(settings, *client, *uploader, queries, *scans, progress, context);
+}
+
+Result<BatchFigures> measureBatches(const LoadSettings& settings, const LoadProgress& progress,
+                                    const RunContext& context) {
+    const auto directory = WorkDirectory::create(settings.directory);
+    RETURN_IF_ERROR(directory);
+    const std::string data = directory->path() + "/data";
+    const auto generator = makeGenerator(settings, settings.batchShapes, context);
+    RETURN_IF_ERROR(generator);
+    RETURN_IF_ERROR(storeSignatures(data, *generator, settings.batchShapes, progress, context));
+    const std::vector<std::string> queries = makeQueries(*generator, settings.batchShapes);
+    const auto server = startServer(settings, data);
+    RETURN_IF_ERROR(server);
+    const auto client = connect(*server);
+    RETURN_IF_ERROR(client);
+    return measureBatchesOf(settings, *server, *client, queries, progress, context);
 }
 
 Result<StartFigures> measureStart(const LoadSettings& settings, const LoadProgress& progress,

@@ -26,6 +26,9 @@ struct LoadSettings {
     std::size_t queries = 300;         ///< latency: at most, idle and busy each
     double querySeconds = 120.0;       ///< latency: or about this long, idle and busy each
     std::uint32_t k = 10;
+    unsigned batchClients = 4;          ///< batches: clients that send SearchBatch without a pause
+    std::size_t batchQueries = 1'000;   ///< batches: of each
+    std::uint64_t batchShapes = 1'000;  ///< batches: stored
     std::uint64_t startShapes = 1'000'000;
     std::string startData;                    ///< startup: data directory; filled first if missing, and kept
     std::uint64_t uploadBytes = 100'000'000;  ///< 12 a point
@@ -61,6 +64,14 @@ struct LatencyFigures {
     double busyScansPerSecond = 0.0;  ///< described meanwhile
 };
 
+struct BatchFigures {
+    Latencies idle;
+    Latencies busy;  ///< of single searches while batches are answered
+    double p99Ratio = 0.0;
+    double searchesPerSecond = 0.0;  ///< of the batches, meanwhile
+    std::uint64_t peak = 0;          ///< memory of the server, bytes
+};
+
 struct StartFigures {
     std::uint64_t shapes = 0;         ///< with a signature
     double servingSeconds = 0.0;      ///< from exec to SERVING; median of the rounds
@@ -89,6 +100,8 @@ using LoadProgress = std::function<void(const std::string& what, std::uint64_t d
                                                   const RunContext& context);
 [[nodiscard]] Result<LatencyFigures> measureLatency(const LoadSettings& settings,
                                                     const LoadProgress& progress, const RunContext& context);
+[[nodiscard]] Result<BatchFigures> measureBatches(const LoadSettings& settings, const LoadProgress& progress,
+                                                  const RunContext& context);
 [[nodiscard]] Result<StartFigures> measureStart(const LoadSettings& settings, const LoadProgress& progress,
                                                 const RunContext& context);
 [[nodiscard]] Result<UploadFigures> measureUpload(const LoadSettings& settings, const LoadProgress& progress,

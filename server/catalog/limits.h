@@ -34,6 +34,9 @@ constexpr std::size_t kMaxPageBytes = std::size_t{3} << 20;
 constexpr std::uint32_t kMostVerified = 10'000;
 /// A larger answer to a search is refused.
 constexpr std::size_t kMaxAnswerBytes = std::size_t{64} << 20;
+/// The answers being made of all calls together; more are refused. In memory they take about four times as
+/// much.
+constexpr std::size_t kMaxAnswersBytes = std::size_t{192} << 20;
 
 // Calls at a time. A transport needs a thread for each, and some to refuse the rest.
 constexpr int kMaxOrdinaryCalls = 208;

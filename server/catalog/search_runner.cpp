@@ -7,13 +7,29 @@
 #include "core/base/return_if_error.h"
 
 namespace shapedb::catalog {
+namespace {
+
+Result<VerifiedResult> search(const VerifiableQuery& query, const SignatureSet& set,
+                              const SearchOptions& options, const std::optional<VerifyOptions>& verify,
+                              const SurfaceOf& surfaceOf, const RunContext& context) {
+    SearchOptions own = options;
+    own.excludeId = query.excludeId;
+    if (verify && query.surface) {
+        return topKVerified(query.signature, *query.surface, set, own, *verify, surfaceOf, context);
+    }
+    auto found = topK(query.signature, set, own, context);
+    RETURN_IF_ERROR(found);
+    return unverified(std::move(*found));
+}
+
+}  // namespace
 
 struct SearchRunner::Arena {
     explicit Arena(int threads) : tasks(threads) {}
     oneapi::tbb::task_arena tasks;
 };
 
-SearchRunner::SearchRunner(int threads) : arena_(std::make_unique<Arena>(threads)) {}
+SearchRunner::SearchRunner(int threads) : arena_(std::make_unique<Arena>(threads)), lane_(threads) {}
 
 SearchRunner::~SearchRunner() = default;
 
@@ -21,39 +37,26 @@ Result<VerifiedResult> SearchRunner::run(const VerifiableQuery& query, const Sig
                                          const SearchOptions& options,
                                          const std::optional<VerifyOptions>& verify,
                                          const SurfaceOf& surfaceOf, const RunContext& context) {
-    SearchOptions own = options;
-    own.excludeId = query.excludeId;
-    auto result = arena_->tasks.execute([&]() -> Result<VerifiedResult> {
-        if (verify && query.surface) {
-            return topKVerified(query.signature, *query.surface, set, own, *verify, surfaceOf, context);
-        }
-        auto found = topK(query.signature, set, own, context);
-        RETURN_IF_ERROR(found);
-        return unverified(std::move(*found));
-    });
+    auto result =
+        arena_->tasks.execute([&] { return search(query, set, options, verify, surfaceOf, context); });
     if (result) count_.fetch_add(1);
     return result;
 }
 
-Result<std::vector<VerifiedResult>> SearchRunner::runBatch(
-    const std::vector<VerifiableQuery>& queries, const SignatureSet& set, const SearchOptions& options,
-    const std::optional<VerifyOptions>& verify, const SurfaceOf& surfaceOf, const RunContext& context) {
-    std::vector<VerifiedResult> results;
-    if (verify) {
-        // One after another: each spreads its fits over all threads.
-        for (std::size_t i = 0; i < queries.size(); ++i) {
-            auto result = run(queries[i], set, options, verify, surfaceOf, context);
-            if (!result) return fail(ofQuery(i, result.error()));
-            results.push_back(std::move(*result));
-        }
-        return results;
-    }
-    const std::vector<BatchQuery> plain(queries.begin(), queries.end());
-    auto found = arena_->tasks.execute([&] { return topKBatch(plain, set, options, context); });
-    RETURN_IF_ERROR(found);
-    for (SearchResult& one : *found) results.push_back(unverified(std::move(one)));
-    count_.fetch_add(results.size());
-    return results;
+Result<void> SearchRunner::runBatch(const std::vector<VerifiableQuery>& queries, const SignatureSet& set,
+                                    const SearchOptions& options, const std::optional<VerifyOptions>& verify,
+                                    const SurfaceOf& surfaceOf, const RunContext& context,
+                                    const OnFound& onFound) {
+    return lane_.run(queries.size(), [&](std::size_t i) -> Result<void> {
+        auto found = search(queries[i], set, options, verify, surfaceOf, context);
+        if (!found) return fail(ofQuery(i, found.error()));
+        count_.fetch_add(1);
+        return onFound(i, std::move(*found));
+    });
+}
+
+Result<void> SearchRunner::inBackground(const std::function<Result<void>()>& work) {
+    return lane_.run(1, [&](std::size_t) { return work(); });
 }
 
 }  // namespace shapedb::catalog

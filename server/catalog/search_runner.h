@@ -2,19 +2,25 @@
 #pragma once
 
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
 
 #include "core/base/error.h"
 #include "core/search/verify.h"
+#include "server/catalog/background_lane.h"
 
 namespace shapedb::catalog {
 
-/// All searches share the threads of one arena, however many calls run. Thread-safe.
+/// Single searches share the threads of one arena, however many calls run; batches share as many threads of
+/// low priority. Thread-safe.
 class SearchRunner {
   public:
+    using OnFound = std::function<Result<void>(std::size_t query, VerifiedResult result)>;
+
     /// `threads` at least 1.
     explicit SearchRunner(int threads);
     ~SearchRunner();
@@ -25,10 +31,16 @@ class SearchRunner {
                                              const std::optional<VerifyOptions>& verify,
                                              const SurfaceOf& surfaceOf, const RunContext& context);
 
-    /// The same for many; the first error ends all and names its query. Results in the order of the queries.
-    [[nodiscard]] Result<std::vector<VerifiedResult>> runBatch(
-        const std::vector<VerifiableQuery>& queries, const SignatureSet& set, const SearchOptions& options,
-        const std::optional<VerifyOptions>& verify, const SurfaceOf& surfaceOf, const RunContext& context);
+    /// The same for many, one on each thread, beside which single searches keep their speed. `onFound(i,
+    /// result)` is called for each, in no order and by several threads at a time. The first error ends all
+    /// and names its query.
+    [[nodiscard]] Result<void> runBatch(const std::vector<VerifiableQuery>& queries, const SignatureSet& set,
+                                        const SearchOptions& options,
+                                        const std::optional<VerifyOptions>& verify,
+                                        const SurfaceOf& surfaceOf, const RunContext& context,
+                                        const OnFound& onFound);
+    /// Runs `work` with the priority of batches; it may throw. Errors: those of `work`.
+    [[nodiscard]] Result<void> inBackground(const std::function<Result<void>()>& work);
 
     /// Successful searches since start.
     [[nodiscard]] std::uint64_t count() const { return count_.load(); }
@@ -36,6 +48,7 @@ class SearchRunner {
   private:
     struct Arena;
     std::unique_ptr<Arena> arena_;
+    BackgroundLane lane_;
     std::atomic<std::uint64_t> count_{0};
 };
 

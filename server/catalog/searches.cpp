@@ -23,11 +23,13 @@ Result<bool> sizesCount(bool keepScale, bool freeScale, LengthUnit unit) {
 }  // namespace
 
 Result<void> AnswerRoom::take(std::size_t bytes) {
+    const std::lock_guard<std::mutex> lock(mutex_);
     if (bytes > left_) {
         return fail(ErrorCode::kInvalidArgument,
                     "the answer would exceed " + std::to_string(kMaxAnswerBytes) +
                         " bytes; ask for a smaller k or fewer queries, or set no_explanation");
     }
+    RETURN_IF_ERROR(share_.take(bytes));
     left_ -= bytes;
     return {};
 }
@@ -227,11 +229,21 @@ Result<ScanSearch> Searches::byScan(const PreparedSearch& search, const store::V
     return ScanSearch{std::move(*description), std::move(*found)};
 }
 
-Result<std::vector<VerifiedResult>> Searches::runBatch(const PreparedSearch& search,
-                                                       const std::vector<VerifiableQuery>& queries,
-                                                       const RunContext& context) const {
-    return runner_.runBatch(queries, search.collection->signatures, search.options, search.verify, surfaces(),
-                            context);
+Result<void> Searches::runBatch(PreparedSearch& search, const std::vector<QuerySource>& sources,
+                                const RunContext& context, const OnFound& onFound) const {
+    std::vector<VerifiableQuery> all;
+    const auto read = runner_.inBackground([&]() -> Result<void> {
+        auto found = queries(search, sources);
+        RETURN_IF_ERROR(found);
+        all = std::move(*found);
+        return {};
+    });
+    RETURN_IF_ERROR(read);
+    return runner_.runBatch(all, search.collection->signatures, search.options, search.verify, surfaces(),
+                            context, [&](std::size_t i, VerifiedResult found) -> Result<void> {
+                                const auto done = onFound(i, all[i].signature, found);
+                                return done ? done : fail(ofQuery(i, done.error()));
+                            });
 }
 
 SurfaceOf Searches::surfaces() const {

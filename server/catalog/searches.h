@@ -75,14 +75,19 @@ struct FoundHit {
     Verdict verdict = Verdict::kNone;
 };
 
-/// How many bytes an answer may still grow by. One for each request.
+/// How many bytes an answer may still grow by. One for each request; thread-safe.
 class AnswerRoom {
   public:
-    /// Errors: kInvalidArgument, saying how to ask for less.
+    /// `all`: what the answers of all calls may take together; must outlive this.
+    explicit AnswerRoom(Budget& all) : share_(all) {}
+
+    /// Errors: kInvalidArgument, saying how to ask for less; kQueueFull (the answers of other calls).
     [[nodiscard]] Result<void> take(std::size_t bytes);
 
   private:
+    std::mutex mutex_;
     std::size_t left_ = kMaxAnswerBytes;
+    Budget::Share share_;
 };
 
 /// Thread-safe. The references must outlive it.
@@ -139,10 +144,13 @@ class Searches {
     /// only meanwhile, and searches. Errors: those of Catalog::describe and of `run`.
     [[nodiscard]] Result<ScanSearch> byScan(const PreparedSearch& search, const store::VerifiedScan& scan,
                                             const RunContext& context) const;
-    /// As `run` of each; an error names its query.
-    [[nodiscard]] Result<std::vector<VerifiedResult>> runBatch(const PreparedSearch& search,
-                                                               const std::vector<VerifiableQuery>& queries,
-                                                               const RunContext& context) const;
+    /// The queries of `sources`, each found as by `run`, beside which single searches keep their speed.
+    /// `onFound(i, query, result)` is called for each, in no order and by several threads at a time. An error
+    /// names its query. Errors: those of `queries`, `run` and `onFound`.
+    using OnFound =
+        std::function<Result<void>(std::size_t i, const Signature& query, const VerifiedResult& found)>;
+    [[nodiscard]] Result<void> runBatch(PreparedSearch& search, const std::vector<QuerySource>& sources,
+                                        const RunContext& context, const OnFound& onFound) const;
     /// Successful searches since start.
     [[nodiscard]] std::uint64_t count() const { return runner_.count(); }
 

@@ -72,7 +72,7 @@ Result<void> search(const Services& services, const Call& call, const catalog::P
                     const VerifiableQuery& query, pb::SearchResponse* response) {
     const auto found = services.searches.run(prepared, query, call.run());
     RETURN_IF_ERROR(found);
-    catalog::AnswerRoom room;
+    catalog::AnswerRoom room(services.admission.answers);
     return answer(services, prepared, query.signature, *found, room, response);
 }
 
@@ -83,22 +83,21 @@ catalog::QuerySource sourceFrom(const v1::SearchBatchRequest::Query& query) {
     return source;
 }
 
-/// Reads all queries first and searches them together.
 Result<void> searchBatch(const Services& services, const Call& call, catalog::PreparedSearch& prepared,
                          const v1::SearchBatchRequest& request, v1::SearchBatchResponse* response) {
     std::vector<catalog::QuerySource> sources;
-    for (const auto& query : request.queries()) sources.push_back(sourceFrom(query));
-    const auto queries = services.searches.queries(prepared, sources);
-    RETURN_IF_ERROR(queries);
-    const auto found = services.searches.runBatch(prepared, *queries, call.run());
-    RETURN_IF_ERROR(found);
-    catalog::AnswerRoom room;
-    for (std::size_t i = 0; i < queries->size(); ++i) {
-        const auto done =
-            answer(services, prepared, (*queries)[i].signature, (*found)[i], room, response->add_responses());
-        if (!done) return fail(ofQuery(i, done.error()));
+    for (const auto& query : request.queries()) {
+        sources.push_back(sourceFrom(query));
+        response->add_responses();
     }
-    return {};
+    catalog::AnswerRoom room(services.admission.answers);
+    // Each thread fills the response of its own query.
+    return services.searches.runBatch(
+        prepared, sources, call.run(),
+        [&](std::size_t i, const Signature& query, const VerifiedResult& found) {
+            return answer(services, prepared, query, found, room,
+                          response->mutable_responses(static_cast<int>(i)));
+        });
 }
 
 }  // namespace
@@ -136,7 +135,7 @@ grpc::Status SearchServiceHandler::SearchByScan(grpc::ServerContext* context,
         const Description& description = searched->description;
         toProto(description.segmentation, response->mutable_report());
         response->set_seconds_segment(description.segmentation.totalSeconds);
-        catalog::AnswerRoom room;
+        catalog::AnswerRoom room(services_.admission.answers);
         return answer(services_, prepared, description.signature, searched->found, room, response);
     });
 }

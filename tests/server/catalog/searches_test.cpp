@@ -204,10 +204,53 @@ TEST_F(SearchesTest, AComparisonRefusesToKeepSizesInDifferentUnits) {
 }
 
 TEST(AnswerRoom, RefusesWhatDoesNotFit) {
-    AnswerRoom room;
+    Budget all(2 * kMaxAnswerBytes, "bytes");
+    AnswerRoom room(all);
     EXPECT_TRUE(room.take(kMaxAnswerBytes - 1));
     EXPECT_TRUE(room.take(1));
     EXPECT_EQ(room.take(1).error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST(AnswerRoom, IsSharedByAllAnswersUntilTheyAreGone) {
+    Budget all(100, "bytes");
+    AnswerRoom first(all);
+    {
+        AnswerRoom second(all);
+        EXPECT_TRUE(first.take(60));
+        EXPECT_EQ(second.take(41).error().code, ErrorCode::kQueueFull);
+        EXPECT_TRUE(second.take(40));
+        EXPECT_EQ(first.take(1).error().code, ErrorCode::kQueueFull);
+    }
+    EXPECT_TRUE(first.take(40));
+}
+
+TEST_F(SearchesTest, ABatchFindsWhatEachQueryFindsAlone) {
+    std::vector<std::string> keys;
+    for (int i = 0; i < 40; ++i) {
+        keys.push_back("shape " + std::to_string(i));
+        putAndWait(keys.back(), static_cast<float>(1 + i % 7));
+    }
+    SearchRequest request;
+    request.k = 5;
+    auto prepared = searches().prepare(catalog->collection("").value(), request);
+    ASSERT_TRUE(prepared);
+    std::vector<QuerySource> sources;
+    for (const std::string& key : keys) sources.push_back({&key, nullptr});
+    const auto queries = searches().queries(*prepared, sources);
+    ASSERT_TRUE(queries);
+    std::vector<std::vector<std::int64_t>> found(keys.size());
+    ASSERT_TRUE(searches().runBatch(*prepared, sources, {},
+                                    [&](std::size_t i, const Signature&, const VerifiedResult& result) {
+                                        for (const auto& hit : result.hits) found[i].push_back(hit.id);
+                                        return Result<void>();
+                                    }));
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+        const auto alone = searches().run(*prepared, (*queries)[i], {});
+        ASSERT_TRUE(alone);
+        std::vector<std::int64_t> expected;
+        for (const auto& hit : alone->hits) expected.push_back(hit.id);
+        EXPECT_EQ(found[i], expected) << keys[i];
+    }
 }
 
 TEST_F(SearchesTest, PagesOfAListingFollowOneAnother) {
