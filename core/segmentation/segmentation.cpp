@@ -353,10 +353,12 @@ Result<Segmentation> segmentOrThrow(const PointCloud& points, const Segmentation
                         " big Delaunay balls, all reached from outside); "
                         "scan the shape from all sides or raise big_ball_ratio");
     }
+    RETURN_IF_ERROR(context.checkpoint());
     const std::vector<std::int32_t> siteLabels = labelSites(prepared->sites.size(), result);
     const auto size = interiorSize(prepared->sites, siteLabels, result.tetrahedra);
     RETURN_IF_ERROR(size);
     result.size = *size * prepared->frame.unit;
+    RETURN_IF_ERROR(context.checkpoint());
     result.pointSegment.reserve(points.size());
     for (const std::uint32_t site : result.siteOfPoint) {
         result.pointSegment.push_back(site == kNoSite ? -1 : siteLabels[site]);

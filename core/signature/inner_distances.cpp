@@ -247,6 +247,7 @@ Result<InnerDistances> innerDistances(const InteriorView& view, const RunContext
     const InteriorGrid grid(view, side / kVoxelsPerSide);
     RETURN_IF_ERROR(context.checkpoint());
     const Cells cells = gatherCells(grid, cellSide(grid, side));
+    RETURN_IF_ERROR(context.checkpoint());
     InnerDistances result;
     placeCells(grid, cells, result);
     for (const InteriorGrid::Matter& m : grid.matter()) {
@@ -254,6 +255,7 @@ Result<InnerDistances> innerDistances(const InteriorView& view, const RunContext
         result.matter.push_back({m.tetrahedron, placed ? cells.ofVoxel[m.voxel] : InnerDistances::kNoCell});
     }
     std::vector<CellPair> pairs = touchingCells(grid, cells);
+    RETURN_IF_ERROR(context.checkpoint());
     joinPieces(view, grid, cells, pairs);
     const CellGraph graph = graphOf(pairs, cells.size());
     result.sources = spreadSources(cells, result.volumes);

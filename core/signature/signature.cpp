@@ -123,6 +123,7 @@ Result<Signature> makeSignature(const Segmentation& segmentation, const Signatur
     try {
         auto signature = makeSignatureOrThrow(segmentation, options);
         if (!signature || !options.attributes) return signature;
+        RETURN_IF_ERROR(context.checkpoint());
         auto attributes = attributesOf(segmentation, *signature, context);
         RETURN_IF_ERROR(attributes);
         signature->attributes = std::move(*attributes);

@@ -33,6 +33,8 @@ constexpr std::size_t kOutlineDistances = 20;
 constexpr std::size_t kChords = 100000;
 // Every statistic starts a stream of its own, so none depends on which others were computed before it.
 constexpr std::uint64_t kChordSeed = 145;
+/// About a millisecond.
+constexpr std::size_t kChordsBetweenCheckpoints = 1024;
 
 const StatisticLayout& layout(Statistic statistic) {
     return kStatistics[static_cast<std::size_t>(statistic)];
@@ -140,12 +142,14 @@ void surfaceDistances(const InteriorView& view, std::uint8_t* out) {
     histogram.writeLevels(out);
 }
 
-void chords(const InteriorView& view, std::uint8_t* out) {
+/// Once the context is cancelled what is written means nothing.
+void chords(const InteriorView& view, std::uint8_t* out, const RunContext& context) {
     const Voxels voxels(view);
     Random random(kChordSeed);
     Histogram histogram(kChordLengths, kChordShares);
     const std::size_t n = view.surface.size();
     for (std::size_t i = 0; i < kChords; ++i) {
+        if (i % kChordsBetweenCheckpoints == 0 && !context.checkpoint()) return;
         const Point3& a = view.surface[random.below(n)];
         const Point3& b = view.surface[random.below(n)];
         const double d = distance(a, b);
@@ -210,12 +214,14 @@ Result<ShapeStatistics> shapeStatistics(const InteriorView& view, const RunConte
         thicknessChange(view, *inner, bins(Statistic::kThicknessChange));
     };
     const auto lines = [&] {
-        chords(view, bins(Statistic::kChords));
+        chords(view, bins(Statistic::kChords), context);
+        if (!context.checkpoint()) return;
         surfaceDistances(view, bins(Statistic::kSurfaceDistances));
     };
     const auto rest = [&] {
         thicknessByRadius(view, bins(Statistic::kThicknessByRadius));
         harmonics(view.centroids, view.volumes, bins(Statistic::kInteriorHarmonics));
+        if (!context.checkpoint()) return;
         harmonics(view.surface, {}, bins(Statistic::kSurfaceHarmonics));
         // Reported at the end.
         if (!context.checkpoint()) return;
