@@ -33,9 +33,16 @@ namespace operations {
 // ShapeService
 inline constexpr Operation kAddShape{"ShapeService", "AddShape", Role::kWriter, CallClass::kUpload};
 inline constexpr Operation kGetShape{"ShapeService", "GetShape", Role::kReader, CallClass::kOrdinary};
+inline constexpr Operation kGetShapes{"ShapeService", "GetShapes", Role::kReader, CallClass::kOrdinary};
+inline constexpr Operation kGetPoints{"ShapeService", "GetPoints", Role::kReader, CallClass::kOrdinary};
 inline constexpr Operation kListShapes{"ShapeService", "ListShapes", Role::kReader, CallClass::kOrdinary};
 inline constexpr Operation kCountShapes{"ShapeService", "CountShapes", Role::kReader, CallClass::kOrdinary};
+inline constexpr Operation kCountByValue{"ShapeService", "CountByValue", Role::kReader, CallClass::kOrdinary};
 inline constexpr Operation kDeleteShape{"ShapeService", "DeleteShape", Role::kWriter, CallClass::kOrdinary};
+inline constexpr Operation kDeleteShapes{"ShapeService", "DeleteShapes", Role::kWriter, CallClass::kOrdinary};
+inline constexpr Operation kUpdateMetadata{"ShapeService", "UpdateMetadata", Role::kWriter,
+                                           CallClass::kOrdinary};
+inline constexpr Operation kRetryShapes{"ShapeService", "RetryShapes", Role::kWriter, CallClass::kOrdinary};
 inline constexpr Operation kWatchIngest{"ShapeService", "WatchIngest", Role::kReader, CallClass::kOrdinary};
 inline constexpr Operation kGetSignature{"ShapeService", "GetSignature", Role::kReader, CallClass::kOrdinary};
 inline constexpr Operation kGetSegments{"ShapeService", "GetSegments", Role::kReader, CallClass::kOrdinary};
@@ -61,6 +68,11 @@ inline constexpr Operation kListCollections{"CollectionService", "ListCollection
                                             CallClass::kOrdinary};
 inline constexpr Operation kDeleteCollection{"CollectionService", "DeleteCollection", Role::kAdmin,
                                              CallClass::kOrdinary};
+inline constexpr Operation kRenameCollection{"CollectionService", "RenameCollection", Role::kAdmin,
+                                             CallClass::kOrdinary};
+inline constexpr Operation kSetAlias{"CollectionService", "SetAlias", Role::kAdmin, CallClass::kOrdinary};
+inline constexpr Operation kDeleteAlias{"CollectionService", "DeleteAlias", Role::kAdmin,
+                                        CallClass::kOrdinary};
 
 // AdminService
 inline constexpr Operation kRebuild{"AdminService", "Rebuild", Role::kAdmin, CallClass::kAdmin};
@@ -72,11 +84,17 @@ inline constexpr Operation kStats{"AdminService", "Stats", Role::kAdmin, CallCla
 inline constexpr Operation kServerInfo{"AdminService", "ServerInfo", Role::kReader, CallClass::kAdmin};
 
 /// All of the above. A test compares it with the services in proto/.
-inline constexpr std::array<const Operation*, 26> kAll{&kAddShape,
+inline constexpr std::array<const Operation*, 35> kAll{&kAddShape,
                                                        &kGetShape,
+                                                       &kGetShapes,
+                                                       &kGetPoints,
                                                        &kListShapes,
                                                        &kCountShapes,
+                                                       &kCountByValue,
                                                        &kDeleteShape,
+                                                       &kDeleteShapes,
+                                                       &kUpdateMetadata,
+                                                       &kRetryShapes,
                                                        &kWatchIngest,
                                                        &kGetSignature,
                                                        &kGetSegments,
@@ -91,6 +109,9 @@ inline constexpr std::array<const Operation*, 26> kAll{&kAddShape,
                                                        &kGetCollection,
                                                        &kListCollections,
                                                        &kDeleteCollection,
+                                                       &kRenameCollection,
+                                                       &kSetAlias,
+                                                       &kDeleteAlias,
                                                        &kRebuild,
                                                        &kCancelRebuild,
                                                        &kBackup,
