@@ -15,7 +15,7 @@ class PutRules : public ::testing::Test {
     PutRules() : request(putRequest(1, "cup", taggedPoints(1.0f), {{"colour", "red"}})) {
         existing.version = 3;
         existing.checksum = request.scan.checksum();
-        existing.metadata = request.metadata;
+        existing.metadata = request.metadata.set;
     }
 
     Result<PutOutcome> onFreeKey() { return decidePut(request, "parts", nullptr); }
@@ -39,7 +39,7 @@ TEST_F(PutRules, PointsWeighMoreThanMetadata) {
     EXPECT_EQ(onTakenKey().value(), PutOutcome::kMetadataChanged);
     otherPoints();
     EXPECT_EQ(onTakenKey().value(), PutOutcome::kReplaced);
-    existing.metadata = request.metadata;
+    existing.metadata = request.metadata.set;
     EXPECT_EQ(onTakenKey().value(), PutOutcome::kReplaced);
 }
 
@@ -51,7 +51,7 @@ TEST_F(PutRules, InsertOnlyAcceptsARepeatedRequest) {
         "shape 'cup' already exists in collection 'parts' with other points or metadata";
     otherMetadata();
     expectError(onTakenKey().error(), ErrorCode::kAlreadyExists, taken);
-    existing.metadata = request.metadata;
+    existing.metadata = request.metadata.set;
     otherPoints();
     expectError(onTakenKey().error(), ErrorCode::kAlreadyExists, taken);
 }
