@@ -51,9 +51,10 @@ bool verifiedRanksBefore(const VerifiedHit& a, const VerifiedHit& b) {
 
 class Verifier {
   public:
-    Verifier(FitQuery query, const QueryTraits& traits, const SearchOptions& options,
+    Verifier(FitQuery query, const QueryTraits& traits, const SignatureSet& set, const SearchOptions& options,
              const SurfaceOf& surfaceOf, const RunContext& context)
         : query_(std::move(query)),
+          set_(set),
           share_(misfitShare(traits, options.score)),
           options_(options),
           surfaceOf_(surfaceOf),
@@ -90,7 +91,13 @@ class Verifier {
         const auto end = std::find_if(hits_.begin(), hits_.end(),
                                       [&](const VerifiedHit& hit) { return hit.score < options_.threshold; });
         hits_.erase(end, hits_.end());
-        if (hits_.size() > options_.k) hits_.resize(options_.k);
+        if (options_.grouping) {
+            const auto group = [&](const VerifiedHit& hit) { return groupOfHit(hit); };
+            keepBestOfGroups(hits_, options_.k, options_.grouping->perGroup, group);
+            bringGroupsTogether(hits_, group);
+        } else if (hits_.size() > options_.k) {
+            hits_.resize(options_.k);
+        }
         RETURN_IF_ERROR(settleHands());
         result.hits = std::move(hits_);
         return result;
@@ -111,9 +118,22 @@ class Verifier {
     bool reachable(double signatureScore, std::size_t done) const {
         const double best = scoreOf(signatureScore, 0.0);
         if (best < options_.threshold) return false;
-        const auto better = std::count_if(hits_.begin(), hits_.begin() + static_cast<std::ptrdiff_t>(done),
-                                          [&](const VerifiedHit& hit) { return hit.score > best; });
-        return static_cast<std::size_t>(better) < options_.k;
+        const auto end = hits_.begin() + static_cast<std::ptrdiff_t>(done);
+        const auto isBetter = [&](const VerifiedHit& hit) { return hit.score > best; };
+        if (!options_.grouping) {
+            return static_cast<std::size_t>(std::count_if(hits_.begin(), end, isBetter)) < options_.k;
+        }
+        // Not once k groups have all the hits they may have.
+        GroupMap<std::size_t> better;
+        std::size_t full = 0;
+        for (auto hit = hits_.begin(); hit != end; ++hit) {
+            if (isBetter(*hit) && ++better[groupOfHit(*hit)] == options_.grouping->perGroup) ++full;
+        }
+        return full < options_.k;
+    }
+
+    GroupValue groupOfHit(const VerifiedHit& hit) const {
+        return groupOf(set_, hit.id, options_.grouping->key);
     }
 
     Result<void> verify(std::size_t begin, std::size_t end) {
@@ -168,6 +188,7 @@ class Verifier {
     }
 
     const FitQuery query_;
+    const SignatureSet& set_;
     const double share_;
     const SearchOptions& options_;
     const SurfaceOf& surfaceOf_;
@@ -252,6 +273,19 @@ Result<VerifiedExplanation> explainVerified(const Signature& query, const Surfac
 
 namespace {
 
+bool candidateRanksBefore(const SearchHit& a, const SearchHit& b) {
+    return a.score != b.score ? a.score > b.score : a.id < b.id;
+}
+
+// Groups among the hits; without groups each hit is one.
+std::size_t groupCount(const std::vector<SearchHit>& hits, const SignatureSet& set,
+                       const SearchOptions& options) {
+    if (!options.grouping) return hits.size();
+    GroupMap<bool> groups;
+    for (const SearchHit& hit : hits) groups[groupOf(set, hit.id, options.grouping->key)] = true;
+    return groups.size();
+}
+
 // Those that views rank first before the others, after a few that signatures rank first.
 Result<std::vector<SearchHit>> withViewsFirst(const SearchResult& found, const SurfacePoints& surface,
                                               const SignatureSet& set, const SearchOptions& options,
@@ -308,14 +342,15 @@ Result<VerifiedResult> topKVerified(const Signature& query, const SurfacePoints&
         wide.threshold = 0.0;
         auto found = topK(query, set, wide, context);
         RETURN_IF_ERROR(found);
-        const bool all = found->hits.size() < wide.k;
+        const bool all = groupCount(found->hits, set, options) < wide.k;
+        if (options.grouping) std::sort(found->hits.begin(), found->hits.end(), candidateRanksBefore);
         if (traits->ofOneSide) {
             auto ordered = withViewsFirst(*found, surface, set, options, verify, most, context);
             RETURN_IF_ERROR(ordered);
             found->hits = std::move(*ordered);
         }
-        auto result =
-            Verifier(FitQuery(surface), *traits, options, surfaceOf, context).run(found->hits, most, all);
+        auto result = Verifier(FitQuery(surface), *traits, set, options, surfaceOf, context)
+                          .run(found->hits, most, all);
         RETURN_IF_ERROR(result);
         result->counts = found->counts;
         result->scorer = std::move(found->scorer);
