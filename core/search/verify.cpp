@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <new>
+#include <unordered_set>
 #include <utility>
 
 #include "core/base/parallel.h"
@@ -273,19 +274,6 @@ Result<VerifiedExplanation> explainVerified(const Signature& query, const Surfac
 
 namespace {
 
-bool candidateRanksBefore(const SearchHit& a, const SearchHit& b) {
-    return a.score != b.score ? a.score > b.score : a.id < b.id;
-}
-
-// Groups among the hits; without groups each hit is one.
-std::size_t groupCount(const std::vector<SearchHit>& hits, const SignatureSet& set,
-                       const SearchOptions& options) {
-    if (!options.grouping) return hits.size();
-    GroupMap<bool> groups;
-    for (const SearchHit& hit : hits) groups[groupOf(set, hit.id, options.grouping->key)] = true;
-    return groups.size();
-}
-
 // Those that views rank first before the others, after a few that signatures rank first.
 Result<std::vector<SearchHit>> withViewsFirst(const SearchResult& found, const SurfacePoints& surface,
                                               const SignatureSet& set, const SearchOptions& options,
@@ -322,6 +310,28 @@ Result<std::vector<SearchHit>> withViewsFirst(const SearchResult& found, const S
     return order;
 }
 
+// Of candidates in groups half are the first of `order`, whatever their groups, and half the first of
+// `ofGroups`: so the best shape of a group is found though another has the better signature, and many shapes
+// of one group do not keep the others from being verified.
+std::vector<SearchHit> withGroups(const std::vector<SearchHit>& order, std::vector<SearchHit> ofGroups,
+                                  std::size_t most) {
+    std::sort(ofGroups.begin(), ofGroups.end(), [](const SearchHit& a, const SearchHit& b) {
+        return a.score != b.score ? a.score > b.score : a.id < b.id;
+    });
+    std::vector<SearchHit> mixed;
+    std::unordered_set<std::int64_t> taken;
+    const auto take = [&](const std::vector<SearchHit>& from, std::size_t size) {
+        for (auto hit = from.begin(); hit != from.end() && mixed.size() < size; ++hit) {
+            if (taken.insert(hit->id).second) mixed.push_back(*hit);
+        }
+    };
+    take(order, most / 2);
+    take(ofGroups, most);
+    take(order, order.size() + ofGroups.size());
+    take(ofGroups, order.size() + ofGroups.size());
+    return mixed;
+}
+
 }  // namespace
 
 Result<VerifiedResult> topKVerified(const Signature& query, const SurfacePoints& surface,
@@ -340,14 +350,20 @@ Result<VerifiedResult> topKVerified(const Signature& query, const SurfacePoints&
         wide.k = std::max(options.k, most + 1);
         // Candidates below the threshold may reach it by fitting well.
         wide.threshold = 0.0;
+        wide.grouping.reset();
         auto found = topK(query, set, wide, context);
         RETURN_IF_ERROR(found);
-        const bool all = groupCount(found->hits, set, options) < wide.k;
-        if (options.grouping) std::sort(found->hits.begin(), found->hits.end(), candidateRanksBefore);
+        const bool all = found->hits.size() < wide.k;
         if (traits->ofOneSide) {
             auto ordered = withViewsFirst(*found, surface, set, options, verify, most, context);
             RETURN_IF_ERROR(ordered);
             found->hits = std::move(*ordered);
+        }
+        if (options.grouping) {
+            wide.grouping = options.grouping;
+            const auto ofGroups = topK(*found->scorer, set, wide, context);
+            RETURN_IF_ERROR(ofGroups);
+            found->hits = withGroups(found->hits, ofGroups->hits, most);
         }
         auto result = Verifier(FitQuery(surface), *traits, set, options, surfaceOf, context)
                           .run(found->hits, most, all);

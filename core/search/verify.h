@@ -53,8 +53,7 @@ struct VerifiedResult {
     std::vector<VerifiedHit> hits;  ///< in the order of SearchResult::hits
     std::size_t verified = 0;       ///< candidates that were laid on the query
     double misfitShare = 0.0;       ///< weight of the misfit in the scores; 0 of an unverified search
-    /// Whether verifying more candidates could change no hit. With groups, of which the signatures choose the
-    /// candidates, that is: of other groups.
+    /// Whether verifying more candidates could change no hit.
     bool exact = false;
     SearchCounts counts;   ///< of the search for candidates
     double seconds = 0.0;  ///< taken, by both
@@ -122,11 +121,10 @@ void addFit(const FitResult& fit, double share, Explanation& explanation);
     const Signature& query, const SurfacePoints* querySurface, const Signature& other,
     const SurfacePoints* otherSurface, const ScoreOptions& options, const RunContext& context = {});
 
-/// The `options.k` best scores of a snapshot, verified. With groups the candidates are the best shapes of
-/// each by signature, as many as a group may have hits, and besides them those that views rank first: thus
-/// many shapes of one group do not keep the others from being verified. Uses the threads of the caller's
-/// oneTBB arena; their number does not change a bit. Reports progress as stages "search", "views" and
-/// "verify".
+/// The `options.k` best scores of a snapshot, verified. With groups half of the candidates are the best of
+/// each group by signature, so that many shapes of one group do not keep the others from being verified. Uses
+/// the threads of the caller's oneTBB arena; their number does not change a bit. Reports progress as stages
+/// "search", "views" and "verify".
 ///
 /// Errors: those of topK and of `surfaceOf`; kCancelled, kDeadlineExceeded, kOutOfMemory.
 [[nodiscard]] Result<VerifiedResult> topKVerified(const Signature& query, const SurfacePoints& surface,
