@@ -124,6 +124,17 @@ std::vector<std::int64_t> idsOf(const std::vector<store::Shape>& shapes) {
     return ids;
 }
 
+/// What a shape with the metadata `before` has afterwards, if no points are sent.
+Metadata changed(const Metadata& before, const store::MetadataChange& change) {
+    Metadata after = change.of(before);
+    const std::string ofPoints = kMetadataOfPoints;
+    for (auto entry = before.lower_bound(ofPoints);
+         change.replaceAll && entry != before.end() && entry->first.rfind(ofPoints, 0) == 0; ++entry) {
+        after.insert(*entry);  // unless it is set
+    }
+    return after;
+}
+
 }  // namespace
 
 Result<BulkDeletion> deleteShapes(Catalog& catalog, const index::Snapshot& collection,
@@ -204,7 +215,7 @@ Result<BulkMetadata> changeMetadata(Catalog& catalog, const index::Snapshot& col
         BulkMetadata counts;
         const auto after = [&](const store::Shape& shape) -> std::optional<Metadata> {
             if (!change.isMeant(shape)) return std::nullopt;
-            Metadata metadata = wanted.of(shape.metadata);
+            Metadata metadata = changed(shape.metadata, wanted);
             if (const auto checked = checkMetadata(metadata); !checked) {
                 if (counts.refused++ == 0) {
                     counts.firstRefusedKey = shape.key;
@@ -215,9 +226,9 @@ Result<BulkMetadata> changeMetadata(Catalog& catalog, const index::Snapshot& col
             if (metadata == shape.metadata) ++counts.unchanged;
             return metadata;
         };
-        const auto changed = catalog.changeMetadata(change.epoch(), idsOf(batch), after);
-        RETURN_IF_ERROR(changed);
-        result.changed += changed->size();
+        const auto done = catalog.changeMetadata(change.epoch(), idsOf(batch), after);
+        RETURN_IF_ERROR(done);
+        result.changed += done->size();
         result.unchanged += counts.unchanged;
         result.refused += counts.refused;
         if (counts.firstRefused && !result.firstRefused) {
@@ -242,18 +253,18 @@ Result<ChangedShape> changeMetadataOf(Catalog& catalog, const index::SnapshotPtr
     Result<void> allowed;
     const auto after = [&](const store::Shape& shape) -> std::optional<Metadata> {
         seen = shape;
-        Metadata metadata = change.of(shape.metadata);
+        Metadata metadata = changed(shape.metadata, change);
         const bool repeated = metadata == shape.metadata && expectedVersion == shape.version - 1;
         if (!repeated) allowed = store::requireVersion(key, shape.version, expectedVersion);
         if (allowed) allowed = checkMetadata(metadata);
         return allowed ? std::optional<Metadata>(std::move(metadata)) : std::nullopt;
     };
-    auto changed = catalog.changeMetadata(epoch, {found->shape.id}, after);
-    RETURN_IF_ERROR(changed);
+    auto done = catalog.changeMetadata(epoch, {found->shape.id}, after);
+    RETURN_IF_ERROR(done);
     RETURN_IF_ERROR(allowed);
     if (!seen) return fail(store::noSuchShape(collection->collection.name, key));  // deleted meanwhile
-    if (changed->empty()) return ChangedShape{false, std::move(*seen)};
-    return ChangedShape{true, std::move(changed->front())};
+    if (done->empty()) return ChangedShape{false, std::move(*seen)};
+    return ChangedShape{true, std::move(done->front())};
 }
 
 }  // namespace shapedb::catalog

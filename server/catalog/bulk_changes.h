@@ -52,7 +52,8 @@ struct BulkMetadata {
     std::string firstRefusedKey;
     std::optional<Error> firstRefused;
 };
-/// Of all shapes that pass the filter. Errors: kInvalidArgument (the change).
+/// Of all shapes that pass the filter. A change that replaces all leaves keys that begin with
+/// kMetadataOfPoints. Errors: kInvalidArgument (the change).
 [[nodiscard]] Result<BulkMetadata> changeMetadata(Catalog& catalog, const index::Snapshot& collection,
                                                   const std::string& filter,
                                                   const store::MetadataChange& change,

@@ -201,6 +201,19 @@ TEST_F(BulkChanges, MergesRemovesAndReplacesMetadata) {
     EXPECT_EQ(catalog->findShape(snapshot(), "a")->shape.state, store::ShapeState::kReady);
 }
 
+TEST_F(BulkChanges, ReplacingAllLeavesWhatDescribesThePoints) {
+    put("a", 1.0f, {{"label", "cup"}, {"shapedb.offset", "1 2 3"}, {"shapedc", "x"}});
+    const MetadataChange all{{{"x", "y"}}, {}, true};
+    ASSERT_TRUE(changeMetadata(*catalog, *snapshot(), "", all, {}));
+    EXPECT_EQ(searchedMetadata("a"), (Metadata{{"x", "y"}, {"shapedb.offset", "1 2 3"}}));
+    ASSERT_TRUE(changeMetadataOf(*catalog, snapshot(), "a", {{}, {}, true}, {}));
+    EXPECT_EQ(searchedMetadata("a"), (Metadata{{"shapedb.offset", "1 2 3"}}));
+    ASSERT_TRUE(changeMetadataOf(*catalog, snapshot(), "a", {{{"shapedb.offset", "0 0 0"}}, {}, true}, {}));
+    EXPECT_EQ(searchedMetadata("a"), (Metadata{{"shapedb.offset", "0 0 0"}}));
+    ASSERT_TRUE(changeMetadataOf(*catalog, snapshot(), "a", {{}, {"shapedb.offset"}, false}, {}));
+    EXPECT_EQ(searchedMetadata("a"), Metadata());
+}
+
 TEST_F(BulkChanges, OneFullShapeDoesNotKeepTheOthersFromChanging) {
     Metadata full;
     for (std::size_t i = 0; i < kMaxMetadataEntries; ++i) full["m" + std::to_string(i)] = "v";
