@@ -252,6 +252,9 @@ CommandResult runCount(Session& session, const ListFlags& flags) {
     if (flags.by.empty() && flags.limit) {
         return fail(ErrorCode::kInvalidArgument, "--limit is for --by: how many values to show");
     }
+    if (!flags.by.empty() && !flags.request.keyPrefix.empty()) {
+        return fail(ErrorCode::kInvalidArgument, "--prefix and --by exclude each other; use --filter");
+    }
     const auto client = connectToServer(session);
     RETURN_IF_ERROR(client);
     if (!flags.by.empty()) return countValues(session, *client, flags);
@@ -288,6 +291,7 @@ std::shared_ptr<ListFlags> addListCommand(CLI::App& app, Session& session, const
                         "Only shapes with such metadata, e.g. 'label=cup'");
     command->add_option("--state", flags->state, "Only shapes in this state")
         ->check(CLI::IsMember({"pending", "ready", "failed"}));
+    command->add_option("--prefix", flags->request.keyPrefix, "Only shapes whose key begins with this");
     command->callback([&session, flags, runner] {
         session.action = [&session, flags, runner] { return runner(session, *flags); };
     });
@@ -312,8 +316,6 @@ void addShapeCommands(CLI::App& app, Session& session) {
         ->check(aboveZero());
     app.get_subcommand("list")->add_option("--cursor", list->request.cursor,
                                            "Continue an earlier list --limit");
-    app.get_subcommand("list")->add_option("--prefix", list->request.keyPrefix,
-                                           "Only shapes whose key begins with this");
     app.get_subcommand("list")
         ->add_option("--order", list->order,
                      "Order: id, key or updated (time of change), with a '-' before it the reverse "

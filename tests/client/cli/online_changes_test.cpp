@@ -158,6 +158,8 @@ TEST_F(OnlineChanges, ListsInEveryOrder) {
                                                 "human/human_02", "mug/mug_01", "mug/mug_02"}));
     EXPECT_EQ(listed({"--order", "-key", "--limit", "2"}), (Keys{"mug/mug_02", "mug/mug_01"}));
     EXPECT_EQ(listed({"--prefix", "human/"}), (Keys{"human/human_01", "human/human_02"}));
+    EXPECT_EQ(in({"count", "--prefix", "human/"})["count"], 2);
+    EXPECT_EQ(in({"count", "--prefix", "human/", "--by", "label"}, 2)["error"]["name"], "invalid_argument");
     EXPECT_EQ(listed({"--prefix", "human/", "--order", "-id"}), (Keys{"human/human_02", "human/human_01"}));
     in({"metadata", "human/human_01", "--set", "seen=yes"});
     EXPECT_EQ(listed({"--order", "-updated", "--limit", "1"}), Keys{"human/human_01"});
