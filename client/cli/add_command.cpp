@@ -303,7 +303,7 @@ CommandResult runAdd(Session& session, const AddFlags& flags) {
     auto uploads = listUploads(flags);
     RETURN_IF_ERROR(uploads);
     if (flags.each) {
-        uploads = oneForEachObject(std::move(*uploads), flags, session.context());
+        uploads = oneForEachObject(*uploads, flags, session.context());
         RETURN_IF_ERROR(uploads);
     }
     RETURN_IF_ERROR(checkKeys(*uploads));
