@@ -14,7 +14,7 @@ build_packages=(
   libsqlite3-dev libzstd-dev libssl-dev libspdlog-dev libtomlplusplus-dev
   libcli11-dev nlohmann-json3-dev libpng-dev liblzf-dev zlib1g-dev
   libgtest-dev libgmock-dev clang-format-14 valgrind
-  python3-grpcio python3-protobuf
+  python3-grpcio python3-protobuf openssl
 )
 runtime_packages=(
   ca-certificates libgmpxx4ldbl libmpfr6 libtbb12 libgrpc++1.51 libprotobuf32 libsqlite3-0

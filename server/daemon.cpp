@@ -12,7 +12,11 @@
 #include "server/files/data_directory.h"
 #include "server/ingest/crash_marker.h"
 #include "server/rpc/grpc_server.h"
+#include "server/security/authorization.h"
+#include "server/security/usage_saver.h"
+#include "server/store/sqlite/sqlite_key_store.h"
 #include "server/store/sqlite/sqlite_store.h"
+#include "server/telemetry/audit_log.h"
 
 namespace shapedb {
 namespace {
@@ -20,6 +24,7 @@ namespace {
 constexpr const char* kTemporaryFolder = "tmp";
 constexpr const char* kRebuildJournal = "rebuild.journal";
 constexpr const char* kCrashMarker = "crash.marker";
+constexpr const char* kAuditFile = "audit.log";
 
 Result<std::unique_ptr<store::Store>> openStore(const config::ServerConfig& config) {
     RETURN_IF_ERROR(files::prepareDataDirectory(config.data));
@@ -28,6 +33,22 @@ Result<std::unique_ptr<store::Store>> openStore(const config::ServerConfig& conf
     options.readers = config.store.readers;
     options.pointCompressionLevel = config.store.compressionLevel;
     return store::openSqliteStore(options);
+}
+
+Result<telemetry::LoggerPtr> openAudit(const config::ServerConfig& config) {
+    const std::string& file = config.security.auditFile;
+    return telemetry::AuditLog::openFile(file.empty() ? config.data + "/" + kAuditFile : file);
+}
+
+/// Errors: kRejected (keys are required and there is none).
+Result<std::unique_ptr<security::Keyring>> openKeys(const config::ServerConfig& config) {
+    auto keyring = openKeyring(config.data);
+    RETURN_IF_ERROR(keyring);
+    if (!config::keysRequired(config) || (*keyring)->hasUsableKey()) return keyring;
+    return fail(ErrorCode::kRejected,
+                "this server wants API keys, and there is none that can be used: make the first one with "
+                "'shapedbd key create --data " +
+                    config.data + " --role admin --name NAME'");
 }
 
 catalog::CatalogOptions catalogOptions(const config::ServerConfig& config,
@@ -48,18 +69,32 @@ catalog::CatalogOptions catalogOptions(const config::ServerConfig& config,
 
 }  // namespace
 
+Result<std::unique_ptr<security::Keyring>> openKeyring(const std::string& dataDirectory) {
+    RETURN_IF_ERROR(files::prepareDataDirectory(dataDirectory));
+    auto store = store::openSqliteKeyStore(dataDirectory + "/" + files::kKeysName);
+    RETURN_IF_ERROR(store);
+    auto keyring = std::make_unique<security::Keyring>(std::move(*store));
+    RETURN_IF_ERROR(keyring->load());
+    return keyring;
+}
+
 /// In order of construction; destroyed in reverse.
 struct Daemon::Parts {
     Parts(const config::ServerConfig& configuration, telemetry::LoggerPtr logger,
           ingest::SignaturePipeline pipeline, std::unique_ptr<store::Store> store,
-          const std::vector<store::Crash>& crashes)
+          const std::vector<store::Crash>& crashes, std::unique_ptr<security::Keyring> keys,
+          telemetry::LoggerPtr auditLogger)
         : config(configuration),
           log(std::move(logger)),
+          audit(std::move(auditLogger)),
+          keyring(std::move(keys)),
+          usageSaver(*keyring, log),
+          access{*keyring, config::keysRequired(config)},
           catalog(std::move(store), std::move(pipeline), log, catalogOptions(config, crashes)),
           admission(config.limits.maxUploadBytes, config.limits.maxUploads),
           runner(config::threadsOrProcessors(config.search.threads)),
           searches(catalog, runner, config.limits.maxK),
-          grpc(config, catalog, admission, searches, log, temporaryDirectory()) {}
+          grpc({config, catalog, admission, searches, access, audit, log, temporaryDirectory()}) {}
 
     std::string temporaryDirectory() const { return config.data + "/" + kTemporaryFolder; }
     Result<void> serve();
@@ -67,6 +102,10 @@ struct Daemon::Parts {
 
     const config::ServerConfig config;
     telemetry::LoggerPtr log;
+    telemetry::AuditLog audit;
+    const std::unique_ptr<security::Keyring> keyring;
+    security::UsageSaver usageSaver;
+    const security::AccessPolicy access;
     catalog::Catalog catalog;
     catalog::Admission admission;
     catalog::SearchRunner runner;
@@ -78,9 +117,7 @@ struct Daemon::Parts {
 Result<void> Daemon::Parts::serve() {
     RETURN_IF_ERROR(files::prepareTemporaryDirectory(temporaryDirectory()));
     RETURN_IF_ERROR(catalog.start());
-    const auto wanted = config::parseEndpoint(config.listen);
-    RETURN_IF_ERROR(wanted);
-    return grpc.listen(*wanted);
+    return grpc.listen();
 }
 
 Result<void> Daemon::Parts::drain() {
@@ -112,8 +149,12 @@ Result<std::unique_ptr<Daemon>> Daemon::start(const config::ServerConfig& config
     for (const store::Crash& crash : *crashes) {
         log->error("the last process crashed while it segmented a scan", {{"shape", crash.shapeId}});
     }
-    auto parts =
-        std::make_unique<Parts>(config, std::move(log), std::move(pipeline), std::move(*opened), *crashes);
+    auto keys = openKeys(config);
+    RETURN_IF_ERROR(keys);
+    auto audit = openAudit(config);
+    RETURN_IF_ERROR(audit);
+    auto parts = std::make_unique<Parts>(config, std::move(log), std::move(pipeline), std::move(*opened),
+                                         *crashes, std::move(*keys), std::move(*audit));
     std::unique_ptr<Daemon> daemon(new Daemon(std::move(parts)));
     RETURN_IF_ERROR(daemon->parts_->serve());
     return daemon;

@@ -7,15 +7,21 @@
 #include "core/base/error.h"
 #include "server/config/server_config.h"
 #include "server/ingest/signature_pipeline.h"
+#include "server/security/keyring.h"
 #include "server/telemetry/logger.h"
 
 namespace shapedb {
+
+/// The API keys of the server with this data directory, which may be running. Errors: kFileNotWritable (data
+/// directory), those of store::openSqliteKeyStore.
+[[nodiscard]] Result<std::unique_ptr<security::Keyring>> openKeyring(const std::string& dataDirectory);
 
 /// Not thread-safe: one thread starts and drains it.
 class Daemon {
   public:
     /// Returns once it serves. Errors: kFileNotWritable (data directory), those of
-    /// store::openSqliteStore, kUnavailable (cannot listen on the address).
+    /// store::openSqliteStore and openKeyring, kRejected (API keys are required and there is none), those of
+    /// GrpcServer::listen.
     [[nodiscard]] static Result<std::unique_ptr<Daemon>> start(const config::ServerConfig& config,
                                                                telemetry::LoggerPtr log,
                                                                ingest::SignaturePipeline pipeline);

@@ -1,12 +1,13 @@
 // shapedbd: reads the configuration, serves until SIGTERM or SIGINT, shuts down cleanly.
 //
-// Prints one line to standard output, `listening on HOST:PORT`; everything else is logged.
-// Exit codes: 0 success, 1 could not start or not shut down cleanly, 2 wrong configuration, 130
-// stopped at once by a second signal.
+// Prints one line to standard output, `listening on HOST:PORT`; everything else is logged. `shapedbd key`
+// makes, lists and revokes API keys instead. Exit codes: 0 success, 1 could not start or not shut down
+// cleanly, 2 wrong configuration, 130 stopped at once by a second signal.
 
 #include <algorithm>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <string>
 
@@ -16,6 +17,7 @@
 #include "server/config/load.h"
 #include "server/config/settings.h"
 #include "server/daemon.h"
+#include "server/key_command.h"
 #include "server/telemetry/logger.h"
 
 namespace {
@@ -50,11 +52,9 @@ int serve(const config::ServerConfig& config) {
         return kCannotServe;
     }
     const config::Endpoint& endpoint = (*daemon)->endpoint();
-    if (!endpoint.isLoopback()) {
-        (*log)->warn(
-            "listening beyond this machine without transport security: anyone who can reach the "
-            "port can read, change and delete everything",
-            {{"address", endpoint.text()}});
+    if (!endpoint.isLoopback() && !config::keysRequired(config)) {
+        (*log)->warn("anyone who can reach this port can read, change and delete everything, as configured",
+                     {{"address", endpoint.text()}});
     }
     (*log)->info("listening", {{"address", endpoint.text()}});
     std::printf("listening on %s\n", endpoint.text().c_str());
@@ -70,6 +70,7 @@ int serve(const config::ServerConfig& config) {
 }
 
 int run(int argc, char** argv) {
+    if (argc > 1 && std::string(argv[1]) == "key") return runKeyCommand(argc - 1, argv + 1);
     // The exit code is the answer of a check: 0, or 1 also for a mistake in the flags.
     const bool checking = std::any_of(argv, argv + argc,
                                       [](const char* flag) { return std::string(flag) == "--check-config"; });
@@ -95,6 +96,8 @@ int main(int argc, char** argv) {
     // Beyond a limit of file sizes, writing fails with EFBIG, which is reported; the signal would end the
     // process.
     std::signal(SIGXFSZ, SIG_IGN);
+    // What gRPC would write to standard error is about strangers who break the protocol, and without end.
+    setenv("GRPC_VERBOSITY", "NONE", 0);
     try {
         return run(argc, argv);
     } catch (const std::exception& error) {

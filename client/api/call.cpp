@@ -89,6 +89,7 @@ Result<void> makeCallUnguarded(const ClientOptions& options, const RunContext& c
     while (true) {
         grpc::ClientContext rpc;
         setDeadline(rpc, deadline);
+        if (!options.apiKey.empty()) rpc.AddMetadata("authorization", "Bearer " + options.apiKey);
         Result<void> local;
         grpc::Status status;
         {
@@ -102,7 +103,8 @@ Result<void> makeCallUnguarded(const ClientOptions& options, const RunContext& c
             !proceed && proceed.error().code == ErrorCode::kCancelled) {
             return fail(proceed.error());
         }
-        const Error error = errorOf(status, rpc.GetServerTrailingMetadata(), options.address);
+        const Error error = errorOf(status, rpc.GetServerTrailingMetadata(),
+                                    options.address + (options.tls.enabled ? " with TLS" : ""));
         if (!traits.idempotent) return fail(error);
         const AttemptFailure failure = failureOf(status, rpc.GetServerTrailingMetadata(), error);
         inARow = failure.code == reason ? inARow + 1 : 1;

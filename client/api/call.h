@@ -21,7 +21,7 @@
 namespace shapedb::client {
 
 struct Client::Impl {
-    ClientOptions options;  ///< the address includes the port
+    ClientOptions options;  ///< the address includes the port, apiKey what its file holds
     std::shared_ptr<grpc::Channel> channel;
     std::unique_ptr<v1::ShapeService::Stub> shapes;
     std::unique_ptr<v1::SearchService::Stub> search;

@@ -6,6 +6,7 @@
 #include <grpcpp/grpcpp.h>
 
 #include "client/api/call.h"
+#include "client/api/credentials.h"
 #include "client/api/retry.h"
 #include "core/base/return_if_error.h"
 
@@ -71,9 +72,14 @@ Result<Client> Client::connect(ClientOptions options) {
     try {
         auto impl = std::make_unique<Impl>();
         options.address = withDefaultPort(options.address);
+        auto key = apiKeyOf(options);
+        RETURN_IF_ERROR(key);
+        options.apiKey = std::move(*key);
+        grpc::ChannelArguments arguments = channelArguments();
+        const auto credentials = channelCredentials(options.tls, arguments);
+        RETURN_IF_ERROR(credentials);
         impl->options = std::move(options);
-        impl->channel = grpc::CreateCustomChannel(impl->options.address, grpc::InsecureChannelCredentials(),
-                                                  channelArguments());
+        impl->channel = grpc::CreateCustomChannel(impl->options.address, *credentials, arguments);
         impl->shapes = v1::ShapeService::NewStub(impl->channel);
         impl->search = v1::SearchService::NewStub(impl->channel);
         impl->align = v1::AlignService::NewStub(impl->channel);

@@ -37,9 +37,26 @@ struct RetryPolicy {
     double jitter = 0.2;  ///< [0, 1]
 };
 
+/// Transport security. The files are PEM and read once, by Client::connect.
+struct TlsOptions {
+    bool enabled = false;
+    /// Who signs the server's certificate; empty: whom this machine trusts.
+    std::string caFile;
+    /// For servers that ask clients for a certificate: both or neither.
+    std::string certificateFile;
+    std::string keyFile;
+    /// The name that the server's certificate must have; empty: the host of the address.
+    std::string serverName;
+};
+
 struct ClientOptions {
     /// HOST, HOST:PORT, [IPV6]:PORT, or any name that gRPC understands ("unix:/run/shapedb.sock").
     std::string address = "127.0.0.1:7878";
+    TlsOptions tls{};
+    /// Sent with every call, but never unprotected beyond this machine. Empty: what `apiKeyFile` holds.
+    std::string apiKey{};
+    /// A file with the key in its first line; empty: no key.
+    std::string apiKeyFile{};
     /// The most one call may take, retries included; 0: no limit. Calls that follow work on the server
     /// (watchIngest, addShape with wait, rebuild, backup, restore, check) or change many shapes are limited
     /// by their RunContext alone.
@@ -47,19 +64,26 @@ struct ClientOptions {
     RetryPolicy retry{};
 };
 
+/// The defaults with what the environment says: SHAPEDB_SERVER (address), SHAPEDB_API_KEY,
+/// SHAPEDB_API_KEY_FILE, SHAPEDB_TLS ("1": enabled), SHAPEDB_TLS_CA (also enables it),
+/// SHAPEDB_CLIENT_CERTIFICATE, SHAPEDB_CLIENT_KEY. Not while another thread changes the environment.
+[[nodiscard]] ClientOptions optionsFromEnvironment();
+
 /// A connection to one server, opened when first needed and reopened when lost.
 ///
 /// Every call blocks until it is answered. A RunContext can cancel it (kCancelled, within about 20 ms) and
 /// limit its time (kDeadlineExceeded), and receives the progress of uploads and downloads in bytes.
 ///
-/// Errors of every call, not repeated below: the server's, with its name and message; kUnavailable (cannot be
-/// reached); kDeadlineExceeded; kCancelled; kOutOfMemory; kInternal. Scans are checked before they are sent:
-/// kTooFewPoints (none), kNonFiniteCoordinate, kCoordinateOutOfRange (beyond single precision).
+/// Errors of every call, not repeated below: the server's, with its name and message; kUnauthenticated and
+/// kPermissionDenied (the API key); kRateLimited; kUnavailable (cannot be reached); kDeadlineExceeded;
+/// kCancelled; kOutOfMemory; kInternal. Scans are checked before they are sent: kTooFewPoints (none),
+/// kNonFiniteCoordinate, kCoordinateOutOfRange (beyond single precision).
 ///
 /// Thread-safety: all member functions may be called from any number of threads at once.
 class Client {
   public:
-    /// Does not touch the network. Errors: kInvalidArgument naming the option and its range.
+    /// Does not touch the network. Errors: kInvalidArgument naming the option and its range, also if an API
+    /// key would be sent unprotected; kFileNotReadable (key or certificates).
     [[nodiscard]] static Result<Client> connect(ClientOptions options);
 
     ~Client();
@@ -247,6 +271,16 @@ class Client {
 
     [[nodiscard]] Result<Stats> stats(const RunContext& context = {}) const;
     [[nodiscard]] Result<ServerInfo> serverInfo(const RunContext& context = {}) const;
+
+    /// API keys take an admin key of all collections, or the server's Unix socket. Not retried: a key whose
+    /// reply was lost is in `listKeys` and can be revoked. Errors: kInvalidArgument, kUnauthenticated,
+    /// kPermissionDenied.
+    [[nodiscard]] Result<CreatedKey> createKey(const KeyRequest& request,
+                                               const RunContext& context = {}) const;
+    /// The oldest first, those that were revoked or have expired included.
+    [[nodiscard]] Result<std::vector<Key>> listKeys(const RunContext& context = {}) const;
+    /// Errors: kNotFound (no such key, or it was revoked before).
+    [[nodiscard]] Result<Key> revokeKey(const std::string& id, const RunContext& context = {}) const;
 
     /// State of one service by its full name ("shapedb.v1.SearchService"), or of the whole server if empty.
     /// Not retried. Errors: kNotFound.

@@ -6,11 +6,6 @@ namespace shapedb::client {
 
 namespace {
 
-Timestamp fromWire(const google::protobuf::Timestamp& from) {
-    return Timestamp(std::chrono::duration_cast<Timestamp::duration>(std::chrono::seconds(from.seconds()) +
-                                                                     std::chrono::nanoseconds(from.nanos())));
-}
-
 ShapeState fromWire(v1::ShapeState from) {
     switch (from) {
         case v1::SHAPE_STATE_READY: return ShapeState::kReady;
@@ -36,6 +31,20 @@ Motion fromWire(const v1::Motion& from) {
 }  // namespace
 
 Error fromWire(const v1::Failure& from) { return {errorCodeFromName(from.error()), from.message()}; }
+
+Timestamp fromWire(const google::protobuf::Timestamp& from) {
+    return Timestamp(std::chrono::duration_cast<Timestamp::duration>(std::chrono::seconds(from.seconds()) +
+                                                                     std::chrono::nanoseconds(from.nanos())));
+}
+
+google::protobuf::Timestamp toWire(Timestamp from) {
+    const auto since = from.time_since_epoch();
+    const auto seconds = std::chrono::floor<std::chrono::seconds>(since);
+    google::protobuf::Timestamp to;
+    to.set_seconds(seconds.count());
+    to.set_nanos(static_cast<std::int32_t>(std::chrono::nanoseconds(since - seconds).count()));
+    return to;
+}
 
 const char* stateName(ShapeState state) noexcept {
     switch (state) {

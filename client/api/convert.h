@@ -46,6 +46,8 @@ void fillParameters(const Parameters& from, Message* to) {
 void fill(const MetadataChange& from, v1::MetadataChange* to);
 void fill(const ShapeSelection& from, v1::ShapeSelection* to);
 
+[[nodiscard]] Timestamp fromWire(const google::protobuf::Timestamp& from);
+[[nodiscard]] google::protobuf::Timestamp toWire(Timestamp from);
 [[nodiscard]] Shape fromWire(const v1::Shape& from);
 [[nodiscard]] Error fromWire(const v1::Failure& from);
 [[nodiscard]] AddOutcome fromWire(v1::AddShapeResponse::Outcome from);

@@ -18,9 +18,9 @@ ErrorCode codeOf(grpc::StatusCode code) {
         case grpc::StatusCode::ALREADY_EXISTS: return ErrorCode::kAlreadyExists;
         case grpc::StatusCode::ABORTED: return ErrorCode::kVersionConflict;
         case grpc::StatusCode::FAILED_PRECONDITION:
-        case grpc::StatusCode::PERMISSION_DENIED:
-        case grpc::StatusCode::UNAUTHENTICATED:
         case grpc::StatusCode::UNIMPLEMENTED: return ErrorCode::kRejected;
+        case grpc::StatusCode::PERMISSION_DENIED: return ErrorCode::kPermissionDenied;
+        case grpc::StatusCode::UNAUTHENTICATED: return ErrorCode::kUnauthenticated;
         case grpc::StatusCode::UNAVAILABLE: return ErrorCode::kUnavailable;
         case grpc::StatusCode::CANCELLED: return ErrorCode::kCancelled;
         case grpc::StatusCode::DEADLINE_EXCEEDED: return ErrorCode::kDeadlineExceeded;
@@ -37,9 +37,12 @@ Error errorOf(const grpc::Status& status, const TrailingMetadata& trailing, cons
     }
     const Error error{codeOf(status.error_code()), status.error_message()};
     switch (status.error_code()) {
-        case grpc::StatusCode::UNAVAILABLE:
-            return {error.code, "cannot reach a server at " + address + ": is shapedbd running there? (" +
-                                    error.message + ")"};
+        case grpc::StatusCode::UNAVAILABLE: {
+            // What becomes of a call without TLS to a server that wants it.
+            const bool closed = error.message.find("Socket closed") != std::string::npos;
+            return {error.code, "cannot reach a server at " + address + ": is shapedbd running there" +
+                                    (closed ? ", and does it want TLS" : "") + "? (" + error.message + ")"};
+        }
         case grpc::StatusCode::DEADLINE_EXCEEDED:
             return {error.code, "the server at " + address + " did not answer before the deadline"};
         case grpc::StatusCode::UNIMPLEMENTED:

@@ -339,6 +339,44 @@ struct ServerInfo {
     std::uint32_t ingestThreads = 0;
 };
 
+/// What an API key allows; each role includes the ones before it.
+enum class Role { kReader, kWriter, kAdmin };
+
+/// 0: without limit.
+struct KeyLimits {
+    std::uint32_t callsPerSecond = 0;
+    std::uint64_t scansPerDay = 0;
+    std::uint64_t bytesPerDay = 0;  ///< of points received
+};
+
+/// What whoever makes an API key decides.
+struct KeyRequest {
+    std::string name;  ///< whose key it is; several may share it
+    Role role = Role::kReader;
+    std::vector<std::string> collections;  ///< empty: all
+    std::optional<Timestamp> expires;      ///< empty: never
+    KeyLimits limits;
+};
+
+/// An API key without its secret.
+struct Key {
+    std::string id;
+    std::string name;
+    Role role = Role::kReader;
+    std::vector<std::string> collections;
+    KeyLimits limits;
+    Timestamp created;
+    std::optional<Timestamp> expires;
+    std::optional<Timestamp> revoked;
+    std::uint64_t scansToday = 0;
+    std::uint64_t bytesToday = 0;
+};
+
+struct CreatedKey {
+    Key key;
+    std::string secret;  ///< the whole key; the server cannot tell it again
+};
+
 /// The state of a service by grpc.health.v1.
 enum class Health { kUnknown, kServing, kNotServing };
 

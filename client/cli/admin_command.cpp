@@ -228,6 +228,7 @@ void addAdminCommands(CLI::App& app, Session& session) {
     addPlainCommand(*group, session, "check", "Read the whole database and report damage", &runCheck);
     addPlainCommand(*group, session, "stats", "Show counts and sizes", &runStats);
     addPlainCommand(*group, session, "info", "Show version and limits", &runInfo);
+    addKeyCommands(*group, session);
 }
 
 }  // namespace shapedb::cli

@@ -13,8 +13,19 @@ constexpr int kPatientAttempts = 1'000'000;
 }  // namespace
 
 Result<client::Client> connectToServer(const Session& session, Work work) {
-    client::ClientOptions options;
-    if (!session.options().server.empty()) options.address = session.options().server;
+    client::ClientOptions options = client::optionsFromEnvironment();
+    const GlobalOptions& flags = session.options();
+    const auto prefer = [](std::string& value, const std::string& flag) {
+        if (!flag.empty()) value = flag;
+    };
+    prefer(options.address, flags.server);
+    if (!flags.keyFile.empty()) options.apiKey.clear();
+    prefer(options.apiKeyFile, flags.keyFile);
+    prefer(options.tls.caFile, flags.tls.caFile);
+    prefer(options.tls.certificateFile, flags.tls.certificateFile);
+    prefer(options.tls.keyFile, flags.tls.keyFile);
+    prefer(options.tls.serverName, flags.tls.serverName);
+    options.tls.enabled = options.tls.enabled || flags.tls.enabled || !flags.tls.caFile.empty();
     if (work == Work::kHeavy) {
         options.deadline = kHeavyDeadline;
         options.retry.maxQueueAttempts = kPatientAttempts;

@@ -17,8 +17,8 @@ enum class Work {
     kHeavy,  ///< an hour: scans are sent and segmented, a full queue is waited for
 };
 
-/// A client for --server. With --timeout the session's context limits the calls instead of `work`.
-/// Errors: kInvalidArgument.
+/// A client for --server, with the API key and TLS of the flags or the environment. With --timeout the
+/// session's context limits the calls instead of `work`. Errors: kInvalidArgument.
 [[nodiscard]] Result<client::Client> connectToServer(const Session& session, Work work = Work::kLight);
 
 /// --collection; empty for the default one.

@@ -29,9 +29,12 @@ ExitCode exitCodeOf(ErrorCode code) noexcept {
         case ErrorCode::kAlreadyExists:
         case ErrorCode::kVersionConflict:
         case ErrorCode::kNotReady:
-        case ErrorCode::kRejected: return kWrongState;
+        case ErrorCode::kRejected:
+        case ErrorCode::kUnauthenticated:
+        case ErrorCode::kPermissionDenied: return kWrongState;
 
         case ErrorCode::kQueueFull:
+        case ErrorCode::kRateLimited:
         case ErrorCode::kUnavailable:
         case ErrorCode::kDeadlineExceeded: return kUnavailable;
 

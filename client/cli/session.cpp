@@ -26,6 +26,23 @@ void addGlobalOptions(CLI::App& app, GlobalOptions& options) {
         ->envname("SHAPEDB_SERVER")
         ->default_str("127.0.0.1:7878")
         ->type_name("HOST:PORT");
+    app.add_option("--key-file", options.keyFile,
+                   "File with your API key [SHAPEDB_API_KEY_FILE, SHAPEDB_API_KEY]")
+        ->type_name("FILE");
+    app.add_flag("--tls", options.tls.enabled, "Protect the connection with TLS [SHAPEDB_TLS=1]");
+    app.add_option("--tls-ca", options.tls.caFile,
+                   "Who signs the server's certificate, PEM; implies --tls [SHAPEDB_TLS_CA; whom this "
+                   "machine trusts]")
+        ->type_name("FILE");
+    app.add_option("--client-certificate", options.tls.certificateFile,
+                   "For servers that ask for one, PEM [SHAPEDB_CLIENT_CERTIFICATE]")
+        ->type_name("FILE");
+    app.add_option("--client-key", options.tls.keyFile,
+                   "The key of that certificate, PEM [SHAPEDB_CLIENT_KEY]")
+        ->type_name("FILE");
+    app.add_option("--server-name", options.tls.serverName,
+                   "The name in the server's certificate, if it is not the host of --server")
+        ->type_name("NAME");
     app.add_option("--timeout", options.timeoutSeconds,
                    "Give up after this long [a minute per call, an hour per scan, no limit for following]")
         ->check(aboveZero())

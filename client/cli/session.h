@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "client/api/client.h"
 #include "client/cli/console.h"
 #include "core/base/error.h"
 #include "core/base/run_context.h"
@@ -18,7 +19,9 @@ namespace shapedb::cli {
 
 struct GlobalOptions {
     bool json = false;
-    std::string server;                    ///< HOST:PORT
+    std::string server;   ///< HOST:PORT
+    std::string keyFile;  ///< of the API key; this and the next ones override the environment
+    client::TlsOptions tls;
     std::optional<double> timeoutSeconds;  ///< for the whole command
 };
 
@@ -62,6 +65,8 @@ void addChangeCommands(CLI::App& app, Session& session);
 void addCollectionCommands(CLI::App& app, Session& session);
 void addAdminCommands(CLI::App& app, Session& session);
 void addHealthCommand(CLI::App& app, Session& session);
+/// Below `shapedb admin`.
+void addKeyCommands(CLI::App& admin, Session& session);
 
 /// The whole program without its signal handler: reads the command line, runs the command, prints the result
 /// or the error. Never throws.

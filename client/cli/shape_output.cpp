@@ -29,15 +29,6 @@ constexpr double kElsewhere = 0.1;
 
 json pointJson(const Point3& p) { return json::array({p.x, p.y, p.z}); }
 
-std::string timeText(client::Timestamp time) {
-    const std::time_t seconds = std::chrono::system_clock::to_time_t(time);
-    std::tm parts{};
-    if (gmtime_r(&seconds, &parts) == nullptr) return {};
-    char buffer[40];
-    const std::size_t length = std::strftime(buffer, sizeof buffer, "%Y-%m-%dT%H:%M:%SZ", &parts);
-    return std::string(buffer, length);
-}
-
 /// "a", "a and b", "a, b and c".
 std::string joined(const std::vector<std::string>& words) {
     std::string text;

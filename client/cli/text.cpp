@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <ctime>
 
 #include "common/safe_text.h"
 
@@ -143,6 +144,15 @@ std::string Table::render() const {
         line([&](std::size_t c) { return c < row.size() ? row[c] : std::string(); });
     }
     return text;
+}
+
+std::string timeText(std::chrono::system_clock::time_point time) {
+    const std::time_t seconds = std::chrono::system_clock::to_time_t(time);
+    std::tm parts{};
+    if (gmtime_r(&seconds, &parts) == nullptr) return {};
+    char buffer[40];
+    const std::size_t length = std::strftime(buffer, sizeof buffer, "%Y-%m-%dT%H:%M:%SZ", &parts);
+    return std::string(buffer, length);
 }
 
 }  // namespace shapedb::cli

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -69,5 +70,8 @@ class Table {
     std::vector<Column> columns_;
     std::vector<std::vector<std::string>> rows_;
 };
+
+/// UTC, as in "2026-11-29T15:04:05Z".
+[[nodiscard]] std::string timeText(std::chrono::system_clock::time_point time);
 
 }  // namespace shapedb::cli

@@ -34,7 +34,10 @@ const char* errorCodeName(ErrorCode code) noexcept {
         case ErrorCode::kVersionConflict: return "version_conflict";
         case ErrorCode::kNotReady: return "not_ready";
         case ErrorCode::kRejected: return "rejected";
+        case ErrorCode::kUnauthenticated: return "unauthenticated";
+        case ErrorCode::kPermissionDenied: return "permission_denied";
         case ErrorCode::kQueueFull: return "queue_full";
+        case ErrorCode::kRateLimited: return "rate_limited";
         case ErrorCode::kUnavailable: return "unavailable";
         case ErrorCode::kCancelled: return "cancelled";
         case ErrorCode::kDeadlineExceeded: return "deadline_exceeded";

@@ -44,8 +44,12 @@ enum class ErrorCode {
     kVersionConflict,  ///< the expected version is not the current one
     kNotReady,         ///< the shape exists but has no signature (yet)
     kRejected,         ///< the operation makes no sense in this state; the message says which
+    // Who asks may not do it.
+    kUnauthenticated,   ///< no API key, or one that is unknown, revoked or has expired
+    kPermissionDenied,  ///< the API key does not allow this
     // The system cannot do it now.
     kQueueFull,         ///< the ingest queue is at its bound; retry later
+    kRateLimited,       ///< the API key has used up what it may use for now; retry later
     kUnavailable,       ///< shutting down, not started, or not reachable
     kCancelled,         ///< the caller asked to stop
     kDeadlineExceeded,  ///< the caller's deadline passed

@@ -73,6 +73,12 @@ Result<index::SnapshotPtr> Catalog::collection(const std::string& name) const {
     return index_.byName(collectionNameOrDefault(name));
 }
 
+std::string Catalog::nameOf(const std::string& name) const {
+    std::string own = collectionNameOrDefault(name);
+    const auto found = index_.byName(own);
+    return found ? (*found)->collection.name : own;
+}
+
 Result<std::vector<index::SnapshotPtr>> Catalog::collections() const {
     RETURN_IF_ERROR(requireContent());
     return index_.all();

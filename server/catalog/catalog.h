@@ -142,6 +142,9 @@ class Catalog {
 
     /// By its name or an alias; the default collection for an empty name. Errors: kNotFound.
     [[nodiscard]] Result<index::SnapshotPtr> collection(const std::string& name) const;
+    /// The name of the collection that `name` stands for now: itself, unless it is an alias or empty. Also of
+    /// collections that are not there.
+    [[nodiscard]] std::string nameOf(const std::string& name) const;
     /// By name.
     [[nodiscard]] Result<std::vector<index::SnapshotPtr>> collections() const;
     [[nodiscard]] Result<ShapeCounts> countShapes(const index::Snapshot& collection);

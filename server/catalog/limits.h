@@ -12,7 +12,7 @@
 namespace shapedb::catalog {
 
 // Names and text (repeated in the comments of proto/).
-constexpr std::size_t kMaxCollectionNameBytes = 128;
+using store::kMaxCollectionNameBytes;
 constexpr std::size_t kMaxDescriptionBytes = 1'024;
 using store::kMaxKeyBytes;
 constexpr std::size_t kMaxMetadataEntries = 64;

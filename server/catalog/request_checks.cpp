@@ -14,15 +14,9 @@ tl::unexpected<Error> bad(std::string message) {
     return fail(ErrorCode::kInvalidArgument, std::move(message));
 }
 
-bool isAlphanumeric(char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
-}
-
-bool isNameByte(char c) { return isAlphanumeric(c) || c == '_' || c == '.' || c == '-'; }
-
 bool isMetadataKey(const std::string& key) {
     return !key.empty() && key.size() <= kMaxMetadataKeyBytes &&
-           std::all_of(key.begin(), key.end(), isNameByte);
+           std::all_of(key.begin(), key.end(), store::isNameByte);
 }
 
 }  // namespace
@@ -32,14 +26,7 @@ std::string collectionNameOrDefault(const std::string& name) {
 }
 
 Result<void> checkCollectionName(const std::string& name) {
-    if (name.empty()) return bad("name: a collection needs a name");
-    if (name.size() > kMaxCollectionNameBytes) {
-        return bad("name: " + std::to_string(name.size()) + " bytes, at most " +
-                   std::to_string(kMaxCollectionNameBytes) + " are allowed");
-    }
-    if (!std::all_of(name.begin(), name.end(), isNameByte) || !isAlphanumeric(name.front())) {
-        return bad("name: only letters, digits, '_', '.' and '-' are allowed, the first a letter or digit");
-    }
+    if (const auto problem = store::problemOfCollectionName(name)) return bad("name: " + *problem);
     return {};
 }
 

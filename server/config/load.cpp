@@ -21,7 +21,14 @@ namespace {
 constexpr const char* kPrefix = "SHAPEDB_";
 constexpr const char* kConfigVariable = "SHAPEDB_CONFIG";
 /// Used by other programs of the project.
-constexpr const char* kForeignVariables[] = {"SHAPEDB_DATA", "SHAPEDB_SERVER"};
+constexpr const char* kForeignVariables[] = {"SHAPEDB_DATA",
+                                             "SHAPEDB_SERVER",
+                                             "SHAPEDB_API_KEY",
+                                             "SHAPEDB_API_KEY_FILE",
+                                             "SHAPEDB_TLS",
+                                             "SHAPEDB_TLS_CA",
+                                             "SHAPEDB_CLIENT_CERTIFICATE",
+                                             "SHAPEDB_CLIENT_KEY"};
 
 const Setting* findByKey(const std::string& key) {
     const auto& all = settings();
@@ -193,6 +200,13 @@ Result<CommandLine> parseCommandLine(int argc, const char* const* argv) {
 }
 
 Result<Loaded> load(const CommandLine& commandLine, const std::vector<std::string>& environment) {
+    auto loaded = loadEachAlone(commandLine, environment);
+    RETURN_IF_ERROR(loaded);
+    RETURN_IF_ERROR(validateTogether(loaded->config));
+    return loaded;
+}
+
+Result<Loaded> loadEachAlone(const CommandLine& commandLine, const std::vector<std::string>& environment) {
     Loaded loaded;
     for (const Setting& setting : settings()) loaded.origins[setting.key] = "default";
 
@@ -214,7 +228,6 @@ Result<Loaded> load(const CommandLine& commandLine, const std::vector<std::strin
         const auto assigned = assign(loaded, *setting, text, "flag " + setting->flag);
         RETURN_IF_ERROR(assigned);
     }
-    RETURN_IF_ERROR(validateTogether(loaded.config));
     return loaded;
 }
 

@@ -42,6 +42,10 @@ struct Loaded {
 [[nodiscard]] Result<Loaded> load(const CommandLine& commandLine,
                                   const std::vector<std::string>& environment);
 
+/// The same without the rules between settings (validateTogether): for what needs some of them only.
+[[nodiscard]] Result<Loaded> loadEachAlone(const CommandLine& commandLine,
+                                           const std::vector<std::string>& environment);
+
 /// One line for each setting: `key = value  # origin`. Valid TOML.
 [[nodiscard]] std::string describe(const Loaded& loaded);
 

@@ -15,6 +15,20 @@ struct ServerConfig {
     std::string listen = "127.0.0.1:7878";
     /// Directory of the database; created when missing.
     std::string data = "shapedb-data";
+    /// Path of a Unix socket to serve on as well, for administrators of this machine; empty: none.
+    std::string unixSocket;
+
+    struct Tls {
+        std::string certificate;  ///< PEM file; empty: no TLS
+        std::string key;          ///< PEM file
+        std::string clientCa;  ///< PEM file: clients need a certificate signed by one of these; empty: none
+    } tls;
+
+    struct Security {
+        std::string keys = "network";       ///< who must have an API key: "network" or "always"
+        std::string anyoneMayDoAll = "no";  ///< "yes": beyond loopback without TLS and keys
+        std::string auditFile;              ///< empty: audit.log in `data`
+    } security;
 
     struct Ingest {
         int threads = 0;  ///< segmentation workers; 0: one per processor
@@ -60,6 +74,9 @@ struct ServerConfig {
         int drainSeconds = 10;  ///< time for running calls to finish
     } shutdown;
 };
+
+/// Whether callers at `listen` must have an API key.
+[[nodiscard]] bool keysRequired(const ServerConfig& config);
 
 /// `configured`, or the number of processors (at least 1) when it is 0.
 [[nodiscard]] int threadsOrProcessors(int configured) noexcept;

@@ -162,16 +162,42 @@ Setting dataSetting() {
     return setting;
 }
 
-Setting logFileSetting() {
-    Setting setting = named("log.file", SettingKind::kText, "a path or empty",
-                            "File to append the log to. Empty: standard error.");
-    setting.assign = [](ServerConfig& config, const std::string& text) -> Result<void> {
+/// A path that may be empty.
+template <typename Field>
+Setting optionalPath(const std::string& key, Field field, std::string help) {
+    Setting setting = named(key, SettingKind::kText, "a path or empty", std::move(help));
+    setting.assign = [=](ServerConfig& config, const std::string& text) -> Result<void> {
         if (!printable(text)) return fail(ErrorCode::kInvalidArgument, "the path has a control character");
-        config.log.file = text;
+        field(config) = text;
         return {};
     };
-    setting.show = [](const ServerConfig& config) { return config.log.file; };
+    setting.show = [=](const ServerConfig& config) { return field(const_cast<ServerConfig&>(config)); };
     return setting;
+}
+
+/// Nobody sets this by accident, or without knowing what it means.
+constexpr const char* kAnyoneMayDoAll =
+    "security.anyone_on_the_network_may_read_change_and_delete_everything";
+
+/// What must not be reachable beyond this machine without TLS.
+Result<void> validateSecurity(const ServerConfig& config) {
+    const bool tls = !config.tls.certificate.empty();
+    if (tls != !config.tls.key.empty()) {
+        return fail(ErrorCode::kInvalidArgument,
+                    "tls.certificate and tls.key belong together: set both or neither");
+    }
+    if (!tls && !config.tls.clientCa.empty()) {
+        return fail(ErrorCode::kInvalidArgument, "tls.client_ca takes tls.certificate and tls.key");
+    }
+    const auto endpoint = parseEndpoint(config.listen);
+    RETURN_IF_ERROR(endpoint);
+    if (tls || endpoint->isLoopback() || config.security.anyoneMayDoAll == "yes") return {};
+    return fail(
+        ErrorCode::kInvalidArgument,
+        "listen = " + config.listen +
+            " is beyond this machine, which takes TLS (tls.certificate, tls.key) and API keys (shapedbd "
+            "key create); see docs/security.md. For a network where everybody may do everything set " +
+            kAnyoneMayDoAll + " = yes");
 }
 
 std::vector<Setting> makeSettings() {
@@ -183,6 +209,29 @@ std::vector<Setting> makeSettings() {
     return {
         listenSetting(),
         dataSetting(),
+        optionalPath(
+            "unix_socket", [](C& c) -> std::string& { return c.unixSocket; },
+            "Unix socket to serve on as well, for the owner of this process and without API key. Empty: "
+            "none."),
+        optionalPath(
+            "tls.certificate", [](C& c) -> std::string& { return c.tls.certificate; },
+            "Certificate of the server and those above it (PEM). Empty: no TLS."),
+        optionalPath(
+            "tls.key", [](C& c) -> std::string& { return c.tls.key; },
+            "Private key of the certificate (PEM, without password)."),
+        optionalPath(
+            "tls.client_ca", [](C& c) -> std::string& { return c.tls.clientCa; },
+            "Clients need a certificate signed by one of these (PEM). Empty: they need none."),
+        choice(
+            "security.keys", {"network", "always"}, [](C& c) -> std::string& { return c.security.keys; },
+            "Who must have an API key: callers of a server beyond loopback, or always everybody."),
+        optionalPath(
+            "security.audit_file", [](C& c) -> std::string& { return c.security.auditFile; },
+            "Log of refused calls and those of administrators (JSON). Empty: audit.log in the data "
+            "directory."),
+        choice(
+            kAnyoneMayDoAll, {"no", "yes"}, [](C& c) -> std::string& { return c.security.anyoneMayDoAll; },
+            "yes: listen beyond loopback without TLS and without API keys."),
         number(
             "ingest.threads", kInteger, 0, 256, [](C& c) -> int& { return c.ingest.threads; },
             "Segmentation workers. 0: one per processor."),
@@ -245,7 +294,9 @@ std::vector<Setting> makeSettings() {
         choice(
             "log.format", {"text", "json"}, [](C& c) -> std::string& { return c.log.format; },
             "text for people, json (one object per line) for machines."),
-        logFileSetting(),
+        optionalPath(
+            "log.file", [](C& c) -> std::string& { return c.log.file; },
+            "File to append the log to. Empty: standard error."),
         number(
             "shutdown.drain_seconds", kInteger, 0, 3'600,
             [](C& c) -> int& { return c.shutdown.drainSeconds; },
@@ -276,7 +327,14 @@ const std::vector<Setting>& settings() {
     return table;
 }
 
+bool keysRequired(const ServerConfig& config) {
+    if (config.security.keys == "always") return true;
+    const auto endpoint = parseEndpoint(config.listen);
+    return !(endpoint && endpoint->isLoopback()) && config.security.anyoneMayDoAll == "no";
+}
+
 Result<void> validateTogether(const ServerConfig& config) {
+    RETURN_IF_ERROR(validateSecurity(config));
     const std::uint64_t scan = config.limits.maxPoints * 12;
     const auto tooSmall = [&](const char* key) {
         return fail(ErrorCode::kInvalidArgument,

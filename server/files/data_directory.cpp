@@ -56,7 +56,7 @@ Result<void> prepareDataDirectory(const std::string& path) {
     bool ours = false;
     std::optional<std::string> foreign;
     RETURN_IF_ERROR(directory->forEach([&](const std::string& name) {
-        ours = ours || startsWith(name, kDatabaseName);
+        ours = ours || startsWith(name, kDatabaseName) || startsWith(name, kKeysName);
         if (!comesWithTheFileSystem(name)) foreign = name;
         return !ours;
     }));

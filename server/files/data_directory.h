@@ -9,6 +9,8 @@ namespace shapedb::files {
 
 /// Name of the database in it.
 constexpr const char* kDatabaseName = "shapedb.sqlite";
+/// Name of the API keys in it.
+constexpr const char* kKeysName = "keys.sqlite";
 
 /// Creates the directory with its parents, readable by its owner only, or accepts one that is empty or holds
 /// a ShapeDB database; an existing one keeps its permissions. Errors: kFileNotWritable (it cannot be created

@@ -1,5 +1,6 @@
 #include "server/net/listener.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <memory>
 #include <system_error>
@@ -12,6 +13,8 @@
 #include <poll.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
 #include <unistd.h>
 
 #include "core/base/return_if_error.h"
@@ -30,8 +33,8 @@ using Addresses = std::unique_ptr<addrinfo, void (*)(addrinfo*)>;
 
 std::string reason(int number) { return std::generic_category().message(number); }
 
-tl::unexpected<Error> cannotListen(const config::Endpoint& endpoint, const std::string& why) {
-    return fail(ErrorCode::kUnavailable, "cannot listen on " + endpoint.text() + ": " + why);
+tl::unexpected<Error> cannotListen(const std::string& where, const std::string& why) {
+    return fail(ErrorCode::kUnavailable, "cannot listen on " + where + ": " + why);
 }
 
 Result<Addresses> resolve(const config::Endpoint& endpoint) {
@@ -42,7 +45,7 @@ Result<Addresses> resolve(const config::Endpoint& endpoint) {
     addrinfo* found = nullptr;
     const int code =
         ::getaddrinfo(endpoint.host.c_str(), std::to_string(endpoint.port).c_str(), &hints, &found);
-    if (code != 0) return cannotListen(endpoint, ::gai_strerror(code));
+    if (code != 0) return cannotListen(endpoint.text(), ::gai_strerror(code));
     return Addresses(found, ::freeaddrinfo);
 }
 
@@ -83,6 +86,34 @@ void setPort(addrinfo& address, int port) {
     }
 }
 
+Result<sockaddr_un> unixAddress(const std::string& path) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    // The last byte stays zero.
+    if (path.size() >= sizeof address.sun_path) {
+        return cannotListen(path, "the path of a Unix socket has at most " +
+                                      std::to_string(sizeof address.sun_path - 1) + " bytes");
+    }
+    std::copy(path.begin(), path.end(), address.sun_path);
+    return address;
+}
+
+/// Removes the socket of a process that is gone; leaves alone whatever else has the name.
+Result<void> removeAbandoned(const std::string& path, const sockaddr_un& address) {
+    struct stat status {};
+    if (::lstat(path.c_str(), &status) != 0) return {};
+    if (!S_ISSOCK(status.st_mode)) return cannotListen(path, "there is a file of that name");
+    const int probe = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    if (probe < 0) return cannotListen(path, reason(errno));
+    const bool alive = ::connect(probe, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+    const int why = errno;
+    ::close(probe);
+    if (alive) return cannotListen(path, "another process listens there");
+    if (why != ECONNREFUSED) return cannotListen(path, reason(why));
+    ::unlink(path.c_str());
+    return {};
+}
+
 int acceptOne(int listening) { return ::accept4(listening, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC); }
 
 int openSpare() { return ::open("/dev/null", O_RDONLY | O_CLOEXEC); }
@@ -110,6 +141,7 @@ bool concernsOneConnection(int number) {
 Listener::~Listener() {
     stop();
     for (const int socket : listening_) ::close(socket);
+    if (!unixPath_.empty()) ::unlink(unixPath_.c_str());
     if (wake_ >= 0) ::close(wake_);
     if (spare_ >= 0) ::close(spare_);
 }
@@ -131,10 +163,33 @@ Result<void> Listener::open(const config::Endpoint& endpoint) {
         listening_.push_back(socket);
         if (endpoint_.port == 0) endpoint_.port = portOf(socket);
     }
-    if (listening_.empty() || why == EADDRINUSE) return cannotListen(endpoint, reason(why));
+    if (listening_.empty() || why == EADDRINUSE) return cannotListen(endpoint.text(), reason(why));
+    return makeEvents(endpoint_.text());
+}
+
+Result<void> Listener::openUnix(const std::string& path) {
+    const auto address = unixAddress(path);
+    RETURN_IF_ERROR(address);
+    RETURN_IF_ERROR(removeAbandoned(path, *address));
+    const int socket = ::socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+    if (socket < 0) return cannotListen(path, reason(errno));
+    // Before it has a name, so that nobody else can connect at any time.
+    const bool bound = ::fchmod(socket, S_IRWXU) == 0 &&
+                       ::bind(socket, reinterpret_cast<const sockaddr*>(&*address), sizeof *address) == 0;
+    if (bound) unixPath_ = path;
+    if (!bound || ::listen(socket, kBacklog) != 0) {
+        const int why = errno;
+        ::close(socket);
+        return cannotListen(path, reason(why));
+    }
+    listening_.push_back(socket);
+    return makeEvents(path);
+}
+
+Result<void> Listener::makeEvents(const std::string& where) {
     wake_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     spare_ = openSpare();
-    if (wake_ < 0 || spare_ < 0) return cannotListen(endpoint, reason(errno));
+    if (wake_ < 0 || spare_ < 0) return cannotListen(where, reason(errno));
     return {};
 }
 
@@ -209,6 +264,7 @@ void Listener::handOver(int socket) {
         return;
     }
     const int on = 1;
+    // Of no effect on a Unix socket.
     ::setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
     open_.add(socket);
     ++connections_;

@@ -38,7 +38,12 @@ class Listener {
     /// Binds to every address of the host. Port 0 picks a free one. Call once. Errors: kUnavailable (the host
     /// is unknown, the address is in use, does not belong to this machine or is not permitted).
     [[nodiscard]] Result<void> open(const config::Endpoint& endpoint);
-    /// Where it listens: the host asked for and the port in use.
+    /// Binds to a Unix socket that only its owner can connect to (mode 0700). A socket that nobody listens at
+    /// any more is replaced; this one is removed by the destructor. Call once, instead of `open`. Errors:
+    /// kUnavailable (somebody listens there, something else has the name, the path is longer than 107 bytes,
+    /// the folder does not take it).
+    [[nodiscard]] Result<void> openUnix(const std::string& path);
+    /// Where it listens: the host asked for and the port in use; of a Unix socket nothing.
     [[nodiscard]] const config::Endpoint& endpoint() const { return endpoint_; }
 
     /// Starts to accept, at most `maxConnections` at a time; more are closed at once, so that their clients
@@ -54,12 +59,14 @@ class Listener {
 
   private:
     void run();
+    Result<void> makeEvents(const std::string& where);
     /// False when there is trouble: `errno` says which.
     bool acceptAll(int listening);
     void handOver(int socket);
     void reportProblem(const std::string& problem);
 
     config::Endpoint endpoint_;
+    std::string unixPath_;  ///< to remove; empty: none
     std::vector<int> listening_;
     int wake_ = -1;   ///< eventfd that ends the thread
     int spare_ = -1;  ///< given up to tell a client that there are no descriptors left

@@ -27,6 +27,12 @@ class AdminServiceHandler final : public shapedb::v1::AdminService::Service {
                        v1::StatsResponse* response) override;
     grpc::Status ServerInfo(grpc::ServerContext* context, const v1::ServerInfoRequest* request,
                             v1::ServerInfoResponse* response) override;
+    grpc::Status CreateKey(grpc::ServerContext* context, const v1::CreateKeyRequest* request,
+                           v1::CreateKeyResponse* response) override;
+    grpc::Status ListKeys(grpc::ServerContext* context, const v1::ListKeysRequest* request,
+                          v1::ListKeysResponse* response) override;
+    grpc::Status RevokeKey(grpc::ServerContext* context, const v1::RevokeKeyRequest* request,
+                           v1::RevokeKeyResponse* response) override;
 
   private:
     const Services& services_;

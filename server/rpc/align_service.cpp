@@ -31,6 +31,8 @@ class Uploads {
         return finished("other: ", other_, isolationFrom(header_.other_isolation()));
     }
     const v1::AlignHeader& header() const { return header_; }
+    /// Of the key in the header.
+    const std::string& collection() const { return collection_; }
 
   private:
     Result<void> begin(const v1::AlignHeader& header) {
@@ -39,9 +41,17 @@ class Uploads {
         if (header.other_case() == v1::AlignHeader::OTHER_NOT_SET) {
             return fail(ErrorCode::kInvalidArgument, "other: give a key, or other_points and a second scan");
         }
+        if (header.has_key()) {
+            call_.noteKey(header.key().key());
+            auto collection = call_.useCollection(header.key().collection());
+            RETURN_IF_ERROR(collection);
+            collection_ = std::move(*collection);
+        }
+        RETURN_IF_ERROR(call_.useScan(header.query_points()));
         if (header.has_other_points()) {
             begun = other_.begin(header.other_points(), header.other_sha256());
             if (!begun) return fail(withContext(begun.error(), "other: "));
+            RETURN_IF_ERROR(call_.useScan(header.other_points()));
         }
         header_ = header;
         return {};
@@ -59,6 +69,7 @@ class Uploads {
     catalog::ScanUpload query_;
     catalog::ScanUpload other_;
     v1::AlignHeader header_;  // empty until it arrives
+    std::string collection_;
 };
 
 FitOptions optionsFrom(const v1::AlignHeader& header) {
@@ -87,9 +98,7 @@ grpc::Status AlignServiceHandler::Align(grpc::ServerContext* context,
         };
         Result<FitResult> fitted = fail(ErrorCode::kInternal, "not aligned");
         if (header.has_key()) {
-            call.noteCollection(header.key().collection());
-            call.noteKey(header.key().key());
-            fitted = align(catalog::ShapeName{header.key().collection(), header.key().key()});
+            fitted = align(catalog::ShapeName{uploads.collection(), header.key().key()});
         } else {
             const auto other = uploads.other();
             RETURN_IF_ERROR(other);

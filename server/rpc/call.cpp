@@ -1,8 +1,14 @@
 #include "server/rpc/call.h"
 
+#include <algorithm>
+#include <cctype>
+#include <string_view>
 #include <utility>
 
+#include <grpc/grpc_security_constants.h>
+
 #include "core/base/return_if_error.h"
+#include "server/catalog/limits.h"
 #include "server/catalog/request_checks.h"
 #include "server/rpc/status.h"
 
@@ -29,6 +35,8 @@ const char* statusName(grpc::StatusCode code) {
         case grpc::StatusCode::NOT_FOUND: return "NOT_FOUND";
         case grpc::StatusCode::ALREADY_EXISTS: return "ALREADY_EXISTS";
         case grpc::StatusCode::RESOURCE_EXHAUSTED: return "RESOURCE_EXHAUSTED";
+        case grpc::StatusCode::PERMISSION_DENIED: return "PERMISSION_DENIED";
+        case grpc::StatusCode::UNAUTHENTICATED: return "UNAUTHENTICATED";
         case grpc::StatusCode::FAILED_PRECONDITION: return "FAILED_PRECONDITION";
         case grpc::StatusCode::ABORTED: return "ABORTED";
         case grpc::StatusCode::OUT_OF_RANGE: return "OUT_OF_RANGE";
@@ -49,6 +57,30 @@ telemetry::Level levelOf(grpc::StatusCode code) {
     }
 }
 
+/// What follows "Bearer " in the metadata `authorization`; empty if there is none.
+std::string keyPresented(const grpc::ServerContext& context) {
+    constexpr std::string_view kScheme = "bearer ";
+    const auto& metadata = context.client_metadata();
+    const auto found = metadata.find("authorization");
+    if (found == metadata.end()) return {};
+    const std::string_view value(found->second.data(), found->second.size());
+    const auto sameLetter = [](char a, char b) { return std::tolower(static_cast<unsigned char>(a)) == b; };
+    const bool bearer = value.size() > kScheme.size() &&
+                        std::equal(kScheme.begin(), kScheme.end(), value.begin(),
+                                   [&](char wanted, char given) { return sameLetter(given, wanted); });
+    // Another scheme is no key either, and is told so.
+    return std::string(bearer ? value.substr(kScheme.size()) : value);
+}
+
+security::Credentials credentialsOf(const grpc::ServerContext& context) {
+    security::Credentials credentials;
+    credentials.key = keyPresented(context);
+    const auto kind = context.auth_context()->FindPropertyValues(GRPC_TRANSPORT_SECURITY_TYPE_PROPERTY_NAME);
+    // Given by gRPC to connections at the Unix socket, and to no others.
+    credentials.localAdmin = !kind.empty() && kind.front() == "local";
+    return credentials;
+}
+
 }  // namespace
 
 Call::Call(const Services& services, grpc::ServerContext& context, const security::Operation& operation)
@@ -58,14 +90,33 @@ Call::Call(const Services& services, grpc::ServerContext& context, const securit
       peer_(context.peer()),
       began_(std::chrono::steady_clock::now()),
       cancellation_(services.cancellations, context),
-      frame_(services.catalog, services.admission, run_) {
+      frame_(services.catalog, services.admission, run_),
+      authorization_(services.access, operation) {
     run_.cancel = &cancellation_.flag();
     run_.deadline = steadyDeadline(context);
 }
 
+Result<void> Call::begin() {
+    RETURN_IF_ERROR(authorization_.begin(credentialsOf(context_)));
+    return frame_.admit(operation_.callClass);
+}
+
+Result<std::string> Call::useCollection(const std::string& name) {
+    collection_ = services_.catalog.nameOf(name);
+    // A key for an alias may use what it stands for. The error tells no more than the caller knew.
+    const std::string asked = catalog::collectionNameOrDefault(name);
+    RETURN_IF_ERROR(authorization_.useCollection(authorization_.sees(collection_) ? collection_ : asked));
+    return collection_;
+}
+
+Result<void> Call::useScan(std::uint64_t points) {
+    return authorization_.useScan(points * catalog::kPointBytes);
+}
+
 Result<index::SnapshotPtr> Call::collection(const std::string& name) {
-    noteCollection(name);
-    return services_.catalog.collection(name);
+    const auto own = useCollection(name);
+    RETURN_IF_ERROR(own);
+    return services_.catalog.collection(*own);
 }
 
 Result<catalog::FoundShape> Call::shape(const v1::ShapeRef& ref) {
@@ -75,14 +126,12 @@ Result<catalog::FoundShape> Call::shape(const v1::ShapeRef& ref) {
     return services_.catalog.findShape(*found, ref.key());
 }
 
-void Call::noteCollection(const std::string& name) { collection_ = catalog::collectionNameOrDefault(name); }
-
 grpc::Status Call::finish(Result<void> result) {
     std::optional<Error> cutOff;
     if (auto why = cancellation_.cutOff()) cutOff = Error{ErrorCode::kCancelled, std::move(*why)};
-    result = frame_.settle(std::move(result), cutOff);
-    const grpc::Status status =
-        result ? grpc::Status::OK : makeStatus(result.error(), context_, frame_.retryHint());
+    result = frame_.settle(authorization_.settle(std::move(result)), cutOff);
+    const auto hint = authorization_.retryAfter() ? authorization_.retryAfter() : frame_.retryHint();
+    const grpc::Status status = result ? grpc::Status::OK : makeStatus(result.error(), context_, hint);
     logLine(status, result ? nullptr : &result.error());
     return status;
 }
@@ -93,6 +142,10 @@ void Call::logLine(const grpc::Status& status, const Error* error) {
                                             {"peer", peer_},
                                             {"code", std::string(statusName(status.error_code()))},
                                             {"ms", took.count()}};
+    if (const std::string key = authorization_.keyId(); !key.empty()) {
+        fields.push_back({"caller", key});
+        fields.push_back({"caller_name", authorization_.keyName()});
+    }
     if (!collection_.empty()) fields.push_back({"collection", collection_});
     fields.insert(fields.end(), notes_.begin(), notes_.end());
     if (points_ > 0) fields.push_back({"points", points_});
@@ -101,6 +154,12 @@ void Call::logLine(const grpc::Status& status, const Error* error) {
         for (telemetry::Field& field : telemetry::fieldsOf(*error)) fields.push_back(std::move(field));
     }
     services_.log->log(levelOf(status.error_code()), "call", fields);
+    if (status.error_code() == grpc::StatusCode::UNAUTHENTICATED ||
+        status.error_code() == grpc::StatusCode::PERMISSION_DENIED) {
+        services_.audit.recordRefusal(std::move(fields));
+    } else if (operation_.role == security::Role::kAdmin) {
+        services_.audit.recordAdministration(fields);
+    }
 }
 
 }  // namespace shapedb::rpc

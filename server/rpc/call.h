@@ -1,5 +1,5 @@
-// One gRPC call around its handler: the rules of catalog::CallFrame, the client's cancellation and
-// deadline, one log line; no exception leaves it.
+// One gRPC call around its handler: who may make it (security::Authorization), the rules of
+// catalog::CallFrame, the client's cancellation and deadline, one log line; no exception leaves it.
 #pragma once
 
 #include <chrono>
@@ -12,9 +12,11 @@
 #include <grpcpp/support/status.h>
 
 #include "core/base/error.h"
+#include "core/base/return_if_error.h"
 #include "core/base/run_context.h"
 #include "server/catalog/call_frame.h"
 #include "server/rpc/services.h"
+#include "server/security/authorization.h"
 #include "server/security/operation.h"
 #include "shapedb/v1/shape_service.pb.h"
 
@@ -29,7 +31,10 @@ class Call {
     Call(const Call&) = delete;
     Call& operator=(const Call&) = delete;
 
+    /// First of all. Errors: those of Authorization::begin and CallFrame::admit.
+    [[nodiscard]] Result<void> begin();
     [[nodiscard]] catalog::CallFrame& frame() { return frame_; }
+    [[nodiscard]] const security::Authorization& authorization() const { return authorization_; }
 
     /// Follows the client's cancellation and deadline.
     [[nodiscard]] const RunContext& run() const { return run_; }
@@ -57,14 +62,20 @@ class Call {
     /// Asks gRPC directly; the flag in `run()` follows a moment later.
     [[nodiscard]] bool clientGone() const { return context_.IsCancelled(); }
 
-    /// The collection, the default one for an empty name; noted for the log. Errors: kNotFound.
+    /// Before anything of a collection (the default one for an empty name) is read or changed: whether the
+    /// caller may; noted for the log. Errors: kPermissionDenied.
+    /// Returns the name of the collection itself, which an alias stands for at this moment: look nothing up
+    /// by the alias afterwards, which may stand for another collection by then.
+    [[nodiscard]] Result<std::string> useCollection(const std::string& name);
+    /// Before a scan is received, as announced. Errors: kRateLimited.
+    [[nodiscard]] Result<void> useScan(std::uint64_t points);
+    /// The collection, after `useCollection`. Errors: kPermissionDenied, kNotFound.
     [[nodiscard]] Result<index::SnapshotPtr> collection(const std::string& name);
     /// The shape, with collection and key noted for the log. Errors: as Catalog::findShape.
     [[nodiscard]] Result<catalog::FoundShape> shape(const v1::ShapeRef& ref);
     /// Adds a field to the log line.
     void note(telemetry::Field field) { notes_.push_back(std::move(field)); }
     void noteKey(const std::string& key) { note({"key", key}); }
-    void noteCollection(const std::string& name);
     void addPoints(std::uint64_t points, std::uint64_t bytes) {
         points_ += points;
         bytes_ += bytes;
@@ -84,6 +95,7 @@ class Call {
     CancelWatcher::Registration cancellation_;
     RunContext run_;
     catalog::CallFrame frame_;
+    security::Authorization authorization_;
     std::string collection_;
     std::vector<telemetry::Field> notes_;
     std::uint64_t points_ = 0;
@@ -95,8 +107,10 @@ template <typename Body>
 grpc::Status handle(const Services& services, grpc::ServerContext* context,
                     const security::Operation& operation, Body&& body) {
     Call call(services, *context, operation);
-    Result<void> result = call.frame().admit(operation.callClass);
-    if (result) result = catalog::guarded([&]() -> Result<void> { return body(call); });
+    Result<void> result = catalog::guarded([&]() -> Result<void> {
+        RETURN_IF_ERROR(call.begin());
+        return body(call);
+    });
     return call.finish(std::move(result));
 }
 

@@ -25,7 +25,7 @@ grpc::Status CollectionServiceHandler::CreateCollection(grpc::ServerContext* con
                                                         const v1::CreateCollectionRequest* request,
                                                         v1::Collection* response) {
     return handle(services_, context, operations::kCreateCollection, [&](Call& call) -> Result<void> {
-        call.note({"collection", request->name()});
+        RETURN_IF_ERROR(call.useCollection(request->name()));
         const auto wanted = overridesFrom(request->profile(), request->segmentation(), request->signature());
         RETURN_IF_ERROR(wanted);
         const auto parameters = wanted->ofNew();
@@ -50,10 +50,11 @@ grpc::Status CollectionServiceHandler::GetCollection(grpc::ServerContext* contex
 grpc::Status CollectionServiceHandler::ListCollections(grpc::ServerContext* context,
                                                        const v1::ListCollectionsRequest*,
                                                        v1::ListCollectionsResponse* response) {
-    return handle(services_, context, operations::kListCollections, [&](Call&) -> Result<void> {
+    return handle(services_, context, operations::kListCollections, [&](Call& call) -> Result<void> {
         const auto collections = services_.catalog.collections();
         RETURN_IF_ERROR(collections);
         for (const index::SnapshotPtr& snapshot : *collections) {
+            if (!call.authorization().sees(snapshot->collection.name)) continue;
             RETURN_IF_ERROR(fill(services_, *snapshot, response->add_collections()));
         }
         return {};
@@ -64,7 +65,9 @@ grpc::Status CollectionServiceHandler::RenameCollection(grpc::ServerContext* con
                                                         const v1::RenameCollectionRequest* request,
                                                         v1::Collection* response) {
     return handle(services_, context, operations::kRenameCollection, [&](Call& call) -> Result<void> {
-        call.noteCollection(request->name());
+        // The new name is asked for as if a collection were created.
+        RETURN_IF_ERROR(call.useCollection(request->new_name()));
+        RETURN_IF_ERROR(call.useCollection(request->name()));
         call.note({"new_name", request->new_name()});
         const auto renamed = services_.catalog.renameCollection(request->name(), request->new_name());
         RETURN_IF_ERROR(renamed);
@@ -76,9 +79,12 @@ grpc::Status CollectionServiceHandler::SetAlias(grpc::ServerContext* context,
                                                 const v1::SetAliasRequest* request,
                                                 v1::Collection* response) {
     return handle(services_, context, operations::kSetAlias, [&](Call& call) -> Result<void> {
-        call.noteCollection(request->collection());
+        // The alias too: the name of a collection that could be created, or what it stands for now.
+        RETURN_IF_ERROR(call.useCollection(request->alias()));
+        const auto collection = call.useCollection(request->collection());
+        RETURN_IF_ERROR(collection);
         call.note({"alias", request->alias()});
-        const auto named = services_.catalog.setAlias(request->alias(), request->collection());
+        const auto named = services_.catalog.setAlias(request->alias(), *collection);
         RETURN_IF_ERROR(named);
         return fill(services_, **named, response);
     });
@@ -88,7 +94,7 @@ grpc::Status CollectionServiceHandler::DeleteAlias(grpc::ServerContext* context,
                                                    const v1::DeleteAliasRequest* request,
                                                    v1::DeleteAliasResponse*) {
     return handle(services_, context, operations::kDeleteAlias, [&](Call& call) -> Result<void> {
-        call.noteCollection(request->alias());
+        RETURN_IF_ERROR(call.useCollection(request->alias()));
         return services_.catalog.deleteAlias(request->alias());
     });
 }
@@ -97,7 +103,7 @@ grpc::Status CollectionServiceHandler::DeleteCollection(grpc::ServerContext* con
                                                         const v1::DeleteCollectionRequest* request,
                                                         v1::DeleteCollectionResponse*) {
     return handle(services_, context, operations::kDeleteCollection, [&](Call& call) -> Result<void> {
-        call.noteCollection(request->name());
+        RETURN_IF_ERROR(call.useCollection(request->name()));
         return services_.catalog.deleteCollection(request->name(), request->force());
     });
 }

@@ -1,5 +1,6 @@
 #include "server/rpc/convert.h"
 
+#include <algorithm>
 #include <string>
 
 namespace shapedb::rpc {
@@ -19,6 +20,14 @@ void toProto(store::TimestampMs time, google::protobuf::Timestamp* out) {
     if (rest < 0) seconds -= 1, rest += 1'000;
     out->set_seconds(seconds);
     out->set_nanos(static_cast<std::int32_t>(rest * 1'000'000));
+}
+
+store::TimestampMs fromProto(const google::protobuf::Timestamp& time) {
+    // The range of Timestamp: years 1 to 9999.
+    constexpr std::int64_t kFirst = -62'135'596'800;
+    constexpr std::int64_t kLast = 253'402'300'799;
+    return std::clamp(time.seconds(), kFirst, kLast) * 1'000 +
+           std::clamp(time.nanos(), 0, 999'999'999) / 1'000'000;
 }
 
 pb::ShapeState toProto(store::ShapeState state) {

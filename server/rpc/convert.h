@@ -30,6 +30,8 @@ void toProto(const store::Shape& shape, const std::string& collection, std::opti
 void toProto(const Error& failure, pb::Failure* out);
 void toProto(const store::Collection& collection, const ShapeParameters& parameters, pb::Collection* out);
 void toProto(store::TimestampMs time, google::protobuf::Timestamp* out);
+/// Rounds towards the past. What is out of range becomes the nearest time that is in it.
+[[nodiscard]] store::TimestampMs fromProto(const google::protobuf::Timestamp& time);
 
 /// Empty for UNSPECIFIED. Errors: kInvalidArgument (a number without a name).
 [[nodiscard]] Result<std::optional<store::ShapeState>> fromProto(pb::ShapeState state);

@@ -10,6 +10,7 @@
 #include <grpcpp/health_check_service_interface.h>
 
 #include "core/base/return_if_error.h"
+#include "server/config/settings.h"
 #include "server/net/descriptor_limit.h"
 #include "server/net/listener.h"
 #include "server/rpc/admin_service.h"
@@ -20,12 +21,16 @@
 #include "server/rpc/search_service.h"
 #include "server/rpc/services.h"
 #include "server/rpc/shape_service.h"
+#include "server/rpc/tls_credentials.h"
 
 namespace shapedb::rpc {
 namespace {
 
 /// For calls that are cancelled: long enough to learn of it.
 constexpr std::chrono::milliseconds kToLearnOfCancellation{200};
+
+/// Administrators and health checks of this machine.
+constexpr std::size_t kMaxLocalConnections = 64;
 
 /// Names the health service answers for.
 constexpr const char* kServiceNames[] = {"shapedb.v1.ShapeService", "shapedb.v1.SearchService",
@@ -59,16 +64,18 @@ void limitTransport(grpc::ServerBuilder& builder, const config::ServerConfig::Li
 
 /// In order of construction; destroyed in reverse.
 struct GrpcServer::Parts {
-    Parts(const config::ServerConfig& config, catalog::Catalog& catalog, catalog::Admission& admission,
-          catalog::Searches& searches, telemetry::LoggerPtr log, std::string temporaryDirectory)
-        : cancellations(std::chrono::seconds(config.limits.stallSeconds), config.limits.minBytesPerSecond),
-          services{config,
-                   catalog,
-                   admission,
+    explicit Parts(Surroundings given)
+        : cancellations(std::chrono::seconds(given.config.limits.stallSeconds),
+                        given.config.limits.minBytesPerSecond),
+          services{given.config,
+                   given.catalog,
+                   given.admission,
                    cancellations,
-                   searches,
-                   std::move(log),
-                   std::move(temporaryDirectory),
+                   given.searches,
+                   given.access,
+                   given.audit,
+                   std::move(given.log),
+                   std::move(given.temporaryDirectory),
                    std::chrono::system_clock::now()},
           shapeService(services),
           searchService(services),
@@ -88,18 +95,25 @@ struct GrpcServer::Parts {
     void reportNotServing();
     void reportListening(const std::string& problem);
 
-    std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor;
+    /// One way in: a listener, and what gRPC does with its connections.
+    struct Entrance {
+        net::Listener listener;
+        std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor;
+    };
+    void open(Entrance& entrance, std::size_t maxConnections);
+    Result<std::shared_ptr<grpc::ServerCredentials>> credentials();
+
+    std::unique_ptr<TlsCredentials> tls;  ///< null without TLS
     std::unique_ptr<grpc::Server> server;
-    net::Listener listener;
+    Entrance network;
+    Entrance local;  ///< the Unix socket
     std::mutex healthMutex;
     bool ending = false;
+    int inTrouble = 0;  ///< listeners that cannot accept
 };
 
-GrpcServer::GrpcServer(const config::ServerConfig& config, catalog::Catalog& catalog,
-                       catalog::Admission& admission, catalog::Searches& searches, telemetry::LoggerPtr log,
-                       std::string temporaryDirectory)
-    : parts_(std::make_unique<Parts>(config, catalog, admission, searches, std::move(log),
-                                     std::move(temporaryDirectory))) {}
+GrpcServer::GrpcServer(Surroundings surroundings)
+    : parts_(std::make_unique<Parts>(std::move(surroundings))) {}
 
 GrpcServer::~GrpcServer() { shutDown(); }
 
@@ -116,18 +130,41 @@ void GrpcServer::Parts::reportListening(const std::string& problem) {
     } else {
         services.log->error("connections cannot be accepted", {{"reason", problem}});
     }
-    if (!ending) server->GetHealthCheckService()->SetServingStatus(problem.empty());
+    inTrouble += problem.empty() ? -1 : 1;
+    if (!ending) server->GetHealthCheckService()->SetServingStatus(inTrouble == 0);
 }
 
-Result<void> GrpcServer::listen(const config::Endpoint& wanted) {
-    RETURN_IF_ERROR(parts_->listener.open(wanted));
+Result<std::shared_ptr<grpc::ServerCredentials>> GrpcServer::Parts::credentials() {
+    const config::ServerConfig::Tls& files = services.config.tls;
+    if (files.certificate.empty()) return grpc::InsecureServerCredentials();
+    auto started = TlsCredentials::start({files.certificate, files.key, files.clientCa}, services.log);
+    RETURN_IF_ERROR(started);
+    tls = std::move(*started);
+    return tls->credentials();
+}
+
+Result<void> GrpcServer::listen() {
+    const config::ServerConfig& config = parts_->services.config;
+    const auto wanted = config::parseEndpoint(config.listen);
+    RETURN_IF_ERROR(wanted);
+    RETURN_IF_ERROR(parts_->network.listener.open(*wanted));
+    if (!config.unixSocket.empty()) {
+        RETURN_IF_ERROR(parts_->local.listener.openUnix(config.unixSocket));
+    }
+    const auto credentials = parts_->credentials();
+    RETURN_IF_ERROR(credentials);
     grpc::EnableDefaultHealthCheckService(true);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
     grpc::ServerBuilder builder;
-    // Connections come from our own listener: see net/listener.h.
-    parts_->acceptor = builder.experimental().AddExternalConnectionAcceptor(
-        grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
-        grpc::InsecureServerCredentials());
+    // Connections come from our own listeners: see net/listener.h.
+    constexpr auto kFromDescriptor = grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD;
+    parts_->network.acceptor =
+        builder.experimental().AddExternalConnectionAcceptor(kFromDescriptor, *credentials);
+    if (!config.unixSocket.empty()) {
+        // Marks the calls that come through the Unix socket (call.cpp), and takes nothing else.
+        parts_->local.acceptor = builder.experimental().AddExternalConnectionAcceptor(
+            kFromDescriptor, grpc::experimental::LocalServerCredentials(UDS));
+    }
     builder.RegisterService(&parts_->shapeService);
     builder.RegisterService(&parts_->searchService);
     builder.RegisterService(&parts_->alignService);
@@ -136,7 +173,7 @@ Result<void> GrpcServer::listen(const config::Endpoint& wanted) {
     limitTransport(builder, parts_->services.config.limits);
     parts_->server = builder.BuildAndStart();
     if (!parts_->server) {
-        return fail(ErrorCode::kUnavailable, "the gRPC server on " + wanted.text() + " cannot be started");
+        return fail(ErrorCode::kUnavailable, "the gRPC server on " + wanted->text() + " cannot be started");
     }
     for (const char* name : kServiceNames)
         parts_->server->GetHealthCheckService()->SetServingStatus(name, true);
@@ -152,25 +189,31 @@ void GrpcServer::startListening() {
         log->warn("the limit of open files leaves room for fewer connections than limits.max_connections",
                   {{"connections", std::uint64_t{most}}, {"wanted", std::uint64_t{wanted}}});
     }
-    net::ListenerEvents events;
-    events.onConnection = [this](int socket) {
-        grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters connection;
-        connection.fd = socket;
-        parts_->acceptor->HandleNewConnection(&connection);
-    };
-    events.onProblem = [this](const std::string& problem) { parts_->reportListening(problem); };
-    events.onTooMany = [log](std::size_t open) {
-        log->warn("too many connections: more are closed at once", {{"open", std::uint64_t{open}}});
-    };
-    parts_->listener.start(most, std::move(events));
+    parts_->open(parts_->network, most);
+    if (parts_->local.acceptor) parts_->open(parts_->local, kMaxLocalConnections);
 }
 
-const config::Endpoint& GrpcServer::endpoint() const { return parts_->listener.endpoint(); }
+void GrpcServer::Parts::open(Entrance& entrance, std::size_t maxConnections) {
+    net::ListenerEvents events;
+    events.onConnection = [acceptor = entrance.acceptor.get()](int socket) {
+        grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters connection;
+        connection.fd = socket;
+        acceptor->HandleNewConnection(&connection);
+    };
+    events.onProblem = [this](const std::string& problem) { reportListening(problem); };
+    events.onTooMany = [log = services.log](std::size_t open) {
+        log->warn("too many connections: more are closed at once", {{"open", std::uint64_t{open}}});
+    };
+    entrance.listener.start(maxConnections, std::move(events));
+}
+
+const config::Endpoint& GrpcServer::endpoint() const { return parts_->network.listener.endpoint(); }
 
 void GrpcServer::reportNotServing() { parts_->reportNotServing(); }
 
 void GrpcServer::shutDown() {
-    parts_->listener.stop();
+    parts_->network.listener.stop();
+    parts_->local.listener.stop();
     if (!parts_->server) return;
     // Also ends health and reflection streams, which never end by themselves.
     parts_->server->Shutdown(std::chrono::system_clock::now() + kToLearnOfCancellation);

@@ -9,6 +9,8 @@
 #include "server/catalog/gates.h"
 #include "server/catalog/searches.h"
 #include "server/config/server_config.h"
+#include "server/security/authorization.h"
+#include "server/telemetry/audit_log.h"
 #include "server/telemetry/logger.h"
 
 namespace shapedb::rpc {
@@ -16,15 +18,24 @@ namespace shapedb::rpc {
 /// Not thread-safe: one thread starts it and takes it down.
 class GrpcServer {
   public:
-    /// What is given by reference must outlive this. `temporaryDirectory` must exist: backup and restore
-    /// put their files there.
-    GrpcServer(const config::ServerConfig& config, catalog::Catalog& catalog, catalog::Admission& admission,
-               catalog::Searches& searches, telemetry::LoggerPtr log, std::string temporaryDirectory);
+    /// What its handlers work with. What is given by reference must outlive the server.
+    struct Surroundings {
+        const config::ServerConfig& config;
+        catalog::Catalog& catalog;
+        catalog::Admission& admission;
+        catalog::Searches& searches;
+        const security::AccessPolicy& access;
+        telemetry::AuditLog& audit;
+        telemetry::LoggerPtr log;
+        std::string temporaryDirectory;  ///< must exist: backup and restore put their files there
+    };
+    explicit GrpcServer(Surroundings surroundings);
     /// As `shutDown`.
     ~GrpcServer();
 
-    /// Returns once it serves. Call once. Errors: kUnavailable (cannot listen on the address).
-    [[nodiscard]] Result<void> listen(const config::Endpoint& endpoint);
+    /// Returns once it serves, at the configured endpoint and Unix socket, with the configured TLS. Call
+    /// once. Errors: kUnavailable (cannot listen there), those of TlsCredentials::start.
+    [[nodiscard]] Result<void> listen();
 
     /// Where it listens: the host asked for and the port in use.
     [[nodiscard]] const config::Endpoint& endpoint() const;

@@ -48,9 +48,11 @@ Result<store::VerifiedScan> receiveScan(Reader& reader, catalog::ScanUpload& upl
     const auto take = [&](const Request& request) -> Result<void> {
         if (request.has_chunk()) return receiveChunk(request.chunk().xyz(), upload, call);
         const auto& header = request.header();
+        // First, since it asks whether the caller may.
+        RETURN_IF_ERROR(onHeader(header));
         RETURN_IF_ERROR(upload.begin(header.point_count(), header.sha256()));
         isolation = isolationFrom(header.isolation());
-        return onHeader(header);
+        return call.useScan(header.point_count());
     };
     RETURN_IF_ERROR(receiveMessages<Request>(reader, call, take));
     auto scan = upload.finish();

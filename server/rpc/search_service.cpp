@@ -175,6 +175,7 @@ grpc::Status SearchServiceHandler::SearchBatch(grpc::ServerContext* context,
     return handle(services_, context, operations::kSearchBatch, [&](Call& call) -> Result<void> {
         const int count = request->queries_size();
         call.note({"queries", std::int64_t{count}});
+        RETURN_IF_ERROR(call.useCollection(request->options().collection()));
         RETURN_IF_ERROR(
             catalog::checkBatchSize(static_cast<std::uint64_t>(count), services_.config.limits.maxBatch));
         auto prepared = prepare(services_, call, request->options());
@@ -186,14 +187,14 @@ grpc::Status SearchServiceHandler::SearchBatch(grpc::ServerContext* context,
 grpc::Status SearchServiceHandler::Compare(grpc::ServerContext* context, const v1::CompareRequest* request,
                                            v1::CompareResponse* response) {
     return handle(services_, context, operations::kCompare, [&](Call& call) -> Result<void> {
-        const auto nameFrom = [&](const pb::ShapeRef& ref) {
-            call.noteKey(ref.key());
-            call.noteCollection(ref.collection());
-            return catalog::ShapeName{ref.collection(), ref.key()};
-        };
-        const catalog::ShapeName query = nameFrom(request->query());
-        const catalog::ShapeName other = nameFrom(request->other());
-        const auto compared = services_.searches.compare(query, other, scoreOptionsFrom(*request),
+        std::vector<catalog::ShapeName> names;
+        for (const pb::ShapeRef* ref : {&request->query(), &request->other()}) {
+            call.noteKey(ref->key());
+            const auto collection = call.useCollection(ref->collection());
+            RETURN_IF_ERROR(collection);
+            names.push_back({*collection, ref->key()});
+        }
+        const auto compared = services_.searches.compare(names[0], names[1], scoreOptionsFrom(*request),
                                                          request->free_scale(), call.run());
         RETURN_IF_ERROR(compared);
         const VerifiedExplanation& verified = compared->verified;

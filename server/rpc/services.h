@@ -9,6 +9,8 @@
 #include "server/catalog/searches.h"
 #include "server/config/server_config.h"
 #include "server/rpc/cancel_watcher.h"
+#include "server/security/authorization.h"
+#include "server/telemetry/audit_log.h"
 #include "server/telemetry/logger.h"
 
 namespace shapedb::rpc {
@@ -20,6 +22,8 @@ struct Services {
     catalog::Admission& admission;
     CancelWatcher& cancellations;
     catalog::Searches& searches;
+    const security::AccessPolicy& access;
+    telemetry::AuditLog& audit;
     telemetry::LoggerPtr log;
     std::string temporaryDirectory;  ///< exists; for backup and restore files
     std::chrono::system_clock::time_point started;

@@ -99,9 +99,11 @@ Result<void> ShapeServiceHandler::addShape(Call& call, grpc::ServerReader<v1::Ad
                                     services_.admission.uploads);
     const auto takeHeader = [&](const v1::AddShapeHeader& message) -> Result<void> {
         call.noteKey(message.key());
-        call.noteCollection(message.collection());
+        const auto collection = call.useCollection(message.collection());
+        RETURN_IF_ERROR(collection);
         auto header = headerFrom(message);
         RETURN_IF_ERROR(header);
+        header->collection = *collection;
         return addition.begin(std::move(*header), message.wait());
     };
     auto scan = receiveScan<v1::AddShapeRequest>(reader, addition.upload(), call, takeHeader);
@@ -234,10 +236,11 @@ grpc::Status ShapeServiceHandler::DeleteShape(grpc::ServerContext* context,
     return handle(services_, context, operations::kDeleteShape, [&](Call& call) -> Result<void> {
         const pb::ShapeRef& ref = request->shape();
         call.noteKey(ref.key());
-        call.noteCollection(ref.collection());
+        const auto collection = call.useCollection(ref.collection());
+        RETURN_IF_ERROR(collection);
         std::optional<std::int64_t> expected;
         if (request->has_expected_version()) expected = request->expected_version();
-        const auto deleted = services_.catalog.deleteShape(ref.collection(), ref.key(), expected);
+        const auto deleted = services_.catalog.deleteShape(*collection, ref.key(), expected);
         RETURN_IF_ERROR(deleted);
         toProto(deleted->shape, deleted->collection->collection.name, deleted->quality(),
                 response->mutable_shape());

@@ -30,7 +30,10 @@ grpc::StatusCode statusCodeOf(ErrorCode code) noexcept {
         case ErrorCode::kNotReady:
         case ErrorCode::kRejected:
         case ErrorCode::kSchemaTooNew: return grpc::StatusCode::FAILED_PRECONDITION;
+        case ErrorCode::kUnauthenticated: return grpc::StatusCode::UNAUTHENTICATED;
+        case ErrorCode::kPermissionDenied: return grpc::StatusCode::PERMISSION_DENIED;
         case ErrorCode::kQueueFull:
+        case ErrorCode::kRateLimited:
         case ErrorCode::kOutOfMemory:
         case ErrorCode::kStorageFull: return grpc::StatusCode::RESOURCE_EXHAUSTED;
         case ErrorCode::kUnavailable: return grpc::StatusCode::UNAVAILABLE;

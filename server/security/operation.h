@@ -21,70 +21,108 @@ enum class CallClass : std::uint8_t {
     kAdmin,     ///< has places of its own
 };
 
+/// What of the server a call touches: a key may be for some collections only.
+enum class Scope : std::uint8_t {
+    kCollections,  ///< the collections it names, of which the key must have each
+    kNone,         ///< none, or only some calls name one, which they must ask for
+    kServer,       ///< all collections: needs a key of all
+    kKeys,         ///< the API keys: as kServer, and never without a key
+};
+
 struct Operation {
     const char* service;  ///< as in proto/, without the package
     const char* name;     ///< as in proto/
     Role role;
     CallClass callClass;
+    Scope scope;
 };
 
 namespace operations {
 
 // ShapeService
-inline constexpr Operation kAddShape{"ShapeService", "AddShape", Role::kWriter, CallClass::kUpload};
-inline constexpr Operation kGetShape{"ShapeService", "GetShape", Role::kReader, CallClass::kOrdinary};
-inline constexpr Operation kGetShapes{"ShapeService", "GetShapes", Role::kReader, CallClass::kOrdinary};
-inline constexpr Operation kGetPoints{"ShapeService", "GetPoints", Role::kReader, CallClass::kOrdinary};
-inline constexpr Operation kListShapes{"ShapeService", "ListShapes", Role::kReader, CallClass::kOrdinary};
-inline constexpr Operation kCountShapes{"ShapeService", "CountShapes", Role::kReader, CallClass::kOrdinary};
-inline constexpr Operation kCountByValue{"ShapeService", "CountByValue", Role::kReader, CallClass::kOrdinary};
-inline constexpr Operation kDeleteShape{"ShapeService", "DeleteShape", Role::kWriter, CallClass::kOrdinary};
-inline constexpr Operation kDeleteShapes{"ShapeService", "DeleteShapes", Role::kWriter, CallClass::kOrdinary};
+inline constexpr Operation kAddShape{"ShapeService", "AddShape", Role::kWriter, CallClass::kUpload,
+                                     Scope::kCollections};
+inline constexpr Operation kGetShape{"ShapeService", "GetShape", Role::kReader, CallClass::kOrdinary,
+                                     Scope::kCollections};
+inline constexpr Operation kGetShapes{"ShapeService", "GetShapes", Role::kReader, CallClass::kOrdinary,
+                                      Scope::kCollections};
+inline constexpr Operation kGetPoints{"ShapeService", "GetPoints", Role::kReader, CallClass::kOrdinary,
+                                      Scope::kCollections};
+inline constexpr Operation kListShapes{"ShapeService", "ListShapes", Role::kReader, CallClass::kOrdinary,
+                                       Scope::kCollections};
+inline constexpr Operation kCountShapes{"ShapeService", "CountShapes", Role::kReader, CallClass::kOrdinary,
+                                        Scope::kCollections};
+inline constexpr Operation kCountByValue{"ShapeService", "CountByValue", Role::kReader, CallClass::kOrdinary,
+                                         Scope::kCollections};
+inline constexpr Operation kDeleteShape{"ShapeService", "DeleteShape", Role::kWriter, CallClass::kOrdinary,
+                                        Scope::kCollections};
+inline constexpr Operation kDeleteShapes{"ShapeService", "DeleteShapes", Role::kWriter, CallClass::kOrdinary,
+                                         Scope::kCollections};
 inline constexpr Operation kUpdateMetadata{"ShapeService", "UpdateMetadata", Role::kWriter,
-                                           CallClass::kOrdinary};
-inline constexpr Operation kRetryShapes{"ShapeService", "RetryShapes", Role::kWriter, CallClass::kOrdinary};
-inline constexpr Operation kWatchIngest{"ShapeService", "WatchIngest", Role::kReader, CallClass::kOrdinary};
-inline constexpr Operation kGetSignature{"ShapeService", "GetSignature", Role::kReader, CallClass::kOrdinary};
-inline constexpr Operation kGetSegments{"ShapeService", "GetSegments", Role::kReader, CallClass::kOrdinary};
-inline constexpr Operation kSegment{"ShapeService", "Segment", Role::kReader, CallClass::kUpload};
+                                           CallClass::kOrdinary, Scope::kCollections};
+inline constexpr Operation kRetryShapes{"ShapeService", "RetryShapes", Role::kWriter, CallClass::kOrdinary,
+                                        Scope::kCollections};
+inline constexpr Operation kWatchIngest{"ShapeService", "WatchIngest", Role::kReader, CallClass::kOrdinary,
+                                        Scope::kCollections};
+inline constexpr Operation kGetSignature{"ShapeService", "GetSignature", Role::kReader, CallClass::kOrdinary,
+                                         Scope::kCollections};
+inline constexpr Operation kGetSegments{"ShapeService", "GetSegments", Role::kReader, CallClass::kOrdinary,
+                                        Scope::kCollections};
+inline constexpr Operation kSegment{"ShapeService", "Segment", Role::kReader, CallClass::kUpload,
+                                    Scope::kNone};
 
 // SearchService
-inline constexpr Operation kSearchByKey{"SearchService", "SearchByKey", Role::kReader, CallClass::kOrdinary};
-inline constexpr Operation kSearchByScan{"SearchService", "SearchByScan", Role::kReader, CallClass::kUpload};
+inline constexpr Operation kSearchByKey{"SearchService", "SearchByKey", Role::kReader, CallClass::kOrdinary,
+                                        Scope::kCollections};
+inline constexpr Operation kSearchByScan{"SearchService", "SearchByScan", Role::kReader, CallClass::kUpload,
+                                         Scope::kCollections};
 inline constexpr Operation kSearchBySignature{"SearchService", "SearchBySignature", Role::kReader,
-                                              CallClass::kOrdinary};
-inline constexpr Operation kSearchBatch{"SearchService", "SearchBatch", Role::kReader, CallClass::kOrdinary};
-inline constexpr Operation kCompare{"SearchService", "Compare", Role::kReader, CallClass::kOrdinary};
+                                              CallClass::kOrdinary, Scope::kCollections};
+inline constexpr Operation kSearchBatch{"SearchService", "SearchBatch", Role::kReader, CallClass::kOrdinary,
+                                        Scope::kCollections};
+inline constexpr Operation kCompare{"SearchService", "Compare", Role::kReader, CallClass::kOrdinary,
+                                    Scope::kCollections};
 
 // AlignService
-inline constexpr Operation kAlign{"AlignService", "Align", Role::kReader, CallClass::kUpload};
+inline constexpr Operation kAlign{"AlignService", "Align", Role::kReader, CallClass::kUpload, Scope::kNone};
 
 // CollectionService
 inline constexpr Operation kCreateCollection{"CollectionService", "CreateCollection", Role::kAdmin,
-                                             CallClass::kOrdinary};
+                                             CallClass::kOrdinary, Scope::kCollections};
 inline constexpr Operation kGetCollection{"CollectionService", "GetCollection", Role::kReader,
-                                          CallClass::kOrdinary};
+                                          CallClass::kOrdinary, Scope::kCollections};
 inline constexpr Operation kListCollections{"CollectionService", "ListCollections", Role::kReader,
-                                            CallClass::kOrdinary};
+                                            CallClass::kOrdinary, Scope::kNone};
 inline constexpr Operation kDeleteCollection{"CollectionService", "DeleteCollection", Role::kAdmin,
-                                             CallClass::kOrdinary};
+                                             CallClass::kOrdinary, Scope::kCollections};
 inline constexpr Operation kRenameCollection{"CollectionService", "RenameCollection", Role::kAdmin,
-                                             CallClass::kOrdinary};
-inline constexpr Operation kSetAlias{"CollectionService", "SetAlias", Role::kAdmin, CallClass::kOrdinary};
+                                             CallClass::kOrdinary, Scope::kCollections};
+inline constexpr Operation kSetAlias{"CollectionService", "SetAlias", Role::kAdmin, CallClass::kOrdinary,
+                                     Scope::kCollections};
 inline constexpr Operation kDeleteAlias{"CollectionService", "DeleteAlias", Role::kAdmin,
-                                        CallClass::kOrdinary};
+                                        CallClass::kOrdinary, Scope::kCollections};
 
 // AdminService
-inline constexpr Operation kRebuild{"AdminService", "Rebuild", Role::kAdmin, CallClass::kAdmin};
-inline constexpr Operation kCancelRebuild{"AdminService", "CancelRebuild", Role::kAdmin, CallClass::kAdmin};
-inline constexpr Operation kBackup{"AdminService", "Backup", Role::kAdmin, CallClass::kAdmin};
-inline constexpr Operation kRestore{"AdminService", "Restore", Role::kAdmin, CallClass::kAdmin};
-inline constexpr Operation kCheck{"AdminService", "Check", Role::kAdmin, CallClass::kAdmin};
-inline constexpr Operation kStats{"AdminService", "Stats", Role::kAdmin, CallClass::kAdmin};
-inline constexpr Operation kServerInfo{"AdminService", "ServerInfo", Role::kReader, CallClass::kAdmin};
+inline constexpr Operation kRebuild{"AdminService", "Rebuild", Role::kAdmin, CallClass::kAdmin,
+                                    Scope::kCollections};
+inline constexpr Operation kCancelRebuild{"AdminService", "CancelRebuild", Role::kAdmin, CallClass::kAdmin,
+                                          Scope::kCollections};
+inline constexpr Operation kBackup{"AdminService", "Backup", Role::kAdmin, CallClass::kAdmin, Scope::kServer};
+inline constexpr Operation kRestore{"AdminService", "Restore", Role::kAdmin, CallClass::kAdmin,
+                                    Scope::kServer};
+inline constexpr Operation kCheck{"AdminService", "Check", Role::kAdmin, CallClass::kAdmin, Scope::kServer};
+inline constexpr Operation kStats{"AdminService", "Stats", Role::kAdmin, CallClass::kAdmin, Scope::kServer};
+inline constexpr Operation kServerInfo{"AdminService", "ServerInfo", Role::kReader, CallClass::kAdmin,
+                                       Scope::kNone};
+inline constexpr Operation kCreateKey{"AdminService", "CreateKey", Role::kAdmin, CallClass::kAdmin,
+                                      Scope::kKeys};
+inline constexpr Operation kListKeys{"AdminService", "ListKeys", Role::kAdmin, CallClass::kAdmin,
+                                     Scope::kKeys};
+inline constexpr Operation kRevokeKey{"AdminService", "RevokeKey", Role::kAdmin, CallClass::kAdmin,
+                                      Scope::kKeys};
 
 /// All of the above. A test compares it with the services in proto/.
-inline constexpr std::array<const Operation*, 35> kAll{&kAddShape,
+inline constexpr std::array<const Operation*, 38> kAll{&kAddShape,
                                                        &kGetShape,
                                                        &kGetShapes,
                                                        &kGetPoints,
@@ -118,7 +156,10 @@ inline constexpr std::array<const Operation*, 35> kAll{&kAddShape,
                                                        &kRestore,
                                                        &kCheck,
                                                        &kStats,
-                                                       &kServerInfo};
+                                                       &kServerInfo,
+                                                       &kCreateKey,
+                                                       &kListKeys,
+                                                       &kRevokeKey};
 
 }  // namespace operations
 

@@ -1,5 +1,5 @@
-// What a key may be: one rule for uploads, for what is looked up, and for databases that are restored or
-// checked.
+// What the keys of shapes and the names of collections may be: one rule for uploads, for what is looked up,
+// for databases that are restored or checked, and for what an API key may use.
 #pragma once
 
 #include <cstddef>
@@ -9,9 +9,17 @@
 namespace shapedb::store {
 
 constexpr std::size_t kMaxKeyBytes = 512;
+constexpr std::size_t kMaxCollectionNameBytes = 128;
 
 /// Why `key` is none, as "512 bytes, at most ..."; nothing if it is one: 1 to kMaxKeyBytes bytes of UTF-8
 /// without characters that change what a terminal shows, or hide in it (findUnsafe in common/safe_text.h).
 [[nodiscard]] std::optional<std::string> problemOfKey(const std::string& key);
+
+/// A letter, a digit, '_', '.' or '-'.
+[[nodiscard]] bool isNameByte(char c) noexcept;
+
+/// The same for the name of a collection: 1 to kMaxCollectionNameBytes of the above, the first a letter or
+/// digit.
+[[nodiscard]] std::optional<std::string> problemOfCollectionName(const std::string& name);
 
 }  // namespace shapedb::store

@@ -9,7 +9,9 @@
 #include <spdlog/logger.h>
 #include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/basic_file_sink.h>
+#include <spdlog/sinks/rotating_file_sink.h>
 #include <spdlog/sinks/stdout_sinks.h>
+#include <sys/stat.h>
 
 #include "common/safe_text.h"
 
@@ -143,6 +145,24 @@ std::string formatJson(const std::string& message, const std::vector<Field>& fie
     std::string line = "\"message\":" + jsonString(message);
     for (const Field& field : fields) line += ",\"" + field.name + "\":" + show(field.value, true);
     return line;
+}
+
+Result<LoggerPtr> makeRotatingLog(const std::string& file, std::size_t bytes, std::size_t files) {
+    LogOptions options;
+    options.json = true;
+    options.file = file;
+    try {
+        spdlog::file_event_handlers handlers;
+        handlers.after_open = [](const spdlog::filename_t& name, std::FILE*) {
+            ::chmod(name.c_str(), S_IRUSR | S_IWUSR);
+        };
+        return std::make_shared<SpdlogLogger>(
+            std::make_shared<spdlog::sinks::rotating_file_sink_mt>(file, bytes, files, false, handlers),
+            options);
+    } catch (const std::exception& error) {
+        return fail(ErrorCode::kFileNotWritable,
+                    "log file " + file + " cannot be opened for writing: " + error.what());
+    }
 }
 
 Result<LoggerPtr> makeLogger(const LogOptions& options) {

@@ -59,6 +59,11 @@ struct LogOptions {
 /// Errors: kFileNotWritable.
 [[nodiscard]] Result<LoggerPtr> makeLogger(const LogOptions& options);
 
+/// A log file that is replaced by the next one when it has `bytes`; `files` older ones are kept beside it as
+/// NAME.1.EXT, NAME.2.EXT and so on. JSON, and only for its owner to read. Errors: kFileNotWritable.
+[[nodiscard]] Result<LoggerPtr> makeRotatingLog(const std::string& file, std::size_t bytes,
+                                                std::size_t files);
+
 /// A line without time and level: `message name=value name="quoted value"`, or the members of a JSON
 /// object without braces.
 [[nodiscard]] std::string formatText(const std::string& message, const std::vector<Field>& fields);

@@ -11,11 +11,15 @@ import tempfile
 import time
 import unittest
 
-import grpc
+# Servers are started while channels are open, and grpcio would wait for these before each fork.
+os.environ["GRPC_ENABLE_FORK_SUPPORT"] = "0"
+
+import grpc  # noqa: E402
 import health_pb2
 import health_pb2_grpc
 from shapedb.v1 import admin_service_pb2 as admin
 from shapedb.v1 import admin_service_pb2_grpc as admin_grpc
+from shapedb.v1 import align_service_pb2 as align
 from shapedb.v1 import collection_service_pb2 as collections
 from shapedb.v1 import collection_service_pb2_grpc as collections_grpc
 from shapedb.v1 import search_service_pb2 as search
@@ -31,15 +35,22 @@ CHUNK_POINTS = 80_000  # below the 1 MiB of a chunk
 class Server:
     """shapedbd on a free port with a data directory of its own."""
 
-    def __init__(self, *flags, directory=None, open_files=None, memory=None, file_size=None):
+    def __init__(self, *flags, directory=None, open_files=None, memory=None, file_size=None, listen="127.0.0.1:0",
+                 first_key=False):
         self._own = tempfile.TemporaryDirectory(prefix="shapedb-attack-")
         self.data = directory or os.path.join(self._own.name, "data")
         self.log_path = os.path.join(self._own.name, "log")
-        self._flags = flags
+        self._flags = ["--listen", listen, *(flag.replace("{data}", self.data) for flag in flags)]
+        if first_key:
+            self.key_command("create", "--name", "first", "--role", "admin")
         self._limits = [(resource.RLIMIT_NOFILE, open_files), (resource.RLIMIT_AS, memory),
                         (resource.RLIMIT_FSIZE, file_size)]
         self.process = None
-        self.start()
+        try:
+            self.start()
+        except RuntimeError:
+            self._own.cleanup()
+            raise
 
     def start(self):
         def limit():
@@ -49,15 +60,20 @@ class Server:
 
         with open(self.log_path, "a") as log:
             self.process = subprocess.Popen(
-                [os.environ["SHAPEDBD"], "--data", self.data, "--listen", "127.0.0.1:0", *self._flags],
+                [os.environ["SHAPEDBD"], "--data", self.data, *self._flags],
                 stdout=subprocess.PIPE, stderr=log, text=True, preexec_fn=limit)
         banner = self.process.stdout.readline()
         if not banner.startswith("listening on "):
             self.process.wait()
             self.process.stdout.close()
             raise RuntimeError("the server did not start: " + self.log())
-        self.address = banner.split()[-1]
-        self.port = int(self.address.rsplit(":", 1)[1])
+        self.port = int(banner.rsplit(":", 1)[1])
+        self.address = f"127.0.0.1:{self.port}"
+
+    def key_command(self, *arguments):
+        """`shapedbd key`, on the data directory."""
+        return subprocess.run([os.environ["SHAPEDBD"], "key", *arguments, "--data", self.data], check=True,
+                              capture_output=True, text=True)
 
     def __enter__(self):
         return self
@@ -99,11 +115,28 @@ class Server:
         return Client(self.address, **options)
 
 
+class Bearer(grpc.UnaryUnaryClientInterceptor, grpc.UnaryStreamClientInterceptor, grpc.StreamUnaryClientInterceptor,
+             grpc.StreamStreamClientInterceptor):
+    """Sends an API key with every call."""
+
+    def __init__(self, key):
+        self._metadata = [("authorization", key if " " in key else "Bearer " + key)]
+
+    def _send(self, continuation, details, request):
+        return continuation(details._replace(metadata=[*(details.metadata or ()), *self._metadata]), request)
+
+    intercept_unary_unary = intercept_unary_stream = intercept_stream_unary = intercept_stream_stream = _send
+
+
 class Client:
-    def __init__(self, address, compression=None):
+    def __init__(self, address, compression=None, key=None, credentials=None):
         # A channel of its own connection: by default channels to one address share one.
         options = [("grpc.use_local_subchannel_pool", 1), ("grpc.max_send_message_length", -1)]
-        self.channel = grpc.insecure_channel(address, options=options, compression=compression)
+        if credentials is None:
+            self._connection = grpc.insecure_channel(address, options=options, compression=compression)
+        else:
+            self._connection = grpc.secure_channel(address, credentials, options=options, compression=compression)
+        self.channel = grpc.intercept_channel(self._connection, *([Bearer(key)] if key else []))
         self.shapes = shapes_grpc.ShapeServiceStub(self.channel)
         self.search = search_grpc.SearchServiceStub(self.channel)
         self.collections = collections_grpc.CollectionServiceStub(self.channel)
@@ -114,7 +147,7 @@ class Client:
         return self
 
     def __exit__(self, *error):
-        self.channel.close()
+        self._connection.close()
 
     def serving(self, service=""):
         reply = self.health.Check(health_pb2.HealthCheckRequest(service=service), timeout=10)

@@ -1,6 +1,6 @@
-# cmake -DFOLDER=migrations -DOUTPUT=x.cpp -P embed_migrations.cmake
-# Writes the *.sql files as one C++ array (server/store/sqlite/migrator.h). Names must be NNNN_words.sql,
-# numbered 1, 2, 3 ... without a gap.
+# cmake -DFOLDER=migrations/x -DFUNCTION=name -DOUTPUT=x.cpp -P embed_migrations.cmake
+# Writes the *.sql files as one C++ array, returned by FUNCTION (server/store/sqlite/migrator.h). Names must be
+# NNNN_words.sql, numbered 1, 2, 3 ... without a gap.
 file(GLOB FILES ${FOLDER}/*.sql)
 list(SORT FILES)
 set(expected 0)
@@ -16,14 +16,14 @@ foreach(path IN LISTS FILES)
     message(FATAL_ERROR "${path}: migration ${expected} is missing or doubled")
   endif()
   file(READ ${path} text)
-  string(APPEND rows "    {${number}, \"${name}\", R\"sql(${text})sql\"},\n")
+  string(APPEND rows "        {${number}, \"${name}\", R\"sql(${text})sql\"},\n")
 endforeach()
-file(WRITE ${OUTPUT} "// Generated from migrations/*.sql; do not edit.
+file(WRITE ${OUTPUT} "// Generated from ${FOLDER}/*.sql; do not edit.
 #include \"server/store/sqlite/migrator.h\"
 
 namespace shapedb::store {
 
-const std::vector<Migration>& embeddedMigrations() {
+const std::vector<Migration>& ${FUNCTION}() {
     static const std::vector<Migration> kMigrations = {
 ${rows}    };
     return kMigrations;

@@ -1,6 +1,6 @@
 // Brings a database to the schema of this program.
 //
-// Migrations are the numbered files of migrations/sqlite/, compiled in. They only go forward, each in
+// Migrations are the numbered files of migrations/, compiled in. They only go forward, each in
 // its own transaction, and are never edited after release: the database records the SHA-256 of each
 // one it has applied.
 #pragma once
@@ -24,8 +24,10 @@ struct Migration {
     const char* sql;
 };
 
-/// In ascending order of number, without gaps.
+/// Those of the database. In ascending order of number, without gaps.
 const std::vector<Migration>& embeddedMigrations();
+/// Those of the API keys, which are a database of their own.
+const std::vector<Migration>& embeddedKeyMigrations();
 
 enum class FileKind {
     kEmpty,    ///< an SQLite file without content

@@ -83,14 +83,23 @@ TEST_F(Load, ConfigFlagOverridesItsVariable) {
 
 // Round trip of every setting through every source: the value shown is read back as it is.
 TEST_F(Load, EverySettingIsReadFromEverySource) {
+    // A certificate without its key, or the other way round, is refused.
+    ServerConfig partners;
+    partners.tls = {"c.pem", "k.pem", ""};
+    const std::vector<const char*> partnerFlags = {"--tls-certificate", "c.pem", "--tls-key", "k.pem"};
     for (const Setting& setting : settings()) {
+        std::vector<const char*> with;
+        if (setting.key == "tls.client_ca") with = partnerFlags;
+        if (setting.key == "tls.certificate") with.assign(partnerFlags.begin() + 2, partnerFlags.end());
+        if (setting.key == "tls.key") with.assign(partnerFlags.begin(), partnerFlags.begin() + 2);
         for (const int source : {0, 1, 2}) {
             ServerConfig probe;
             // A value other than the default, found among a few candidates.
             std::string text;
-            for (const char* candidate :
-                 {"3", "5", "2MiB", "/some/where", "localhost:1", "warn", "json", "200MiB", "8GiB"}) {
+            for (const char* candidate : {"3", "5", "2MiB", "/some/where", "localhost:1", "warn", "json",
+                                          "200MiB", "8GiB", "always", "yes"}) {
                 ServerConfig tried;
+                tried.tls = partners.tls;
                 if (setting.assign(tried, candidate) && setting.show(tried) != setting.show(probe) &&
                     validateTogether(tried)) {
                     text = candidate;
@@ -107,11 +116,14 @@ TEST_F(Load, EverySettingIsReadFromEverySource) {
                                               ? file(setting.key + " = " + value + "\n")
                                               : file("[" + setting.key.substr(0, dot) + "]\n" +
                                                      setting.key.substr(dot + 1) + " = " + value + "\n");
-                loaded = loadWith({"--config", path.c_str()});
+                with.insert(with.end(), {"--config", path.c_str()});
+                loaded = loadWith(with);
+                with.resize(with.size() - 2);
             } else if (source == 1) {
-                loaded = loadWith({}, {setting.environment + "=" + text});
+                loaded = loadWith(with, {setting.environment + "=" + text});
             } else {
-                loaded = loadWith({setting.flag.c_str(), text.c_str()});
+                with.insert(with.end(), {setting.flag.c_str(), text.c_str()});
+                loaded = loadWith(with);
             }
             ASSERT_TRUE(loaded) << setting.key << ": " << loaded.error().message;
             ServerConfig expected;
@@ -213,6 +225,30 @@ TEST_F(Load, RefusesSettingsThatContradictEachOther) {
     expectRefused(loadWith({"--ingest-max-queued-bytes", "1MiB"}), ErrorCode::kInvalidArgument,
                   {"ingest.max_queued_bytes", "limits.max_points"});
     EXPECT_TRUE(loadWith({"--limits-max-upload-bytes", "1MiB", "--limits-max-points", "80000"}));
+    expectRefused(loadWith({"--tls-certificate", "c"}), ErrorCode::kInvalidArgument, {"tls.key"});
+    expectRefused(loadWith({"--tls-key", "k"}), ErrorCode::kInvalidArgument, {"tls.certificate"});
+    expectRefused(loadWith({"--tls-client-ca", "a"}), ErrorCode::kInvalidArgument, {"tls.client_ca"});
+}
+
+TEST_F(Load, BeyondThisMachineTlsIsNeeded) {
+    const std::string anyone = "--security-anyone-on-the-network-may-read-change-and-delete-everything";
+    for (const char* address :
+         {"0.0.0.0:1", "[::]:1", "192.168.1.2:1", "shapes.example:1", "[::ffff:1.2.3.4]:1"}) {
+        expectRefused(loadWith({"--listen", address}), ErrorCode::kInvalidArgument,
+                      {address, "tls.certificate", "docs/security.md"});
+        const auto secured = loadWith({"--listen", address, "--tls-certificate", "c", "--tls-key", "k"});
+        ASSERT_TRUE(secured) << secured.error().message;
+        EXPECT_TRUE(keysRequired(secured->config));
+        const auto open = loadWith({"--listen", address, anyone.c_str(), "yes"});
+        ASSERT_TRUE(open) << open.error().message;
+        EXPECT_FALSE(keysRequired(open->config));
+    }
+    for (const char* address : {"127.0.0.1:1", "127.9.9.9:1", "[::1]:1", "localhost:1"}) {
+        const auto loaded = loadWith({"--listen", address});
+        ASSERT_TRUE(loaded) << loaded.error().message;
+        EXPECT_FALSE(keysRequired(loaded->config));
+        EXPECT_TRUE(keysRequired(loadWith({"--listen", address, "--security-keys", "always"})->config));
+    }
 }
 
 TEST(ParseCommandLine, ParsesHelpVersionAndCheck) {

@@ -1,6 +1,7 @@
 #include "server/net/listener.h"
 
 #include <atomic>
+#include <fstream>
 #include <mutex>
 #include <string>
 #include <vector>
@@ -12,10 +13,13 @@
 #include <poll.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
 #include <unistd.h>
 
 #include "server/net/descriptor_limit.h"
 #include "tests/support/eventually.h"
+#include "tests/support/temporary_directory.h"
 
 namespace shapedb::net {
 namespace {
@@ -96,6 +100,68 @@ TEST_F(ListenerTest, HandsConnectionsOver) {
     char byte = 0;
     ASSERT_TRUE(eventually([&] { return ::recv(served[0].get(), &byte, 1, 0) == 1; }));
     EXPECT_EQ(byte, 'x');
+}
+
+class UnixListenerTest : public ListenerTest {
+  protected:
+    sockaddr_un address() const {
+        sockaddr_un unixAddress{};
+        unixAddress.sun_family = AF_UNIX;
+        path.copy(unixAddress.sun_path, sizeof unixAddress.sun_path - 1);
+        return unixAddress;
+    }
+    testing::TemporaryDirectory directory;
+    std::string path = directory.path() + "/s.sock";
+};
+
+TEST_F(UnixListenerTest, OnlyItsOwnerCanConnect) {
+    const auto previous = ::umask(0);
+    ASSERT_TRUE(listener.openUnix(path));
+    ::umask(previous);
+    struct stat status {};
+    ASSERT_EQ(::stat(path.c_str(), &status), 0);
+    EXPECT_EQ(status.st_mode & 0777, 0700u);
+    std::atomic<int> accepted{0};
+    ListenerEvents events;
+    events.onConnection = [&](int socket) {
+        ++accepted;
+        ::close(socket);
+    };
+    listener.start(10, std::move(events));
+    const Socket client(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
+    const sockaddr_un at = address();
+    ASSERT_EQ(::connect(client.get(), reinterpret_cast<const sockaddr*>(&at), sizeof at), 0);
+    EXPECT_TRUE(eventually([&] { return accepted == 1; }));
+    listener.stop();
+}
+
+TEST_F(UnixListenerTest, ReplacesASocketThatNobodyListensAt) {
+    {
+        const Socket dead(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
+        const sockaddr_un at = address();
+        ASSERT_EQ(::bind(dead.get(), reinterpret_cast<const sockaddr*>(&at), sizeof at), 0);
+    }
+    EXPECT_TRUE(listener.openUnix(path));
+}
+
+TEST_F(UnixListenerTest, LeavesALiveOneAndOtherFilesAlone) {
+    Listener first;
+    ASSERT_TRUE(first.openUnix(path));
+    EXPECT_EQ(listener.openUnix(path).error().code, ErrorCode::kUnavailable);
+    const std::string file = directory.path() + "/file";
+    std::ofstream(file) << "precious";
+    EXPECT_EQ(Listener().openUnix(file).error().code, ErrorCode::kUnavailable);
+    std::string content;
+    std::getline(std::ifstream(file) >> std::ws, content);
+    EXPECT_EQ(content, "precious");
+    EXPECT_EQ(Listener().openUnix(directory.path() + "/" + std::string(200, 'x')).error().code,
+              ErrorCode::kUnavailable);
+    EXPECT_EQ(Listener().openUnix("/nowhere/s.sock").error().code, ErrorCode::kUnavailable);
+}
+
+TEST_F(UnixListenerTest, IsGoneAfterwards) {
+    { EXPECT_TRUE(Listener().openUnix(path)); }
+    EXPECT_NE(::access(path.c_str(), F_OK), 0);
 }
 
 TEST_F(ListenerTest, RefusesMoreThanItsCapacityUntilSomeClose) {

@@ -1,0 +1,111 @@
+// The API keys of a server: who presents which, and how much each has used.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "core/base/error.h"
+#include "server/security/key.h"
+#include "server/security/key_store.h"
+
+namespace shapedb::security {
+
+/// What a refused caller is told: the error, and when it may try again.
+struct Refusal {
+    Error error;
+    std::chrono::milliseconds retryAfter{0};
+};
+
+/// Both clocks of this process; tests have their own.
+struct Clock {
+    std::function<UnixMs()> wall;                          ///< the system's time
+    std::function<std::chrono::milliseconds()> monotonic;  ///< never goes back
+};
+[[nodiscard]] Clock systemClock();
+
+/// A key in use, with what it has used. Thread-safe.
+class KeyHolder {
+  public:
+    KeyHolder(Key key, KeyUsage usage);
+
+    /// As it was made.
+    [[nodiscard]] const Key& key() const { return key_; }
+    [[nodiscard]] std::optional<UnixMs> revoked() const;
+    void revoke(UnixMs when) { revoked_ = when; }
+
+    /// Takes one call off its rate (a token bucket that holds the calls of one second). Errors: kRateLimited.
+    [[nodiscard]] tl::expected<void, Refusal> takeCall(std::chrono::milliseconds now);
+    /// Counts one scan of `bytes` bytes, or nothing at all if that is more than is left of the day. Errors:
+    /// kRateLimited, until midnight UTC.
+    [[nodiscard]] tl::expected<void, Refusal> takeScan(std::uint64_t bytes, UnixMs now);
+    /// Of the day of `now`.
+    [[nodiscard]] KeyUsage usage(UnixMs now) const;
+
+  private:
+    void beginDay(std::int64_t day) const;
+
+    const Key key_;
+    std::atomic<UnixMs> revoked_;  ///< kNever: it was not
+    mutable std::mutex mutex_;
+    mutable KeyUsage usage_;
+    double tokens_;
+    std::chrono::milliseconds refilled_{0};
+};
+
+struct KeyStatus {
+    Key key;
+    KeyUsage today;
+};
+
+struct CreatedKey {
+    Key key;
+    std::string text;  ///< the whole key; nobody can read it again
+};
+
+/// Thread-safe.
+class Keyring {
+  public:
+    explicit Keyring(std::unique_ptr<KeyStore> store, Clock clock = systemClock());
+
+    /// Reads the keys. Call once, first. Errors of this and the next three: those of KeyStore.
+    [[nodiscard]] Result<void> load();
+    /// Errors: kInvalidArgument, as `validate`.
+    [[nodiscard]] Result<CreatedKey> create(const KeySpec& spec);
+    /// The oldest first.
+    [[nodiscard]] Result<std::vector<KeyStatus>> list();
+    /// Nobody can use the key from now on. Errors: kNotFound (there is none, or it was revoked before).
+    [[nodiscard]] Result<Key> revoke(const std::string& id);
+
+    /// Who presents `presented`. Keys that another process has made or revoked count within a second.
+    /// Errors: kUnauthenticated (no such key, revoked, expired); those of KeyStore.
+    [[nodiscard]] Result<std::shared_ptr<KeyHolder>> find(const std::string& presented);
+    /// Whether there is a key that can be used.
+    [[nodiscard]] bool hasUsableKey() const;
+    [[nodiscard]] const Clock& clock() const { return clock_; }
+
+    /// Writes what has been used since the last time; call now and then. A process that dies loses what it
+    /// has not written. Errors: those of KeyStore.
+    [[nodiscard]] Result<void> saveUsage();
+
+  private:
+    Result<void> reload();
+    Result<void> reloadIfChanged();
+    std::shared_ptr<KeyHolder> holderOf(const std::string& id) const;
+
+    const std::unique_ptr<KeyStore> store_;
+    const Clock clock_;
+    mutable std::mutex mutex_;
+    std::map<std::string, std::shared_ptr<KeyHolder>> holders_;  ///< by id
+    std::map<std::string, KeyUsage> saved_;
+    std::int64_t version_ = 0;
+    std::chrono::milliseconds looked_{0};
+};
+
+}  // namespace shapedb::security

@@ -1,0 +1,35 @@
+// Writes what API keys have used, now and then.
+#pragma once
+
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+
+#include "server/security/keyring.h"
+#include "server/telemetry/logger.h"
+
+namespace shapedb::security {
+
+/// Saves every ten seconds while it lives, and once more when it is destroyed.
+class UsageSaver {
+  public:
+    /// `keyring` must outlive this.
+    UsageSaver(Keyring& keyring, telemetry::LoggerPtr log);
+    ~UsageSaver();
+    UsageSaver(const UsageSaver&) = delete;
+    UsageSaver& operator=(const UsageSaver&) = delete;
+
+  private:
+    void run();
+    void save();
+
+    Keyring& keyring_;
+    const telemetry::LoggerPtr log_;
+    bool failing_ = false;  ///< told once
+    std::mutex mutex_;
+    std::condition_variable wake_;
+    bool ending_ = false;
+    std::thread thread_;
+};
+
+}  // namespace shapedb::security

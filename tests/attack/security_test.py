@@ -1,0 +1,507 @@
+"""Who may do what: TLS, API keys, roles, collections, limits; and that no secret is told anywhere."""
+
+import datetime
+import glob
+import json
+import os
+import subprocess
+import tempfile
+import threading
+import time
+import unittest
+
+from attacker import Client, Server, admin, align, ball, collections, eventually, grpc, main, reason, search, shapes
+from google.protobuf import timestamp_pb2
+
+READER, WRITER, ADMIN = admin.ROLE_READER, admin.ROLE_WRITER, admin.ROLE_ADMIN
+
+# Every rpc: the role it needs, and what it touches. Written down here apart from the server's own table.
+COLLECTION, NOTHING, WHOLE_SERVER = "the collection it names", "nothing stored", "the whole server"
+RULES = {
+    "ShapeService": {
+        "AddShape": (WRITER, COLLECTION), "GetShape": (READER, COLLECTION), "ListShapes": (READER, COLLECTION),
+        "CountShapes": (READER, COLLECTION), "DeleteShape": (WRITER, COLLECTION),
+        "WatchIngest": (READER, COLLECTION), "GetSignature": (READER, COLLECTION),
+        "GetSegments": (READER, COLLECTION), "Segment": (READER, NOTHING),
+        "GetShapes": (READER, COLLECTION), "GetPoints": (READER, COLLECTION), "CountByValue": (READER, COLLECTION),
+        "DeleteShapes": (WRITER, COLLECTION), "UpdateMetadata": (WRITER, COLLECTION),
+        "RetryShapes": (WRITER, COLLECTION),
+    },
+    "SearchService": {
+        "SearchByKey": (READER, COLLECTION), "SearchByScan": (READER, COLLECTION),
+        "SearchBySignature": (READER, COLLECTION), "SearchBatch": (READER, COLLECTION),
+        "Compare": (READER, COLLECTION),
+    },
+    "AlignService": {"Align": (READER, COLLECTION)},
+    "CollectionService": {
+        "CreateCollection": (ADMIN, COLLECTION), "GetCollection": (READER, COLLECTION),
+        "ListCollections": (READER, NOTHING), "DeleteCollection": (ADMIN, COLLECTION),
+        "RenameCollection": (ADMIN, COLLECTION), "SetAlias": (ADMIN, COLLECTION), "DeleteAlias": (ADMIN, COLLECTION),
+    },
+    "AdminService": {
+        "Rebuild": (ADMIN, COLLECTION), "CancelRebuild": (ADMIN, COLLECTION), "Backup": (ADMIN, WHOLE_SERVER),
+        "Restore": (ADMIN, WHOLE_SERVER), "Check": (ADMIN, WHOLE_SERVER), "Stats": (ADMIN, WHOLE_SERVER),
+        "ServerInfo": (READER, NOTHING), "CreateKey": (ADMIN, WHOLE_SERVER), "ListKeys": (ADMIN, WHOLE_SERVER),
+        "RevokeKey": (ADMIN, WHOLE_SERVER),
+    },
+}
+
+
+def messages(rpc, collection):
+    """What is sent to an rpc so that it concerns a collection; harmless where it is allowed."""
+    ref = shapes.ShapeRef(collection=collection, key="nobody")
+    special = {
+        "AddShape": [shapes.AddShapeRequest(header=shapes.AddShapeHeader(
+            collection=collection, key="k", point_count=3))],
+        "SearchByKey": [search.SearchByKeyRequest(options=search.SearchOptions(collection=collection, k=1), key="k")],
+        "SearchByScan": [search.SearchByScanRequest(header=search.SearchByScanHeader(
+            options=search.SearchOptions(collection=collection, k=1), point_count=4))],
+        "SearchBySignature": [search.SearchBySignatureRequest(
+            options=search.SearchOptions(collection=collection, k=1))],
+        "SearchBatch": [search.SearchBatchRequest(options=search.SearchOptions(collection=collection, k=1))],
+        "Compare": [search.CompareRequest(query=shapes.ShapeRef(collection="open", key="k"), other=ref)],
+        "Align": [align.AlignRequest(header=align.AlignHeader(query_points=4, key=ref))],
+        "Segment": [shapes.SegmentRequest(header=shapes.SegmentHeader(point_count=3))],
+        "CreateCollection": [collections.CreateCollectionRequest(name=collection)],
+        "GetCollection": [collections.GetCollectionRequest(name=collection)],
+        "DeleteCollection": [collections.DeleteCollectionRequest(name=collection)],
+        "RenameCollection": [collections.RenameCollectionRequest(name=collection, new_name="open")],
+        "SetAlias": [collections.SetAliasRequest(alias="open", collection=collection)],
+        "DeleteAlias": [collections.DeleteAliasRequest(alias=collection)],
+        "CreateKey": [admin.CreateKeyRequest(name="", role=READER)],
+    }
+    return special.get(rpc)
+
+
+def methods():
+    for module in (shapes, search, align, collections, admin):
+        for service in module.DESCRIPTOR.services_by_name.values():
+            for method in service.methods:
+                yield service, method
+
+
+def request_of(method, collection):
+    given = messages(method.name, collection)
+    if given is not None:
+        return given
+    message = method.input_type._concrete_class()
+    if "collection" in method.input_type.fields_by_name:
+        message.collection = collection
+    elif "shape" in method.input_type.fields_by_name:
+        message.shape.collection = collection
+        message.shape.key = "nobody"
+    return [message]
+
+
+def call(channel, service, method, collection, metadata=()):
+    """Makes any rpc by its description; the status code."""
+    path = f"/{service.full_name}/{method.name}"
+    sends = request_of(method, collection)
+    serialize = method.input_type._concrete_class.SerializeToString
+    parse = method.output_type._concrete_class.FromString
+    kind = ("stream" if method.client_streaming else "unary") + "_" + (
+        "stream" if method.server_streaming else "unary")
+    make = getattr(channel, kind)(path, request_serializer=serialize, response_deserializer=parse)
+    argument = iter(sends) if method.client_streaming else sends[0]
+    try:
+        answer = make(argument, timeout=30, metadata=metadata)
+        if method.server_streaming:
+            list(answer)
+        return grpc.StatusCode.OK
+    except grpc.RpcError as error:
+        return error.code()
+
+
+def bearer(key):
+    return (("authorization", "Bearer " + key),)
+
+
+class SecuredServer(Server):
+    """Demands keys, and has a Unix socket for its own admin."""
+
+    def __init__(self, *flags, **options):
+        super().__init__("--security-keys", "always", "--unix-socket", "{data}.sock", *flags, first_key=True,
+                         **options)
+
+    def local(self):
+        return Client("unix:" + self.data + ".sock")
+
+    def make(self, role, name="test", **spec):
+        with self.local() as client:
+            return client.admin.CreateKey(admin.CreateKeyRequest(name=name, role=role, **spec), timeout=10)
+
+
+class Matrix(unittest.TestCase):
+    def test_every_rpc_for_every_role_and_collection(self):
+        self.assertEqual({s.name: {m.name for m in s.methods} for s, _ in methods()},
+                         {s: set(rules) for s, rules in RULES.items()}, "the table lists every rpc")
+        with SecuredServer() as server:
+            with server.local() as local:
+                for name in ("open", "closed"):
+                    local.collections.CreateCollection(collections.CreateCollectionRequest(name=name), timeout=10)
+            keys = {(role, some): server.make(role, collections=["open"] if some else []).secret
+                    for role in (READER, WRITER, ADMIN) for some in (False, True)}
+            channel = grpc.insecure_channel(server.address)
+            for service, method in methods():
+                needed, touches = RULES[service.name][method.name]
+                for collection in ("open", "closed", "not there"):
+                    with self.subTest(rpc=method.name, collection=collection, key=None):
+                        self.assertEqual(call(channel, service, method, collection),
+                                         grpc.StatusCode.UNAUTHENTICATED)
+                        self.assertEqual(call(channel, service, method, collection, bearer("shapedb_1_2")),
+                                         grpc.StatusCode.UNAUTHENTICATED)
+                    for (role, some), key in keys.items():
+                        with self.subTest(rpc=method.name, collection=collection, role=role, some=some):
+                            code = call(channel, service, method, collection, bearer(key))
+                            denied = (role < needed or (some and touches == WHOLE_SERVER) or
+                                      (some and touches == COLLECTION and collection != "open"))
+                            if denied:
+                                self.assertEqual(code, grpc.StatusCode.PERMISSION_DENIED)
+                            else:
+                                self.assertNotIn(code, (grpc.StatusCode.PERMISSION_DENIED,
+                                                        grpc.StatusCode.UNAUTHENTICATED,
+                                                        grpc.StatusCode.INTERNAL))
+                # What an allowed admin has deleted or made is put back.
+                with server.local() as local:
+                    for name in ("open", "closed"):
+                        try:
+                            local.collections.CreateCollection(
+                                collections.CreateCollectionRequest(name=name), timeout=10)
+                        except grpc.RpcError:
+                            pass
+            channel.close()
+
+    def test_lists_only_the_collections_of_the_key(self):
+        with SecuredServer() as server:
+            with server.local() as local:
+                for name in ("mine", "theirs"):
+                    local.collections.CreateCollection(collections.CreateCollectionRequest(name=name), timeout=10)
+            key = server.make(READER, collections=["mine", "not made yet"][:1]).secret
+            with server.connect(key=key) as client:
+                listed = client.collections.ListCollections(collections.ListCollectionsRequest(), timeout=10)
+                self.assertEqual([c.name for c in listed.collections], ["mine"])
+
+    def test_an_alias_is_what_it_stands_for(self):
+        with SecuredServer() as server:
+            def alias(collection, client):
+                client.collections.SetAlias(collections.SetAliasRequest(alias="live", collection=collection), timeout=10)
+
+            def count(client, collection):
+                return client.shapes.CountShapes(shapes.CountShapesRequest(collection=collection), timeout=10).count
+
+            def denied(make):
+                with self.assertRaises(grpc.RpcError) as raised:
+                    make()
+                self.assertEqual(raised.exception.code(), grpc.StatusCode.PERMISSION_DENIED)
+                return raised.exception.details()
+
+            with server.local() as local:
+                for name in ("mine", "theirs"):
+                    local.collections.CreateCollection(collections.CreateCollectionRequest(name=name), timeout=10)
+                alias("mine", local)
+                mine = server.make(ADMIN, collections=["mine"]).secret
+                live = server.make(READER, collections=["live"]).secret
+                with server.connect(key=mine) as holder, server.connect(key=live) as follower:
+                    self.assertEqual(count(holder, "live"), 0)
+                    self.assertEqual(count(follower, "live"), 0)
+                    denied(lambda: count(follower, "mine"))
+                    alias("theirs", local)
+                    told = denied(lambda: count(holder, "live"))
+                    self.assertNotIn("theirs", told, "what an alias stands for is not told")
+                    self.assertEqual(count(follower, "live"), 0)
+                    # Nobody reaches a collection by an alias or a name of his own making.
+                    denied(lambda: holder.collections.SetAlias(
+                        collections.SetAliasRequest(alias="mine2", collection="mine"), timeout=10))
+                    denied(lambda: holder.collections.SetAlias(
+                        collections.SetAliasRequest(alias="mine", collection="theirs"), timeout=10))
+                    denied(lambda: alias("mine", holder))
+                    denied(lambda: holder.collections.DeleteAlias(
+                        collections.DeleteAliasRequest(alias="live"), timeout=10))
+                    denied(lambda: holder.collections.RenameCollection(
+                        collections.RenameCollectionRequest(name="mine", new_name="other"), timeout=10))
+
+
+class Keys(unittest.TestCase):
+    def test_live_as_long_as_they_should(self):
+        with SecuredServer() as server:
+            soon = timestamp_pb2.Timestamp()
+            soon.FromDatetime(datetime.datetime.utcnow() + datetime.timedelta(seconds=3))
+            short, long = server.make(WRITER, expires=soon), server.make(WRITER)
+            with server.connect(key=short.secret) as client:
+                self.assertEqual(client.count(), 0)
+                self.assertTrue(eventually(lambda: self.refused(client), 10))
+            with server.connect(key=long.secret) as client, server.local() as local:
+                self.assertEqual(client.count(), 0)
+                local.admin.RevokeKey(admin.RevokeKeyRequest(id=long.key.id), timeout=10)
+                self.assertTrue(self.refused(client), "from the next call on")
+
+    def refused(self, client):
+        try:
+            client.count()
+            return False
+        except grpc.RpcError as error:
+            self.assertEqual(error.code(), grpc.StatusCode.UNAUTHENTICATED)
+            return True
+
+    def test_are_also_made_and_revoked_on_the_data_directory(self):
+        with SecuredServer() as server:
+            made = server.key_command("create", "--name", "by hand", "--role", "writer")
+            secret = made.stdout.strip()
+            with server.connect(key=secret) as client:
+                self.assertTrue(eventually(lambda: not self.refused(client), 5), "within a second")
+                listed = server.key_command("list").stdout
+                key_id = next(line.split()[0] for line in listed.splitlines() if "by hand" in line)
+                self.assertNotIn(secret.rsplit("_", 1)[1], listed)
+                server.key_command("revoke", key_id)
+                self.assertTrue(eventually(lambda: self.refused(client), 5))
+
+    def test_without_a_key_nobody_makes_one_over_the_network(self):
+        with Server() as server, server.connect() as client:  # loopback, keys optional
+            self.assertEqual(client.count(), 0)
+            with self.assertRaises(grpc.RpcError) as error:
+                client.admin.CreateKey(admin.CreateKeyRequest(name="mine", role=ADMIN), timeout=10)
+            self.assertEqual(error.exception.code(), grpc.StatusCode.UNAUTHENTICATED)
+
+    def test_a_backup_holds_none_and_a_restore_revives_none(self):
+        with SecuredServer() as server:
+            key = server.make(ADMIN)
+            with server.local() as local:
+                backup = list(local.admin.Backup(admin.BackupRequest(), timeout=60))
+                content = b"".join(chunk.data for chunk in backup)
+                self.assertNotIn(key.key.id.encode(), content)
+                local.admin.RevokeKey(admin.RevokeKeyRequest(id=key.key.id), timeout=10)
+                local.admin.Restore(iter(backup), timeout=60)
+            with server.connect(key=key.secret) as client:
+                self.assertTrue(self.refused(client))
+
+    def test_keep_to_their_rate_and_their_day(self):
+        with SecuredServer() as server:
+            slow = server.make(READER, limits=admin.KeyLimits(calls_per_second=3))
+            with server.connect(key=slow.secret) as client:
+                waits = []
+                for _ in range(12):
+                    try:
+                        client.count()
+                    except grpc.RpcError as error:
+                        self.assertEqual(error.code(), grpc.StatusCode.RESOURCE_EXHAUSTED)
+                        self.assertEqual(reason(error), "rate_limited")
+                        waits.append(int(dict(error.trailing_metadata())["grpc-retry-pushback-ms"]))
+                self.assertGreaterEqual(len(waits), 6)
+                self.assertLessEqual(max(waits), 334)
+                time.sleep(max(waits[-1], 1) / 1000)
+                client.count()
+            limits = admin.KeyLimits(scans_per_day=2, bytes_per_day=12 * 1_000)
+            daily = server.make(WRITER, limits=limits)
+            with server.connect(key=daily.secret) as client:
+                client.add("first", ball(600), wait=False)
+                self.limited(client, "too many bytes", ball(500))
+                client.add("second", ball(400), wait=False)
+                self.limited(client, "too many scans", ball(4))
+            with server.local() as local:
+                listed = {k.id: k for k in local.admin.ListKeys(admin.ListKeysRequest(), timeout=10).keys}
+                self.assertEqual(listed[daily.key.id].scans_today, 2)
+                self.assertEqual(listed[daily.key.id].bytes_today, 12_000)
+            self.assertEqual(server.stop(), 0)
+            server.start()
+            with server.connect(key=daily.secret) as client:
+                self.limited(client, "after a restart", ball(4))
+
+    def limited(self, client, name, points):
+        with self.assertRaises(grpc.RpcError) as error:
+            client.add(name, points, wait=False)
+        self.assertEqual(reason(error.exception), "rate_limited")
+
+
+class Secrets(unittest.TestCase):
+    def test_are_told_nowhere(self):
+        with SecuredServer("--log-level", "trace", "--log-format", "json") as server:
+            key = server.make(READER)
+            secret = key.secret.rsplit("_", 1)[1]
+            wrong = key.secret[:-4] + "beef"
+            answers = []
+            for presented in (key.secret, wrong, key.secret.upper(), "Basic " + key.secret):
+                with server.connect(key=presented) as client:
+                    for attempt in (client.count, lambda c=client: c.admin.Stats(admin.StatsRequest(), timeout=10)):
+                        try:
+                            attempt()
+                        except grpc.RpcError as error:
+                            answers.append(error.details())
+            for text in answers:
+                self.assertNotIn(secret[:16], text.lower())
+            shown = subprocess.run([os.environ["SHAPEDBD"], "--data", server.data, "--check-config"],
+                                   capture_output=True, text=True, check=True).stdout
+            self.assertNotIn(secret[:16], shown)
+            with open(f"/proc/{server.process.pid}/cmdline") as line:
+                self.assertNotIn(secret[:16], line.read())
+            self.assertEqual(server.stop(), 0)
+            self.assertIn("caller", server.log())
+            files = [server.log_path, *glob.glob(server.data + "/**", recursive=True)]
+            for path in files:
+                if os.path.isfile(path):
+                    with open(path, "rb") as content:
+                        found = content.read().lower()
+                    self.assertNotIn(secret[:16].encode(), found, path)
+                    self.assertNotIn(wrong[-20:].encode(), found, path)
+
+    def test_the_audit_log_tells_who_did_what(self):
+        with SecuredServer() as server:
+            key = server.make(ADMIN, name="ann")
+            with server.connect(key=key.secret) as client:
+                client.collections.CreateCollection(collections.CreateCollectionRequest(name="bones"), timeout=10)
+                client.count()
+            with server.connect() as stranger:
+                with self.assertRaises(grpc.RpcError):
+                    stranger.count()
+            with open(server.data + "/audit.log") as file:
+                lines = [json.loads(line) for line in file]
+            self.assertEqual([(line["message"], line["rpc"]) for line in lines],
+                             [("administration", "CreateKey"), ("administration", "CreateCollection"),
+                              ("refused", "CountShapes")])
+            self.assertEqual(lines[0]["api_key_name"], "ann")
+            self.assertEqual(lines[1]["caller"], key.key.id)
+            self.assertEqual(lines[1]["collection"], "bones")
+            self.assertNotIn("caller", lines[2])
+
+
+class Certificates:
+    """An authority and what it signs, made with openssl."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        self.run("req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-days", "2",
+                 "-keyout", self.path("ca.key"), "-out", self.path("ca.pem"), "-subj", "/CN=authority")
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    def run(self, *arguments):
+        subprocess.run(["openssl", *arguments], check=True, capture_output=True)
+
+    def read(self, name):
+        with open(self.path(name), "rb") as file:
+            return file.read()
+
+    def sign(self, name):
+        """NAME.key and NAME.pem, for localhost."""
+        self.run("req", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-keyout",
+                 self.path(name + ".key"), "-out", self.path(name + ".csr"), "-subj", "/CN=" + name)
+        with open(self.path("names"), "w") as file:
+            file.write("subjectAltName=DNS:localhost,IP:127.0.0.1")
+        self.run("x509", "-req", "-in", self.path(name + ".csr"), "-CA", self.path("ca.pem"), "-CAkey",
+                 self.path("ca.key"), "-CAcreateserial", "-days", "2", "-extfile", self.path("names"), "-out",
+                 self.path(name + ".pem"))
+
+    def install(self, name, part):
+        """Puts a file of `name` where the server reads it, as certbot does: in one step."""
+        with open(self.path("new"), "wb") as file:
+            file.write(self.read(f"{name}.{part}"))
+        os.replace(self.path("new"), self.path("server." + part))
+
+
+class Tls(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory(prefix="shapedb-tls-")
+        self.addCleanup(folder.cleanup)
+        self.certificates = Certificates(folder.name)
+        for name in ("first", "second", "client"):
+            self.certificates.sign(name)
+        self.install("first")
+
+    def install(self, name):
+        self.certificates.install(name, "pem")
+        self.certificates.install(name, "key")
+
+    def server(self, *flags):
+        path = self.certificates.path
+        return SecuredServer("--tls-certificate", path("server.pem"), "--tls-key", path("server.key"), *flags,
+                             listen="0.0.0.0:0")
+
+    def connect(self, server, key, **client):
+        credentials = grpc.ssl_channel_credentials(self.certificates.read("ca.pem"), **client)
+        return Client(f"localhost:{server.port}", key=key, credentials=credentials)
+
+    def serial(self, server):
+        """Of the certificate that a new connection is shown."""
+        shown = subprocess.run(["openssl", "s_client", "-connect", f"127.0.0.1:{server.port}", "-alpn", "h2"],
+                               input=b"", capture_output=True).stdout
+        return subprocess.run(["openssl", "x509", "-noout", "-subject"], input=shown, capture_output=True,
+                              check=True).stdout.decode().strip()
+
+    def test_beyond_loopback_only_with_tls_and_a_key(self):
+        with self.assertRaises(RuntimeError) as error:
+            Server(listen="0.0.0.0:0")
+        self.assertIn("tls.certificate", str(error.exception))
+        path = self.certificates.path
+        with self.assertRaises(RuntimeError) as error:
+            Server("--tls-certificate", path("server.pem"), "--tls-key", path("server.key"), listen="0.0.0.0:0")
+        self.assertIn("shapedbd key create", str(error.exception))
+        with self.server() as server:
+            key = server.make(READER).secret
+            with self.connect(server, key) as client:
+                self.assertEqual(client.count(), 0)
+                self.assertTrue(client.serving())
+            with self.connect(server, None) as client, self.assertRaises(grpc.RpcError) as error:
+                client.count()
+            self.assertEqual(error.exception.code(), grpc.StatusCode.UNAUTHENTICATED)
+            with Client(server.address, key=key) as plain, self.assertRaises(grpc.RpcError) as error:
+                plain.count(timeout=5)
+            self.assertEqual(error.exception.code(), grpc.StatusCode.UNAVAILABLE, "no TLS, no answer")
+
+    def test_certificates_are_replaced_without_a_dropped_call(self):
+        with self.server() as server:
+            key = server.make(READER).secret
+            self.assertIn("first", self.serial(server))
+            failures, calls, stop = [], [0], threading.Event()
+
+            def read():
+                while not stop.is_set():
+                    try:
+                        with self.connect(server, key) as client:  # a new connection each time
+                            client.count()
+                        calls[0] += 1
+                    except grpc.RpcError as error:
+                        failures.append(error.details())
+
+            reader = threading.Thread(target=read)
+            with self.connect(server, key) as lasting:
+                lasting.count()
+                reader.start()
+                for name in ("second", "first", "second"):
+                    self.install(name)
+                    self.assertTrue(eventually(lambda n=name: n in self.serial(server), 15), name)
+                lasting.count()
+            stop.set()
+            reader.join()
+            self.assertEqual(failures, [])
+            self.assertGreater(calls[0], 20)
+
+    def test_a_mismatched_pair_keeps_the_old_and_says_so(self):
+        with self.server() as server:
+            key = server.make(READER).secret
+            self.certificates.install("second", "pem")  # and not its key
+            self.assertTrue(eventually(lambda: "key of another certificate" in server.log(), 10))
+            time.sleep(2)
+            self.assertIn("first", self.serial(server))
+            with self.connect(server, key) as client:
+                client.count()
+            self.certificates.install("second", "key")
+            self.assertTrue(eventually(lambda: "second" in self.serial(server), 15))
+        with self.assertRaises(RuntimeError) as error:
+            self.certificates.install("first", "pem")
+            self.server()
+        self.assertIn("key of another certificate", str(error.exception))
+
+    def test_clients_may_have_to_show_a_certificate(self):
+        with self.server("--tls-client-ca", self.certificates.path("ca.pem")) as server:
+            key = server.make(READER).secret
+            with self.connect(server, key) as client, self.assertRaises(grpc.RpcError) as error:
+                client.count(timeout=5)
+            self.assertEqual(error.exception.code(), grpc.StatusCode.UNAVAILABLE)
+            shown = {"private_key": self.certificates.read("client.key"),
+                     "certificate_chain": self.certificates.read("client.pem")}
+            with self.connect(server, key, **shown) as client:
+                self.assertEqual(client.count(), 0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,111 @@
+#include "server/store/sqlite/sqlite_key_store.h"
+
+#include <fstream>
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include "tests/support/temporary_directory.h"
+
+namespace shapedb::store {
+namespace {
+
+using security::Key;
+
+Key keyNamed(const std::string& id, security::UnixMs created) {
+    Key key;
+    key.id = id;
+    key.spec.name = "of " + id;
+    key.spec.role = security::Role::kWriter;
+    key.spec.collections = {"bones", "stones"};
+    key.spec.limits = {7, 8, ~std::uint64_t{0}};
+    key.secretSha256 = sha256(id.data(), id.size());
+    key.created = created;
+    return key;
+}
+
+class SqliteKeyStoreTest : public ::testing::Test {
+  protected:
+    std::unique_ptr<security::KeyStore> open() {
+        auto opened = openSqliteKeyStore(path_);
+        EXPECT_TRUE(opened) << opened.error().message;
+        return std::move(*opened);
+    }
+    testing::TemporaryDirectory directory_;
+    std::string path_ = directory_.path() + "/keys.sqlite";
+};
+
+TEST_F(SqliteKeyStoreTest, KeepsEverything) {
+    Key first = keyNamed("b", 100), second = keyNamed("a", 200);
+    second.spec.collections.clear();
+    second.spec.expires = 5'000;
+    {
+        const auto store = open();
+        ASSERT_TRUE(store->insert(second));
+        ASSERT_TRUE(store->insert(first));
+        ASSERT_TRUE(store->revoke("b", 300));
+        ASSERT_TRUE(store->saveUsage({{"a", {20'000, 3, 4}}}));
+        ASSERT_TRUE(store->saveUsage({{"a", {20'001, 1, 2}}}));
+    }
+    const auto store = open();
+    const auto keys = store->list().value();
+    ASSERT_EQ(keys.size(), 2u);
+    EXPECT_EQ(keys[0].id, "b") << "the oldest first";
+    EXPECT_EQ(keys[0].spec.name, "of b");
+    EXPECT_EQ(keys[0].spec.role, security::Role::kWriter);
+    EXPECT_EQ(keys[0].spec.collections, first.spec.collections);
+    EXPECT_EQ(keys[0].spec.limits.callsPerSecond, 7u);
+    EXPECT_EQ(keys[0].spec.limits.scansPerDay, 8u);
+    EXPECT_EQ(keys[0].spec.limits.bytesPerDay, ~std::uint64_t{0});
+    EXPECT_EQ(keys[0].secretSha256, first.secretSha256);
+    EXPECT_EQ(keys[0].created, 100);
+    EXPECT_EQ(keys[0].revoked, 300);
+    EXPECT_FALSE(keys[0].spec.expires);
+    EXPECT_TRUE(keys[1].spec.collections.empty());
+    EXPECT_EQ(keys[1].spec.expires, 5'000);
+    EXPECT_FALSE(keys[1].revoked);
+    const auto usage = store->usage().value();
+    ASSERT_EQ(usage.size(), 1u);
+    EXPECT_EQ(usage.at("a").day, 20'001);
+    EXPECT_EQ(usage.at("a").scans, 1u);
+}
+
+TEST_F(SqliteKeyStoreTest, RevokesOnce) {
+    const auto store = open();
+    ASSERT_TRUE(store->insert(keyNamed("a", 1)));
+    EXPECT_EQ(store->revoke("a", 9).value().revoked, 9);
+    EXPECT_EQ(store->revoke("a", 10).error().code, ErrorCode::kNotFound);
+    EXPECT_EQ(store->revoke("b", 10).error().code, ErrorCode::kNotFound);
+    EXPECT_EQ(store->list().value()[0].revoked, 9);
+}
+
+TEST_F(SqliteKeyStoreTest, TheVersionTellsOfOtherProcesses) {
+    const auto ours = open(), theirs = open();
+    const auto before = ours->version().value();
+    EXPECT_EQ(ours->version().value(), before);
+    ASSERT_TRUE(theirs->insert(keyNamed("a", 1)));
+    const auto after = ours->version().value();
+    EXPECT_NE(after, before);
+    EXPECT_EQ(ours->list().value().size(), 1u);
+    EXPECT_EQ(ours->version().value(), after);
+}
+
+TEST_F(SqliteKeyStoreTest, OnlyTheOwnerCanReadTheFile) {
+    const auto previous = ::umask(0);
+    open();
+    ::umask(previous);
+    struct stat status {};
+    ASSERT_EQ(::stat(path_.c_str(), &status), 0);
+    EXPECT_EQ(status.st_mode & 0777, 0600u);
+}
+
+TEST_F(SqliteKeyStoreTest, RefusesOtherFiles) {
+    std::ofstream(path_) << "not a database, but long enough to look like one: " << std::string(2'000, 'x');
+    const auto opened = openSqliteKeyStore(path_);
+    ASSERT_FALSE(opened);
+    EXPECT_EQ(opened.error().code, ErrorCode::kDataLoss);
+    EXPECT_EQ(openSqliteKeyStore(directory_.path()).error().code, ErrorCode::kStorage);
+}
+
+}  // namespace
+}  // namespace shapedb::store
