@@ -129,7 +129,7 @@ Result<void> storeOne(store::Store& store, std::int64_t collection, const std::s
     store::PutRequest put(std::move(*scan));
     put.collectionId = collection;
     put.key = key;
-    put.metadata = {{"family", "mug"}};
+    put.metadata.set = {{"family", "mug"}};
     const auto stored = store.putShape(put);
     RETURN_IF_ERROR(stored);
     const auto job = store.claimJob();

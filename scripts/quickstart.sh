@@ -43,7 +43,7 @@ run build/bin/shapedb sample "$demo/scans" --count 4 --points 10000 > /dev/null
 ls "$demo/scans" | paste -sd' '
 
 step "Upload and segment"
-run build/bin/shapedb add "$demo/scans" --label-from-folder --wait
+run build/bin/shapedb add "$demo/scans" --base "$demo/scans" --label-from-folder --wait
 
 step "Rebuild the index from the stored points"
 run build/bin/shapedb admin rebuild

@@ -58,8 +58,8 @@ struct ClientOptions {
     /// A file with the key in its first line; empty: no key.
     std::string apiKeyFile{};
     /// The most one call may take, retries included; 0: no limit. Calls that follow work on the server
-    /// (watchIngest, addShape with wait, rebuild, backup, restore, check) are limited by their RunContext
-    /// alone.
+    /// (watchIngest, addShape with wait, rebuild, backup, restore, check) or change many shapes are limited
+    /// by their RunContext alone.
     std::chrono::milliseconds deadline{60000};
     RetryPolicy retry{};
 };
@@ -97,7 +97,7 @@ class Client {
 
     /// Uploads one scan with its count and checksum, in chunks of at most 1 MiB. On return the scan is
     /// durable. The same key with the same points and metadata is the same shape, so the call is retried
-    /// unless expectedVersion is set.
+    /// unless expectedVersion is set. Without metadata a shape that has the key keeps what it has.
     ///
     /// Points travel in single precision. If the scan lies so far from the origin that rounding would hurt it
     /// (a coordinate beyond 16 diagonals of the bounding box, as in surveyed coordinates), the centre of the
@@ -109,19 +109,56 @@ class Client {
     /// Errors: kNotFound.
     [[nodiscard]] Result<Shape> getShape(const ShapeRef& shape, const RunContext& context = {}) const;
 
+    /// Up to 1,000 shapes of one collection, as of one moment. Errors: kNotFound (the collection),
+    /// kInvalidArgument.
+    [[nodiscard]] Result<FoundShapes> getShapes(const std::string& collection,
+                                                const std::vector<std::string>& keys,
+                                                const RunContext& context = {}) const;
+
+    /// The stored points of a shape; nothing is segmented. Errors: kNotFound, kChecksumMismatch.
+    [[nodiscard]] Result<StoredPoints> getPoints(const ShapeRef& shape, const RunContext& context = {}) const;
+
     /// One page. Errors: kNotFound, kMalformedFilter, kMalformedCursor, kInvalidArgument.
     [[nodiscard]] Result<ListPage> listShapes(const ListRequest& request,
                                               const RunContext& context = {}) const;
 
-    /// How many shapes listShapes would return in all; page size and cursor are ignored.
+    /// How many shapes listShapes would return in all; page size, cursor and order are ignored.
     [[nodiscard]] Result<std::uint64_t> countShapes(const ListRequest& request,
                                                     const RunContext& context = {}) const;
+
+    /// How many shapes have which value under a metadata key. Errors: kNotFound, kMalformedFilter,
+    /// kInvalidArgument (also: too many different values).
+    [[nodiscard]] Result<ValueCounts> countByValue(const ValueCountRequest& request,
+                                                   const RunContext& context = {}) const;
 
     /// Deletes the shape with its points and signature; returns what it was. Not retried.
     /// Errors: kNotFound; kVersionConflict if `expectedVersion` is set and is not the current one.
     [[nodiscard]] Result<Shape> deleteShape(const ShapeRef& shape,
                                             std::optional<std::int64_t> expectedVersion = {},
                                             const RunContext& context = {}) const;
+
+    /// Deletes many shapes, some at a time; what was deleted before an error stays deleted. Not retried, and
+    /// limited by the RunContext alone. Errors: kNotFound (the collection), kMalformedFilter,
+    /// kInvalidArgument (keys).
+    [[nodiscard]] Result<DeleteReply> deleteShapes(const ShapeSelection& selection,
+                                                   const RunContext& context = {}) const;
+
+    /// Changes metadata without sending points. Errors: kNotFound, kInvalidArgument, kVersionConflict.
+    [[nodiscard]] Result<MetadataReply> updateMetadata(const ShapeRef& shape, const MetadataChange& change,
+                                                       std::optional<std::int64_t> expectedVersion = {},
+                                                       const RunContext& context = {}) const;
+
+    /// The same of all shapes that pass a filter (empty: all of the collection), some at a time; what was
+    /// changed before an error stays changed. Not retried, and limited by the RunContext alone.
+    [[nodiscard]] Result<MetadataReply> updateMetadataWhere(const std::string& collection,
+                                                            const std::string& filter,
+                                                            const MetadataChange& change,
+                                                            const RunContext& context = {}) const;
+
+    /// Queues failed shapes again; of a filter those that pass and have failed. Limited by the RunContext
+    /// alone. Errors: kNotFound (the collection), kMalformedFilter, kInvalidArgument (keys), kQueueFull.
+    [[nodiscard]] Result<RetryReply> retryShapes(const ShapeSelection& selection,
+                                                 const RunContext& context = {}) const;
 
     /// Calls `onEvent` with the current state and with each change until the shape is kReady or kFailed;
     /// returns the last event. Errors: kNotFound.
@@ -192,6 +229,18 @@ class Client {
     /// false.
     [[nodiscard]] Result<void> deleteCollection(const std::string& name, bool force,
                                                 const RunContext& context = {}) const;
+
+    /// Not retried. Errors: kNotFound, kAlreadyExists, kInvalidArgument; kRejected (the default collection).
+    [[nodiscard]] Result<Collection> renameCollection(const std::string& name, const std::string& newName,
+                                                      const RunContext& context = {}) const;
+
+    /// Makes `alias` stand for a collection, or for another one than before, at one moment. Returns that
+    /// collection. Errors: kNotFound, kAlreadyExists (a collection has this name), kInvalidArgument.
+    [[nodiscard]] Result<Collection> setAlias(const std::string& alias, const std::string& collection,
+                                              const RunContext& context = {}) const;
+
+    /// Not retried. Errors: kNotFound.
+    [[nodiscard]] Result<void> deleteAlias(const std::string& alias, const RunContext& context = {}) const;
 
     // ------------------------------------------------------------------------------------- admin
 

@@ -47,4 +47,35 @@ Result<void> Client::deleteCollection(const std::string& name, bool force, const
     return {};
 }
 
+Result<Collection> Client::renameCollection(const std::string& name, const std::string& newName,
+                                            const RunContext& context) const {
+    v1::RenameCollectionRequest request;
+    request.set_name(name);
+    request.set_new_name(newName);
+    const auto response = callUnary(impl_->options, context, kOnce, *impl_->collections,
+                                    &v1::CollectionService::Stub::RenameCollection, request);
+    RETURN_IF_ERROR(response);
+    return fromWire(*response);
+}
+
+Result<Collection> Client::setAlias(const std::string& alias, const std::string& collection,
+                                    const RunContext& context) const {
+    v1::SetAliasRequest request;
+    request.set_alias(alias);
+    request.set_collection(collection);
+    const auto response = callUnary(impl_->options, context, kIdempotent, *impl_->collections,
+                                    &v1::CollectionService::Stub::SetAlias, request);
+    RETURN_IF_ERROR(response);
+    return fromWire(*response);
+}
+
+Result<void> Client::deleteAlias(const std::string& alias, const RunContext& context) const {
+    v1::DeleteAliasRequest request;
+    request.set_alias(alias);
+    const auto response = callUnary(impl_->options, context, kOnce, *impl_->collections,
+                                    &v1::CollectionService::Stub::DeleteAlias, request);
+    RETURN_IF_ERROR(response);
+    return {};
+}
+
 }  // namespace shapedb::client

@@ -6,8 +6,6 @@ namespace shapedb::client {
 
 namespace {
 
-Error fromWire(const v1::Failure& from) { return {errorCodeFromName(from.error()), from.message()}; }
-
 ShapeState fromWire(v1::ShapeState from) {
     switch (from) {
         case v1::SHAPE_STATE_READY: return ShapeState::kReady;
@@ -31,6 +29,8 @@ Motion fromWire(const v1::Motion& from) {
 }
 
 }  // namespace
+
+Error fromWire(const v1::Failure& from) { return {errorCodeFromName(from.error()), from.message()}; }
 
 Timestamp fromWire(const google::protobuf::Timestamp& from) {
     return Timestamp(std::chrono::duration_cast<Timestamp::duration>(std::chrono::seconds(from.seconds()) +
@@ -85,6 +85,31 @@ void fill(const SearchOptions& from, v1::SearchOptions* to) {
     to->set_verify_candidates(from.verifyCandidates);
     if (from.oneSided) to->set_one_sided(*from.oneSided);
     if (from.viewpoint) wire::toProto(*from.viewpoint, to->mutable_viewpoint());
+    to->set_group_by(from.groupBy);
+    to->set_per_group(from.perGroup);
+}
+
+void fill(const MetadataChange& from, v1::MetadataChange* to) {
+    to->mutable_set()->insert(from.set.begin(), from.set.end());
+    to->mutable_remove()->Add(from.remove.begin(), from.remove.end());
+    to->set_replace_all(from.replaceAll);
+}
+
+void fill(const ShapeSelection& from, v1::ShapeSelection* to) {
+    if (from.filter) {
+        to->set_filter(*from.filter);
+    } else {
+        to->mutable_keys()->mutable_keys()->Add(from.keys.begin(), from.keys.end());
+    }
+}
+
+v1::ShapeOrder toWire(ShapeOrder order) {
+    switch (order) {
+        case ShapeOrder::kId: return v1::SHAPE_ORDER_ID;
+        case ShapeOrder::kKey: return v1::SHAPE_ORDER_KEY;
+        case ShapeOrder::kUpdated: return v1::SHAPE_ORDER_UPDATED;
+    }
+    return v1::SHAPE_ORDER_ID;
 }
 
 v1::AddMode toWire(AddMode mode) {
@@ -92,6 +117,7 @@ v1::AddMode toWire(AddMode mode) {
         case AddMode::kUpsert: return v1::ADD_MODE_UPSERT;
         case AddMode::kInsertOnly: return v1::ADD_MODE_INSERT_ONLY;
         case AddMode::kUpdateOnly: return v1::ADD_MODE_UPDATE_ONLY;
+        case AddMode::kSamePoints: return v1::ADD_MODE_SAME_POINTS;
     }
     return v1::ADD_MODE_UPSERT;
 }
@@ -268,6 +294,12 @@ SearchReply fromWire(const v1::SearchResponse& from) {
         out.verdictReliability = hit.verdict_reliability();
         to.hits.push_back(std::move(out));
     }
+    for (const v1::HitGroup& group : from.groups()) {
+        HitGroup out;
+        if (group.has_value()) out.value = group.value();
+        out.hits = group.hits();
+        to.groups.push_back(std::move(out));
+    }
     to.candidates = from.candidates();
     to.filtered = from.filtered();
     to.scored = from.scored();
@@ -305,6 +337,7 @@ Collection fromWire(const v1::Collection& from) {
     to.parameters.views = from.signature().views();
     to.parameters.unit = wire::fromProto(from.signature().unit()).value_or(LengthUnit::kNone);
     to.generation = from.generation();
+    to.aliases.assign(from.aliases().begin(), from.aliases().end());
     to.created = fromWire(from.created());
     to.shapes = from.shapes();
     to.shapesReady = from.shapes_ready();

@@ -42,10 +42,14 @@ void fillParameters(const Parameters& from, Message* to) {
 
 [[nodiscard]] v1::AddMode toWire(AddMode mode);
 [[nodiscard]] v1::ShapeState toWire(const std::optional<ShapeState>& state);
+[[nodiscard]] v1::ShapeOrder toWire(ShapeOrder order);
+void fill(const MetadataChange& from, v1::MetadataChange* to);
+void fill(const ShapeSelection& from, v1::ShapeSelection* to);
 
 [[nodiscard]] Timestamp fromWire(const google::protobuf::Timestamp& from);
 [[nodiscard]] google::protobuf::Timestamp toWire(Timestamp from);
 [[nodiscard]] Shape fromWire(const v1::Shape& from);
+[[nodiscard]] Error fromWire(const v1::Failure& from);
 [[nodiscard]] AddOutcome fromWire(v1::AddShapeResponse::Outcome from);
 [[nodiscard]] IngestEvent fromWire(const v1::IngestEvent& from);
 [[nodiscard]] Signature fromWire(const v1::Signature& from);

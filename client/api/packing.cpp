@@ -1,11 +1,14 @@
 #include "client/api/packing.h"
 
 #include <algorithm>
+#include <array>
+#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <limits>
 
+#include "client/api/types.h"
 #include "common/sha256.h"
 #include "core/base/return_if_error.h"
 
@@ -127,6 +130,25 @@ std::string offsetText(const Point3& offset) {
     char buffer[120];
     std::snprintf(buffer, sizeof buffer, "%.17g %.17g %.17g", offset.x, offset.y, offset.z);
     return buffer;
+}
+
+Result<Point3> offsetOf(const std::string& text) {
+    std::array<double, 3> numbers{};
+    const char* at = text.data();
+    const char* const end = at + text.size();
+    for (double& number : numbers) {
+        while (at != end && *at == ' ') ++at;
+        const auto [next, error] = std::from_chars(at, end, number);
+        if (error != std::errc()) at = nullptr;
+        if (at == nullptr) break;
+        at = next;
+    }
+    if (at != end ||
+        !std::all_of(numbers.begin(), numbers.end(), [](double n) { return std::isfinite(n); })) {
+        return fail(ErrorCode::kDataLoss,
+                    std::string("metadata ") + kOffsetKey + ": '" + text + "' is not three numbers");
+    }
+    return Point3{numbers[0], numbers[1], numbers[2]};
 }
 
 }  // namespace shapedb::client

@@ -56,5 +56,7 @@ void writeScan(Stream& stream, const Request& header, const PackedPoints& points
 
 /// "12 0.5 -3", with enough digits to read the same doubles back.
 [[nodiscard]] std::string offsetText(const Point3& offset);
+/// The inverse. Errors: kDataLoss (other text).
+[[nodiscard]] Result<Point3> offsetOf(const std::string& text);
 
 }  // namespace shapedb::client

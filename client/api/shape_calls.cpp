@@ -3,6 +3,7 @@
 #include "client/api/client.h"
 #include "client/api/convert.h"
 #include "client/api/packing.h"
+#include "common/sha256.h"
 #include "core/base/return_if_error.h"
 
 namespace shapedb::client {
@@ -15,8 +16,20 @@ v1::AddShapeRequest addHeader(const AddRequest& request, const PackedPoints& pac
     header->set_collection(request.shape.collection);
     header->set_key(request.shape.key);
     header->set_mode(toWire(request.mode));
-    header->mutable_metadata()->insert(request.metadata.begin(), request.metadata.end());
-    if (packed.offset != Point3{}) (*header->mutable_metadata())[kOffsetKey] = offsetText(packed.offset);
+    const bool moved = packed.offset != Point3{};
+    if (request.metadata && (moved || !request.metadata->empty())) {
+        header->mutable_metadata()->insert(request.metadata->begin(), request.metadata->end());
+        if (moved) (*header->mutable_metadata())[kOffsetKey] = offsetText(packed.offset);
+    } else {
+        // What the shape has stays, except for the offset, which is of these points.
+        v1::MetadataChange* change = header->mutable_metadata_change();
+        change->set_replace_all(request.metadata.has_value());
+        if (moved) {
+            (*change->mutable_set())[kOffsetKey] = offsetText(packed.offset);
+        } else if (!request.metadata) {
+            change->add_remove(kOffsetKey);
+        }
+    }
     if (request.expectedVersion) header->set_expected_version(*request.expectedVersion);
     header->set_point_count(packed.count);
     header->set_sha256(packed.sha256);
@@ -75,6 +88,75 @@ Result<Shape> Client::getShape(const ShapeRef& shape, const RunContext& context)
     return fromWire(response->shape());
 }
 
+Result<FoundShapes> Client::getShapes(const std::string& collection, const std::vector<std::string>& keys,
+                                      const RunContext& context) const {
+    v1::GetShapesRequest request;
+    request.set_collection(collection);
+    request.mutable_keys()->Add(keys.begin(), keys.end());
+    const auto response = callUnary(impl_->options, context, kIdempotent, *impl_->shapes,
+                                    &v1::ShapeService::Stub::GetShapes, request);
+    RETURN_IF_ERROR(response);
+    FoundShapes found;
+    for (const v1::Shape& shape : response->shapes()) found.shapes.push_back(fromWire(shape));
+    found.missing.assign(response->missing().begin(), response->missing().end());
+    return found;
+}
+
+namespace {
+
+Result<void> readPoints(grpc::ClientReader<v1::StoredPoints>& stream, StoredPoints& scan,
+                        const RunContext& context) {
+    Sha256 hash;
+    v1::StoredPoints message;
+    while (stream.Read(&message)) {
+        if (message.has_shape()) {
+            scan.shape = fromWire(message.shape());
+        } else if (message.has_chunk()) {
+            const std::string& xyz = message.chunk().xyz();
+            hash.update(xyz.data(), xyz.size());
+            RETURN_IF_ERROR(unpackPoints(xyz, scan.points));
+            context.report("download", scan.points.size(), scan.shape.pointCount);
+        }
+    }
+    const Sha256Digest digest = hash.finish();
+    // After an error of the call its status says why there is less, or nothing.
+    if (!scan.points.empty() && scan.points.size() == scan.shape.pointCount &&
+        scan.shape.sha256 != std::string(digest.begin(), digest.end())) {
+        return fail(ErrorCode::kChecksumMismatch,
+                    "the points of '" + scan.shape.key + "' were damaged in transfer: ask for them again");
+    }
+    return {};
+}
+
+}  // namespace
+
+Result<StoredPoints> Client::getPoints(const ShapeRef& shape, const RunContext& context) const {
+    v1::GetPointsRequest request;
+    fill(shape, request.mutable_shape());
+    StoredPoints scan;
+    const auto made =
+        makeCall(impl_->options, context, kIdempotent, [&](grpc::ClientContext& rpc, Result<void>& local) {
+            scan = {};
+            const auto stream = impl_->shapes->GetPoints(&rpc, request);
+            local = readPoints(*stream, scan, context);
+            if (!local) rpc.TryCancel();
+            return stream->Finish();
+        });
+    RETURN_IF_ERROR(made);
+    if (scan.points.size() != scan.shape.pointCount) {
+        return fail(ErrorCode::kCountMismatch, "the server sent " + std::to_string(scan.points.size()) +
+                                                   " of " + std::to_string(scan.shape.pointCount) +
+                                                   " points");
+    }
+    const auto offset = scan.shape.metadata.find(kOffsetKey);
+    if (offset != scan.shape.metadata.end()) {
+        const auto read = offsetOf(offset->second);
+        RETURN_IF_ERROR(read);
+        scan.offset = *read;
+    }
+    return scan;
+}
+
 Result<ListPage> Client::listShapes(const ListRequest& list, const RunContext& context) const {
     v1::ListShapesRequest request;
     request.set_collection(list.collection);
@@ -82,6 +164,9 @@ Result<ListPage> Client::listShapes(const ListRequest& list, const RunContext& c
     request.set_state(toWire(list.state));
     request.set_page_size(list.pageSize);
     request.set_cursor(list.cursor);
+    request.set_key_prefix(list.keyPrefix);
+    request.set_order(toWire(list.order));
+    request.set_descending(list.descending);
     const auto response = callUnary(impl_->options, context, kIdempotent, *impl_->shapes,
                                     &v1::ShapeService::Stub::ListShapes, request);
     RETURN_IF_ERROR(response);
@@ -96,10 +181,29 @@ Result<std::uint64_t> Client::countShapes(const ListRequest& list, const RunCont
     request.set_collection(list.collection);
     request.set_filter(list.filter);
     request.set_state(toWire(list.state));
+    request.set_key_prefix(list.keyPrefix);
     const auto response = callUnary(impl_->options, context, kIdempotent, *impl_->shapes,
                                     &v1::ShapeService::Stub::CountShapes, request);
     RETURN_IF_ERROR(response);
     return response->count();
+}
+
+Result<ValueCounts> Client::countByValue(const ValueCountRequest& count, const RunContext& context) const {
+    v1::CountByValueRequest request;
+    request.set_collection(count.collection);
+    request.set_metadata_key(count.metadataKey);
+    request.set_filter(count.filter);
+    request.set_state(toWire(count.state));
+    request.set_max_values(count.maxValues);
+    const auto response = callUnary(impl_->options, context, kIdempotent, *impl_->shapes,
+                                    &v1::ShapeService::Stub::CountByValue, request);
+    RETURN_IF_ERROR(response);
+    ValueCounts counts;
+    for (const auto& one : response->values()) counts.values.push_back({one.value(), one.shapes()});
+    counts.otherValues = response->other_values();
+    counts.otherShapes = response->other_shapes();
+    counts.without = response->shapes_without();
+    return counts;
 }
 
 Result<Shape> Client::deleteShape(const ShapeRef& shape, std::optional<std::int64_t> expectedVersion,

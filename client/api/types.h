@@ -3,15 +3,14 @@
 #pragma once
 
 #include <array>
-#include <chrono>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "client/api/shape_types.h"
 #include "core/base/error.h"
 #include "core/base/length_unit.h"
-#include "core/base/metadata.h"
 #include "core/fit/verdict_kinds.h"
 #include "core/geometry/motion.h"
 #include "core/geometry/point.h"
@@ -23,14 +22,7 @@ namespace shapedb::client {
 using shapedb::InteriorDoubt;
 using shapedb::InteriorMethod;
 using shapedb::InteriorSource;
-using shapedb::Metadata;
 using shapedb::Profile;
-
-using Timestamp = std::chrono::system_clock::time_point;
-
-/// Metadata key of the offset that an upload subtracted from the coordinates (see Client::addShape): three
-/// numbers separated by blanks, in scan units.
-constexpr const char* kOffsetKey = "shapedb.offset";
 
 /// What decides the signature of a scan. A field that is not set takes the profile's value when a collection
 /// is created or a scan segmented, and keeps its value in a rebuild.
@@ -53,95 +45,6 @@ struct Parameters {
     std::optional<bool> attributes;          ///< false: points and weights alone, as published
     std::optional<bool> views;               ///< keep views, so that scans of one side find the shape
     std::optional<LengthUnit> unit;          ///< of the scans of a collection: with one, sizes count
-};
-
-/// Names one shape. An empty collection is "default".
-struct ShapeRef {
-    std::string collection;
-    std::string key;
-};
-
-enum class ShapeState {
-    kPending,  ///< on disk; waiting to be segmented, or being segmented
-    kReady,    ///< found by searches
-    kFailed,   ///< could not be segmented; `failure` says why
-};
-
-/// "pending", "ready" or "failed".
-[[nodiscard]] const char* stateName(ShapeState state) noexcept;
-
-/// What the server knows about one shape, without its points.
-struct Shape {
-    std::string collection;
-    std::string key;           ///< chosen by the client, unique in the collection
-    std::int64_t id = 0;       ///< given by the server, rising; breaks ties in rankings
-    std::int64_t version = 0;  ///< 1 when inserted, one more with every change
-    ShapeState state = ShapeState::kPending;
-    std::uint64_t pointCount = 0;
-    std::string sha256;  ///< 32 bytes, of the points as sent
-    Metadata metadata;
-    Timestamp created;
-    Timestamp updated;
-    std::optional<Error> failure;  ///< set exactly when state is kFailed
-    /// How certain the interior is, [0, 1]. Not set before there is a signature with attributes.
-    std::optional<double> quality;
-};
-
-enum class AddMode {
-    kUpsert,      ///< insert or replace
-    kInsertOnly,  ///< kAlreadyExists if another shape has the key
-    kUpdateOnly,  ///< kNotFound if no shape has the key
-};
-
-struct AddRequest {
-    ShapeRef shape{};
-    AddMode mode = AddMode::kUpsert;
-    Metadata metadata{};
-    /// If set, the version the shape must have now; 0: the key must be free. Such a call is not retried: a
-    /// first try whose reply was lost may have changed the version.
-    std::optional<std::int64_t> expectedVersion{};
-    /// Return only when the shape is kReady or kFailed.
-    bool wait = false;
-};
-
-enum class AddOutcome {
-    kCreated,
-    kReplaced,         ///< new points: segmented again
-    kMetadataChanged,  ///< same points, new metadata
-    kUnchanged,        ///< same points, same metadata: a repeated request
-    kRetried,          ///< same points of a shape that had failed: segmented again
-};
-
-/// "created", "replaced", "metadata changed", "unchanged" or "retried".
-[[nodiscard]] const char* outcomeName(AddOutcome outcome) noexcept;
-
-struct AddReply {
-    AddOutcome outcome = AddOutcome::kCreated;
-    Shape shape;
-    Point3 offset;  ///< subtracted from the coordinates before upload, scan units; usually zero
-};
-
-struct ListRequest {
-    std::string collection{};
-    std::string filter{};               ///< docs/filters.md; empty: all
-    std::optional<ShapeState> state{};  ///< not set: any state
-    std::uint32_t pageSize = 0;         ///< 1 to 1,000; 0: 100
-    std::string cursor{};               ///< nextCursor of the previous page
-};
-
-struct ListPage {
-    std::vector<Shape> shapes;  ///< in ascending order of id
-    std::string nextCursor;     ///< empty on the last page
-};
-
-/// One step of an ingest, as watchIngest reports it.
-struct IngestEvent {
-    ShapeState state = ShapeState::kPending;
-    std::string stage;  ///< while kPending: "queued", or the stage that is running
-    std::uint64_t done = 0;
-    std::uint64_t total = 0;  ///< in the stage's own unit; 0: unknown
-    std::optional<Error> failure;
-    std::optional<double> quality;  ///< when kReady: Shape::quality
 };
 
 /// One segment of a shape, as its signature keeps it.
@@ -228,6 +131,10 @@ struct SearchOptions {
     std::uint32_t verifyCandidates = 0;  ///< how many at most; 0: the server's default
     std::optional<bool> oneSided;        ///< a camera saw the query from one place; nothing: judged
     std::optional<Point3> viewpoint;     ///< where it stood, in coordinates of the query
+    /// A metadata key: the k groups of shapes with the same value under it (those without the key are one)
+    /// whose best hits are best. Empty: no groups.
+    std::string groupBy{};
+    std::uint32_t perGroup = 0;  ///< hits of each group, 1 to 100; 0: 1
 };
 
 struct CompareOptions {
@@ -307,8 +214,17 @@ struct Hit {
     double verdictReliability = 0.0;  ///< how often such a verdict was right where it was measured, [0, 1]
 };
 
+/// Hits with the same value under SearchOptions::groupBy.
+struct HitGroup {
+    std::optional<std::string> value;  ///< not set: their shapes do not have the key
+    std::size_t hits = 0;
+};
+
 struct SearchReply {
-    std::vector<Hit> hits;         ///< in descending order of score; ties in ascending order of id
+    /// In descending order of score; ties in ascending order of id. With groups group after group, in the
+    /// order of their best hits, and so within each.
+    std::vector<Hit> hits;
+    std::vector<HitGroup> groups;  ///< with SearchOptions::groupBy: of the hits, in their order
     std::uint64_t candidates = 0;  ///< shapes in the snapshot searched
     std::uint64_t filtered = 0;    ///< of these, how many pass the filter
     std::uint64_t scored = 0;      ///< of these, how many no bound ruled out
@@ -348,6 +264,7 @@ struct Collection {
     std::uint64_t shapes = 0;  ///< in any state
     std::uint64_t shapesReady = 0;
     std::uint64_t shapesFailed = 0;
+    std::vector<std::string> aliases;  ///< other names that stand for it, in ascending order
 };
 
 struct RebuildRequest {

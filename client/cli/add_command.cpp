@@ -30,10 +30,12 @@ struct AddFlags {
     std::vector<std::string> paths;
     std::string collection;
     std::string key;
+    std::string base;
     std::vector<std::string> metadata;
     bool labelFromFolder = false;
     bool insertOnly = false;
     bool updateOnly = false;
+    bool replace = false;
     bool wait = false;
     bool each = false;
     unsigned jobs = 1;
@@ -43,7 +45,7 @@ struct AddFlags {
 
 struct Upload {
     std::string path;
-    std::string name;  ///< relative to the given path; decides key and seed
+    std::string name;  ///< relative to the given path; decides the seed
     std::string key;
     std::string label;
     std::optional<std::size_t> object;  ///< --each: which of the objects of the scan
@@ -60,7 +62,9 @@ Result<std::vector<Upload>> listUploads(const AddFlags& flags) {
             Upload upload;
             upload.path = file.path;
             upload.name = relativeName(file.path, path);
-            upload.key = withoutEnding(upload.name);
+            auto key = keyOfFile(file.path, flags.base);
+            RETURN_IF_ERROR(key);
+            upload.key = std::move(*key);
             upload.label = file.label;
             uploads.push_back(std::move(upload));
         }
@@ -102,9 +106,11 @@ Result<void> checkKeys(const std::vector<Upload>& uploads) {
     for (const Upload& upload : uploads) {
         const auto [other, isNew] = taken.emplace(upload.key, upload.path);
         if (!isNew) {
-            return fail(ErrorCode::kInvalidArgument,
-                        other->second + " and " + upload.path + " would both get the key '" + upload.key +
-                            "'; add them separately with --key, or add a folder above both");
+            return fail(ErrorCode::kInvalidArgument, other->second == upload.path
+                                                         ? upload.path + " is given twice"
+                                                         : other->second + " and " + upload.path +
+                                                               " would both get the key '" + upload.key +
+                                                               "'; add them one by one with --key");
         }
     }
     return {};
@@ -113,8 +119,11 @@ Result<void> checkKeys(const std::vector<Upload>& uploads) {
 client::AddRequest requestFor(const AddFlags& flags, const client::Metadata& metadata, const Upload& upload) {
     client::AddRequest request;
     request.shape = {flags.collection, upload.key};
-    request.metadata = metadata;
-    if (flags.labelFromFolder) request.metadata.emplace("label", upload.label);
+    // Without any a shape that has the key keeps what it has.
+    if (!metadata.empty() || flags.labelFromFolder) request.metadata = metadata;
+    if (flags.labelFromFolder) request.metadata->emplace("label", upload.label);
+    // Two files may come to the same key, at different times or from different people.
+    if (!flags.replace) request.mode = client::AddMode::kSamePoints;
     if (flags.insertOnly) request.mode = client::AddMode::kInsertOnly;
     if (flags.updateOnly) request.mode = client::AddMode::kUpdateOnly;
     return request;
@@ -139,6 +148,9 @@ void uploadOne(const client::Client& client, const AddFlags& flags, const Terms&
     auto reply = client.addShape(requestFor(flags, terms.metadata, upload), scan->points, context);
     if (!reply) {
         upload.failure = reply.error();
+        if (reply.error().code == ErrorCode::kAlreadyExists && !flags.insertOnly) {
+            upload.failure->message += ": --replace replaces them, --key gives this scan another key";
+        }
     } else {
         upload.reply = std::move(*reply);
     }
@@ -286,12 +298,12 @@ int reportFailures(Session& session, const std::vector<Upload>& uploads) {
 }
 
 CommandResult runAdd(Session& session, const AddFlags& flags) {
-    const auto metadata = parseMetadata(flags.metadata);
+    const auto metadata = parseMetadata(flags.metadata, "--meta");
     RETURN_IF_ERROR(metadata);
     auto uploads = listUploads(flags);
     RETURN_IF_ERROR(uploads);
     if (flags.each) {
-        uploads = oneForEachObject(std::move(*uploads), flags, session.context());
+        uploads = oneForEachObject(*uploads, flags, session.context());
         RETURN_IF_ERROR(uploads);
     }
     RETURN_IF_ERROR(checkKeys(*uploads));
@@ -314,14 +326,20 @@ void addAddCommand(CLI::App& app, Session& session) {
     command->add_option("PATH", flags->paths, "Scan files or folders")->required();
     addCollectionOption(*command, flags->collection);
     command->add_option("--key", flags->key,
-                        "Key, if there is only one scan [path below the given folder, without ending]");
+                        "Key, if there is only one scan [path below the current folder, without ending]");
+    command->add_option("--base", flags->base, "Keys are paths below this folder instead of the current one")
+        ->type_name("DIR")
+        ->check(CLI::ExistingDirectory);
     command->add_flag("--label-from-folder", flags->labelFromFolder,
                       "Set the metadata 'label' to the name of the file's folder");
     command->add_option("--meta", flags->metadata, "Metadata of all scans; may be repeated")
         ->type_name("NAME=VALUE")
         ->allow_extra_args(false);
     auto* insertOnly = command->add_flag("--insert-only", flags->insertOnly, "Fail if the key is taken");
-    command->add_flag("--update-only", flags->updateOnly, "Fail if the key is free")->excludes(insertOnly);
+    command->add_flag("--update-only", flags->updateOnly, "Replace what has the key; fail if it is free")
+        ->excludes(insertOnly);
+    command->add_flag("--replace", flags->replace, "Replace other points that have the key")
+        ->excludes(insertOnly);
     command->add_flag("--wait", flags->wait, "Wait until all scans are segmented, not only stored");
     command
         ->add_option("--jobs", flags->jobs,

@@ -1,4 +1,4 @@
-// `shapedb collection create|get|list|delete`.
+// `shapedb collection create|get|list|rename|alias|unalias|delete`.
 #include <memory>
 
 #include <CLI/CLI.hpp>
@@ -19,6 +19,7 @@ namespace {
 
 struct CollectionFlags {
     std::string name;
+    std::string other;  ///< the new name, or what an alias stands for
     std::string description;
     ParameterFlags parameters;
     bool force = false;
@@ -27,6 +28,7 @@ struct CollectionFlags {
 json collectionJson(const client::Collection& collection) {
     return {{"name", collection.name},
             {"description", collection.description},
+            {"aliases", collection.aliases},
             {"generation", collection.generation},
             {"shapes", collection.shapes},
             {"shapes_ready", collection.shapesReady},
@@ -44,12 +46,15 @@ std::string collectionsText(const std::vector<client::Collection>& collections) 
                  {"generation", right},
                  {"profile"},
                  {"unit"},
+                 {"aliases"},
                  {"description"}});
     for (const client::Collection& one : collections) {
-        table.add({one.name, formatCount(one.shapes), formatCount(one.shapesReady),
-                   formatCount(one.shapesFailed), std::to_string(one.generation),
-                   profileName(one.parameters.profile.value_or(Profile::kDefault)),
-                   lengthUnitName(one.parameters.unit.value_or(LengthUnit::kNone)), one.description});
+        std::string aliases;
+        for (const std::string& alias : one.aliases) aliases += (aliases.empty() ? "" : ", ") + alias;
+        table.add(
+            {one.name, formatCount(one.shapes), formatCount(one.shapesReady), formatCount(one.shapesFailed),
+             std::to_string(one.generation), profileName(one.parameters.profile.value_or(Profile::kDefault)),
+             lengthUnitName(one.parameters.unit.value_or(LengthUnit::kNone)), aliases, one.description});
     }
     return table.render();
 }
@@ -96,6 +101,32 @@ CommandResult runDelete(Session& session, const CollectionFlags& flags) {
     return kOk;
 }
 
+CommandResult runRename(Session& session, const CollectionFlags& flags) {
+    const auto client = connectToServer(session);
+    RETURN_IF_ERROR(client);
+    return show(session, client->renameCollection(flags.name, flags.other, session.context()));
+}
+
+CommandResult runAlias(Session& session, const CollectionFlags& flags) {
+    const auto client = connectToServer(session);
+    RETURN_IF_ERROR(client);
+    const auto collection = client->setAlias(flags.name, flags.other, session.context());
+    RETURN_IF_ERROR(collection);
+    session.console().document({{"alias", flags.name}, {"collection", collection->name}});
+    session.console().text(flags.name + ": stands for " + collection->name + "\n");
+    return kOk;
+}
+
+CommandResult runUnalias(Session& session, const CollectionFlags& flags) {
+    const auto client = connectToServer(session);
+    RETURN_IF_ERROR(client);
+    const auto deleted = client->deleteAlias(flags.name, session.context());
+    RETURN_IF_ERROR(deleted);
+    session.console().document({{"deleted", flags.name}});
+    session.console().text(flags.name + ": no alias any more\n");
+    return kOk;
+}
+
 using Runner = CommandResult (*)(Session&, const CollectionFlags&);
 
 CLI::App* addOne(CLI::App& group, Session& session, const char* name, const char* help,
@@ -125,6 +156,17 @@ void addCollectionCommands(CLI::App& app, Session& session) {
     addUnitsFlag(*create, flags->parameters);
     addName(addOne(*group, session, "get", "Show one collection", flags, &runGet));
     addOne(*group, session, "list", "List all collections", flags, &runList);
+    CLI::App* rename = addOne(*group, session, "rename", "Give a collection another name", flags, &runRename);
+    addName(rename);
+    rename->add_option("NEW", flags->other, "The new name")->required();
+    CLI::App* alias =
+        addOne(*group, session, "alias", "Make a name stand for a collection, or for another one than before",
+               flags, &runAlias);
+    alias->add_option("NAME", flags->name, "The alias")->required();
+    alias->add_option("TARGET", flags->other, "The collection")->required();
+    CLI::App* unalias =
+        addOne(*group, session, "unalias", "Delete an alias; the collection stays", flags, &runUnalias);
+    unalias->add_option("NAME", flags->name, "The alias")->required();
     CLI::App* remove = addOne(*group, session, "delete", "Delete a collection", flags, &runDelete);
     addName(remove);
     remove->add_flag("--force", flags->force, "Delete its shapes too");

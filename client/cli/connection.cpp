@@ -43,16 +43,16 @@ void addCollectionOption(CLI::App& command, std::string& collection) {
     command.add_option("--collection", collection, "Collection to use [default]")->type_name("NAME");
 }
 
-Result<client::Metadata> parseMetadata(const std::vector<std::string>& pairs) {
+Result<client::Metadata> parseMetadata(const std::vector<std::string>& pairs, const char* flag) {
     client::Metadata metadata;
     for (const std::string& pair : pairs) {
         const std::size_t equals = pair.find('=');
         if (equals == std::string::npos || equals == 0) {
-            return fail(ErrorCode::kInvalidArgument, "--meta '" + pair + "' is not NAME=VALUE");
+            return fail(ErrorCode::kInvalidArgument, std::string(flag) + " '" + pair + "' is not NAME=VALUE");
         }
         const std::string name = pair.substr(0, equals);
         if (!metadata.emplace(name, pair.substr(equals + 1)).second) {
-            return fail(ErrorCode::kInvalidArgument, "--meta gives '" + name + "' twice");
+            return fail(ErrorCode::kInvalidArgument, std::string(flag) + " gives '" + name + "' twice");
         }
     }
     return metadata;

@@ -24,8 +24,8 @@ enum class Work {
 /// --collection; empty for the default one.
 void addCollectionOption(CLI::App& command, std::string& collection);
 
-/// The NAME=VALUE pairs of --meta. Errors: kInvalidArgument naming the pair.
-[[nodiscard]] Result<client::Metadata> parseMetadata(const std::vector<std::string>& pairs);
+/// The NAME=VALUE pairs of a flag. Errors: kInvalidArgument naming the pair.
+[[nodiscard]] Result<client::Metadata> parseMetadata(const std::vector<std::string>& pairs, const char* flag);
 
 /// The metadata "label" of a shape; empty if there is none.
 [[nodiscard]] std::string labelOf(const client::Shape& shape);

@@ -43,8 +43,21 @@ std::optional<Motion> motionOf(const client::Hit& hit, const Point3& offset) {
     return motion;
 }
 
+/// The group of each hit; nothing without groups.
+std::vector<const client::HitGroup*> groupOfHits(const client::SearchReply& reply) {
+    std::vector<const client::HitGroup*> groups;
+    for (const client::HitGroup& group : reply.groups) groups.insert(groups.end(), group.hits, &group);
+    groups.resize(reply.groups.empty() ? 0 : reply.hits.size(), nullptr);
+    return groups;
+}
+
+json valueOf(const client::HitGroup* group) {
+    return group != nullptr && group->value ? json(*group->value) : json();
+}
+
 json replyJson(const client::SearchReply& reply) {
     json hits = json::array();
+    const auto groups = groupOfHits(reply);
     for (std::size_t i = 0; i < reply.hits.size(); ++i) {
         const client::Hit& hit = reply.hits[i];
         json entry = {{"rank", i + 1},
@@ -57,6 +70,7 @@ json replyJson(const client::SearchReply& reply) {
                       {"verdict_reliability", hit.verdictReliability},
                       {"shape", toJson(hit.shape)}};
         if (const auto motion = motionOf(hit, reply.offset)) entry["matrix"] = matrixOf(*motion);
+        if (!groups.empty()) entry["group"] = valueOf(groups[i]);
         if (hit.fit) entry["fit"] = toJson(*hit.fit);
         if (hit.explanation) entry["explanation"] = toJson(*hit.explanation);
         hits.push_back(std::move(entry));
@@ -99,11 +113,22 @@ std::string replyText(const QueryFlags& flags, const client::SearchReply& reply)
     if (reply.hits.empty()) return text + "Nothing found.\n";
 
     const auto right = Table::Align::kRight;
-    Table table({{"rank", right}, {"score", right}, {""}, {"verdict"}, {"label"}, {"key"}});
+    const auto groups = groupOfHits(reply);
+    std::vector<Table::Column> columns = {{"rank", right}, {"score", right}, {""},
+                                          {"verdict"},     {"label"},        {"key"}};
+    if (!groups.empty()) columns.insert(columns.begin(), {flags.options.groupBy});
+    Table table(std::move(columns));
     for (std::size_t i = 0; i < reply.hits.size(); ++i) {
         const client::Hit& hit = reply.hits[i];
-        table.add({std::to_string(i + 1), formatFixed(hit.score, 3), bar(hit.score, 20),
-                   verdictText(hit.verdict), labelOf(hit.shape), hit.shape.key});
+        std::vector<std::string> cells = {std::to_string(i + 1), formatFixed(hit.score, 3),
+                                          bar(hit.score, 20),    verdictText(hit.verdict),
+                                          labelOf(hit.shape),    hit.shape.key};
+        if (!groups.empty()) {
+            const json value = valueOf(groups[i]);
+            const bool first = i == 0 || groups[i] != groups[i - 1];
+            cells.insert(cells.begin(), !first ? "" : value.is_null() ? "(none)" : value.get<std::string>());
+        }
+        table.add(std::move(cells));
     }
     text += table.render();
     const std::size_t explained = flags.explain ? reply.hits.size() : 1;
@@ -183,6 +208,12 @@ void addQueryCommand(CLI::App& app, Session& session) {
     command->add_option("--threshold", flags->options.threshold, "Lowest score of a hit, 0 to 1");
     command->add_option("--filter", flags->options.filter,
                         "Only shapes with such metadata, e.g. 'label=cup'");
+    auto* groupBy = command->add_option("--group-by", flags->options.groupBy,
+                                        "Show the best of each value of this metadata; -k counts the values");
+    groupBy->type_name("NAME");
+    command->add_option("--per-group", flags->options.perGroup, "Most hits of each value [1]")
+        ->check(CLI::Range(1, 100))
+        ->needs(groupBy);
     addScoreFlags(*command, flags->score);
     addFreeScaleFlag(*command, flags->score);
     addUnitFlag(*command, flags->unit);

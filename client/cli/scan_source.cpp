@@ -143,4 +143,16 @@ std::string withoutEnding(const std::string& name) {
     return (path.parent_path() / path.stem()).generic_string();
 }
 
+Result<std::string> keyOfFile(const std::string& path, const std::string& base) {
+    std::error_code error;
+    const fs::path here = fs::current_path(error);
+    if (error) return fail(ErrorCode::kFileNotReadable, "the current folder: " + error.message());
+    const fs::path file = (here / path).lexically_normal();
+    const fs::path folder = (here / base / "").lexically_normal();
+    const fs::path below = file.lexically_relative(folder);
+    if (!below.empty() && *below.begin() != "..") return withoutEnding(below.generic_string());
+    if (base.empty()) return withoutEnding(file.relative_path().generic_string());
+    return fail(ErrorCode::kInvalidArgument, path + " is not below --base " + base);
+}
+
 }  // namespace shapedb::cli

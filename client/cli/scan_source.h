@@ -61,7 +61,13 @@ struct LoadedScan : Scan {
 /// `path` relative to `folder`, with '/' as separator; the file name if `folder` is the file itself.
 [[nodiscard]] std::string relativeName(const std::string& path, const std::string& folder);
 
-/// "Hand/193.ply" -> "Hand/193": the key of an uploaded file.
+/// "Hand/193.ply" -> "Hand/193".
 [[nodiscard]] std::string withoutEnding(const std::string& name);
+
+/// The key of an uploaded file: its path below `base` (empty: the current folder) without ending, with '/' as
+/// separator; without a base the whole path, from below the root, of a file that is not below the current
+/// folder. Says which file it is however its path was typed; links are names like any other. Errors:
+/// kInvalidArgument (not below `base`), kFileNotReadable (there is no current folder).
+[[nodiscard]] Result<std::string> keyOfFile(const std::string& path, const std::string& base);
 
 }  // namespace shapedb::cli

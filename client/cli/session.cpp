@@ -124,6 +124,7 @@ int run(int argc, const char* const* argv, Console& console, const std::atomic<b
         addCompareCommand(app, session);
         addAlignCommand(app, session);
         addShapeCommands(app, session);
+        addChangeCommands(app, session);
         addCollectionCommands(app, session);
         addAdminCommands(app, session);
         addHealthCommand(app, session);

@@ -61,6 +61,7 @@ void addQueryCommand(CLI::App& app, Session& session);
 void addCompareCommand(CLI::App& app, Session& session);
 void addAlignCommand(CLI::App& app, Session& session);
 void addShapeCommands(CLI::App& app, Session& session);
+void addChangeCommands(CLI::App& app, Session& session);
 void addCollectionCommands(CLI::App& app, Session& session);
 void addAdminCommands(CLI::App& app, Session& session);
 void addHealthCommand(CLI::App& app, Session& session);

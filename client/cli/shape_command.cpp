@@ -1,4 +1,4 @@
-// `shapedb get|list|count|delete|watch|signature`: single stored shapes.
+// `shapedb get|list|count|watch|signature`: what is stored.
 #include <algorithm>
 #include <memory>
 
@@ -26,6 +26,7 @@ constexpr std::uint32_t kPageSize = 1000;
 struct KeyFlags {
     client::ShapeRef shape;
     std::string out;
+    bool points = false;
 };
 
 std::string shapeText(const client::Shape& shape) {
@@ -45,9 +46,31 @@ std::string shapeText(const client::Shape& shape) {
     return table.render();
 }
 
+/// --points: writes the scan as it was sent, where it was.
+CommandResult writeScan(Session& session, const client::Client& client, const KeyFlags& flags) {
+    auto scan = client.getPoints(flags.shape, session.context());
+    RETURN_IF_ERROR(scan);
+    const bool moved = scan->offset != Point3{};
+    if (moved) {
+        for (Point3& point : scan->points) point = point + scan->offset;
+    }
+    // Moved back, the coordinates have more digits than single precision.
+    RETURN_IF_ERROR(
+        writePointsPly(flags.out, scan->points, moved ? PlyPrecision::kDouble : PlyPrecision::kSingle));
+    json document = toJson(scan->shape);
+    document["out"] = flags.out;
+    session.console().document(document);
+    session.console().text(shapeText(scan->shape) + "\nPoints as they were sent: " + flags.out + "\n");
+    return kOk;
+}
+
 CommandResult runGet(Session& session, const KeyFlags& flags) {
+    if (flags.points && flags.out.empty()) {
+        return fail(ErrorCode::kInvalidArgument, "--points needs --out FILE.ply, the file to write");
+    }
     const auto client = connectToServer(session);
     RETURN_IF_ERROR(client);
+    if (flags.points) return writeScan(session, *client, flags);
     const RunContext context = session.context();
     const auto shape = client->getShape(flags.shape, context);
     RETURN_IF_ERROR(shape);
@@ -128,8 +151,25 @@ CommandResult runWatch(Session& session, const KeyFlags& flags) {
 struct ListFlags {
     client::ListRequest request;
     std::string state;
+    std::string order;
+    std::string by;  ///< count: the metadata key whose values are counted
     std::optional<std::uint64_t> limit;
 };
+
+/// Names an order, or the reverse of one with a '-' before it.
+Result<void> readOrder(const ListFlags& flags, client::ListRequest& request) {
+    // Without an order, keys that begin alike are shown in theirs.
+    std::string name = !flags.order.empty() ? flags.order : flags.request.keyPrefix.empty() ? "id" : "key";
+    request.descending = name.front() == '-';
+    if (request.descending) name.erase(0, 1);
+    if (name == "id") request.order = client::ShapeOrder::kId;
+    if (name == "key") request.order = client::ShapeOrder::kKey;
+    if (name == "updated") request.order = client::ShapeOrder::kUpdated;
+    if (name == "id" || name == "key" || name == "updated") return {};
+    return fail(
+        ErrorCode::kInvalidArgument,
+        "--order '" + flags.order + "' is not id, key or updated, or one of them with a '-' before it");
+}
 
 std::optional<client::ShapeState> stateOf(const std::string& name) {
     if (name == "pending") return client::ShapeState::kPending;
@@ -143,6 +183,7 @@ Result<client::ListPage> listAll(const client::Client& client, const ListFlags& 
                                  const RunContext& context) {
     client::ListRequest request = flags.request;
     request.state = stateOf(flags.state);
+    RETURN_IF_ERROR(readOrder(flags, request));
     client::ListPage all;
     do {
         const std::uint64_t missing = flags.limit ? *flags.limit - all.shapes.size() : kPageSize;
@@ -175,9 +216,48 @@ CommandResult runList(Session& session, const ListFlags& flags) {
     return kOk;
 }
 
+CommandResult countValues(Session& session, const client::Client& client, const ListFlags& flags) {
+    client::ValueCountRequest request;
+    request.collection = flags.request.collection;
+    request.metadataKey = flags.by;
+    request.filter = flags.request.filter;
+    request.state = stateOf(flags.state);
+    request.maxValues = static_cast<std::uint32_t>(flags.limit.value_or(0));
+    const auto counts = client.countByValue(request, session.context());
+    RETURN_IF_ERROR(counts);
+    json values = json::array();
+    Table table({{flags.by}, {"shapes", Table::Align::kRight}});
+    for (const client::ValueCount& one : counts->values) {
+        values.push_back({{"value", one.value}, {"count", one.shapes}});
+        table.add({one.value, formatCount(one.shapes)});
+    }
+    session.console().document({{"by", flags.by},
+                                {"values", values},
+                                {"other_values", counts->otherValues},
+                                {"other_count", counts->otherShapes},
+                                {"without", counts->without}});
+    std::string text = table.empty() ? "no shapes with " + flags.by + "\n" : table.render();
+    if (counts->otherValues > 0) {
+        text += "and " + formatCount(counts->otherValues, "other value", "other values") + ": " +
+                formatCount(counts->otherShapes, "shape", "shapes") + "\n";
+    }
+    if (counts->without > 0) {
+        text += formatCount(counts->without, "shape", "shapes") + " without " + flags.by + "\n";
+    }
+    session.console().text(text);
+    return kOk;
+}
+
 CommandResult runCount(Session& session, const ListFlags& flags) {
+    if (flags.by.empty() && flags.limit) {
+        return fail(ErrorCode::kInvalidArgument, "--limit is for --by: how many values to show");
+    }
+    if (!flags.by.empty() && !flags.request.keyPrefix.empty()) {
+        return fail(ErrorCode::kInvalidArgument, "--prefix and --by exclude each other; use --filter");
+    }
     const auto client = connectToServer(session);
     RETURN_IF_ERROR(client);
+    if (!flags.by.empty()) return countValues(session, *client, flags);
     client::ListRequest request = flags.request;
     request.state = stateOf(flags.state);
     const auto count = client->countShapes(request, session.context());
@@ -185,40 +265,6 @@ CommandResult runCount(Session& session, const ListFlags& flags) {
     session.console().document({{"count", *count}});
     session.console().text(std::to_string(*count) + "\n");
     return kOk;
-}
-
-struct DeleteFlags {
-    std::vector<std::string> keys;
-    std::string collection;
-    std::optional<std::int64_t> expectedVersion;
-};
-
-CommandResult runDelete(Session& session, const DeleteFlags& flags) {
-    if (flags.expectedVersion && flags.keys.size() != 1) {
-        return fail(ErrorCode::kInvalidArgument, "--expected-version applies to one shape; give one key");
-    }
-    const auto client = connectToServer(session);
-    RETURN_IF_ERROR(client);
-    const RunContext context = session.context();
-    json deleted = json::array();
-    json failed = json::array();
-    int last = kOk;
-    for (const std::string& key : flags.keys) {
-        const auto shape = client->deleteShape({flags.collection, key}, flags.expectedVersion, context);
-        if (shape) {
-            deleted.push_back(toJson(*shape));
-            session.console().text(key + ": deleted\n");
-            continue;
-        }
-        if (flags.keys.size() == 1) return fail(shape.error());
-        failed.push_back({{"key", key}, {"error", toJson(shape.error())}});
-        session.console().note(key + ": " + shape.error().message);
-        last = exitCodeOf(shape.error().code);
-        if (last == kUnavailable || last == kInterrupted) break;  // the others would fail too
-    }
-    session.console().document({{"deleted", deleted}, {"failed", failed}});
-    if (failed.empty()) return kOk;
-    return last == kUnavailable || last == kInterrupted ? last : static_cast<int>(kSomeFailed);
 }
 
 using KeyRunner = CommandResult (*)(Session&, const KeyFlags&);
@@ -245,6 +291,7 @@ std::shared_ptr<ListFlags> addListCommand(CLI::App& app, Session& session, const
                         "Only shapes with such metadata, e.g. 'label=cup'");
     command->add_option("--state", flags->state, "Only shapes in this state")
         ->check(CLI::IsMember({"pending", "ready", "failed"}));
+    command->add_option("--prefix", flags->request.keyPrefix, "Only shapes whose key begins with this");
     command->callback([&session, flags, runner] {
         session.action = [&session, flags, runner] { return runner(session, *flags); };
     });
@@ -258,6 +305,8 @@ void addShapeCommands(CLI::App& app, Session& session) {
     app.get_subcommand("get")
         ->add_option("--out", get->out, "Write its points, coloured and labelled by part")
         ->type_name("FILE.ply");
+    app.get_subcommand("get")->add_flag("--points", get->points,
+                                        "With --out: write the points as they were sent, and nothing else");
     addKeyCommand(app, session, "signature", "Show what a search compares: parts and statistics of a shape",
                   &runSignature);
     addKeyCommand(app, session, "watch", "Follow a shape until it is segmented", &runWatch);
@@ -267,16 +316,18 @@ void addShapeCommands(CLI::App& app, Session& session) {
         ->check(aboveZero());
     app.get_subcommand("list")->add_option("--cursor", list->request.cursor,
                                            "Continue an earlier list --limit");
-    addListCommand(app, session, "count", "Count stored shapes", &runCount);
-
-    auto flags = std::make_shared<DeleteFlags>();
-    CLI::App* command = app.add_subcommand("delete", "Delete stored shapes");
-    command->add_option("KEY", flags->keys, "Keys of the shapes")->required();
-    addCollectionOption(*command, flags->collection);
-    command->add_option("--expected-version", flags->expectedVersion,
-                        "Only if the shape has this version now");
-    command->callback(
-        [&session, flags] { session.action = [&session, flags] { return runDelete(session, *flags); }; });
+    app.get_subcommand("list")
+        ->add_option("--order", list->order,
+                     "Order: id, key or updated (time of change), with a '-' before it the reverse "
+                     "[id; with --prefix key]")
+        ->type_name("ORDER");
+    const auto count = addListCommand(app, session, "count", "Count stored shapes", &runCount);
+    app.get_subcommand("count")
+        ->add_option("--by", count->by, "Count the shapes of each value of this metadata")
+        ->type_name("NAME");
+    app.get_subcommand("count")
+        ->add_option("--limit", count->limit, "With --by: show at most this many values, up to 1000 [100]")
+        ->check(CLI::Range(1, 1000));
 }
 
 }  // namespace shapedb::cli

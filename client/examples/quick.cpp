@@ -42,7 +42,7 @@ int main(int argc, char** argv) {
 
     AddRequest request;
     request.shape.key = "dumbbell";
-    request.metadata["label"] = "example";
+    request.metadata = Metadata{{"label", "example"}};
     request.wait = true;  // until it is segmented and can be found
     const auto added = client->addShape(request, dumbbell());
     if (!added) return complain(added.error());

@@ -54,37 +54,50 @@ void append(std::string& bytes, Unsigned value) {
     for (std::size_t i = 0; i < sizeof value; ++i) bytes += static_cast<char>((value >> (8 * i)) & 0xff);
 }
 
-Result<void> appendPoint(std::string& bytes, const PointCloud& points, std::size_t index) {
+template <typename Bits, typename Number>
+void appendNumber(std::string& bytes, Number value) {
+    static_assert(sizeof(Bits) == sizeof(Number));
+    Bits bits = 0;
+    std::memcpy(&bits, &value, sizeof bits);
+    append(bytes, bits);
+}
+
+Result<void> appendPoint(std::string& bytes, const PointCloud& points, std::size_t index,
+                         PlyPrecision precision) {
     for (const double coordinate : {points[index].x, points[index].y, points[index].z}) {
         const auto name = [&] { return "point " + std::to_string(index) + " has a coordinate that is "; };
         if (!std::isfinite(coordinate)) {
             return fail(ErrorCode::kNonFiniteCoordinate, name() + "NaN or infinite");
         }
+        if (precision == PlyPrecision::kDouble) {
+            appendNumber<std::uint64_t>(bytes, coordinate);
+            continue;
+        }
         if (std::abs(coordinate) > static_cast<double>(std::numeric_limits<float>::max())) {
             return fail(ErrorCode::kCoordinateOutOfRange,
                         name() + "too large for single precision, in which the file stores it");
         }
-        const auto single = static_cast<float>(coordinate);
-        std::uint32_t bits = 0;
-        std::memcpy(&bits, &single, sizeof bits);
-        append(bytes, bits);
+        appendNumber<std::uint32_t>(bytes, static_cast<float>(coordinate));
     }
     return {};
 }
 
 Result<void> writePly(const std::string& path, const PointCloud& points,
-                      const std::vector<std::int32_t>* labels) {
+                      const std::vector<std::int32_t>* labels, PlyPrecision precision) {
     auto file = io::OutputFile::create(path);
     RETURN_IF_ERROR(file);
-    std::string bytes = "ply\nformat binary_little_endian 1.0\nelement vertex " +
-                        std::to_string(points.size()) +
-                        "\nproperty float x\nproperty float y\nproperty float z\n";
+    std::string bytes =
+        "ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(points.size()) + "\n";
+    for (const char* axis : {"x", "y", "z"}) {
+        bytes += std::string("property ") + (precision == PlyPrecision::kDouble ? "double " : "float ") +
+                 axis + "\n";
+    }
     if (labels != nullptr) {
         bytes += "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty int segment\n";
     }
     bytes += "end_header\n";
     for (std::size_t i = 0; i < points.size(); ++i) {
-        if (const auto done = appendPoint(bytes, points, i); !done) {
+        if (const auto done = appendPoint(bytes, points, i, precision); !done) {
             return fail(done.error().code, path + ": " + done.error().message);
         }
         if (labels != nullptr) {
@@ -100,9 +113,9 @@ Result<void> writePly(const std::string& path, const PointCloud& points,
 }
 
 Result<void> writePlyGuarded(const std::string& path, const PointCloud& points,
-                             const std::vector<std::int32_t>* labels) {
+                             const std::vector<std::int32_t>* labels, PlyPrecision precision) {
     try {
-        return writePly(path, points, labels);
+        return writePly(path, points, labels, precision);
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::kOutOfMemory, path + ": not enough memory to write the file");
     } catch (const std::exception& e) {
@@ -134,11 +147,11 @@ Result<void> writeLabelledPly(const std::string& path, const PointCloud& points,
                                                      " labels for " + std::to_string(points.size()) +
                                                      " points; one each is needed");
     }
-    return writePlyGuarded(path, points, &labels);
+    return writePlyGuarded(path, points, &labels, PlyPrecision::kSingle);
 }
 
-Result<void> writePointsPly(const std::string& path, const PointCloud& points) {
-    return writePlyGuarded(path, points, nullptr);
+Result<void> writePointsPly(const std::string& path, const PointCloud& points, PlyPrecision precision) {
+    return writePlyGuarded(path, points, nullptr, precision);
 }
 
 }  // namespace shapedb

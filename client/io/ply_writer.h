@@ -37,7 +37,11 @@ struct Rgb {
 [[nodiscard]] Result<void> writeLabelledPly(const std::string& path, const PointCloud& points,
                                             const std::vector<std::int32_t>& labels);
 
-/// Writes binary little-endian PLY with the vertex properties float x y z. Errors as above.
-[[nodiscard]] Result<void> writePointsPly(const std::string& path, const PointCloud& points);
+/// How coordinates are stored.
+enum class PlyPrecision { kSingle, kDouble };
+
+/// Writes binary little-endian PLY with the vertex properties x y z, float or double. Errors as above.
+[[nodiscard]] Result<void> writePointsPly(const std::string& path, const PointCloud& points,
+                                          PlyPrecision precision = PlyPrecision::kSingle);
 
 }  // namespace shapedb

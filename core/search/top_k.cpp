@@ -36,8 +36,14 @@ struct Candidate {
     double bound = 0.0;
     const Survivor* survivor = nullptr;
     const SignatureBlock* block = nullptr;
+    GroupValue group = nullptr;  ///< of searches with groups
 
     std::int64_t id() const { return block->id(survivor->row); }
+};
+
+// A hit so far.
+struct RankedHit : SearchHit {
+    GroupValue group = nullptr;
 };
 
 struct BlockScan {
@@ -61,6 +67,9 @@ Result<void> validate(const SearchOptions& options) {
     if (!(options.threshold >= 0.0 && options.threshold <= 1.0)) {
         return fail(ErrorCode::kInvalidArgument,
                     "threshold is " + std::to_string(options.threshold) + "; it must be 0 to 1");
+    }
+    if (options.grouping && options.grouping->perGroup == 0) {
+        return fail(ErrorCode::kInvalidArgument, "0 hits of a group; ask for at least 1");
     }
     return {};
 }
@@ -97,11 +106,20 @@ Result<void> parallelUntilStopped(std::size_t begin, std::size_t end, std::size_
 // Climbs the scorer's ladder of bounds (for attributed shapes from the statistics, 256 bytes each, to the
 // full score), each rung only for the candidates that the one before left. A small share of the snapshot
 // comes first: its best scores then rule out most of the rest.
+//
+// With groups, what a candidate needs depends on its group too: to beat the last hit of a full one. The
+// groups of the best k hits of which no two are of one group come first; then, `only` among these, more hits
+// of each. (Both at once would lose hits: a group may fall behind and come back by a better hit, when its
+// others are forgotten.)
 class Searcher {
   public:
     Searcher(const Scorer& scorer, const SignatureSet& set, const SearchOptions& options,
-             const RunContext& context)
-        : scorer_(scorer), options_(options), context_(context) {
+             std::size_t perGroup, const std::vector<RankedHit>* only, const RunContext& context)
+        : scorer_(scorer), options_(options), context_(context), perGroup_(perGroup) {
+        if (only != nullptr) {
+            only_.emplace();
+            for (const RankedHit& hit : *only) (*only_)[hit.group] = true;
+        }
         result_.counts.candidates = set.size();
         // Each slice is spread evenly over the set: shapes that were added together are often alike.
         order_.reserve(set.blocks().size());
@@ -132,20 +150,42 @@ class Searcher {
         return std::move(result_);
     }
 
+    // In the order of their rank.
+    const std::vector<RankedHit>& hits() const { return hits_; }
+
   private:
-    // Candidates that score less are no hits.
+    // Candidates that score less are no hits, whatever their group.
     double needed() const {
-        return result_.hits.size() == options_.k ? result_.hits.back().score : options_.threshold;
+        if (!only_) return hits_.size() == options_.k ? hits_.back().score : options_.threshold;
+        return lastOfFull_.size() == only_->size() ? leastOfFull_ : options_.threshold;
+    }
+
+    // Of a candidate of this group, given what any needs.
+    double neededIn(GroupValue group, double least) const {
+        if (!options_.grouping) return least;
+        const double* last = lastOfFull_.find(group);
+        return last != nullptr ? std::max(least, *last) : least;
     }
 
     BlockScan scanBlock(const SignatureBlock& block, double least) const {
         BlockScan scan;
-        const std::vector<std::uint8_t> wanted = wantedRows(block, options_.filter, options_.excludeId);
+        std::vector<std::uint8_t> wanted = wantedRows(block, options_.filter, options_.excludeId);
+        if (only_) keepGroups(block, wanted);
         scan.filtered = wanted.empty()
                             ? block.size()
                             : static_cast<std::uint64_t>(std::count(wanted.begin(), wanted.end(), 1));
         if (scan.filtered > 0) scorer_.scan(block.rows(), wanted, least, scan.left, scan.counts);
         return scan;
+    }
+
+    // Takes the rows of other groups out of `wanted`, in which an empty one means all.
+    void keepGroups(const SignatureBlock& block, std::vector<std::uint8_t>& wanted) const {
+        wanted.resize(block.size(), wanted.empty() ? 1 : 0);
+        for (std::size_t row = 0; row < block.size(); ++row) {
+            if (wanted[row] != 0 && only_->find(groupOf(block, row, options_.grouping->key)) == nullptr) {
+                wanted[row] = 0;
+            }
+        }
     }
 
     Result<std::vector<BlockScan>> scanSlice(std::size_t begin, std::size_t end) const {
@@ -172,7 +212,10 @@ class Searcher {
         for (std::size_t b = 0; b < scans.size(); ++b) {
             for (const Survivor& survivor : scans[b].left) {
                 // Points into `scans`, which live until all candidates have been visited.
-                all.push_back({survivor.bound, &survivor, order_[begin + b]});
+                const SignatureBlock* block = order_[begin + b];
+                const GroupValue group =
+                    options_.grouping ? groupOf(*block, survivor.row, options_.grouping->key) : nullptr;
+                all.push_back({survivor.bound, &survivor, block, group});
             }
         }
         std::sort(all.begin(), all.end(), visitedBefore);
@@ -201,22 +244,46 @@ class Searcher {
     Result<void> scoreChunk(const std::vector<Candidate>& candidates, std::size_t begin, std::size_t end,
                             double least) {
         std::vector<std::optional<double>> scores(end - begin);
+        // Before any is scored: what a candidate needs must not depend on which thread is faster.
+        std::vector<double> neededOf(end - begin);
+        for (std::size_t i = begin; i < end; ++i) {
+            neededOf[i - begin] = neededIn(candidates[i].group, least);
+        }
         // A signature of many points takes milliseconds, so every one is preceded by a look at the context.
         auto done = parallelUntilStopped(begin, end, kGrain, context_, [&](std::size_t i) {
             const Candidate& candidate = candidates[i];
+            const double own = neededOf[i - begin];
+            if (candidate.bound < own) return;
             const ShapeRow shape = candidate.block->rows()[candidate.survivor->row];
-            scores[i - begin] = scorer_.scoreIfReaches(shape, *candidate.survivor, least);
+            scores[i - begin] = scorer_.scoreIfReaches(shape, *candidate.survivor, own);
         });
         RETURN_IF_ERROR(done);
         for (std::size_t i = begin; i < end; ++i) {
             const std::optional<double> score = scores[i - begin];
             if (!score) continue;
             ++result_.counts.scored;
-            if (*score >= options_.threshold) result_.hits.push_back({candidates[i].id(), *score});
+            if (*score >= options_.threshold) {
+                hits_.push_back({{candidates[i].id(), *score}, candidates[i].group});
+            }
         }
-        std::sort(result_.hits.begin(), result_.hits.end(), ranksBefore);
-        if (result_.hits.size() > options_.k) result_.hits.resize(options_.k);
+        std::sort(hits_.begin(), hits_.end(), ranksBefore);
+        if (options_.grouping) {
+            keepBestOfGroups(hits_, options_.k, perGroup_, [](const RankedHit& hit) { return hit.group; });
+            noteFullGroups();
+        } else if (hits_.size() > options_.k) {
+            hits_.resize(options_.k);
+        }
         return {};
+    }
+
+    void noteFullGroups() {
+        GroupMap<std::size_t> counts;
+        lastOfFull_.clear();
+        for (const RankedHit& hit : hits_) {
+            if (++counts[hit.group] < perGroup_) continue;
+            lastOfFull_[hit.group] = hit.score;
+            leastOfFull_ = hit.score;  // the hits come best first
+        }
     }
 
     const Scorer& scorer_;
@@ -224,8 +291,29 @@ class Searcher {
     const RunContext& context_;
     std::vector<const SignatureBlock*> order_;
     std::size_t blocksDone_ = 0;
-    SearchResult result_;
+    SearchResult result_;  // without its hits
+    std::vector<RankedHit> hits_;
+    const std::size_t perGroup_;
+    std::optional<GroupMap<bool>> only_;
+    GroupMap<double> lastOfFull_;  // score of the last hit of each group that has all it may have
+    double leastOfFull_ = 0.0;     // the least of these
 };
+
+Result<SearchResult> searchFor(const Scorer& scorer, const SignatureSet& set, const SearchOptions& options,
+                               const RunContext& context) {
+    Searcher first(scorer, set, options, 1, nullptr, context);
+    auto result = first.run();
+    RETURN_IF_ERROR(result);
+    std::vector<RankedHit> hits = first.hits();
+    if (options.grouping && options.grouping->perGroup > 1 && !hits.empty()) {
+        Searcher more(scorer, set, options, options.grouping->perGroup, &hits, context);
+        RETURN_IF_ERROR(more.run());
+        hits = more.hits();
+        bringGroupsTogether(hits, [](const RankedHit& hit) { return hit.group; });
+    }
+    result->hits.assign(hits.begin(), hits.end());
+    return result;
+}
 
 Result<SearchResult> outOfMemory(const SignatureSet& set) {
     return fail(ErrorCode::kOutOfMemory,
@@ -252,7 +340,7 @@ Result<SearchResult> topK(const Scorer& scorer, const SignatureSet& set, const S
     RETURN_IF_ERROR(validate(options));
     try {
         const auto began = RunContext::Clock::now();
-        auto result = Searcher(scorer, set, options, context).run();
+        auto result = searchFor(scorer, set, options, context);
         if (result) result->seconds = std::chrono::duration<double>(RunContext::Clock::now() - began).count();
         return result;
     } catch (const std::bad_alloc&) {

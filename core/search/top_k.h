@@ -10,6 +10,7 @@
 #include "core/base/run_context.h"
 #include "core/matching/scorer.h"
 #include "core/search/filter.h"
+#include "core/search/grouping.h"
 #include "core/search/signature_set.h"
 
 namespace shapedb {
@@ -20,9 +21,11 @@ struct SearchOptions {
     Filter filter;                          ///< applied first: the k best of those that pass
     ScoreOptions score;                     ///< not read when a scorer is given
     std::optional<std::int64_t> excludeId;  ///< leaves one shape out (a query by key)
+    /// The k groups whose best hits are best, with the best hits of each; nothing: no groups.
+    std::optional<Grouping> grouping{};
 };
 
-/// Errors: kInvalidArgument (k, threshold).
+/// Errors: kInvalidArgument (k, threshold, hits of a group).
 [[nodiscard]] Result<void> validate(const SearchOptions& options);
 
 struct SearchHit {
@@ -39,8 +42,10 @@ struct SearchCounts {
 };
 
 struct SearchResult {
-    std::vector<SearchHit> hits;  ///< in descending order of score, ties in ascending order of id
-    SearchCounts counts;
+    /// In descending order of score, ties in ascending order of id; with groups so within each, and group
+    /// after group in the order of their best hits.
+    std::vector<SearchHit> hits;
+    SearchCounts counts;   ///< with groups: of the search for the best hit of each
     double seconds = 0.0;  ///< taken
     /// What scored the hits, to explain them; null when the caller gave the scorer.
     std::shared_ptr<const Scorer> scorer;

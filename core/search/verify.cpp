@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <new>
+#include <unordered_set>
 #include <utility>
 
 #include "core/base/parallel.h"
@@ -51,9 +52,10 @@ bool verifiedRanksBefore(const VerifiedHit& a, const VerifiedHit& b) {
 
 class Verifier {
   public:
-    Verifier(FitQuery query, const QueryTraits& traits, const SearchOptions& options,
+    Verifier(FitQuery query, const QueryTraits& traits, const SignatureSet& set, const SearchOptions& options,
              const SurfaceOf& surfaceOf, const RunContext& context)
         : query_(std::move(query)),
+          set_(set),
           share_(misfitShare(traits, options.score)),
           options_(options),
           surfaceOf_(surfaceOf),
@@ -90,7 +92,13 @@ class Verifier {
         const auto end = std::find_if(hits_.begin(), hits_.end(),
                                       [&](const VerifiedHit& hit) { return hit.score < options_.threshold; });
         hits_.erase(end, hits_.end());
-        if (hits_.size() > options_.k) hits_.resize(options_.k);
+        if (options_.grouping) {
+            const auto group = [&](const VerifiedHit& hit) { return groupOfHit(hit); };
+            keepBestOfGroups(hits_, options_.k, options_.grouping->perGroup, group);
+            bringGroupsTogether(hits_, group);
+        } else if (hits_.size() > options_.k) {
+            hits_.resize(options_.k);
+        }
         RETURN_IF_ERROR(settleHands());
         result.hits = std::move(hits_);
         return result;
@@ -111,9 +119,22 @@ class Verifier {
     bool reachable(double signatureScore, std::size_t done) const {
         const double best = scoreOf(signatureScore, 0.0);
         if (best < options_.threshold) return false;
-        const auto better = std::count_if(hits_.begin(), hits_.begin() + static_cast<std::ptrdiff_t>(done),
-                                          [&](const VerifiedHit& hit) { return hit.score > best; });
-        return static_cast<std::size_t>(better) < options_.k;
+        const auto end = hits_.begin() + static_cast<std::ptrdiff_t>(done);
+        const auto isBetter = [&](const VerifiedHit& hit) { return hit.score > best; };
+        if (!options_.grouping) {
+            return static_cast<std::size_t>(std::count_if(hits_.begin(), end, isBetter)) < options_.k;
+        }
+        // Not once k groups have all the hits they may have.
+        GroupMap<std::size_t> better;
+        std::size_t full = 0;
+        for (auto hit = hits_.begin(); hit != end; ++hit) {
+            if (isBetter(*hit) && ++better[groupOfHit(*hit)] == options_.grouping->perGroup) ++full;
+        }
+        return full < options_.k;
+    }
+
+    GroupValue groupOfHit(const VerifiedHit& hit) const {
+        return groupOf(set_, hit.id, options_.grouping->key);
     }
 
     Result<void> verify(std::size_t begin, std::size_t end) {
@@ -168,6 +189,7 @@ class Verifier {
     }
 
     const FitQuery query_;
+    const SignatureSet& set_;
     const double share_;
     const SearchOptions& options_;
     const SurfaceOf& surfaceOf_;
@@ -288,6 +310,28 @@ Result<std::vector<SearchHit>> withViewsFirst(const SearchResult& found, const S
     return order;
 }
 
+// Of candidates in groups half are the first of `order`, whatever their groups, and half the first of
+// `ofGroups`: so the best shape of a group is found though another has the better signature, and many shapes
+// of one group do not keep the others from being verified.
+std::vector<SearchHit> withGroups(const std::vector<SearchHit>& order, std::vector<SearchHit> ofGroups,
+                                  std::size_t most) {
+    std::sort(ofGroups.begin(), ofGroups.end(), [](const SearchHit& a, const SearchHit& b) {
+        return a.score != b.score ? a.score > b.score : a.id < b.id;
+    });
+    std::vector<SearchHit> mixed;
+    std::unordered_set<std::int64_t> taken;
+    const auto take = [&](const std::vector<SearchHit>& from, std::size_t size) {
+        for (auto hit = from.begin(); hit != from.end() && mixed.size() < size; ++hit) {
+            if (taken.insert(hit->id).second) mixed.push_back(*hit);
+        }
+    };
+    take(order, most / 2);
+    take(ofGroups, most);
+    take(order, order.size() + ofGroups.size());
+    take(ofGroups, order.size() + ofGroups.size());
+    return mixed;
+}
+
 }  // namespace
 
 Result<VerifiedResult> topKVerified(const Signature& query, const SurfacePoints& surface,
@@ -306,6 +350,7 @@ Result<VerifiedResult> topKVerified(const Signature& query, const SurfacePoints&
         wide.k = std::max(options.k, most + 1);
         // Candidates below the threshold may reach it by fitting well.
         wide.threshold = 0.0;
+        wide.grouping.reset();
         auto found = topK(query, set, wide, context);
         RETURN_IF_ERROR(found);
         const bool all = found->hits.size() < wide.k;
@@ -314,8 +359,14 @@ Result<VerifiedResult> topKVerified(const Signature& query, const SurfacePoints&
             RETURN_IF_ERROR(ordered);
             found->hits = std::move(*ordered);
         }
-        auto result =
-            Verifier(FitQuery(surface), *traits, options, surfaceOf, context).run(found->hits, most, all);
+        if (options.grouping) {
+            wide.grouping = options.grouping;
+            const auto ofGroups = topK(*found->scorer, set, wide, context);
+            RETURN_IF_ERROR(ofGroups);
+            found->hits = withGroups(found->hits, ofGroups->hits, most);
+        }
+        auto result = Verifier(FitQuery(surface), *traits, set, options, surfaceOf, context)
+                          .run(found->hits, most, all);
         RETURN_IF_ERROR(result);
         result->counts = found->counts;
         result->scorer = std::move(found->scorer);

@@ -50,7 +50,7 @@ struct VerifiedHit {
 };
 
 struct VerifiedResult {
-    std::vector<VerifiedHit> hits;  ///< in descending order of score, ties in ascending order of id
+    std::vector<VerifiedHit> hits;  ///< in the order of SearchResult::hits
     std::size_t verified = 0;       ///< candidates that were laid on the query
     double misfitShare = 0.0;       ///< weight of the misfit in the scores; 0 of an unverified search
     /// Whether verifying more candidates could change no hit.
@@ -121,8 +121,10 @@ void addFit(const FitResult& fit, double share, Explanation& explanation);
     const Signature& query, const SurfacePoints* querySurface, const Signature& other,
     const SurfacePoints* otherSurface, const ScoreOptions& options, const RunContext& context = {});
 
-/// The `options.k` best scores of a snapshot, verified. Uses the threads of the caller's oneTBB arena; their
-/// number does not change a bit. Reports progress as stages "search", "views" and "verify".
+/// The `options.k` best scores of a snapshot, verified. With groups half of the candidates are the best of
+/// each group by signature, so that many shapes of one group do not keep the others from being verified. Uses
+/// the threads of the caller's oneTBB arena; their number does not change a bit. Reports progress as stages
+/// "search", "views" and "verify".
 ///
 /// Errors: those of topK and of `surfaceOf`; kCancelled, kDeadlineExceeded, kOutOfMemory.
 [[nodiscard]] Result<VerifiedResult> topKVerified(const Signature& query, const SurfacePoints& surface,

@@ -45,13 +45,13 @@ forbid "$transport" "gRPC or protobuf below server/rpc/" server ':!server/rpc'
 forbid 'server/(rpc|catalog|ingest|index|config)/' "the store may not include what is built on it" server/store
 forbid 'server/rpc/' "server/rpc is the outermost layer" server/catalog server/ingest server/index server/telemetry server/config
 forbid 'server/catalog/' "the catalog is built on these" server/ingest server/index server/telemetry
-forbid "$transport" "gRPC or protobuf in a public client header" client/api/client.h client/api/types.h
+forbid "$transport" "gRPC or protobuf in a public client header" client/api/client.h client/api/shape_types.h client/api/types.h
 forbid 'server/|bench/' "client/ may not include the server" client
 forbid 'server/|client/|bench/' "common/ may not include client or server" common
 
 # A program that uses the installed client library finds every header that an installed one includes.
 installed=$(sed -n '/^set(installed_core_headers/,/)/p' client/api/CMakeLists.txt | grep -oE '[a-z_/]+\.h' | sed 's#^#core/#')
-installed="$installed client/api/client.h client/api/types.h"
+installed="$installed client/api/client.h client/api/shape_types.h client/api/types.h"
 for header in $(grep -hoE '^#include "[^"]+"' $installed | cut -d'"' -f2 | sort -u); do
   case " $(echo $installed) " in
     *" $header "*) ;;

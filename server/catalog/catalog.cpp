@@ -73,6 +73,12 @@ Result<index::SnapshotPtr> Catalog::collection(const std::string& name) const {
     return index_.byName(collectionNameOrDefault(name));
 }
 
+std::string Catalog::nameOf(const std::string& name) const {
+    std::string own = collectionNameOrDefault(name);
+    const auto found = index_.byName(own);
+    return found ? (*found)->collection.name : own;
+}
+
 Result<std::vector<index::SnapshotPtr>> Catalog::collections() const {
     RETURN_IF_ERROR(requireContent());
     return index_.all();
@@ -112,7 +118,7 @@ Result<index::SnapshotPtr> Catalog::createCollection(const std::string& name, co
 Result<void> Catalog::deleteCollection(const std::string& name, bool force) {
     RETURN_IF_ERROR(checkCollectionName(name));
     const RestoreGate::Write write(restores_);
-    const auto found = collection(name);
+    const auto found = collectionNamed(name);
     RETURN_IF_ERROR(found);
     const store::Collection& collection = (*found)->collection;
     if (!force) {
@@ -130,6 +136,58 @@ Result<void> Catalog::deleteCollection(const std::string& name, bool force) {
     RETURN_IF_ERROR(store_->deleteCollection(collection.id));
     index_.remove(collection.id);
     workers_.supersedeCollection(collection.id);
+    return {};
+}
+
+Result<index::SnapshotPtr> Catalog::collectionNamed(const std::string& name) const {
+    const auto found = collection(name);
+    RETURN_IF_ERROR(found);
+    const std::string& own = (*found)->collection.name;
+    if (own == name) return found;
+    return fail(ErrorCode::kNotFound,
+                "'" + name + "' is an alias: name the collection itself, '" + own + "'");
+}
+
+Result<index::SnapshotPtr> Catalog::renameCollection(const std::string& name, const std::string& newName) {
+    RETURN_IF_ERROR(checkCollectionName(name));
+    if (const auto checked = checkCollectionName(newName); !checked) {
+        return fail(withContext(checked.error(), "new_"));
+    }
+    if (name == kDefaultCollection) {
+        return fail(ErrorCode::kRejected, std::string("collection '") + kDefaultCollection +
+                                              "' keeps its name: requests that name no collection mean it");
+    }
+    const RestoreGate::Write write(restores_);
+    const auto found = collectionNamed(name);
+    RETURN_IF_ERROR(found);
+    const std::int64_t id = (*found)->collection.id;
+    return index_.rename(id, [&] { return store_->renameCollection(id, newName); });
+}
+
+Result<index::SnapshotPtr> Catalog::setAlias(const std::string& alias, const std::string& name) {
+    if (const auto checked = checkCollectionName(alias); !checked) {
+        return fail(withContext(checked.error(), "alias: "));
+    }
+    RETURN_IF_ERROR(checkCollectionName(name));
+    const RestoreGate::Write write(restores_);
+    // One after the other, so that store and index end with the same.
+    const std::lock_guard<std::mutex> lock(aliases_);
+    const auto found = collection(name);
+    RETURN_IF_ERROR(found);
+    RETURN_IF_ERROR(store_->setAlias(alias, (*found)->collection.id));
+    index_.setAlias(alias, (*found)->collection.id);
+    return found;
+}
+
+Result<void> Catalog::deleteAlias(const std::string& alias) {
+    if (const auto checked = checkCollectionName(alias); !checked) {
+        return fail(withContext(checked.error(), "alias: "));
+    }
+    const RestoreGate::Write write(restores_);
+    RETURN_IF_ERROR(requireContent());
+    const std::lock_guard<std::mutex> lock(aliases_);
+    RETURN_IF_ERROR(store_->deleteAlias(alias));
+    index_.removeAlias(alias);
     return {};
 }
 

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -54,7 +55,7 @@ struct ShapeHeader {
     std::string key;
     store::PutMode mode = store::PutMode::kUpsert;
     std::optional<std::int64_t> expectedVersion;
-    Metadata metadata;
+    store::MetadataChange metadata;
 };
 
 struct AddedShape {
@@ -139,8 +140,11 @@ class Catalog {
 
     // Collections ------------------------------------------------------------------
 
-    /// The default collection for an empty name. Errors: kNotFound.
+    /// By its name or an alias; the default collection for an empty name. Errors: kNotFound.
     [[nodiscard]] Result<index::SnapshotPtr> collection(const std::string& name) const;
+    /// The name of the collection that `name` stands for now: itself, unless it is an alias or empty. Also of
+    /// collections that are not there.
+    [[nodiscard]] std::string nameOf(const std::string& name) const;
     /// By name.
     [[nodiscard]] Result<std::vector<index::SnapshotPtr>> collections() const;
     [[nodiscard]] Result<ShapeCounts> countShapes(const index::Snapshot& collection);
@@ -148,10 +152,24 @@ class Catalog {
     [[nodiscard]] Result<index::SnapshotPtr> createCollection(const std::string& name,
                                                               const std::string& description,
                                                               const ShapeParameters& parameters);
-    /// Cancels its rebuild and stops its workers. There is no default name, so a missing
-    /// name cannot delete one. Errors: kInvalidArgument (name), kNotFound; kRejected: it has shapes and
-    /// `force` is not set.
+    /// Cancels its rebuild and stops its workers. There is no default name and no alias is followed, so that
+    /// only the collection that is meant can be deleted. Errors: kInvalidArgument (name), kNotFound;
+    /// kRejected: it has shapes and `force` is not set.
     [[nodiscard]] Result<void> deleteCollection(const std::string& name, bool force);
+    /// Follows no alias. Errors: kInvalidArgument (a name), kNotFound, kAlreadyExists; kRejected: it is the
+    /// default collection, which requests without a name need.
+    [[nodiscard]] Result<index::SnapshotPtr> renameCollection(const std::string& name,
+                                                              const std::string& newName);
+    /// A new alias, or one that named another collection before. Errors: kInvalidArgument (a name),
+    /// kNotFound (the collection), kAlreadyExists (a collection has this name).
+    [[nodiscard]] Result<index::SnapshotPtr> setAlias(const std::string& alias,
+                                                      const std::string& collection);
+    /// Errors: kInvalidArgument (name), kNotFound.
+    [[nodiscard]] Result<void> deleteAlias(const std::string& alias);
+    /// In ascending order.
+    [[nodiscard]] std::vector<std::string> aliasesOf(const index::Snapshot& collection) const {
+        return index_.aliasesOf(collection.collection.id);
+    }
     /// Reads the stored signatures again; nothing is segmented. Errors: kNotFound.
     [[nodiscard]] Result<index::SnapshotPtr> reload(const std::string& name);
 
@@ -162,8 +180,11 @@ class Catalog {
     /// Errors: kNotFound.
     [[nodiscard]] Result<store::Shape> shapeById(std::int64_t shapeId);
     /// As store::Store.
+    [[nodiscard]] Result<std::vector<std::optional<store::Shape>>> getShapes(
+        std::int64_t collectionId, const std::vector<std::string>& keys);
     [[nodiscard]] Result<std::vector<store::Shape>> listShapes(std::int64_t collectionId,
-                                                               std::int64_t afterId, std::size_t limit,
+                                                               const store::ShapeListing& listing,
+                                                               std::size_t limit,
                                                                const store::ShapeFilter& filter);
     [[nodiscard]] Result<std::uint64_t> countShapes(std::int64_t collectionId,
                                                     const store::ShapeFilter& filter);
@@ -180,6 +201,22 @@ class Catalog {
     /// kInvalidArgument (key), kNotFound, kVersionConflict.
     [[nodiscard]] Result<FoundShape> deleteShape(const std::string& collection, const std::string& key,
                                                  std::optional<std::int64_t> expectedVersion);
+
+    // Changes of many shapes, one transaction each; bulk_changes.h divides what a request asks for into them.
+    // `epoch` is that of the moment when the ids were read. Errors: kUnavailable (a restore replaced the
+    // content since then: the ids may mean other shapes).
+
+    /// As store::Store::deleteShapes; the shapes leave the searches and their workers stop.
+    [[nodiscard]] Result<std::vector<store::Shape>> deleteShapes(
+        std::uint64_t epoch, const std::vector<std::int64_t>& shapeIds,
+        const std::function<bool(const store::Shape&)>& still);
+    /// As store::Store::changeMetadata; searches see the new metadata.
+    [[nodiscard]] Result<std::vector<store::Shape>> changeMetadata(
+        std::uint64_t epoch, const std::vector<std::int64_t>& shapeIds,
+        const std::function<std::optional<Metadata>(const store::Shape&)>& change);
+    /// As store::Store::retryShapes with the bounds of this server; wakes the workers. Errors: kQueueFull.
+    [[nodiscard]] Result<std::uint64_t> retryShapes(std::uint64_t epoch,
+                                                    const std::vector<std::int64_t>& shapeIds);
 
     /// Follows a shape until it is no longer pending, and if it is ready, until searches find it. Calls
     /// `onEvent` at once and after each change of what it tells, never twice with the same event. Errors:
@@ -198,6 +235,14 @@ class Catalog {
     /// The signature behind a hit, with what the index leaves out. Errors: kNotFound, kNotReady (also:
     /// of another generation than `searched`), kDataLoss.
     [[nodiscard]] Result<Signature> storedSignature(const index::Snapshot& searched, std::int64_t shapeId);
+    /// The points of a shape in the order of the upload, packed, and the shape that they are of, which may
+    /// have changed since it was looked up. Takes their bytes from `share`. Errors: kNotFound (deleted
+    /// meanwhile), kQueueFull, kDataLoss.
+    struct StoredScan {
+        store::Shape shape;
+        std::vector<float> points;
+    };
+    [[nodiscard]] Result<StoredScan> storedScan(const FoundShape& found, Budget::Share& share);
     /// The surface points of a shape, null if it has none (yet). Errors: kDataLoss.
     [[nodiscard]] Result<std::shared_ptr<const SurfacePoints>> surface(std::int64_t shapeId) {
         return index_.surface(shapeId);
@@ -276,6 +321,12 @@ class Catalog {
     Result<void> replaceContent(const std::string& path, const RunContext& context, bool& replaced);
     /// After a change that the store has acknowledged, which must not be reported as refused.
     void refreshOrLog(const store::Shape& shape, const char* consequence);
+    /// The same for shapes of one collection; there may be none.
+    void refreshOrLog(const std::vector<store::Shape>& shapes, const char* consequence);
+    /// By its own name. Errors: kNotFound (also: an alias).
+    Result<index::SnapshotPtr> collectionNamed(const std::string& name) const;
+    /// Under the gate of restores. Errors: kUnavailable.
+    Result<void> requireEpoch(std::uint64_t epoch) const;
 
     // In order of construction; destroyed in reverse.
     telemetry::LoggerPtr log_;
@@ -288,7 +339,8 @@ class Catalog {
     ingest::WorkerPool workers_;
     ingest::RebuildDriver rebuilds_;
     RestoreGate restores_;
-    bool lost_ = false;  ///< the last content restored could not be loaded; only restores look at it
+    std::mutex aliases_;  ///< held while an alias changes
+    bool lost_ = false;   ///< the last content restored could not be loaded; only restores look at it
     SegmentationSlots slots_;
 };
 

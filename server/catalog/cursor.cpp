@@ -7,10 +7,9 @@
 namespace shapedb::catalog {
 namespace {
 
-// "1" (version), 16 digits of the id, 16 digits of the checksum.
-constexpr char kVersion = '1';
+// "2" (version), the place in hexadecimal digits, 16 digits of the checksum.
+constexpr char kVersion = '2';
 constexpr std::size_t kDigits = 16;
-constexpr std::size_t kLength = 1 + 2 * kDigits;
 
 std::string hex16(std::uint64_t value) {
     constexpr char kHex[] = "0123456789abcdef";
@@ -19,38 +18,89 @@ std::string hex16(std::uint64_t value) {
     return text;
 }
 
-/// Of everything the cursor depends on. Unambiguous: only the last part has a variable length.
-std::string checksum(const Listing& listing, const std::string& id) {
-    const std::string bound = std::string("shapedb cursor ") + kVersion + ' ' + id + ' ' +
-                              hex16(static_cast<std::uint64_t>(listing.collectionId)) + ' ' +
-                              std::to_string(listing.state) + ' ' + listing.filter;
+/// Of everything the cursor depends on. Unambiguous: what has a variable length follows its length.
+std::string checksum(const Listing& listing, const std::string& place) {
+    std::string bound = std::string("shapedb cursor ") + kVersion;
+    for (const std::uint64_t number :
+         {static_cast<std::uint64_t>(listing.collectionId), static_cast<std::uint64_t>(listing.state),
+          static_cast<std::uint64_t>(listing.order), std::uint64_t{listing.descending}}) {
+        bound += ' ' + std::to_string(number);
+    }
+    for (const std::string* text : {&place, &listing.filter, &listing.keyPrefix}) {
+        bound += ' ' + std::to_string(text->size()) + ' ' + *text;
+    }
     return toHex(sha256(bound.data(), bound.size())).substr(0, kDigits);
+}
+
+std::string placeText(store::ShapeOrder order, const store::ShapeListing::Place& place) {
+    const std::string id = hex16(static_cast<std::uint64_t>(place.id));
+    switch (order) {
+        case store::ShapeOrder::kId: break;
+        case store::ShapeOrder::kUpdated: return id + hex16(static_cast<std::uint64_t>(place.updatedAt));
+        case store::ShapeOrder::kKey: {
+            std::string text = id;
+            for (const char byte : place.key) text += hex16(static_cast<unsigned char>(byte)).substr(14);
+            return text;
+        }
+    }
+    return id;
+}
+
+/// False unless all of `digits` is one number.
+bool readHex(const std::string& digits, std::uint64_t& value) {
+    const char* end = digits.data() + digits.size();
+    const auto [at, error] = std::from_chars(digits.data(), end, value, 16);
+    return error == std::errc() && at == end;
+}
+
+std::optional<store::ShapeListing::Place> readPlace(store::ShapeOrder order, const std::string& text) {
+    std::uint64_t number = 0;
+    store::ShapeListing::Place place;
+    if (text.size() < kDigits || !readHex(text.substr(0, kDigits), number)) return std::nullopt;
+    place.id = static_cast<std::int64_t>(number);
+    const std::string rest = text.substr(kDigits);
+    switch (order) {
+        case store::ShapeOrder::kId: break;
+        case store::ShapeOrder::kUpdated:
+            if (rest.size() != kDigits || !readHex(rest, number)) return std::nullopt;
+            place.updatedAt = static_cast<store::TimestampMs>(number);
+            return place;
+        case store::ShapeOrder::kKey:
+            if (rest.size() % 2 != 0) return std::nullopt;
+            for (std::size_t i = 0; i < rest.size(); i += 2) {
+                if (!readHex(rest.substr(i, 2), number)) return std::nullopt;
+                place.key += static_cast<char>(number);
+            }
+            return place;
+    }
+    return rest.empty() ? std::optional(place) : std::nullopt;
 }
 
 }  // namespace
 
-std::string encodeCursor(const Listing& listing, std::int64_t afterId) {
-    const std::string id = hex16(static_cast<std::uint64_t>(afterId));
-    return kVersion + id + checksum(listing, id);
+std::string encodeCursor(const Listing& listing, const store::ShapeListing::Place& after) {
+    const std::string place = placeText(listing.order, after);
+    return kVersion + place + checksum(listing, place);
 }
 
-Result<std::int64_t> decodeCursor(const Listing& listing, const std::string& cursor) {
-    if (cursor.empty()) return 0;
+Result<std::optional<store::ShapeListing::Place>> decodeCursor(const Listing& listing,
+                                                               const std::string& cursor) {
+    if (cursor.empty()) return std::optional<store::ShapeListing::Place>();
     const auto malformed = [](const char* what) {
         return fail(ErrorCode::kMalformedCursor,
                     std::string("cursor: ") + what +
-                        ": pass next_cursor of the page before unchanged, with the "
-                        "same collection, filter and state, or start without one");
+                        ": pass next_cursor of the page before unchanged, with the same collection, filter, "
+                        "state, order and prefix, or start without one");
     };
-    if (cursor.size() != kLength) return malformed("damaged");
+    if (cursor.size() < 1 + kDigits) return malformed("damaged");
     if (cursor.front() != kVersion) return malformed("of another version of the server");
-    const std::string id = cursor.substr(1, kDigits);
-    if (cursor.substr(1 + kDigits) != checksum(listing, id))
+    const std::string place = cursor.substr(1, cursor.size() - 1 - kDigits);
+    if (cursor.substr(cursor.size() - kDigits) != checksum(listing, place)) {
         return malformed("damaged or of another listing");
-    std::uint64_t afterId = 0;
-    const auto [end, error] = std::from_chars(id.data(), id.data() + id.size(), afterId, 16);
-    if (error != std::errc() || end != id.data() + id.size()) return malformed("damaged");
-    return static_cast<std::int64_t>(afterId);
+    }
+    auto read = readPlace(listing.order, place);
+    if (!read) return malformed("damaged");
+    return read;
 }
 
 }  // namespace shapedb::catalog

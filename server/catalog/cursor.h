@@ -2,9 +2,11 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "core/base/error.h"
+#include "server/store/store.h"
 
 namespace shapedb::catalog {
 
@@ -13,13 +15,17 @@ struct Listing {
     std::int64_t collectionId = 0;
     std::string filter;
     int state = 0;  ///< 0: all; 1 + the number of a store::ShapeState
+    std::string keyPrefix{};
+    store::ShapeOrder order = store::ShapeOrder::kId;
+    bool descending = false;
 };
 
-/// For the page after the shape with id `afterId`. ASCII: version, id, checksum.
-[[nodiscard]] std::string encodeCursor(const Listing& listing, std::int64_t afterId);
+/// For the page after a shape that stood at this place. Letters and digits: version, place, checksum.
+[[nodiscard]] std::string encodeCursor(const Listing& listing, const store::ShapeListing::Place& after);
 
-/// The inverse; an empty cursor is the start (0). Errors: kMalformedCursor (damaged, of another
-/// version or of another listing).
-[[nodiscard]] Result<std::int64_t> decodeCursor(const Listing& listing, const std::string& cursor);
+/// The inverse, of what the order of the listing needs; nothing for an empty cursor, the start. Errors:
+/// kMalformedCursor (damaged, of another version or of another listing).
+[[nodiscard]] Result<std::optional<store::ShapeListing::Place>> decodeCursor(const Listing& listing,
+                                                                             const std::string& cursor);
 
 }  // namespace shapedb::catalog

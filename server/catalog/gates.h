@@ -155,7 +155,7 @@ struct Admission {
     Admission(std::uint64_t uploadBytes, int uploadCalls);
 
     CallGate calls;
-    Budget uploads;    ///< bytes of points being received
+    Budget uploads;    ///< bytes of points being received, or sent as they were received
     Budget followers;  ///< calls that wait for a shape or a rebuild
     Budget answers;    ///< bytes of the answers to searches, as encoded, while they are made
     Budget copies;     ///< copies of the database on their way to or from a client

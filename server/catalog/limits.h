@@ -20,10 +20,30 @@ constexpr std::size_t kMaxMetadataKeyBytes = 128;
 constexpr std::size_t kMaxMetadataValueBytes = 1'024;
 constexpr std::size_t kMaxFilterBytes = 16'384;
 
+/// Metadata keys that begin so describe the points (the client library keeps their offset under one): whoever
+/// replaces all metadata without sending points does not mean them.
+constexpr char kMetadataOfPoints[] = "shapedb.";
+
 // Scans.
 using shapedb::kPointBytes;
 constexpr std::uint64_t kMinPoints = 4;
 using shapedb::kMaxChunkBytes;
+
+// Shapes that one call names, and changes of many.
+constexpr std::size_t kMaxKeys = 1'000;
+/// Changed in one transaction, so that no other write waits for long; of points at most so many bytes are
+/// deleted at a time, or those of one shape.
+constexpr std::size_t kShapesPerChange = 128;
+constexpr std::uint64_t kPointBytesPerChange = std::uint64_t{16} << 20;
+
+// Counts by value.
+constexpr std::uint32_t kDefaultValues = 100;
+constexpr std::uint32_t kMaxValues = 1'000;
+/// A count keeps all values in memory until it knows the most frequent ones.
+constexpr std::size_t kMaxDifferentValues = 100'000;
+
+/// Hits of one group. With all groups of a search no more than its largest k.
+constexpr std::uint32_t kMaxPerGroup = 100;
 
 // Listings and answers.
 constexpr std::uint32_t kDefaultPageSize = 100;

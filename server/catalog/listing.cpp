@@ -1,6 +1,7 @@
 #include "server/catalog/listing.h"
 
 #include <algorithm>
+#include <unordered_map>
 #include <utility>
 
 #include "core/base/return_if_error.h"
@@ -10,16 +11,15 @@
 
 namespace shapedb::catalog {
 
-namespace {
-
-/// Errors: kInvalidArgument (length), kMalformedFilter.
 Result<store::ShapeFilter> makeFilter(const ShapeSelection& selection, const RunContext& context) {
     RETURN_IF_ERROR(checkFilterLength(selection.filter));
+    RETURN_IF_ERROR(checkKeyPrefix(selection.keyPrefix));
     Result<Filter> filter = Filter::parse(selection.filter);
     RETURN_IF_ERROR(filter);
     store::ShapeFilter result;
     result.state = selection.state;
     result.context = context;
+    result.keyPrefix = selection.keyPrefix;
     // With no `accept` the store counts without reading rows.
     if (filter->acceptsAll()) return result;
     result.accept = [filter = std::move(*filter)](const store::Shape& shape) {
@@ -27,6 +27,8 @@ Result<store::ShapeFilter> makeFilter(const ShapeSelection& selection, const Run
     };
     return result;
 }
+
+namespace {
 
 /// What a cursor is bound to: 0 for all states.
 int cursorState(const std::optional<store::ShapeState>& state) {
@@ -42,14 +44,20 @@ Result<std::string> listPage(
     RETURN_IF_ERROR(checkPageSize(request.pageSize));
     const auto filter = makeFilter(request.selection, context);
     RETURN_IF_ERROR(filter);
-    const Listing listing{collection.collection.id, request.selection.filter,
-                          cursorState(request.selection.state)};
-    const auto afterId = decodeCursor(listing, request.cursor);
-    RETURN_IF_ERROR(afterId);
+    Listing listing;
+    listing.collectionId = collection.collection.id;
+    listing.filter = request.selection.filter;
+    listing.state = cursorState(request.selection.state);
+    listing.keyPrefix = request.selection.keyPrefix;
+    listing.order = request.order;
+    listing.descending = request.descending;
+    auto after = decodeCursor(listing, request.cursor);
+    RETURN_IF_ERROR(after);
 
     const std::size_t pageSize = request.pageSize == 0 ? kDefaultPageSize : request.pageSize;
     // One more than requested tells whether there is a next page.
-    const auto shapes = catalog.listShapes(listing.collectionId, *afterId, pageSize + 1, *filter);
+    const auto shapes = catalog.listShapes(
+        listing.collectionId, {request.order, request.descending, std::move(*after)}, pageSize + 1, *filter);
     RETURN_IF_ERROR(shapes);
     std::size_t bytes = 0;
     std::size_t sent = 0;
@@ -57,7 +65,33 @@ Result<std::string> listPage(
         const store::Shape& shape = (*shapes)[sent];
         bytes += visit(shape, qualityIn(collection.signatures, shape.id));
     }
-    return sent < shapes->size() ? encodeCursor(listing, (*shapes)[sent - 1].id) : std::string();
+    if (sent == shapes->size()) return std::string();
+    const store::Shape& last = (*shapes)[sent - 1];
+    return encodeCursor(listing, {last.id, last.updatedAt, last.key});
+}
+
+Result<std::vector<std::string>> visitShapes(
+    Catalog& catalog, const index::Snapshot& collection, const std::vector<std::string>& keys,
+    const std::function<std::size_t(const store::Shape&, std::optional<double> quality)>& visit) {
+    RETURN_IF_ERROR(checkKeys(keys));
+    const auto found = catalog.getShapes(collection.collection.id, keys);
+    RETURN_IF_ERROR(found);
+    std::vector<std::string> missing;
+    std::size_t bytes = 0;
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+        const std::optional<store::Shape>& shape = (*found)[i];
+        if (!shape) {
+            missing.push_back(keys[i]);
+            continue;
+        }
+        bytes += visit(*shape, qualityIn(collection.signatures, shape->id));
+        if (bytes > kMaxAnswerBytes) {
+            return fail(ErrorCode::kInvalidArgument, "keys: the answer would exceed " +
+                                                         std::to_string(kMaxAnswerBytes) +
+                                                         " bytes; ask for fewer shapes");
+        }
+    }
+    return missing;
 }
 
 Result<std::uint64_t> countSelected(Catalog& catalog, const index::Snapshot& collection,
@@ -65,6 +99,48 @@ Result<std::uint64_t> countSelected(Catalog& catalog, const index::Snapshot& col
     const auto filter = makeFilter(selection, context);
     RETURN_IF_ERROR(filter);
     return catalog.countShapes(collection.collection.id, *filter);
+}
+
+Result<ValueCounts> countByValue(Catalog& catalog, const index::Snapshot& collection,
+                                 const ShapeSelection& selection, const std::string& metadataKey,
+                                 std::uint32_t maxValues, const RunContext& context) {
+    RETURN_IF_ERROR(checkMetadataKey("metadata_key:", metadataKey));
+    RETURN_IF_ERROR(checkMaxValues(maxValues));
+    auto filter = makeFilter(selection, context);
+    RETURN_IF_ERROR(filter);
+    std::unordered_map<std::string, std::uint64_t> shapes;
+    ValueCounts counts;
+    bool tooMany = false;
+    // Counted where the store asks which shapes to count.
+    const auto accept = std::move(filter->accept);
+    filter->accept = [&](const store::Shape& shape) {
+        if (tooMany || (accept && !accept(shape))) return false;
+        const auto value = shape.metadata.find(metadataKey);
+        if (value == shape.metadata.end()) {
+            ++counts.without;
+            return true;
+        }
+        ++shapes[value->second];
+        tooMany = shapes.size() > kMaxDifferentValues;
+        return true;
+    };
+    RETURN_IF_ERROR(catalog.countShapes(collection.collection.id, *filter));
+    if (tooMany) {
+        return fail(ErrorCode::kInvalidArgument, "metadata_key: '" + metadataKey + "' has more than " +
+                                                     std::to_string(kMaxDifferentValues) +
+                                                     " different values: count a narrower filter");
+    }
+    for (const auto& [value, count] : shapes) counts.values.push_back({value, count});
+    std::sort(counts.values.begin(), counts.values.end(), [](const ValueCount& a, const ValueCount& b) {
+        return a.shapes != b.shapes ? a.shapes > b.shapes : a.value < b.value;
+    });
+    const std::size_t named = maxValues == 0 ? kDefaultValues : maxValues;
+    for (std::size_t i = named; i < counts.values.size(); ++i) {
+        ++counts.otherValues;
+        counts.otherShapes += counts.values[i].shapes;
+    }
+    if (counts.values.size() > named) counts.values.resize(named);
+    return counts;
 }
 
 }  // namespace shapedb::catalog

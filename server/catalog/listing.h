@@ -1,4 +1,4 @@
-// A page of a listing of shapes, whatever the transport.
+// Pages of a listing of shapes, and counts, whatever the transport.
 #pragma once
 
 #include <cstddef>
@@ -6,6 +6,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/base/error.h"
 #include "core/base/run_context.h"
@@ -18,25 +19,56 @@ namespace shapedb::catalog {
 struct ShapeSelection {
     std::string filter;  ///< docs/filters.md; empty: all
     std::optional<store::ShapeState> state;
+    std::string keyPrefix{};  ///< empty: all
 };
+
+/// Checked, for the store. `context` must outlive it. Errors: kInvalidArgument (prefix), kMalformedFilter.
+[[nodiscard]] Result<store::ShapeFilter> makeFilter(const ShapeSelection& selection,
+                                                    const RunContext& context);
 
 struct ListRequest {
     ShapeSelection selection;
     std::uint32_t pageSize = 0;  ///< 0: the default
     std::string cursor;          ///< empty: from the start
+    store::ShapeOrder order = store::ShapeOrder::kId;
+    bool descending = false;
 };
 
-/// Calls `visit` with each shape of the page, by id; it returns how many bytes the shape takes in the
-/// answer, which ends the page before it grows too large. Returns the cursor of the next page, empty if
-/// there is none. Errors: kInvalidArgument (page size, filter), kMalformedFilter, kMalformedCursor,
-/// kCancelled, kDeadlineExceeded; those of the store.
+/// Calls `visit` with each shape of the page, in the order of the request; it returns how many bytes the
+/// shape takes in the answer, which ends the page before it grows too large. Returns the cursor of the next
+/// page, empty if there is none. Errors: kInvalidArgument (page size, prefix), kMalformedFilter,
+/// kMalformedCursor, kCancelled, kDeadlineExceeded; those of the store.
 [[nodiscard]] Result<std::string> listPage(
     Catalog& catalog, const index::Snapshot& collection, const ListRequest& request,
     const RunContext& context,
     const std::function<std::size_t(const store::Shape&, std::optional<double> quality)>& visit);
 
+/// Calls `visit` with the shape of each key, in their order, as above. Returns the keys that no shape has.
+/// Errors: kInvalidArgument (keys, an answer beyond kMaxAnswerBytes); those of the store.
+[[nodiscard]] Result<std::vector<std::string>> visitShapes(
+    Catalog& catalog, const index::Snapshot& collection, const std::vector<std::string>& keys,
+    const std::function<std::size_t(const store::Shape&, std::optional<double> quality)>& visit);
+
 /// Errors: kInvalidArgument, kMalformedFilter, kCancelled, kDeadlineExceeded; those of the store.
 [[nodiscard]] Result<std::uint64_t> countSelected(Catalog& catalog, const index::Snapshot& collection,
                                                   const ShapeSelection& selection, const RunContext& context);
+
+struct ValueCount {
+    std::string value;
+    std::uint64_t shapes = 0;
+};
+struct ValueCounts {
+    std::vector<ValueCount> values;  ///< most shapes first, ties by value
+    std::uint64_t otherValues = 0;   ///< that there was no room for
+    std::uint64_t otherShapes = 0;   ///< that have those
+    std::uint64_t without = 0;       ///< shapes without the key
+};
+/// How many of the shapes have which value under a metadata key; at most `maxValues` are named (0: the
+/// default). Errors: as above; kInvalidArgument also for the key, `maxValues`, and more than
+/// kMaxDifferentValues values.
+[[nodiscard]] Result<ValueCounts> countByValue(Catalog& catalog, const index::Snapshot& collection,
+                                               const ShapeSelection& selection,
+                                               const std::string& metadataKey, std::uint32_t maxValues,
+                                               const RunContext& context);
 
 }  // namespace shapedb::catalog

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "common/safe_text.h"
+#include "core/base/return_if_error.h"
 #include "server/catalog/limits.h"
 #include "server/store/key_rules.h"
 
@@ -11,6 +12,11 @@ namespace {
 
 tl::unexpected<Error> bad(std::string message) {
     return fail(ErrorCode::kInvalidArgument, std::move(message));
+}
+
+bool isMetadataKey(const std::string& key) {
+    return !key.empty() && key.size() <= kMaxMetadataKeyBytes &&
+           std::all_of(key.begin(), key.end(), store::isNameByte);
 }
 
 }  // namespace
@@ -37,17 +43,63 @@ Result<void> checkKey(const std::string& key) {
     return {};
 }
 
+Result<void> checkMetadataKey(const char* field, const std::string& key) {
+    if (isMetadataKey(key)) return {};
+    return bad(std::string(field) + " '" + key.substr(0, kMaxMetadataKeyBytes) + "' is not 1 to " +
+               std::to_string(kMaxMetadataKeyBytes) + " letters, digits, '_', '.' and '-'");
+}
+
+Result<void> checkMetadataChange(const store::MetadataChange& change) {
+    RETURN_IF_ERROR(checkMetadata(change.set));
+    if (change.replaceAll && !change.remove.empty()) {
+        return bad("remove: replace_all removes all keys that are not set; leave one out");
+    }
+    for (const std::string& key : change.remove) {
+        RETURN_IF_ERROR(checkMetadataKey("remove: key", key));
+        if (change.set.count(key) > 0) return bad("remove: key '" + key + "' is also set");
+    }
+    return {};
+}
+
+Result<void> checkKeys(const std::vector<std::string>& keys) {
+    if (keys.empty() || keys.size() > kMaxKeys) {
+        return bad("keys: " + std::to_string(keys.size()) + " keys, 1 to " + std::to_string(kMaxKeys) +
+                   " are allowed");
+    }
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+        if (const auto problem = store::problemOfKey(keys[i])) {
+            return bad("keys: key " + std::to_string(i) + ": " + *problem);
+        }
+    }
+    return {};
+}
+
+Result<void> checkKeyPrefix(const std::string& prefix) {
+    if (prefix.size() > kMaxKeyBytes) {
+        return bad("key_prefix: " + std::to_string(prefix.size()) + " bytes, at most " +
+                   std::to_string(kMaxKeyBytes) + " are allowed");
+    }
+    if (!isUtf8(prefix)) return bad("key_prefix: not valid UTF-8");
+    return {};
+}
+
+Result<void> checkMaxValues(std::uint32_t maxValues) {
+    if (maxValues <= kMaxValues) return {};
+    return bad("max_values: " + std::to_string(maxValues) + " is outside 1 to " + std::to_string(kMaxValues));
+}
+
+Result<void> checkExpectedVersion(const std::optional<std::int64_t>& version) {
+    if (version.value_or(0) >= 0) return {};
+    return bad("expected_version: must be 0 (the key is free) or more");
+}
+
 Result<void> checkMetadata(const Metadata& metadata) {
     if (metadata.size() > kMaxMetadataEntries) {
         return bad("metadata: " + std::to_string(metadata.size()) + " entries, at most " +
                    std::to_string(kMaxMetadataEntries) + " are allowed");
     }
     for (const auto& [key, value] : metadata) {
-        if (key.empty() || key.size() > kMaxMetadataKeyBytes ||
-            !std::all_of(key.begin(), key.end(), store::isNameByte)) {
-            return bad("metadata: key '" + key.substr(0, kMaxMetadataKeyBytes) + "' is not 1 to " +
-                       std::to_string(kMaxMetadataKeyBytes) + " letters, digits, '_', '.' and '-'");
-        }
+        RETURN_IF_ERROR(checkMetadataKey("metadata: key", key));
         if (value.size() > kMaxMetadataValueBytes) {
             return bad("metadata: the value of '" + key + "' has " + std::to_string(value.size()) +
                        " bytes, at most " + std::to_string(kMaxMetadataValueBytes) + " are allowed");
@@ -75,6 +127,24 @@ Result<void> checkVerifyOptions(const VerifyOptions& options) {
     if (!options.viewpoint) return {};
     if (!isFinite(*options.viewpoint)) return bad("viewpoint: a coordinate is not finite");
     if (!options.oneSided.value_or(true)) return bad("viewpoint: given for a query that is not one-sided");
+    return {};
+}
+
+Result<void> checkGrouping(const std::string& groupBy, std::uint32_t perGroup, std::uint32_t k,
+                           std::uint32_t maxK) {
+    if (groupBy.empty()) {
+        if (perGroup == 0) return {};
+        return bad("per_group: given without group_by");
+    }
+    RETURN_IF_ERROR(checkMetadataKey("group_by:", groupBy));
+    if (perGroup > kMaxPerGroup) {
+        return bad("per_group: " + std::to_string(perGroup) + " is outside 1 to " +
+                   std::to_string(kMaxPerGroup));
+    }
+    if (std::uint64_t{k} * perGroup > maxK) {
+        return bad("per_group: " + std::to_string(k) + " groups of " + std::to_string(perGroup) +
+                   " are more than " + std::to_string(maxK) + " hits");
+    }
     return {};
 }
 

@@ -3,11 +3,14 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "core/base/error.h"
 #include "core/base/metadata.h"
 #include "core/search/verify.h"
+#include "server/store/metadata_change.h"
 
 namespace shapedb::catalog {
 
@@ -24,12 +27,28 @@ constexpr const char* kDefaultCollection = "default";
 [[nodiscard]] Result<void> checkKey(const std::string& key);
 /// At most kMaxMetadataEntries, each key and value within its limits.
 [[nodiscard]] Result<void> checkMetadata(const Metadata& metadata);
+/// As `checkMetadata` of what it sets; nothing is both set and removed, or removed where all is replaced.
+[[nodiscard]] Result<void> checkMetadataChange(const store::MetadataChange& change);
+/// 1 to kMaxMetadataKeyBytes of [A-Za-z0-9_.-]. `field` names it in the error.
+[[nodiscard]] Result<void> checkMetadataKey(const char* field, const std::string& key);
+/// 1 to kMaxKeys, each as `checkKey`.
+[[nodiscard]] Result<void> checkKeys(const std::vector<std::string>& keys);
+/// At most kMaxKeyBytes of UTF-8.
+[[nodiscard]] Result<void> checkKeyPrefix(const std::string& prefix);
+/// 0 (the default) to kMaxValues.
+[[nodiscard]] Result<void> checkMaxValues(std::uint32_t maxValues);
+/// A version; 0: the key is free.
+[[nodiscard]] Result<void> checkExpectedVersion(const std::optional<std::int64_t>& version);
 /// 1 to `maxK`.
 [[nodiscard]] Result<void> checkK(std::uint32_t k, std::uint32_t maxK);
 /// 1 to `maxBatch` queries.
 [[nodiscard]] Result<void> checkBatchSize(std::uint64_t queries, std::uint32_t maxBatch);
 /// At most kMostVerified candidates; a viewpoint is finite and not of a query that is not of one side.
 [[nodiscard]] Result<void> checkVerifyOptions(const VerifyOptions& options);
+/// No groups, or by a key as `checkMetadataKey` with 0 (the default) to kMaxPerGroup hits of each, in all not
+/// more than `maxK`.
+[[nodiscard]] Result<void> checkGrouping(const std::string& groupBy, std::uint32_t perGroup, std::uint32_t k,
+                                         std::uint32_t maxK);
 /// [0, 1], not NaN.
 [[nodiscard]] Result<void> checkThreshold(double threshold);
 /// At most kMaxFilterBytes.

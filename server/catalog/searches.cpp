@@ -1,5 +1,6 @@
 #include "server/catalog/searches.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "core/base/return_if_error.h"
@@ -39,6 +40,7 @@ Result<PreparedSearch> Searches::prepare(index::SnapshotPtr collection, const Se
     RETURN_IF_ERROR(checkThreshold(request.threshold));
     RETURN_IF_ERROR(checkFilterLength(request.filter));
     RETURN_IF_ERROR(checkVerifyOptions(request.verifyOptions));
+    RETURN_IF_ERROR(checkGrouping(request.groupBy, request.perGroup, request.k, maxK_));
     const auto keepScale =
         sizesCount(request.score.keepScale, request.freeScale, collection->parameters.unit);
     RETURN_IF_ERROR(keepScale);
@@ -54,6 +56,9 @@ Result<PreparedSearch> Searches::prepare(index::SnapshotPtr collection, const Se
     prepared.options.filter = std::move(*filter);
     prepared.options.score = request.score;
     prepared.options.score.keepScale = *keepScale;
+    if (!request.groupBy.empty()) {
+        prepared.options.grouping = Grouping{request.groupBy, std::max(1u, request.perGroup)};
+    }
     prepared.explain = request.explain;
     if (request.verify.value_or(prepared.collection->parameters.profile == Profile::kDefault)) {
         prepared.verify = request.verifyOptions;
@@ -280,6 +285,12 @@ Result<void> Searches::visitHits(const PreparedSearch& search, const Signature& 
         out.signatureScore = hit.signatureScore;
         out.fit = hit.fit;
         out.verdict = hit.verdict;
+        if (search.options.grouping) {
+            // As it was searched: the shape may have other metadata by now.
+            const GroupValue group =
+                groupOf(search.collection->signatures, hit.id, search.options.grouping->key);
+            if (group != nullptr) out.group = *group;
+        }
         if (search.explain) {
             auto explanation = explain(search, query, found, hit);
             RETURN_IF_ERROR(explanation);

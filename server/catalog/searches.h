@@ -29,6 +29,8 @@ struct SearchRequest {
     bool explain = true;
     std::optional<bool> verify;  ///< nothing: yes, but not in collections of profile `paper`
     VerifyOptions verifyOptions;
+    std::string groupBy;         ///< a metadata key; empty: no groups
+    std::uint32_t perGroup = 0;  ///< hits of a group at most; 0: 1
 };
 
 /// Checked options, and the snapshot that all queries of the request read.
@@ -73,6 +75,8 @@ struct FoundHit {
     std::optional<Explanation> explanation;  ///< its motion is that of `fit`, if there is one
     std::shared_ptr<const FitResult> fit;    ///< null if it was not verified
     Verdict verdict = Verdict::kNone;
+    /// Of a search with groups: the value that the group has in common, empty for shapes without the key.
+    std::optional<std::string> group;
 };
 
 /// How many bytes an answer may still grow by. One for each request; thread-safe.
@@ -96,7 +100,8 @@ class Searches {
     Searches(Catalog& catalog, SearchRunner& runner, std::uint32_t maxK)
         : catalog_(catalog), runner_(runner), maxK_(maxK) {}
 
-    /// Errors: kInvalidArgument (k, threshold, what verifying takes), kMalformedFilter; those of the store.
+    /// Errors: kInvalidArgument (k, threshold, what verifying takes, groups), kMalformedFilter; those of the
+    /// store.
     [[nodiscard]] Result<PreparedSearch> prepare(index::SnapshotPtr collection,
                                                  const SearchRequest& request) const;
 

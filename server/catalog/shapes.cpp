@@ -24,9 +24,15 @@ Result<FoundShape> Catalog::findShape(const index::SnapshotPtr& collection, cons
 
 Result<store::Shape> Catalog::shapeById(std::int64_t shapeId) { return store_->getShapeById(shapeId); }
 
-Result<std::vector<store::Shape>> Catalog::listShapes(std::int64_t collectionId, std::int64_t afterId,
-                                                      std::size_t limit, const store::ShapeFilter& filter) {
-    return store_->listShapes(collectionId, afterId, limit, filter);
+Result<std::vector<std::optional<store::Shape>>> Catalog::getShapes(std::int64_t collectionId,
+                                                                    const std::vector<std::string>& keys) {
+    return store_->getShapes(collectionId, keys);
+}
+
+Result<std::vector<store::Shape>> Catalog::listShapes(std::int64_t collectionId,
+                                                      const store::ShapeListing& listing, std::size_t limit,
+                                                      const store::ShapeFilter& filter) {
+    return store_->listShapes(collectionId, listing, limit, filter);
 }
 
 Result<std::uint64_t> Catalog::countShapes(std::int64_t collectionId, const store::ShapeFilter& filter) {
@@ -85,10 +91,8 @@ std::optional<double> Catalog::servingQuality(const store::Shape& shape) const {
 
 Result<void> Catalog::admitUpload(const ShapeHeader& header) const {
     RETURN_IF_ERROR(checkKey(header.key));
-    RETURN_IF_ERROR(checkMetadata(header.metadata));
-    if (header.expectedVersion && *header.expectedVersion < 0) {
-        return fail(ErrorCode::kInvalidArgument, "expected_version: must be 0 (the key is free) or more");
-    }
+    RETURN_IF_ERROR(checkMetadataChange(header.metadata));
+    RETURN_IF_ERROR(checkExpectedVersion(header.expectedVersion));
     RETURN_IF_ERROR(collection(header.collection));
     return restores_.requireNoRestore();
 }
@@ -105,6 +109,7 @@ Result<AddedShape> Catalog::put(const ShapeHeader& header, store::VerifiedScan s
     request.mode = header.mode;
     request.expectedVersion = header.expectedVersion;
     request.metadata = header.metadata;
+    request.checkMetadata = checkMetadata;
     request.maxQueuedJobs = options_.maxQueuedJobs;
     request.maxQueuedBytes = options_.maxQueuedBytes;
     auto put = store_->putShape(request);
@@ -150,6 +155,55 @@ Result<FoundShape> Catalog::deleteShape(const std::string& collectionName, const
 void Catalog::refreshOrLog(const store::Shape& shape, const char* consequence) {
     const auto refreshed = index_.refresh(shape.collectionId, shape.id);
     if (!refreshed) log_->error(consequence, telemetry::fieldsOf(refreshed.error()));
+}
+
+void Catalog::refreshOrLog(const std::vector<store::Shape>& shapes, const char* consequence) {
+    if (shapes.empty()) return;
+    std::vector<std::int64_t> ids;
+    for (const store::Shape& shape : shapes) ids.push_back(shape.id);
+    const auto refreshed = index_.refresh(shapes.front().collectionId, ids);
+    if (!refreshed) log_->error(consequence, telemetry::fieldsOf(refreshed.error()));
+}
+
+Result<void> Catalog::requireEpoch(std::uint64_t epoch) const {
+    if (restores_.epoch() == epoch) return {};
+    return fail(ErrorCode::kUnavailable,
+                "the database was replaced by a backup while the call ran: repeat it");
+}
+
+Result<std::vector<store::Shape>> Catalog::deleteShapes(
+    std::uint64_t epoch, const std::vector<std::int64_t>& shapeIds,
+    const std::function<bool(const store::Shape&)>& still) {
+    const RestoreGate::Write write(restores_);
+    RETURN_IF_ERROR(requireEpoch(epoch));
+    auto deleted = store_->deleteShapes(shapeIds, still);
+    RETURN_IF_ERROR(deleted);
+    for (const store::Shape& shape : *deleted) {
+        workers_.supersede(shape.id);
+        // Wakes those who follow it, to find that it is gone.
+        board_.settled(shape.id);
+    }
+    refreshOrLog(*deleted, "deleted shapes are still searched");
+    return deleted;
+}
+
+Result<std::vector<store::Shape>> Catalog::changeMetadata(
+    std::uint64_t epoch, const std::vector<std::int64_t>& shapeIds,
+    const std::function<std::optional<Metadata>(const store::Shape&)>& change) {
+    const RestoreGate::Write write(restores_);
+    RETURN_IF_ERROR(requireEpoch(epoch));
+    auto changed = store_->changeMetadata(shapeIds, change);
+    RETURN_IF_ERROR(changed);
+    refreshOrLog(*changed, "new metadata is not searched yet");
+    return changed;
+}
+
+Result<std::uint64_t> Catalog::retryShapes(std::uint64_t epoch, const std::vector<std::int64_t>& shapeIds) {
+    const RestoreGate::Write write(restores_);
+    RETURN_IF_ERROR(requireEpoch(epoch));
+    const auto queued = store_->retryShapes(shapeIds, options_.maxQueuedJobs, options_.maxQueuedBytes);
+    if (queued.value_or(0) > 0) workers_.wake();
+    return queued;
 }
 
 // Following ------------------------------------------------------------------------------
@@ -224,6 +278,24 @@ Result<store::Shape> Catalog::awaitIngest(const store::Shape& added, const Check
                     settled.error().message + "; the scan is stored and will be segmented");
     }
     return settled;
+}
+
+Result<Catalog::StoredScan> Catalog::storedScan(const FoundShape& found, Budget::Share& share) {
+    store::Shape shape = found.shape;
+    RETURN_IF_ERROR(share.take(shape.pointCount * kPointBytes));
+    for (;;) {
+        auto points = store_->loadPoints(shape.id);
+        RETURN_IF_ERROR(points);
+        auto now = store_->getShapeById(shape.id);
+        RETURN_IF_ERROR(now);
+        const bool same = now->pointsVersion == shape.pointsVersion;
+        if (!same && now->pointCount > shape.pointCount) {
+            RETURN_IF_ERROR(share.take((now->pointCount - shape.pointCount) * kPointBytes));
+        }
+        shape = std::move(*now);
+        if (same) return StoredScan{std::move(shape), std::move(*points)};
+        // Replaced while they were read: again, so that shape and points belong together.
+    }
 }
 
 // Segmentation for callers ---------------------------------------------------------------

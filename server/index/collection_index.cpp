@@ -197,6 +197,9 @@ Result<void> CollectionIndex::loadAllUnguarded(const RunContext& context) {
         slot->publish(*snapshot);
         insert(next, std::move(slot));
     }
+    const auto aliases = store_.listAliases();
+    RETURN_IF_ERROR(aliases);
+    for (const store::Alias& alias : *aliases) next.aliases[alias.name] = alias.collectionId;
     surfaces_.clear();
     const std::lock_guard<std::mutex> lock(mutex_);
     // The old directory is freed with `next`, after the lock has been released.
@@ -216,7 +219,13 @@ Result<SnapshotPtr> CollectionIndex::byName(const std::string& name) const {
     {
         const std::lock_guard<std::mutex> lock(mutex_);
         const auto found = directory_.byName.find(name);
-        if (found != directory_.byName.end()) slot = found->second;
+        const auto alias = directory_.aliases.find(name);
+        if (found != directory_.byName.end()) {
+            slot = found->second;
+        } else if (alias != directory_.aliases.end()) {
+            const auto meant = directory_.byId.find(alias->second);
+            if (meant != directory_.byId.end()) slot = meant->second;
+        }
     }
     if (!slot) return fail(ErrorCode::kNotFound, "there is no collection '" + name + "': create it first");
     return slot->current();
@@ -259,18 +268,60 @@ void CollectionIndex::remove(std::int64_t collectionId) {
     if (found == directory_.byId.end()) return;
     removed = found->second;
     directory_.byId.erase(found);
+    for (auto alias = directory_.aliases.begin(); alias != directory_.aliases.end();) {
+        alias = alias->second == collectionId ? directory_.aliases.erase(alias) : std::next(alias);
+    }
     // The name may be taken again by now.
     const auto named = directory_.byName.find(removed->current()->collection.name);
     if (named != directory_.byName.end() && named->second == removed) directory_.byName.erase(named);
 }
 
-Result<void> CollectionIndex::refresh(std::int64_t collectionId, std::int64_t shapeId) {
-    surfaces_.forget(shapeId);
+Result<SnapshotPtr> CollectionIndex::rename(std::int64_t collectionId,
+                                            const std::function<Result<store::Collection>()>& change) {
+    const SlotPtr slot = find(collectionId);
+    if (!slot) return fail(ErrorCode::kNotFound, "there is no collection " + std::to_string(collectionId));
+    // Reloads look the collection up by the name of the snapshot.
+    const std::lock_guard<std::mutex> apply(slot->apply);
+    const SnapshotPtr before = slot->current();
+    auto renamed = change();
+    RETURN_IF_ERROR(renamed);
+    auto next = std::make_shared<Snapshot>(*before);
+    next->collection.name = renamed->name;
+    slot->publish(next);
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const auto old = directory_.byName.find(before->collection.name);
+    if (old != directory_.byName.end() && old->second == slot) directory_.byName.erase(old);
+    // Unless it was deleted meanwhile.
+    if (directory_.byId.count(collectionId) > 0) directory_.byName[renamed->name] = slot;
+    return SnapshotPtr(std::move(next));
+}
+
+void CollectionIndex::setAlias(const std::string& name, std::int64_t collectionId) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (directory_.byId.count(collectionId) > 0) directory_.aliases[name] = collectionId;
+}
+
+void CollectionIndex::removeAlias(const std::string& name) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    directory_.aliases.erase(name);
+}
+
+std::vector<std::string> CollectionIndex::aliasesOf(std::int64_t collectionId) const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    std::vector<std::string> names;
+    for (const auto& [name, id] : directory_.aliases) {
+        if (id == collectionId) names.push_back(name);
+    }
+    return names;
+}
+
+Result<void> CollectionIndex::refresh(std::int64_t collectionId, const std::vector<std::int64_t>& shapeIds) {
+    for (const std::int64_t shapeId : shapeIds) surfaces_.forget(shapeId);
     const SlotPtr slot = find(collectionId);
     if (!slot) return {};
     return guarded([&] {
         // Before waiting for the lock: whoever gets it next applies all marks at once.
-        slot->mark({shapeId});
+        slot->mark(shapeIds);
         const std::lock_guard<std::mutex> lock(slot->apply);
         return slot->stale ? reloadLocked(*slot) : applyDirty(*slot);
     });

@@ -52,7 +52,7 @@ class CollectionIndex {
     /// Forgets everything; running searches keep their snapshot.
     void clear();
 
-    /// Errors: kNotFound.
+    /// By its name or an alias. Errors: kNotFound.
     [[nodiscard]] Result<SnapshotPtr> byName(const std::string& name) const;
     /// Errors: kNotFound.
     [[nodiscard]] Result<SnapshotPtr> byId(std::int64_t collectionId) const;
@@ -64,9 +64,22 @@ class CollectionIndex {
     /// Removes a collection; ignores unknown ids. Running searches keep their snapshot.
     void remove(std::int64_t collectionId);
 
-    /// Reads one shape again. Searches that start afterwards see at least what was committed before the
-    /// call. No error when the collection is gone.
-    [[nodiscard]] Result<void> refresh(std::int64_t collectionId, std::int64_t shapeId);
+    /// Calls `change`, which renames the collection in the store, and shows it under its new name; nothing
+    /// reads the collection again in between. Errors: kNotFound; those of `change`.
+    [[nodiscard]] Result<SnapshotPtr> rename(std::int64_t collectionId,
+                                             const std::function<Result<store::Collection>()>& change);
+    /// At one moment `name` stands for this collection, and for no other any more.
+    void setAlias(const std::string& name, std::int64_t collectionId);
+    void removeAlias(const std::string& name);
+    /// The aliases of a collection, in ascending order.
+    [[nodiscard]] std::vector<std::string> aliasesOf(std::int64_t collectionId) const;
+
+    /// Reads shapes of one collection again. Searches that start afterwards see at least what was committed
+    /// before the call. No error when the collection is gone.
+    [[nodiscard]] Result<void> refresh(std::int64_t collectionId, const std::vector<std::int64_t>& shapeIds);
+    [[nodiscard]] Result<void> refresh(std::int64_t collectionId, std::int64_t shapeId) {
+        return refresh(collectionId, std::vector<std::int64_t>{shapeId});
+    }
 
     /// Reads one collection again. Errors: kNotFound, kDataLoss.
     [[nodiscard]] Result<void> reload(std::int64_t collectionId);
@@ -100,6 +113,7 @@ class CollectionIndex {
     struct Directory {
         std::map<std::string, SlotPtr> byName;
         std::map<std::int64_t, SlotPtr> byId;
+        std::map<std::string, std::int64_t> aliases;
     };
 
     SlotPtr find(std::int64_t collectionId) const;

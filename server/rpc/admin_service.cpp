@@ -30,9 +30,14 @@ Result<catalog::RebuildRequest> rebuildRequestFrom(const v1::RebuildRequest& req
     return wanted;
 }
 
-/// Asks for the collection that is to be rebuilt, or for all.
-Result<void> useTargets(const catalog::Catalog& catalog, Call& call, const v1::RebuildRequest& request) {
-    if (!request.collection().empty()) return call.useCollection(request.collection());
+/// Asks for the collection that is to be rebuilt, and names it, or for all.
+Result<void> useTargets(const catalog::Catalog& catalog, Call& call, catalog::RebuildRequest& wanted) {
+    if (!wanted.collection.empty()) {
+        auto own = call.useCollection(wanted.collection);
+        RETURN_IF_ERROR(own);
+        wanted.collection = std::move(*own);
+        return {};
+    }
     const auto all = catalog.collections();
     RETURN_IF_ERROR(all);
     for (const index::SnapshotPtr& snapshot : *all) {
@@ -65,9 +70,9 @@ Result<void> requireRoomForRestore(const std::string& directory, std::uint64_t a
 grpc::Status AdminServiceHandler::Rebuild(grpc::ServerContext* context, const v1::RebuildRequest* request,
                                           grpc::ServerWriter<v1::RebuildProgress>* writer) {
     return handle(services_, context, operations::kRebuild, [&](Call& call) -> Result<void> {
-        const auto wanted = rebuildRequestFrom(*request);
+        auto wanted = rebuildRequestFrom(*request);
         RETURN_IF_ERROR(wanted);
-        RETURN_IF_ERROR(useTargets(services_.catalog, call, *request));
+        RETURN_IF_ERROR(useTargets(services_.catalog, call, *wanted));
         return services_.catalog.rebuild(*wanted, call.frame(),
                                          [&](const catalog::RebuildProgress& progress) {
                                              return call.write(*writer, progressFrom(progress));
@@ -79,8 +84,9 @@ grpc::Status AdminServiceHandler::CancelRebuild(grpc::ServerContext* context,
                                                 const v1::CancelRebuildRequest* request,
                                                 v1::CancelRebuildResponse*) {
     return handle(services_, context, operations::kCancelRebuild, [&](Call& call) -> Result<void> {
-        RETURN_IF_ERROR(call.useCollection(request->collection()));
-        return services_.catalog.cancelRebuild(request->collection());
+        const auto collection = call.useCollection(request->collection());
+        RETURN_IF_ERROR(collection);
+        return services_.catalog.cancelRebuild(*collection);
     });
 }
 

@@ -31,6 +31,8 @@ class Uploads {
         return finished("other: ", other_, isolationFrom(header_.other_isolation()));
     }
     const v1::AlignHeader& header() const { return header_; }
+    /// Of the key in the header.
+    const std::string& collection() const { return collection_; }
 
   private:
     Result<void> begin(const v1::AlignHeader& header) {
@@ -41,7 +43,9 @@ class Uploads {
         }
         if (header.has_key()) {
             call_.noteKey(header.key().key());
-            RETURN_IF_ERROR(call_.useCollection(header.key().collection()));
+            auto collection = call_.useCollection(header.key().collection());
+            RETURN_IF_ERROR(collection);
+            collection_ = std::move(*collection);
         }
         RETURN_IF_ERROR(call_.useScan(header.query_points()));
         if (header.has_other_points()) {
@@ -65,6 +69,7 @@ class Uploads {
     catalog::ScanUpload query_;
     catalog::ScanUpload other_;
     v1::AlignHeader header_;  // empty until it arrives
+    std::string collection_;
 };
 
 FitOptions optionsFrom(const v1::AlignHeader& header) {
@@ -93,7 +98,7 @@ grpc::Status AlignServiceHandler::Align(grpc::ServerContext* context,
         };
         Result<FitResult> fitted = fail(ErrorCode::kInternal, "not aligned");
         if (header.has_key()) {
-            fitted = align(catalog::ShapeName{header.key().collection(), header.key().key()});
+            fitted = align(catalog::ShapeName{uploads.collection(), header.key().key()});
         } else {
             const auto other = uploads.other();
             RETURN_IF_ERROR(other);

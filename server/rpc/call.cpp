@@ -125,9 +125,12 @@ Result<void> Call::begin() {
     return frame_.admit(operation_.callClass);
 }
 
-Result<void> Call::useCollection(const std::string& name) {
-    collection_ = catalog::collectionNameOrDefault(name);
-    return authorization_.useCollection(collection_);
+Result<std::string> Call::useCollection(const std::string& name) {
+    collection_ = services_.catalog.nameOf(name);
+    // A key for an alias may use what it stands for. The error tells no more than the caller knew.
+    const std::string asked = catalog::collectionNameOrDefault(name);
+    RETURN_IF_ERROR(authorization_.useCollection(authorization_.sees(collection_) ? collection_ : asked));
+    return collection_;
 }
 
 Result<void> Call::useScan(std::uint64_t points) {
@@ -135,8 +138,9 @@ Result<void> Call::useScan(std::uint64_t points) {
 }
 
 Result<index::SnapshotPtr> Call::collection(const std::string& name) {
-    RETURN_IF_ERROR(useCollection(name));
-    return services_.catalog.collection(name);
+    const auto own = useCollection(name);
+    RETURN_IF_ERROR(own);
+    return services_.catalog.collection(*own);
 }
 
 Result<catalog::FoundShape> Call::shape(const v1::ShapeRef& ref) {

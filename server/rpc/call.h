@@ -64,7 +64,9 @@ class Call {
 
     /// Before anything of a collection (the default one for an empty name) is read or changed: whether the
     /// caller may; noted for the log. Errors: kPermissionDenied.
-    [[nodiscard]] Result<void> useCollection(const std::string& name);
+    /// Returns the name of the collection itself, which an alias stands for at this moment: look nothing up
+    /// by the alias afterwards, which may stand for another collection by then.
+    [[nodiscard]] Result<std::string> useCollection(const std::string& name);
     /// Before a scan is received, as announced. Errors: kRateLimited.
     [[nodiscard]] Result<void> useScan(std::uint64_t points);
     /// The collection, after `useCollection`. Errors: kPermissionDenied, kNotFound.

@@ -15,6 +15,7 @@ Result<void> fill(const Services& services, const index::Snapshot& snapshot, v1:
     out->set_shapes(counts->all);
     out->set_shapes_ready(counts->ready);
     out->set_shapes_failed(counts->failed);
+    for (const std::string& alias : services.catalog.aliasesOf(snapshot)) out->add_aliases(alias);
     return {};
 }
 
@@ -57,6 +58,44 @@ grpc::Status CollectionServiceHandler::ListCollections(grpc::ServerContext* cont
             RETURN_IF_ERROR(fill(services_, *snapshot, response->add_collections()));
         }
         return {};
+    });
+}
+
+grpc::Status CollectionServiceHandler::RenameCollection(grpc::ServerContext* context,
+                                                        const v1::RenameCollectionRequest* request,
+                                                        v1::Collection* response) {
+    return handle(services_, context, operations::kRenameCollection, [&](Call& call) -> Result<void> {
+        // The new name is asked for as if a collection were created.
+        RETURN_IF_ERROR(call.useCollection(request->new_name()));
+        RETURN_IF_ERROR(call.useCollection(request->name()));
+        call.note({"new_name", request->new_name()});
+        const auto renamed = services_.catalog.renameCollection(request->name(), request->new_name());
+        RETURN_IF_ERROR(renamed);
+        return fill(services_, **renamed, response);
+    });
+}
+
+grpc::Status CollectionServiceHandler::SetAlias(grpc::ServerContext* context,
+                                                const v1::SetAliasRequest* request,
+                                                v1::Collection* response) {
+    return handle(services_, context, operations::kSetAlias, [&](Call& call) -> Result<void> {
+        // The alias too: the name of a collection that could be created, or what it stands for now.
+        RETURN_IF_ERROR(call.useCollection(request->alias()));
+        const auto collection = call.useCollection(request->collection());
+        RETURN_IF_ERROR(collection);
+        call.note({"alias", request->alias()});
+        const auto named = services_.catalog.setAlias(request->alias(), *collection);
+        RETURN_IF_ERROR(named);
+        return fill(services_, **named, response);
+    });
+}
+
+grpc::Status CollectionServiceHandler::DeleteAlias(grpc::ServerContext* context,
+                                                   const v1::DeleteAliasRequest* request,
+                                                   v1::DeleteAliasResponse*) {
+    return handle(services_, context, operations::kDeleteAlias, [&](Call& call) -> Result<void> {
+        RETURN_IF_ERROR(call.useCollection(request->alias()));
+        return services_.catalog.deleteAlias(request->alias());
     });
 }
 

@@ -17,6 +17,12 @@ class CollectionServiceHandler final : public shapedb::v1::CollectionService::Se
                                v1::Collection* response) override;
     grpc::Status ListCollections(grpc::ServerContext* context, const v1::ListCollectionsRequest* request,
                                  v1::ListCollectionsResponse* response) override;
+    grpc::Status RenameCollection(grpc::ServerContext* context, const v1::RenameCollectionRequest* request,
+                                  v1::Collection* response) override;
+    grpc::Status SetAlias(grpc::ServerContext* context, const v1::SetAliasRequest* request,
+                          v1::Collection* response) override;
+    grpc::Status DeleteAlias(grpc::ServerContext* context, const v1::DeleteAliasRequest* request,
+                             v1::DeleteAliasResponse* response) override;
     grpc::Status DeleteCollection(grpc::ServerContext* context, const v1::DeleteCollectionRequest* request,
                                   v1::DeleteCollectionResponse* response) override;
 

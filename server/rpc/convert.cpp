@@ -80,12 +80,36 @@ Result<std::optional<store::ShapeState>> fromProto(pb::ShapeState state) {
     }
 }
 
+Result<store::ShapeOrder> fromProto(pb::ShapeOrder order) {
+    switch (static_cast<int>(order)) {
+        case pb::SHAPE_ORDER_UNSPECIFIED:
+        case pb::SHAPE_ORDER_ID: return store::ShapeOrder::kId;
+        case pb::SHAPE_ORDER_KEY: return store::ShapeOrder::kKey;
+        case pb::SHAPE_ORDER_UPDATED: return store::ShapeOrder::kUpdated;
+        default: return unknownNumber("order", order);
+    }
+}
+
+store::MetadataChange fromProto(const pb::MetadataChange& change) {
+    return {toMetadata(change.set()), {change.remove().begin(), change.remove().end()}, change.replace_all()};
+}
+
+catalog::ChangeTarget fromProto(const pb::ShapeSelection& selection) {
+    catalog::ChangeTarget target;
+    if (selection.has_keys()) {
+        target.keys.emplace(selection.keys().keys().begin(), selection.keys().keys().end());
+    }
+    if (selection.has_filter()) target.filter = selection.filter();
+    return target;
+}
+
 Result<store::PutMode> fromProto(pb::AddMode mode) {
     switch (static_cast<int>(mode)) {
         case pb::ADD_MODE_UNSPECIFIED:
         case pb::ADD_MODE_UPSERT: return store::PutMode::kUpsert;
         case pb::ADD_MODE_INSERT_ONLY: return store::PutMode::kInsertOnly;
         case pb::ADD_MODE_UPDATE_ONLY: return store::PutMode::kUpdateOnly;
+        case pb::ADD_MODE_SAME_POINTS: return store::PutMode::kSamePoints;
         default: return unknownNumber("mode", mode);
     }
 }

@@ -6,6 +6,7 @@
 #include "common/wire.h"
 #include "core/base/error.h"
 #include "core/pipeline.h"
+#include "server/catalog/bulk_changes.h"
 #include "server/catalog/parameter_overrides.h"
 #include "server/index/collection_index.h"
 #include "server/store/store.h"
@@ -34,6 +35,10 @@ void toProto(store::TimestampMs time, google::protobuf::Timestamp* out);
 
 /// Empty for UNSPECIFIED. Errors: kInvalidArgument (a number without a name).
 [[nodiscard]] Result<std::optional<store::ShapeState>> fromProto(pb::ShapeState state);
+/// UNSPECIFIED is by id. Errors: kInvalidArgument.
+[[nodiscard]] Result<store::ShapeOrder> fromProto(pb::ShapeOrder order);
+[[nodiscard]] store::MetadataChange fromProto(const pb::MetadataChange& change);
+[[nodiscard]] catalog::ChangeTarget fromProto(const pb::ShapeSelection& selection);
 /// UNSPECIFIED is upsert. Errors: kInvalidArgument.
 [[nodiscard]] Result<store::PutMode> fromProto(pb::AddMode mode);
 

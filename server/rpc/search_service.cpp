@@ -38,8 +38,23 @@ Result<catalog::PreparedSearch> prepare(const Services& services, Call& call,
     if (options.has_verify()) request.verify = options.verify();
     request.verifyOptions.mostCandidates = options.verify_candidates();
     if (options.has_one_sided()) request.verifyOptions.oneSided = options.one_sided();
+    request.groupBy = options.group_by();
+    request.perGroup = options.per_group();
     if (options.has_viewpoint()) request.verifyOptions.viewpoint = fromProto(options.viewpoint());
     return services.searches.prepare(*collection, request);
+}
+
+/// Counts a hit to the group before it, or begins the next.
+void noteGroup(const std::optional<std::string>& value, pb::SearchResponse* response) {
+    const auto isOf = [&](const pb::HitGroup& group) {
+        return group.has_value() == value.has_value() && (!value || group.value() == *value);
+    };
+    if (response->groups().empty() || !isOf(*response->groups().rbegin())) {
+        pb::HitGroup* group = response->add_groups();
+        if (value) group->set_value(*value);
+    }
+    pb::HitGroup& last = *response->mutable_groups()->rbegin();
+    last.set_hits(last.hits() + 1);
 }
 
 Result<void> answer(const Services& services, const catalog::PreparedSearch& prepared, const Signature& query,
@@ -64,6 +79,7 @@ Result<void> answer(const Services& services, const catalog::PreparedSearch& pre
         out->set_verdict(wire::toProto(hit.verdict));
         out->set_verdict_reliability(reliabilityOf(hit.verdict));
         if (hit.explanation) toProto(*hit.explanation, out->mutable_explanation());
+        if (prepared.options.grouping) noteGroup(hit.group, response);
         return room.take(out->ByteSizeLong());
     });
 }
@@ -170,13 +186,14 @@ grpc::Status SearchServiceHandler::SearchBatch(grpc::ServerContext* context,
 grpc::Status SearchServiceHandler::Compare(grpc::ServerContext* context, const v1::CompareRequest* request,
                                            v1::CompareResponse* response) {
     return handle(services_, context, operations::kCompare, [&](Call& call) -> Result<void> {
+        std::vector<catalog::ShapeName> names;
         for (const pb::ShapeRef* ref : {&request->query(), &request->other()}) {
             call.noteKey(ref->key());
-            RETURN_IF_ERROR(call.useCollection(ref->collection()));
+            const auto collection = call.useCollection(ref->collection());
+            RETURN_IF_ERROR(collection);
+            names.push_back({*collection, ref->key()});
         }
-        const catalog::ShapeName query{request->query().collection(), request->query().key()};
-        const catalog::ShapeName other{request->other().collection(), request->other().key()};
-        const auto compared = services_.searches.compare(query, other, scoreOptionsFrom(*request),
+        const auto compared = services_.searches.compare(names[0], names[1], scoreOptionsFrom(*request),
                                                          request->free_scale(), call.run());
         RETURN_IF_ERROR(compared);
         const VerifiedExplanation& verified = compared->verified;

@@ -36,7 +36,15 @@ Result<catalog::ShapeHeader> headerFrom(const pb::AddShapeHeader& message) {
     header.key = message.key();
     header.mode = *mode;
     if (message.has_expected_version()) header.expectedVersion = message.expected_version();
-    header.metadata = toMetadata(message.metadata());
+    if (!message.has_metadata_change()) {
+        // An upload without metadata leaves those of the shape alone.
+        if (!message.metadata().empty()) header.metadata = store::replacedBy(toMetadata(message.metadata()));
+        return header;
+    }
+    if (!message.metadata().empty()) {
+        return fail(ErrorCode::kInvalidArgument, "metadata_change: metadata is set too: leave one out");
+    }
+    header.metadata = fromProto(message.metadata_change());
     return header;
 }
 
@@ -63,6 +71,19 @@ Result<void> sendSegments(Call& call, Writer& writer, const Description& descrip
     return {};
 }
 
+template <typename Writer>
+Result<void> sendPoints(Call& call, Writer& writer, const std::vector<float>& xyz) {
+    constexpr std::size_t kChunk = catalog::kMaxChunkBytes / catalog::kPointBytes * catalog::kPointBytes;
+    const auto* bytes = reinterpret_cast<const char*>(xyz.data());
+    const std::size_t size = xyz.size() * sizeof(float);
+    for (std::size_t at = 0; at < size; at += kChunk) {
+        v1::StoredPoints message;
+        message.mutable_chunk()->set_xyz(bytes + at, std::min(kChunk, size - at));
+        RETURN_IF_ERROR(call.write(writer, message));
+    }
+    return {};
+}
+
 }  // namespace
 
 grpc::Status ShapeServiceHandler::AddShape(grpc::ServerContext* context,
@@ -78,9 +99,11 @@ Result<void> ShapeServiceHandler::addShape(Call& call, grpc::ServerReader<v1::Ad
                                     services_.admission.uploads);
     const auto takeHeader = [&](const v1::AddShapeHeader& message) -> Result<void> {
         call.noteKey(message.key());
-        RETURN_IF_ERROR(call.useCollection(message.collection()));
+        const auto collection = call.useCollection(message.collection());
+        RETURN_IF_ERROR(collection);
         auto header = headerFrom(message);
         RETURN_IF_ERROR(header);
+        header->collection = *collection;
         return addition.begin(std::move(*header), message.wait());
     };
     auto scan = receiveScan<v1::AddShapeRequest>(reader, addition.upload(), call, takeHeader);
@@ -104,6 +127,42 @@ grpc::Status ShapeServiceHandler::GetShape(grpc::ServerContext* context, const v
     });
 }
 
+grpc::Status ShapeServiceHandler::GetShapes(grpc::ServerContext* context, const v1::GetShapesRequest* request,
+                                            v1::GetShapesResponse* response) {
+    return handle(services_, context, operations::kGetShapes, [&](Call& call) -> Result<void> {
+        const auto collection = call.collection(request->collection());
+        RETURN_IF_ERROR(collection);
+        call.note({"keys", std::int64_t{request->keys_size()}});
+        const auto visit = [&](const store::Shape& shape, std::optional<double> quality) {
+            pb::Shape* out = response->add_shapes();
+            toProto(shape, (*collection)->collection.name, quality, out);
+            return out->ByteSizeLong();
+        };
+        const auto missing = catalog::visitShapes(services_.catalog, **collection,
+                                                  {request->keys().begin(), request->keys().end()}, visit);
+        RETURN_IF_ERROR(missing);
+        for (const std::string& key : *missing) response->add_missing(key);
+        return {};
+    });
+}
+
+grpc::Status ShapeServiceHandler::GetPoints(grpc::ServerContext* context, const v1::GetPointsRequest* request,
+                                            grpc::ServerWriter<v1::StoredPoints>* writer) {
+    return handle(services_, context, operations::kGetPoints, [&](Call& call) -> Result<void> {
+        const auto found = call.shape(request->shape());
+        RETURN_IF_ERROR(found);
+        catalog::Budget::Share share(services_.admission.uploads);
+        const auto scan = services_.catalog.storedScan(*found, share);
+        RETURN_IF_ERROR(scan);
+        call.addPoints(scan->points.size() / 3, scan->points.size() * sizeof(float));
+        v1::StoredPoints message;
+        toProto(scan->shape, found->collection->collection.name,
+                services_.catalog.servingQuality(scan->shape), message.mutable_shape());
+        RETURN_IF_ERROR(call.write(*writer, message));
+        return sendPoints(call, *writer, scan->points);
+    });
+}
+
 grpc::Status ShapeServiceHandler::ListShapes(grpc::ServerContext* context,
                                              const v1::ListShapesRequest* request,
                                              v1::ListShapesResponse* response) {
@@ -112,8 +171,13 @@ grpc::Status ShapeServiceHandler::ListShapes(grpc::ServerContext* context,
         RETURN_IF_ERROR(collection);
         const auto state = fromProto(request->state());
         RETURN_IF_ERROR(state);
-        const catalog::ListRequest wanted{
-            {request->filter(), *state}, request->page_size(), request->cursor()};
+        const auto order = fromProto(request->order());
+        RETURN_IF_ERROR(order);
+        const catalog::ListRequest wanted{{request->filter(), *state, request->key_prefix()},
+                                          request->page_size(),
+                                          request->cursor(),
+                                          *order,
+                                          request->descending()};
         const auto next = catalog::listPage(services_.catalog, **collection, wanted, call.run(),
                                             [&](const store::Shape& shape, std::optional<double> quality) {
                                                 pb::Shape* out = response->add_shapes();
@@ -134,10 +198,34 @@ grpc::Status ShapeServiceHandler::CountShapes(grpc::ServerContext* context,
         RETURN_IF_ERROR(collection);
         const auto state = fromProto(request->state());
         RETURN_IF_ERROR(state);
-        const auto count =
-            catalog::countSelected(services_.catalog, **collection, {request->filter(), *state}, call.run());
+        const auto count = catalog::countSelected(
+            services_.catalog, **collection, {request->filter(), *state, request->key_prefix()}, call.run());
         RETURN_IF_ERROR(count);
         response->set_count(*count);
+        return {};
+    });
+}
+
+grpc::Status ShapeServiceHandler::CountByValue(grpc::ServerContext* context,
+                                               const v1::CountByValueRequest* request,
+                                               v1::CountByValueResponse* response) {
+    return handle(services_, context, operations::kCountByValue, [&](Call& call) -> Result<void> {
+        const auto collection = call.collection(request->collection());
+        RETURN_IF_ERROR(collection);
+        const auto state = fromProto(request->state());
+        RETURN_IF_ERROR(state);
+        const auto counts =
+            catalog::countByValue(services_.catalog, **collection, {request->filter(), *state, {}},
+                                  request->metadata_key(), request->max_values(), call.run());
+        RETURN_IF_ERROR(counts);
+        for (const catalog::ValueCount& one : counts->values) {
+            auto* out = response->add_values();
+            out->set_value(one.value);
+            out->set_shapes(one.shapes);
+        }
+        response->set_other_values(counts->otherValues);
+        response->set_other_shapes(counts->otherShapes);
+        response->set_shapes_without(counts->without);
         return {};
     });
 }
@@ -148,13 +236,94 @@ grpc::Status ShapeServiceHandler::DeleteShape(grpc::ServerContext* context,
     return handle(services_, context, operations::kDeleteShape, [&](Call& call) -> Result<void> {
         const pb::ShapeRef& ref = request->shape();
         call.noteKey(ref.key());
-        RETURN_IF_ERROR(call.useCollection(ref.collection()));
+        const auto collection = call.useCollection(ref.collection());
+        RETURN_IF_ERROR(collection);
         std::optional<std::int64_t> expected;
         if (request->has_expected_version()) expected = request->expected_version();
-        const auto deleted = services_.catalog.deleteShape(ref.collection(), ref.key(), expected);
+        const auto deleted = services_.catalog.deleteShape(*collection, ref.key(), expected);
         RETURN_IF_ERROR(deleted);
         toProto(deleted->shape, deleted->collection->collection.name, deleted->quality(),
                 response->mutable_shape());
+        return {};
+    });
+}
+
+grpc::Status ShapeServiceHandler::DeleteShapes(grpc::ServerContext* context,
+                                               const v1::DeleteShapesRequest* request,
+                                               v1::DeleteShapesResponse* response) {
+    return handle(services_, context, operations::kDeleteShapes, [&](Call& call) -> Result<void> {
+        const auto collection = call.collection(request->collection());
+        RETURN_IF_ERROR(collection);
+        const auto result = catalog::deleteShapes(services_.catalog, **collection,
+                                                  fromProto(request->selection()), call.run());
+        RETURN_IF_ERROR(result);
+        call.note({"deleted", result->deleted});
+        response->set_deleted(result->deleted);
+        for (const std::string& key : result->missing) response->add_missing(key);
+        return {};
+    });
+}
+
+grpc::Status ShapeServiceHandler::UpdateMetadata(grpc::ServerContext* context,
+                                                 const v1::UpdateMetadataRequest* request,
+                                                 v1::UpdateMetadataResponse* response) {
+    return handle(services_, context, operations::kUpdateMetadata, [&](Call& call) -> Result<void> {
+        const auto collection = call.collection(request->collection());
+        RETURN_IF_ERROR(collection);
+        return updateMetadata(call, *collection, *request, *response);
+    });
+}
+
+Result<void> ShapeServiceHandler::updateMetadata(Call& call, const index::SnapshotPtr& collection,
+                                                 const v1::UpdateMetadataRequest& request,
+                                                 v1::UpdateMetadataResponse& response) {
+    const store::MetadataChange change = fromProto(request.change());
+    if (!request.has_filter()) {
+        call.noteKey(request.key());
+        std::optional<std::int64_t> expected;
+        if (request.has_expected_version()) expected = request.expected_version();
+        const auto result =
+            catalog::changeMetadataOf(services_.catalog, collection, request.key(), change, expected);
+        RETURN_IF_ERROR(result);
+        (result->changed ? response.set_changed(1) : response.set_unchanged(1));
+        toProto(result->shape, collection->collection.name, services_.catalog.servingQuality(result->shape),
+                response.mutable_shape());
+        return {};
+    }
+    if (request.has_expected_version()) {
+        return fail(ErrorCode::kInvalidArgument, "expected_version: not with a filter");
+    }
+    const auto result =
+        catalog::changeMetadata(services_.catalog, *collection, request.filter(), change, call.run());
+    RETURN_IF_ERROR(result);
+    call.note({"changed", result->changed});
+    response.set_changed(result->changed);
+    response.set_unchanged(result->unchanged);
+    response.set_refused(result->refused);
+    if (result->firstRefused) {
+        response.set_first_refused_key(result->firstRefusedKey);
+        toProto(*result->firstRefused, response.mutable_first_refused());
+    }
+    return {};
+}
+
+grpc::Status ShapeServiceHandler::RetryShapes(grpc::ServerContext* context,
+                                              const v1::RetryShapesRequest* request,
+                                              v1::RetryShapesResponse* response) {
+    return handle(services_, context, operations::kRetryShapes, [&](Call& call) -> Result<void> {
+        const auto collection = call.collection(request->collection());
+        RETURN_IF_ERROR(collection);
+        const auto result = catalog::retryShapes(services_.catalog, **collection,
+                                                 fromProto(request->selection()), call.run());
+        if (!result && result.error().code == ErrorCode::kQueueFull) {
+            call.frame().retryAfter(services_.catalog.retryAfterQueueFull());
+        }
+        RETURN_IF_ERROR(result);
+        call.note({"queued", result->queued});
+        response->set_queued(result->queued);
+        response->set_left(result->left);
+        for (const std::string& key : result->notFailed) response->add_not_failed(key);
+        for (const std::string& key : result->missing) response->add_missing(key);
         return {};
     });
 }

@@ -17,12 +17,24 @@ class ShapeServiceHandler final : public shapedb::v1::ShapeService::Service {
                           v1::AddShapeResponse* response) override;
     grpc::Status GetShape(grpc::ServerContext* context, const v1::GetShapeRequest* request,
                           v1::GetShapeResponse* response) override;
+    grpc::Status GetShapes(grpc::ServerContext* context, const v1::GetShapesRequest* request,
+                           v1::GetShapesResponse* response) override;
+    grpc::Status GetPoints(grpc::ServerContext* context, const v1::GetPointsRequest* request,
+                           grpc::ServerWriter<v1::StoredPoints>* writer) override;
     grpc::Status ListShapes(grpc::ServerContext* context, const v1::ListShapesRequest* request,
                             v1::ListShapesResponse* response) override;
     grpc::Status CountShapes(grpc::ServerContext* context, const v1::CountShapesRequest* request,
                              v1::CountShapesResponse* response) override;
+    grpc::Status CountByValue(grpc::ServerContext* context, const v1::CountByValueRequest* request,
+                              v1::CountByValueResponse* response) override;
     grpc::Status DeleteShape(grpc::ServerContext* context, const v1::DeleteShapeRequest* request,
                              v1::DeleteShapeResponse* response) override;
+    grpc::Status DeleteShapes(grpc::ServerContext* context, const v1::DeleteShapesRequest* request,
+                              v1::DeleteShapesResponse* response) override;
+    grpc::Status UpdateMetadata(grpc::ServerContext* context, const v1::UpdateMetadataRequest* request,
+                                v1::UpdateMetadataResponse* response) override;
+    grpc::Status RetryShapes(grpc::ServerContext* context, const v1::RetryShapesRequest* request,
+                             v1::RetryShapesResponse* response) override;
     grpc::Status WatchIngest(grpc::ServerContext* context, const v1::WatchIngestRequest* request,
                              grpc::ServerWriter<v1::IngestEvent>* writer) override;
     grpc::Status GetSignature(grpc::ServerContext* context, const v1::GetSignatureRequest* request,
@@ -35,6 +47,9 @@ class ShapeServiceHandler final : public shapedb::v1::ShapeService::Service {
   private:
     Result<void> addShape(Call& call, grpc::ServerReader<v1::AddShapeRequest>& reader,
                           v1::AddShapeResponse& response);
+    Result<void> updateMetadata(Call& call, const index::SnapshotPtr& collection,
+                                const v1::UpdateMetadataRequest& request,
+                                v1::UpdateMetadataResponse& response);
 
     const Services& services_;
 };

@@ -44,11 +44,23 @@ inline constexpr Operation kAddShape{"ShapeService", "AddShape", Role::kWriter, 
                                      Scope::kCollections};
 inline constexpr Operation kGetShape{"ShapeService", "GetShape", Role::kReader, CallClass::kOrdinary,
                                      Scope::kCollections};
+inline constexpr Operation kGetShapes{"ShapeService", "GetShapes", Role::kReader, CallClass::kOrdinary,
+                                      Scope::kCollections};
+inline constexpr Operation kGetPoints{"ShapeService", "GetPoints", Role::kReader, CallClass::kOrdinary,
+                                      Scope::kCollections};
 inline constexpr Operation kListShapes{"ShapeService", "ListShapes", Role::kReader, CallClass::kOrdinary,
                                        Scope::kCollections};
 inline constexpr Operation kCountShapes{"ShapeService", "CountShapes", Role::kReader, CallClass::kOrdinary,
                                         Scope::kCollections};
+inline constexpr Operation kCountByValue{"ShapeService", "CountByValue", Role::kReader, CallClass::kOrdinary,
+                                         Scope::kCollections};
 inline constexpr Operation kDeleteShape{"ShapeService", "DeleteShape", Role::kWriter, CallClass::kOrdinary,
+                                        Scope::kCollections};
+inline constexpr Operation kDeleteShapes{"ShapeService", "DeleteShapes", Role::kWriter, CallClass::kOrdinary,
+                                         Scope::kCollections};
+inline constexpr Operation kUpdateMetadata{"ShapeService", "UpdateMetadata", Role::kWriter,
+                                           CallClass::kOrdinary, Scope::kCollections};
+inline constexpr Operation kRetryShapes{"ShapeService", "RetryShapes", Role::kWriter, CallClass::kOrdinary,
                                         Scope::kCollections};
 inline constexpr Operation kWatchIngest{"ShapeService", "WatchIngest", Role::kReader, CallClass::kOrdinary,
                                         Scope::kCollections};
@@ -83,6 +95,12 @@ inline constexpr Operation kListCollections{"CollectionService", "ListCollection
                                             CallClass::kOrdinary, Scope::kNone};
 inline constexpr Operation kDeleteCollection{"CollectionService", "DeleteCollection", Role::kAdmin,
                                              CallClass::kOrdinary, Scope::kCollections};
+inline constexpr Operation kRenameCollection{"CollectionService", "RenameCollection", Role::kAdmin,
+                                             CallClass::kOrdinary, Scope::kCollections};
+inline constexpr Operation kSetAlias{"CollectionService", "SetAlias", Role::kAdmin, CallClass::kOrdinary,
+                                     Scope::kCollections};
+inline constexpr Operation kDeleteAlias{"CollectionService", "DeleteAlias", Role::kAdmin,
+                                        CallClass::kOrdinary, Scope::kCollections};
 
 // AdminService
 inline constexpr Operation kRebuild{"AdminService", "Rebuild", Role::kAdmin, CallClass::kAdmin,
@@ -104,11 +122,17 @@ inline constexpr Operation kRevokeKey{"AdminService", "RevokeKey", Role::kAdmin,
                                       Scope::kKeys};
 
 /// All of the above. A test compares it with the services in proto/.
-inline constexpr std::array<const Operation*, 29> kAll{&kAddShape,
+inline constexpr std::array<const Operation*, 38> kAll{&kAddShape,
                                                        &kGetShape,
+                                                       &kGetShapes,
+                                                       &kGetPoints,
                                                        &kListShapes,
                                                        &kCountShapes,
+                                                       &kCountByValue,
                                                        &kDeleteShape,
+                                                       &kDeleteShapes,
+                                                       &kUpdateMetadata,
+                                                       &kRetryShapes,
                                                        &kWatchIngest,
                                                        &kGetSignature,
                                                        &kGetSegments,
@@ -123,6 +147,9 @@ inline constexpr std::array<const Operation*, 29> kAll{&kAddShape,
                                                        &kGetCollection,
                                                        &kListCollections,
                                                        &kDeleteCollection,
+                                                       &kRenameCollection,
+                                                       &kSetAlias,
+                                                       &kDeleteAlias,
                                                        &kRebuild,
                                                        &kCancelRebuild,
                                                        &kBackup,

@@ -8,7 +8,10 @@ namespace shapedb::store {
 Result<PutOutcome> decidePut(const PutRequest& request, const std::string& collectionName,
                              const Shape* existing) {
     const bool samePoints = existing != nullptr && existing->checksum == request.scan.checksum();
-    const bool identical = samePoints && existing->metadata == request.metadata;
+    const Metadata before = existing != nullptr ? existing->metadata : Metadata();
+    const Metadata after = request.metadata.of(before);
+    if (request.checkMetadata) RETURN_IF_ERROR(request.checkMetadata(after));
+    const bool identical = samePoints && after == before;
     if (existing == nullptr && request.mode == PutMode::kUpdateOnly) {
         return fail(noSuchShape(collectionName, request.key));
     }
@@ -16,6 +19,11 @@ Result<PutOutcome> decidePut(const PutRequest& request, const std::string& colle
         return fail(ErrorCode::kAlreadyExists, "shape " + quoted(request.key) +
                                                    " already exists in collection " + quoted(collectionName) +
                                                    " with other points or metadata");
+    }
+    if (existing != nullptr && request.mode == PutMode::kSamePoints && !samePoints) {
+        return fail(ErrorCode::kAlreadyExists, "shape " + quoted(request.key) +
+                                                   " already exists in collection " + quoted(collectionName) +
+                                                   " with other points");
     }
     const std::int64_t version = existing != nullptr ? existing->version : 0;
     // Done before, and the client did not hear of it.

@@ -12,7 +12,8 @@
 namespace shapedb::store {
 
 /// What the put changes; `existing` is the shape that has the key now, null when the key is free.
-/// Errors: kNotFound, kAlreadyExists, kVersionConflict, as Store::putShape.
+/// Errors: kNotFound, kAlreadyExists, kVersionConflict and those of request.checkMetadata, as
+/// Store::putShape.
 [[nodiscard]] Result<PutOutcome> decidePut(const PutRequest& request, const std::string& collectionName,
                                            const Shape* existing);
 

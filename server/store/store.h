@@ -22,6 +22,7 @@
 #include "core/base/error.h"
 #include "core/base/metadata.h"
 #include "core/base/run_context.h"
+#include "server/store/metadata_change.h"
 #include "server/store/quarantine.h"
 #include "server/store/verified_scan.h"
 
@@ -39,6 +40,12 @@ struct Collection {
     /// Of the signatures that serve queries; a finished rebuild raises it by one.
     std::int64_t generation = 1;
     TimestampMs createdAt = 0;
+};
+
+/// Another name of a collection.
+struct Alias {
+    std::string name;  ///< unique, also among the names of collections
+    std::int64_t collectionId = 0;
 };
 
 /// The numbers are persisted (column shape.state): never renumber.
@@ -67,6 +74,7 @@ enum class PutMode {
     kUpsert,      ///< insert or replace
     kInsertOnly,  ///< kAlreadyExists when the key is taken by other bytes or other metadata
     kUpdateOnly,  ///< kNotFound when the key is free
+    kSamePoints,  ///< kAlreadyExists when the key is taken by other points
 };
 
 struct PutRequest {
@@ -79,7 +87,10 @@ struct PutRequest {
     /// When set, the shape must have this version now; 0: the key must be free. A repeated request whose
     /// reply was lost is recognised: the shape is one version further and as requested.
     std::optional<std::int64_t> expectedVersion;
-    Metadata metadata;
+    MetadataChange metadata;  ///< of a shape that has the key; a new one gets those of `set`
+    /// Asked about the metadata that the shape would have; an error refuses the put. Called in the
+    /// transaction; must not call the store. Null accepts all.
+    std::function<Result<void>(const Metadata&)> checkMetadata{};
     /// Bounds of the job queue (queued and running) with this scan in it, checked in the same
     /// transaction; 0: no bound. Ignored when no job is queued. A scan larger than maxQueuedBytes
     /// never fits: the caller keeps its point limit below that.
@@ -106,6 +117,23 @@ struct ShapeFilter {
     std::function<bool(const Shape&)> accept;
     /// Checked before each row, so that a read whose caller has gone stops.
     RunContext context{};
+    std::string keyPrefix{};  ///< bytes that the key begins with
+};
+
+/// Equal times of change are in order of id; keys are compared byte by byte.
+enum class ShapeOrder { kId, kKey, kUpdated };
+
+/// The order of a listing, and where it continues.
+struct ShapeListing {
+    ShapeOrder order = ShapeOrder::kId;
+    bool descending = false;
+    /// Where the last shape of the page before stood when it was listed; it need not be there any more.
+    struct Place {
+        std::int64_t id = 0;
+        TimestampMs updatedAt = 0;  ///< kUpdated only
+        std::string key{};          ///< kKey only
+    };
+    std::optional<Place> after{};  ///< empty: from the start
 };
 
 /// One scan to segment. Claiming raises `attempts` durably.
@@ -186,7 +214,7 @@ class Store {
 
     // Collections ------------------------------------------------------------------
 
-    /// Errors: kAlreadyExists.
+    /// Errors: kAlreadyExists (a collection or an alias has the name).
     [[nodiscard]] virtual Result<Collection> createCollection(const std::string& name,
                                                               const std::string& description,
                                                               const std::string& parameters) = 0;
@@ -194,30 +222,50 @@ class Store {
     [[nodiscard]] virtual Result<Collection> getCollection(const std::string& name) = 0;
     /// By name.
     [[nodiscard]] virtual Result<std::vector<Collection>> listCollections() = 0;
-    /// Deletes the collection with its shapes and jobs. Errors: kNotFound.
+    /// Deletes the collection with its shapes, jobs and aliases. Errors: kNotFound.
     [[nodiscard]] virtual Result<void> deleteCollection(std::int64_t collectionId) = 0;
+    /// Errors: kNotFound, kAlreadyExists (as above; its own name is no error).
+    [[nodiscard]] virtual Result<Collection> renameCollection(std::int64_t collectionId,
+                                                              const std::string& name) = 0;
+    /// A new alias, or one that named another collection before. Errors: kNotFound, kAlreadyExists (a
+    /// collection has the name).
+    [[nodiscard]] virtual Result<void> setAlias(const std::string& name, std::int64_t collectionId) = 0;
+    /// Errors: kNotFound.
+    [[nodiscard]] virtual Result<void> deleteAlias(const std::string& name) = 0;
+    /// By name.
+    [[nodiscard]] virtual Result<std::vector<Alias>> listAliases() = 0;
 
     // Shapes -----------------------------------------------------------------------
 
     /// Stores a scan and queues its job in one transaction; durable when it returns.
     ///
-    /// The same checksum and metadata as stored: kUnchanged, also in insert-only mode. A failed shape is
-    /// tried again: kRetried. New metadata alone raise the version and leave state, job and signature alone.
-    /// New points make the shape pending and replace its job; the old signature serves until
+    /// The same checksum, and metadata that do not change: kUnchanged, also in insert-only mode. A failed
+    /// shape is tried again: kRetried. New metadata alone raise the version and leave state, job and
+    /// signature alone. New points make the shape pending and replace its job; the old signature serves until
     /// finishJob replaces it or failJob removes it.
     ///
     /// Errors (nothing is stored): kNotFound (collection, or the key in update-only mode),
-    /// kAlreadyExists, kVersionConflict (names both versions), kQueueFull.
+    /// kAlreadyExists, kVersionConflict (names both versions), kQueueFull, those of request.checkMetadata.
     [[nodiscard]] virtual Result<PutResult> putShape(const PutRequest& request) = 0;
     /// Errors: kNotFound.
     [[nodiscard]] virtual Result<Shape> getShape(std::int64_t collectionId, const std::string& key) = 0;
     /// Errors: kNotFound.
     [[nodiscard]] virtual Result<Shape> getShapeById(std::int64_t shapeId) = 0;
-    /// Shapes with id > afterId, in ascending order of id, at most `limit`: stable under inserts and deletes.
-    /// Errors: kCancelled, kDeadlineExceeded (filter.context).
+    /// One for each key, empty where no shape has it; all as of one moment.
+    [[nodiscard]] virtual Result<std::vector<std::optional<Shape>>> getShapes(
+        std::int64_t collectionId, const std::vector<std::string>& keys) = 0;
+    /// At most `limit` shapes after `listing.after`. By id and by key stable under inserts and deletes; by
+    /// time of change a shape that changes moves. Errors: kCancelled, kDeadlineExceeded (filter.context).
     [[nodiscard]] virtual Result<std::vector<Shape>> listShapes(std::int64_t collectionId,
-                                                                std::int64_t afterId, std::size_t limit,
+                                                                const ShapeListing& listing,
+                                                                std::size_t limit,
                                                                 const ShapeFilter& filter) = 0;
+    /// Shapes with id > afterId, in ascending order of id.
+    [[nodiscard]] Result<std::vector<Shape>> listShapes(std::int64_t collectionId, std::int64_t afterId,
+                                                        std::size_t limit, const ShapeFilter& filter) {
+        return listShapes(collectionId, {ShapeOrder::kId, false, ShapeListing::Place{afterId}}, limit,
+                          filter);
+    }
     /// Errors: kCancelled, kDeadlineExceeded (filter.context).
     [[nodiscard]] virtual Result<std::uint64_t> countShapes(std::int64_t collectionId,
                                                             const ShapeFilter& filter) = 0;
@@ -225,6 +273,16 @@ class Store {
     /// Errors: kNotFound, kVersionConflict.
     [[nodiscard]] virtual Result<Shape> deleteShape(std::int64_t collectionId, const std::string& key,
                                                     std::optional<std::int64_t> expectedVersion) = 0;
+    /// In one transaction, removes each of these shapes that is still there and of which `still` says so, and
+    /// returns them as they were. `still` must not call the store.
+    [[nodiscard]] virtual Result<std::vector<Shape>> deleteShapes(
+        const std::vector<std::int64_t>& shapeIds, const std::function<bool(const Shape&)>& still) = 0;
+    /// In one transaction, gives each of these shapes that is still there the metadata that `change` returns,
+    /// and returns those that had others, as they are now. Where `change` returns nothing the shape is left
+    /// alone. Raises the version; state, job and signature stay. `change` must not call the store.
+    [[nodiscard]] virtual Result<std::vector<Shape>> changeMetadata(
+        const std::vector<std::int64_t>& shapeIds,
+        const std::function<std::optional<Metadata>(const Shape&)>& change) = 0;
     /// Packed x y z, compared with the stored checksum. Errors: kNotFound, kDataLoss.
     [[nodiscard]] virtual Result<std::vector<float>> loadPoints(std::int64_t shapeId) = 0;
     /// The signature that serves now. Errors: kNotFound (shape), kNotReady.

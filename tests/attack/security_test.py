@@ -23,6 +23,9 @@ RULES = {
         "CountShapes": (READER, COLLECTION), "DeleteShape": (WRITER, COLLECTION),
         "WatchIngest": (READER, COLLECTION), "GetSignature": (READER, COLLECTION),
         "GetSegments": (READER, COLLECTION), "Segment": (READER, NOTHING),
+        "GetShapes": (READER, COLLECTION), "GetPoints": (READER, COLLECTION), "CountByValue": (READER, COLLECTION),
+        "DeleteShapes": (WRITER, COLLECTION), "UpdateMetadata": (WRITER, COLLECTION),
+        "RetryShapes": (WRITER, COLLECTION),
     },
     "SearchService": {
         "SearchByKey": (READER, COLLECTION), "SearchByScan": (READER, COLLECTION),
@@ -33,6 +36,7 @@ RULES = {
     "CollectionService": {
         "CreateCollection": (ADMIN, COLLECTION), "GetCollection": (READER, COLLECTION),
         "ListCollections": (READER, NOTHING), "DeleteCollection": (ADMIN, COLLECTION),
+        "RenameCollection": (ADMIN, COLLECTION), "SetAlias": (ADMIN, COLLECTION), "DeleteAlias": (ADMIN, COLLECTION),
     },
     "AdminService": {
         "Rebuild": (ADMIN, COLLECTION), "CancelRebuild": (ADMIN, COLLECTION), "Backup": (ADMIN, WHOLE_SERVER),
@@ -61,6 +65,9 @@ def messages(rpc, collection):
         "CreateCollection": [collections.CreateCollectionRequest(name=collection)],
         "GetCollection": [collections.GetCollectionRequest(name=collection)],
         "DeleteCollection": [collections.DeleteCollectionRequest(name=collection)],
+        "RenameCollection": [collections.RenameCollectionRequest(name=collection, new_name="open")],
+        "SetAlias": [collections.SetAliasRequest(alias="open", collection=collection)],
+        "DeleteAlias": [collections.DeleteAliasRequest(alias=collection)],
         "CreateKey": [admin.CreateKeyRequest(name="", role=READER)],
     }
     return special.get(rpc)
@@ -173,6 +180,45 @@ class Matrix(unittest.TestCase):
             with server.connect(key=key) as client:
                 listed = client.collections.ListCollections(collections.ListCollectionsRequest(), timeout=10)
                 self.assertEqual([c.name for c in listed.collections], ["mine"])
+
+    def test_an_alias_is_what_it_stands_for(self):
+        with SecuredServer() as server:
+            def alias(collection, client):
+                client.collections.SetAlias(collections.SetAliasRequest(alias="live", collection=collection), timeout=10)
+
+            def count(client, collection):
+                return client.shapes.CountShapes(shapes.CountShapesRequest(collection=collection), timeout=10).count
+
+            def denied(make):
+                with self.assertRaises(grpc.RpcError) as raised:
+                    make()
+                self.assertEqual(raised.exception.code(), grpc.StatusCode.PERMISSION_DENIED)
+                return raised.exception.details()
+
+            with server.local() as local:
+                for name in ("mine", "theirs"):
+                    local.collections.CreateCollection(collections.CreateCollectionRequest(name=name), timeout=10)
+                alias("mine", local)
+                mine = server.make(ADMIN, collections=["mine"]).secret
+                live = server.make(READER, collections=["live"]).secret
+                with server.connect(key=mine) as holder, server.connect(key=live) as follower:
+                    self.assertEqual(count(holder, "live"), 0)
+                    self.assertEqual(count(follower, "live"), 0)
+                    denied(lambda: count(follower, "mine"))
+                    alias("theirs", local)
+                    told = denied(lambda: count(holder, "live"))
+                    self.assertNotIn("theirs", told, "what an alias stands for is not told")
+                    self.assertEqual(count(follower, "live"), 0)
+                    # Nobody reaches a collection by an alias or a name of his own making.
+                    denied(lambda: holder.collections.SetAlias(
+                        collections.SetAliasRequest(alias="mine2", collection="mine"), timeout=10))
+                    denied(lambda: holder.collections.SetAlias(
+                        collections.SetAliasRequest(alias="mine", collection="theirs"), timeout=10))
+                    denied(lambda: alias("mine", holder))
+                    denied(lambda: holder.collections.DeleteAlias(
+                        collections.DeleteAliasRequest(alias="live"), timeout=10))
+                    denied(lambda: holder.collections.RenameCollection(
+                        collections.RenameCollectionRequest(name="mine", new_name="other"), timeout=10))
 
 
 class Keys(unittest.TestCase):

@@ -389,7 +389,7 @@ TEST_F(BadInput, ForeignOrDamagedCursorIsRefused) {
     otherCollection.set_collection("default");
     expectMalformed(otherCollection);
     for (const std::string& damaged :
-         {cursor.substr(1), cursor + "0", std::string("made up"), "2" + cursor.substr(1)}) {
+         {cursor.substr(1), cursor + "0", std::string("made up"), "1" + cursor.substr(1)}) {
         pb::ListShapesRequest bad = request;
         bad.set_cursor(damaged);
         expectMalformed(bad);

@@ -44,6 +44,8 @@ constexpr char kCounterProblems[] =
     "SELECT 'job ' || id FROM job WHERE max(id, attempts, stops) > ?1 UNION ALL "
     "SELECT 'rebuild ' || id FROM rebuild WHERE max(id, target_generation) > ?1 UNION ALL "
     "SELECT 'table tally' FROM tally WHERE commits < 0 OR commits > ?1";
+constexpr char kAliasProblems[] =
+    "SELECT a.name FROM collection_alias a JOIN collection c ON c.name = a.name";
 constexpr Rule kRules[] = {
     {"SELECT s.key FROM shape s JOIN job j ON j.shape_id = s.id JOIN shape_points p ON p.shape_id = s.id "
      "WHERE "
@@ -94,6 +96,10 @@ class Checker {
                 while (query.step()) add("shape " + quoted(query.text(0)) + " " + rule.problem);
             });
         }
+        section([&] {
+            Query query(connection_, kAliasProblems);
+            while (query.step()) add(quoted(query.text(0)) + " is both a collection and an alias");
+        });
         section([&] { counters(); });
         section([&] { keys(); });
         section([&] {

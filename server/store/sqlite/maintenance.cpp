@@ -10,6 +10,7 @@
 
 #include "server/store/sqlite/check.h"
 #include "server/store/sqlite/migrator.h"
+#include "server/store/sqlite/rows.h"
 #include "server/store/sqlite/sequences.h"
 #include "server/store/sqlite/sqlite_store_impl.h"
 

@@ -24,7 +24,7 @@ void writeMetadata(Connection& connection, std::int64_t shapeId, const Metadata&
     }
 }
 
-void replaceMetadata(Connection& connection, const Shape& existing, const Metadata& metadata) {
+void rewriteMetadata(Connection& connection, const Shape& existing, const Metadata& metadata) {
     if (existing.metadata == metadata) return;
     Query(connection, sql::kDeleteMetadata, existing.id).run();
     writeMetadata(connection, existing.id, metadata);
@@ -62,21 +62,21 @@ PutResult SqliteStore::insertShape(Connection& connection, const PutRequest& req
           view(request.scan.checksum()), now())
         .run();
     const std::int64_t shapeId = connection.lastInsertId();
-    writeMetadata(connection, shapeId, request.metadata);
+    writeMetadata(connection, shapeId, request.metadata.set);
     writePoints(connection, shapeId, request, encoding);
     queueJob(connection, request, shapeId, 1);
     return {PutOutcome::kCreated, *findShapeById(connection, shapeId)};
 }
 
-PutResult SqliteStore::changeMetadata(Connection& connection, const PutRequest& request,
-                                      const Shape& existing) {
-    replaceMetadata(connection, existing, request.metadata);
+Shape SqliteStore::replaceMetadata(Connection& connection, const Shape& existing, const Metadata& metadata) {
+    rewriteMetadata(connection, existing, metadata);
     Query(connection, sql::kRaiseVersion, existing.id, now()).run();
-    return {PutOutcome::kMetadataChanged, *findShapeById(connection, existing.id)};
+    return *findShapeById(connection, existing.id);
 }
 
 PutResult SqliteStore::retryShape(Connection& connection, const PutRequest& request, const Shape& existing) {
-    if (existing.metadata != request.metadata) changeMetadata(connection, request, existing);
+    const Metadata metadata = request.metadata.of(existing.metadata);
+    if (existing.metadata != metadata) replaceMetadata(connection, existing, metadata);
     orRaise(requireRoom(request.scan.bytes(), request.maxQueuedJobs, request.maxQueuedBytes,
                         readTally(connection)));
     queueAgain(connection, existing.id, existing.pointsVersion, request.scan.bytes());
@@ -86,7 +86,7 @@ PutResult SqliteStore::retryShape(Connection& connection, const PutRequest& requ
 PutResult SqliteStore::replacePoints(Connection& connection, const PutRequest& request,
                                      const PointEncoding& encoding, const Shape& existing) {
     const std::int64_t shapeId = existing.id;
-    replaceMetadata(connection, existing, request.metadata);
+    rewriteMetadata(connection, existing, request.metadata.of(existing.metadata));
     Query(connection, sql::kReplacePointsOfShape, shapeId, request.scan.pointCount(),
           view(request.scan.checksum()), now())
         .run();
@@ -114,7 +114,9 @@ Result<PutResult> SqliteStore::putShape(const PutRequest& request) {
         switch (orRaise(decidePut(request, collection.name, existing ? &*existing : nullptr))) {
             case PutOutcome::kCreated: return insertShape(connection, request, *encoding);
             case PutOutcome::kUnchanged: return {PutOutcome::kUnchanged, *existing};
-            case PutOutcome::kMetadataChanged: return changeMetadata(connection, request, *existing);
+            case PutOutcome::kMetadataChanged:
+                return {PutOutcome::kMetadataChanged,
+                        replaceMetadata(connection, *existing, request.metadata.of(existing->metadata))};
             case PutOutcome::kRetried: return retryShape(connection, request, *existing);
             case PutOutcome::kReplaced: break;
         }
@@ -138,59 +140,13 @@ Result<Shape> SqliteStore::getShapeById(std::int64_t shapeId) {
     });
 }
 
-namespace {
-
-/// Calls `visit` for each accepted shape in ascending order of id, until it returns false. Throws Failure
-/// when the filter's context says so.
-template <typename Visit>
-void forEachAccepted(Connection& connection, std::int64_t collectionId, std::int64_t afterId,
-                     const ShapeFilter& filter, Visit visit) {
-    Query query(connection, filter.state ? sql::kListShapesInState : sql::kListShapes);
-    if (filter.state) {
-        query.bindAll(collectionId, afterId, static_cast<int>(*filter.state));
-    } else {
-        query.bindAll(collectionId, afterId);
-    }
-    forEachShape(query, [&](Shape&& shape) {
-        orRaise(filter.context.checkpoint());
-        if (filter.accept && !filter.accept(shape)) return true;
-        return visit(std::move(shape));
-    });
-}
-
-}  // namespace
-
-Result<std::vector<Shape>> SqliteStore::listShapes(std::int64_t collectionId, std::int64_t afterId,
-                                                   std::size_t limit, const ShapeFilter& filter) {
-    return read("list the shapes", [&](Connection& connection) {
-        std::vector<Shape> page;
-        if (limit == 0) return page;
-        forEachAccepted(connection, collectionId, afterId, filter, [&](Shape&& shape) {
-            page.push_back(std::move(shape));
-            return page.size() < limit;
-        });
-        return page;
-    });
-}
-
-Result<std::uint64_t> SqliteStore::countShapes(std::int64_t collectionId, const ShapeFilter& filter) {
-    return read("count the shapes", [&](Connection& connection) {
-        std::uint64_t count = 0;
-        if (filter.accept) {
-            forEachAccepted(connection, collectionId, 0, filter, [&](Shape&&) {
-                ++count;
-                return true;
-            });
-            return count;
-        }
-        Query query(connection, filter.state ? sql::kCountShapesInState : sql::kCountShapes);
-        if (filter.state) {
-            query.bindAll(collectionId, static_cast<int>(*filter.state));
-        } else {
-            query.bindAll(collectionId);
-        }
-        if (query.step()) count = static_cast<std::uint64_t>(query.integer(0));
-        return count;
+Result<std::vector<std::optional<Shape>>> SqliteStore::getShapes(std::int64_t collectionId,
+                                                                 const std::vector<std::string>& keys) {
+    return read("read the shapes", [&](Connection& connection) {
+        std::vector<std::optional<Shape>> found;
+        found.reserve(keys.size());
+        for (const std::string& key : keys) found.push_back(findShape(connection, collectionId, key));
+        return found;
     });
 }
 
@@ -202,6 +158,35 @@ Result<Shape> SqliteStore::deleteShape(std::int64_t collectionId, const std::str
         orRaise(requireVersion(key, found->version, expectedVersion));
         Query(connection, sql::kDeleteShape, found->id).run();
         return std::move(*found);
+    });
+}
+
+Result<std::vector<Shape>> SqliteStore::deleteShapes(const std::vector<std::int64_t>& shapeIds,
+                                                     const std::function<bool(const Shape&)>& still) {
+    return write("delete the shapes", [&](Connection& connection) {
+        std::vector<Shape> deleted;
+        for (const std::int64_t shapeId : shapeIds) {
+            auto found = findShapeById(connection, shapeId);
+            if (!found || !still(*found)) continue;
+            Query(connection, sql::kDeleteShape, shapeId).run();
+            deleted.push_back(std::move(*found));
+        }
+        return deleted;
+    });
+}
+
+Result<std::vector<Shape>> SqliteStore::changeMetadata(
+    const std::vector<std::int64_t>& shapeIds,
+    const std::function<std::optional<Metadata>(const Shape&)>& change) {
+    return write("change the metadata", [&](Connection& connection) {
+        std::vector<Shape> changed;
+        for (const std::int64_t shapeId : shapeIds) {
+            const auto found = findShapeById(connection, shapeId);
+            const auto metadata = found ? change(*found) : std::nullopt;
+            if (!metadata || *metadata == found->metadata) continue;
+            changed.push_back(replaceMetadata(connection, *found, *metadata));
+        }
+        return changed;
     });
 }
 

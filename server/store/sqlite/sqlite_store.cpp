@@ -181,43 +181,6 @@ void SqliteStore::boundWal() noexcept {
     }));
 }
 
-// Collections ----------------------------------------------------------------------------
-
-Result<Collection> SqliteStore::createCollection(const std::string& name, const std::string& description,
-                                                 const std::string& parameters) {
-    return write("create the collection", [&](Connection& connection) {
-        if (findCollection(connection, name)) {
-            raise(ErrorCode::kAlreadyExists, "collection '" + name + "' already exists");
-        }
-        Query(connection, sql::kInsertCollection, name, description, parameters, now()).run();
-        return requireCollection(connection, connection.lastInsertId());
-    });
-}
-
-Result<Collection> SqliteStore::getCollection(const std::string& name) {
-    return read("read the collection", [&](Connection& connection) {
-        auto found = findCollection(connection, name);
-        if (!found) raise(ErrorCode::kNotFound, "there is no collection '" + name + "'");
-        return std::move(*found);
-    });
-}
-
-Result<std::vector<Collection>> SqliteStore::listCollections() {
-    return read("list the collections", [&](Connection& connection) {
-        std::vector<Collection> all;
-        Query query(connection, sql::kListCollections);
-        while (query.step()) all.push_back(readCollection(query));
-        return all;
-    });
-}
-
-Result<void> SqliteStore::deleteCollection(std::int64_t collectionId) {
-    return write("delete the collection", [&](Connection& connection) {
-        requireCollection(connection, collectionId);
-        Query(connection, sql::kDeleteCollection, collectionId).run();
-    });
-}
-
 // Statistics -----------------------------------------------------------------------------
 
 Result<StoreStats> SqliteStore::stats() {

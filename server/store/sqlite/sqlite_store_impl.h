@@ -1,5 +1,5 @@
-// The class behind openSqliteStore; its functions are in shapes.cpp, jobs.cpp, rebuild.cpp,
-// maintenance.cpp and sqlite_store.cpp.
+// The class behind openSqliteStore; its functions are in collections.cpp, shapes.cpp, listing.cpp, jobs.cpp,
+// rebuild.cpp, maintenance.cpp and sqlite_store.cpp.
 //
 // Lock order: largeScanMutex_, writerMutex_, the pool's mutex. Nobody holds a reader while waiting
 // for the writer, so that neither waits for the other.
@@ -32,15 +32,26 @@ class SqliteStore final : public Store {
     Result<Collection> getCollection(const std::string& name) override;
     Result<std::vector<Collection>> listCollections() override;
     Result<void> deleteCollection(std::int64_t collectionId) override;
+    Result<Collection> renameCollection(std::int64_t collectionId, const std::string& name) override;
+    Result<void> setAlias(const std::string& name, std::int64_t collectionId) override;
+    Result<void> deleteAlias(const std::string& name) override;
+    Result<std::vector<Alias>> listAliases() override;
 
     Result<PutResult> putShape(const PutRequest& request) override;
     Result<Shape> getShape(std::int64_t collectionId, const std::string& key) override;
     Result<Shape> getShapeById(std::int64_t shapeId) override;
-    Result<std::vector<Shape>> listShapes(std::int64_t collectionId, std::int64_t afterId, std::size_t limit,
-                                          const ShapeFilter& filter) override;
+    Result<std::vector<std::optional<Shape>>> getShapes(std::int64_t collectionId,
+                                                        const std::vector<std::string>& keys) override;
+    Result<std::vector<Shape>> listShapes(std::int64_t collectionId, const ShapeListing& listing,
+                                          std::size_t limit, const ShapeFilter& filter) override;
     Result<std::uint64_t> countShapes(std::int64_t collectionId, const ShapeFilter& filter) override;
     Result<Shape> deleteShape(std::int64_t collectionId, const std::string& key,
                               std::optional<std::int64_t> expectedVersion) override;
+    Result<std::vector<Shape>> deleteShapes(const std::vector<std::int64_t>& shapeIds,
+                                            const std::function<bool(const Shape&)>& still) override;
+    Result<std::vector<Shape>> changeMetadata(
+        const std::vector<std::int64_t>& shapeIds,
+        const std::function<std::optional<Metadata>(const Shape&)>& change) override;
     Result<std::vector<float>> loadPoints(std::int64_t shapeId) override;
     Result<SignatureRow> getSignature(std::int64_t shapeId) override;
     Result<std::optional<SurfaceRow>> getSurface(std::int64_t shapeId) override;
@@ -118,7 +129,7 @@ class SqliteStore final : public Store {
     void boundWal() noexcept;
 
     PutResult insertShape(Connection& connection, const PutRequest& request, const PointEncoding& encoding);
-    PutResult changeMetadata(Connection& connection, const PutRequest& request, const Shape& existing);
+    Shape replaceMetadata(Connection& connection, const Shape& existing, const Metadata& metadata);
     PutResult retryShape(Connection& connection, const PutRequest& request, const Shape& existing);
     PutResult replacePoints(Connection& connection, const PutRequest& request, const PointEncoding& encoding,
                             const Shape& existing);

@@ -173,7 +173,7 @@ TEST(Client, UploadsInChunksWithCountAndChecksum) {
     AddRequest request;
     request.shape = {"cups", "a"};
     request.mode = AddMode::kInsertOnly;
-    request.metadata = {{"label", "cup"}};
+    request.metadata = Metadata{{"label", "cup"}};
     std::uint64_t reported = 0;
     RunContext context;
     context.progress = [&](const char* stage, std::uint64_t done, std::uint64_t total) {
@@ -214,7 +214,41 @@ TEST(Client, OffsetIsRecordedInTheMetadata) {
     const auto reply = server.client().addShape({{"", "a"}}, points);
     ASSERT_TRUE(reply);
     EXPECT_NEAR(reply->offset.x, 5e6 + 49.5, 1.0);
-    EXPECT_EQ(server.shapes.header.metadata().at(kOffsetKey), offsetText(reply->offset));
+    EXPECT_EQ(server.shapes.header.metadata_change().set().at(kOffsetKey), offsetText(reply->offset));
+}
+
+// A client that gives no metadata is told apart from one that gives an empty set; the offset is always that
+// of the points.
+TEST(Client, UploadsWithoutMetadataLeaveThoseOfTheShape) {
+    FakeServer server;
+    PointCloud far = cloud(1000);
+    for (Point3& p : far) p = p + Point3{5e6, 0.0, 0.0};
+    const auto sent = [&](const std::optional<Metadata>& metadata, const PointCloud& points) {
+        AddRequest request;
+        request.shape.key = "a";
+        request.metadata = metadata;
+        EXPECT_TRUE(server.client().addShape(request, points));
+        return server.shapes.header;
+    };
+    const auto none = sent(std::nullopt, cloud(1000));
+    EXPECT_TRUE(none.metadata().empty());
+    EXPECT_FALSE(none.metadata_change().replace_all());
+    EXPECT_TRUE(none.metadata_change().set().empty());
+    ASSERT_EQ(none.metadata_change().remove_size(), 1) << "of earlier points";
+    EXPECT_EQ(none.metadata_change().remove(0), kOffsetKey);
+    const auto noneFar = sent(std::nullopt, far);
+    EXPECT_FALSE(noneFar.metadata_change().replace_all());
+    EXPECT_EQ(noneFar.metadata_change().set().count(kOffsetKey), 1u);
+    const auto empty = sent(Metadata{}, cloud(1000));
+    EXPECT_TRUE(empty.metadata_change().replace_all());
+    EXPECT_TRUE(empty.metadata_change().set().empty());
+    const auto emptyFar = sent(Metadata{}, far);
+    EXPECT_FALSE(emptyFar.has_metadata_change());
+    EXPECT_EQ(emptyFar.metadata().size(), 1u);
+    const auto some = sent(Metadata{{"label", "cup"}}, far);
+    EXPECT_EQ(some.metadata().at("label"), "cup");
+    EXPECT_EQ(some.metadata().count(kOffsetKey), 1u);
+    EXPECT_FALSE(some.has_metadata_change());
 }
 
 TEST(Client, BadScansAreNotSent) {

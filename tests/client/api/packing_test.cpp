@@ -124,6 +124,10 @@ TEST(Packing, OffsetTextRoundTrips) {
     double z = 0.0;
     ASSERT_EQ(std::sscanf(offsetText(offset).c_str(), "%lf %lf %lf", &x, &y, &z), 3);
     EXPECT_EQ((Point3{x, y, z}), offset);
+    EXPECT_EQ(offsetOf(offsetText(offset)).value(), offset);
+    for (const char* text : {"", "1 2", "1 2 3 4", "1 2 x", "1,2,3", "nan 0 0", "1 2 3 "}) {
+        EXPECT_EQ(offsetOf(text).error().code, ErrorCode::kDataLoss) << text;
+    }
 }
 
 }  // namespace

@@ -60,8 +60,8 @@ class Online : public CommandTest {
     /// A collection with the six samples, segmented.
     static void fill(const std::string& collection) {
         onlineJson({"collection", "create", collection, "--profile", "paper"});
-        const json added =
-            onlineJson({"add", scans(), "--collection", collection, "--label-from-folder", "--wait"});
+        const json added = onlineJson(
+            {"add", scans(), "--base", scans(), "--collection", collection, "--label-from-folder", "--wait"});
         ASSERT_EQ(added["added"].size(), 6u);
     }
 };
@@ -75,7 +75,8 @@ TEST_F(Online, HealthIsServing) {
 
 TEST_F(Online, AddStoresEveryFileOnce) {
     fill("add");
-    const json again = onlineJson({"add", scans(), "--collection", "add", "--label-from-folder", "--wait"});
+    const json again = onlineJson(
+        {"add", scans(), "--base", scans(), "--collection", "add", "--label-from-folder", "--wait"});
     EXPECT_EQ(again["outcomes"], json({{"unchanged", 6}}));
     for (const json& shape : again["added"]) {
         EXPECT_EQ(shape["state"], "ready");
@@ -105,7 +106,8 @@ TEST_F(Online, AddContinuesAfterABadFile) {
     writePoints("in/good.xyz", dumbbellPoints(2000));
     writePoints("in/flat.xyz", ellipsoidPoints(1.0, 1.0, 0.0, 100));
     write("in/broken.ply", "ply\nformat ascii 1.0\nelement vertex 10\n");
-    const CommandRun run = online({"add", path("in"), "--collection", "mixed", "--wait", "--json"});
+    const CommandRun run =
+        online({"add", path("in"), "--base", path("in"), "--collection", "mixed", "--wait", "--json"});
     EXPECT_EQ(run.exitCode, 1);
     const json document = run.json();
     ASSERT_EQ(document["added"].size(), 1u);
@@ -118,10 +120,12 @@ TEST_F(Online, AddContinuesAfterABadFile) {
 
 TEST_F(Online, AddRefusesTwoFilesWithOneKey) {
     writePoints("in/a.xyz", dumbbellPoints(500));
-    writePoints("in/a.pts.xyz", dumbbellPoints(500));
-    writePoints("other/a.xyz", dumbbellPoints(500));
-    const CommandRun run = online({"add", path("in/a.xyz"), path("other/a.xyz"), "--json"});
+    writePoints("in/a.txt", dumbbellPoints(600));
+    const CommandRun run = online({"add", path("in/a.xyz"), path("in/a.txt"), "--json"});
     EXPECT_EQ(run.exitCode, 2);
+    EXPECT_NE(run.err.find("would both get the key"), std::string::npos) << run.err;
+    const CommandRun twice = online({"add", path("in/a.xyz"), path("in/../in/a.xyz")});
+    EXPECT_EQ(twice.exitCode, 2) << "one file, typed in two ways";
     EXPECT_EQ(onlineJson({"add", path("in"), "--key", "x"}, 2)["error"]["name"], "invalid_argument");
     EXPECT_EQ(onlineJson({"add", path("in/a.xyz"), "--meta", "nonsense"}, 2)["error"]["name"],
               "invalid_argument");
@@ -138,7 +142,8 @@ TEST_F(Online, SurveyedCoordinatesKeepTheirShape) {
         text += std::to_string(p.x) + " " + std::to_string(p.y) + " " + std::to_string(p.z) + "\n";
     }
     write("surveyed.xyz", text);
-    onlineJson({"add", path("local.xyz"), path("surveyed.xyz"), "--collection", "survey", "--wait"});
+    onlineJson({"add", path("local.xyz"), path("surveyed.xyz"), "--base", folder(), "--collection", "survey",
+                "--wait"});
     const json shape = onlineJson({"get", "surveyed", "--collection", "survey"});
     EXPECT_NEAR(std::stod(shape["metadata"]["shapedb.offset"].get<std::string>()), 4.5e6, 0.01);
     EXPECT_FALSE(
@@ -193,7 +198,7 @@ TEST_F(Online, QueryTextRanksAndExplains) {
 
 TEST_F(Online, UnitsConvertScansAndAnswersAndMakeSizesCount) {
     onlineJson({"collection", "create", "metres", "--units", "m"});
-    onlineJson({"add", scans(), "--collection", "metres", "--wait"});
+    onlineJson({"add", scans(), "--base", scans(), "--collection", "metres", "--wait"});
     const std::string file = scans() + "/mug/mug_01.ply";
     // The same numbers taken for millimetres: a thousandth of the size.
     const json tiny = onlineJson({"query", file, "--collection", "metres", "-k", "1", "--unit", "mm"});
@@ -255,7 +260,8 @@ TEST_F(Online, AddEachStoresTheObjectsOfATable) {
     for (const Point3& p : points) out << p.x << " " << p.y << " " << p.z << "\n";
     out.close();
     onlineJson({"collection", "create", "table"});
-    const json added = onlineJson({"add", file, "--collection", "table", "--each", "--wait"});
+    const json added =
+        onlineJson({"add", file, "--base", data()->path(), "--collection", "table", "--each", "--wait"});
     ASSERT_EQ(added["added"].size(), 2u) << added;
     EXPECT_EQ(added["added"][0]["key"], "table/1");
     EXPECT_EQ(added["added"][1]["key"], "table/2");
@@ -360,7 +366,7 @@ TEST_F(Online, WatchEndsWhenReady) {
     onlineJson({"collection", "create", "watch"});
     writePoints("flat.xyz", ellipsoidPoints(1.0, 1.0, 0.0, 100));
     writePoints("bell.xyz", dumbbellPoints(2000));
-    onlineJson({"add", path("bell.xyz"), "--collection", "watch"});
+    onlineJson({"add", path("bell.xyz"), "--base", folder(), "--collection", "watch"});
     EXPECT_EQ(onlineJson({"watch", "bell", "--collection", "watch"})["state"], "ready");
     EXPECT_EQ(onlineJson({"watch", "nobody", "--collection", "watch"}, 4)["error"]["name"], "not_found");
 }
@@ -420,7 +426,7 @@ TEST_F(Online, RestoreBringsBackABackup) {
         arguments.insert(arguments.end(), to.begin(), to.end());
         return runCommand(arguments);
     };
-    EXPECT_EQ(ask({"add", scans() + "/mug", "--wait"}).exitCode, 0);
+    EXPECT_EQ(ask({"add", scans() + "/mug", "--base", scans() + "/mug", "--wait"}).exitCode, 0);
     const json backup = ask({"admin", "backup", path("copy.db")}).json();
     EXPECT_EQ(backup["bytes"], fs::file_size(path("copy.db")));
     EXPECT_FALSE(fs::exists(path("copy.db.part")));

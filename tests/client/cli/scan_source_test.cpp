@@ -1,5 +1,6 @@
 #include "client/cli/scan_source.h"
 
+#include <filesystem>
 #include <set>
 
 #include "core/synthetic/noise.h"
@@ -80,6 +81,24 @@ TEST_F(ScanSource, ErrorsNameTheFile) {
     ASSERT_FALSE(scan);
     EXPECT_EQ(scan.error().code, ErrorCode::kFileNotReadable);
     EXPECT_NE(scan.error().message.find("missing.ply"), std::string::npos);
+}
+
+TEST_F(ScanSource, AKeyDoesNotDependOnHowThePathWasTyped) {
+    const std::string here = std::filesystem::current_path().generic_string();
+    for (const std::string typed :
+         {"scans/cup/1.ply", "./scans//cup/1.ply", "scans/jug/../cup/1.ply", "scans/cup/./1.ply"}) {
+        EXPECT_EQ(keyOfFile(typed, "").value(), "scans/cup/1") << typed;
+        EXPECT_EQ(keyOfFile(here + "/" + typed, "").value(), "scans/cup/1") << typed;
+        for (const std::string base : {"scans", "scans/", "./scans", "other/../scans"}) {
+            EXPECT_EQ(keyOfFile(typed, base).value(), "cup/1") << typed << " below " << base;
+            EXPECT_EQ(keyOfFile(here + "/" + typed, here + "/" + base).value(), "cup/1");
+        }
+    }
+    EXPECT_EQ(keyOfFile("scans/jug/1.ply", "").value(), "scans/jug/1") << "the same name in another folder";
+    EXPECT_EQ(keyOfFile("/data/cup/1.ply", "").value(), "data/cup/1") << "elsewhere: the whole path";
+    EXPECT_EQ(keyOfFile("/data/cup/1.ply", "/").value(), "data/cup/1");
+    EXPECT_EQ(keyOfFile("/data/cup/1.ply", "/data/jug").error().code, ErrorCode::kInvalidArgument);
+    EXPECT_EQ(keyOfFile("/database/1.ply", "/data").error().code, ErrorCode::kInvalidArgument);
 }
 
 }  // namespace

@@ -45,7 +45,7 @@ class CatalogTest : public ::testing::Test {
         ShapeHeader header;
         header.collection = collection;
         header.key = key;
-        header.metadata = std::move(metadata);
+        header.metadata = store::replacedBy(std::move(metadata));
         return catalog->put(header, store::VerifiedScan::verify(taggedPoints(tag)).value());
     }
     store::Shape putAndWait(const std::string& key, float tag) {
@@ -101,9 +101,9 @@ TEST_F(CatalogTest, RefusesAHopelessUploadBeforeItsPoints) {
     header.expectedVersion = -1;
     EXPECT_EQ(catalog->admitUpload(header).error().code, ErrorCode::kInvalidArgument);
     header.expectedVersion.reset();
-    header.metadata = {{"a b", "no blanks"}};
+    header.metadata.set = {{"a b", "no blanks"}};
     EXPECT_EQ(catalog->admitUpload(header).error().code, ErrorCode::kInvalidArgument);
-    header.metadata.clear();
+    header.metadata.set.clear();
     header.collection = "unknown";
     EXPECT_EQ(catalog->admitUpload(header).error().code, ErrorCode::kNotFound);
     header.collection.clear();

@@ -50,6 +50,18 @@ TEST(RequestChecks, LimitsMetadata) {
     EXPECT_FALSE(checkMetadata({{"k", "\xed\xa0\x80"}})) << "a surrogate";
 }
 
+TEST(RequestChecks, LimitsGroups) {
+    EXPECT_TRUE(checkGrouping("", 0, 10, 10));
+    EXPECT_FALSE(checkGrouping("", 1, 10, 10)) << "hits of no group";
+    EXPECT_TRUE(checkGrouping("label", 0, 10, 10));
+    EXPECT_TRUE(checkGrouping("label", 1, 10, 10));
+    EXPECT_FALSE(checkGrouping("label", 2, 10, 10)) << "20 hits";
+    EXPECT_TRUE(checkGrouping("label", 100, 1, 100));
+    EXPECT_FALSE(checkGrouping("label", 101, 1, 1'000));
+    EXPECT_FALSE(checkGrouping("label", 4'294'967'295u, 4'294'967'295u, 10));
+    EXPECT_FALSE(checkGrouping("a b", 1, 1, 10));
+}
+
 TEST(RequestChecks, LimitsNumbersAndTexts) {
     EXPECT_FALSE(checkK(0, 10));
     EXPECT_TRUE(checkK(1, 10));

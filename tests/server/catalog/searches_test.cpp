@@ -125,6 +125,36 @@ TEST_F(SearchesTest, AnswersExplainHitsAndLeaveOutDeletedShapes) {
     EXPECT_TRUE(keysOf(found).empty());
 }
 
+TEST_F(SearchesTest, AnAnswerInGroupsNamesTheirValues) {
+    const auto labelled = [&](const std::string& key, float tag, const std::string& label) {
+        const store::Shape shape = putAndWait(key, tag);
+        ASSERT_TRUE(catalog->changeMetadata(catalog->epoch(), {shape.id}, [&](const store::Shape&) {
+            return label.empty() ? Metadata() : Metadata{{"label", label}};
+        }));
+    };
+    labelled("cup 1", 5.0f, "cup");
+    labelled("cup 2", 5.1f, "cup");
+    labelled("plain", 6.0f, "");
+    labelled("jug", 9.0f, "jug");
+    SearchRequest request;
+    request.k = 3;
+    request.groupBy = "label";
+    auto prepared = prepare(request);
+    ASSERT_TRUE(prepared);
+    const auto query = searches().storedQuery(*prepared, "cup 1", true).value();
+    const auto found = searches().run(*prepared, query, {}).value();
+    std::vector<std::pair<std::string, std::string>> hits;
+    ASSERT_TRUE(searches().visitHits(*prepared, query.signature, found, [&](const FoundHit& hit) {
+        hits.push_back({hit.shape.key, hit.group.value_or("(none)")});
+        return Result<void>();
+    }));
+    const std::vector<std::pair<std::string, std::string>> expected = {
+        {"cup 1", "cup"}, {"plain", "(none)"}, {"jug", "jug"}};
+    EXPECT_EQ(hits, expected);
+    request.perGroup = 20;
+    EXPECT_EQ(prepare(request).error().code, ErrorCode::kInvalidArgument) << "60 hits, the server gives 50";
+}
+
 TEST_F(SearchesTest, AQueryIsAStoredShapeOrASignature) {
     const store::Shape cup = putAndWait("cup", 5.0f);
     SearchRequest request;

@@ -111,7 +111,13 @@ TEST(Enums, ConvertBothWaysAndRefuseUnknownNumbers) {
     EXPECT_EQ(*fromProto(pb::ADD_MODE_UNSPECIFIED), store::PutMode::kUpsert);
     EXPECT_EQ(*fromProto(pb::ADD_MODE_INSERT_ONLY), store::PutMode::kInsertOnly);
     EXPECT_EQ(*fromProto(pb::ADD_MODE_UPDATE_ONLY), store::PutMode::kUpdateOnly);
-    EXPECT_FALSE(fromProto(static_cast<pb::AddMode>(4)));
+    EXPECT_EQ(*fromProto(pb::ADD_MODE_SAME_POINTS), store::PutMode::kSamePoints);
+    EXPECT_FALSE(fromProto(static_cast<pb::AddMode>(5)));
+    EXPECT_EQ(*fromProto(pb::SHAPE_ORDER_UNSPECIFIED), store::ShapeOrder::kId);
+    EXPECT_EQ(*fromProto(pb::SHAPE_ORDER_ID), store::ShapeOrder::kId);
+    EXPECT_EQ(*fromProto(pb::SHAPE_ORDER_KEY), store::ShapeOrder::kKey);
+    EXPECT_EQ(*fromProto(pb::SHAPE_ORDER_UPDATED), store::ShapeOrder::kUpdated);
+    EXPECT_FALSE(fromProto(static_cast<pb::ShapeOrder>(4)));
 }
 
 TEST(Timestamps, AreSplitTowardsThePast) {

@@ -15,7 +15,7 @@ class PutRules : public ::testing::Test {
     PutRules() : request(putRequest(1, "cup", taggedPoints(1.0f), {{"colour", "red"}})) {
         existing.version = 3;
         existing.checksum = request.scan.checksum();
-        existing.metadata = request.metadata;
+        existing.metadata = request.metadata.set;
     }
 
     Result<PutOutcome> onFreeKey() { return decidePut(request, "parts", nullptr); }
@@ -39,7 +39,7 @@ TEST_F(PutRules, PointsWeighMoreThanMetadata) {
     EXPECT_EQ(onTakenKey().value(), PutOutcome::kMetadataChanged);
     otherPoints();
     EXPECT_EQ(onTakenKey().value(), PutOutcome::kReplaced);
-    existing.metadata = request.metadata;
+    existing.metadata = request.metadata.set;
     EXPECT_EQ(onTakenKey().value(), PutOutcome::kReplaced);
 }
 
@@ -51,7 +51,7 @@ TEST_F(PutRules, InsertOnlyAcceptsARepeatedRequest) {
         "shape 'cup' already exists in collection 'parts' with other points or metadata";
     otherMetadata();
     expectError(onTakenKey().error(), ErrorCode::kAlreadyExists, taken);
-    existing.metadata = request.metadata;
+    existing.metadata = request.metadata.set;
     otherPoints();
     expectError(onTakenKey().error(), ErrorCode::kAlreadyExists, taken);
 }
@@ -62,6 +62,58 @@ TEST_F(PutRules, UpdateOnlyNeedsTheShape) {
     EXPECT_EQ(onTakenKey().value(), PutOutcome::kUnchanged);
     otherPoints();
     EXPECT_EQ(onTakenKey().value(), PutOutcome::kReplaced);
+}
+
+TEST_F(PutRules, SamePointsDoesNotReplaceOthers) {
+    request.mode = PutMode::kSamePoints;
+    EXPECT_EQ(onFreeKey().value(), PutOutcome::kCreated);
+    EXPECT_EQ(onTakenKey().value(), PutOutcome::kUnchanged);
+    otherMetadata();
+    EXPECT_EQ(onTakenKey().value(), PutOutcome::kMetadataChanged);
+    otherPoints();
+    expectError(onTakenKey().error(), ErrorCode::kAlreadyExists,
+                "shape 'cup' already exists in collection 'parts' with other points");
+    existing.state = ShapeState::kFailed;
+    EXPECT_EQ(onTakenKey().error().code, ErrorCode::kAlreadyExists);
+}
+
+TEST_F(PutRules, WhatDoesNotChangeTheMetadataIsARepetition) {
+    request.metadata = {};
+    EXPECT_EQ(onTakenKey().value(), PutOutcome::kUnchanged) << "none given";
+    request.mode = PutMode::kInsertOnly;
+    EXPECT_EQ(onTakenKey().value(), PutOutcome::kUnchanged);
+    request.mode = PutMode::kUpsert;
+    request.metadata = {{{"colour", "red"}}, {"size"}, false};
+    EXPECT_EQ(onTakenKey().value(), PutOutcome::kUnchanged);
+    request.metadata = {{}, {"colour"}, false};
+    EXPECT_EQ(onTakenKey().value(), PutOutcome::kMetadataChanged);
+    request.metadata = replacedBy({});
+    EXPECT_EQ(onTakenKey().value(), PutOutcome::kMetadataChanged);
+}
+
+TEST_F(PutRules, TheMetadataThatTheShapeWouldHaveAreChecked) {
+    std::vector<Metadata> asked;
+    request.checkMetadata = [&](const Metadata& metadata) -> Result<void> {
+        asked.push_back(metadata);
+        if (metadata.size() < 2) return {};
+        return fail(ErrorCode::kInvalidArgument, "too many");
+    };
+    EXPECT_TRUE(onTakenKey());
+    request.metadata = {{{"size", "3"}}, {}, false};
+    EXPECT_TRUE(onFreeKey());
+    EXPECT_EQ(onTakenKey().error().code, ErrorCode::kInvalidArgument);
+    ASSERT_EQ(asked.size(), 3u);
+    EXPECT_EQ(asked[1], (Metadata{{"size", "3"}}));
+    EXPECT_EQ(asked[2], (Metadata{{"colour", "red"}, {"size", "3"}}));
+}
+
+TEST(MetadataChange, SetsRemovesAndReplaces) {
+    const Metadata before = {{"a", "1"}, {"b", "2"}};
+    EXPECT_EQ(MetadataChange().of(before), before);
+    EXPECT_EQ((MetadataChange{{{"b", "3"}, {"c", "4"}}, {"a", "x"}, false}).of(before),
+              (Metadata{{"b", "3"}, {"c", "4"}}));
+    EXPECT_EQ(replacedBy({{"c", "4"}}).of(before), (Metadata{{"c", "4"}}));
+    EXPECT_EQ(replacedBy({}).of(before), Metadata());
 }
 
 TEST_F(PutRules, AFailedShapeIsTriedAgain) {

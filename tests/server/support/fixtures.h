@@ -57,7 +57,7 @@ inline store::PutRequest putRequest(std::int64_t collectionId, const std::string
     store::PutRequest request(store::VerifiedScan::verify(points).value());
     request.collectionId = collectionId;
     request.key = key;
-    request.metadata = std::move(metadata);
+    request.metadata = store::replacedBy(std::move(metadata));
     return request;
 }
 

@@ -17,66 +17,11 @@ tl::unexpected<Error> notFound(const std::string& what) {
     return fail(ErrorCode::kNotFound, "no such " + what);
 }
 
-bool accepts(const ShapeFilter& filter, const Shape& shape) {
-    return (!filter.state || *filter.state == shape.state) && (!filter.accept || filter.accept(shape));
-}
-
 }  // namespace
 
 TimestampMs MemoryStore::now() {
     using namespace std::chrono;
     return duration_cast<milliseconds>(system_clock::now().time_since_epoch()).count();
-}
-
-Result<Collection> MemoryStore::createCollection(const std::string& name, const std::string& description,
-                                                 const std::string& parameters) {
-    return guarded("createCollection", [&]() -> Result<Collection> {
-        for (const auto& [id, collection] : content_.collections) {
-            if (collection.name == name) return fail(ErrorCode::kAlreadyExists, "collection exists");
-        }
-        Collection collection;
-        collection.id = content_.nextId++;
-        collection.name = name;
-        collection.description = description;
-        collection.parameters = parameters;
-        collection.createdAt = now();
-        return content_.collections[collection.id] = collection;
-    });
-}
-
-Result<Collection> MemoryStore::getCollection(const std::string& name) {
-    return guarded("getCollection", [&]() -> Result<Collection> {
-        for (const auto& [id, collection] : content_.collections) {
-            if (collection.name == name) return collection;
-        }
-        return notFound("collection");
-    });
-}
-
-Result<std::vector<Collection>> MemoryStore::listCollections() {
-    return guarded("listCollections", [&]() -> Result<std::vector<Collection>> {
-        std::vector<Collection> all;
-        for (const auto& [id, collection] : content_.collections) all.push_back(collection);
-        std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
-        return all;
-    });
-}
-
-Result<void> MemoryStore::deleteCollection(std::int64_t collectionId) {
-    return guarded("deleteCollection", [&]() -> Result<void> {
-        if (content_.collections.erase(collectionId) == 0) return notFound("collection");
-        std::vector<std::int64_t> ids;
-        for (const auto& [id, shape] : content_.shapes) {
-            if (shape.collectionId == collectionId) ids.push_back(id);
-        }
-        for (const std::int64_t id : ids) removeShape(id);
-        for (auto rebuild = content_.rebuilds.begin(); rebuild != content_.rebuilds.end();) {
-            const bool its = rebuild->second.collectionId == collectionId;
-            if (its) content_.rebuilt.erase(rebuild->first);
-            rebuild = its ? content_.rebuilds.erase(rebuild) : std::next(rebuild);
-        }
-        return {};
-    });
 }
 
 Shape* MemoryStore::find(std::int64_t collectionId, const std::string& key) {
@@ -140,6 +85,7 @@ Result<PutResult> MemoryStore::putShape(const PutRequest& request) {
                                           queueWithout(existing != nullptr ? existing->id : 0));
             if (!room) return fail(room.error());
         }
+        const Metadata after = request.metadata.of(existing != nullptr ? existing->metadata : Metadata());
         if (existing == nullptr) {
             const std::int64_t id = content_.nextId++;
             existing = &content_.shapes[id];
@@ -150,14 +96,14 @@ Result<PutResult> MemoryStore::putShape(const PutRequest& request) {
             existing->createdAt = now();
         }
         if (*outcome == PutOutcome::kRetried) {
-            if (existing->metadata != request.metadata) ++existing->version;
-            existing->metadata = request.metadata;
+            if (existing->metadata != after) ++existing->version;
+            existing->metadata = after;
             retry(*existing);
             return PutResult{*outcome, *existing};
         }
         existing->version += 1;
         existing->updatedAt = now();
-        existing->metadata = request.metadata;
+        existing->metadata = after;
         if (*outcome == PutOutcome::kMetadataChanged) return PutResult{*outcome, *existing};
         existing->pointsVersion = existing->version;
         existing->checksum = request.scan.checksum();
@@ -185,44 +131,6 @@ Result<Shape> MemoryStore::getShapeById(std::int64_t shapeId) {
         const auto found = content_.shapes.find(shapeId);
         if (found == content_.shapes.end()) return notFound("shape");
         return found->second;
-    });
-}
-
-Result<std::vector<Shape>> MemoryStore::listShapes(std::int64_t collectionId, std::int64_t afterId,
-                                                   std::size_t limit, const ShapeFilter& filter) {
-    return guarded("listShapes", [&] { return list(collectionId, afterId, limit, filter); });
-}
-
-Result<std::vector<Shape>> MemoryStore::list(std::int64_t collectionId, std::int64_t afterId,
-                                             std::size_t limit, const ShapeFilter& filter) const {
-    std::vector<Shape> page;
-    for (auto at = content_.shapes.upper_bound(afterId); at != content_.shapes.end() && page.size() < limit;
-         ++at) {
-        if (at->second.collectionId != collectionId) continue;
-        if (const auto go = filter.context.checkpoint(); !go) return fail(go.error());
-        if (accepts(filter, at->second)) page.push_back(at->second);
-    }
-    return page;
-}
-
-Result<std::uint64_t> MemoryStore::countShapes(std::int64_t collectionId, const ShapeFilter& filter) {
-    return guarded("countShapes", [&]() -> Result<std::uint64_t> {
-        const auto all = list(collectionId, 0, ~std::size_t{0}, filter);
-        if (!all) return fail(all.error());
-        return all->size();
-    });
-}
-
-Result<Shape> MemoryStore::deleteShape(std::int64_t collectionId, const std::string& key,
-                                       std::optional<std::int64_t> expectedVersion) {
-    return guarded("deleteShape", [&]() -> Result<Shape> {
-        const Shape* found = find(collectionId, key);
-        if (found == nullptr) return notFound("shape");
-        const auto version = requireVersion(key, found->version, expectedVersion);
-        if (!version) return fail(version.error());
-        const Shape shape = *found;
-        removeShape(shape.id);
-        return shape;
     });
 }
 

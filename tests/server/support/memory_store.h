@@ -25,16 +25,29 @@ class MemoryStore : public store::Store {
     Result<store::Collection> getCollection(const std::string& name) override;
     Result<std::vector<store::Collection>> listCollections() override;
     Result<void> deleteCollection(std::int64_t collectionId) override;
+    Result<store::Collection> renameCollection(std::int64_t collectionId, const std::string& name) override;
+    Result<void> setAlias(const std::string& name, std::int64_t collectionId) override;
+    Result<void> deleteAlias(const std::string& name) override;
+    Result<std::vector<store::Alias>> listAliases() override;
 
     Result<store::PutResult> putShape(const store::PutRequest& request) override;
     Result<store::Shape> getShape(std::int64_t collectionId, const std::string& key) override;
     Result<store::Shape> getShapeById(std::int64_t shapeId) override;
-    Result<std::vector<store::Shape>> listShapes(std::int64_t collectionId, std::int64_t afterId,
-                                                 std::size_t limit,
+    Result<std::vector<std::optional<store::Shape>>> getShapes(std::int64_t collectionId,
+                                                               const std::vector<std::string>& keys) override;
+    using Store::listShapes;
+    Result<std::vector<store::Shape>> listShapes(std::int64_t collectionId,
+                                                 const store::ShapeListing& listing, std::size_t limit,
                                                  const store::ShapeFilter& filter) override;
     Result<std::uint64_t> countShapes(std::int64_t collectionId, const store::ShapeFilter& filter) override;
     Result<store::Shape> deleteShape(std::int64_t collectionId, const std::string& key,
                                      std::optional<std::int64_t> expectedVersion) override;
+    Result<std::vector<store::Shape>> deleteShapes(
+        const std::vector<std::int64_t>& shapeIds,
+        const std::function<bool(const store::Shape&)>& still) override;
+    Result<std::vector<store::Shape>> changeMetadata(
+        const std::vector<std::int64_t>& shapeIds,
+        const std::function<std::optional<Metadata>(const store::Shape&)>& change) override;
     Result<std::vector<float>> loadPoints(std::int64_t shapeId) override;
     Result<store::SignatureRow> getSignature(std::int64_t shapeId) override;
     Result<std::optional<store::SurfaceRow>> getSurface(std::int64_t shapeId) override;
@@ -85,6 +98,7 @@ class MemoryStore : public store::Store {
     };
     struct Content {
         std::map<std::int64_t, store::Collection> collections;
+        std::map<std::string, std::int64_t> aliases;
         std::map<std::int64_t, store::Shape> shapes;
         std::map<std::int64_t, std::vector<float>> points;
         std::map<std::int64_t, store::SignatureRow> signatures;
@@ -104,9 +118,11 @@ class MemoryStore : public store::Store {
         return body();
     }
 
-    Result<std::vector<store::Shape>> list(std::int64_t collectionId, std::int64_t afterId, std::size_t limit,
-                                           const store::ShapeFilter& filter) const;
+    Result<std::vector<store::Shape>> list(std::int64_t collectionId, const store::ShapeListing& listing,
+                                           std::size_t limit, const store::ShapeFilter& filter) const;
     static store::TimestampMs now();
+    /// By a collection or an alias.
+    bool isTaken(const std::string& name) const;
     store::Shape* find(std::int64_t collectionId, const std::string& key);
     void queueJob(const store::Shape& shape);
     void removeShape(std::int64_t shapeId);

@@ -79,7 +79,9 @@ std::string put(Side& side, Random random) {
     const std::string key = "k" + std::to_string(random.below(4));
     PutRequest put =
         request(side.collection, key, cloud(random.below(3)), {{"n", random.below(2) ? "1" : "2"}});
-    put.mode = static_cast<PutMode>(random.below(3));
+    put.mode = static_cast<PutMode>(random.below(4));
+    put.metadata.replaceAll = random.below(2) == 0;
+    if (!put.metadata.replaceAll && random.below(2) == 0) put.metadata = {{}, {"n"}, false};
     if (random.below(3) == 0) put.expectedVersion = static_cast<std::int64_t>(random.below(4));
     if (random.below(3) == 0) put.maxQueuedJobs = 2;
     if (random.below(3) == 0) put.maxQueuedBytes = 2 * put.scan.bytes();
@@ -103,7 +105,9 @@ std::string work(Side& side, Random random) {
         case 2: return textOf(side.store.finishJob(job, row));
         case 3: return textOf(side.store.failJob(job, {ErrorCode::kNoInterior, "hollow"}));
         case 4: return textOf(side.store.releaseJob(job));
-        case 5: return textOf(side.store.retryShapes({job.shapeId, 1, 2, 3}, random.below(4), 0));
+        case 5:
+            return textOf(side.store.retryShapes(
+                {job.shapeId, side.idOf("k0"), side.idOf("k1"), side.idOf("k2")}, random.below(4), 0));
         default:
             return textOf(side.store.recoverJobs(2, random.below(2) == 0
                                                         ? std::vector<Crash>{{job.shapeId, job.pointsVersion}}
@@ -150,8 +154,44 @@ std::string rebuild(Side& side, Random random) {
     }
 }
 
+/// Some shapes by their keys; one of them need not be there.
+std::vector<std::int64_t> idsOf(Side& side, Random& random) {
+    std::vector<std::int64_t> ids;
+    for (const std::string key : {"k0", "k1", "k2", "k3"}) {
+        if (random.below(2) == 0) ids.push_back(side.idOf(key));
+    }
+    return ids;
+}
+
+std::string many(Side& side, Random random) {
+    const auto ids = idsOf(side, random);
+    const std::string value = random.below(2) ? "1" : "2";
+    if (random.below(3) > 0) {
+        return textOf(side.store.changeMetadata(ids, [&](const Shape& shape) {
+            return shape.key == "k2" ? std::nullopt : std::optional<Metadata>(Metadata{{"n", value}});
+        }));
+    }
+    return textOf(side.store.deleteShapes(ids, [&](const Shape& shape) {
+        return shape.metadata.count("n") > 0 && shape.metadata.at("n") == value;
+    }));
+}
+
+std::string collections(Side& side, Random random) {
+    const std::string name = "n" + std::to_string(random.below(3));
+    switch (random.below(3)) {
+        case 0: {
+            const auto renamed = side.store.renameCollection(side.collection, name);
+            return renamed ? renamed->name : errorCodeName(renamed.error().code);
+        }
+        case 1: return textOf(side.store.setAlias(name, side.collection + (random.below(4) == 0 ? 1000 : 0)));
+        default: return textOf(side.store.deleteAlias(name));
+    }
+}
+
 std::string step(Side& side, Random random) {
-    switch (random.below(8)) {
+    switch (random.below(10)) {
+        case 8: return "many " + many(side, random);
+        case 9: return "collections " + collections(side, random);
         case 0:
         case 1:
         case 2: return "put " + put(side, random);
@@ -175,6 +215,13 @@ std::string stateOf(Side& side) {
     for (const std::string key : {"k0", "k1", "k2", "k3"}) {
         text += textOf(side.store.getSignature(side.idOf(key))) + "\n";
     }
+    ShapeFilter k;
+    k.keyPrefix = "k";
+    text += textOf(side.store.listShapes(side.collection, {ShapeOrder::kKey, true}, 3, k));
+    const auto aliases = side.store.listAliases().value();
+    for (const Alias& alias : aliases) text += alias.name + " ";
+    const auto collections = side.store.listCollections().value();
+    for (const Collection& one : collections) text += one.name + " ";
     const auto stats = side.store.stats();
     return text + std::to_string(stats->signatures) + " signatures, " + std::to_string(stats->pointBytes) +
            " bytes of points";
@@ -188,6 +235,7 @@ TEST_F(MemoryStoreTest, AnswersAsSqliteDoes) {
         Side a(*store_);
         Side b(memory);
         for (Side* side : {&a, &b}) {
+            ASSERT_TRUE(side->store.createCollection("n2", "", "p"));
             side->collection = side->store.createCollection("c" + std::to_string(seed), "", "p").value().id;
         }
         Random random(seed);
@@ -198,7 +246,11 @@ TEST_F(MemoryStoreTest, AnswersAsSqliteDoes) {
             ASSERT_EQ(stateOf(a), stateOf(b)) << "seed " << seed << ", step " << i << ": " << done;
         }
         expectSound();
-        ASSERT_TRUE(store_->deleteCollection(a.collection));
+        const auto collections = store_->listCollections().value();
+        for (const Collection& one : collections) {
+            ASSERT_TRUE(store_->deleteCollection(one.id));
+        }
+        EXPECT_TRUE(store_->listAliases()->empty());
     }
 }
 

@@ -18,10 +18,11 @@ const std::vector<float> kTetrahedron = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
 std::vector<float> ball() { return cloud(42, 300); }
 
 /// A ready, a replaced (pending, old signature serving), a failed and a running shape, beside
-/// a rebuild in progress and an empty collection.
+/// a rebuild in progress, an empty collection and an alias.
 void fill(Store& store) {
     const Collection c = store.createCollection("golden", "one of each", "theta=20").value();
     ASSERT_TRUE(store.createCollection("empty", "", ""));
+    ASSERT_TRUE(store.setAlias("gold", c.id));
     const std::vector<float> round = ball();
     const auto finish = [&] {
         const Job job = **store.claimJob();
@@ -41,7 +42,7 @@ void fill(Store& store) {
 
 class EachGoldenTest : public GoldenTest, public ::testing::WithParamInterface<int> {};
 
-INSTANTIATE_TEST_SUITE_P(Versions, EachGoldenTest, ::testing::Values(1, 2, 3, 4));
+INSTANTIATE_TEST_SUITE_P(Versions, EachGoldenTest, ::testing::Values(1, 2, 3, 4, 5));
 
 TEST_F(GoldenTest, CanBeWritten) {
     const char* target = std::getenv("SHAPEDB_WRITE_GOLDEN");
@@ -72,6 +73,15 @@ TEST_P(EachGoldenTest, OpensAndAnswers) {
     const Collection c = store_->getCollection("golden").value();
     EXPECT_EQ(c.parameters, "theta=20");
     EXPECT_EQ(c.generation, 1);
+    const auto aliases = store_->listAliases().value();
+    ASSERT_EQ(aliases.size(), GetParam() >= 5 ? 1u : 0u);
+    if (!aliases.empty()) {
+        EXPECT_EQ(aliases.front().name, "gold");
+        EXPECT_EQ(aliases.front().collectionId, c.id);
+    }
+    const auto changed = store_->listShapes(c.id, {ShapeOrder::kUpdated, true, std::nullopt}, 10, {}).value();
+    ASSERT_EQ(changed.size(), 3u);
+    EXPECT_EQ(changed.front().key, "replaced");
     const Shape ready = store_->getShape(c.id, "ready").value();
     EXPECT_EQ(ready.state, ShapeState::kReady);
     EXPECT_EQ(ready.metadata, (Metadata{{"label", "tetrahedron"}, {"n", "4"}}));

@@ -1,5 +1,6 @@
 // The store behaves like a map: seeded random operations on both with restarts in between (after
 // leveldb's ModelDB).
+#include <algorithm>
 #include <map>
 #include <set>
 
@@ -107,7 +108,7 @@ class ModelTest : public StoreTest, public ::testing::WithParamInterface<int> {
         const std::string key = randomKey();
         const auto found = model_.find(key);
         const bool failed = found != model_.end() && found->second.shape.state == ShapeState::kFailed;
-        const std::int64_t id = found != model_.end() ? found->second.shape.id : 1;
+        const std::int64_t id = found != model_.end() ? found->second.shape.id : 200'000;
         EXPECT_EQ(store_->retryShapes({id, id + 100'000}, 0, 0).value(), failed ? 1u : 0u);
         if (failed) requeue(key);
     }
@@ -130,6 +131,62 @@ class ModelTest : public StoreTest, public ::testing::WithParamInterface<int> {
         EXPECT_TRUE(*result == found->second.shape);
         unqueue(key);
         model_.erase(found);
+    }
+
+    /// Some shapes by id, among them ids that no shape has any more.
+    std::vector<std::int64_t> randomIds() {
+        std::vector<std::int64_t> ids;
+        for (std::uint64_t i = random_.below(4); i > 0; --i) {
+            ids.push_back(
+                static_cast<std::int64_t>(1 + random_.below(static_cast<std::uint64_t>(lastId_ + 2))));
+        }
+        std::sort(ids.begin(), ids.end());
+        ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+        return ids;
+    }
+
+    ModelShape* byId(std::int64_t id) {
+        for (auto& entry : model_) {
+            if (entry.second.shape.id == id) return &entry.second;
+        }
+        return nullptr;
+    }
+
+    void doDeleteMany() {
+        const auto ids = randomIds();
+        const auto isEven = [](const Shape& shape) { return shape.key.back() % 2 == 0; };
+        const auto deleted = store_->deleteShapes(ids, isEven);
+        ASSERT_TRUE(deleted) << deleted.error().message;
+        std::size_t expected = 0;
+        for (const std::int64_t id : ids) {
+            const ModelShape* model = byId(id);
+            if (model == nullptr || !isEven(model->shape)) continue;
+            ASSERT_LT(expected, deleted->size());
+            EXPECT_TRUE((*deleted)[expected++] == model->shape);
+            const std::string key = model->shape.key;
+            unqueue(key);
+            model_.erase(key);
+        }
+        EXPECT_EQ(deleted->size(), expected);
+    }
+
+    void doChangeMetadata() {
+        const auto ids = randomIds();
+        const Metadata wanted = randomMetadata();
+        const auto changed = store_->changeMetadata(ids, [&](const Shape& shape) {
+            return shape.key == "k0" ? std::nullopt : std::optional<Metadata>(wanted);
+        });
+        ASSERT_TRUE(changed) << changed.error().message;
+        std::size_t expected = 0;
+        for (const std::int64_t id : ids) {
+            ModelShape* model = byId(id);
+            if (model == nullptr || model->shape.key == "k0" || model->shape.metadata == wanted) continue;
+            model->shape.metadata = wanted;
+            ++model->shape.version;
+            ASSERT_LT(expected, changed->size());
+            EXPECT_TRUE((*changed)[expected++] == model->shape);
+        }
+        EXPECT_EQ(changed->size(), expected);
     }
 
     void doClaim() {
@@ -321,6 +378,7 @@ class ModelTest : public StoreTest, public ::testing::WithParamInterface<int> {
     void compare() {
         const auto listed = store_->listShapes(collection_.id, 0, 1000, {}).value();
         ASSERT_EQ(listed.size(), model_.size());
+        compareByKey();
         std::size_t serving = 0;
         std::map<std::int64_t, SignatureRow> index;
         const auto rows = store_->loadIndex(collection_.id, 0, 1000).value();
@@ -343,6 +401,28 @@ class ModelTest : public StoreTest, public ::testing::WithParamInterface<int> {
         EXPECT_EQ(store_->queueDepth()->jobs, queue_.size());
         EXPECT_EQ(store_->queueDepth()->bytes, 96 * queue_.size());
         EXPECT_EQ(store_->getCollection("parts")->generation, generation_);
+    }
+
+    void compareByKey() {
+        std::vector<std::string> asked;
+        for (int i = 0; i <= kKeys; ++i) asked.push_back("k" + std::to_string(i));
+        const auto found = store_->getShapes(collection_.id, asked).value();
+        for (std::size_t i = 0; i < asked.size(); ++i) {
+            const auto model = model_.find(asked[i]);
+            ASSERT_EQ(found[i].has_value(), model != model_.end());
+            if (found[i]) {
+                EXPECT_TRUE(*found[i] == model->second.shape);
+            }
+        }
+        ShapeFilter ones;
+        ones.keyPrefix = "k1";
+        auto model = model_.lower_bound("k1");
+        const auto listed = store_->listShapes(collection_.id, {ShapeOrder::kKey}, 100, ones).value();
+        for (const Shape& shape : listed) {
+            ASSERT_NE(model, model_.end());
+            EXPECT_TRUE(shape == (model++)->second.shape);
+        }
+        EXPECT_TRUE(model == model_.end() || model->first.rfind("k1", 0) != 0) << model->first;
     }
 
     Random random_{0};
@@ -369,8 +449,12 @@ TEST_P(ModelTest, BehavesLikeAMap) {
             doPut();
         } else if (dice < 22) {
             doRetry();
-        } else if (dice < 27) {
+        } else if (dice < 25) {
             doDelete();
+        } else if (dice < 26) {
+            doDeleteMany();
+        } else if (dice < 29) {
+            doChangeMetadata();
         } else if (dice < 50) {
             doClaim();
         } else if (dice < 70) {

@@ -295,5 +295,21 @@ TEST_F(SqliteShapesTest, LoadsTheIndexInPages) {
     EXPECT_EQ(total, 7u);
 }
 
+TEST_F(SqliteShapesTest, ARefusedCheckOfTheMetadataStoresNothing) {
+    const Collection c = collection();
+    const Shape before = put(c.id, "cup", 1, {{"label", "cup"}});
+    PutRequest refused = request(c.id, "cup", cloud(2));
+    refused.metadata = {{{"size", "3"}}, {}, false};
+    refused.checkMetadata = [](const Metadata& metadata) -> Result<void> {
+        return fail(ErrorCode::kInvalidArgument, std::to_string(metadata.size()) + " entries");
+    };
+    const auto result = store_->putShape(refused);
+    ASSERT_FALSE(result);
+    EXPECT_EQ(result.error().message, "2 entries");
+    EXPECT_TRUE(store_->getShape(c.id, "cup").value() == before);
+    EXPECT_EQ(store_->loadPoints(before.id).value(), cloud(1));
+    expectSound();
+}
+
 }  // namespace
 }  // namespace shapedb::store

@@ -29,8 +29,8 @@ class SqlitePlanTest : public ::testing::Test {
 
 /// Few rows, or a total that nobody asks for often.
 bool mayReadAWholeTable(const std::string& name) {
-    static const std::set<std::string> names = {"kListCollections", "kCountCollections", "kRunningRebuilds",
-                                                "kCountStates", "kCountSignatures"};
+    static const std::set<std::string> names = {"kListCollections", "kListAliases", "kCountCollections",
+                                                "kRunningRebuilds", "kCountStates", "kCountSignatures"};
     return names.count(name) > 0;
 }
 
@@ -52,6 +52,23 @@ TEST_F(SqlitePlanTest, PagesStartAtTheirCursor) {
     EXPECT_NE(plan(sql::kListShapesInState).find("shape_by_state (collection_id=? AND state=? AND rowid>?)"),
               std::string::npos)
         << plan(sql::kListShapesInState);
+    EXPECT_NE(plan(sql::kListShapesBackwards).find("shape_by_collection (collection_id=? AND rowid<?)"),
+              std::string::npos)
+        << plan(sql::kListShapesBackwards);
+    for (const char* byKey :
+         {sql::kListShapesFromKey, sql::kListShapesByKey, sql::kListShapesByKeyBackwards}) {
+        EXPECT_NE(plan(byKey).find("sqlite_autoindex_shape_1 (collection_id=? AND key"), std::string::npos)
+            << plan(byKey);
+    }
+    for (const char* byChange : {sql::kListShapesByChange, sql::kListShapesByChangeBackwards}) {
+        EXPECT_NE(plan(byChange).find("shape_by_change (collection_id=? AND updated_at"), std::string::npos)
+            << plan(byChange);
+    }
+    for (const char* ofChange : {sql::kListShapesOfChange, sql::kListShapesOfChangeBackwards}) {
+        EXPECT_NE(plan(ofChange).find("shape_by_change (collection_id=? AND updated_at=? AND rowid"),
+                  std::string::npos)
+            << plan(ofChange);
+    }
     EXPECT_NE(plan(sql::kLoadIndex).find("shape_by_collection (collection_id=? AND rowid>?)"),
               std::string::npos)
         << plan(sql::kLoadIndex);

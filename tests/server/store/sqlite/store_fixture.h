@@ -33,7 +33,7 @@ inline PutRequest request(std::int64_t collectionId, const std::string& key, con
     PutRequest put(VerifiedScan::verify(points).value());
     put.collectionId = collectionId;
     put.key = key;
-    put.metadata = std::move(metadata);
+    put.metadata = replacedBy(std::move(metadata));
     return put;
 }
 

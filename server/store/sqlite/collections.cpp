@@ -1,0 +1,94 @@
+// Collections and their aliases.
+#include "server/store/sqlite/rows.h"
+#include "server/store/sqlite/sqlite_store_impl.h"
+
+namespace shapedb::store {
+
+namespace {
+
+bool isAlias(Connection& connection, const std::string& name) {
+    return Query(connection, sql::kAliasByName, name).step();
+}
+
+/// Throws Failure kAlreadyExists.
+void requireFreeName(Connection& connection, const std::string& name) {
+    if (findCollection(connection, name)) {
+        raise(ErrorCode::kAlreadyExists, "collection '" + name + "' already exists");
+    }
+    if (isAlias(connection, name)) {
+        raise(ErrorCode::kAlreadyExists, "'" + name + "' is an alias of a collection");
+    }
+}
+
+}  // namespace
+
+Result<Collection> SqliteStore::createCollection(const std::string& name, const std::string& description,
+                                                 const std::string& parameters) {
+    return write("create the collection", [&](Connection& connection) {
+        requireFreeName(connection, name);
+        Query(connection, sql::kInsertCollection, name, description, parameters, now()).run();
+        return requireCollection(connection, connection.lastInsertId());
+    });
+}
+
+Result<Collection> SqliteStore::getCollection(const std::string& name) {
+    return read("read the collection", [&](Connection& connection) {
+        auto found = findCollection(connection, name);
+        if (!found) raise(ErrorCode::kNotFound, "there is no collection '" + name + "'");
+        return std::move(*found);
+    });
+}
+
+Result<std::vector<Collection>> SqliteStore::listCollections() {
+    return read("list the collections", [&](Connection& connection) {
+        std::vector<Collection> all;
+        Query query(connection, sql::kListCollections);
+        while (query.step()) all.push_back(readCollection(query));
+        return all;
+    });
+}
+
+Result<void> SqliteStore::deleteCollection(std::int64_t collectionId) {
+    return write("delete the collection", [&](Connection& connection) {
+        requireCollection(connection, collectionId);
+        Query(connection, sql::kDeleteCollection, collectionId).run();
+    });
+}
+
+Result<Collection> SqliteStore::renameCollection(std::int64_t collectionId, const std::string& name) {
+    return write("rename the collection", [&](Connection& connection) {
+        if (requireCollection(connection, collectionId).name != name) {
+            requireFreeName(connection, name);
+            Query(connection, sql::kRenameCollection, collectionId, name).run();
+        }
+        return requireCollection(connection, collectionId);
+    });
+}
+
+Result<void> SqliteStore::setAlias(const std::string& name, std::int64_t collectionId) {
+    return write("set the alias", [&](Connection& connection) {
+        requireCollection(connection, collectionId);
+        if (findCollection(connection, name)) {
+            raise(ErrorCode::kAlreadyExists, "'" + name + "' is the name of a collection");
+        }
+        Query(connection, sql::kPutAlias, name, collectionId).run();
+    });
+}
+
+Result<void> SqliteStore::deleteAlias(const std::string& name) {
+    return write("delete the alias", [&](Connection& connection) {
+        if (!isAlias(connection, name)) raise(ErrorCode::kNotFound, "there is no alias '" + name + "'");
+        Query(connection, sql::kDeleteAlias, name).run();
+    });
+}
+
+Result<std::vector<Alias>> SqliteStore::listAliases() {
+    return read("list the aliases", [](Connection& connection) {
+        std::vector<Alias> all;
+        Query query(connection, sql::kListAliases);
+        while (query.step()) all.push_back({query.text(0), query.integer(1)});
+        return all;
+    });
+}
+
+}  // namespace shapedb::store
