@@ -36,13 +36,14 @@ class Server:
     """shapedbd on a free port with a data directory of its own."""
 
     def __init__(self, *flags, directory=None, open_files=None, memory=None, file_size=None, listen="127.0.0.1:0",
-                 first_key=False):
+                 first_key=False, prefix=()):
         self._own = tempfile.TemporaryDirectory(prefix="shapedb-attack-")
         self.data = directory or os.path.join(self._own.name, "data")
         self.log_path = os.path.join(self._own.name, "log")
         self._flags = ["--listen", listen, *(flag.replace("{data}", self.data) for flag in flags)]
         if first_key:
             self.key_command("create", "--name", "first", "--role", "admin")
+        self._prefix = list(prefix)
         self._limits = [(resource.RLIMIT_NOFILE, open_files), (resource.RLIMIT_AS, memory),
                         (resource.RLIMIT_FSIZE, file_size)]
         self.process = None
@@ -60,7 +61,7 @@ class Server:
 
         with open(self.log_path, "a") as log:
             self.process = subprocess.Popen(
-                [os.environ["SHAPEDBD"], "--data", self.data, *self._flags],
+                [*self._prefix, os.environ["SHAPEDBD"], "--data", self.data, *self._flags],
                 stdout=subprocess.PIPE, stderr=log, text=True, preexec_fn=limit)
         banner = self.process.stdout.readline()
         if not banner.startswith("listening on "):

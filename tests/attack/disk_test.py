@@ -1,14 +1,13 @@
 """Attacks on the disk and on what is kept there."""
 
 import os
+import random
 import tempfile
 import threading
 import time
 import unittest
 
-import grpc
-
-from attacker import MIB, Server, admin, ball, eventually, main, reason
+from attacker import MIB, admin, ball, eventually, grpc, main, reason, shapes, Server
 
 
 class DataDirectory(unittest.TestCase):
@@ -124,6 +123,37 @@ class Keys(unittest.TestCase):
             # Values may hold anything; what shows them escapes it.
             client.add("good", ball(500), metadata={"note": "\x1b[2J\r\nnext \u202e"})
             self.assertEqual(client.count(), 1)
+
+
+class FullDisk(unittest.TestCase):
+    """On a file system of 60 MiB in memory, which takes a mount namespace of our own."""
+
+    def test_deletions_are_possible_and_make_room(self):
+        with tempfile.TemporaryDirectory(prefix="shapedb-full-") as folder:
+            inside = ("mount -t tmpfs -o size=60m tmpfs " + folder + " && exec \"$0\" \"$@\"")
+            with Server(directory=folder + "/data", prefix=["unshare", "--user", "--map-root-user", "--mount", "sh", "-c",
+                                                            inside]) as server, server.connect() as client:
+                stored, error = [], None
+                points = noise(60_000)
+                while error is None and len(stored) < 200:
+                    try:
+                        client.add(f"scan {len(stored)}", points, wait=False)
+                        stored.append(f"scan {len(stored)}")
+                    except grpc.RpcError as failure:
+                        error = failure
+                self.assertEqual(reason(error), "storage_full")
+                self.assertGreater(len(stored), 5)
+                for key in stored:
+                    client.shapes.DeleteShape(shapes.DeleteShapeRequest(shape=shapes.ShapeRef(key=key)), timeout=30)
+                self.assertEqual(client.count(), 0)
+                self.assertTrue(server.running())
+                self.assertEqual(list(client.admin.Check(admin.CheckRequest(), timeout=60))[-1].finished, True)
+
+
+def noise(points):
+    """Points that hardly compress."""
+    generator = random.Random(1)
+    return [(generator.random(), generator.random(), generator.random()) for _ in range(points)]
 
 
 if __name__ == "__main__":

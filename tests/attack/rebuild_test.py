@@ -3,9 +3,7 @@
 import threading
 import unittest
 
-import grpc
-
-from attacker import Server, admin, ball, main, search, shapes, types
+from attacker import admin, ball, grpc, main, search, shapes, types, Server
 
 
 class Switches(unittest.TestCase):

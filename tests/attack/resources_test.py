@@ -6,9 +6,7 @@ import threading
 import time
 import unittest
 
-import grpc
-
-from attacker import MIB, Server, admin, ball, collections, eventually, main, reason, shapes, types
+from attacker import MIB, admin, ball, collections, eventually, grpc, main, reason, shapes, types, Server
 
 
 class CompressedMessages(unittest.TestCase):

@@ -49,7 +49,7 @@ Result<std::vector<Collection>> SqliteStore::listCollections() {
 }
 
 Result<void> SqliteStore::deleteCollection(std::int64_t collectionId) {
-    return write("delete the collection", [&](Connection& connection) {
+    return remove("delete the collection", [&](Connection& connection) {
         requireCollection(connection, collectionId);
         Query(connection, sql::kDeleteCollection, collectionId).run();
     });

@@ -1,4 +1,5 @@
 // Rebuilds: a second generation of signatures is built beside the serving one.
+#include "core/base/return_if_error.h"
 #include "server/store/parameters_codec.h"
 #include "server/store/sqlite/rows.h"
 #include "server/store/sqlite/sqlite_store_impl.h"
@@ -71,6 +72,7 @@ bool pointsAreCurrent(Connection& connection, const Rebuild& rebuild, std::int64
 }  // namespace
 
 Result<Rebuild> SqliteStore::startRebuild(std::int64_t collectionId, const std::string& parameters) {
+    RETURN_IF_ERROR(holdReserve());
     return write("start the rebuild", [&](Connection& connection) {
         const Collection collection = requireCollection(connection, collectionId);
         {

@@ -103,6 +103,7 @@ PutResult SqliteStore::replacePoints(Connection& connection, const PutRequest& r
 }
 
 Result<PutResult> SqliteStore::putShape(const PutRequest& request) {
+    RETURN_IF_ERROR(holdReserve());
     // Compressing takes longest and needs no write lock.
     std::unique_lock<std::mutex> largeScan(largeScanMutex_, std::defer_lock);
     if (request.scan.bytes() > PointEncoding::kWholeBytes) largeScan.lock();
@@ -152,7 +153,7 @@ Result<std::vector<std::optional<Shape>>> SqliteStore::getShapes(std::int64_t co
 
 Result<Shape> SqliteStore::deleteShape(std::int64_t collectionId, const std::string& key,
                                        std::optional<std::int64_t> expectedVersion) {
-    return write("delete the shape", [&](Connection& connection) {
+    return remove("delete the shape", [&](Connection& connection) {
         auto found = findShape(connection, collectionId, key);
         if (!found) throw Failure(noSuchShape(requireCollection(connection, collectionId).name, key));
         orRaise(requireVersion(key, found->version, expectedVersion));
@@ -163,7 +164,7 @@ Result<Shape> SqliteStore::deleteShape(std::int64_t collectionId, const std::str
 
 Result<std::vector<Shape>> SqliteStore::deleteShapes(const std::vector<std::int64_t>& shapeIds,
                                                      const std::function<bool(const Shape&)>& still) {
-    return write("delete the shapes", [&](Connection& connection) {
+    return remove("delete the shapes", [&](Connection& connection) {
         std::vector<Shape> deleted;
         for (const std::int64_t shapeId : shapeIds) {
             auto found = findShapeById(connection, shapeId);

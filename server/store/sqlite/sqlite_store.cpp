@@ -133,10 +133,13 @@ std::unique_ptr<Connection> openWriter(const SqliteOptions& options) {
 SqliteStore::SqliteStore(const SqliteOptions& options)
     : options_(completed(options)),
       lock_(options_.path),
+      reserve_(options_.path + ".reserve"),
       writer_(openWriter(options_)),
       readers_(std::make_unique<ReaderPool>(options_.path, options_.readers, options_.busyTimeoutMs)),
       mark_(options_.path + ".commits"),
       walAttemptAt_(kWalBoundBytes) {
+    // Without it deletions may be refused on a full disk; uploads ask again.
+    static_cast<void>(reserve_.hold());
     findings_ = mendSequences(*writer_);
     const std::int64_t commits = countCommits(*writer_);
     missingCommits_ = std::max<std::int64_t>(0, mark_.read().value_or(0) - commits);
@@ -148,6 +151,18 @@ SqliteStore::SqliteStore(const SqliteOptions& options)
             "scans again");
     }
     mark_.write(commits);
+}
+
+bool SqliteStore::releaseReserve() noexcept {
+    const std::lock_guard<std::mutex> lock(writerMutex_);
+    return reserve_.release();
+}
+
+Result<void> SqliteStore::holdReserve() noexcept {
+    return guarded("keep space for deletions", [&] {
+        const std::lock_guard<std::mutex> lock(writerMutex_);
+        orRaise(reserve_.hold());
+    });
 }
 
 void SqliteStore::commit(Transaction& transaction, std::int64_t changesBefore) {

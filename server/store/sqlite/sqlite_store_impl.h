@@ -17,6 +17,7 @@
 #include "server/store/sqlite/commit_mark.h"
 #include "server/store/sqlite/pool.h"
 #include "server/store/sqlite/process_lock.h"
+#include "server/store/sqlite/space_reserve.h"
 #include "server/store/sqlite/sqlite_store.h"
 
 namespace shapedb::store {
@@ -108,6 +109,18 @@ class SqliteStore final : public Store {
         });
     }
 
+    /// As `write`, for what frees space: on a full disk it gets what the reserve holds.
+    template <typename Body>
+    auto remove(const char* operation, Body&& body) noexcept
+        -> Result<std::invoke_result_t<Body, Connection&>> {
+        auto done = write(operation, body);
+        if (done || done.error().code != ErrorCode::kStorageFull || !releaseReserve()) return done;
+        return write(operation, body);
+    }
+    bool releaseReserve() noexcept;
+    /// Before the database grows. Errors: kStorageFull (only the reserve is left, or not even that).
+    Result<void> holdReserve() noexcept;
+
     /// Runs `body(connection)` in a read transaction on a pooled connection.
     template <typename Body>
     auto read(const char* operation, Body&& body) noexcept
@@ -143,6 +156,7 @@ class SqliteStore final : public Store {
 
     SqliteOptions options_;
     ProcessLock lock_;
+    SpaceReserve reserve_;       ///< under writerMutex_
     std::mutex largeScanMutex_;  ///< one compressed copy of a large scan at a time, to bound memory
     std::mutex writerMutex_;
     std::unique_ptr<Connection> writer_;

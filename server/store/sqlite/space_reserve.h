@@ -1,0 +1,36 @@
+// Space on the disk that is kept for deletions: to delete, SQLite must write first.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "core/base/error.h"
+
+namespace shapedb::store {
+
+/// A file that takes space and holds nothing. Not thread-safe.
+class SpaceReserve {
+  public:
+    /// The log of many deletions between two checkpoints.
+    static constexpr std::uint64_t kBytes = std::uint64_t{16} << 20;
+
+    explicit SpaceReserve(std::string path, std::uint64_t bytes = kBytes);
+    ~SpaceReserve();
+    SpaceReserve(const SpaceReserve&) = delete;
+    SpaceReserve& operator=(const SpaceReserve&) = delete;
+
+    /// Takes the space, if that has not happened yet. Before anything that lets the database grow. Errors:
+    /// kStorageFull (there is none). Where space cannot be taken for another reason, such as a limit of file
+    /// sizes, there is no reserve, and no error.
+    [[nodiscard]] Result<void> hold();
+    /// Gives the space to whoever writes next. False if there was none to give.
+    bool release();
+
+  private:
+    const std::string path_;
+    const std::uint64_t bytes_;
+    int file_ = -1;
+    bool held_ = false;
+};
+
+}  // namespace shapedb::store
