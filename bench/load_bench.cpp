@@ -26,11 +26,13 @@ using nlohmann::json;
 // The limits of docs/benchmarks.md.
 constexpr double kLeastIngestRatio = 0.9;
 constexpr double kMostP99Ratio = 3.0;
+constexpr double kLeastGoodput = 0.9;
 constexpr double kMostStartSeconds = 5.0;
 constexpr double kMostResidentRatio = 1.3;
 constexpr std::int64_t kMostUploadGrowth = 64 << 20;
 
-constexpr std::array<const char*, 5> kParts = {"ingest", "latency", "batches", "startup", "upload"};
+constexpr std::array<const char*, 6> kParts = {"ingest",   "latency", "batches",
+                                               "overload", "startup", "upload"};
 
 struct LoadFlags {
     LoadSettings settings;
@@ -141,6 +143,29 @@ void report(const BatchFigures& figures, const LoadSettings& settings, Report& r
     report.lines.push_back({"peak memory of the server", cli::formatBytes(figures.peak), "", true});
 }
 
+void report(const OverloadFigures& figures, const LoadSettings& settings, Report& report) {
+    const bool kept = figures.ratio >= kLeastGoodput;
+    report.parts["overload"] = {
+        {"shapes", settings.overloadShapes},      {"clients", settings.peakClients},
+        {"peak_per_second", figures.peak},        {"overloaded_per_second", figures.overloaded},
+        {"refused_per_second", figures.refused},  {"ratio", figures.ratio},
+        {"least_ratio", kLeastGoodput},           {"kept", kept},
+        {"resident_bytes", figures.memoryBefore}, {"peak_bytes", figures.memoryPeak}};
+    const std::string clients = std::to_string(settings.peakClients);
+    report.lines.push_back(
+        {"searches of " + cli::formatCount(settings.overloadShapes) + " by " + clients + " clients",
+         cli::formatFixed(figures.peak, 0) + "/s", "", true});
+    report.lines.push_back(
+        {"by ten times as many: answered / refused",
+         cli::formatFixed(figures.overloaded, 0) + " / " + cli::formatFixed(figures.refused, 0) + " /s", "",
+         true});
+    report.lines.push_back({"goodput at ten times the load / peak", cli::formatFixed(figures.ratio, 2),
+                            ">= " + cli::formatFixed(kLeastGoodput, 1), kept});
+    report.lines.push_back(
+        {"memory of the server before / at most",
+         cli::formatBytes(figures.memoryBefore) + " / " + cli::formatBytes(figures.memoryPeak), "", true});
+}
+
 void report(const StartFigures& figures, const LoadSettings&, Report& report) {
     const bool fast = figures.servingSeconds <= kMostStartSeconds;
     const bool small = figures.residentRatio <= kMostResidentRatio;
@@ -220,8 +245,9 @@ Result<int> runLoad(const LoadFlags& flags, Bench& bench) {
     if (done && wanted(kParts[0])) done = add(measureIngest, settings, bench, all);
     if (done && wanted(kParts[1])) done = add(measureLatency, settings, bench, all);
     if (done && wanted(kParts[2])) done = add(measureBatches, settings, bench, all);
-    if (done && wanted(kParts[3])) done = add(measureStart, settings, bench, all);
-    if (done && wanted(kParts[4])) done = add(measureUpload, settings, bench, all);
+    if (done && wanted(kParts[3])) done = add(measureOverload, settings, bench, all);
+    if (done && wanted(kParts[4])) done = add(measureStart, settings, bench, all);
+    if (done && wanted(kParts[5])) done = add(measureUpload, settings, bench, all);
     RETURN_IF_ERROR(done);
     const Environment here = environment();
     json document = {{"environment", environmentJson(here)},
@@ -251,7 +277,9 @@ void addLoadOperation(CLI::App& app, Bench& bench) {
     settings.threads = cli::defaultThreads();
     CLI::App* command = app.add_subcommand(
         "load", "A server under load: ingest beside core alone, searches during ingest, start, large upload");
-    command->add_option("--part", flags->parts, "Only these: ingest, latency, batches, startup, upload")
+    command
+        ->add_option("--part", flags->parts,
+                     "Only these: ingest, latency, batches, overload, startup, upload")
         ->delimiter(',')
         ->check(CLI::IsMember(std::vector<std::string>(kParts.begin(), kParts.end())))
         ->type_name("A,B,...");
@@ -283,6 +311,12 @@ void addLoadOperation(CLI::App& app, Bench& bench) {
     command->add_option("--queries", settings.queries, "latency: queries idle, and as many busy")
         ->check(CLI::Range(1, 1'000'000))
         ->capture_default_str();
+    command
+        ->add_option("--peak-clients", settings.peakClients,
+                     "overload: as many as the server serves best; then ten times as many")
+        ->check(CLI::Range(1u, 90u));
+    command->add_option("--overload-shapes", settings.overloadShapes, "overload: stored signatures")
+        ->check(CLI::Range(1, 100'000'000));
     command
         ->add_option("--batch-clients", settings.batchClients,
                      "batches: clients that send them without a pause")

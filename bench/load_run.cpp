@@ -9,6 +9,7 @@
 
 #include <sys/resource.h>
 
+#include "bench/load_parts.h"
 #include "bench/quantiles.h"
 #include "bench/server_process.h"
 #include "bench/stored_shapes.h"
@@ -22,17 +23,9 @@ namespace shapedb::bench {
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 /// Clients per worker: enough that no worker waits for a scan.
 constexpr unsigned kClientsPerWorker = 2;
-constexpr std::size_t kDistinctQueries = 64;
-constexpr std::size_t kWarmUpQueries = 3;
-constexpr std::chrono::milliseconds kWarmUp{1'500};
-constexpr double kTail = 0.99;
 constexpr std::uint64_t kBytesPerPoint = 12;
-
-double since(Clock::time_point began) { return std::chrono::duration<double>(Clock::now() - began).count(); }
 
 /// Processor seconds of this process, all threads.
 double processorSeconds() {
@@ -42,25 +35,6 @@ double processorSeconds() {
         return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
     };
     return seconds(usage.ru_utime) + seconds(usage.ru_stime);
-}
-
-Result<client::Client> connect(const ServerProcess& server) {
-    client::ClientOptions options;
-    options.address = server.address();
-    options.deadline = std::chrono::minutes(10);
-    return client::Client::connect(options);
-}
-
-Result<ServerProcess> startServer(const LoadSettings& settings, const std::string& data,
-                                  std::vector<std::string> flags = {}) {
-    flags.insert(flags.end(), {"--ingest-threads", std::to_string(settings.threads)});
-    return ServerProcess::start(settings.server, data, flags);
-}
-
-RunContext cancelledBy(const RunContext& context) {
-    RunContext plain;
-    plain.cancel = context.cancel;
-    return plain;
 }
 
 /// Describes all scans without a server. Returns seconds.
@@ -110,50 +84,6 @@ double medianOf(const std::vector<IngestRound>& rounds, double (*value)(const In
     std::vector<double> values;
     for (const IngestRound& round : rounds) values.push_back(value(round));
     return median(std::move(values));
-}
-
-Result<SignatureGenerator> makeGenerator(const LoadSettings& settings, std::uint64_t shapes,
-                                         const RunContext& context) {
-    return SignatureGenerator::create(
-        {Mixture::kPlain, shapes, settings.seed, settings.sourcePoints, settings.sourceMembers},
-        cancelledBy(context));
-}
-
-Result<void> storeSignatures(const std::string& data, const SignatureGenerator& generator,
-                             std::uint64_t count, const LoadProgress& progress, const RunContext& context) {
-    RunContext reporting = context;
-    reporting.progress = [&](const char*, std::uint64_t done, std::uint64_t total) {
-        progress("storing signatures", done, total);
-    };
-    return fillDataDirectory(data, generator, count, reporting);
-}
-
-/// Queries that are not among the `stored` shapes.
-std::vector<std::string> makeQueries(const SignatureGenerator& generator, std::uint64_t stored) {
-    std::vector<std::string> queries;
-    for (std::size_t i = 0; i < kDistinctQueries; ++i)
-        queries.push_back(encodeSignature(generator.make(stored + i)));
-    return queries;
-}
-
-/// Runs the queries in turn and appends the seconds each took.
-Result<void> ask(const client::Client& client, const std::vector<std::string>& queries, std::uint32_t k,
-                 std::size_t count, double seconds, std::vector<double>& took, const RunContext& context) {
-    client::SearchOptions options;
-    options.k = k;
-    const auto until = Clock::now() + std::chrono::duration<double>(seconds);
-    for (std::size_t i = 0; i < count && Clock::now() < until; ++i) {
-        const auto began = Clock::now();
-        const auto reply =
-            client.searchBySignature(options, queries[took.size() % queries.size()], cancelledBy(context));
-        RETURN_IF_ERROR(reply);
-        took.push_back(since(began));
-    }
-    return {};
-}
-
-Latencies latenciesOf(const std::vector<double>& took) {
-    return {took.size(), median(took), percentile(took, kTail)};
 }
 
 /// Alternates idle and busy, so that other load on the machine affects both.
@@ -207,57 +137,6 @@ Result<LatencyFigures> measureLatencyOf(const LoadSettings& settings, const clie
     LatencyFigures figures{latenciesOf(idle), latenciesOf(busy), 0.0, 0.0};
     if (figures.idle.p99 > 0.0) figures.p99Ratio = figures.busy.p99 / figures.idle.p99;
     if (busySeconds > 0.0) figures.busyScansPerSecond = static_cast<double>(described) / busySeconds;
-    return figures;
-}
-
-/// As measureLatencyOf, beside clients that send large batches.
-Result<BatchFigures> measureBatchesOf(const LoadSettings& settings, const ServerProcess& server,
-                                      const client::Client& client, const std::vector<std::string>& queries,
-                                      const LoadProgress& progress, const RunContext& context) {
-    std::vector<client::BatchQuery> batch(settings.batchQueries);
-    for (std::size_t i = 0; i < batch.size(); ++i) batch[i].signature = queries[i % queries.size()];
-    client::SearchOptions options;
-    options.k = settings.k;
-    std::vector<double> idle, busy, warmUp;
-    const std::size_t share = (settings.queries + settings.rounds - 1) / settings.rounds;
-    const double seconds = settings.querySeconds / static_cast<double>(settings.rounds);
-    RETURN_IF_ERROR(ask(client, queries, settings.k, kWarmUpQueries, seconds, warmUp, context));
-    BatchFigures figures;
-    double busySeconds = 0.0;
-    for (std::size_t round = 0; round < settings.rounds; ++round) {
-        progress("queries beside batches", round, settings.rounds);
-        RETURN_IF_ERROR(ask(client, queries, settings.k, share, seconds, idle, context));
-        std::atomic<bool> stop{false};
-        RunContext stopped;
-        stopped.cancel = &stop;
-        WorkLoop loop(settings.batchClients, stop, [&](std::size_t) -> Result<bool> {
-            const auto own = connect(server);
-            RETURN_IF_ERROR(own);
-            RETURN_IF_ERROR(own->searchBatch(options, batch, stopped));
-            return true;
-        });
-        std::this_thread::sleep_for(kWarmUp);
-        const auto before = client.stats();
-        const std::size_t asked = busy.size();
-        const auto began = Clock::now();
-        RETURN_IF_ERROR(ask(client, queries, settings.k, share, seconds, busy, context));
-        busySeconds += since(began);
-        const auto after = client.stats();
-        stop = true;
-        RETURN_IF_ERROR(loop.finish());
-        if (!before || !after) return fail((before ? after : before).error());
-        figures.searchesPerSecond +=
-            static_cast<double>(after->searches - before->searches - (busy.size() - asked));
-        // What was interrupted ends before the next round.
-        std::this_thread::sleep_for(kWarmUp);
-    }
-    const auto memory = server.memory();
-    RETURN_IF_ERROR(memory);
-    figures.peak = memory->peak;
-    figures.idle = latenciesOf(idle);
-    figures.busy = latenciesOf(busy);
-    if (figures.idle.p99 > 0.0) figures.p99Ratio = figures.busy.p99 / figures.idle.p99;
-    if (busySeconds > 0.0) figures.searchesPerSecond /= busySeconds;
     return figures;
 }
 
@@ -373,22 +252,6 @@ Result<LatencyFigures> measureLatency(const LoadSettings& settings, const LoadPr
     const auto uploader = connect(*server);
     RETURN_IF_ERROR(uploader);
     return measureLatencyOf(settings, *client, *uploader, queries, *scans, progress, context);
-}
-
-Result<BatchFigures> measureBatches(const LoadSettings& settings, const LoadProgress& progress,
-                                    const RunContext& context) {
-    const auto directory = WorkDirectory::create(settings.directory);
-    RETURN_IF_ERROR(directory);
-    const std::string data = directory->path() + "/data";
-    const auto generator = makeGenerator(settings, settings.batchShapes, context);
-    RETURN_IF_ERROR(generator);
-    RETURN_IF_ERROR(storeSignatures(data, *generator, settings.batchShapes, progress, context));
-    const std::vector<std::string> queries = makeQueries(*generator, settings.batchShapes);
-    const auto server = startServer(settings, data);
-    RETURN_IF_ERROR(server);
-    const auto client = connect(*server);
-    RETURN_IF_ERROR(client);
-    return measureBatchesOf(settings, *server, *client, queries, progress, context);
 }
 
 Result<StartFigures> measureStart(const LoadSettings& settings, const LoadProgress& progress,

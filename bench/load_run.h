@@ -29,6 +29,8 @@ struct LoadSettings {
     unsigned batchClients = 4;          ///< batches: clients that send SearchBatch without a pause
     std::size_t batchQueries = 1'000;   ///< batches: of each
     std::uint64_t batchShapes = 1'000;  ///< batches: stored
+    unsigned peakClients = 25;  ///< overload: as many as the server serves best; ten times as many after
+    std::uint64_t overloadShapes = 10'000;  ///< overload: stored
     std::uint64_t startShapes = 1'000'000;
     std::string startData;                    ///< startup: data directory; filled first if missing, and kept
     std::uint64_t uploadBytes = 100'000'000;  ///< 12 a point
@@ -72,6 +74,15 @@ struct BatchFigures {
     std::uint64_t peak = 0;          ///< memory of the server, bytes
 };
 
+struct OverloadFigures {
+    double peak = 0.0;               ///< searches answered a second, with peakClients
+    double overloaded = 0.0;         ///< the same with ten times as many
+    double ratio = 0.0;              ///< median of the rounds
+    double refused = 0.0;            ///< searches a second meanwhile
+    std::uint64_t memoryBefore = 0;  ///< of the server, bytes
+    std::uint64_t memoryPeak = 0;
+};
+
 struct StartFigures {
     std::uint64_t shapes = 0;         ///< with a signature
     double servingSeconds = 0.0;      ///< from exec to SERVING; median of the rounds
@@ -102,6 +113,9 @@ using LoadProgress = std::function<void(const std::string& what, std::uint64_t d
                                                     const LoadProgress& progress, const RunContext& context);
 [[nodiscard]] Result<BatchFigures> measureBatches(const LoadSettings& settings, const LoadProgress& progress,
                                                   const RunContext& context);
+[[nodiscard]] Result<OverloadFigures> measureOverload(const LoadSettings& settings,
+                                                      const LoadProgress& progress,
+                                                      const RunContext& context);
 [[nodiscard]] Result<StartFigures> measureStart(const LoadSettings& settings, const LoadProgress& progress,
                                                 const RunContext& context);
 [[nodiscard]] Result<UploadFigures> measureUpload(const LoadSettings& settings, const LoadProgress& progress,

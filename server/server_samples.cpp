@@ -42,6 +42,8 @@ std::vector<Sample> sampleContent(catalog::Catalog& catalog) {
          number(stored.storedPointBytes)},
         {"shapedb_missing_commits", "Acknowledged changes that were gone when the server started.", kGauge,
          number(stored.missingCommits)},
+        {"shapedb_damaged_collections", "Collections whose signatures could not be read.", kGauge,
+         number(stats->damagedCollections)},
         {"shapedb_build_info",
          "Always 1; the labels tell the version and the database's schema.",
          kGauge,

@@ -261,6 +261,7 @@ Result<CatalogStats> Catalog::stats() {
     stats.store = *stored;
     stats.queue = *depth;
     stats.index = index_.totals();
+    stats.damagedCollections = index_.damaged();
     stats.running = workers_.running();
     // Read one after the other: a job may have begun in between.
     stats.queued = depth->jobs - std::min(depth->jobs, stats.running);

@@ -36,6 +36,7 @@ Result<void> AnswerRoom::take(std::size_t bytes) {
 }
 
 Result<PreparedSearch> Searches::prepare(index::SnapshotPtr collection, const SearchRequest& request) const {
+    if (collection->damage) return fail(*collection->damage);
     RETURN_IF_ERROR(checkK(request.k, maxK_));
     RETURN_IF_ERROR(checkThreshold(request.threshold));
     RETURN_IF_ERROR(checkFilterLength(request.filter));

@@ -176,6 +176,29 @@ Result<SnapshotPtr> CollectionIndex::read(const store::Collection& collection, s
     return SnapshotPtr(std::move(*snapshot));
 }
 
+Result<SnapshotPtr> CollectionIndex::readOrMark(const store::Collection& collection,
+                                                const RunContext& context) const {
+    auto whole = read(collection, batchesOfAllProcessors(), context);
+    if (whole || whole.error().code != ErrorCode::kDataLoss) return whole;
+    auto marked = withoutSignatures(collection);
+    RETURN_IF_ERROR(marked);
+    (*marked)->damage =
+        Error{ErrorCode::kDataLoss,
+              "collection '" + collection.name + "' cannot be searched, its signatures could not be read (" +
+                  whole.error().message +
+                  "): run 'shapedb admin check', then restore a backup, or try 'shapedb "
+                  "admin rebuild --collection " +
+                  collection.name + "'"};
+    log_->error("a collection is damaged; the others are served", telemetry::fieldsOf(*(*marked)->damage));
+    return SnapshotPtr(std::move(*marked));
+}
+
+std::size_t CollectionIndex::damaged() const {
+    std::size_t count = 0;
+    for (const SnapshotPtr& snapshot : all()) count += snapshot->damage ? 1 : 0;
+    return count;
+}
+
 void CollectionIndex::insert(Directory& directory, SlotPtr slot) const {
     const store::Collection& collection = slot->current()->collection;
     directory.byId[collection.id] = slot;
@@ -191,7 +214,7 @@ Result<void> CollectionIndex::loadAllUnguarded(const RunContext& context) {
     RETURN_IF_ERROR(collections);
     Directory next;
     for (const store::Collection& collection : *collections) {
-        Result<SnapshotPtr> snapshot = read(collection, batchesOfAllProcessors(), context);
+        Result<SnapshotPtr> snapshot = readOrMark(collection, context);
         RETURN_IF_ERROR(snapshot);
         auto slot = std::make_shared<Slot>();
         slot->publish(*snapshot);

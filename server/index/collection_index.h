@@ -11,6 +11,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <shared_mutex>
 #include <string>
 #include <vector>
@@ -29,6 +30,9 @@ struct Snapshot {
     store::Collection collection;
     ShapeParameters parameters;  ///< of collection.parameters
     SignatureSet signatures;     ///< all of generation collection.generation
+    /// Why signatures are missing: those stored could not be read. The collection must not be searched, since
+    /// nobody could tell what was not found.
+    std::optional<Error> damage{};
 };
 
 using SnapshotPtr = std::shared_ptr<const Snapshot>;
@@ -45,9 +49,13 @@ class CollectionIndex {
     ~CollectionIndex();
 
     /// Reads everything on all processors and replaces the index at the end (start, restore). Damaged
-    /// signatures are logged and left out. Errors: kCancelled, kDeadlineExceeded; kDataLoss (parameters
-    /// of a collection, which is named).
+    /// signatures are logged and left out; a collection that cannot be read is logged and marked
+    /// (Snapshot::damage), the others are served. Errors: kCancelled, kDeadlineExceeded; kDataLoss
+    /// (parameters of a collection, which is named).
     [[nodiscard]] Result<void> loadAll(const RunContext& context = {});
+
+    /// Collections marked as damaged.
+    [[nodiscard]] std::size_t damaged() const;
 
     /// Forgets everything; running searches keep their snapshot.
     void clear();
@@ -118,6 +126,7 @@ class CollectionIndex {
 
     SlotPtr find(std::int64_t collectionId) const;
     Result<void> loadAllUnguarded(const RunContext& context);
+    Result<SnapshotPtr> readOrMark(const store::Collection& collection, const RunContext& context) const;
     Result<SnapshotPtr> read(const store::Collection& collection, std::size_t batches,
                              const RunContext& context) const;
     Result<SignatureSet> readSignatures(std::int64_t collectionId, std::size_t batches,

@@ -7,7 +7,7 @@ import threading
 import time
 import unittest
 
-from attacker import MIB, admin, ball, eventually, grpc, main, reason, shapes, Server
+from attacker import MIB, Server, admin, ball, collections, eventually, grpc, main, reason, search, shapes
 
 
 class DataDirectory(unittest.TestCase):
@@ -123,6 +123,59 @@ class Keys(unittest.TestCase):
             # Values may hold anything; what shows them escapes it.
             client.add("good", ball(500), metadata={"note": "\x1b[2J\r\nnext \u202e"})
             self.assertEqual(client.count(), 1)
+
+
+class DamagedPage(unittest.TestCase):
+    """One page of the database is overwritten: what can be served is served."""
+
+    PAGE = 4096
+
+    def page_of_signature(self, path, mine, others):
+        """A page with signatures of one collection only."""
+        with open(path, "rb") as file:
+            content = file.read()
+        pages = [{content.find(s) // self.PAGE for s in some} for some in (mine, others)]
+        return min(pages[0] - pages[1])
+
+    def test_takes_out_its_collection_and_no_other(self):
+        with Server("--metrics-listen", "127.0.0.1:0") as server:
+            with server.connect() as client:
+                for name in ("first", "second"):
+                    client.collections.CreateCollection(collections.CreateCollectionRequest(name=name), timeout=10)
+                for i in range(40):
+                    for name in ("first", "second") if i < 4 else ("first",):
+                        client.add(f"ball {i}", ball(200, 1 + 0.05 * i), collection=name, wait=False)
+                self.assertTrue(eventually(lambda: client.admin.Stats(
+                    admin.StatsRequest(), timeout=10).shapes_pending == 0))
+
+                def stored(name, count):
+                    return [client.shapes.GetSignature(shapes.GetSignatureRequest(shape=shapes.ShapeRef(
+                        collection=name, key=f"ball {i}")), timeout=10).signature.encoded for i in range(count)]
+                signatures = stored("first", 40), stored("second", 4)
+            self.assertEqual(server.stop(), 0)
+            path = server.data + "/shapedb.sqlite"
+            page = self.page_of_signature(path, *signatures)
+            with open(path, "r+b") as file:
+                file.seek(page * self.PAGE)
+                file.write(b"\xff" * 64)
+            server.start()
+            with server.connect() as client:
+                options = search.SearchOptions(collection="second", k=3, verify=False)
+                found = client.search.SearchByKey(
+                    search.SearchByKeyRequest(options=options, key="ball 1", include_self=True), timeout=30)
+                self.assertEqual(found.hits[0].shape.key, "ball 1")
+                options.collection = "first"
+                with self.assertRaises(grpc.RpcError) as error:
+                    client.search.SearchByKey(search.SearchByKeyRequest(options=options, key="ball 1"), timeout=30)
+                self.assertEqual(reason(error.exception), "data_loss")
+                for word in ("'first'", "shapedb admin check", "restore a backup"):
+                    self.assertIn(word, error.exception.details())
+                self.assertEqual(client.shapes.CountShapes(
+                    shapes.CountShapesRequest(collection="first"), timeout=10).count, 40, "the shapes are there")
+                problems = [p for m in client.admin.Check(admin.CheckRequest(), timeout=60) for p in m.problems]
+                self.assertTrue(problems)
+                client.add("more", ball(300), collection="second")
+            self.assertIn("a collection is damaged", server.log())
 
 
 class FullDisk(unittest.TestCase):

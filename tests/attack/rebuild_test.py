@@ -3,7 +3,7 @@
 import threading
 import unittest
 
-from attacker import admin, ball, grpc, main, search, shapes, types, Server
+from attacker import Server, admin, ball, grpc, main, search, shapes, types
 
 
 class Switches(unittest.TestCase):

@@ -6,7 +6,7 @@ import threading
 import time
 import unittest
 
-from attacker import MIB, admin, ball, collections, eventually, grpc, main, reason, shapes, types, Server
+from attacker import MIB, Server, admin, ball, collections, eventually, grpc, main, reason, shapes, types
 
 
 class CompressedMessages(unittest.TestCase):

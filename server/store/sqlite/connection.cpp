@@ -109,6 +109,7 @@ void Connection::raiseLast(int code) const {
     message += " (SQLite code " + std::to_string(code) + ")";
     const ErrorCode mapped = codeOf(code, full);
     if (mapped == ErrorCode::kStorageFull) message += "; free some space on the device";
+    if (mapped == ErrorCode::kDataLoss) message += "; run 'shapedb admin check', restore a backup";
     throw Failure(mapped, std::move(message), true);
 }
 

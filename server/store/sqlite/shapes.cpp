@@ -179,6 +179,7 @@ Result<std::vector<Shape>> SqliteStore::deleteShapes(const std::vector<std::int6
 Result<std::vector<Shape>> SqliteStore::changeMetadata(
     const std::vector<std::int64_t>& shapeIds,
     const std::function<std::optional<Metadata>(const Shape&)>& change) {
+    RETURN_IF_ERROR(holdReserve());
     return write("change the metadata", [&](Connection& connection) {
         std::vector<Shape> changed;
         for (const std::int64_t shapeId : shapeIds) {

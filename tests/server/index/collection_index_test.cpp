@@ -198,6 +198,37 @@ TEST_F(Index, DamagedSignatureIsLeftOutAndLogged) {
     EXPECT_NE(log->all().find("key=c"), std::string::npos) << log->all();
 }
 
+TEST_F(Index, ACollectionThatCannotBeReadIsMarkedAndTheOthersAreServed) {
+    put("a", 1.0f);
+    ASSERT_TRUE(store.createCollection("aaa", "", paperParameters()));  // read first
+    int reads = 0;
+    store.fault = [&](const std::string& function) -> std::optional<Error> {
+        if (function != "loadIndex" || ++reads > 1) return std::nullopt;
+        return Error{ErrorCode::kDataLoss, "a page is malformed"};
+    };
+    ASSERT_TRUE(index.loadAll());
+    EXPECT_EQ(index.damaged(), 1u);
+    EXPECT_FALSE(snapshot()->damage);
+    EXPECT_EQ(snapshot()->signatures.size(), 1u);
+    const auto damaged = (*index.byName("aaa"))->damage;
+    ASSERT_TRUE(damaged);
+    EXPECT_EQ(damaged->code, ErrorCode::kDataLoss);
+    for (const char* word : {"'aaa'", "a page is malformed", "shapedb admin check", "--collection aaa"}) {
+        EXPECT_NE(damaged->message.find(word), std::string::npos) << damaged->message;
+        EXPECT_NE(log->all().find(word), std::string::npos) << log->all();
+    }
+    ASSERT_TRUE(index.reload((*index.byName("aaa"))->collection.id));
+    EXPECT_EQ(index.damaged(), 0u) << "once it can be read again";
+}
+
+TEST_F(Index, OtherErrorsOfTheStoreEndTheLoading) {
+    store.fault = [](const std::string& function) -> std::optional<Error> {
+        if (function != "loadIndex") return std::nullopt;
+        return Error{ErrorCode::kStorage, "no disk"};
+    };
+    EXPECT_EQ(index.loadAll().error().code, ErrorCode::kStorage);
+}
+
 TEST_F(Index, DamagedParametersNameTheCollection) {
     ASSERT_TRUE(store.createCollection("broken", "", "{}"));
     const auto loaded = index.loadAll();
