@@ -68,7 +68,10 @@ struct Goodput {
     double refused = 0.0;    ///< a second
 };
 
-/// `clients` search without a pause and come back at once when they are refused, for `seconds`.
+/// Far less than the half second that the server asks for.
+constexpr std::chrono::milliseconds kComeBack{100};
+
+/// `clients` search without a pause for `seconds`; those that are refused come back after kComeBack.
 Result<Goodput> goodputOf(const LoadSettings& settings, const ServerProcess& server,
                           const std::vector<std::string>& queries, unsigned clients, double seconds) {
     client::SearchOptions options;
@@ -90,6 +93,7 @@ Result<Goodput> goodputOf(const LoadSettings& settings, const ServerProcess& ser
             ++answered;
         } else if (reply.error().code == ErrorCode::kQueueFull) {
             ++refused;
+            std::this_thread::sleep_for(kComeBack);
         } else if (!stop) {
             return fail(reply.error());
         }

@@ -81,9 +81,9 @@ struct CatalogStats {
     store::QueueDepth queue;  ///< waiting and running
     index::CollectionIndex::Totals index;
     std::size_t damagedCollections = 0;  ///< as CollectionIndex::damaged
-    std::uint64_t queued = 0;    ///< jobs that wait for a worker
-    std::uint64_t running = 0;   ///< jobs
-    std::uint64_t ingested = 0;  ///< jobs since start that ended in a signature
+    std::uint64_t queued = 0;            ///< jobs that wait for a worker
+    std::uint64_t running = 0;           ///< jobs
+    std::uint64_t ingested = 0;          ///< jobs since start that ended in a signature
 };
 
 /// How well the interior of a shape was determined, in [0, 1]; empty when searches do not find the

@@ -100,8 +100,8 @@ class Searches {
     Searches(Catalog& catalog, SearchRunner& runner, std::uint32_t maxK)
         : catalog_(catalog), runner_(runner), maxK_(maxK) {}
 
-    /// Errors: kInvalidArgument (k, threshold, what verifying takes, groups), kMalformedFilter; kDataLoss (the
-    /// collection is damaged: Snapshot::damage); those of the store.
+    /// Errors: kInvalidArgument (k, threshold, what verifying takes, groups), kMalformedFilter; kDataLoss
+    /// (the collection is damaged: Snapshot::damage); those of the store.
     [[nodiscard]] Result<PreparedSearch> prepare(index::SnapshotPtr collection,
                                                  const SearchRequest& request) const;
 
