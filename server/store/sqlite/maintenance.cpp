@@ -98,7 +98,11 @@ void publish(const std::string& temporary, const std::string& path) {
     fs::path folder = fs::path(path).parent_path();
     if (folder.empty()) folder = ".";
     const File directory(folder.string(), O_RDONLY | O_DIRECTORY);
-    if (directory.get() < 0 || ::fsync(directory.get()) != 0) raiseUnwritable(path, errno);
+    if (directory.get() < 0 || ::fsync(directory.get()) != 0) {
+        const int why = errno;
+        ::unlink(path.c_str());  // nothing is left of a backup that failed
+        raiseUnwritable(path, why);
+    }
 }
 
 void copyBytes(const std::string& from, const std::string& to, const RunContext& context) {

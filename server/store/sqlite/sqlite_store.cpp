@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
+#include <cstdio>
 #include <cstring>
 #include <filesystem>
 
@@ -56,12 +57,17 @@ SqliteOptions completed(SqliteOptions options) {
     return options;
 }
 
+[[noreturn]] void raiseSystem(const std::string& what, int why) {
+    const bool full = why == ENOSPC || why == EFBIG || why == EDQUOT;
+    raise(full ? ErrorCode::kStorageFull : ErrorCode::kStorage, what + ": " + std::strerror(why));
+}
+
 void syncPath(const std::string& path, int flags) {
     const int descriptor = open(path.c_str(), flags | O_CLOEXEC);
     const bool ok = descriptor >= 0 && fsync(descriptor) == 0;
     const int why = errno;
     if (descriptor >= 0) close(descriptor);
-    if (!ok) raise(ErrorCode::kStorage, "cannot make '" + path + "' durable: " + std::strerror(why));
+    if (!ok) raiseSystem("cannot make '" + path + "' durable", why);
 }
 
 /// A new database gets its name when it is complete: an empty file is always damage, never a fresh
@@ -70,19 +76,18 @@ void createDatabase(const SqliteOptions& options) {
     const std::string fresh = options.path + ".new";
     std::filesystem::remove(fresh);
     const int descriptor = open(fresh.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
-    if (descriptor < 0) {
-        const ErrorCode code = errno == ENOSPC ? ErrorCode::kStorageFull : ErrorCode::kStorage;
-        raise(code, "cannot create database '" + options.path + "': " + std::strerror(errno));
-    }
+    if (descriptor < 0) raiseSystem("cannot create database '" + options.path + "'", errno);
     close(descriptor);
     {
         Connection connection(fresh, OpenMode::kReadWrite, options.busyTimeoutMs);
-        // Only an empty file takes it.
-        connection.execute("PRAGMA page_size=" + std::to_string(kPageSize));
+        // Only an empty file takes the page size. A crash loses a file that nobody knows yet.
+        connection.execute("PRAGMA page_size=" + std::to_string(kPageSize) +
+                           "; PRAGMA synchronous=OFF; PRAGMA journal_mode=MEMORY");
         migrate(connection, embeddedMigrations(), options.now());
     }
     syncPath(fresh, O_RDONLY);
-    std::filesystem::rename(fresh, options.path);
+    if (::rename(fresh.c_str(), options.path.c_str()) != 0)
+        raiseSystem("cannot create database '" + options.path + "'", errno);
     syncPath(std::filesystem::path(options.path).parent_path().string(), O_RDONLY | O_DIRECTORY);
 }
 
