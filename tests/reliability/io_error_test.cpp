@@ -11,7 +11,7 @@ namespace shapedb::reliability {
 namespace {
 
 // In CI one of so many calls fails; SHAPEDB_TEST_SCALE divides it.
-constexpr int kEveryCall = 20;
+constexpr int kEveryCall = 40;
 
 Trouble ioTrouble(const std::string& name, FaultKind kind, bool lasting) {
     return {name,
@@ -32,8 +32,10 @@ class IoErrorTest : public ::testing::TestWithParam<FaultKind> {
     void tryAll(const std::vector<Moment>& moments) {
         const auto every = static_cast<std::uint64_t>(std::max(1, kEveryCall / testing::testScale()));
         Tally tally;
-        tryTrouble(moments, ioTrouble("one fault", GetParam(), false), every, tally);
-        tryTrouble(moments, ioTrouble("faults from", GetParam(), true), every, tally);
+        const Trouble once = ioTrouble("one fault", GetParam(), false);
+        const auto places = placesIn(moments, once);
+        tryTrouble(moments, places, once, every, tally);
+        tryTrouble(moments, places, ioTrouble("faults from then on,", GetParam(), true), every, tally);
         EXPECT_GT(tally.errors, 0u);
         std::cout << tally.places << " calls, " << tally.tried << " made to fail: " << tally.errors
                   << " errors, " << tally.unnoticed << " without consequence\n";

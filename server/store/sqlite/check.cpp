@@ -133,6 +133,10 @@ class Checker {
     /// SQLite lists a page that the device does not give like a damaged one. It is not: the next time it may
     /// be there.
     static void raiseUnreadable(const std::string& line) {
+        // A page of the list of free ones comes without a code; a wrong number would have been noticed
+        // before.
+        if (line.find("failed to get page") != std::string::npos)
+            raise(ErrorCode::kStorage, "the database cannot be read: " + line);
         static constexpr std::string_view kReason = "error code=";
         const std::size_t at = line.find(kReason);
         if (at == std::string::npos) return;

@@ -8,6 +8,7 @@
 #include <filesystem>
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "server/store/sqlite/migrator.h"
@@ -28,10 +29,9 @@ constexpr int kWalWaitMs = 500;
 /// The log file is cut to this size after each write-back: bursts do not keep disk space.
 constexpr std::uint64_t kWalKeepBytes = 16u << 20;
 
-std::uint64_t fileSize(const std::string& path) {
-    std::error_code error;
-    const std::uintmax_t size = std::filesystem::file_size(path, error);
-    return error ? 0 : static_cast<std::uint64_t>(size);
+std::uint64_t fileSize(const std::string& path) noexcept {
+    struct stat status {};
+    return ::stat(path.c_str(), &status) == 0 ? static_cast<std::uint64_t>(status.st_size) : 0;
 }
 
 TimestampMs systemNow() {
@@ -127,6 +127,9 @@ std::unique_ptr<Connection> openWriter(const SqliteOptions& options) {
     writer->execute("PRAGMA wal_autocheckpoint=" + std::to_string(kWalAutoCheckpointPages) +
                     "; PRAGMA journal_size_limit=" + std::to_string(kWalKeepBytes) +
                     "; PRAGMA secure_delete=FAST");
+    // Of a log that another process left, the system may have in memory only what it could not write when
+    // that process asked for it. What follows in the log would be lost with it, so that nothing may follow.
+    static_cast<void>(writer->truncateWal(options.busyTimeoutMs));
     migrate(*writer, embeddedMigrations(), options.now());
     return writer;
 }
@@ -137,6 +140,7 @@ std::unique_ptr<Connection> openWriter(const SqliteOptions& options) {
 // that has its log and its tables.
 SqliteStore::SqliteStore(const SqliteOptions& options)
     : options_(completed(options)),
+      walPath_(options_.path + "-wal"),
       lock_(options_.path),
       writer_(openWriter(options_)),
       readers_(std::make_unique<ReaderPool>(options_.path, options_.readers, options_.busyTimeoutMs)),
@@ -174,7 +178,7 @@ std::vector<std::string> SqliteStore::findings() const {
 // SQLite writes the log back every thousand pages, but cannot start it from the beginning while reads overlap
 // without a gap. Past a bound this waits for a gap: not long, and not again before the log has grown further.
 void SqliteStore::boundWal() noexcept {
-    const std::uint64_t size = fileSize(options_.path + "-wal");
+    const std::uint64_t size = fileSize(walPath_);
     if (size < walAttemptAt_) {
         if (size < kWalBoundBytes) walAttemptAt_ = kWalBoundBytes;
         return;
@@ -249,7 +253,7 @@ Result<StoreStats> SqliteStore::stats() {
             stats.storedPointBytes = static_cast<std::uint64_t>(tally.integer(3));
         }
         stats.databaseBytes = fileSize(options_.path);
-        stats.walBytes = fileSize(options_.path + "-wal");
+        stats.walBytes = fileSize(walPath_);
         stats.schemaVersion = schemaVersion(connection);
         const std::lock_guard<std::mutex> lock(findingsMutex_);
         stats.missingCommits = static_cast<std::uint64_t>(missingCommits_);

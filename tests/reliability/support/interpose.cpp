@@ -26,6 +26,9 @@ std::string pathOf(int descriptor) {
     return {path, size > 0 ? static_cast<std::size_t>(size) : 0};
 }
 
+/// Takes no memory when there is no disk: the store may be out of it.
+Disk* diskAt(const char* path) { return Disk::current() != nullptr ? Disk::of(path) : nullptr; }
+
 int failWith(FaultKind kind) {
     errno = Faults::systemError(kind);
     return -1;
@@ -64,7 +67,7 @@ int rename(const char* from, const char* to) noexcept {
     using Rename = int (*)(const char*, const char*);
     static const auto real = shapedb::reliability::libraryFunction<Rename>("rename");
     if (const auto fault = Faults::next(Call::kRename)) return shapedb::reliability::failWith(*fault);
-    if (Disk* const disk = Disk::of(from)) disk->renamed(from, to);
+    if (Disk* const disk = shapedb::reliability::diskAt(from)) disk->renamed(from, to);
     return real(from, to);
 }
 
@@ -73,21 +76,21 @@ int renameat2(int fromFolder, const char* from, int toFolder, const char* to, un
     static const auto real = shapedb::reliability::libraryFunction<Rename>("renameat2");
     if (const auto fault = Faults::next(Call::kRename)) return shapedb::reliability::failWith(*fault);
     // Told first, so that it can be interrupted: a backup's name is free, as the store has checked.
-    if (Disk* const disk = Disk::of(from)) disk->renamed(from, to);
+    if (Disk* const disk = shapedb::reliability::diskAt(from)) disk->renamed(from, to);
     return real(fromFolder, from, toFolder, to, flags);
 }
 
 int remove(const char* path) noexcept {
     using Remove = int (*)(const char*);
     static const auto real = shapedb::reliability::libraryFunction<Remove>("remove");
-    if (Disk* const disk = Disk::of(path)) disk->removed(path);
+    if (Disk* const disk = shapedb::reliability::diskAt(path)) disk->removed(path);
     return real(path);
 }
 
 int unlink(const char* path) noexcept {
     using Remove = int (*)(const char*);
     static const auto real = shapedb::reliability::libraryFunction<Remove>("unlink");
-    if (Disk* const disk = Disk::of(path)) disk->removed(path);
+    if (Disk* const disk = shapedb::reliability::diskAt(path)) disk->removed(path);
     return real(path);
 }
 }

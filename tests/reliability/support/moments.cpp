@@ -117,13 +117,6 @@ class Attempt {
     World world_{folder_.path()};
 };
 
-std::uint64_t placesIn(const Moment& moment, const Trouble& trouble) {
-    Attempt attempt(moment, trouble);
-    const auto done = attempt.run(~std::uint64_t{0});
-    if (!done) ADD_FAILURE() << "without trouble: " << done.error().message;
-    return trouble.places();
-}
-
 }  // namespace
 
 std::vector<Moment> record(const std::vector<Step>& steps, const Image& files) {
@@ -169,15 +162,25 @@ std::vector<Moment> recordMigrations() {
     return moments;
 }
 
-void tryTrouble(const std::vector<Moment>& moments, const Trouble& trouble, std::uint64_t every,
-                Tally& tally) {
+std::vector<std::uint64_t> placesIn(const std::vector<Moment>& moments, const Trouble& trouble) {
+    std::vector<std::uint64_t> places;
     for (const Moment& moment : moments) {
-        const std::uint64_t places = placesIn(moment, trouble);
-        for (std::uint64_t at = 1; at <= places; ++at) {
+        Attempt attempt(moment, trouble);
+        const auto done = attempt.run(~std::uint64_t{0});
+        if (!done) ADD_FAILURE() << moment.step.name << " without trouble: " << done.error().message;
+        places.push_back(trouble.places());
+    }
+    return places;
+}
+
+void tryTrouble(const std::vector<Moment>& moments, const std::vector<std::uint64_t>& places,
+                const Trouble& trouble, std::uint64_t every, Tally& tally) {
+    for (std::size_t i = 0; i < moments.size(); ++i) {
+        for (std::uint64_t at = 1; at <= places[i]; ++at) {
             if (tally.places++ % every != 0) continue;
-            SCOPED_TRACE(moment.step.name + ", " + trouble.name + " at place " + std::to_string(at) + " of " +
-                         std::to_string(places));
-            Attempt attempt(moment, trouble);
+            SCOPED_TRACE(moments[i].step.name + ", " + trouble.name + " at place " + std::to_string(at) +
+                         " of " + std::to_string(places[i]));
+            Attempt attempt(moments[i], trouble);
             const auto done = attempt.run(at);
             ++tally.tried;
             EXPECT_TRUE(trouble.fired()) << "the step takes another way each time";

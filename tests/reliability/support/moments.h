@@ -49,10 +49,14 @@ struct Tally {
     std::uint64_t unnoticed = 0;  ///< calls that succeeded nevertheless
 };
 
-/// Repeats each moment with trouble at every `every`-th place in it. The call fails with a fitting error and
-/// changes nothing, or succeeds; with the trouble gone, the same store does it, is sound, holds no lock and
-/// no memory, and starts again with what was acknowledged. Adds test failures otherwise.
-void tryTrouble(const std::vector<Moment>& moments, const Trouble& trouble, std::uint64_t every,
-                Tally& tally);
+/// How many places for trouble there are in each moment.
+[[nodiscard]] std::vector<std::uint64_t> placesIn(const std::vector<Moment>& moments, const Trouble& trouble);
+
+/// Repeats each moment with trouble at every `every`-th place in it, of so many (placesIn). The call fails
+/// with a fitting error and changes nothing, or succeeds; with the trouble gone, the same store does it, is
+/// sound, holds no lock and no memory, and starts again with what was acknowledged. Adds test failures
+/// otherwise.
+void tryTrouble(const std::vector<Moment>& moments, const std::vector<std::uint64_t>& places,
+                const Trouble& trouble, std::uint64_t every, Tally& tally);
 
 }  // namespace shapedb::reliability
