@@ -40,7 +40,7 @@ done
 forbid 'core/matching/attributed/' "the published score does not know the one with attributes" core/matching/published
 forbid 'CGAL' "CGAL in a header that others include" 'core/**/*.h'
 forbid 'sqlite3' "sqlite3.h outside server/store/sqlite/" \
-  server client tests bench common ':!server/store/sqlite' ':!tests/server/store/sqlite'
+  server client tests bench common ':!server/store/sqlite' ':!tests/server/store/sqlite' ':!tests/reliability'
 forbid "$transport" "gRPC or protobuf below server/rpc/" server ':!server/rpc'
 forbid 'server/(rpc|catalog|ingest|index|config)/' "the store may not include what is built on it" server/store
 forbid 'server/rpc/' "server/rpc is the outermost layer" server/catalog server/ingest server/index server/telemetry server/config
@@ -62,7 +62,7 @@ done
 # Each test program is built from all *_test.cpp below its folders.
 for test in $(git ls-files -- '*_test.cpp'); do
   case "$test" in
-    tests/core/* | tests/common/* | tests/server/* | tests/client/* | tests/integration/* | tests/bench/*) ;;
+    tests/core/* | tests/common/* | tests/server/* | tests/client/* | tests/integration/* | tests/reliability/* | tests/bench/*) ;;
     *) complain "$test is in no test program: see tests/CMakeLists.txt" ;;
   esac
 done

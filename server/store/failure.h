@@ -38,6 +38,24 @@ T orRaise(Result<T> result) {
     if constexpr (!std::is_void_v<T>) return std::move(*result);
 }
 
+/// The exception being handled as an Error. `operation` completes "cannot ...".
+inline Error handledError(const char* operation) noexcept {
+    try {
+        try {
+            throw;
+        } catch (const Failure& failure) {
+            if (!failure.fromDatabase) return failure.error;
+            return {failure.error.code, std::string("cannot ") + operation + ": " + failure.error.message};
+        } catch (const std::bad_alloc&) {
+        } catch (const std::exception& other) {
+            return {ErrorCode::kInternal, std::string("cannot ") + operation + ": " + other.what()};
+        }
+    } catch (const std::bad_alloc&) {
+        // There is no memory for the message either.
+    }
+    return {ErrorCode::kOutOfMemory, "out of memory"};  // fits without allocating
+}
+
 /// Runs the body of a public function and turns every exception into an Error. `operation`
 /// completes "cannot ...".
 template <typename Fn>
@@ -49,13 +67,8 @@ auto guarded(const char* operation, Fn&& body) noexcept -> Result<std::invoke_re
         } else {
             return body();
         }
-    } catch (const Failure& failure) {
-        if (!failure.fromDatabase) return fail(failure.error);
-        return fail(failure.error.code, std::string("cannot ") + operation + ": " + failure.error.message);
-    } catch (const std::bad_alloc&) {
-        return fail(ErrorCode::kOutOfMemory, "out of memory");  // fits without allocating
-    } catch (const std::exception& other) {
-        return fail(ErrorCode::kInternal, std::string("cannot ") + operation + ": " + other.what());
+    } catch (const std::exception&) {
+        return fail(handledError(operation));
     }
 }
 

@@ -88,7 +88,7 @@ Result<std::string> encodePoints(const std::vector<float>& points, int level) tr
     blob.resize(1 + size);
     return blob;
 } catch (const std::bad_alloc&) {
-    return fail(ErrorCode::kOutOfMemory, "not enough memory to compress points");
+    return fail(ErrorCode::kOutOfMemory, "out of memory");  // fits without allocating
 }
 
 namespace {

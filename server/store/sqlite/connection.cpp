@@ -13,6 +13,7 @@ constexpr char kBeginRead[] = "BEGIN";
 // Takes the write lock at once. A transaction that reads first may be refused it later.
 constexpr char kBeginWrite[] = "BEGIN IMMEDIATE";
 constexpr char kCommit[] = "COMMIT";
+constexpr char kRollback[] = "ROLLBACK";
 
 // Virtual machine steps between two checks for cancellation: a few microseconds.
 constexpr int kProgressSteps = 10000;
@@ -89,15 +90,22 @@ Connection::Connection(const std::string& path, OpenMode mode, int busyTimeoutMs
         sqlite3_db_config(db_, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
         sqlite3_db_config(db_, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
         execute("PRAGMA cell_size_check=ON; PRAGMA foreign_keys=ON; PRAGMA synchronous=FULL");
+        // Now, for when it is needed there may be no memory.
+        sqlite3_stmt* raw = nullptr;
+        const int prepared = sqlite3_prepare_v3(db_, kRollback, -1, SQLITE_PREPARE_PERSISTENT, &raw, nullptr);
+        rollback_.reset(raw);
+        if (prepared != SQLITE_OK) raiseLast(prepared);
     } catch (...) {
-        statements_.clear();
-        sqlite3_close(db_);
+        closeAll();
         throw;
     }
 }
 
-Connection::~Connection() {
+Connection::~Connection() { closeAll(); }
+
+void Connection::closeAll() noexcept {
     statements_.clear();
+    rollback_.reset();
     sqlite3_close(db_);
 }
 
@@ -137,7 +145,9 @@ std::string Connection::text(const std::string& sql) {
 
 void Connection::rollback() noexcept {
     // After some failures (disk full, I/O error) SQLite has rolled back already.
-    if (sqlite3_get_autocommit(db_) == 0) sqlite3_exec(db_, "ROLLBACK", nullptr, nullptr, nullptr);
+    if (sqlite3_get_autocommit(db_) != 0) return;
+    sqlite3_step(rollback_.get());
+    sqlite3_reset(rollback_.get());
 }
 
 std::int64_t Connection::changes() const noexcept { return sqlite3_changes64(db_); }
@@ -231,6 +241,7 @@ BlobView Query::blob(int column) const {
 }
 
 Transaction::Transaction(Connection& connection, Kind kind) : connection_(connection) {
+    connection.rollback();  // one that could not be ended, as a last resort
     Query(connection, kind == Kind::kWrite ? kBeginWrite : kBeginRead).run();
 }
 

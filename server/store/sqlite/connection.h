@@ -43,7 +43,7 @@ class Connection {
     std::int64_t integer(const std::string& sql);
     std::string text(const std::string& sql);
 
-    /// Ends the open transaction, if there is one.
+    /// Ends the open transaction, if there is one. Needs no memory.
     void rollback() noexcept;
     /// Rows changed by the last INSERT, UPDATE or DELETE, without triggers and cascades.
     std::int64_t changes() const noexcept;
@@ -65,11 +65,13 @@ class Connection {
     using StatementPtr = std::unique_ptr<sqlite3_stmt, StatementCloser>;
 
     sqlite3_stmt* prepared(const char* sql);
+    void closeAll() noexcept;
 
     sqlite3* db_ = nullptr;
     int busyTimeoutMs_ = 0;
     // By address: the SQL texts are the constants of sql.h, each prepared once.
     std::unordered_map<const char*, StatementPtr> statements_;
+    StatementPtr rollback_;
 };
 
 /// A blob bound without a copy: the bytes must outlive the query.

@@ -1,4 +1,5 @@
 // Backup, restore and check.
+#include <array>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
@@ -27,21 +28,21 @@ constexpr std::size_t kCopyBytes = 1u << 20;
 /// Removes a temporary database and the files SQLite may put beside it.
 class TemporaryFile {
   public:
-    explicit TemporaryFile(std::string path) : path_(std::move(path)) { remove(); }
+    explicit TemporaryFile(const std::string& path)
+        : paths_{path, path + "-journal", path + "-wal", path + "-shm"} {
+        remove();
+    }
     ~TemporaryFile() { remove(); }
     TemporaryFile(const TemporaryFile&) = delete;
     TemporaryFile& operator=(const TemporaryFile&) = delete;
-    const std::string& path() const { return path_; }
+    const std::string& path() const { return paths_.front(); }
 
   private:
     void remove() const noexcept {
-        for (const char* ending : {"", "-journal", "-wal", "-shm"}) {
-            std::error_code ignored;
-            fs::remove(path_ + ending, ignored);
-        }
+        for (const std::string& path : paths_) ::unlink(path.c_str());
     }
 
-    std::string path_;
+    std::array<std::string, 4> paths_;  ///< made at once: removing must not need memory
 };
 
 class File {
@@ -87,6 +88,10 @@ void publish(const std::string& temporary, const std::string& path) {
         const File file(temporary, O_RDONLY);
         if (file.get() < 0 || ::fsync(file.get()) != 0) raiseUnwritable(path, errno);
     }
+    fs::path folder = fs::path(path).parent_path();
+    if (folder.empty()) folder = ".";
+    const File directory(folder.string(), O_RDONLY | O_DIRECTORY);
+    if (directory.get() < 0) raiseUnwritable(path, errno);
     if (::renameat2(AT_FDCWD, temporary.c_str(), AT_FDCWD, path.c_str(), RENAME_NOREPLACE) != 0) {
         if (errno == EEXIST)
             raise(ErrorCode::kAlreadyExists, "'" + path + "' already exists; choose a new name");
@@ -96,10 +101,11 @@ void publish(const std::string& temporary, const std::string& path) {
             raise(ErrorCode::kAlreadyExists, "'" + path + "' already exists; choose a new name");
         if (::rename(temporary.c_str(), path.c_str()) != 0) raiseUnwritable(path, errno);
     }
-    fs::path folder = fs::path(path).parent_path();
-    if (folder.empty()) folder = ".";
-    const File directory(folder.string(), O_RDONLY | O_DIRECTORY);
-    if (directory.get() < 0 || ::fsync(directory.get()) != 0) raiseUnwritable(path, errno);
+    if (::fsync(directory.get()) != 0) {
+        const int why = errno;
+        ::unlink(path.c_str());  // nothing is left of a backup that failed
+        raiseUnwritable(path, why);
+    }
 }
 
 void copyBytes(const std::string& from, const std::string& to, const RunContext& context) {
@@ -187,8 +193,9 @@ void prepareCopy(Connection& copy, const RunContext& context, std::int64_t nowMs
 /// Ids are never reused, not even across a restore: new rows continue after both histories, and jobs
 /// and rebuilds of the file get ids that the running server has never given out, so that a result in
 /// flight cannot meet the wrong row.
-void separateIds(Connection& copy, Connection& live) {
-    const std::int64_t commits = std::max(countCommits(copy), countCommits(live));
+/// Returns how many commits the copy counts then.
+std::int64_t separateIds(Connection& copy, Connection& live) {
+    const std::int64_t commits = std::max(countCommits(copy), countCommits(live)) + 1;
     Transaction transaction(copy, Transaction::Kind::kWrite);
     for (const char* table : {"collection", "shape"}) {
         setLastId(copy, table, std::max(lastId(copy, table), lastId(live, table)));
@@ -200,10 +207,11 @@ void separateIds(Connection& copy, Connection& live) {
         setLastId(copy, table, offset + lastId(copy, table));
     }
     // No mark of an acknowledged change is ahead of the database that replaces this one.
-    copy.execute("UPDATE tally SET commits = " + std::to_string(commits + 1));
+    copy.execute("UPDATE tally SET commits = " + std::to_string(commits));
     // The server that made the backup did not die of the jobs it was running.
     copy.execute("UPDATE job SET state = 0, attempts = attempts - 1 WHERE state = 1");
     transaction.commit();
+    return commits;
 }
 
 }  // namespace
@@ -250,13 +258,14 @@ Result<void> SqliteStore::restore(const std::string& path, const RunContext& con
         });
         // Until the end: no id may be given out between reading the last ones and replacing the tables.
         const std::lock_guard<std::mutex> lock(writerMutex_);
-        separateIds(*copy, *writer_);
+        const std::int64_t commits = separateIds(*copy, *writer_);
         if (replacing) replacing();
         copyDatabase(*copy, *writer_, kStepPages, [&](std::uint64_t done, std::uint64_t total) {
             context.report("restore", done, total);
             orRaise(context.checkpoint());
         });
-        mark_.write(countCommits(*writer_));
+        // The content is replaced: nothing may fail from here on.
+        mark_.write(commits);
         {
             const std::lock_guard<std::mutex> known(findingsMutex_);
             missingCommits_ = 0;

@@ -107,7 +107,9 @@ Result<PutResult> SqliteStore::putShape(const PutRequest& request) {
     // Compressing takes longest and needs no write lock.
     std::unique_lock<std::mutex> largeScan(largeScanMutex_, std::defer_lock);
     if (request.scan.bytes() > PointEncoding::kWholeBytes) largeScan.lock();
-    const auto encoding = PointEncoding::encode(request.scan.points(), options_.pointCompressionLevel);
+    const auto encoding = guarded("store the scan", [&] {
+        return orRaise(PointEncoding::encode(request.scan.points(), options_.pointCompressionLevel));
+    });
     RETURN_IF_ERROR(encoding);
     return write("store the scan", [&](Connection& connection) -> PutResult {
         const Collection collection = requireCollection(connection, request.collectionId);

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
+#include <cstdio>
 #include <cstring>
 #include <filesystem>
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "server/store/sqlite/migrator.h"
@@ -27,10 +29,9 @@ constexpr int kWalWaitMs = 500;
 /// The log file is cut to this size after each write-back: bursts do not keep disk space.
 constexpr std::uint64_t kWalKeepBytes = 16u << 20;
 
-std::uint64_t fileSize(const std::string& path) {
-    std::error_code error;
-    const std::uintmax_t size = std::filesystem::file_size(path, error);
-    return error ? 0 : static_cast<std::uint64_t>(size);
+std::uint64_t fileSize(const std::string& path) noexcept {
+    struct stat status {};
+    return ::stat(path.c_str(), &status) == 0 ? static_cast<std::uint64_t>(status.st_size) : 0;
 }
 
 TimestampMs systemNow() {
@@ -56,12 +57,17 @@ SqliteOptions completed(SqliteOptions options) {
     return options;
 }
 
+[[noreturn]] void raiseSystem(const std::string& what, int why) {
+    const bool full = why == ENOSPC || why == EFBIG || why == EDQUOT;
+    raise(full ? ErrorCode::kStorageFull : ErrorCode::kStorage, what + ": " + std::strerror(why));
+}
+
 void syncPath(const std::string& path, int flags) {
     const int descriptor = open(path.c_str(), flags | O_CLOEXEC);
     const bool ok = descriptor >= 0 && fsync(descriptor) == 0;
     const int why = errno;
     if (descriptor >= 0) close(descriptor);
-    if (!ok) raise(ErrorCode::kStorage, "cannot make '" + path + "' durable: " + std::strerror(why));
+    if (!ok) raiseSystem("cannot make '" + path + "' durable", why);
 }
 
 /// A new database gets its name when it is complete: an empty file is always damage, never a fresh
@@ -70,19 +76,18 @@ void createDatabase(const SqliteOptions& options) {
     const std::string fresh = options.path + ".new";
     std::filesystem::remove(fresh);
     const int descriptor = open(fresh.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
-    if (descriptor < 0) {
-        const ErrorCode code = errno == ENOSPC ? ErrorCode::kStorageFull : ErrorCode::kStorage;
-        raise(code, "cannot create database '" + options.path + "': " + std::strerror(errno));
-    }
+    if (descriptor < 0) raiseSystem("cannot create database '" + options.path + "'", errno);
     close(descriptor);
     {
         Connection connection(fresh, OpenMode::kReadWrite, options.busyTimeoutMs);
-        // Only an empty file takes it.
-        connection.execute("PRAGMA page_size=" + std::to_string(kPageSize));
+        // Only an empty file takes the page size. A crash loses a file that nobody knows yet.
+        connection.execute("PRAGMA page_size=" + std::to_string(kPageSize) +
+                           "; PRAGMA synchronous=OFF; PRAGMA journal_mode=MEMORY");
         migrate(connection, embeddedMigrations(), options.now());
     }
     syncPath(fresh, O_RDONLY);
-    std::filesystem::rename(fresh, options.path);
+    if (::rename(fresh.c_str(), options.path.c_str()) != 0)
+        raiseSystem("cannot create database '" + options.path + "'", errno);
     syncPath(std::filesystem::path(options.path).parent_path().string(), O_RDONLY | O_DIRECTORY);
 }
 
@@ -122,6 +127,9 @@ std::unique_ptr<Connection> openWriter(const SqliteOptions& options) {
     writer->execute("PRAGMA wal_autocheckpoint=" + std::to_string(kWalAutoCheckpointPages) +
                     "; PRAGMA journal_size_limit=" + std::to_string(kWalKeepBytes) +
                     "; PRAGMA secure_delete=FAST");
+    // Of a log that another process left, the system may have in memory only what it could not write when
+    // that process asked for it. What follows in the log would be lost with it, so that nothing may follow.
+    static_cast<void>(writer->truncateWal(options.busyTimeoutMs));
     migrate(*writer, embeddedMigrations(), options.now());
     return writer;
 }
@@ -132,6 +140,7 @@ std::unique_ptr<Connection> openWriter(const SqliteOptions& options) {
 // that has its log and its tables.
 SqliteStore::SqliteStore(const SqliteOptions& options)
     : options_(completed(options)),
+      walPath_(options_.path + "-wal"),
       lock_(options_.path),
       reserve_(options_.path + ".reserve"),
       writer_(openWriter(options_)),
@@ -184,7 +193,7 @@ std::vector<std::string> SqliteStore::findings() const {
 // SQLite writes the log back every thousand pages, but cannot start it from the beginning while reads overlap
 // without a gap. Past a bound this waits for a gap: not long, and not again before the log has grown further.
 void SqliteStore::boundWal() noexcept {
-    const std::uint64_t size = fileSize(options_.path + "-wal");
+    const std::uint64_t size = fileSize(walPath_);
     if (size < walAttemptAt_) {
         if (size < kWalBoundBytes) walAttemptAt_ = kWalBoundBytes;
         return;
@@ -222,7 +231,7 @@ Result<StoreStats> SqliteStore::stats() {
             stats.storedPointBytes = static_cast<std::uint64_t>(tally.integer(3));
         }
         stats.databaseBytes = fileSize(options_.path);
-        stats.walBytes = fileSize(options_.path + "-wal");
+        stats.walBytes = fileSize(walPath_);
         stats.schemaVersion = schemaVersion(connection);
         const std::lock_guard<std::mutex> lock(findingsMutex_);
         stats.missingCommits = static_cast<std::uint64_t>(missingCommits_);

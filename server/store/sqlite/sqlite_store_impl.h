@@ -155,6 +155,7 @@ class SqliteStore final : public Store {
     bool jobIsCurrent(Connection& connection, const Job& job, std::int64_t generation);
 
     SqliteOptions options_;
+    std::string walPath_;
     ProcessLock lock_;
     SpaceReserve reserve_;       ///< under writerMutex_
     std::mutex largeScanMutex_;  ///< one compressed copy of a large scan at a time, to bound memory

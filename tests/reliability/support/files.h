@@ -1,0 +1,23 @@
+// Whole files, read and written at once.
+#pragma once
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+namespace shapedb::reliability {
+
+/// Empty when there is none.
+inline std::string readFile(const std::string& path) {
+    std::error_code error;
+    const auto size = std::filesystem::file_size(path, error);
+    std::string bytes(error ? 0 : static_cast<std::size_t>(size), '\0');
+    std::ifstream(path, std::ios::binary).read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    return bytes;
+}
+
+inline void writeFile(const std::string& path, const std::string& bytes) {
+    std::ofstream(path, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+}
+
+}  // namespace shapedb::reliability
