@@ -90,4 +90,12 @@ std::string escapeUnsafe(std::string_view text, bool newlines) {
     return safe;
 }
 
+std::string cutText(const std::string& text, std::size_t limit) {
+    if (text.size() <= limit) return text;
+    std::size_t end = limit;
+    // Back over continuation bytes (10xxxxxx), so that no character is cut in two.
+    while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xc0) == 0x80) --end;
+    return text.substr(0, end);
+}
+
 }  // namespace shapedb

@@ -20,4 +20,7 @@ namespace shapedb {
 /// line feeds.
 [[nodiscard]] std::string escapeUnsafe(std::string_view text, bool newlines = false);
 
+/// At most `limit` bytes of `text`, never half a UTF-8 character.
+[[nodiscard]] std::string cutText(const std::string& text, std::size_t limit);
+
 }  // namespace shapedb

@@ -36,14 +36,16 @@ Result<std::unique_ptr<store::Store>> openStore(const config::ServerConfig& conf
     return store::openSqliteStore(options);
 }
 
-Result<telemetry::LoggerPtr> openAudit(const config::ServerConfig& config) {
+Result<std::unique_ptr<telemetry::AuditLog>> openAudit(const config::ServerConfig& config,
+                                                       const telemetry::LoggerPtr& log) {
     const std::string& file = config.security.auditFile;
-    return telemetry::AuditLog::openFile(file.empty() ? config.data + "/" + kAuditFile : file);
+    return telemetry::AuditLog::open(file.empty() ? config.data + "/" + kAuditFile : file, log);
 }
 
 /// Errors: kRejected (keys are required and there is none).
-Result<std::unique_ptr<security::Keyring>> openKeys(const config::ServerConfig& config) {
-    auto keyring = openKeyring(config.data);
+Result<std::unique_ptr<security::Keyring>> openKeys(const config::ServerConfig& config,
+                                                    const telemetry::LoggerPtr& log) {
+    auto keyring = openKeyring(config.data, log);
     RETURN_IF_ERROR(keyring);
     if (!config::keysRequired(config) || (*keyring)->hasUsableKey()) return keyring;
     return fail(ErrorCode::kRejected,
@@ -70,11 +72,18 @@ catalog::CatalogOptions catalogOptions(const config::ServerConfig& config,
 
 }  // namespace
 
-Result<std::unique_ptr<security::Keyring>> openKeyring(const std::string& dataDirectory) {
+Result<std::unique_ptr<security::Keyring>> openKeyring(const std::string& dataDirectory,
+                                                       const telemetry::LoggerPtr& log) {
     RETURN_IF_ERROR(files::prepareDataDirectory(dataDirectory));
     auto store = store::openSqliteKeyStore(dataDirectory + "/" + files::kKeysName);
     RETURN_IF_ERROR(store);
-    auto keyring = std::make_unique<security::Keyring>(std::move(*store));
+    const auto report = [log](const Error* problem) {
+        if (!log) return;
+        if (problem == nullptr) return log->info("the stored API keys can be read again");
+        log->error("the stored API keys cannot be read: those that are known go on",
+                   telemetry::fieldsOf(*problem));
+    };
+    auto keyring = std::make_unique<security::Keyring>(std::move(*store), security::systemClock(), report);
     RETURN_IF_ERROR(keyring->load());
     return keyring;
 }
@@ -84,10 +93,10 @@ struct Daemon::Parts {
     Parts(const config::ServerConfig& configuration, telemetry::LoggerPtr logger,
           ingest::SignaturePipeline pipeline, std::unique_ptr<store::Store> store,
           const std::vector<store::Crash>& crashes, std::unique_ptr<security::Keyring> keys,
-          telemetry::LoggerPtr auditLogger)
+          std::unique_ptr<telemetry::AuditLog> auditLog)
         : config(configuration),
           log(std::move(logger)),
-          audit(std::move(auditLogger)),
+          audit(std::move(auditLog)),
           keyring(std::move(keys)),
           usageSaver(*keyring, log),
           access{*keyring, config::keysRequired(config)},
@@ -95,7 +104,7 @@ struct Daemon::Parts {
           admission(config.limits.maxUploadBytes, config.limits.maxUploads),
           runner(config::threadsOrProcessors(config.search.threads)),
           searches(catalog, runner, config.limits.maxK),
-          grpc({config, catalog, admission, searches, access, audit, metrics, log, temporaryDirectory()}) {}
+          grpc({config, catalog, admission, searches, access, *audit, metrics, log, temporaryDirectory()}) {}
 
     std::string temporaryDirectory() const { return config.data + "/" + kTemporaryFolder; }
     Result<void> serve();
@@ -104,7 +113,7 @@ struct Daemon::Parts {
 
     const config::ServerConfig config;
     telemetry::LoggerPtr log;
-    telemetry::AuditLog audit;
+    const std::unique_ptr<telemetry::AuditLog> audit;
     telemetry::Metrics metrics;
     const std::unique_ptr<security::Keyring> keyring;
     security::UsageSaver usageSaver;
@@ -166,9 +175,9 @@ Result<std::unique_ptr<Daemon>> Daemon::start(const config::ServerConfig& config
     for (const store::Crash& crash : *crashes) {
         log->error("the last process crashed while it segmented a scan", {{"shape", crash.shapeId}});
     }
-    auto keys = openKeys(config);
+    auto keys = openKeys(config, log);
     RETURN_IF_ERROR(keys);
-    auto audit = openAudit(config);
+    auto audit = openAudit(config, log);
     RETURN_IF_ERROR(audit);
     auto parts = std::make_unique<Parts>(config, std::move(log), std::move(pipeline), std::move(*opened),
                                          *crashes, std::move(*keys), std::move(*audit));

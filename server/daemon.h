@@ -12,9 +12,10 @@
 
 namespace shapedb {
 
-/// The API keys of the server with this data directory, which may be running. Errors: kFileNotWritable (data
-/// directory), those of store::openSqliteKeyStore.
-[[nodiscard]] Result<std::unique_ptr<security::Keyring>> openKeyring(const std::string& dataDirectory);
+/// The API keys of the server with this data directory, which may be running. Trouble with them is told in
+/// `log`, which may be null. Errors: kFileNotWritable (data directory), those of store::openSqliteKeyStore.
+[[nodiscard]] Result<std::unique_ptr<security::Keyring>> openKeyring(const std::string& dataDirectory,
+                                                                     const telemetry::LoggerPtr& log);
 
 /// Not thread-safe: one thread starts and drains it.
 class Daemon {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <ctime>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -120,11 +121,15 @@ CLI::App* addCreate(CLI::App& app, KeyFlags& flags) {
         ->type_name("NAME");
     create->add_option("--valid-days", flags.validDays, "Days until it expires [never]")
         ->check(CLI::Range(1, 36'500));
-    create->add_option("--calls-per-second", flags.limits.callsPerSecond, "Most calls a second [no limit]");
-    create->add_option("--scans-per-day", flags.limits.scansPerDay,
-                       "Most scans received a day, UTC [no limit]");
-    create->add_option("--bytes-per-day", flags.limits.bytesPerDay,
-                       "Most bytes of points received a day, UTC [no limit]");
+    create->add_option("--calls-per-second", flags.limits.callsPerSecond, "Most calls a second [no limit]")
+        ->check(CLI::Range(std::int64_t{1}, std::int64_t{1'000'000}));
+    create
+        ->add_option("--scans-per-day", flags.limits.scansPerDay, "Most scans received a day, UTC [no limit]")
+        ->check(CLI::Range(std::int64_t{1}, std::numeric_limits<std::int64_t>::max()));
+    create
+        ->add_option("--bytes-per-day", flags.limits.bytesPerDay,
+                     "Most bytes of points received a day, UTC [no limit]")
+        ->check(CLI::Range(std::int64_t{1}, std::numeric_limits<std::int64_t>::max()));
     return create;
 }
 
@@ -156,7 +161,7 @@ int runKeyCommand(int argc, char** argv) {
     return answer([&]() -> Result<void> {
         const auto data = dataDirectoryOf(flags);
         RETURN_IF_ERROR(data);
-        const auto keyring = openKeyring(*data);
+        const auto keyring = openKeyring(*data, nullptr);
         RETURN_IF_ERROR(keyring);
         if (create->parsed()) return createKey(**keyring, flags);
         if (list->parsed()) return listKeys(**keyring);

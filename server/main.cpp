@@ -56,6 +56,9 @@ int serve(const config::ServerConfig& config) {
         (*log)->warn("anyone who can reach this port can read, change and delete everything, as configured",
                      {{"address", endpoint.text()}});
     }
+    if (!endpoint.isLoopback() && config::keysRequired(config) && config.tls.certificate.empty()) {
+        (*log)->warn("API keys travel unprotected, as configured", {{"address", endpoint.text()}});
+    }
     (*log)->info("listening", {{"address", endpoint.text()}});
     std::printf("listening on %s\n", endpoint.text().c_str());
     std::fflush(stdout);

@@ -1,19 +1,18 @@
 #include "client/api/credentials.h"
 
-#include <cerrno>
 #include <cstdlib>
-#include <fstream>
-#include <ios>
-#include <iterator>
-#include <system_error>
 
+#include <arpa/inet.h>
 #include <grpcpp/create_channel.h>
 
+#include "common/small_file.h"
 #include "core/base/return_if_error.h"
 
 namespace shapedb::client {
 
 namespace {
+
+constexpr std::size_t kMaxFileBytes = std::size_t{1} << 20;
 
 std::string fromEnvironment(const char* name) {
     const char* value = std::getenv(name);
@@ -24,24 +23,8 @@ bool startsWith(const std::string& text, const std::string& prefix) {
     return text.compare(0, prefix.size(), prefix) == 0;
 }
 
-/// `what` completes "... PATH cannot be read".
-Result<std::string> readText(const char* what, const std::string& path) {
-    errno = 0;
-    std::string text;
-    bool good = false;
-    try {
-        std::ifstream stream(path, std::ios::binary);
-        text.assign(std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>());
-        good = stream.is_open() && !stream.bad();
-    } catch (const std::ios_base::failure&) {  // a folder
-    }
-    if (good) return text;
-    const std::string why = errno == 0 ? "" : ": " + std::generic_category().message(errno);
-    return fail(ErrorCode::kFileNotReadable, std::string(what) + " " + path + " cannot be read" + why);
-}
-
 Result<std::string> readOptional(const char* what, const std::string& path) {
-    return path.empty() ? Result<std::string>(std::string()) : readText(what, path);
+    return path.empty() ? Result<std::string>(std::string()) : readSmallFile(what, path, kMaxFileBytes);
 }
 
 }  // namespace
@@ -61,16 +44,19 @@ ClientOptions optionsFromEnvironment() {
 }
 
 bool isThisMachine(const std::string& address) {
-    for (const char* local : {"unix:", "unix-abstract:", "localhost:", "127.", "[::1]:"}) {
+    for (const char* local : {"unix:", "unix-abstract:", "localhost:", "[::1]:"}) {
         if (startsWith(address, local)) return true;
     }
-    return false;
+    // A name may begin like an address: 127.example.org.
+    in_addr v4{};
+    const std::string host = address.substr(0, address.rfind(':'));
+    return ::inet_pton(AF_INET, host.c_str(), &v4) == 1 && (ntohl(v4.s_addr) >> 24) == 127;
 }
 
 Result<std::string> apiKeyOf(const ClientOptions& options) {
     std::string key = options.apiKey;
     if (key.empty() && !options.apiKeyFile.empty()) {
-        auto text = readText("API key file", options.apiKeyFile);
+        auto text = readSmallFile("API key file", options.apiKeyFile, kMaxFileBytes);
         RETURN_IF_ERROR(text);
         key = text->substr(0, text->find_first_of("\r\n"));
         if (key.empty()) {
@@ -95,6 +81,8 @@ Result<std::shared_ptr<grpc::ChannelCredentials>> channelCredentials(const TlsOp
                                                                      grpc::ChannelArguments& arguments) {
     const bool files = !tls.caFile.empty() || !tls.certificateFile.empty() || !tls.keyFile.empty();
     if (!tls.enabled) {
+        // A proxy that the environment names would read all that is said, the key too.
+        arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
         if (!files) return grpc::InsecureChannelCredentials();
         return fail(ErrorCode::kInvalidArgument, "there are files for TLS, but TLS is not enabled");
     }

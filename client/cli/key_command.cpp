@@ -1,5 +1,6 @@
 // `shapedb admin key create|list|revoke`.
 #include <chrono>
+#include <limits>
 #include <memory>
 
 #include <CLI/CLI.hpp>
@@ -154,12 +155,18 @@ void addCreateFlags(CLI::App& create, const std::shared_ptr<KeyFlags>& flags) {
         ->type_name("NAME");
     create.add_option("--valid-days", flags->validDays, "Days until it expires [never]")
         ->check(CLI::Range(1, 36'500));
-    create.add_option("--calls-per-second", flags->request.limits.callsPerSecond,
-                      "Most calls a second [no limit]");
-    create.add_option("--scans-per-day", flags->request.limits.scansPerDay,
-                      "Most scans received a day, UTC [no limit]");
-    create.add_option("--bytes-per-day", flags->request.limits.bytesPerDay,
-                      "Most bytes of points received a day, UTC [no limit]");
+    create
+        .add_option("--calls-per-second", flags->request.limits.callsPerSecond,
+                    "Most calls a second [no limit]")
+        ->check(CLI::Range(std::int64_t{1}, std::int64_t{1'000'000}));
+    create
+        .add_option("--scans-per-day", flags->request.limits.scansPerDay,
+                    "Most scans received a day, UTC [no limit]")
+        ->check(CLI::Range(std::int64_t{1}, std::numeric_limits<std::int64_t>::max()));
+    create
+        .add_option("--bytes-per-day", flags->request.limits.bytesPerDay,
+                    "Most bytes of points received a day, UTC [no limit]")
+        ->check(CLI::Range(std::int64_t{1}, std::numeric_limits<std::int64_t>::max()));
 }
 
 }  // namespace

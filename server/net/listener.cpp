@@ -77,6 +77,13 @@ int portOf(int socket) {
     return ntohs(port);
 }
 
+bool isLoopback(const sockaddr& address) {
+    if (address.sa_family == AF_INET6) {
+        return IN6_IS_ADDR_LOOPBACK(&reinterpret_cast<const sockaddr_in6&>(address).sin6_addr);
+    }
+    return (ntohl(reinterpret_cast<const sockaddr_in&>(address).sin_addr.s_addr) >> 24) == 127;
+}
+
 void setPort(addrinfo& address, int port) {
     const auto wire = htons(static_cast<std::uint16_t>(port));
     if (address.ai_family == AF_INET6) {
@@ -141,7 +148,11 @@ bool concernsOneConnection(int number) {
 Listener::~Listener() {
     stop();
     for (const int socket : listening_) ::close(socket);
-    if (!unixPath_.empty()) ::unlink(unixPath_.c_str());
+    struct stat status {};
+    // Not what somebody else has put there since.
+    const bool ours = !unixPath_.empty() && ::lstat(unixPath_.c_str(), &status) == 0 &&
+                      status.st_ino == unixInode_ && status.st_dev == unixDevice_;
+    if (ours) ::unlink(unixPath_.c_str());
     if (wake_ >= 0) ::close(wake_);
     if (spare_ >= 0) ::close(spare_);
 }
@@ -152,6 +163,9 @@ Result<void> Listener::open(const config::Endpoint& endpoint) {
     RETURN_IF_ERROR(addresses);
     int why = 0;
     for (addrinfo* at = addresses->get(); at != nullptr; at = at->ai_next) {
+        if (endpoint.isLoopback() && !isLoopback(*at->ai_addr)) {
+            return cannotListen(endpoint.text(), "the name leads beyond this machine");
+        }
         if (endpoint_.port != 0) setPort(*at, endpoint_.port);  // all on the one that was picked
         const int socket = listenOn(*at);
         if (socket < 0) {
@@ -176,7 +190,12 @@ Result<void> Listener::openUnix(const std::string& path) {
     // Before it has a name, so that nobody else can connect at any time.
     const bool bound = ::fchmod(socket, S_IRWXU) == 0 &&
                        ::bind(socket, reinterpret_cast<const sockaddr*>(&*address), sizeof *address) == 0;
-    if (bound) unixPath_ = path;
+    struct stat status {};
+    if (bound && ::lstat(path.c_str(), &status) == 0) {
+        unixPath_ = path;
+        unixInode_ = status.st_ino;
+        unixDevice_ = status.st_dev;
+    }
     if (!bound || ::listen(socket, kBacklog) != 0) {
         const int why = errno;
         ::close(socket);

@@ -10,6 +10,8 @@
 #include <thread>
 #include <vector>
 
+#include <sys/types.h>
+
 #include "core/base/error.h"
 #include "server/config/server_config.h"
 #include "server/net/connections.h"
@@ -36,7 +38,8 @@ class Listener {
     Listener& operator=(const Listener&) = delete;
 
     /// Binds to every address of the host. Port 0 picks a free one. Call once. Errors: kUnavailable (the host
-    /// is unknown, the address is in use, does not belong to this machine or is not permitted).
+    /// is unknown, the address is in use, does not belong to this machine or is not permitted; a name of
+    /// loopback leads elsewhere).
     [[nodiscard]] Result<void> open(const config::Endpoint& endpoint);
     /// Binds to a Unix socket that only its owner can connect to (mode 0700). A socket that nobody listens at
     /// any more is replaced; this one is removed by the destructor. Call once, instead of `open`. Errors:
@@ -67,6 +70,8 @@ class Listener {
 
     config::Endpoint endpoint_;
     std::string unixPath_;  ///< to remove; empty: none
+    ino_t unixInode_ = 0;   ///< of it, as we made it
+    dev_t unixDevice_ = 0;
     std::vector<int> listening_;
     int wake_ = -1;   ///< eventfd that ends the thread
     int spare_ = -1;  ///< given up to tell a client that there are no descriptors left

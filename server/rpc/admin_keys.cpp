@@ -44,7 +44,7 @@ void keyToProto(const security::Key& key, const security::KeyUsage& today, v1::K
     out->set_role(protoOf(key.spec.role));
     for (const std::string& collection : key.spec.collections) out->add_collections(collection);
     const security::KeyLimits& limits = key.spec.limits;
-    if (limits.callsPerSecond + limits.scansPerDay + limits.bytesPerDay > 0) {
+    if (limits.callsPerSecond > 0 || limits.scansPerDay > 0 || limits.bytesPerDay > 0) {
         out->mutable_limits()->set_calls_per_second(limits.callsPerSecond);
         out->mutable_limits()->set_scans_per_day(limits.scansPerDay);
         out->mutable_limits()->set_bytes_per_day(limits.bytesPerDay);

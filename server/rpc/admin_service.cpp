@@ -30,22 +30,6 @@ Result<catalog::RebuildRequest> rebuildRequestFrom(const v1::RebuildRequest& req
     return wanted;
 }
 
-/// Asks for the collection that is to be rebuilt, and names it, or for all.
-Result<void> useTargets(const catalog::Catalog& catalog, Call& call, catalog::RebuildRequest& wanted) {
-    if (!wanted.collection.empty()) {
-        auto own = call.useCollection(wanted.collection);
-        RETURN_IF_ERROR(own);
-        wanted.collection = std::move(*own);
-        return {};
-    }
-    const auto all = catalog.collections();
-    RETURN_IF_ERROR(all);
-    for (const index::SnapshotPtr& snapshot : *all) {
-        RETURN_IF_ERROR(call.useCollection(snapshot->collection.name));
-    }
-    return {};
-}
-
 v1::RebuildProgress progressFrom(const catalog::RebuildProgress& progress) {
     v1::RebuildProgress message;
     message.set_collection(progress.collection);
@@ -72,7 +56,13 @@ grpc::Status AdminServiceHandler::Rebuild(grpc::ServerContext* context, const v1
     return handle(services_, context, operations::kRebuild, [&](Call& call) -> Result<void> {
         auto wanted = rebuildRequestFrom(*request);
         RETURN_IF_ERROR(wanted);
-        RETURN_IF_ERROR(useTargets(services_.catalog, call, *wanted));
+        if (wanted->collection.empty()) {
+            RETURN_IF_ERROR(call.useAllCollections());
+        } else {
+            auto named = call.useCollection(wanted->collection);
+            RETURN_IF_ERROR(named);
+            wanted->collection = std::move(*named);
+        }
         return services_.catalog.rebuild(*wanted, call.frame(),
                                          [&](const catalog::RebuildProgress& progress) {
                                              return call.write(*writer, progressFrom(progress));

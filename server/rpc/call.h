@@ -67,6 +67,8 @@ class Call {
     /// Returns the name of the collection itself, which an alias stands for at this moment: look nothing up
     /// by the alias afterwards, which may stand for another collection by then.
     [[nodiscard]] Result<std::string> useCollection(const std::string& name);
+    /// The same for all of them, those to come too.
+    [[nodiscard]] Result<void> useAllCollections() { return authorization_.useAllCollections(); }
     /// Before a scan is received, as announced. Errors: kRateLimited.
     [[nodiscard]] Result<void> useScan(std::uint64_t points);
     /// The collection, after `useCollection`. Errors: kPermissionDenied, kNotFound.

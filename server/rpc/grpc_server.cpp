@@ -1,13 +1,18 @@
 #include "server/rpc/grpc_server.h"
 
+#include <algorithm>
 #include <chrono>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/grpcpp.h>
 #include <grpcpp/health_check_service_interface.h>
+#include <grpcpp/impl/server_builder_option.h>
+#include <grpcpp/impl/server_builder_plugin.h>
 
 #include "core/base/return_if_error.h"
 #include "server/config/settings.h"
@@ -36,6 +41,17 @@ constexpr std::size_t kMaxLocalConnections = 64;
 constexpr const char* kServiceNames[] = {"shapedb.v1.ShapeService", "shapedb.v1.SearchService",
                                          "shapedb.v1.CollectionService", "shapedb.v1.AlignService",
                                          "shapedb.v1.AdminService"};
+
+/// For servers that strangers reach: reflection asks for no key, and its streams hold threads for as long as
+/// they like. gRPC adds it to every server of a program that is linked with it.
+class WithoutReflection final : public grpc::ServerBuilderOption {
+  public:
+    void UpdateArguments(grpc::ChannelArguments*) override {}
+    void UpdatePlugins(std::vector<std::unique_ptr<grpc::ServerBuilderPlugin>>* plugins) override {
+        const auto isReflection = [](const auto& plugin) { return plugin->name() == "proto_server_reflection"; };
+        plugins->erase(std::remove_if(plugins->begin(), plugins->end(), isReflection), plugins->end());
+    }
+};
 
 void limitTransport(grpc::ServerBuilder& builder, const config::ServerConfig::Limits& limits) {
     builder.SetMaxReceiveMessageSize(kMaxReceiveBytes);
@@ -157,6 +173,7 @@ Result<void> GrpcServer::listen() {
     grpc::EnableDefaultHealthCheckService(true);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
     grpc::ServerBuilder builder;
+    if (parts_->services.access.keysRequired) builder.SetOption(std::make_unique<WithoutReflection>());
     // Connections come from our own listeners: see net/listener.h.
     constexpr auto kFromDescriptor = grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD;
     parts_->network.acceptor =

@@ -1,5 +1,6 @@
 #include "server/rpc/status.h"
 
+#include "common/safe_text.h"
 #include "server/rpc/message_limits.h"
 
 namespace shapedb::rpc {
@@ -46,14 +47,6 @@ grpc::StatusCode statusCodeOf(ErrorCode code) noexcept {
         case ErrorCode::kInternal: return grpc::StatusCode::INTERNAL;
     }
     return grpc::StatusCode::INTERNAL;
-}
-
-std::string cutText(const std::string& text, std::size_t limit) {
-    if (text.size() <= limit) return text;
-    std::size_t end = limit;
-    // Back over continuation bytes (10xxxxxx), so that no character is cut in two.
-    while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xc0) == 0x80) --end;
-    return text.substr(0, end);
 }
 
 grpc::Status makeStatus(const Error& error, grpc::ServerContext& context,

@@ -25,7 +25,4 @@ constexpr const char* kRetryKey = "grpc-retry-pushback-ms";
 [[nodiscard]] grpc::Status makeStatus(const Error& error, grpc::ServerContext& context,
                                       std::optional<std::chrono::milliseconds> retryAfter = std::nullopt);
 
-/// At most `limit` bytes of `text`, never half a UTF-8 character.
-[[nodiscard]] std::string cutText(const std::string& text, std::size_t limit);
-
 }  // namespace shapedb::rpc

@@ -17,8 +17,8 @@ tl::unexpected<Error> denied(const Key& key, const std::string& why) {
 Result<void> Authorization::begin(const Credentials& credentials) {
     RETURN_IF_ERROR(authenticate(credentials));
     if (!holder_) return {};
-    RETURN_IF_ERROR(requireRole());
-    return spend(holder_->takeCall(policy_.keyring.clock().monotonic()));
+    RETURN_IF_ERROR(spend(holder_->takeCall(policy_.keyring.clock().monotonic())));
+    return requireRole();
 }
 
 Result<void> Authorization::authenticate(const Credentials& credentials) {
@@ -61,6 +61,12 @@ Result<void> Authorization::useCollection(const std::string& name) {
     usedCollection_ = true;
     if (sees(name)) return {};
     return denied(holder_->key(), "is not for collection '" + name + "'");
+}
+
+Result<void> Authorization::useAllCollections() {
+    usedCollection_ = true;
+    if (!holder_ || holder_->key().spec.collections.empty()) return {};
+    return denied(holder_->key(), "is for some collections: name one of them");
 }
 
 bool Authorization::sees(const std::string& collection) const {

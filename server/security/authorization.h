@@ -39,6 +39,8 @@ class Authorization {
     /// Before anything of the collection is read or changed. Errors: kPermissionDenied, whether or not the
     /// collection exists.
     [[nodiscard]] Result<void> useCollection(const std::string& name);
+    /// The same for all collections, those to come too. Errors: kPermissionDenied, which names none.
+    [[nodiscard]] Result<void> useAllCollections();
     /// Whether the caller may know of the collection.
     [[nodiscard]] bool sees(const std::string& collection) const;
     /// Before a scan of so many bytes is received. Errors: kRateLimited.

@@ -1,19 +1,17 @@
 #include "server/security/certificate.h"
 
 #include <array>
-#include <cerrno>
 #include <ctime>
-#include <fstream>
-#include <iterator>
 #include <memory>
-#include <system_error>
 
 #include <openssl/bio.h>
 #include <openssl/err.h>
 #include <openssl/pem.h>
+#include <openssl/ssl.h>
 #include <openssl/x509.h>
 #include <sys/stat.h>
 
+#include "common/small_file.h"
 #include "core/base/return_if_error.h"
 
 namespace shapedb::security {
@@ -32,20 +30,7 @@ tl::unexpected<Error> malformed(const std::string& path, const std::string& why)
 }
 
 Result<std::string> readFile(const std::string& path) {
-    errno = 0;
-    std::ifstream stream(path, std::ios::binary);
-    std::string text;
-    try {
-        text.assign(std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>());
-    } catch (const std::ios_base::failure&) {
-        stream.setstate(std::ios::badbit);  // a folder
-    }
-    if (!stream.is_open() || stream.bad()) {
-        const std::string why = errno == 0 ? "cannot be read" : std::generic_category().message(errno);
-        return fail(ErrorCode::kFileNotReadable, path + ": " + why);
-    }
-    if (text.size() > kMaxFileBytes) return malformed(path, "too large for a PEM file");
-    return text;
+    return readSmallFile("TLS file", path, kMaxFileBytes);
 }
 
 Bio readerOf(const std::string& text) {
@@ -108,6 +93,56 @@ Result<void> requireValidAt(const std::string& path, const X509& certificate, Un
     return {};
 }
 
+/// Reads key and chain as the TLS library of gRPC does, with its rules for their strength: what it would
+/// refuse at each handshake is refused here.
+Result<void> requireUsable(const std::string& path, const std::string& pem) {
+    const std::unique_ptr<SSL_CTX, decltype(&SSL_CTX_free)> context(SSL_CTX_new(TLS_server_method()),
+                                                                    SSL_CTX_free);
+    const auto refused = [&] {
+        const unsigned long code = ERR_peek_last_error();
+        const char* reason = code == 0 ? nullptr : ERR_reason_error_string(code);
+        return malformed(path, std::string("certificate and key cannot be used: ") +
+                                   (reason == nullptr ? "unknown reason" : reason));
+    };
+    const Bio chain = readerOf(pem);
+    const Certificate leaf(PEM_read_bio_X509_AUX(chain.get(), nullptr, nullptr, nullptr), X509_free);
+    if (!context || !leaf || SSL_CTX_use_certificate(context.get(), leaf.get()) != 1) return refused();
+    ERR_clear_error();
+    while (X509* next = PEM_read_bio_X509(chain.get(), nullptr, nullptr, nullptr)) {
+        // Owned by the context from here on.
+        if (SSL_CTX_add_extra_chain_cert(context.get(), next) != 1) {
+            X509_free(next);
+            return refused();
+        }
+    }
+    // The end of the text, or a certificate that was cut short.
+    if (ERR_GET_REASON(ERR_peek_last_error()) != PEM_R_NO_START_LINE) return refused();
+    ERR_clear_error();
+    const Bio keyText = readerOf(pem);
+    const PrivateKey key(PEM_read_bio_PrivateKey(keyText.get(), nullptr, noPassword, nullptr), EVP_PKEY_free);
+    if (!key || SSL_CTX_use_PrivateKey(context.get(), key.get()) != 1 ||
+        SSL_CTX_check_private_key(context.get()) != 1) {
+        return refused();
+    }
+    return {};
+}
+
+/// All of the file, not only what stands before a mistake. Errors: kMalformedFile.
+Result<void> requireCertificates(const std::string& path, const std::string& pem) {
+    const Bio all = readerOf(pem);
+    int count = 0;
+    while (X509* one = PEM_read_bio_X509_AUX(all.get(), nullptr, nullptr, nullptr)) {
+        X509_free(one);
+        ++count;
+    }
+    if (count > 0 && ERR_GET_REASON(ERR_peek_last_error()) == PEM_R_NO_START_LINE) {
+        ERR_clear_error();
+        return {};
+    }
+    return malformed(path, count == 0 ? "there is no certificate in PEM form"
+                                      : "certificate " + std::to_string(count + 1) + " is damaged");
+}
+
 bool othersCanRead(const std::string& path) {
     struct stat status {};
     return ::stat(path.c_str(), &status) == 0 && (status.st_mode & S_IROTH) != 0;
@@ -129,14 +164,16 @@ Result<TlsIdentity> loadTlsIdentity(const TlsFiles& files, UnixMs now) {
     }
     RETURN_IF_ERROR(requireValidAt(files.certificate, **certificate, now));
     TlsIdentity identity;
-    identity.pem = *keyPem + "\n" + *certificatePem;
+    // The certificates first, for a key file may hold some as well.
+    identity.pem = *certificatePem + "\n" + *keyPem;
+    RETURN_IF_ERROR(requireUsable(files.certificate, identity.pem));
     identity.subject = subjectOf(**certificate);
     identity.notAfter = timeOf(X509_get0_notAfter(certificate->get()));
     identity.keyIsReadableByOthers = othersCanRead(files.key);
     if (files.clientCa.empty()) return identity;
     auto cas = readFile(files.clientCa);
     RETURN_IF_ERROR(cas);
-    RETURN_IF_ERROR(parseCertificate(files.clientCa, *cas));
+    RETURN_IF_ERROR(requireCertificates(files.clientCa, *cas));
     identity.clientCas = std::move(*cas);
     return identity;
 }

@@ -24,8 +24,9 @@ struct TlsIdentity {
     bool keyIsReadableByOthers = false;
 };
 
-/// Errors, which name the file: kFileNotReadable; kMalformedFile (no certificate, no key or an encrypted one,
-/// the key is of another certificate); kRejected (the certificate has expired by `now` or is not valid yet).
+/// Errors, which name the file: kFileNotReadable; kMalformedFile (no certificate, a damaged one, no key or an
+/// encrypted one, the key is of another certificate, or too weak for TLS); kRejected (the certificate has
+/// expired by `now` or is not valid yet).
 [[nodiscard]] Result<TlsIdentity> loadTlsIdentity(const TlsFiles& files, UnixMs now);
 
 }  // namespace shapedb::security

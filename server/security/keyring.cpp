@@ -93,12 +93,13 @@ KeyUsage KeyHolder::usage(UnixMs now) const {
 }
 
 void KeyHolder::beginDay(std::int64_t day) const {
-    // A clock that was set back does not give the day anew.
-    if (day > usage_.day) usage_ = {day, 0, 0};
+    // A clock that is set back by a day does not give it anew; one that was years ahead must not take them
+    // away.
+    if (day > usage_.day || day + 1 < usage_.day) usage_ = {day, 0, 0};
 }
 
-Keyring::Keyring(std::unique_ptr<KeyStore> store, Clock clock)
-    : store_(std::move(store)), clock_(std::move(clock)) {}
+Keyring::Keyring(std::unique_ptr<KeyStore> store, Clock clock, OnProblem onProblem)
+    : store_(std::move(store)), clock_(std::move(clock)), onProblem_(std::move(onProblem)) {}
 
 Result<void> Keyring::load() {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -132,13 +133,22 @@ Result<void> Keyring::reload() {
     return {};
 }
 
-Result<void> Keyring::reloadIfChanged() {
-    const milliseconds now = clock_.monotonic();
-    if (now - looked_ < kLookAgain) return {};
-    looked_ = now;
+void Keyring::lookForChanges() {
+    {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        const milliseconds now = clock_.monotonic();
+        if (now - looked_ < kLookAgain) return;
+        looked_ = now;
+    }
+    // Without the lock: nobody else waits for the disk.
     const auto version = store_->version();
-    RETURN_IF_ERROR(version);
-    return *version == version_ ? Result<void>() : reload();
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!version) return report(fail(version.error()));
+    report(*version == version_ ? Result<void>() : reload());
+}
+
+void Keyring::report(const Result<void>& looked) {
+    if (std::exchange(inTrouble_, !looked) != !looked) onProblem_(looked ? nullptr : &looked.error());
 }
 
 Result<CreatedKey> Keyring::create(const KeySpec& spec) {
@@ -173,6 +183,13 @@ Result<std::vector<KeyStatus>> Keyring::list() {
 Result<Key> Keyring::revoke(const std::string& id) {
     const std::lock_guard<std::mutex> lock(mutex_);
     auto key = store_->revoke(id, clock_.wall());
+    const auto holder = holderOf(id);
+    if (!key && key.error().code != ErrorCode::kNotFound && holder && !holder->revoked()) {
+        holder->revoke(clock_.wall());
+        return fail(
+            key.error().code,
+            "the API key is refused from now on, but only until the server restarts: " + key.error().message);
+    }
     RETURN_IF_ERROR(key);
     RETURN_IF_ERROR(reload());
     return key;
@@ -187,10 +204,10 @@ Result<std::shared_ptr<KeyHolder>> Keyring::find(const std::string& presented) {
     const auto refused = [](std::string why) { return fail(ErrorCode::kUnauthenticated, std::move(why)); };
     const auto given = parseApiKey(presented);
     if (!given) return refused("this is no API key: one has the form shapedb_ID_SECRET");
+    lookForChanges();
     std::shared_ptr<KeyHolder> holder;
     {
         const std::lock_guard<std::mutex> lock(mutex_);
-        RETURN_IF_ERROR(reloadIfChanged());
         holder = holderOf(given->id);
     }
     if (!holder || !equalInConstantTime(hashOf(*given), holder->key().secretSha256)) {

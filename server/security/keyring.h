@@ -72,7 +72,11 @@ struct CreatedKey {
 /// Thread-safe.
 class Keyring {
   public:
-    explicit Keyring(std::unique_ptr<KeyStore> store, Clock clock = systemClock());
+    /// Called with an error when the stored keys can no longer be read, and with null when they can again.
+    using OnProblem = std::function<void(const Error* problem)>;
+    explicit Keyring(
+        std::unique_ptr<KeyStore> store, Clock clock = systemClock(),
+        OnProblem onProblem = [](const Error*) {});
 
     /// Reads the keys. Call once, first. Errors of this and the next three: those of KeyStore.
     [[nodiscard]] Result<void> load();
@@ -80,11 +84,13 @@ class Keyring {
     [[nodiscard]] Result<CreatedKey> create(const KeySpec& spec);
     /// The oldest first.
     [[nodiscard]] Result<std::vector<KeyStatus>> list();
-    /// Nobody can use the key from now on. Errors: kNotFound (there is none, or it was revoked before).
+    /// Nobody can use the key from now on; after an error of the store this holds until the server restarts.
+    /// Errors: kNotFound (there is none, or it was revoked before).
     [[nodiscard]] Result<Key> revoke(const std::string& id);
 
     /// Who presents `presented`. Keys that another process has made or revoked count within a second.
-    /// Errors: kUnauthenticated (no such key, revoked, expired); those of KeyStore.
+    /// While the store cannot be read those that are known count. Errors: kUnauthenticated (no such key,
+    /// revoked, expired).
     [[nodiscard]] Result<std::shared_ptr<KeyHolder>> find(const std::string& presented);
     /// Whether there is a key that can be used.
     [[nodiscard]] bool hasUsableKey() const;
@@ -96,7 +102,8 @@ class Keyring {
 
   private:
     Result<void> reload();
-    Result<void> reloadIfChanged();
+    void lookForChanges();
+    void report(const Result<void>& looked);
     std::shared_ptr<KeyHolder> holderOf(const std::string& id) const;
 
     const std::unique_ptr<KeyStore> store_;
@@ -106,6 +113,8 @@ class Keyring {
     std::map<std::string, KeyUsage> saved_;
     std::int64_t version_ = 0;
     std::chrono::milliseconds looked_{0};
+    const OnProblem onProblem_;
+    bool inTrouble_ = false;
 };
 
 }  // namespace shapedb::security

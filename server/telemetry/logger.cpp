@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdio>
 #include <exception>
+#include <functional>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -20,10 +21,15 @@ namespace {
 
 using Value = decltype(Field::value);
 
+/// Longer than any reason of ours.
+constexpr std::size_t kMaxFieldBytes = 2'048;
+
 /// A JSON string literal; invalid UTF-8 becomes U+FFFD.
 std::string jsonString(const std::string& text) {
+    // A stranger must not fill the disk with one call.
+    const std::string cut = cutText(text, kMaxFieldBytes);
     // What JSON need not escape may still write on the terminal of whoever reads the log.
-    return escapeUnsafe(nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+    return escapeUnsafe(nlohmann::json(cut).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
 }
 
 std::string number(double value) {
@@ -46,7 +52,7 @@ std::string show(const Value& value, bool json) {
         [json](const auto& v) -> std::string {
             using T = std::decay_t<decltype(v)>;
             if constexpr (std::is_same_v<T, std::string>) {
-                return !json && plainWord(v) ? v : jsonString(v);
+                return !json && v.size() <= kMaxFieldBytes && plainWord(v) ? v : jsonString(v);
             } else if constexpr (std::is_same_v<T, bool>) {
                 return v ? "true" : "false";
             } else if constexpr (std::is_same_v<T, double>) {
@@ -85,7 +91,8 @@ std::string levelName(Level level) {
 
 class SpdlogLogger : public Logger {
   public:
-    SpdlogLogger(spdlog::sink_ptr sink, const LogOptions& options)
+    SpdlogLogger(
+        spdlog::sink_ptr sink, const LogOptions& options, std::function<void()> onFailure = [] {})
         : json_(options.json), logger_("shapedb", std::move(sink)) {
         // UTC, so that lines of several machines sort.
         const char* pattern = json_ ? R"({"time":"%Y-%m-%dT%H:%M:%S.%eZ",%v})" : "%Y-%m-%dT%H:%M:%S.%eZ %v";
@@ -93,7 +100,8 @@ class SpdlogLogger : public Logger {
             std::make_unique<spdlog::pattern_formatter>(pattern, spdlog::pattern_time_type::utc));
         logger_.set_level(spdlogLevel(options.level));
         logger_.flush_on(spdlog::level::trace);
-        logger_.set_error_handler([](const std::string&) {});  // a full disk must not make calls fail
+        // A full disk must not make calls fail.
+        logger_.set_error_handler([failed = std::move(onFailure)](const std::string&) { failed(); });
     }
 
     void log(Level level, const std::string& message, const std::vector<Field>& fields) override {
@@ -147,7 +155,12 @@ std::string formatJson(const std::string& message, const std::vector<Field>& fie
     return line;
 }
 
-Result<LoggerPtr> makeRotatingLog(const std::string& file, std::size_t bytes, std::size_t files) {
+Result<LoggerPtr> makeRotatingLog(const std::string& file, std::size_t bytes, std::size_t files,
+                                  std::function<void()> onFailure) {
+    struct stat status {};
+    if (::lstat(file.c_str(), &status) == 0 && !S_ISREG(status.st_mode)) {
+        return fail(ErrorCode::kFileNotWritable, "log file " + file + " is a link or no file at all");
+    }
     LogOptions options;
     options.json = true;
     options.file = file;
@@ -158,7 +171,7 @@ Result<LoggerPtr> makeRotatingLog(const std::string& file, std::size_t bytes, st
         };
         return std::make_shared<SpdlogLogger>(
             std::make_shared<spdlog::sinks::rotating_file_sink_mt>(file, bytes, files, false, handlers),
-            options);
+            options, std::move(onFailure));
     } catch (const std::exception& error) {
         return fail(ErrorCode::kFileNotWritable,
                     "log file " + file + " cannot be opened for writing: " + error.what());

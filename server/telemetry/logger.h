@@ -1,7 +1,9 @@
 // Log lines with named fields, as text for people or as JSON for machines.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <variant>
@@ -20,9 +22,9 @@ struct Field {
     std::variant<std::string, std::int64_t, std::uint64_t, double, bool> value;
 };
 
-/// Writes whole lines, never interleaved. Values may hold any bytes: control characters, quotes and
-/// invalid UTF-8 are escaped, so that no client can forge a line. Thread-safe. There is no global
-/// logger.
+/// Writes whole lines, never interleaved; texts are cut at 2 KiB. Values may hold any bytes: control
+/// characters, quotes and invalid UTF-8 are escaped, so that no client can forge a line. Thread-safe. There
+/// is no global logger.
 class Logger {
   public:
     virtual ~Logger() = default;
@@ -60,9 +62,10 @@ struct LogOptions {
 [[nodiscard]] Result<LoggerPtr> makeLogger(const LogOptions& options);
 
 /// A log file that is replaced by the next one when it has `bytes`; `files` older ones are kept beside it as
-/// NAME.1.EXT, NAME.2.EXT and so on. JSON, and only for its owner to read. Errors: kFileNotWritable.
-[[nodiscard]] Result<LoggerPtr> makeRotatingLog(const std::string& file, std::size_t bytes,
-                                                std::size_t files);
+/// NAME.1.EXT, NAME.2.EXT and so on. JSON, and only for its owner to read. `onFailure` is called, by whoever
+/// logs, for lines that cannot be written. Errors: kFileNotWritable (also: it is a link).
+[[nodiscard]] Result<LoggerPtr> makeRotatingLog(const std::string& file, std::size_t bytes, std::size_t files,
+                                                std::function<void()> onFailure);
 
 /// A line without time and level: `message name=value name="quoted value"`, or the members of a JSON
 /// object without braces.

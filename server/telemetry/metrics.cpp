@@ -16,6 +16,9 @@ namespace {
 const prometheus::Histogram::BucketBoundaries kCallSeconds = {0.001, 0.003, 0.01, 0.03, 0.1,  0.3,
                                                               1.0,   3.0,   10.0, 30.0, 100.0};
 
+/// Each may be held by a client that says nothing.
+constexpr std::size_t kHttpThreads = 8;
+
 prometheus::ClientMetric metricOf(const Sample& sample) {
     prometheus::ClientMetric metric;
     for (const auto& [name, value] : sample.labels) metric.label.push_back({name, value});
@@ -91,7 +94,7 @@ void Metrics::setSampler(Sampler sampler) {
 
 Result<int> Metrics::serve(const std::string& address) {
     try {
-        parts_->exposer = std::make_unique<prometheus::Exposer>(address);
+        parts_->exposer = std::make_unique<prometheus::Exposer>(address, kHttpThreads);
         parts_->exposer->RegisterCollectable(parts_->registry);
         if (parts_->state) parts_->exposer->RegisterCollectable(parts_->state);
         const auto ports = parts_->exposer->GetListeningPorts();

@@ -221,6 +221,28 @@ class Matrix(unittest.TestCase):
                         collections.RenameCollectionRequest(name="mine", new_name="other"), timeout=10))
 
 
+class Strangers(unittest.TestCase):
+    def test_cannot_hold_threads_with_reflection(self):
+        """Its streams would last for as long as the stranger likes, and it asks for no key."""
+        with SecuredServer() as server, grpc.insecure_channel(server.address) as channel:
+            info = channel.stream_stream("/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo",
+                                         request_serializer=bytes, response_deserializer=bytes)
+            with self.assertRaises(grpc.RpcError) as error:
+                list(info(iter([b""]), timeout=10))
+            self.assertEqual(error.exception.code(), grpc.StatusCode.UNIMPLEMENTED)
+
+    def test_learn_no_name_from_a_refusal(self):
+        with SecuredServer() as server:
+            with server.local() as local:
+                for name in ("mine", "aaa-secret-merger"):
+                    local.collections.CreateCollection(collections.CreateCollectionRequest(name=name), timeout=10)
+            key = server.make(ADMIN, collections=["mine"]).secret
+            with server.connect(key=key) as client, self.assertRaises(grpc.RpcError) as error:
+                list(client.admin.Rebuild(admin.RebuildRequest(), timeout=10))
+            self.assertEqual(error.exception.code(), grpc.StatusCode.PERMISSION_DENIED)
+            self.assertNotIn("secret-merger", error.exception.details())
+
+
 class Keys(unittest.TestCase):
     def test_live_as_long_as_they_should(self):
         with SecuredServer() as server:
@@ -352,15 +374,28 @@ class Secrets(unittest.TestCase):
             with server.connect() as stranger:
                 with self.assertRaises(grpc.RpcError):
                     stranger.count()
-            with open(server.data + "/audit.log") as file:
-                lines = [json.loads(line) for line in file]
-            self.assertEqual([(line["message"], line["rpc"]) for line in lines],
-                             [("administration", "CreateKey"), ("administration", "CreateCollection"),
-                              ("refused", "CountShapes")])
-            self.assertEqual(lines[0]["api_key_name"], "ann")
-            self.assertEqual(lines[1]["caller"], key.key.id)
-            self.assertEqual(lines[1]["collection"], "bones")
-            self.assertNotIn("caller", lines[2])
+            done, refused = self.lines(server, "audit.log"), self.lines(server, "audit.refused.log")
+            self.assertEqual([line["rpc"] for line in done], ["CreateKey", "CreateCollection"])
+            self.assertEqual(done[0]["api_key_name"], "ann")
+            self.assertEqual(done[1]["caller"], key.key.id)
+            self.assertEqual(done[1]["collection"], "bones")
+            self.assertEqual([line["rpc"] for line in refused], ["CountShapes"])
+            self.assertNotIn("caller", refused[0])
+
+    def lines(self, server, name):
+        with open(server.data + "/" + name) as file:
+            return [json.loads(line) for line in file]
+
+    def test_one_call_cannot_fill_a_log(self):
+        with SecuredServer() as server:
+            key = server.make(READER, collections=["bones"])
+            with server.connect(key=key.secret) as client:
+                for _ in range(5):
+                    with self.assertRaises(grpc.RpcError):
+                        client.shapes.CountShapes(shapes.CountShapesRequest(collection="A" * (3 << 20)), timeout=10)
+            for line in self.lines(server, "audit.refused.log"):
+                self.assertLess(len(json.dumps(line)), 8_192)
+            self.assertLess(len(server.log()), 65_536)
 
 
 class Certificates:

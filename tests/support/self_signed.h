@@ -6,6 +6,7 @@
 #include <openssl/ec.h>
 #include <openssl/evp.h>
 #include <openssl/pem.h>
+#include <openssl/rsa.h>
 #include <openssl/x509.h>
 
 namespace shapedb::testing {
@@ -15,9 +16,9 @@ struct PemPair {
     std::string certificate;
 };
 
-/// A self-signed certificate valid from `begin` to `end`, seconds from now.
-inline PemPair selfSigned(const char* name, long begin = -60, long end = 3'600) {
-    EVP_PKEY* key = EVP_EC_gen("P-256");
+/// A self-signed certificate valid from `begin` to `end`, seconds from now. `rsaBits` 0: elliptic.
+inline PemPair selfSigned(const char* name, long begin = -60, long end = 3'600, unsigned rsaBits = 0) {
+    EVP_PKEY* key = rsaBits == 0 ? EVP_EC_gen("P-256") : EVP_RSA_gen(rsaBits);
     X509* certificate = X509_new();
     ASN1_INTEGER_set(X509_get_serialNumber(certificate), 1);
     X509_gmtime_adj(X509_getm_notBefore(certificate), begin);

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "server/store/failure.h"
@@ -38,6 +39,7 @@ constexpr char kSaveUsage[] =
     "INSERT INTO api_key_usage (key_id, day, scans, bytes) VALUES (?1, ?2, ?3, ?4) "
     "ON CONFLICT (key_id) DO UPDATE SET day = excluded.day, scans = excluded.scans, bytes = excluded.bytes";
 #undef KEY_COLUMNS
+constexpr char kReadVersion[] = "PRAGMA data_version";
 
 std::string joinLines(const std::vector<std::string>& lines) {
     std::string text;
@@ -88,15 +90,16 @@ void createPrivateFile(const std::string& path) {
 
 class SqliteKeyStore final : public security::KeyStore {
   public:
-    explicit SqliteKeyStore(const std::string& path) {
+    explicit SqliteKeyStore(const std::string& path) : path_(path) {
         createPrivateFile(path);
-        connection_ = std::make_unique<Connection>(path, OpenMode::kReadWrite, kBusyTimeoutMs);
+        open();
         if (identify(*connection_) == FileKind::kForeign) {
             raise(ErrorCode::kDataLoss, "'" + path + "' is not a file of API keys");
         }
         const auto now = std::chrono::system_clock::now().time_since_epoch();
         migrate(*connection_, embeddedKeyMigrations(),
                 std::chrono::duration_cast<std::chrono::milliseconds>(now).count());
+        watched_ = watch_->integer(kReadVersion);
     }
 
     Result<void> insert(const Key& key) override {
@@ -140,8 +143,16 @@ class SqliteKeyStore final : public security::KeyStore {
     }
 
     Result<std::int64_t> version() override {
-        return locked("look for changed API keys",
-                      [&] { return connection_->integer("PRAGMA data_version"); });
+        return locked("look for changed API keys", [&]() -> std::int64_t {
+            try {
+                const std::int64_t now = watch_->integer(kReadVersion);
+                if (std::exchange(watched_, now) != now) ++version_;
+            } catch (const Failure& failure) {
+                // Another process is writing: what it does is seen the next time.
+                if (failure.error.code != ErrorCode::kStorage) throw;
+            }
+            return version_;
+        });
     }
 
     Result<std::map<std::string, KeyUsage>> usage() override {
@@ -170,11 +181,42 @@ class SqliteKeyStore final : public security::KeyStore {
     template <typename Body>
     auto locked(const char* operation, Body&& body) -> Result<std::invoke_result_t<Body>> {
         const std::lock_guard<std::mutex> lock(mutex_);
-        return guarded(operation, std::forward<Body>(body));
+        return guarded(operation, [&] {
+            followFile();
+            return body();
+        });
     }
 
+    void open() {
+        struct stat status {};
+        if (::stat(path_.c_str(), &status) != 0) raiseGone();
+        inode_ = status.st_ino;
+        device_ = status.st_dev;
+        connection_ = std::make_unique<Connection>(path_, OpenMode::kReadWrite, kBusyTimeoutMs);
+        watch_ = std::make_unique<Connection>(path_, OpenMode::kReadOnly, 0);
+    }
+
+    /// An operator may put another file in its place, a copy that was saved for instance.
+    void followFile() {
+        struct stat status {};
+        if (::stat(path_.c_str(), &status) != 0) raiseGone();
+        if (status.st_ino == inode_ && status.st_dev == device_) return;
+        open();
+        ++version_;
+    }
+
+    [[noreturn]] void raiseGone() const {
+        raise(ErrorCode::kStorage, "the file of API keys '" + path_ + "' is gone: put it back");
+    }
+
+    const std::string path_;
     std::mutex mutex_;
     std::unique_ptr<Connection> connection_;
+    std::unique_ptr<Connection> watch_;  ///< waits for nobody
+    ino_t inode_ = 0;
+    dev_t device_ = 0;
+    std::int64_t watched_ = 0;  ///< SQLite's number for the changes of others
+    std::int64_t version_ = 0;
 };
 
 }  // namespace

@@ -87,12 +87,22 @@ TEST_F(KeyCommand, TakesTheKeyFromAFileOrTheEnvironment) {
 
 TEST_F(KeyCommand, NeverSendsTheKeyUnprotectedBeyondThisMachine) {
     for (const char* server :
-         {"192.0.2.1", "shapes.example:7878", "[2001:db8::1]:7878", "dns:///shapes.example:1"}) {
+         {"192.0.2.1", "shapes.example:7878", "[2001:db8::1]:7878", "dns:///shapes.example:1",
+          "127.0.0.1.example:7878", "127.example:7878", "localhost.example:7878"}) {
         const auto run =
             runCommand({"list", "--server", server, "--key-file", path("admin.key"), "--timeout", "1"});
         EXPECT_EQ(run.exitCode, kUsage) << server;
         EXPECT_NE(run.err.find("TLS"), std::string::npos) << run.err;
     }
+}
+
+TEST_F(KeyCommand, AProxyOfTheEnvironmentSeesNothing) {
+    serve({});
+    std::map<std::string, std::string> environment = {{"SHAPEDB_API_KEY_FILE", path("admin.key")}};
+    // Nobody listens there: a call that went to it would fail.
+    for (const char* name : {"http_proxy", "https_proxy", "grpc_proxy"})
+        environment[name] = "http://127.0.0.1:9";
+    EXPECT_EQ(with(environment, {"list"}).exitCode, kOk);
 }
 
 TEST_F(KeyCommand, SpeaksTls) {

@@ -53,7 +53,7 @@ Step put(const std::string& key, std::uint64_t seed, std::size_t points, Metadat
                 PutRequest request(std::move(*scan));
                 request.collectionId = world.memory.collectionId;
                 request.key = key;
-                request.metadata = metadata;
+                request.metadata = store::replacedBy(metadata);
                 return outcome(inStore([&] { return world.store->putShape(request); }));
             }};
 }

@@ -6,6 +6,8 @@
 
 #include <gtest/gtest.h>
 
+#include "common/safe_text.h"
+
 namespace shapedb::rpc {
 namespace {
 

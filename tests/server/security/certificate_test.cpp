@@ -69,6 +69,34 @@ TEST_F(CertificateTest, RefusesWhatIsNotThere) {
                   ErrorCode::kMalformedFile, "half.pem");
 }
 
+TEST_F(CertificateTest, WaitsForNoPipeAndReadsNoEndlessFile) {
+    const std::string pipe = directory_.path() + "/pipe";
+    ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+    expectRefused({files_.certificate, pipe, ""}, ErrorCode::kFileNotReadable, "not a regular file");
+    expectRefused({"/dev/zero", files_.key, ""}, ErrorCode::kFileNotReadable, "not a regular file");
+    expectRefused({write("huge.pem", std::string(std::size_t{2} << 20, 'x')), files_.key, ""},
+                  ErrorCode::kMalformedFile, "huge.pem");
+}
+
+TEST_F(CertificateTest, RefusesWhatNoHandshakeWouldTake) {
+    const auto weak = selfSigned("weak", -60, 3'600, 1'024);
+    expectRefused({write("weak.pem", weak.certificate), write("weak.key", weak.key), ""},
+                  ErrorCode::kMalformedFile, "cannot be used");
+    const auto next = selfSigned("authority").certificate;
+    expectRefused({write("cut.pem", pair_.certificate + next.substr(0, next.size() / 2)), files_.key, ""},
+                  ErrorCode::kMalformedFile, "cannot be used");
+    expectRefused({files_.certificate, files_.key, write("cas.pem", next + next.substr(0, next.size() / 2))},
+                  ErrorCode::kMalformedFile, "certificate 2 is damaged");
+    EXPECT_TRUE(loadTlsIdentity({write("chain.pem", pair_.certificate + next), files_.key, ""}, now()));
+}
+
+TEST_F(CertificateTest, AKeyFileMayHoldOldCertificates) {
+    files_.key = write("both.pem", selfSigned("old").certificate + pair_.key);
+    const auto loaded = loadTlsIdentity(files_, now());
+    ASSERT_TRUE(loaded) << loaded.error().message;
+    EXPECT_EQ(loaded->pem.find(pair_.certificate), 0u) << "the right one comes first";
+}
+
 TEST_F(CertificateTest, RefusesAnEncryptedKeyWithoutAskingForAPassword) {
     files_.key = write("locked.pem",
                        "-----BEGIN ENCRYPTED PRIVATE KEY-----\nMIIBHDBXBgkqhkiG9w0BBQ0w\n"

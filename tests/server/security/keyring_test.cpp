@@ -93,6 +93,40 @@ TEST_F(KeyringTest, SeesWhatAnotherProcessDoes) {
     EXPECT_NE(problem(made.text), "");
 }
 
+TEST_F(KeyringTest, KnownKeysGoOnWhileTheStoreCannotBeRead) {
+    std::vector<std::string> problems;
+    Keyring keyring(std::make_unique<MemoryKeyStore>(table_), time_.clock(), [&](const Error* problem) {
+        problems.push_back(problem == nullptr ? "good" : problem->message);
+    });
+    ASSERT_TRUE(keyring.load());
+    KeySpec spec;
+    spec.name = "known";
+    const auto known = keyring.create(spec).value();
+    table_.fault = Error{ErrorCode::kDataLoss, "a page is damaged"};
+    for (int i = 0; i < 5; ++i) {
+        time_.pass(milliseconds(500));
+        EXPECT_TRUE(keyring.find(known.text)) << i;
+        EXPECT_EQ(keyring.find(makeApiKey()->text()).error().code, ErrorCode::kUnauthenticated)
+            << "strangers learn nothing of it";
+    }
+    EXPECT_EQ(problems, (std::vector<std::string>{"a page is damaged"})) << "told once";
+    const auto revoked = keyring.revoke(known.key.id);
+    ASSERT_FALSE(revoked);
+    EXPECT_EQ(revoked.error().code, ErrorCode::kDataLoss);
+    EXPECT_FALSE(keyring.find(known.text)) << "refused all the same";
+    table_.fault.reset();
+    time_.pass(milliseconds(500));
+    EXPECT_FALSE(keyring.find(known.text));
+    EXPECT_EQ(problems.back(), "good");
+}
+
+TEST_F(KeyringTest, AClockThatWasYearsAheadTakesNoDaysAway) {
+    const auto holder = keyring_.find(make(Role::kWriter, {0, 1, 0})).value();
+    ASSERT_TRUE(holder->takeScan(1, time_.wall + 400 * kDay));
+    EXPECT_TRUE(holder->takeScan(1, time_.wall));
+    EXPECT_FALSE(holder->takeScan(1, time_.wall));
+}
+
 TEST_F(KeyringTest, CallsAreTakenFromABucketOfOneSecond) {
     const auto holder = keyring_.find(make(Role::kReader, {5, 0, 0})).value();
     const auto take = [&] { return holder->takeCall(time_.monotonic); };

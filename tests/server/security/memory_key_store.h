@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,7 @@ struct KeyTable {
     std::vector<Key> keys;
     std::map<std::string, KeyUsage> usage;
     std::int64_t changes = 0;
+    std::optional<Error> fault;  ///< of every function while it is set
 };
 
 class MemoryKeyStore final : public KeyStore {
@@ -25,16 +27,19 @@ class MemoryKeyStore final : public KeyStore {
 
     Result<void> insert(const Key& key) override {
         const std::lock_guard<std::mutex> lock(table_.mutex);
+        if (table_.fault) return fail(*table_.fault);
         table_.keys.push_back(key);
         ++table_.changes;
         return {};
     }
     Result<std::vector<Key>> list() override {
         const std::lock_guard<std::mutex> lock(table_.mutex);
+        if (table_.fault) return fail(*table_.fault);
         return table_.keys;
     }
     Result<Key> revoke(const std::string& id, UnixMs now) override {
         const std::lock_guard<std::mutex> lock(table_.mutex);
+        if (table_.fault) return fail(*table_.fault);
         for (Key& key : table_.keys) {
             if (key.id != id || key.revoked) continue;
             key.revoked = now;
@@ -45,14 +50,17 @@ class MemoryKeyStore final : public KeyStore {
     }
     Result<std::int64_t> version() override {
         const std::lock_guard<std::mutex> lock(table_.mutex);
+        if (table_.fault) return fail(*table_.fault);
         return table_.changes;
     }
     Result<std::map<std::string, KeyUsage>> usage() override {
         const std::lock_guard<std::mutex> lock(table_.mutex);
+        if (table_.fault) return fail(*table_.fault);
         return table_.usage;
     }
     Result<void> saveUsage(const std::map<std::string, KeyUsage>& usage) override {
         const std::lock_guard<std::mutex> lock(table_.mutex);
+        if (table_.fault) return fail(*table_.fault);
         for (const auto& [id, used] : usage) table_.usage[id] = used;
         return {};
     }

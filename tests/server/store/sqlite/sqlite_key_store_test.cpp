@@ -1,10 +1,13 @@
 #include "server/store/sqlite/sqlite_key_store.h"
 
+#include <chrono>
+#include <filesystem>
 #include <fstream>
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include "server/store/sqlite/connection.h"
 #include "tests/support/temporary_directory.h"
 
 namespace shapedb::store {
@@ -88,6 +91,30 @@ TEST_F(SqliteKeyStoreTest, TheVersionTellsOfOtherProcesses) {
     EXPECT_NE(after, before);
     EXPECT_EQ(ours->list().value().size(), 1u);
     EXPECT_EQ(ours->version().value(), after);
+}
+
+TEST_F(SqliteKeyStoreTest, FollowsAFileThatIsPutInItsPlace) {
+    const auto store = open();
+    ASSERT_TRUE(store->insert(keyNamed("a", 1)));
+    const auto before = store->version().value();
+    std::filesystem::copy(path_, path_ + ".copy");
+    std::filesystem::rename(path_ + ".copy", path_);
+    EXPECT_NE(store->version().value(), before);
+    ASSERT_TRUE(open()->revoke("a", 9)) << "by another process";
+    EXPECT_EQ(store->list().value()[0].revoked, 9);
+    std::filesystem::remove(path_);
+    EXPECT_EQ(store->version().error().code, ErrorCode::kStorage);
+    EXPECT_FALSE(store->insert(keyNamed("b", 1))) << "not into a file that nobody can open again";
+}
+
+TEST_F(SqliteKeyStoreTest, TheVersionWaitsForNobody) {
+    const auto store = open();
+    Connection other(path_, OpenMode::kReadWrite, 0);
+    other.execute("BEGIN EXCLUSIVE");
+    const auto began = std::chrono::steady_clock::now();
+    EXPECT_TRUE(store->version());
+    EXPECT_LT(std::chrono::steady_clock::now() - began, std::chrono::seconds(4)) << "others wait 5 s";
+    other.rollback();
 }
 
 TEST_F(SqliteKeyStoreTest, OnlyTheOwnerCanReadTheFile) {
