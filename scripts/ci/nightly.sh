@@ -1,10 +1,20 @@
 #!/usr/bin/env bash
 # Everything that is too slow for every change. Runs all lanes, even after one has failed, and says which failed.
-#   scripts/ci/nightly.sh [LANE]...    sanitize, threads, bench, tidy, fuzz, mutate; all by default
+#   scripts/ci/nightly.sh [LANE]...    sanitize, threads, bench, tidy, fuzz, mutate, reliability; all by default
 set -uo pipefail
 cd "$(dirname "$0")/../.."
 lanes=("$@")
-[ ${#lanes[@]} -gt 0 ] || lanes=(sanitize threads bench tidy fuzz mutate)
+[ ${#lanes[@]} -gt 0 ] || lanes=(sanitize threads bench tidy fuzz mutate reliability)
+
+# The long counts of docs/reliability.md. Not by ctest, whose limits of time are those of the short ones.
+reliability() {
+  local tests=${BUILD_DIR:-build}/tests
+  scripts/install-deps.sh && scripts/build.sh dev || return 1
+  SHAPEDB_TEST_SCALE=40 "$tests/shapedb_reliability_test" --gtest_filter='*PowerLoss*:*IoError*' || return 1
+  SHAPEDB_TEST_SCALE=20 "$tests/shapedb_reliability_test" --gtest_filter='*OutOfMemory*:*Failpoint*' || return 1
+  SHAPEDB_TEST_SCALE=20 "$tests/shapedb_server_test" --gtest_filter='*ModelTest*' || return 1
+  SHAPEDB_TEST_SCALE=10 ctest --test-dir "${BUILD_DIR:-build}" --output-on-failure -R '^attack\.kill$'
+}
 
 failed=()
 for lane in "${lanes[@]}"; do
@@ -17,6 +27,7 @@ for lane in "${lanes[@]}"; do
     fuzz) scripts/ci/fuzz.sh 600 ;;
     # Another part of the mutants each day. Survivors are printed, not failures.
     mutate) scripts/mutate.sh --seed "$(date +%j)" ;;
+    reliability) reliability ;;
     *) echo "nightly: unknown lane $lane" >&2; exit 2 ;;
   esac || failed+=("$lane")
 done

@@ -9,6 +9,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "server/store/failpoints.h"
+
 namespace shapedb::ingest {
 
 namespace {
@@ -57,6 +59,7 @@ void CrashJournal::write() {
     const bool written =
         file >= 0 && ::write(file, text.data(), text.size()) == static_cast<ssize_t>(text.size());
     if (file >= 0) ::close(file);
+    SHAPEDB_FAILPOINT("journal.written");
     if (!written || std::rename(next.c_str(), path_.c_str()) != 0) {
         log_->warn("crash journal of the rebuild cannot be written", {{"path", path_}});
     }
@@ -79,6 +82,7 @@ CrashJournal::Entry::Entry(CrashJournal& journal, const store::Shape& shape)
     const std::lock_guard<std::mutex> lock(journal_.mutex_);
     journal_.states_[key_].inHand = true;
     journal_.write();
+    SHAPEDB_FAILPOINT("journal.in_hand");
 }
 
 CrashJournal::Entry::~Entry() {

@@ -8,6 +8,7 @@
 #include "server/ingest/background_thread.h"
 #include "server/ingest/crash_marker.h"
 #include "server/ingest/quarantine_log.h"
+#include "server/store/failpoints.h"
 #include "server/store/parameters_codec.h"
 #include "server/store/quarantine.h"
 
@@ -83,6 +84,7 @@ Result<store::Rebuild> RebuildDriver::begin(const store::Collection& collection,
                                               "' with other parameters is running: wait for it or cancel it");
     }
     auto started = store_.startRebuild(collection.id, text);
+    SHAPEDB_FAILPOINT("rebuild.started");
     RETURN_IF_ERROR(started);
     log_->info("rebuild started", {{"collection", collection.name},
                                    {"rebuild", started->id},
@@ -273,6 +275,7 @@ void RebuildDriver::finish(const ActivePtr& active, std::unique_lock<std::mutex>
     lock.unlock();
     const auto finished =
         index_.switchGeneration(rebuild.collectionId, [&] { return store_.finishRebuild(rebuild.id); });
+    SHAPEDB_FAILPOINT("rebuild.switched");
     // Only the store knows whether it is done: the reload of the index may have failed afterwards.
     const auto now = store_.getRebuild(rebuild.id);
     lock.lock();
@@ -334,6 +337,7 @@ Result<void> RebuildDriver::isolated(Active& active, const store::Shape& shape) 
     CrashJournal::Entry entry(journal_, shape);
     const InHand inHand(shape.id, shape.pointsVersion);
     const Result<void> stored = process(active, shape);
+    SHAPEDB_FAILPOINT("rebuild.stored");
     if (stored && !active.cancel) entry.acquit();
     return stored;
 }

@@ -8,6 +8,7 @@
 #include "server/ingest/background_thread.h"
 #include "server/ingest/crash_marker.h"
 #include "server/ingest/quarantine_log.h"
+#include "server/store/failpoints.h"
 #include "server/store/quarantine.h"
 
 namespace shapedb::ingest {
@@ -284,7 +285,9 @@ WorkerPool::Outcome WorkerPool::attempt(Running& running) {
     context.progress = [this, &job](const char* stage, std::uint64_t done, std::uint64_t total) {
         board_.report(job.shapeId, stage, done, total);
     };
+    SHAPEDB_FAILPOINT("worker.claimed");
     PipelineOutcome made = pipeline_.run(store_, job.shapeId, (*collection)->parameters, context);
+    SHAPEDB_FAILPOINT("worker.segmented");
     switch (made.kind) {
         case PipelineOutcome::Kind::kSignature:
             return commit(running, (*collection)->collection.generation, std::move(made));
@@ -326,6 +329,7 @@ WorkerPool::Outcome WorkerPool::commit(const Running& running, std::int64_t gene
         return isTransient(finished.error().code) ? Outcome::kStoreFailed : giveUp(job, finished.error());
     }
     if (!*finished) return Outcome::kDone;  // deleted or replaced meanwhile
+    SHAPEDB_FAILPOINT("worker.stored");
     ingested_.fetch_add(1);
     if (const auto refreshed = index_.refresh(job.collectionId, job.shapeId); !refreshed) {
         log_->error("signature is stored but not searched yet", fieldsOf(job, refreshed.error()));
@@ -344,6 +348,7 @@ WorkerPool::Outcome WorkerPool::giveUp(const store::Job& job, const Error& why) 
         return Outcome::kStoreFailed;
     }
     if (!*failed) return Outcome::kDone;  // deleted or replaced meanwhile
+    SHAPEDB_FAILPOINT("worker.failed");
     auto fields = fieldsOf(job, why);
     fields.push_back({"key", (*failed)->key});
     log_->warn("scan cannot be segmented", fields);

@@ -14,8 +14,9 @@ import grpc
 
 from attacker import Server, admin, ball, collections, eventually, main, pack, shapes, types
 
-KILLS = 20 * max(1, int(os.environ.get("SHAPEDB_TEST_SCALE", "1")))
-SEED = int(os.environ.get("SHAPEDB_TEST_SEED", "1"))
+# Taken away, since the server refuses variables of this kind that it does not know.
+KILLS = 20 * max(1, int(os.environ.pop("SHAPEDB_TEST_SCALE", "1")))
+SEED = int(os.environ.pop("SHAPEDB_TEST_SEED", "1"))
 WRITERS = 3
 KEYS = 8  # of each writer
 CLOUDS = [ball(60 + 30 * i, 1 + 0.1 * i) for i in range(12)]

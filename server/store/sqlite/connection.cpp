@@ -1,7 +1,9 @@
 #include "server/store/sqlite/connection.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <limits>
+#include <vector>
 
 #include <sqlite3.h>
 
@@ -17,6 +19,8 @@ constexpr char kRollback[] = "ROLLBACK";
 
 // Virtual machine steps between two checks for cancellation: a few microseconds.
 constexpr int kProgressSteps = 10000;
+
+constexpr int kRewriteBytes = 1 << 20;
 
 // EFBIG is the file size limit of the process, EDQUOT the user's quota: to the operator the same
 // as a full device.
@@ -163,6 +167,25 @@ bool Connection::truncateWal(int waitMs) {
     if ((code & 0xff) == SQLITE_BUSY) return false;
     if (code != SQLITE_OK) raiseLast(code);
     return true;
+}
+
+void Connection::rewriteWal() {
+    sqlite3_file* log = nullptr;
+    sqlite3_file_control(db_, "main", SQLITE_FCNTL_JOURNAL_POINTER, &log);
+    if (log == nullptr || log->pMethods == nullptr) return;
+    sqlite3_int64 size = 0;
+    int code = log->pMethods->xFileSize(log, &size);
+    if (size == 0 && code == SQLITE_OK) return;
+    std::vector<char> bytes(kRewriteBytes);
+    for (sqlite3_int64 at = 0; at < size && code == SQLITE_OK; at += kRewriteBytes) {
+        const int part = static_cast<int>(std::min<sqlite3_int64>(kRewriteBytes, size - at));
+        code = log->pMethods->xRead(log, bytes.data(), part, at);
+        if (code == SQLITE_OK) code = log->pMethods->xWrite(log, bytes.data(), part, at);
+    }
+    if (code == SQLITE_OK) code = log->pMethods->xSync(log, SQLITE_SYNC_FULL);
+    if (code != SQLITE_OK)
+        throw Failure(codeOf(code, filesAreFull(db_)),
+                      "the log cannot be written again (SQLite code " + std::to_string(code) + ")", true);
 }
 
 sqlite3_stmt* Connection::prepared(const char* sql) {

@@ -54,6 +54,9 @@ class Connection {
     /// when they kept it from finishing.
     bool truncateWal(int waitMs);
 
+    /// Writes every byte of the log again, where it is, and syncs it. Nobody else may have the database open.
+    void rewriteWal();
+
     sqlite3* handle() const noexcept { return db_; }
     [[noreturn]] void raiseLast(int code) const;
 

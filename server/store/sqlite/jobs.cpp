@@ -1,4 +1,5 @@
 // The job queue.
+#include "server/store/failpoints.h"
 #include "server/store/put_rules.h"
 #include "server/store/quarantine.h"
 #include "server/store/sqlite/rows.h"
@@ -61,7 +62,9 @@ Result<std::optional<Shape>> SqliteStore::finishJob(const Job& job, const Signat
         }
         if (!jobIsCurrent(connection, job, signature.generation)) return std::nullopt;
         putSignature(connection, signature);
+        SHAPEDB_FAILPOINT("finish.signature");
         Query(connection, sql::kSetReady, job.shapeId, now()).run();
+        SHAPEDB_FAILPOINT("finish.ready");
         Query(connection, sql::kDeleteJob, job.shapeId).run();
         return findShapeById(connection, job.shapeId);
     });

@@ -9,6 +9,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "server/store/failpoints.h"
 #include "server/store/sqlite/check.h"
 #include "server/store/sqlite/migrator.h"
 #include "server/store/sqlite/rows.h"
@@ -88,6 +89,7 @@ void publish(const std::string& temporary, const std::string& path) {
         const File file(temporary, O_RDONLY);
         if (file.get() < 0 || ::fsync(file.get()) != 0) raiseUnwritable(path, errno);
     }
+    SHAPEDB_FAILPOINT("backup.synced");
     fs::path folder = fs::path(path).parent_path();
     if (folder.empty()) folder = ".";
     const File directory(folder.string(), O_RDONLY | O_DIRECTORY);
@@ -101,6 +103,7 @@ void publish(const std::string& temporary, const std::string& path) {
             raise(ErrorCode::kAlreadyExists, "'" + path + "' already exists; choose a new name");
         if (::rename(temporary.c_str(), path.c_str()) != 0) raiseUnwritable(path, errno);
     }
+    SHAPEDB_FAILPOINT("backup.named");
     if (::fsync(directory.get()) != 0) {
         const int why = errno;
         ::unlink(path.c_str());  // nothing is left of a backup that failed
@@ -222,6 +225,7 @@ Result<void> SqliteStore::backup(const std::string& path, const RunContext& cont
             raise(ErrorCode::kAlreadyExists, "'" + path + "' already exists; choose a new name");
         const TemporaryFile temporary(path + ".partial-" + std::to_string(::getpid()));
         createPrivate(temporary.path());
+        SHAPEDB_FAILPOINT("backup.file");
         const Counted longRead(longReads_);
         {
             Connection source(options_.path, OpenMode::kReadOnly, options_.busyTimeoutMs);
@@ -234,12 +238,15 @@ Result<void> SqliteStore::backup(const std::string& path, const RunContext& cont
                 context.report("backup", done, total);
                 orRaise(context.checkpoint());
             });
+            SHAPEDB_FAILPOINT("backup.copied");
             // Without a log beside it, the file can be read from a folder that is not writable.
             if (target.text("PRAGMA journal_mode=DELETE") != "delete") {
                 raise(ErrorCode::kStorage, "cannot turn the backup into a single file");
             }
         }
+        SHAPEDB_FAILPOINT("backup.closed");
         publish(temporary.path(), path);
+        SHAPEDB_FAILPOINT("backup.durable");
     });
 }
 
@@ -250,6 +257,7 @@ Result<void> SqliteStore::restore(const std::string& path, const RunContext& con
         const TemporaryFile temporary(options_.path + ".restore");
         // The file that the user named stays as it is; migrations change the copy.
         copyBytes(path, temporary.path(), context);
+        SHAPEDB_FAILPOINT("restore.copied");
         std::unique_ptr<Connection> copy;
         blaming(path, [&] {
             copy =
@@ -258,14 +266,18 @@ Result<void> SqliteStore::restore(const std::string& path, const RunContext& con
         });
         // Until the end: no id may be given out between reading the last ones and replacing the tables.
         const std::lock_guard<std::mutex> lock(writerMutex_);
+        SHAPEDB_FAILPOINT("restore.checked");
         const std::int64_t commits = separateIds(*copy, *writer_);
+        SHAPEDB_FAILPOINT("restore.separated");
         if (replacing) replacing();
         copyDatabase(*copy, *writer_, kStepPages, [&](std::uint64_t done, std::uint64_t total) {
             context.report("restore", done, total);
             orRaise(context.checkpoint());
         });
         // The content is replaced: nothing may fail from here on.
+        SHAPEDB_FAILPOINT("restore.replaced");
         mark_.write(commits);
+        SHAPEDB_FAILPOINT("restore.marked");
         {
             const std::lock_guard<std::mutex> known(findingsMutex_);
             missingCommits_ = 0;

@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "common/sha256.h"
+#include "server/store/failpoints.h"
 
 namespace shapedb::store {
 
@@ -58,13 +59,17 @@ void apply(Connection& connection, const Migration& migration, std::int64_t nowM
         connection.execute("PRAGMA application_id=" + std::to_string(kApplicationId));
         connection.execute(kCreateRecord);
     }
+    SHAPEDB_FAILPOINT("migration.begun");
     connection.execute(migration.sql);
+    SHAPEDB_FAILPOINT("migration.applied");
     Query(connection, kWriteRecord, migration.number, std::string(migration.name), fingerprint(migration),
           nowMs)
         .run();
     // Part of the transaction, like the rest.
     connection.execute("PRAGMA user_version=" + std::to_string(migration.number));
+    SHAPEDB_FAILPOINT("migration.recorded");
     transaction.commit();
+    SHAPEDB_FAILPOINT("migration.committed");
 }
 
 std::map<std::string, std::string> schemaOf(Connection& connection) {

@@ -1,5 +1,6 @@
 // Rebuilds: a second generation of signatures is built beside the serving one.
 #include "core/base/return_if_error.h"
+#include "server/store/failpoints.h"
 #include "server/store/parameters_codec.h"
 #include "server/store/sqlite/rows.h"
 #include "server/store/sqlite/sqlite_store_impl.h"
@@ -159,13 +160,16 @@ Result<bool> SqliteStore::finishRebuild(std::int64_t rebuildId) {
             return false;
         // A shape with a job stays pending: the job brings a signature of the new generation.
         Query(connection, sql::kSetReadyRebuilt, collectionId, generation, now()).run();
+        SHAPEDB_FAILPOINT("switch.ready");
         const Collection collection = requireCollection(connection, collectionId);
         if (sameProfile(collection.parameters, rebuild.parameters)) {
             Query(connection, sql::kKeepOldSignatures, rebuildId, collection.generation, generation).run();
         }
         Query(connection, sql::kSetFailedRebuilt, rebuildId, now(), generation).run();
         Query(connection, sql::kSetGeneration, collectionId, generation, rebuild.parameters).run();
+        SHAPEDB_FAILPOINT("switch.generation");
         Query(connection, sql::kKeepOneGeneration, collectionId, generation).run();
+        SHAPEDB_FAILPOINT("switch.one_generation");
         endRebuild(connection, rebuild, RebuildState::kDone, now());
         return true;
     });

@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "core/base/return_if_error.h"
+#include "server/store/failpoints.h"
 #include "server/store/point_blob.h"
 #include "server/store/put_rules.h"
 #include "server/store/sqlite/rows.h"
@@ -62,8 +63,11 @@ PutResult SqliteStore::insertShape(Connection& connection, const PutRequest& req
           view(request.scan.checksum()), now())
         .run();
     const std::int64_t shapeId = connection.lastInsertId();
+    SHAPEDB_FAILPOINT("insert.shape");
     writeMetadata(connection, shapeId, request.metadata.set);
+    SHAPEDB_FAILPOINT("insert.metadata");
     writePoints(connection, shapeId, request, encoding);
+    SHAPEDB_FAILPOINT("insert.points");
     queueJob(connection, request, shapeId, 1);
     return {PutOutcome::kCreated, *findShapeById(connection, shapeId)};
 }
@@ -91,13 +95,16 @@ PutResult SqliteStore::replacePoints(Connection& connection, const PutRequest& r
           view(request.scan.checksum()), now())
         .run();
     Query(connection, sql::kDeletePoints, shapeId).run();
+    SHAPEDB_FAILPOINT("replace.deleted");
     writePoints(connection, shapeId, request, encoding);
+    SHAPEDB_FAILPOINT("replace.points");
     // The serving signature stays until the new result arrives; what a running rebuild made of the
     // old points is worthless.
     const Collection collection = requireCollection(connection, existing.collectionId);
     Query(connection, sql::kDeleteOtherSignatures, shapeId, collection.generation).run();
     Query(connection, sql::kDeleteRebuildFailuresOfShape, shapeId).run();
     Query(connection, sql::kDeleteJob, shapeId).run();
+    SHAPEDB_FAILPOINT("replace.unqueued");
     queueJob(connection, request, shapeId, existing.version + 1);
     return {PutOutcome::kReplaced, *findShapeById(connection, shapeId)};
 }

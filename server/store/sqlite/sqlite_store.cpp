@@ -11,6 +11,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "server/store/failpoints.h"
 #include "server/store/sqlite/migrator.h"
 #include "server/store/sqlite/rows.h"
 #include "server/store/sqlite/sequences.h"
@@ -78,6 +79,7 @@ void createDatabase(const SqliteOptions& options) {
     const int descriptor = open(fresh.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
     if (descriptor < 0) raiseSystem("cannot create database '" + options.path + "'", errno);
     close(descriptor);
+    SHAPEDB_FAILPOINT("create.file");
     {
         Connection connection(fresh, OpenMode::kReadWrite, options.busyTimeoutMs);
         // Only an empty file takes the page size. A crash loses a file that nobody knows yet.
@@ -85,9 +87,12 @@ void createDatabase(const SqliteOptions& options) {
                            "; PRAGMA synchronous=OFF; PRAGMA journal_mode=MEMORY");
         migrate(connection, embeddedMigrations(), options.now());
     }
+    SHAPEDB_FAILPOINT("create.filled");
     syncPath(fresh, O_RDONLY);
+    SHAPEDB_FAILPOINT("create.synced");
     if (::rename(fresh.c_str(), options.path.c_str()) != 0)
         raiseSystem("cannot create database '" + options.path + "'", errno);
+    SHAPEDB_FAILPOINT("create.named");
     syncPath(std::filesystem::path(options.path).parent_path().string(), O_RDONLY | O_DIRECTORY);
 }
 
@@ -109,6 +114,18 @@ void requireUsableFile(const SqliteOptions& options) {
     }
 }
 
+/// What another process left in the log may be in the system's memory only: after a sync that failed, Linux
+/// takes the pages for written. They would be missing after a loss of power, and with them all that follows
+/// in the log.
+void rewriteOldWal(Connection& writer) {
+    try {
+        writer.rewriteWal();
+    } catch (const Failure& failure) {
+        // What is stored can be read all the same.
+        if (failure.error.code != ErrorCode::kStorageFull) throw;
+    }
+}
+
 /// Opens the database, checks that it is ours before writing a byte, and migrates it.
 std::unique_ptr<Connection> openWriter(const SqliteOptions& options) {
     requireUsableFile(options);
@@ -127,10 +144,11 @@ std::unique_ptr<Connection> openWriter(const SqliteOptions& options) {
     writer->execute("PRAGMA wal_autocheckpoint=" + std::to_string(kWalAutoCheckpointPages) +
                     "; PRAGMA journal_size_limit=" + std::to_string(kWalKeepBytes) +
                     "; PRAGMA secure_delete=FAST");
-    // Of a log that another process left, the system may have in memory only what it could not write when
-    // that process asked for it. What follows in the log would be lost with it, so that nothing may follow.
-    static_cast<void>(writer->truncateWal(options.busyTimeoutMs));
+    SHAPEDB_FAILPOINT("open.log");
+    rewriteOldWal(*writer);
+    SHAPEDB_FAILPOINT("open.log_rewritten");
     migrate(*writer, embeddedMigrations(), options.now());
+    SHAPEDB_FAILPOINT("open.migrated");
     return writer;
 }
 
@@ -159,6 +177,7 @@ SqliteStore::SqliteStore(const SqliteOptions& options)
             "an older copy of the database was put in its place; restore a backup, or send the "
             "scans again");
     }
+    SHAPEDB_FAILPOINT("open.counted");
     mark_.write(commits);
 }
 
@@ -179,9 +198,13 @@ void SqliteStore::commit(Transaction& transaction, std::int64_t changesBefore) {
         transaction.commit();
         return;
     }
+    SHAPEDB_FAILPOINT("commit.changed");
     const std::int64_t commits = addCommit(*writer_);
+    SHAPEDB_FAILPOINT("commit.counted");
     transaction.commit();
+    SHAPEDB_FAILPOINT("commit.committed");
     mark_.write(commits);
+    SHAPEDB_FAILPOINT("commit.marked");
     boundWal();
 }
 
@@ -245,6 +268,7 @@ Result<void> SqliteStore::checkpoint() {
         if (!writer_->truncateWal(options_.busyTimeoutMs)) {
             raise(ErrorCode::kStorage, "cannot write back the log: a read is still running; try again later");
         }
+        SHAPEDB_FAILPOINT("checkpoint.written_back");
         walAttemptAt_ = kWalBoundBytes;
     });
 }
