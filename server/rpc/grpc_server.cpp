@@ -48,7 +48,9 @@ class WithoutReflection final : public grpc::ServerBuilderOption {
   public:
     void UpdateArguments(grpc::ChannelArguments*) override {}
     void UpdatePlugins(std::vector<std::unique_ptr<grpc::ServerBuilderPlugin>>* plugins) override {
-        const auto isReflection = [](const auto& plugin) { return plugin->name() == "proto_server_reflection"; };
+        const auto isReflection = [](const auto& plugin) {
+            return plugin->name() == "proto_server_reflection";
+        };
         plugins->erase(std::remove_if(plugins->begin(), plugins->end(), isReflection), plugins->end());
     }
 };
