@@ -88,6 +88,10 @@ void report(const IngestFigures& figures, const LoadSettings& settings, Report& 
                             "", true});
 }
 
+std::string both(const Latencies& latencies) {
+    return milliseconds(latencies.p50) + " / " + milliseconds(latencies.p99);
+}
+
 json latencyJson(const Latencies& latencies) {
     return {{"queries", latencies.queries}, {"p50_seconds", latencies.p50}, {"p99_seconds", latencies.p99}};
 }
@@ -102,9 +106,6 @@ void report(const LatencyFigures& figures, const LoadSettings& settings, Report&
                                {"most_p99_ratio", kMostP99Ratio},
                                {"kept", kept},
                                {"busy_scans_per_second", figures.busyScansPerSecond}};
-    const auto both = [](const Latencies& latencies) {
-        return milliseconds(latencies.p50) + " / " + milliseconds(latencies.p99);
-    };
     report.lines.push_back({"query of " + cli::formatCount(settings.shapes) + ", idle: p50 / p99",
                             both(figures.idle), "", true});
     report.lines.push_back({"query during ingest: p50 / p99", both(figures.busy), "", true});
@@ -127,9 +128,6 @@ void report(const BatchFigures& figures, const LoadSettings& settings, Report& r
                                {"kept", kept},
                                {"batch_searches_per_second", figures.searchesPerSecond},
                                {"peak_bytes", figures.peak}};
-    const auto both = [](const Latencies& latencies) {
-        return milliseconds(latencies.p50) + " / " + milliseconds(latencies.p99);
-    };
     report.lines.push_back({"query of " + cli::formatCount(settings.batchShapes) + ", idle: p50 / p99",
                             both(figures.idle), "", true});
     report.lines.push_back({"query beside " + std::to_string(settings.batchClients) +
