@@ -283,6 +283,27 @@ Result<SnapshotPtr> CollectionIndex::add(const store::Collection& collection) {
     return SnapshotPtr(std::move(*snapshot));
 }
 
+Result<void> CollectionIndex::prepare(const store::Collection& collection, const RunContext& context) {
+    return guarded([&]() -> Result<void> {
+        Result<SnapshotPtr> snapshot = read(collection, kBatchesWhileServing, context);
+        RETURN_IF_ERROR(snapshot);
+        auto slot = std::make_shared<Slot>();
+        slot->publish(*snapshot);
+        const std::lock_guard<std::mutex> lock(mutex_);
+        directory_.byId[collection.id] = std::move(slot);
+        return {};
+    });
+}
+
+Result<SnapshotPtr> CollectionIndex::show(std::int64_t collectionId) {
+    const SlotPtr slot = find(collectionId);
+    if (!slot) return fail(ErrorCode::kNotFound, "there is no collection " + std::to_string(collectionId));
+    SnapshotPtr snapshot = slot->current();
+    const std::lock_guard<std::mutex> lock(mutex_);
+    directory_.byName[snapshot->collection.name] = slot;
+    return snapshot;
+}
+
 void CollectionIndex::remove(std::int64_t collectionId) {
     // Declared before the lock, so that a large snapshot is freed after it.
     SlotPtr removed;

@@ -69,6 +69,11 @@ class CollectionIndex {
 
     /// Adds a collection that was just created, empty. Errors: kDataLoss (its parameters).
     [[nodiscard]] Result<SnapshotPtr> add(const store::Collection& collection);
+    /// Reads a collection that nobody knows yet. Until `show`, it is found by its id alone. Errors:
+    /// kDataLoss, kCancelled, kDeadlineExceeded.
+    [[nodiscard]] Result<void> prepare(const store::Collection& collection, const RunContext& context);
+    /// Makes a prepared collection known under its name. Errors: kNotFound.
+    [[nodiscard]] Result<SnapshotPtr> show(std::int64_t collectionId);
     /// Removes a collection; ignores unknown ids. Running searches keep their snapshot.
     void remove(std::int64_t collectionId);
 

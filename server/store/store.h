@@ -22,6 +22,7 @@
 #include "core/base/error.h"
 #include "core/base/metadata.h"
 #include "core/base/run_context.h"
+#include "server/store/import_request.h"
 #include "server/store/metadata_change.h"
 #include "server/store/quarantine.h"
 #include "server/store/verified_scan.h"
@@ -390,6 +391,25 @@ class Store {
     /// kDeadlineExceeded.
     [[nodiscard]] virtual Result<void> restore(const std::string& path, const RunContext& context,
                                                const std::function<void()>& replacing) = 0;
+    /// About how many bytes exportCollection writes. Errors: kNotFound.
+    [[nodiscard]] virtual Result<std::uint64_t> exportBytes(std::int64_t collectionId) = 0;
+    /// Copies one collection, as it is now, to a new file while others read and write: its parameters,
+    /// shapes, serving signatures and surface points, and a job for each pending shape; no aliases and
+    /// rebuilds. The file is a database with this collection alone, passes `check`, and appears under its
+    /// name when it is complete. Reports the stages "export" (shapes), "integrity", "points". Errors:
+    /// kNotFound, kAlreadyExists (the file), kFileNotWritable, kCancelled, kDeadlineExceeded.
+    [[nodiscard]] virtual Result<void> exportCollection(std::int64_t collectionId, const std::string& path,
+                                                        const RunContext& context) = 0;
+    /// Adds the one collection of such a file (or of a backup that holds no other) beside those that are
+    /// there. Prepares and checks the file as `restore` does. The collection and its shapes get new ids,
+    /// which are in the same order; generation, versions and times stay. Pending shapes are queued as if
+    /// untried. Nothing of it is seen before it is complete, no write waits for long, and an error leaves
+    /// nothing. Reports as `restore`, with "import" (shapes) in place of "restore". Errors: those of
+    /// `restore`, kMalformedFile also for more collections or none; kAlreadyExists (the name is taken),
+    /// kQueueFull, kRejected (another import is running), those of the functions in `request`.
+    [[nodiscard]] virtual Result<Collection> importCollection(const std::string& path,
+                                                              const ImportRequest& request,
+                                                              const RunContext& context) = 0;
     /// Reads everything: database integrity, references, all checksums, the rules between tables.
     /// One line per problem; after two hundred, one that says there are more; empty when sound. Reports
     /// the stages "integrity" and "points" (in shapes). Errors: kCancelled, kDeadlineExceeded.

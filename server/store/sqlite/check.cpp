@@ -61,8 +61,9 @@ constexpr Rule kRules[] = {
      "(SELECT 1 FROM signature g WHERE g.shape_id = s.id AND g.generation = c.generation "
      "AND g.points_version = s.points_version)",
      "is ready but has no signature of its current points"},
-    {"SELECT s.key FROM shape s WHERE s.state = 0 AND NOT EXISTS (SELECT 1 FROM job j WHERE j.shape_id = "
-     "s.id)",
+    // An import queues its jobs when it is complete.
+    {"SELECT s.key FROM shape s JOIN collection c ON c.id = s.collection_id WHERE s.state = 0 AND c.name "
+     "<> " SHAPEDB_IMPORTING " AND NOT EXISTS (SELECT 1 FROM job j WHERE j.shape_id = s.id)",
      "is pending but has no job"},
     {"SELECT s.key FROM shape s JOIN job j ON j.shape_id = s.id WHERE s.state <> 0",
      "has a job but is not pending"},

@@ -10,7 +10,8 @@ bool isAlias(Connection& connection, const std::string& name) {
     return Query(connection, sql::kAliasByName, name).step();
 }
 
-/// Throws Failure kAlreadyExists.
+}  // namespace
+
 void requireFreeName(Connection& connection, const std::string& name) {
     if (findCollection(connection, name)) {
         raise(ErrorCode::kAlreadyExists, "collection '" + name + "' already exists");
@@ -19,8 +20,6 @@ void requireFreeName(Connection& connection, const std::string& name) {
         raise(ErrorCode::kAlreadyExists, "'" + name + "' is an alias of a collection");
     }
 }
-
-}  // namespace
 
 Result<Collection> SqliteStore::createCollection(const std::string& name, const std::string& description,
                                                  const std::string& parameters) {

@@ -40,6 +40,8 @@ std::optional<Shape> findShapeById(Connection& connection, std::int64_t shapeId)
 /// Throws Failure kNotFound.
 Collection requireCollection(Connection& connection, std::int64_t collectionId);
 std::optional<Collection> findCollection(Connection& connection, const std::string& name);
+/// Throws Failure kAlreadyExists (a collection or an alias has the name).
+void requireFreeName(Connection& connection, const std::string& name);
 Collection readCollection(const Query& query);
 
 /// Reads points_version, generation, digest, bytes and views from `column` on and verifies the digest. Throws

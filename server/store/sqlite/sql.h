@@ -13,6 +13,9 @@ namespace shapedb::store::sql {
     "s.checksum, s.created_at, s.updated_at, s.failure_code, s.failure_message, m.name, m.value"
 #define SHAPEDB_FROM_SHAPE " FROM shape s LEFT JOIN shape_metadata m ON m.shape_id = s.id "
 
+/// The name, as an SQL text, of a collection that is being imported. No client can give it or ask for it.
+#define SHAPEDB_IMPORTING "'.import'"
+
 #define STATEMENT(name, text) inline constexpr char name[] = text;
 #include "server/store/sqlite/sql_statements.inc"
 #undef STATEMENT

@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "server/store/failpoints.h"
+#include "server/store/sqlite/database_file.h"
 #include "server/store/sqlite/migrator.h"
 #include "server/store/sqlite/rows.h"
 #include "server/store/sqlite/sequences.h"
@@ -82,10 +83,7 @@ void createDatabase(const SqliteOptions& options) {
     SHAPEDB_FAILPOINT("create.file");
     {
         Connection connection(fresh, OpenMode::kReadWrite, options.busyTimeoutMs);
-        // Only an empty file takes the page size. A crash loses a file that nobody knows yet.
-        connection.execute("PRAGMA page_size=" + std::to_string(kPageSize) +
-                           "; PRAGMA synchronous=OFF; PRAGMA journal_mode=MEMORY");
-        migrate(connection, embeddedMigrations(), options.now());
+        makeEmptyDatabase(connection, options.now());
     }
     SHAPEDB_FAILPOINT("create.filled");
     syncPath(fresh, O_RDONLY);
@@ -179,6 +177,8 @@ SqliteStore::SqliteStore(const SqliteOptions& options)
     }
     SHAPEDB_FAILPOINT("open.counted");
     mark_.write(commits);
+    // What a dead process was importing. Left where it is if the disk fails: no client sees it.
+    static_cast<void>(dropImport());
 }
 
 bool SqliteStore::releaseReserve() noexcept {

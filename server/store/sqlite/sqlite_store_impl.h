@@ -1,8 +1,8 @@
 // The class behind openSqliteStore; its functions are in collections.cpp, shapes.cpp, listing.cpp, jobs.cpp,
-// rebuild.cpp, maintenance.cpp and sqlite_store.cpp.
+// rebuild.cpp, maintenance.cpp, transfer.cpp and sqlite_store.cpp.
 //
-// Lock order: largeScanMutex_, writerMutex_, the pool's mutex. Nobody holds a reader while waiting
-// for the writer, so that neither waits for the other.
+// Lock order: importMutex_, largeScanMutex_, writerMutex_, the pool's mutex. Nobody holds a reader while
+// waiting for the writer, so that neither waits for the other.
 #pragma once
 
 #include <atomic>
@@ -21,6 +21,18 @@
 #include "server/store/sqlite/sqlite_store.h"
 
 namespace shapedb::store {
+
+/// While it lives, there is one more of those that `counter` counts.
+class Counted {
+  public:
+    explicit Counted(std::atomic<int>& counter) : counter_(counter) { ++counter_; }
+    ~Counted() { --counter_; }
+    Counted(const Counted&) = delete;
+    Counted& operator=(const Counted&) = delete;
+
+  private:
+    std::atomic<int>& counter_;
+};
 
 class SqliteStore final : public Store {
   public:
@@ -83,6 +95,11 @@ class SqliteStore final : public Store {
     Result<void> backup(const std::string& path, const RunContext& context) override;
     Result<void> restore(const std::string& path, const RunContext& context,
                          const std::function<void()>& replacing) override;
+    Result<std::uint64_t> exportBytes(std::int64_t collectionId) override;
+    Result<void> exportCollection(std::int64_t collectionId, const std::string& path,
+                                  const RunContext& context) override;
+    Result<Collection> importCollection(const std::string& path, const ImportRequest& request,
+                                        const RunContext& context) override;
     Result<std::vector<std::string>> check(const RunContext& context) override;
     Result<StoreStats> stats() override;
     Result<void> checkpoint() override;
@@ -154,10 +171,20 @@ class SqliteStore final : public Store {
                     std::uint64_t bytes);
     bool jobIsCurrent(Connection& connection, const Job& job, std::int64_t generation);
 
+    /// The first part of an import: the collection, with no shapes and a name that nobody else uses.
+    Collection beginImport(const Collection& wanted, const ImportRequest& request, const QueueDepth& pending);
+    /// The last part of an import: its name and its jobs.
+    Collection finishImport(const Collection& imported, const ImportRequest& request);
+    void importShapes(Connection& file, const Collection& from, const Collection& to,
+                      const ImportRequest& request, const RunContext& context);
+    /// Removes what an import has stored, some shapes at a time, if it was not completed.
+    Result<void> dropImport() noexcept;
+
     SqliteOptions options_;
     std::string walPath_;
     ProcessLock lock_;
     SpaceReserve reserve_;       ///< under writerMutex_
+    std::mutex importMutex_;     ///< one import at a time
     std::mutex largeScanMutex_;  ///< one compressed copy of a large scan at a time, to bound memory
     std::mutex writerMutex_;
     std::unique_ptr<Connection> writer_;
@@ -167,7 +194,7 @@ class SqliteStore final : public Store {
     std::vector<std::string> findings_;  ///< what was noticed when the database was opened
     mutable std::mutex findingsMutex_;
     std::uint64_t walAttemptAt_;  ///< log size at which to wait for readers; under writerMutex_
-    /// Backups and checks, which hold a snapshot too long to wait for.
+    /// Backups, exports and checks, which hold a snapshot too long to wait for.
     std::atomic<int> longReads_{0};
 };
 

@@ -1,5 +1,5 @@
 // The Store contract in maps: a plain second implementation for tests of the layers above. Not
-// durable; backup and restore copy the content under the name of the "file".
+// durable; backups and exports copy the content under the name of the "file".
 #pragma once
 
 #include <functional>
@@ -80,6 +80,11 @@ class MemoryStore : public store::Store {
     Result<void> backup(const std::string& path, const RunContext& context) override;
     Result<void> restore(const std::string& path, const RunContext& context,
                          const std::function<void()>& replacing) override;
+    Result<std::uint64_t> exportBytes(std::int64_t collectionId) override;
+    Result<void> exportCollection(std::int64_t collectionId, const std::string& path,
+                                  const RunContext& context) override;
+    Result<store::Collection> importCollection(const std::string& path, const store::ImportRequest& request,
+                                               const RunContext& context) override;
     Result<std::vector<std::string>> check(const RunContext& context) override;
     Result<store::StoreStats> stats() override;
     Result<void> checkpoint() override;
@@ -148,6 +153,7 @@ class MemoryStore : public store::Store {
     std::mutex mutex_;
     Content content_;
     std::map<std::string, Content> backups_;
+    std::map<std::string, Content> exports_;
 };
 
 }  // namespace shapedb::testing

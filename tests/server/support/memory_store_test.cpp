@@ -282,5 +282,33 @@ TEST_F(MemoryStoreTest, RestoresAsSqliteDoes) {
     EXPECT_FAILS(memory.restore("unknown", {}, {}), ErrorCode::kFileNotReadable);
 }
 
+TEST_F(MemoryStoreTest, ImportsAsSqliteDoes) {
+    testing::MemoryStore memory;
+    Side a(*store_);
+    Side b(memory);
+    for (Side* side : {&a, &b}) {
+        Store& store = side->store;
+        const std::int64_t original = store.createCollection("parts", "", "p").value().id;
+        ASSERT_TRUE(store.putShape(request(original, "k0", cloud(1))));
+        const Job job = **store.claimJob();
+        ASSERT_TRUE(store.finishJob(job, {job.shapeId, 1, 1, "its signature", "its surface"}));
+        ASSERT_TRUE(store.putShape(request(original, "k1", cloud(2), {{"m", "1"}})));
+        const std::string file = folder_.file("export");
+        ASSERT_TRUE(store.exportCollection(original, file, {}));
+        EXPECT_FAILS(store.exportCollection(original, file, {}), ErrorCode::kAlreadyExists);
+        EXPECT_FAILS(store.exportCollection(777, folder_.file("no"), {}), ErrorCode::kNotFound);
+        ImportRequest import;
+        EXPECT_FAILS(store.importCollection(file, import, {}), ErrorCode::kAlreadyExists);
+        import.name = "copy";
+        import.maxQueuedJobs = 1;
+        EXPECT_FAILS(store.importCollection(file, import, {}), ErrorCode::kQueueFull);
+        import.maxQueuedJobs = 2;
+        side->collection = store.importCollection(file, import, {})->id;
+        EXPECT_GT(side->collection, original);
+        EXPECT_FAILS(store.importCollection("unknown", import, {}), ErrorCode::kFileNotReadable);
+    }
+    EXPECT_EQ(stateOf(a), stateOf(b));
+}
+
 }  // namespace
 }  // namespace shapedb::store

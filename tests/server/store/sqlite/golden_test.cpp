@@ -44,6 +44,16 @@ class EachGoldenTest : public GoldenTest, public ::testing::WithParamInterface<i
 
 INSTANTIATE_TEST_SUITE_P(Versions, EachGoldenTest, ::testing::Values(1, 2, 3, 4, 5));
 
+/// The database of a schema version; empty if it is missing.
+std::string golden(int version) {
+    const std::string packed =
+        slurp(std::string(SHAPEDB_GOLDEN_DIR) + "/database_v" + std::to_string(version) + ".db.zst");
+    if (packed.empty()) return {};
+    std::string bytes(ZSTD_getFrameContentSize(packed.data(), packed.size()), ' ');
+    EXPECT_EQ(ZSTD_decompress(bytes.data(), bytes.size(), packed.data(), packed.size()), bytes.size());
+    return bytes;
+}
+
 TEST_F(GoldenTest, CanBeWritten) {
     const char* target = std::getenv("SHAPEDB_WRITE_GOLDEN");
     fill(*store_);
@@ -57,12 +67,25 @@ TEST_F(GoldenTest, CanBeWritten) {
     spill(target, packed);
 }
 
+TEST_P(EachGoldenTest, IsMigratedWhenItsCollectionIsImported) {
+    const std::string path = folder_.file("old.db");
+    spill(path, golden(GetParam()));
+    Connection(path, OpenMode::kReadWrite, 0).execute("DELETE FROM collection WHERE name = 'empty'");
+    const std::string before = slurp(path);
+    const auto imported = store_->importCollection(path, {}, {});
+    ASSERT_TRUE(imported) << imported.error().message;
+    EXPECT_TRUE(slurp(path) == before) << "the file is left as it is";
+    EXPECT_EQ(imported->parameters, "theta=20");
+    EXPECT_EQ(store_->countShapes(imported->id, {}).value(), 3u);
+    EXPECT_EQ(store_->loadIndex(imported->id, 0, 10)->size(), 2u);
+    EXPECT_EQ(store_->queueDepth()->jobs, 1u);
+    EXPECT_EQ(store_->getSignature(store_->getShape(imported->id, "ready")->id)->bytes, "signature of 1/1/1");
+    expectSound();
+}
+
 TEST_P(EachGoldenTest, OpensAndAnswers) {
-    const std::string packed =
-        slurp(std::string(SHAPEDB_GOLDEN_DIR) + "/database_v" + std::to_string(GetParam()) + ".db.zst");
-    ASSERT_FALSE(packed.empty()) << "the golden database is missing";
-    std::string bytes(ZSTD_getFrameContentSize(packed.data(), packed.size()), ' ');
-    ASSERT_EQ(ZSTD_decompress(bytes.data(), bytes.size(), packed.data(), packed.size()), bytes.size());
+    const std::string bytes = golden(GetParam());
+    ASSERT_FALSE(bytes.empty());
     store_.reset();
     spill(options().path, bytes);
     std::filesystem::remove(options().path + ".commits");  // of the database that was here before

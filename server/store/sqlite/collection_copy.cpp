@@ -1,0 +1,126 @@
+#include "server/store/sqlite/collection_copy.h"
+
+#include "server/store/point_blob.h"
+#include "server/store/sqlite/rows.h"
+
+namespace shapedb::store {
+
+namespace {
+
+/// What one transaction copies or deletes: a few milliseconds of the write lock, and of memory.
+constexpr std::size_t kShapesAtATime = 64;
+constexpr std::size_t kBytesAtATime = std::size_t{4} << 20;
+
+std::size_t bytesOf(const CopiedShape& copied) {
+    return copied.points.size() +
+           (copied.signature ? copied.signature->bytes.size() + copied.signature->views.size() : 0) +
+           (copied.surface ? copied.surface->bytes.size() : 0);
+}
+
+CopiedShape withContent(Connection& source, Shape shape, std::int64_t generation) {
+    CopiedShape copied;
+    copied.shape = std::move(shape);
+    const std::int64_t id = copied.shape.id;
+    {
+        Query points(source, sql::kStoredPoints, id);
+        if (!points.step()) {
+            raise(ErrorCode::kDataLoss, "the points of shape " + quoted(copied.shape.key) + " are missing");
+        }
+        copied.pointBytes = static_cast<std::uint64_t>(points.integer(0));
+        const BlobView blob = points.blob(2);
+        if (blob.size > 0) copied.points.assign(static_cast<const char*>(blob.data), blob.size);
+    }
+    {
+        Query signature(source, sql::kServingSignature, id);
+        if (signature.step() && !signature.isNull(3)) {
+            copied.signature = readSignature(source, signature, 3, id);
+            copied.signature->generation = generation;
+        }
+    }
+    Query surface(source, sql::kSurfaceOfShape, id);
+    if (surface.step()) copied.surface = readSurface(surface);
+    return copied;
+}
+
+void insertPoints(Connection& target, std::int64_t shapeId, const CopiedShape& copied) {
+    const std::string& points = copied.points;
+    if (points.size() <= PointEncoding::kWholeBytes) {
+        Query(target, sql::kInsertPoints, shapeId, copied.pointBytes, points.size(),
+              BlobView{points.data(), points.size()})
+            .run();
+        return;
+    }
+    Query(target, sql::kInsertPoints, shapeId, copied.pointBytes, points.size(), ZeroBlob{points.size()})
+        .run();
+    BlobWriter(target, "shape_points", "points", shapeId).append(points.data(), points.size());
+}
+
+}  // namespace
+
+std::vector<CopiedShape> nextShapes(Connection& source, const Collection& collection, std::int64_t afterId) {
+    std::vector<CopiedShape> batch;
+    std::size_t bytes = 0;
+    Query query(source, sql::kListShapes, collection.id, afterId);
+    forEachShape(query, [&](Shape shape) {
+        batch.push_back(withContent(source, std::move(shape), collection.generation));
+        bytes += bytesOf(batch.back());
+        return batch.size() < kShapesAtATime && bytes < kBytesAtATime;
+    });
+    return batch;
+}
+
+std::int64_t insertCollection(Connection& target, const Collection& collection, const std::string& name) {
+    Query(target, sql::kCopyCollection, name, collection.description, collection.parameters,
+          collection.generation, collection.createdAt)
+        .run();
+    return target.lastInsertId();
+}
+
+void insertCopy(Connection& target, std::int64_t collectionId, const CopiedShape& copied) {
+    const Shape& shape = copied.shape;
+    const Error failure = shape.failure.value_or(Error{});
+    Query(target, sql::kCopyShape, collectionId, shape.key, shape.version, shape.pointsVersion,
+          static_cast<int>(shape.state), shape.pointCount,
+          BlobView{shape.checksum.data(), shape.checksum.size()}, shape.createdAt, shape.updatedAt,
+          std::string(errorCodeName(failure.code)), failure.message)
+        .run();
+    const std::int64_t shapeId = target.lastInsertId();
+    for (const auto& [name, value] : shape.metadata) {
+        Query(target, sql::kInsertMetadata, shapeId, name, value).run();
+    }
+    insertPoints(target, shapeId, copied);
+    if (copied.signature) {
+        SignatureRow row = *copied.signature;
+        row.shapeId = shapeId;
+        putSignature(target, row);
+    }
+    if (copied.surface) {
+        const SurfaceRow& surface = *copied.surface;
+        Query(target, sql::kPutSurface, shapeId, surface.pointsVersion, digestOf(surface.bytes),
+              BlobView{surface.bytes.data(), surface.bytes.size()})
+            .run();
+    }
+}
+
+QueueDepth pendingOf(Connection& connection, std::int64_t collectionId) {
+    Query query(connection, sql::kPendingOf, collectionId);
+    if (!query.step()) return {};
+    return {static_cast<std::uint64_t>(query.integer(0)), static_cast<std::uint64_t>(query.integer(1))};
+}
+
+void queuePending(Connection& connection, std::int64_t collectionId, TimestampMs now) {
+    Query(connection, sql::kQueuePending, collectionId, now).run();
+}
+
+std::vector<std::int64_t> someShapes(Connection& connection, std::int64_t collectionId) {
+    std::vector<std::int64_t> ids;
+    std::size_t bytes = 0;
+    Query query(connection, sql::kStoredSizes, collectionId);
+    while (ids.size() < kShapesAtATime && bytes < kBytesAtATime && query.step()) {
+        ids.push_back(query.integer(0));
+        bytes += static_cast<std::size_t>(query.integer(1));
+    }
+    return ids;
+}
+
+}  // namespace shapedb::store

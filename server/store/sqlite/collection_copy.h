@@ -1,0 +1,41 @@
+// Copies a collection from one database to another, some shapes at a time: exports and imports share it.
+// Functions throw Failure.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/store/sqlite/connection.h"
+#include "server/store/store.h"
+
+namespace shapedb::store {
+
+/// A shape with all that belongs to it. Its job is not copied: queuePending makes new ones.
+struct CopiedShape {
+    Shape shape;  ///< with the id that it has in the source
+    std::uint64_t pointBytes = 0;
+    std::string points;  ///< as stored (point_blob.h)
+    std::optional<SignatureRow> signature;
+    std::optional<SurfaceRow> surface;
+};
+
+/// The next shapes of the collection with id > `afterId`, in ascending order of id: few and small enough for
+/// one transaction, or one large one. Empty at the end. Throws Failure kDataLoss.
+[[nodiscard]] std::vector<CopiedShape> nextShapes(Connection& source, const Collection& collection,
+                                                  std::int64_t afterId);
+
+/// In the caller's transaction. Returns the new id.
+std::int64_t insertCollection(Connection& target, const Collection& collection, const std::string& name);
+void insertCopy(Connection& target, std::int64_t collectionId, const CopiedShape& copied);
+
+/// Shapes of the collection that are pending.
+[[nodiscard]] QueueDepth pendingOf(Connection& connection, std::int64_t collectionId);
+/// Queues a job for each of them, which must have none; in the caller's transaction.
+void queuePending(Connection& connection, std::int64_t collectionId, TimestampMs now);
+
+/// The first shapes of the collection: as many as one transaction should delete.
+[[nodiscard]] std::vector<std::int64_t> someShapes(Connection& connection, std::int64_t collectionId);
+
+}  // namespace shapedb::store

@@ -1,0 +1,63 @@
+// Database files other than the live one: made for whoever asked, or received and not to be trusted.
+// Functions throw Failure.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "core/base/run_context.h"
+#include "server/store/sqlite/connection.h"
+#include "server/store/sqlite/sqlite_store.h"
+
+namespace shapedb::store {
+
+/// A path at which a database may be made; it and the files that SQLite may put beside it are removed before
+/// and after.
+class TemporaryDatabase {
+  public:
+    explicit TemporaryDatabase(const std::string& path)
+        : paths_{path, path + "-journal", path + "-wal", path + "-shm"} {
+        remove();
+    }
+    ~TemporaryDatabase() { remove(); }
+    TemporaryDatabase(const TemporaryDatabase&) = delete;
+    TemporaryDatabase& operator=(const TemporaryDatabase&) = delete;
+    [[nodiscard]] const std::string& path() const { return paths_.front(); }
+
+  private:
+    void remove() const noexcept;
+
+    std::array<std::string, 4> paths_;  ///< made at once: removing must not need memory
+};
+
+/// A file that appears under its name when it is complete and durable, and never replaces another.
+class NewFile {
+  public:
+    /// Creates it, empty and private, under a temporary name. Throws Failure kAlreadyExists (`path`),
+    /// kFileNotWritable, kStorageFull.
+    explicit NewFile(const std::string& path);
+    [[nodiscard]] const std::string& temporaryPath() const { return temporary_.path(); }
+    /// No connection may be open. Throws Failure as the constructor.
+    void publish() const;
+
+  private:
+    std::string path_;
+    TemporaryDatabase temporary_;
+};
+
+/// Gives an empty file the schema of this program.
+void makeEmptyDatabase(Connection& connection, std::int64_t nowMs);
+
+/// A copy at `copyPath` of a file that somebody named, with the schema of this program and no problem that
+/// `check` finds; an unfinished import is gone. The file itself is left alone. `use` completes "cannot be
+/// ...". Reports "copy" (bytes), "integrity" and "points". Throws Failure kFileNotReadable, kMalformedFile,
+/// kSchemaTooNew (naming `path`), kCancelled, kDeadlineExceeded.
+[[nodiscard]] std::unique_ptr<Connection> checkedCopy(const std::string& path, const char* use,
+                                                      const std::string& copyPath,
+                                                      const SqliteOptions& options,
+                                                      const RunContext& context);
+
+/// Throws Failure kDataLoss, with the first problem that `check` finds.
+void requireSound(Connection& connection, const RunContext& context);
+
+}  // namespace shapedb::store
