@@ -1,81 +1,15 @@
-// AdminService and grpc.health.v1.
-#include <algorithm>
-#include <fstream>
-
+// AdminService, without files and keys, and grpc.health.v1.
 #include <google/protobuf/io/coded_stream.h>
 #include <grpcpp/generic/generic_stub.h>
 
-#include "client/api/backup_file.h"
 #include "client/api/call.h"
 #include "client/api/client.h"
 #include "client/api/convert.h"
-#include "common/sha256.h"
 #include "core/base/return_if_error.h"
 
 namespace shapedb::client {
 
 namespace {
-
-constexpr std::size_t kBackupChunkBytes = std::size_t{1} << 20;
-
-std::string asBytes(const Sha256Digest& digest) { return {digest.begin(), digest.end()}; }
-
-template <typename Stream>
-Result<BackupReport> receiveBackup(Stream& stream, BackupFile& file, const RunContext& context) {
-    RETURN_IF_ERROR(file.open());
-    BackupReport report;
-    Sha256 checksum;
-    std::uint64_t announced = 0;
-    std::string expected;
-    v1::BackupChunk chunk;
-    while (stream.Read(&chunk)) {
-        if (chunk.total_bytes() != 0) announced = chunk.total_bytes();
-        if (!chunk.sha256().empty()) expected = chunk.sha256();
-        checksum.update(chunk.data().data(), chunk.data().size());
-        RETURN_IF_ERROR(file.write(chunk.data()));
-        report.bytes += chunk.data().size();
-        context.report("backup", report.bytes, announced);
-    }
-    report.sha256 = asBytes(checksum.finish());
-    if (expected.empty() || report.bytes != announced) {
-        return fail(ErrorCode::kCountMismatch, "the backup ended after " + std::to_string(report.bytes) +
-                                                   " of " + std::to_string(announced) +
-                                                   " bytes; nothing was kept");
-    }
-    if (expected != report.sha256) {
-        return fail(ErrorCode::kChecksumMismatch, "the backup was damaged in transfer; nothing was kept");
-    }
-    return report;
-}
-
-/// The size goes with the first chunk, the checksum with the last.
-template <typename Stream>
-Result<void> sendBackup(Stream& stream, std::ifstream& file, std::uint64_t size, const std::string& path,
-                        const RunContext& context) {
-    Sha256 checksum;
-    std::string buffer(kBackupChunkBytes, '\0');
-    std::uint64_t sent = 0;
-    while (sent < size) {
-        // Never beyond the announced size, even if the file grows meanwhile.
-        file.read(buffer.data(),
-                  static_cast<std::streamsize>(std::min<std::uint64_t>(buffer.size(), size - sent)));
-        const auto count = static_cast<std::size_t>(file.gcount());
-        if (count == 0) {
-            return fail(ErrorCode::kFileNotReadable,
-                        path + ": cannot be read beyond byte " + std::to_string(sent));
-        }
-        checksum.update(buffer.data(), count);
-        v1::BackupChunk chunk;
-        if (sent == 0) chunk.set_total_bytes(size);
-        chunk.set_data(buffer.data(), count);
-        sent += count;
-        if (sent == size) chunk.set_sha256(asBytes(checksum.finish()));
-        if (!stream.Write(chunk)) return {};  // the status of the call says why
-        context.report("restore", sent, size);
-    }
-    stream.WritesDone();
-    return {};
-}
 
 // grpc.health.v1 has one field each way: the name of the service in HealthCheckRequest, the status in
 // HealthCheckResponse. Written by hand, which spares a generated file.
@@ -143,45 +77,6 @@ Result<void> Client::cancelRebuild(const std::string& collection, const RunConte
                                     &v1::AdminService::Stub::CancelRebuild, request);
     RETURN_IF_ERROR(response);
     return {};
-}
-
-Result<BackupReport> Client::backupToFile(const std::string& path, const RunContext& context) const {
-    BackupFile file(path);
-    Result<BackupReport> report;
-    const auto made = makeCall(impl_->options, context, kIdempotentUnbounded,
-                               [&](grpc::ClientContext& rpc, Result<void>& local) {
-                                   const auto stream = impl_->admin->Backup(&rpc, v1::BackupRequest());
-                                   report = receiveBackup(*stream, file, context);
-                                   // Only a full disk here ends the call from this side; a short stream has
-                                   // its reason in the status.
-                                   if (!report && report.error().code == ErrorCode::kFileNotWritable) {
-                                       local = fail(report.error());
-                                       rpc.TryCancel();
-                                   }
-                                   return stream->Finish();
-                               });
-    RETURN_IF_ERROR(made);
-    RETURN_IF_ERROR(report);
-    RETURN_IF_ERROR(file.commit());
-    return report;
-}
-
-Result<RestoreReport> Client::restoreFromFile(const std::string& path, const RunContext& context) const {
-    std::ifstream file(path, std::ios::binary | std::ios::ate);
-    const std::streamoff size = file ? static_cast<std::streamoff>(file.tellg()) : -1;
-    if (size < 0) return fail(ErrorCode::kFileNotReadable, path + ": cannot be opened for reading");
-    if (size == 0) return fail(ErrorCode::kFileNotReadable, path + ": is empty, not a backup");
-    file.seekg(0);
-    v1::RestoreResponse response;
-    const auto made =
-        makeCall(impl_->options, context, kOnceUnbounded, [&](grpc::ClientContext& rpc, Result<void>& local) {
-            const auto stream = impl_->admin->Restore(&rpc, &response);
-            local = sendBackup(*stream, file, static_cast<std::uint64_t>(size), path, context);
-            if (!local) rpc.TryCancel();
-            return stream->Finish();
-        });
-    RETURN_IF_ERROR(made);
-    return RestoreReport{response.collections(), response.shapes()};
 }
 
 Result<std::vector<std::string>> Client::check(const std::function<void(const CheckProgress&)>& onProgress,

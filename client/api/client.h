@@ -58,8 +58,8 @@ struct ClientOptions {
     /// A file with the key in its first line; empty: no key.
     std::string apiKeyFile{};
     /// The most one call may take, retries included; 0: no limit. Calls that follow work on the server
-    /// (watchIngest, addShape with wait, rebuild, backup, restore, check) or change many shapes are limited
-    /// by their RunContext alone.
+    /// (watchIngest, addShape with wait, rebuild, backup, restore, export, import, check) or change many
+    /// shapes are limited by their RunContext alone.
     std::chrono::milliseconds deadline{60000};
     RetryPolicy retry{};
 };
@@ -263,6 +263,20 @@ class Client {
     /// Replaces everything on the server with the backup at `path`. Not retried.
     /// Errors: kFileNotReadable.
     [[nodiscard]] Result<RestoreReport> restoreFromFile(const std::string& path,
+                                                        const RunContext& context = {}) const;
+
+    /// Writes a consistent copy of one collection to `path`, as backupToFile. Aliases stay behind. Errors:
+    /// kNotFound, and those of backupToFile.
+    [[nodiscard]] Result<BackupReport> exportCollection(const std::string& collection,
+                                                        const std::string& path,
+                                                        const RunContext& context = {}) const;
+
+    /// Adds the collection at `path`, which exportCollection wrote, under the name `collection`, or under its
+    /// own if that is empty; nothing is segmented again. Not retried. Errors: kFileNotReadable,
+    /// kMalformedFile, kSchemaTooNew, kAlreadyExists, kInvalidArgument (the name), kQueueFull (its pending
+    /// shapes).
+    [[nodiscard]] Result<ImportReport> importCollection(const std::string& path,
+                                                        const std::string& collection = {},
                                                         const RunContext& context = {}) const;
 
     /// Reads the whole database. Returns the problems found, one line each; empty if it is sound.

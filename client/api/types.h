@@ -293,6 +293,12 @@ struct RestoreReport {
     std::uint64_t shapes = 0;
 };
 
+struct ImportReport {
+    std::string collection;           ///< its name now
+    std::uint64_t shapes = 0;         ///< in any state
+    std::uint64_t shapesPending = 0;  ///< of these: queued
+};
+
 struct CheckProgress {
     std::uint64_t done = 0;
     std::uint64_t total = 0;

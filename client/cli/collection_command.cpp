@@ -1,4 +1,4 @@
-// `shapedb collection create|get|list|rename|alias|unalias|delete`.
+// `shapedb collection create|get|list|rename|alias|unalias|delete|export|import`.
 #include <memory>
 
 #include <CLI/CLI.hpp>
@@ -9,6 +9,7 @@
 #include "client/cli/parameters.h"
 #include "client/cli/session.h"
 #include "client/cli/text.h"
+#include "common/sha256.h"
 #include "core/base/return_if_error.h"
 
 namespace shapedb::cli {
@@ -22,6 +23,7 @@ struct CollectionFlags {
     std::string other;  ///< the new name, or what an alias stands for
     std::string description;
     ParameterFlags parameters;
+    std::string file;
     bool force = false;
 };
 
@@ -127,6 +129,38 @@ CommandResult runUnalias(Session& session, const CollectionFlags& flags) {
     return kOk;
 }
 
+CommandResult runExport(Session& session, const CollectionFlags& flags) {
+    const auto client = connectToServer(session);
+    RETURN_IF_ERROR(client);
+    const auto report = client->exportCollection(flags.name, flags.file, session.context());
+    RETURN_IF_ERROR(report);
+    session.console().document({{"collection", flags.name},
+                                {"file", flags.file},
+                                {"bytes", report->bytes},
+                                {"sha256", toHex(report->sha256.data(), report->sha256.size())}});
+    session.console().text(flags.name + ": " + formatBytes(report->bytes) + " written to " + flags.file +
+                           "\n");
+    return kOk;
+}
+
+CommandResult runImport(Session& session, const CollectionFlags& flags) {
+    const auto client = connectToServer(session);
+    RETURN_IF_ERROR(client);
+    const auto report = client->importCollection(flags.file, flags.name, session.context());
+    RETURN_IF_ERROR(report);
+    session.console().document({{"collection", report->collection},
+                                {"file", flags.file},
+                                {"shapes", report->shapes},
+                                {"shapes_pending", report->shapesPending}});
+    session.console().text(report->collection + ": " + formatCount(report->shapes, "shape", "shapes") +
+                           " imported from " + flags.file +
+                           (report->shapesPending > 0
+                                ? ", " + formatCount(report->shapesPending) + " of them still to be segmented"
+                                : "") +
+                           "\n");
+    return kOk;
+}
+
 using Runner = CommandResult (*)(Session&, const CollectionFlags&);
 
 CLI::App* addOne(CLI::App& group, Session& session, const char* name, const char* help,
@@ -170,6 +204,14 @@ void addCollectionCommands(CLI::App& app, Session& session) {
     CLI::App* remove = addOne(*group, session, "delete", "Delete a collection", flags, &runDelete);
     addName(remove);
     remove->add_flag("--force", flags->force, "Delete its shapes too");
+    CLI::App* exported =
+        addOne(*group, session, "export", "Copy one collection to a file", flags, &runExport);
+    addName(exported);
+    exported->add_option("FILE", flags->file, "File to write")->required();
+    CLI::App* imported = addOne(*group, session, "import",
+                                "Add the collection in such a file beside the others", flags, &runImport);
+    imported->add_option("FILE", flags->file, "File that export wrote")->required();
+    imported->add_option("--name", flags->name, "Name that it gets [the one it had]")->type_name("NAME");
 }
 
 }  // namespace shapedb::cli

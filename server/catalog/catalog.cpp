@@ -1,10 +1,12 @@
-// Start and stop, collections, backup and restore; shapes.cpp has the shapes, rebuilds.cpp the rebuilds.
+// Start and stop, collections, backup and restore; shapes.cpp has the shapes, rebuilds.cpp the rebuilds,
+// transfer.cpp exports and imports.
 #include "server/catalog/catalog.h"
 
 #include <algorithm>
 #include <utility>
 
 #include "core/base/return_if_error.h"
+#include "server/catalog/file_name.h"
 #include "server/catalog/limits.h"
 #include "server/catalog/request_checks.h"
 #include "server/store/parameters_codec.h"
@@ -20,14 +22,6 @@ Result<void> ensureDefaultCollection(store::Store& store) {
                                store::encodeParameters(parametersOf(Profile::kDefault)));
     if (!created && created.error().code != ErrorCode::kAlreadyExists) return fail(created.error());
     return {};
-}
-
-// Whoever sent the backup does not know the name of the server's copy.
-Error withoutName(Error error, const std::string& file) {
-    const std::string name = "'" + file + "'";
-    const std::size_t at = error.message.find(name);
-    if (at != std::string::npos) error.message.replace(at, name.size(), "the backup");
-    return error;
 }
 
 }  // namespace
@@ -212,7 +206,7 @@ Result<void> Catalog::restore(const std::string& path, const RunContext& context
     RETURN_IF_ERROR(restores_.beginRestore());
     Result<void> restored = restoreExclusively(path, context);
     restores_.endRestore();
-    if (!restored) return fail(withoutName(restored.error(), path));
+    if (!restored) return fail(named(restored.error(), path, "the backup"));
     return restored;
 }
 
@@ -238,7 +232,9 @@ Result<void> Catalog::replaceContent(const std::string& path, const RunContext& 
         if (restores_.apart() && !lost_) restores_.replaced();
         return restored;
     }
-    const Result<void> loaded = index_.loadAll();
+    // The content of an export has no default collection.
+    Result<void> loaded = ensureDefaultCollection(*store_);
+    if (loaded) loaded = index_.loadAll();
     lost_ = !loaded;
     if (loaded) {
         restores_.replaced();

@@ -171,6 +171,22 @@ class Catalog {
     [[nodiscard]] std::vector<std::string> aliasesOf(const index::Snapshot& collection) const {
         return index_.aliasesOf(collection.collection.id);
     }
+    /// About how many bytes an export writes. Errors: kNotFound.
+    [[nodiscard]] Result<std::uint64_t> exportBytes(const std::string& name);
+    /// As store::Store. Errors also: kNotFound (the collection).
+    [[nodiscard]] Result<void> exportCollection(const std::string& name, const std::string& path,
+                                                const RunContext& context);
+    /// Refuses what `importCollection` would refuse under this name, before the file is sent. Errors:
+    /// kInvalidArgument (name), kAlreadyExists, kUnavailable.
+    [[nodiscard]] Result<void> admitImport(const std::string& name) const;
+    /// Adds the collection of an exported file under `name`, or under its own if that is empty; searches find
+    /// it, and workers get its pending shapes, when this returns. `mayUse` is asked for the name before
+    /// anything is stored. Errors, which call the file "the export": kInvalidArgument (name, description,
+    /// metadata), kMalformedFile (also: parameters), those of `mayUse` and of store::Store::importCollection.
+    using MayUse = std::function<Result<void>(const std::string& name)>;
+    [[nodiscard]] Result<index::SnapshotPtr> importCollection(const std::string& path,
+                                                              const std::string& name, const MayUse& mayUse,
+                                                              const RunContext& context);
     /// Reads the stored signatures again; nothing is segmented. Errors: kNotFound.
     [[nodiscard]] Result<index::SnapshotPtr> reload(const std::string& name);
 

@@ -1,15 +1,11 @@
 #include "server/rpc/admin_service.h"
 
-#include <algorithm>
 #include <chrono>
 #include <string>
 
 #include "core/base/return_if_error.h"
 #include "server/catalog/limits.h"
 #include "server/config/load.h"
-#include "server/files/free_space.h"
-#include "server/files/temporary_file.h"
-#include "server/rpc/backup_stream.h"
 #include "server/rpc/call.h"
 #include "server/rpc/convert.h"
 
@@ -41,14 +37,6 @@ v1::RebuildProgress progressFrom(const catalog::RebuildProgress& progress) {
     return message;
 }
 
-/// The received file, its private copy that is checked, and the log that replaces the content.
-constexpr std::uint64_t kCopiesOfRestore = 3;
-
-Result<void> requireRoomForRestore(const std::string& directory, std::uint64_t announced) {
-    constexpr std::uint64_t kMost = ~std::uint64_t{0} / kCopiesOfRestore;
-    return files::requireFreeSpace(directory, kCopiesOfRestore * std::min(announced, kMost), "the restore");
-}
-
 }  // namespace
 
 grpc::Status AdminServiceHandler::Rebuild(grpc::ServerContext* context, const v1::RebuildRequest* request,
@@ -77,59 +65,6 @@ grpc::Status AdminServiceHandler::CancelRebuild(grpc::ServerContext* context,
         const auto collection = call.useCollection(request->collection());
         RETURN_IF_ERROR(collection);
         return services_.catalog.cancelRebuild(*collection);
-    });
-}
-
-// Backup and Restore keep the order of their steps here: the file is written and read in the messages of
-// the stream, and the rules about the database are in Catalog::backup and Catalog::restore.
-grpc::Status AdminServiceHandler::Backup(grpc::ServerContext* context, const v1::BackupRequest*,
-                                         grpc::ServerWriter<v1::BackupChunk>* writer) {
-    return handle(services_, context, operations::kBackup, [&](Call& call) -> Result<void> {
-        catalog::Budget::Share copy(services_.admission.copies);
-        RETURN_IF_ERROR(copy.take(1));
-        const auto stats = services_.catalog.stats();
-        RETURN_IF_ERROR(stats);
-        RETURN_IF_ERROR(
-            files::requireFreeSpace(services_.temporaryDirectory, stats->store.databaseBytes, "the backup"));
-        const auto file = files::TemporaryFile::create(services_.temporaryDirectory);
-        RETURN_IF_ERROR(file);
-        RETURN_IF_ERROR(services_.catalog.backup(file->path(), call.run()));
-        return sendFile(file->path(), call.run(),
-                        [&](const v1::BackupChunk& chunk) { return call.write(*writer, chunk); });
-    });
-}
-
-grpc::Status AdminServiceHandler::Restore(grpc::ServerContext* context,
-                                          grpc::ServerReader<v1::BackupChunk>* reader,
-                                          v1::RestoreResponse* response) {
-    return handle(services_, context, operations::kRestore, [&](Call& call) -> Result<void> {
-        call.frame().expectRestore();
-        catalog::Budget::Share copy(services_.admission.copies);
-        RETURN_IF_ERROR(copy.take(1));
-        const auto file = files::TemporaryFile::create(services_.temporaryDirectory);
-        RETURN_IF_ERROR(file);
-        auto receiver = FileReceiver::create(file->path());
-        RETURN_IF_ERROR(receiver);
-        v1::BackupChunk chunk;
-        while (call.read(*reader, &chunk)) {
-            RETURN_IF_ERROR(call.run().checkpoint());
-            if (chunk.total_bytes() > 0) {
-                RETURN_IF_ERROR(requireRoomForRestore(services_.temporaryDirectory, chunk.total_bytes()));
-            }
-            RETURN_IF_ERROR(receiver->add(chunk));
-        }
-        if (call.clientGone()) return fail(ErrorCode::kCancelled, "the client cancelled the restore");
-        RETURN_IF_ERROR(receiver->finish());
-        call.note({"bytes", receiver->bytes()});
-
-        RETURN_IF_ERROR(services_.catalog.restore(file->path(), call.run()));
-        const auto stats = services_.catalog.stats();
-        RETURN_IF_ERROR(stats);
-        const store::StoreStats& stored = stats->store;
-        response->set_collections(stored.collections);
-        response->set_shapes(stored.shapesPending + stored.shapesReady + stored.shapesFailed);
-        services_.log->info("database replaced by a backup", {{"shapes", response->shapes()}});
-        return {};
     });
 }
 

@@ -21,6 +21,11 @@ class AdminServiceHandler final : public shapedb::v1::AdminService::Service {
                         grpc::ServerWriter<v1::BackupChunk>* writer) override;
     grpc::Status Restore(grpc::ServerContext* context, grpc::ServerReader<v1::BackupChunk>* reader,
                          v1::RestoreResponse* response) override;
+    grpc::Status ExportCollection(grpc::ServerContext* context, const v1::ExportCollectionRequest* request,
+                                  grpc::ServerWriter<v1::BackupChunk>* writer) override;
+    grpc::Status ImportCollection(grpc::ServerContext* context,
+                                  grpc::ServerReader<v1::ImportCollectionRequest>* reader,
+                                  v1::ImportCollectionResponse* response) override;
     grpc::Status Check(grpc::ServerContext* context, const v1::CheckRequest* request,
                        grpc::ServerWriter<v1::CheckProgress>* writer) override;
     grpc::Status Stats(grpc::ServerContext* context, const v1::StatsRequest* request,

@@ -110,6 +110,10 @@ inline constexpr Operation kCancelRebuild{"AdminService", "CancelRebuild", Role:
 inline constexpr Operation kBackup{"AdminService", "Backup", Role::kAdmin, CallClass::kAdmin, Scope::kServer};
 inline constexpr Operation kRestore{"AdminService", "Restore", Role::kAdmin, CallClass::kAdmin,
                                     Scope::kServer};
+inline constexpr Operation kExportCollection{"AdminService", "ExportCollection", Role::kAdmin,
+                                             CallClass::kAdmin, Scope::kCollections};
+inline constexpr Operation kImportCollection{"AdminService", "ImportCollection", Role::kAdmin,
+                                             CallClass::kAdmin, Scope::kCollections};
 inline constexpr Operation kCheck{"AdminService", "Check", Role::kAdmin, CallClass::kAdmin, Scope::kServer};
 inline constexpr Operation kStats{"AdminService", "Stats", Role::kAdmin, CallClass::kAdmin, Scope::kServer};
 inline constexpr Operation kServerInfo{"AdminService", "ServerInfo", Role::kReader, CallClass::kAdmin,
@@ -122,7 +126,7 @@ inline constexpr Operation kRevokeKey{"AdminService", "RevokeKey", Role::kAdmin,
                                       Scope::kKeys};
 
 /// All of the above. A test compares it with the services in proto/.
-inline constexpr std::array<const Operation*, 38> kAll{&kAddShape,
+inline constexpr std::array<const Operation*, 40> kAll{&kAddShape,
                                                        &kGetShape,
                                                        &kGetShapes,
                                                        &kGetPoints,
@@ -154,6 +158,8 @@ inline constexpr std::array<const Operation*, 38> kAll{&kAddShape,
                                                        &kCancelRebuild,
                                                        &kBackup,
                                                        &kRestore,
+                                                       &kExportCollection,
+                                                       &kImportCollection,
                                                        &kCheck,
                                                        &kStats,
                                                        &kServerInfo,

@@ -42,7 +42,8 @@ RULES = {
         "Rebuild": (ADMIN, COLLECTION), "CancelRebuild": (ADMIN, COLLECTION), "Backup": (ADMIN, WHOLE_SERVER),
         "Restore": (ADMIN, WHOLE_SERVER), "Check": (ADMIN, WHOLE_SERVER), "Stats": (ADMIN, WHOLE_SERVER),
         "ServerInfo": (READER, NOTHING), "CreateKey": (ADMIN, WHOLE_SERVER), "ListKeys": (ADMIN, WHOLE_SERVER),
-        "RevokeKey": (ADMIN, WHOLE_SERVER),
+        "RevokeKey": (ADMIN, WHOLE_SERVER), "ExportCollection": (ADMIN, COLLECTION),
+        "ImportCollection": (ADMIN, COLLECTION),
     },
 }
 
@@ -68,6 +69,8 @@ def messages(rpc, collection):
         "RenameCollection": [collections.RenameCollectionRequest(name=collection, new_name="open")],
         "SetAlias": [collections.SetAliasRequest(alias="open", collection=collection)],
         "DeleteAlias": [collections.DeleteAliasRequest(alias=collection)],
+        "ImportCollection": [admin.ImportCollectionRequest(header=admin.ImportCollectionHeader(
+            collection=collection))],
         "CreateKey": [admin.CreateKeyRequest(name="", role=READER)],
     }
     return special.get(rpc)
@@ -219,6 +222,34 @@ class Matrix(unittest.TestCase):
                         collections.DeleteAliasRequest(alias="live"), timeout=10))
                     denied(lambda: holder.collections.RenameCollection(
                         collections.RenameCollectionRequest(name="mine", new_name="other"), timeout=10))
+
+    def test_an_import_is_for_the_collections_of_the_key_whatever_the_file_says(self):
+        with SecuredServer() as server:
+            with server.local() as local:
+                for name in ("mine", "theirs"):
+                    local.collections.CreateCollection(collections.CreateCollectionRequest(name=name), timeout=10)
+                files = {name: list(local.admin.ExportCollection(
+                    admin.ExportCollectionRequest(collection=name), timeout=30)) for name in ("mine", "theirs")}
+                for name in files:
+                    local.collections.DeleteCollection(collections.DeleteCollectionRequest(name=name), timeout=10)
+            key = server.make(ADMIN, collections=["mine"]).secret
+            with server.connect(key=key) as holder:
+                def bring(file, name):
+                    yield admin.ImportCollectionRequest(header=admin.ImportCollectionHeader(collection=name))
+                    for chunk in files[file]:
+                        yield admin.ImportCollectionRequest(chunk=chunk)
+
+                for file, name in (("theirs", ""), ("theirs", "theirs"), ("mine", "theirs"), ("mine", "new")):
+                    with self.subTest(file=file, name=name), self.assertRaises(grpc.RpcError) as raised:
+                        holder.admin.ImportCollection(bring(file, name), timeout=30)
+                    self.assertEqual(raised.exception.code(), grpc.StatusCode.PERMISSION_DENIED)
+                # What is in the file is the holder's own affair, if the name is.
+                self.assertEqual(holder.admin.ImportCollection(bring("theirs", "mine"), timeout=30).collection, "mine")
+                holder.collections.DeleteCollection(collections.DeleteCollectionRequest(name="mine"), timeout=10)
+                self.assertEqual(holder.admin.ImportCollection(bring("mine", ""), timeout=30).collection, "mine")
+            with server.local() as local:
+                listed = local.collections.ListCollections(collections.ListCollectionsRequest(), timeout=10)
+                self.assertEqual([c.name for c in listed.collections], ["default", "mine"])
 
 
 class Strangers(unittest.TestCase):

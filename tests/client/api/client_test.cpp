@@ -2,13 +2,9 @@
 
 #include <chrono>
 #include <cstdio>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <thread>
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "client/api/packing.h"
 #include "common/sha256.h"
@@ -18,7 +14,6 @@
 namespace shapedb::client {
 namespace {
 
-namespace fs = std::filesystem;
 using std::chrono::milliseconds;
 
 PointCloud cloud(std::size_t count) {
@@ -40,11 +35,6 @@ Answer queueFull(const std::string& pushback) {
         context.AddTrailingMetadata("grpc-retry-pushback-ms", pushback);
         return namedError(context, grpc::StatusCode::RESOURCE_EXHAUSTED, "queue_full", "the queue is full");
     };
-}
-
-std::string digestOf(const std::string& bytes) {
-    const Sha256Digest digest = sha256(bytes.data(), bytes.size());
-    return {digest.begin(), digest.end()};
 }
 
 TEST(Client, OptionsAreValidated) {
@@ -189,7 +179,8 @@ TEST(Client, UploadsInChunksWithCountAndChecksum) {
     EXPECT_EQ(server.shapes.points, packPoints(points)->bytes);
     EXPECT_LE(server.shapes.largestChunk, std::size_t{1} << 20);
     EXPECT_EQ(server.shapes.header.point_count(), 200'000u);
-    EXPECT_EQ(server.shapes.header.sha256(), digestOf(server.shapes.points));
+    const Sha256Digest digest = sha256(server.shapes.points.data(), server.shapes.points.size());
+    EXPECT_EQ(server.shapes.header.sha256(), std::string(digest.begin(), digest.end()));
     EXPECT_EQ(server.shapes.header.collection(), "cups");
     EXPECT_EQ(server.shapes.header.mode(), v1::ADD_MODE_INSERT_ONLY);
     EXPECT_EQ(server.shapes.header.metadata().at("label"), "cup");
@@ -362,94 +353,6 @@ TEST(Client, SegmentedPointsComeBackWithTheirLabels) {
     chunk.mutable_chunk()->add_segments(7);
     server.shapes.segmented = {summary, chunk};
     EXPECT_EQ(server.client().segment(cloud(100), {}, false).error().code, ErrorCode::kMalformedStream);
-}
-
-class ClientBackup : public ::testing::Test {
-  protected:
-    ClientBackup()
-        : folder_((fs::path(::testing::TempDir()) / ("backup-" + std::to_string(::getpid()))).string()) {
-        fs::create_directories(folder_);
-        v1::BackupChunk chunk;
-        chunk.set_total_bytes(content_.size());
-        chunk.set_data(content_.substr(0, 4));
-        server_.admin.backup.push_back(chunk);
-        chunk.Clear();
-        chunk.set_data(content_.substr(4));
-        chunk.set_sha256(digestOf(content_));
-        server_.admin.backup.push_back(chunk);
-    }
-    ~ClientBackup() override { fs::remove_all(folder_); }
-
-    std::string file() const { return folder_ + "/copy.db"; }
-    std::string written() const {
-        std::ifstream stream(file(), std::ios::binary);
-        return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-    }
-    bool nothingLeft() const { return fs::is_empty(folder_); }
-
-    const std::string content_ = "all the shapes there are";
-    std::string folder_;
-    FakeServer server_;
-};
-
-TEST_F(ClientBackup, WritesTheCompleteFile) {
-    const auto report = server_.client().backupToFile(file());
-    ASSERT_TRUE(report) << report.error().message;
-    EXPECT_EQ(report->bytes, content_.size());
-    EXPECT_EQ(report->sha256, digestOf(content_));
-    EXPECT_EQ(written(), content_);
-}
-
-TEST_F(ClientBackup, DamagedOrShortBackupLeavesNoFile) {
-    server_.admin.backup.back().set_data("otherwise");
-    server_.admin.backup.front().set_total_bytes(13);
-    EXPECT_EQ(server_.client().backupToFile(file()).error().code, ErrorCode::kChecksumMismatch);
-    EXPECT_TRUE(nothingLeft());
-
-    server_.admin.backup.pop_back();
-    EXPECT_EQ(server_.client().backupToFile(file()).error().code, ErrorCode::kCountMismatch);
-    EXPECT_TRUE(nothingLeft());
-}
-
-TEST_F(ClientBackup, ServerErrorIsReportedAndTheOldFileKept) {
-    std::ofstream(file()) << "older backup";
-    server_.admin.backup.pop_back();
-    server_.admin.backupStatus = grpc::Status(grpc::StatusCode::DATA_LOSS, "page 7 is damaged");
-    const auto report = server_.client().backupToFile(file());
-    ASSERT_FALSE(report);
-    EXPECT_EQ(report.error().code, ErrorCode::kDataLoss);
-    EXPECT_EQ(written(), "older backup");
-}
-
-TEST_F(ClientBackup, FullDiskIsReported) {
-    const auto report = server_.client().backupToFile(folder_ + "/no/such/folder/copy.db");
-    ASSERT_FALSE(report);
-    EXPECT_EQ(report.error().code, ErrorCode::kFileNotWritable);
-}
-
-TEST_F(ClientBackup, RestoreSendsSizeChunksAndChecksum) {
-    const std::string large(3'000'000, 'x');
-    std::ofstream(file(), std::ios::binary) << large;
-    const auto report = server_.client().restoreFromFile(file());
-    ASSERT_TRUE(report) << report.error().message;
-    EXPECT_EQ(report->shapes, 3u);
-    const auto& chunks = server_.admin.restored;
-    ASSERT_EQ(chunks.size(), 3u);
-    EXPECT_EQ(chunks.front().total_bytes(), large.size());
-    EXPECT_EQ(chunks.back().sha256(), digestOf(large));
-    std::string joined;
-    for (const v1::BackupChunk& chunk : chunks) {
-        EXPECT_LE(chunk.data().size(), std::size_t{1} << 20);
-        joined += chunk.data();
-    }
-    EXPECT_EQ(joined, large);
-}
-
-TEST_F(ClientBackup, RestoreRefusesMissingAndEmptyFiles) {
-    EXPECT_EQ(server_.client().restoreFromFile(file()).error().code, ErrorCode::kFileNotReadable);
-    EXPECT_EQ(server_.client().restoreFromFile(folder_).error().code, ErrorCode::kFileNotReadable);
-    std::ofstream(file()).close();
-    EXPECT_EQ(server_.client().restoreFromFile(file()).error().code, ErrorCode::kFileNotReadable);
 }
 
 TEST(Client, HealthFailsWithoutTheHealthService) {

@@ -65,6 +65,24 @@ grpc::Status FakeAdmin::Backup(grpc::ServerContext*, const v1::BackupRequest*,
     return backupStatus;
 }
 
+grpc::Status FakeAdmin::ExportCollection(grpc::ServerContext*, const v1::ExportCollectionRequest* request,
+                                         grpc::ServerWriter<v1::BackupChunk>* writer) {
+    exported = request->collection();
+    for (const v1::BackupChunk& chunk : backup) writer->Write(chunk);
+    return backupStatus;
+}
+
+grpc::Status FakeAdmin::ImportCollection(grpc::ServerContext*,
+                                         grpc::ServerReader<v1::ImportCollectionRequest>* reader,
+                                         v1::ImportCollectionResponse* response) {
+    v1::ImportCollectionRequest message;
+    while (reader->Read(&message)) imported.push_back(message);
+    response->set_collection("parts");
+    response->set_shapes(7);
+    response->set_shapes_pending(2);
+    return grpc::Status::OK;
+}
+
 grpc::Status FakeAdmin::Restore(grpc::ServerContext*, grpc::ServerReader<v1::BackupChunk>* reader,
                                 v1::RestoreResponse* response) {
     restored.clear();

@@ -54,7 +54,14 @@ class FakeAdmin final : public v1::AdminService::Service {
                         grpc::ServerWriter<v1::BackupChunk>* writer) override;
     grpc::Status Restore(grpc::ServerContext* context, grpc::ServerReader<v1::BackupChunk>* reader,
                          v1::RestoreResponse* response) override;
+    grpc::Status ExportCollection(grpc::ServerContext* context, const v1::ExportCollectionRequest* request,
+                                  grpc::ServerWriter<v1::BackupChunk>* writer) override;
+    grpc::Status ImportCollection(grpc::ServerContext* context,
+                                  grpc::ServerReader<v1::ImportCollectionRequest>* reader,
+                                  v1::ImportCollectionResponse* response) override;
 
+    std::string exported;                               ///< the name asked for
+    std::vector<v1::ImportCollectionRequest> imported;  ///< as received
     std::vector<v1::BackupChunk> backup;
     grpc::Status backupStatus;
     std::vector<v1::BackupChunk> restored;

@@ -444,6 +444,42 @@ TEST_F(Online, RestoreBringsBackABackup) {
     EXPECT_EQ(ask({"admin", "backup", path("no/such/folder/copy.db")}).exitCode, 3);
 }
 
+TEST_F(Online, OneCollectionIsExportedAndImported) {
+    fill("moving");
+    const json exported = onlineJson({"collection", "export", "moving", path("moving.db")});
+    EXPECT_EQ(exported["collection"], "moving");
+    EXPECT_EQ(exported["bytes"], fs::file_size(path("moving.db")));
+    EXPECT_EQ(exported["sha256"].get<std::string>().size(), 64u);
+    EXPECT_FALSE(fs::exists(path("moving.db.part")));
+    EXPECT_EQ(onlineJson({"collection", "import", path("moving.db")}, 4)["error"]["name"], "already_exists");
+    const json imported = onlineJson({"collection", "import", path("moving.db"), "--name", "moved"});
+    EXPECT_EQ(imported["collection"], "moved");
+    EXPECT_EQ(imported["shapes"], 6);
+    EXPECT_EQ(imported["shapes_pending"], 0);
+    json hits[2];
+    for (int i = 0; i < 2; ++i) {
+        hits[i] =
+            onlineJson({"query", "--key", "mug/mug_01", "--collection", i == 0 ? "moving" : "moved"})["hits"];
+    }
+    ASSERT_EQ(hits[0].size(), hits[1].size());
+    for (std::size_t i = 0; i < hits[0].size(); ++i) {
+        EXPECT_EQ(hits[0][i]["key"], hits[1][i]["key"]);
+        EXPECT_EQ(hits[0][i]["score"], hits[1][i]["score"]);
+    }
+    EXPECT_EQ(online({"collection", "delete", "moving", "--force"}).exitCode, 0);
+    const auto again = online({"collection", "import", path("moving.db")});
+    EXPECT_EQ(again.exitCode, 0);
+    EXPECT_NE(again.out.find("moving: 6 shapes imported from "), std::string::npos) << again.out;
+
+    write("rubbish.db", "this is no database");
+    EXPECT_EQ(onlineJson({"collection", "import", path("rubbish.db"), "--name", "x"}, 3)["error"]["name"],
+              "malformed_file");
+    EXPECT_EQ(online({"collection", "import", path("missing.db")}).exitCode, 3);
+    EXPECT_EQ(online({"collection", "export", "nothing", path("nothing.db")}).exitCode, 4);
+    EXPECT_FALSE(fs::exists(path("nothing.db")));
+    EXPECT_EQ(online({"collection", "export", "moving", path("no/such/folder/x.db")}).exitCode, 3);
+}
+
 TEST_F(Online, CheckStatsAndInfoReport) {
     fill("care");
     EXPECT_EQ(onlineJson({"admin", "check"})["sound"], true);

@@ -1,0 +1,77 @@
+// Export and import of one collection.
+#include "core/base/return_if_error.h"
+#include "server/catalog/catalog.h"
+#include "server/catalog/file_name.h"
+#include "server/catalog/request_checks.h"
+#include "server/store/parameters_codec.h"
+
+namespace shapedb::catalog {
+namespace {
+
+/// What a client could not have given a collection of its own, or what no search could read.
+Result<void> checkImported(const store::Collection& collection) {
+    RETURN_IF_ERROR(checkCollectionName(collection.name));
+    RETURN_IF_ERROR(checkDescription(collection.description));
+    const auto parameters = store::decodeParameters(collection.parameters);
+    if (parameters) return {};
+    return fail(ErrorCode::kMalformedFile, "the export cannot be imported: " + parameters.error().message);
+}
+
+Result<void> checkImported(const store::Shape& shape) {
+    const auto checked = checkMetadata(shape.metadata);
+    if (checked) return {};
+    return fail(withContext(checked.error(), "shape '" + shape.key + "': "));
+}
+
+}  // namespace
+
+Result<std::uint64_t> Catalog::exportBytes(const std::string& name) {
+    const auto found = collection(name);
+    RETURN_IF_ERROR(found);
+    return store_->exportBytes((*found)->collection.id);
+}
+
+Result<void> Catalog::exportCollection(const std::string& name, const std::string& path,
+                                       const RunContext& context) {
+    const auto found = collection(name);
+    RETURN_IF_ERROR(found);
+    return store_->exportCollection((*found)->collection.id, path, context);
+}
+
+Result<void> Catalog::admitImport(const std::string& name) const {
+    RETURN_IF_ERROR(checkCollectionName(name));
+    RETURN_IF_ERROR(requireContent());
+    if (!index_.byName(name)) return {};
+    return fail(ErrorCode::kAlreadyExists, "'" + name + "' is the name of a collection or an alias");
+}
+
+Result<index::SnapshotPtr> Catalog::importCollection(const std::string& path, const std::string& name,
+                                                     const MayUse& mayUse, const RunContext& context) {
+    const RestoreGate::Write write(restores_);
+    RETURN_IF_ERROR(requireContent());
+    std::optional<std::int64_t> prepared;
+    store::ImportRequest request;
+    request.name = name;
+    request.accept = [&](const store::Collection& collection) -> Result<void> {
+        RETURN_IF_ERROR(checkImported(collection));
+        return mayUse(collection.name);
+    };
+    request.acceptShape = [](const store::Shape& shape) { return checkImported(shape); };
+    // Before its jobs are queued: a worker's result must find its collection in the index.
+    request.beforeVisible = [&](const store::Collection& collection) {
+        prepared = collection.id;
+        return index_.prepare(collection, context);
+    };
+    request.maxQueuedJobs = options_.maxQueuedJobs;
+    request.maxQueuedBytes = options_.maxQueuedBytes;
+    const auto imported = store_->importCollection(path, request, context);
+    if (!imported) {
+        if (prepared) index_.remove(*prepared);
+        return fail(named(imported.error(), path, "the export"));
+    }
+    auto shown = index_.show(imported->id);
+    workers_.wake();
+    return shown;
+}
+
+}  // namespace shapedb::catalog
