@@ -111,9 +111,9 @@ void prepareCopy(Connection& copy, const RunContext& context, std::int64_t nowMs
         // A file can be made so that its triggers keep a migration busy for ever.
         const Interruptible interruptible(copy, context);
         migrate(copy, embeddedMigrations(), nowMs);
+        // What was being imported when the backup was made would never be completed.
+        copy.execute("DELETE FROM collection WHERE name = " SHAPEDB_IMPORTING);
     }
-    // What was being imported when the backup was made would never be completed.
-    copy.execute("DELETE FROM collection WHERE name = " SHAPEDB_IMPORTING);
     requireSound(copy, context);
 }
 

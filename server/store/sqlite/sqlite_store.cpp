@@ -177,7 +177,10 @@ SqliteStore::SqliteStore(const SqliteOptions& options)
     }
     SHAPEDB_FAILPOINT("open.counted");
     mark_.write(commits);
-    // What a dead process was importing. Left where it is if the disk fails: no client sees it.
+    // What a dead process had in hand: its copies of files, which may be as large as the database,
+    for (const char* copy : {".restore", ".import"})
+        static_cast<void>(TemporaryDatabase(options_.path + copy));
+    // and shapes, which are left where they are if the disk fails: no client sees them.
     static_cast<void>(dropImport());
 }
 
