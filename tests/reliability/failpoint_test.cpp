@@ -62,6 +62,8 @@ class Pipe {
     int ends_[2] = {-1, -1};
 };
 
+int deathCount = 0;
+
 /// At most so many times each failpoint is deadly, spread over all times it is reached.
 int mostDeaths() { return 3 * testing::testScale(); }
 
@@ -89,6 +91,7 @@ void dieIn(const std::vector<Moment>& moments, const Image& files, const std::st
     });
     const std::size_t acknowledged = pipe.count();
     ASSERT_EQ(exit, kDiedThere);
+    ++deathCount;
     ASSERT_LT(acknowledged, moments.size());
 
     const Moment& moment = moments[acknowledged];
@@ -190,6 +193,7 @@ void dieWorking(const std::string& name, int time) {
     });
     if (time > 1 && exit == 0) return;
     ASSERT_EQ(exit, kDiedThere);
+    ++deathCount;
     const auto scans = static_cast<int>(acknowledged.count());
     const int next = inChild([&] {
         Server server(folder.path());
@@ -220,7 +224,7 @@ TEST(FailpointTest, EachIsSurvived) {
     }
     EXPECT_GE(all.size(), 20u);
     EXPECT_EQ(died, all);
-    std::cout << all.size() << " failpoints\n";
+    std::cout << all.size() << " failpoints, " << deathCount << " deaths\n";
 }
 
 bool holdFailpoints(const std::string& paths) {

@@ -4,6 +4,7 @@
 #include "server/store/failpoints.h"
 #include "server/store/sqlite/check.h"
 #include "server/store/sqlite/database_file.h"
+#include "server/store/sqlite/migrator.h"
 #include "server/store/sqlite/rows.h"
 #include "server/store/sqlite/sequences.h"
 #include "server/store/sqlite/sqlite_store_impl.h"
