@@ -1,5 +1,6 @@
 #include "common/small_file.h"
 
+#include <array>
 #include <cerrno>
 #include <system_error>
 
@@ -38,21 +39,17 @@ Result<std::string> readSmallFile(const char* what, const std::string& path, std
         return unreadable(std::generic_category().message(errno));
     }
     if (!S_ISREG(status.st_mode)) return unreadable("it is not a regular file");
-    std::string text(most + 1, '\0');
-    std::size_t size = 0;
-    while (size < text.size()) {
-        const ssize_t got = ::read(file.get(), text.data() + size, text.size() - size);
+    std::string text;
+    std::array<char, 16'384> piece{};
+    while (text.size() <= most) {
+        const ssize_t got = ::read(file.get(), piece.data(), piece.size());
         if (got < 0 && errno == EINTR) continue;
         if (got < 0) return unreadable(std::generic_category().message(errno));
-        if (got == 0) break;
-        size += static_cast<std::size_t>(got);
+        if (got == 0) return text;
+        text.append(piece.data(), static_cast<std::size_t>(got));
     }
-    if (size > most) {
-        return fail(ErrorCode::kMalformedFile,
-                    std::string(what) + " " + path + " has more than " + std::to_string(most) + " bytes");
-    }
-    text.resize(size);
-    return text;
+    return fail(ErrorCode::kMalformedFile,
+                std::string(what) + " " + path + " has more than " + std::to_string(most) + " bytes");
 }
 
 }  // namespace shapedb

@@ -1,15 +1,14 @@
 #include "server/key_command.h"
 
-#include <array>
 #include <cstdint>
 #include <cstdio>
-#include <ctime>
 #include <limits>
 #include <string>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 
+#include "common/utc_text.h"
 #include "core/base/return_if_error.h"
 #include "server/config/load.h"
 #include "server/daemon.h"
@@ -33,14 +32,7 @@ struct KeyFlags {
     std::string id;
 };
 
-std::string dateOf(security::UnixMs time) {
-    const auto seconds = static_cast<std::time_t>(time / 1'000);
-    std::tm parts{};
-    gmtime_r(&seconds, &parts);
-    std::array<char, 32> text{};
-    std::strftime(text.data(), text.size(), "%Y-%m-%d %H:%M", &parts);
-    return text.data();
-}
+std::string dateOf(security::UnixMs time) { return utcText(time / 1'000, "%Y-%m-%d %H:%M"); }
 
 std::string joined(const std::vector<std::string>& names) {
     std::string text;

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <ctime>
 
 #include "common/safe_text.h"
+#include "common/utc_text.h"
 
 namespace shapedb::cli {
 
@@ -147,12 +147,7 @@ std::string Table::render() const {
 }
 
 std::string timeText(std::chrono::system_clock::time_point time) {
-    const std::time_t seconds = std::chrono::system_clock::to_time_t(time);
-    std::tm parts{};
-    if (gmtime_r(&seconds, &parts) == nullptr) return {};
-    char buffer[40];
-    const std::size_t length = std::strftime(buffer, sizeof buffer, "%Y-%m-%dT%H:%M:%SZ", &parts);
-    return std::string(buffer, length);
+    return utcText(std::chrono::system_clock::to_time_t(time), "%Y-%m-%dT%H:%M:%SZ");
 }
 
 }  // namespace shapedb::cli

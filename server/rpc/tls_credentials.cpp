@@ -14,17 +14,13 @@
 #include <unistd.h>
 
 #include "core/base/return_if_error.h"
+#include "server/security/keyring.h"
 
 namespace shapedb::rpc {
 namespace {
 
 constexpr unsigned kWatchSeconds = 1;
 constexpr security::UnixMs kWarnBeforeExpiryMs = security::UnixMs{14} * 86'400'000;
-
-security::UnixMs wallClock() {
-    const auto now = std::chrono::system_clock::now().time_since_epoch();
-    return std::chrono::duration_cast<std::chrono::milliseconds>(now).count();
-}
 
 tl::unexpected<Error> noMemoryFile() {
     return fail(ErrorCode::kInternal,
@@ -68,19 +64,10 @@ Result<void> TlsCredentials::MemoryFile::replace(const std::string& content) {
 TlsCredentials::TlsCredentials(security::TlsFiles files, telemetry::LoggerPtr log)
     : files_(std::move(files)), log_(std::move(log)) {}
 
-TlsCredentials::~TlsCredentials() {
-    {
-        const std::lock_guard<std::mutex> lock(mutex_);
-        ending_ = true;
-    }
-    wake_.notify_all();
-    if (watcher_.joinable()) watcher_.join();
-}
-
 Result<std::unique_ptr<TlsCredentials>> TlsCredentials::start(security::TlsFiles files,
                                                               telemetry::LoggerPtr log) {
     std::unique_ptr<TlsCredentials> tls(new TlsCredentials(std::move(files), std::move(log)));
-    const auto identity = security::loadTlsIdentity(tls->files_, wallClock());
+    const auto identity = security::loadTlsIdentity(tls->files_, security::systemClock().wall());
     RETURN_IF_ERROR(identity);
     RETURN_IF_ERROR(tls->use(*identity));
     const std::string path = tls->identity_.path();
@@ -96,7 +83,7 @@ Result<std::unique_ptr<TlsCredentials>> TlsCredentials::start(security::TlsFiles
         options.set_cert_request_type(GRPC_SSL_REQUEST_AND_REQUIRE_CLIENT_CERTIFICATE_AND_VERIFY);
     }
     tls->credentials_ = grpc::experimental::TlsServerCredentials(options);
-    tls->watcher_ = std::thread([raw = tls.get()] { raw->watch(); });
+    tls->watcher_.emplace(std::chrono::seconds(kWatchSeconds), [raw = tls.get()] { raw->look(); });
     return tls;
 }
 
@@ -118,19 +105,14 @@ Result<void> TlsCredentials::use(const security::TlsIdentity& identity) {
 }
 
 void TlsCredentials::warnOfTrouble(const security::TlsIdentity& identity) {
-    if (toldOfExpiry_ || wallClock() < identity.notAfter - kWarnBeforeExpiryMs) return;
+    if (toldOfExpiry_ || security::systemClock().wall() < identity.notAfter - kWarnBeforeExpiryMs) return;
     toldOfExpiry_ = true;
     log_->warn("the TLS certificate expires within two weeks: replace its files, the server need not stop",
                {{"subject", identity.subject}, {"file", files_.certificate}});
 }
 
-void TlsCredentials::watch() {
-    std::unique_lock<std::mutex> lock(mutex_);
-    while (!wake_.wait_for(lock, std::chrono::seconds(kWatchSeconds), [this] { return ending_; })) look();
-}
-
 void TlsCredentials::look() {
-    auto identity = security::loadTlsIdentity(files_, wallClock());
+    auto identity = security::loadTlsIdentity(files_, security::systemClock().wall());
     Result<void> good;
     if (!identity) {
         good = fail(identity.error());

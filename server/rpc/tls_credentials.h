@@ -2,14 +2,13 @@
 #pragma once
 
 #include <atomic>
-#include <condition_variable>
 #include <memory>
-#include <mutex>
+#include <optional>
 #include <string>
-#include <thread>
 
 #include <grpcpp/security/server_credentials.h>
 
+#include "common/repeating_thread.h"
 #include "core/base/error.h"
 #include "server/security/certificate.h"
 #include "server/telemetry/logger.h"
@@ -27,7 +26,6 @@ class TlsCredentials {
     /// Errors: those of security::loadTlsIdentity; kInternal (no memory file).
     [[nodiscard]] static Result<std::unique_ptr<TlsCredentials>> start(security::TlsFiles files,
                                                                        telemetry::LoggerPtr log);
-    ~TlsCredentials();
     TlsCredentials(const TlsCredentials&) = delete;
     TlsCredentials& operator=(const TlsCredentials&) = delete;
 
@@ -54,7 +52,6 @@ class TlsCredentials {
     TlsCredentials(security::TlsFiles files, telemetry::LoggerPtr log);
     Result<void> use(const security::TlsIdentity& identity);
     void warnOfTrouble(const security::TlsIdentity& identity);
-    void watch();
     void look();
 
     const security::TlsFiles files_;
@@ -66,10 +63,7 @@ class TlsCredentials {
     std::string problem_;  ///< of the files, as last logged
     std::atomic<security::UnixMs> expires_{0};
     bool toldOfExpiry_ = false;
-    std::mutex mutex_;
-    std::condition_variable wake_;
-    bool ending_ = false;
-    std::thread watcher_;
+    std::optional<RepeatingThread> watcher_;  ///< the last, so that it ends first
 };
 
 }  // namespace shapedb::rpc

@@ -1,6 +1,5 @@
 #include "server/security/certificate.h"
 
-#include <array>
 #include <ctime>
 #include <memory>
 
@@ -12,6 +11,7 @@
 #include <sys/stat.h>
 
 #include "common/small_file.h"
+#include "common/utc_text.h"
 #include "core/base/return_if_error.h"
 
 namespace shapedb::security {
@@ -63,14 +63,7 @@ UnixMs timeOf(const ASN1_TIME* time) {
     return static_cast<UnixMs>(timegm(&parts)) * 1'000;
 }
 
-std::string dateOf(UnixMs time) {
-    const auto seconds = static_cast<std::time_t>(time / 1'000);
-    std::tm parts{};
-    gmtime_r(&seconds, &parts);
-    std::array<char, 32> text{};
-    std::strftime(text.data(), text.size(), "%Y-%m-%d %H:%M UTC", &parts);
-    return text.data();
-}
+std::string dateOf(UnixMs time) { return utcText(time / 1'000, "%Y-%m-%d %H:%M UTC"); }
 
 std::string subjectOf(const X509& certificate) {
     const Bio bio(BIO_new(BIO_s_mem()), BIO_free);

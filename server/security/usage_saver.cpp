@@ -11,21 +11,11 @@ constexpr std::chrono::seconds kSaveEvery{10};
 }  // namespace
 
 UsageSaver::UsageSaver(Keyring& keyring, telemetry::LoggerPtr log)
-    : keyring_(keyring), log_(std::move(log)), thread_([this] { run(); }) {}
+    : keyring_(keyring), log_(std::move(log)), thread_(std::in_place, kSaveEvery, [this] { save(); }) {}
 
 UsageSaver::~UsageSaver() {
-    {
-        const std::lock_guard<std::mutex> lock(mutex_);
-        ending_ = true;
-    }
-    wake_.notify_all();
-    thread_.join();
+    thread_.reset();
     save();
-}
-
-void UsageSaver::run() {
-    std::unique_lock<std::mutex> lock(mutex_);
-    while (!wake_.wait_for(lock, kSaveEvery, [this] { return ending_; })) save();
 }
 
 void UsageSaver::save() {

@@ -1,10 +1,9 @@
 // Writes what API keys have used, now and then.
 #pragma once
 
-#include <condition_variable>
-#include <mutex>
-#include <thread>
+#include <optional>
 
+#include "common/repeating_thread.h"
 #include "server/security/keyring.h"
 #include "server/telemetry/logger.h"
 
@@ -20,16 +19,12 @@ class UsageSaver {
     UsageSaver& operator=(const UsageSaver&) = delete;
 
   private:
-    void run();
     void save();
 
     Keyring& keyring_;
     const telemetry::LoggerPtr log_;
     bool failing_ = false;  ///< told once
-    std::mutex mutex_;
-    std::condition_variable wake_;
-    bool ending_ = false;
-    std::thread thread_;
+    std::optional<RepeatingThread> thread_;
 };
 
 }  // namespace shapedb::security

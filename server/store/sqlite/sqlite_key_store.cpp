@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <chrono>
 #include <cstring>
 #include <mutex>
 #include <utility>
@@ -11,6 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "server/security/keyring.h"
 #include "server/store/failure.h"
 #include "server/store/sqlite/connection.h"
 #include "server/store/sqlite/migrator.h"
@@ -96,9 +96,7 @@ class SqliteKeyStore final : public security::KeyStore {
         if (identify(*connection_) == FileKind::kForeign) {
             raise(ErrorCode::kDataLoss, "'" + path + "' is not a file of API keys");
         }
-        const auto now = std::chrono::system_clock::now().time_since_epoch();
-        migrate(*connection_, embeddedKeyMigrations(),
-                std::chrono::duration_cast<std::chrono::milliseconds>(now).count());
+        migrate(*connection_, embeddedKeyMigrations(), security::systemClock().wall());
         watched_ = watch_->integer(kReadVersion);
     }
 

@@ -1,0 +1,28 @@
+// A thread that does the same again and again.
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <functional>
+#include <mutex>
+#include <thread>
+
+namespace shapedb {
+
+/// Calls `work` once per `interval`, the first time after one, until it is destroyed, which waits for a call
+/// that runs. `work` must not throw.
+class RepeatingThread {
+  public:
+    RepeatingThread(std::chrono::milliseconds interval, std::function<void()> work);
+    ~RepeatingThread();
+    RepeatingThread(const RepeatingThread&) = delete;
+    RepeatingThread& operator=(const RepeatingThread&) = delete;
+
+  private:
+    std::mutex mutex_;
+    std::condition_variable wake_;
+    bool ending_ = false;
+    std::thread thread_;
+};
+
+}  // namespace shapedb
