@@ -73,7 +73,7 @@ bool pointsAreCurrent(Connection& connection, const Rebuild& rebuild, std::int64
 }  // namespace
 
 Result<Rebuild> SqliteStore::startRebuild(std::int64_t collectionId, const std::string& parameters) {
-    RETURN_IF_ERROR(holdReserve());
+    RETURN_IF_ERROR(reserve_.hold());
     return write("start the rebuild", [&](Connection& connection) {
         const Collection collection = requireCollection(connection, collectionId);
         {

@@ -110,7 +110,7 @@ PutResult SqliteStore::replacePoints(Connection& connection, const PutRequest& r
 }
 
 Result<PutResult> SqliteStore::putShape(const PutRequest& request) {
-    RETURN_IF_ERROR(holdReserve());
+    RETURN_IF_ERROR(reserve_.hold());
     // Compressing takes longest and needs no write lock.
     std::unique_lock<std::mutex> largeScan(largeScanMutex_, std::defer_lock);
     if (request.scan.bytes() > PointEncoding::kWholeBytes) largeScan.lock();
@@ -188,7 +188,7 @@ Result<std::vector<Shape>> SqliteStore::deleteShapes(const std::vector<std::int6
 Result<std::vector<Shape>> SqliteStore::changeMetadata(
     const std::vector<std::int64_t>& shapeIds,
     const std::function<std::optional<Metadata>(const Shape&)>& change) {
-    RETURN_IF_ERROR(holdReserve());
+    RETURN_IF_ERROR(reserve_.hold());
     return write("change the metadata", [&](Connection& connection) {
         std::vector<Shape> changed;
         for (const std::int64_t shapeId : shapeIds) {

@@ -18,6 +18,7 @@ SpaceReserve::~SpaceReserve() {
 }
 
 Result<void> SpaceReserve::hold() {
+    const std::lock_guard<std::mutex> lock(mutex_);
     if (held_ || file_ < 0) return {};
     const int failed = ::posix_fallocate(file_, 0, static_cast<off_t>(bytes_));
     held_ = failed == 0;
@@ -29,6 +30,7 @@ Result<void> SpaceReserve::hold() {
 }
 
 bool SpaceReserve::release() {
+    const std::lock_guard<std::mutex> lock(mutex_);
     if (!held_) return false;
     held_ = false;
     return ::ftruncate(file_, 0) == 0;

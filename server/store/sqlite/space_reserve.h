@@ -2,13 +2,14 @@
 #pragma once
 
 #include <cstdint>
+#include <mutex>
 #include <string>
 
 #include "core/base/error.h"
 
 namespace shapedb::store {
 
-/// A file that takes space and holds nothing. Not thread-safe.
+/// A file that takes space and holds nothing. Thread-safe.
 class SpaceReserve {
   public:
     /// The log of many deletions between two checkpoints.
@@ -29,6 +30,7 @@ class SpaceReserve {
   private:
     const std::string path_;
     const std::uint64_t bytes_;
+    std::mutex mutex_;
     int file_ = -1;
     bool held_ = false;
 };

@@ -184,18 +184,6 @@ SqliteStore::SqliteStore(const SqliteOptions& options)
     static_cast<void>(dropImport());
 }
 
-bool SqliteStore::releaseReserve() noexcept {
-    const std::lock_guard<std::mutex> lock(writerMutex_);
-    return reserve_.release();
-}
-
-Result<void> SqliteStore::holdReserve() noexcept {
-    return guarded("keep space for deletions", [&] {
-        const std::lock_guard<std::mutex> lock(writerMutex_);
-        orRaise(reserve_.hold());
-    });
-}
-
 void SqliteStore::commit(Transaction& transaction, std::int64_t changesBefore) {
     if (writer_->totalChanges() == changesBefore) {
         transaction.commit();

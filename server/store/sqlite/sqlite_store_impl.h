@@ -131,12 +131,9 @@ class SqliteStore final : public Store {
     auto remove(const char* operation, Body&& body) noexcept
         -> Result<std::invoke_result_t<Body, Connection&>> {
         auto done = write(operation, body);
-        if (done || done.error().code != ErrorCode::kStorageFull || !releaseReserve()) return done;
+        if (done || done.error().code != ErrorCode::kStorageFull || !reserve_.release()) return done;
         return write(operation, body);
     }
-    bool releaseReserve() noexcept;
-    /// Before the database grows. Errors: kStorageFull (only the reserve is left, or not even that).
-    Result<void> holdReserve() noexcept;
 
     /// Runs `body(connection)` in a read transaction on a pooled connection.
     template <typename Body>

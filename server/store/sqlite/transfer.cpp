@@ -124,7 +124,7 @@ Result<Collection> SqliteStore::importCollection(const std::string& path, const 
 
 Collection SqliteStore::beginImport(const Collection& wanted, const ImportRequest& request,
                                     const QueueDepth& pending) {
-    orRaise(holdReserve());
+    orRaise(reserve_.hold());
     return orRaise(write("import the collection", [&](Connection& connection) {
         // Asked again at the end; to be refused here saves the time.
         requireFreeName(connection, wanted.name);
@@ -148,7 +148,7 @@ void SqliteStore::importShapes(Connection& file, const Collection& from, const C
         for (const CopiedShape& copied : batch) {
             if (request.acceptShape) orRaise(request.acceptShape(copied.shape));
         }
-        orRaise(holdReserve());
+        orRaise(reserve_.hold());
         orRaise(write("import the collection", [&](Connection& connection) {
             requireHidden(connection, to);
             for (const CopiedShape& copied : batch) insertCopy(connection, to.id, copied);
