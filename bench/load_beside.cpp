@@ -1,6 +1,7 @@
 // Searches beside others: large batches, and far more clients than the server can serve.
 #include <atomic>
 #include <thread>
+#include <utility>
 
 #include <sys/resource.h>
 #include <sys/syscall.h>
@@ -25,6 +26,26 @@ void yieldToServer() {
         ::setpriority(PRIO_PROCESS, static_cast<id_t>(::syscall(SYS_gettid)), kClientNice) == 0;
     static_cast<void>(kOnce);
 }
+
+/// A server with stored signatures, and queries that are not among them.
+struct Subject {
+    WorkDirectory directory;
+    std::vector<std::string> queries;
+    ServerProcess server;
+
+    static Result<Subject> start(const LoadSettings& settings, std::uint64_t shapes,
+                                 const LoadProgress& progress, const RunContext& context) {
+        auto directory = WorkDirectory::create(settings.directory);
+        RETURN_IF_ERROR(directory);
+        const std::string data = directory->path() + "/data";
+        const auto generator = makeGenerator(settings, shapes, context);
+        RETURN_IF_ERROR(generator);
+        RETURN_IF_ERROR(storeSignatures(data, *generator, shapes, progress, context));
+        auto server = startServer(settings, data);
+        RETURN_IF_ERROR(server);
+        return Subject{std::move(*directory), makeQueries(*generator, shapes), std::move(*server)};
+    }
+};
 
 /// As measureLatencyOf, beside clients that send large batches.
 Result<BatchFigures> measureBatchesOf(const LoadSettings& settings, const ServerProcess& server,
@@ -131,44 +152,32 @@ Result<Goodput> goodputOf(const LoadSettings& settings, const ServerProcess& ser
 
 Result<BatchFigures> measureBatches(const LoadSettings& settings, const LoadProgress& progress,
                                     const RunContext& context) {
-    const auto directory = WorkDirectory::create(settings.directory);
-    RETURN_IF_ERROR(directory);
-    const std::string data = directory->path() + "/data";
-    const auto generator = makeGenerator(settings, settings.batchShapes, context);
-    RETURN_IF_ERROR(generator);
-    RETURN_IF_ERROR(storeSignatures(data, *generator, settings.batchShapes, progress, context));
-    const std::vector<std::string> queries = makeQueries(*generator, settings.batchShapes);
-    const auto server = startServer(settings, data);
-    RETURN_IF_ERROR(server);
-    const auto client = connect(*server);
+    const auto subject = Subject::start(settings, settings.batchShapes, progress, context);
+    RETURN_IF_ERROR(subject);
+    const auto client = connect(subject->server);
     RETURN_IF_ERROR(client);
-    return measureBatchesOf(settings, *server, *client, queries, progress, context);
+    return measureBatchesOf(settings, subject->server, *client, subject->queries, progress, context);
 }
 
 Result<OverloadFigures> measureOverload(const LoadSettings& settings, const LoadProgress& progress,
                                         const RunContext& context) {
-    const auto directory = WorkDirectory::create(settings.directory);
-    RETURN_IF_ERROR(directory);
-    const std::string data = directory->path() + "/data";
-    const auto generator = makeGenerator(settings, settings.overloadShapes, context);
-    RETURN_IF_ERROR(generator);
-    RETURN_IF_ERROR(storeSignatures(data, *generator, settings.overloadShapes, progress, context));
-    const std::vector<std::string> queries = makeQueries(*generator, settings.overloadShapes);
-    const auto server = startServer(settings, data);
-    RETURN_IF_ERROR(server);
+    const auto subject = Subject::start(settings, settings.overloadShapes, progress, context);
+    RETURN_IF_ERROR(subject);
     OverloadFigures figures;
     std::vector<double> ratios;
     const double seconds = settings.querySeconds / static_cast<double>(settings.rounds) / 2.0;
     for (std::size_t round = 0; round < settings.rounds; ++round) {
         progress("overload", round, settings.rounds);
         RETURN_IF_ERROR(context.checkpoint());
-        const auto peak = goodputOf(settings, *server, queries, settings.peakClients, seconds);
+        const auto peak =
+            goodputOf(settings, subject->server, subject->queries, settings.peakClients, seconds);
         RETURN_IF_ERROR(peak);
-        const auto before = server->memory();
+        const auto before = subject->server.memory();
         RETURN_IF_ERROR(before);
-        const auto over = goodputOf(settings, *server, queries, 10 * settings.peakClients, seconds);
+        const auto over =
+            goodputOf(settings, subject->server, subject->queries, 10 * settings.peakClients, seconds);
         RETURN_IF_ERROR(over);
-        const auto after = server->memory();
+        const auto after = subject->server.memory();
         RETURN_IF_ERROR(after);
         figures.peak += peak->perSecond / static_cast<double>(settings.rounds);
         figures.overloaded += over->perSecond / static_cast<double>(settings.rounds);

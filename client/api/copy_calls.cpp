@@ -117,6 +117,17 @@ Result<void> sendChunks(OutgoingFile& file, const char* stage, const RunContext&
     return {};
 }
 
+/// An upload that failed on this side must not look complete.
+template <typename Stream>
+grpc::Status finishUpload(Stream& stream, grpc::ClientContext& rpc, const Result<void>& local) {
+    if (local) {
+        stream.WritesDone();
+    } else {
+        rpc.TryCancel();
+    }
+    return stream.Finish();
+}
+
 }  // namespace
 
 Result<BackupReport> Client::backupToFile(const std::string& path, const RunContext& context) const {
@@ -143,12 +154,7 @@ Result<RestoreReport> Client::restoreFromFile(const std::string& path, const Run
             const auto stream = impl_->admin->Restore(&rpc, &response);
             local = sendChunks(*file, "restore", context,
                                [&](const v1::BackupChunk& chunk) { return stream->Write(chunk); });
-            if (local) {
-                stream->WritesDone();
-            } else {
-                rpc.TryCancel();
-            }
-            return stream->Finish();
+            return finishUpload(*stream, rpc, local);
         });
     RETURN_IF_ERROR(made);
     return RestoreReport{response.collections(), response.shapes()};
@@ -171,12 +177,7 @@ Result<ImportReport> Client::importCollection(const std::string& path, const std
                     return stream->Write(request);
                 });
             }
-            if (local) {
-                stream->WritesDone();
-            } else {
-                rpc.TryCancel();
-            }
-            return stream->Finish();
+            return finishUpload(*stream, rpc, local);
         });
     RETURN_IF_ERROR(made);
     return ImportReport{response.collection(), response.shapes(), response.shapes_pending()};
