@@ -161,6 +161,21 @@ class Client:
         return self.shapes.AddShape(upload(key, points, wait=wait, **header), timeout=timeout)
 
 
+class SecuredServer(Server):
+    """Demands keys, and has a Unix socket for its own admin."""
+
+    def __init__(self, *flags, **options):
+        super().__init__("--security-keys", "always", "--unix-socket", "{data}.sock", *flags, first_key=True,
+                         **options)
+
+    def local(self):
+        return Client("unix:" + self.data + ".sock")
+
+    def make(self, role, name="test", **spec):
+        with self.local() as client:
+            return client.admin.CreateKey(admin.CreateKeyRequest(name=name, role=role, **spec), timeout=10)
+
+
 def ball(points=2_000, stretch=1.0):
     """Points on an ellipsoid, evenly, as a list of (x, y, z)."""
     golden = math.pi * (3.0 - math.sqrt(5.0))

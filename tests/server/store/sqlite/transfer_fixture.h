@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 
+#include "server/store/sqlite/connection.h"
 #include "tests/server/store/sqlite/store_fixture.h"
 
 namespace shapedb::store {
