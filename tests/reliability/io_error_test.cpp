@@ -33,11 +33,11 @@ class IoErrorTest : public ::testing::TestWithParam<FaultKind> {
         const auto every = static_cast<std::uint64_t>(std::max(1, kEveryCall / testing::testScale()));
         Tally tally;
         const Trouble once = ioTrouble("one fault", GetParam(), false);
-        const auto places = placesIn(moments, once);
-        tryTrouble(moments, places, once, every, tally);
-        tryTrouble(moments, places, ioTrouble("faults from then on,", GetParam(), true), every, tally);
+        const Places places = everyPlace(every, moments, once);
+        tryTrouble(moments, places, once, tally);
+        tryTrouble(moments, places, ioTrouble("faults from then on,", GetParam(), true), tally);
         EXPECT_GT(tally.errors, 0u);
-        std::cout << tally.places << " calls, " << tally.tried << " made to fail: " << tally.errors
+        std::cout << places.all << " calls, " << tally.tried << " made to fail: " << tally.errors
                   << " errors, " << tally.unnoticed << " without consequence\n";
     }
 

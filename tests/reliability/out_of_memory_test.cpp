@@ -9,13 +9,8 @@
 namespace shapedb::reliability {
 namespace {
 
-// In CI one of so many allocations fails; SHAPEDB_TEST_SCALE divides it.
-constexpr int kEveryAllocation = 200;
-constexpr int kEveryOfMany = 1000;
-
-std::uint64_t scaled(int every) {
-    return static_cast<std::uint64_t>(std::max(1, every / testing::testScale()));
-}
+// In CI one of so many of the places fails; SHAPEDB_TEST_SCALE divides it.
+constexpr int kEveryStack = 40;
 
 Trouble memoryTrouble(const std::string& name, bool lasting) {
     return {name,
@@ -27,37 +22,23 @@ Trouble memoryTrouble(const std::string& name, bool lasting) {
             false};
 }
 
-void tryAllocations(const std::vector<Moment>& moments, std::uint64_t every) {
+/// At the first allocation of every call stack: at another with the same stack the code goes the same way.
+void tryAllocations(const std::vector<Moment>& moments) {
+    const auto every = static_cast<std::uint64_t>(std::max(1, kEveryStack / testing::testScale()));
     Tally tally;
     const Trouble once = memoryTrouble("one allocation failing", false);
-    const auto places = placesIn(moments, once);
-    tryTrouble(moments, places, once, every, tally);
-    tryTrouble(moments, places, memoryTrouble("allocations failing from then on,", true), every, tally);
+    const Places places =
+        chosenPlaces(every, moments, once, Allocations::watchStacks, Allocations::newStacks);
+    tryTrouble(moments, places, once, tally);
+    tryTrouble(moments, places, memoryTrouble("allocations failing from then on,", true), tally);
     EXPECT_GT(tally.errors, 0u);
-    std::cout << tally.places << " allocations, " << tally.tried << " made to fail: " << tally.errors
+    std::cout << places.all << " allocations, " << tally.tried << " made to fail: " << tally.errors
               << " errors, " << tally.unnoticed << " without consequence\n";
 }
 
-/// Steps that allocate several times as much as all others together, most of it in SQLite's parser.
-bool isLarge(const Moment& moment) {
-    const std::string& name = moment.step.name;
-    return name == "create" || name == "open" || name == "reopen" || name == "restore" || name == "check";
-}
+TEST(OutOfMemoryTest, LosesNothingAndTheStoreWorksOn) { tryAllocations(recordWholeScript()); }
 
-std::vector<Moment> someOf(bool large) {
-    std::vector<Moment> some;
-    for (Moment& moment : recordWholeScript())
-        if (isLarge(moment) == large) some.push_back(std::move(moment));
-    return some;
-}
-
-TEST(OutOfMemoryTest, LosesNothingAndTheStoreWorksOn) {
-    tryAllocations(someOf(false), scaled(kEveryAllocation));
-}
-
-TEST(OutOfMemoryTest, InOpeningRestoringAndChecking) { tryAllocations(someOf(true), scaled(kEveryOfMany)); }
-
-TEST(OutOfMemoryTest, InMigrations) { tryAllocations(recordMigrations(), scaled(kEveryOfMany)); }
+TEST(OutOfMemoryTest, InMigrations) { tryAllocations(recordMigrations()); }
 
 }  // namespace
 }  // namespace shapedb::reliability

@@ -137,6 +137,18 @@ class Checker {
         }
     }
 
+    /// One damaged row is a problem to list. A failing database ends the section, and what says nothing of
+    /// the row ends the check.
+    template <typename Body>
+    void row(Body body) {
+        try {
+            body();
+        } catch (const Failure& failure) {
+            if (failure.fromDatabase || failure.error.code == ErrorCode::kOutOfMemory) throw;
+            add(failure.error.message);
+        }
+    }
+
     /// SQLite lists a page that the device does not give like a damaged one. It is not: the next time it may
     /// be there.
     static void raiseUnreadable(const std::string& line) {
@@ -200,7 +212,7 @@ class Checker {
         for (std::uint64_t done = 0; query.step(); ++done) {
             orRaise(context_.checkpoint());
             context_.report("points", done, total);
-            try {
+            row([&] {
                 const std::vector<float> loaded = readPoints(query);
                 const auto bytes = static_cast<std::int64_t>(loaded.size() * sizeof(float));
                 if (query.integer(4) != bytes ||
@@ -208,11 +220,7 @@ class Checker {
                     add("shape " + quoted(query.text(0)) +
                         ": the stored byte counts do not match its points");
                 }
-            } catch (const Failure& failure) {
-                // One damaged scan is a problem to list; a failing database ends the section.
-                if (failure.fromDatabase) throw;
-                add(failure.error.message);
-            }
+            });
         }
         context_.report("points", total, total);
     }
@@ -221,12 +229,7 @@ class Checker {
         Query query(connection_, kAllSignatures);
         while (query.step()) {
             orRaise(context_.checkpoint());
-            try {
-                readSignature(connection_, query, 1, query.integer(0));
-            } catch (const Failure& failure) {
-                if (failure.fromDatabase) throw;
-                add(failure.error.message);
-            }
+            row([&] { readSignature(connection_, query, 1, query.integer(0)); });
         }
     }
 
@@ -234,12 +237,7 @@ class Checker {
         Query query(connection_, kAllSurfaces);
         while (query.step()) {
             orRaise(context_.checkpoint());
-            try {
-                (void)readSurface(query);
-            } catch (const Failure& failure) {
-                if (failure.fromDatabase) throw;
-                add(failure.error.message);
-            }
+            row([&] { (void)readSurface(query); });
         }
     }
 

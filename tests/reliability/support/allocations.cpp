@@ -2,7 +2,9 @@
 
 #include <cstdlib>
 #include <new>
+#include <unordered_set>
 
+#include <execinfo.h>
 #include <sqlite3.h>
 
 #include "tests/reliability/support/script.h"
@@ -17,8 +19,34 @@ bool hasFailed = false;
 std::uint64_t failsAt = 0;
 std::uint64_t counted = 0;
 
+// As deep as the way out of an error may go.
+constexpr int kFrames = 40;
+
+/// The stacks met, while they are looked at. Allocates, and is not counted meanwhile.
+struct Stacks {
+    std::unordered_set<std::uint64_t> met;
+    std::vector<std::uint64_t> firstAt;
+    bool watched = false;
+
+    void look(std::uint64_t at) {
+        void* frames[kFrames];
+        const int depth = backtrace(frames, kFrames);
+        std::uint64_t hash = 0;
+        for (int i = 0; i < depth; ++i)
+            hash = (hash ^ reinterpret_cast<std::uint64_t>(frames[i])) * 0x9e3779b97f4a7c15;
+        if (met.insert(hash ^ hash >> 32).second) firstAt.push_back(at);
+    }
+};
+
+Stacks stacks;
+
 bool refused() {
     if (!watched || !InStore::now()) return false;
+    if (stacks.watched) {
+        watched = false;
+        stacks.look(counted + 1);
+        watched = true;
+    }
     if (++counted != failsAt && !(goesOn && hasFailed)) return false;
     hasFailed = true;
     return true;
@@ -53,6 +81,16 @@ void Allocations::disarm() { watched = false; }
 bool Allocations::fired() { return hasFailed; }
 
 std::uint64_t Allocations::calls() { return counted; }
+
+void Allocations::watchStacks() {
+    stacks = {};
+    stacks.watched = true;
+}
+
+std::vector<std::uint64_t> Allocations::newStacks() {
+    stacks.watched = false;
+    return std::move(stacks.firstAt);
+}
 
 namespace {
 

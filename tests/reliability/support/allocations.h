@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 namespace shapedb::reliability {
 
@@ -14,6 +15,12 @@ class Allocations {
     /// Since it was armed: whether one has failed, how many were asked for.
     static bool fired();
     static std::uint64_t calls();
+
+    /// From now on the call stack of each allocation is looked at, until `newStacks`.
+    static void watchStacks();
+    /// The allocations since it was armed (from 1) whose call stack no earlier one had since `watchStacks`:
+    /// after any other, the code goes the way it went after one of these.
+    static std::vector<std::uint64_t> newStacks();
 };
 
 }  // namespace shapedb::reliability

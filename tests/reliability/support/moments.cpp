@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <new>
+#include <numeric>
 
 #include <gtest/gtest.h>
 #include <sqlite3.h>
@@ -162,24 +163,39 @@ std::vector<Moment> recordMigrations() {
     return moments;
 }
 
-std::vector<std::uint64_t> placesIn(const std::vector<Moment>& moments, const Trouble& trouble) {
-    std::vector<std::uint64_t> places;
+Places chosenPlaces(std::uint64_t every, const std::vector<Moment>& moments, const Trouble& trouble,
+                    const std::function<void()>& begin,
+                    const std::function<std::vector<std::uint64_t>()>& choose) {
+    Places places;
+    std::uint64_t passed = 0;
     for (const Moment& moment : moments) {
         Attempt attempt(moment, trouble);
+        begin();
         const auto done = attempt.run(~std::uint64_t{0});
         if (!done) ADD_FAILURE() << moment.step.name << " without trouble: " << done.error().message;
-        places.push_back(trouble.places());
+        places.all += trouble.places();
+        std::vector<std::uint64_t>& tried = places.tried.emplace_back();
+        for (const std::uint64_t at : choose())
+            if (passed++ % every == 0) tried.push_back(at);
     }
     return places;
 }
 
-void tryTrouble(const std::vector<Moment>& moments, const std::vector<std::uint64_t>& places,
-                const Trouble& trouble, std::uint64_t every, Tally& tally) {
+Places everyPlace(std::uint64_t every, const std::vector<Moment>& moments, const Trouble& trouble) {
+    const auto all = [&] {
+        std::vector<std::uint64_t> places(trouble.places());
+        std::iota(places.begin(), places.end(), std::uint64_t{1});
+        return places;
+    };
+    return chosenPlaces(
+        every, moments, trouble, [] {}, all);
+}
+
+void tryTrouble(const std::vector<Moment>& moments, const Places& places, const Trouble& trouble,
+                Tally& tally) {
     for (std::size_t i = 0; i < moments.size(); ++i) {
-        for (std::uint64_t at = 1; at <= places[i]; ++at) {
-            if (tally.places++ % every != 0) continue;
-            SCOPED_TRACE(moments[i].step.name + ", " + trouble.name + " at place " + std::to_string(at) +
-                         " of " + std::to_string(places[i]));
+        for (const std::uint64_t at : places.tried[i]) {
+            SCOPED_TRACE(moments[i].step.name + ", " + trouble.name + " at place " + std::to_string(at));
             Attempt attempt(moments[i], trouble);
             const auto done = attempt.run(at);
             ++tally.tried;

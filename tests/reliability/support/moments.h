@@ -43,20 +43,31 @@ struct Trouble {
 };
 
 struct Tally {
-    std::uint64_t places = 0;     ///< there are
-    std::uint64_t tried = 0;      ///< of these
+    std::uint64_t tried = 0;      ///< places
     std::uint64_t errors = 0;     ///< calls that failed
     std::uint64_t unnoticed = 0;  ///< calls that succeeded nevertheless
 };
 
-/// How many places for trouble there are in each moment.
-[[nodiscard]] std::vector<std::uint64_t> placesIn(const std::vector<Moment>& moments, const Trouble& trouble);
+/// Where trouble is tried.
+struct Places {
+    std::uint64_t all = 0;                          ///< there are
+    std::vector<std::vector<std::uint64_t>> tried;  ///< of these, for each moment, from 1
+};
 
-/// Repeats each moment with trouble at every `every`-th place in it, of so many (placesIn). The call fails
-/// with a fitting error and changes nothing, or succeeds; with the trouble gone, the same store does it, is
-/// sound, holds no lock and no memory, and starts again with what was acknowledged. Adds test failures
-/// otherwise.
-void tryTrouble(const std::vector<Moment>& moments, const std::vector<std::uint64_t>& places,
-                const Trouble& trouble, std::uint64_t every, Tally& tally);
+/// Every `every`-th place in the moments, all of them counted through.
+[[nodiscard]] Places everyPlace(std::uint64_t every, const std::vector<Moment>& moments,
+                                const Trouble& trouble);
+
+/// The same of the places that `choose` returns after each moment has passed without trouble; `begin` is
+/// called before it.
+[[nodiscard]] Places chosenPlaces(std::uint64_t every, const std::vector<Moment>& moments,
+                                  const Trouble& trouble, const std::function<void()>& begin,
+                                  const std::function<std::vector<std::uint64_t>()>& choose);
+
+/// Repeats each moment with trouble at each of the places. The call fails with a fitting error and changes
+/// nothing, or succeeds; with the trouble gone, the same store does it, is sound, holds no lock and no
+/// memory, and starts again with what was acknowledged. Adds test failures otherwise.
+void tryTrouble(const std::vector<Moment>& moments, const Places& places, const Trouble& trouble,
+                Tally& tally);
 
 }  // namespace shapedb::reliability
