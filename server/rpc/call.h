@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <grpcpp/server_context.h>
+#include <grpcpp/support/byte_buffer.h>
 #include <grpcpp/support/status.h>
 
 #include "core/base/error.h"
@@ -54,7 +55,7 @@ class Call {
     Result<void> write(Writer& writer, const Message& message) {
         cancellation_.beginTransfer();
         const bool good = writer.Write(message);
-        cancellation_.endTransfer(message.ByteSizeLong());
+        cancellation_.endTransfer(sizeOf(message));
         if (good) return {};
         return fail(ErrorCode::kCancelled, "the client has gone");
     }
@@ -87,6 +88,11 @@ class Call {
     [[nodiscard]] grpc::Status finish(Result<void> result);
 
   private:
+    template <typename Message>
+    static std::size_t sizeOf(const Message& message) {
+        return message.ByteSizeLong();
+    }
+    static std::size_t sizeOf(const grpc::ByteBuffer& encoded) { return encoded.Length(); }
     void logLine(const grpc::Status& status, const Error* error);
 
     const Services& services_;

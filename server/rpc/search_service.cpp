@@ -7,6 +7,7 @@
 #include "server/catalog/request_checks.h"
 #include "server/catalog/scan_upload.h"
 #include "server/catalog/searches.h"
+#include "server/rpc/batch_answer.h"
 #include "server/rpc/call.h"
 #include "server/rpc/convert.h"
 #include "server/rpc/receive_scan.h"
@@ -100,23 +101,45 @@ catalog::QuerySource sourceFrom(const v1::SearchBatchRequest::Query& query) {
 }
 
 Result<void> searchBatch(const Services& services, const Call& call, catalog::PreparedSearch& prepared,
-                         const v1::SearchBatchRequest& request, v1::SearchBatchResponse* response) {
+                         const v1::SearchBatchRequest& request, BatchAnswer& batch) {
     std::vector<catalog::QuerySource> sources;
-    for (const auto& query : request.queries()) {
-        sources.push_back(sourceFrom(query));
-        response->add_responses();
-    }
+    for (const auto& query : request.queries()) sources.push_back(sourceFrom(query));
     catalog::AnswerRoom room(services.admission.answers);
-    // Each thread fills the response of its own query.
     return services.searches.runBatch(
         prepared, sources, call.run(),
-        [&](std::size_t i, const Signature& query, const VerifiedResult& found) {
-            return answer(services, prepared, query, found, room,
-                          response->mutable_responses(static_cast<int>(i)));
+        [&](std::size_t i, const Signature& query, const VerifiedResult& found) -> Result<void> {
+            v1::SearchResponse response;
+            RETURN_IF_ERROR(answer(services, prepared, query, found, room, &response));
+            batch.set(i, response);
+            return {};
         });
 }
 
+/// The one message of a call that a handler reads itself.
+template <typename Stream, typename Message>
+Result<void> readOnly(Call& call, Stream& stream, Message* message) {
+    if (call.read(stream, message)) return {};
+    if (call.clientGone()) return fail(ErrorCode::kCancelled, "the client has gone");
+    return fail(ErrorCode::kInvalidArgument, "the message is not a " + Message::descriptor()->full_name());
+}
+
+int batchMethod() {
+    return v1::SearchBatchRequest::descriptor()
+        ->file()
+        ->FindServiceByName("SearchService")
+        ->FindMethodByName("SearchBatch")
+        ->index();
+}
+
 }  // namespace
+
+SearchServiceHandler::SearchServiceHandler(const Services& services) : services_(services) {
+    MarkMethodStreamed(batchMethod(),
+                       new grpc::internal::StreamedUnaryHandler<v1::SearchBatchRequest, grpc::ByteBuffer>(
+                           [this](grpc::ServerContext* context, BatchStream* stream) {
+                               return searchBatch(context, *stream);
+                           }));
+}
 
 grpc::Status SearchServiceHandler::SearchByKey(grpc::ServerContext* context,
                                                const v1::SearchByKeyRequest* request,
@@ -168,18 +191,20 @@ grpc::Status SearchServiceHandler::SearchBySignature(grpc::ServerContext* contex
     });
 }
 
-grpc::Status SearchServiceHandler::SearchBatch(grpc::ServerContext* context,
-                                               const v1::SearchBatchRequest* request,
-                                               v1::SearchBatchResponse* response) {
+grpc::Status SearchServiceHandler::searchBatch(grpc::ServerContext* context, BatchStream& stream) {
     return handle(services_, context, operations::kSearchBatch, [&](Call& call) -> Result<void> {
-        const int count = request->queries_size();
+        v1::SearchBatchRequest request;
+        RETURN_IF_ERROR(readOnly(call, stream, &request));
+        const int count = request.queries_size();
         call.note({"queries", std::int64_t{count}});
-        RETURN_IF_ERROR(call.useCollection(request->options().collection()));
+        RETURN_IF_ERROR(call.useCollection(request.options().collection()));
         RETURN_IF_ERROR(
             catalog::checkBatchSize(static_cast<std::uint64_t>(count), services_.config.limits.maxBatch));
-        auto prepared = prepare(services_, call, request->options());
+        auto prepared = prepare(services_, call, request.options());
         RETURN_IF_ERROR(prepared);
-        return searchBatch(services_, call, *prepared, *request, response);
+        BatchAnswer batch(static_cast<std::size_t>(count));
+        RETURN_IF_ERROR(rpc::searchBatch(services_, call, *prepared, request, batch));
+        return call.write(stream, batch.message());
     });
 }
 

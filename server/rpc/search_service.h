@@ -1,6 +1,9 @@
 // shapedb.v1.SearchService over gRPC: validate, convert, call the catalog, convert back.
 #pragma once
 
+#include <grpcpp/support/byte_buffer.h>
+#include <grpcpp/support/sync_stream.h>
+
 #include "server/rpc/services.h"
 #include "shapedb/v1/search_service.grpc.pb.h"
 
@@ -9,7 +12,7 @@ namespace shapedb::rpc {
 /// Thread-safe. `services` must outlive it.
 class SearchServiceHandler final : public shapedb::v1::SearchService::Service {
   public:
-    explicit SearchServiceHandler(const Services& services) : services_(services) {}
+    explicit SearchServiceHandler(const Services& services);
 
     grpc::Status SearchByKey(grpc::ServerContext* context, const v1::SearchByKeyRequest* request,
                              v1::SearchResponse* response) override;
@@ -18,12 +21,15 @@ class SearchServiceHandler final : public shapedb::v1::SearchService::Service {
                               v1::SearchResponse* response) override;
     grpc::Status SearchBySignature(grpc::ServerContext* context, const v1::SearchBySignatureRequest* request,
                                    v1::SearchResponse* response) override;
-    grpc::Status SearchBatch(grpc::ServerContext* context, const v1::SearchBatchRequest* request,
-                             v1::SearchBatchResponse* response) override;
     grpc::Status Compare(grpc::ServerContext* context, const v1::CompareRequest* request,
                          v1::CompareResponse* response) override;
 
   private:
+    using BatchStream = grpc::ServerUnaryStreamer<v1::SearchBatchRequest, grpc::ByteBuffer>;
+
+    /// SearchBatch, with an answer that is encoded already.
+    grpc::Status searchBatch(grpc::ServerContext* context, BatchStream& stream);
+
     const Services& services_;
 };
 

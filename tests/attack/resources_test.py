@@ -150,6 +150,18 @@ class SlowUploads(unittest.TestCase):
             self.assertTrue(eventually(lambda: "less than 1000 bytes per second" in server.log()), server.log())
 
 
+class Messages(unittest.TestCase):
+    def test_that_are_none_are_refused(self):
+        """By the handlers that gRPC gives its message, and by the one that reads it itself."""
+        with Server() as server, server.connect() as client:
+            for method in ("SearchByKey", "SearchBatch"):
+                call = client.channel.unary_unary(f"/shapedb.v1.SearchService/{method}")
+                with self.assertRaises(grpc.RpcError) as failure:
+                    call(b"\xff" * 100, timeout=10)
+                self.assertIn(failure.exception.code(), (grpc.StatusCode.INVALID_ARGUMENT, grpc.StatusCode.INTERNAL))
+            self.assertEqual(client.count(), 0)
+
+
 class Floods(unittest.TestCase):
     def test_of_calls_are_refused_by_name_and_pass(self):
         with Server() as server, server.connect() as busy:

@@ -1,0 +1,34 @@
+// The answer of SearchBatch, encoded query by query. gRPC would encode the whole of it, megabytes, on the
+// thread of the call at the end, and single searches beside it would wait for the processor meanwhile.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include <grpcpp/support/byte_buffer.h>
+#include <grpcpp/support/slice.h>
+
+#include "shapedb/v1/search_service.pb.h"
+
+namespace shapedb::rpc {
+
+/// A shapedb.v1.SearchBatchResponse in the making.
+class BatchAnswer {
+  public:
+    /// For so many queries, at least 1, all unanswered.
+    explicit BatchAnswer(std::size_t queries) : encoded_(queries) {}
+
+    /// Encodes the answer of query `i`. Threads may set different queries at the same time. At most 2 GiB - 1
+    /// bytes.
+    void set(std::size_t i, const shapedb::v1::SearchResponse& response);
+
+    /// The message, once every query is answered. Copies no answer.
+    [[nodiscard]] grpc::ByteBuffer message() const {
+        return grpc::ByteBuffer(encoded_.data(), encoded_.size());
+    }
+
+  private:
+    std::vector<grpc::Slice> encoded_;
+};
+
+}  // namespace shapedb::rpc
