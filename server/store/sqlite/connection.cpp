@@ -74,6 +74,15 @@ int openFlags(OpenMode mode) {
     return SQLITE_OPEN_READONLY;
 }
 
+/// Empty for NULL. Fetching a number makes text of it: the memory for that may be missing.
+std::string textOf(sqlite3* database, sqlite3_stmt* statement, int column) {
+    // The text first: once it is converted, it has another size.
+    const auto* data = reinterpret_cast<const char*>(sqlite3_column_text(statement, column));
+    const int size = sqlite3_column_bytes(statement, column);
+    if (data == nullptr && sqlite3_errcode(database) == SQLITE_NOMEM) throw std::bad_alloc();
+    return data == nullptr ? std::string() : std::string(data, static_cast<std::size_t>(size));
+}
+
 }  // namespace
 
 void Connection::StatementCloser::operator()(sqlite3_stmt* statement) const noexcept {
@@ -143,8 +152,7 @@ std::string Connection::text(const std::string& sql) {
     code = sqlite3_step(raw);
     if (code == SQLITE_DONE) return {};
     if (code != SQLITE_ROW) raiseLast(code);
-    const auto* value = reinterpret_cast<const char*>(sqlite3_column_text(raw, 0));
-    return value == nullptr ? std::string() : std::string(value);
+    return textOf(db_, raw, 0);
 }
 
 void Connection::rollback() noexcept {
@@ -248,13 +256,7 @@ std::int64_t Query::integer(int column) const { return sqlite3_column_int64(stat
 
 bool Query::isNull(int column) const { return sqlite3_column_type(statement_, column) == SQLITE_NULL; }
 
-std::string Query::text(int column) const {
-    // The text first: fetching it may convert it, and then it has another size.
-    const auto* data = reinterpret_cast<const char*>(sqlite3_column_text(statement_, column));
-    const int size = sqlite3_column_bytes(statement_, column);
-    if (data == nullptr && sqlite3_errcode(connection_.db_) == SQLITE_NOMEM) throw std::bad_alloc();
-    return data == nullptr ? std::string() : std::string(data, static_cast<std::size_t>(size));
-}
+std::string Query::text(int column) const { return textOf(connection_.db_, statement_, column); }
 
 BlobView Query::blob(int column) const {
     const void* data = sqlite3_column_blob(statement_, column);
