@@ -20,10 +20,12 @@ for target in "${targets[@]}"; do
   corpus=build-fuzz/corpus/$target
   committed=tests/fuzz/corpus/$target
   mkdir -p "$corpus" "$committed"
-  echo "fuzz: $target"
+  log=build-fuzz/$target.log
   build-fuzz/bin/shapedb_fuzz_"$target" "$corpus" "$committed" \
     -max_total_time="$seconds" -max_len=4096 -timeout=20 -rss_limit_mb=3072 \
-    -artifact_prefix=build-fuzz/"$target"- -print_final_stats=1 -verbosity=0
+    -artifact_prefix=build-fuzz/"$target"- -print_final_stats=1 -verbosity=0 >"$log" 2>&1 ||
+    { cat "$log" >&2; echo "fuzz: $target failed" >&2; exit 1; }
+  echo "fuzz: $target, $(sed -n 's/^stat::number_of_executed_units: *//p' "$log") inputs"
   if [ -n "${FUZZ_KEEP:-}" ]; then
     build-fuzz/bin/shapedb_fuzz_"$target" -merge=1 "$committed" "$corpus" -verbosity=0
   fi

@@ -25,7 +25,7 @@ struct Target {
             store::PutRequest request(*store::VerifiedScan::verify({tag, 0, 0, 0, 1, 0, 0, 0, 1, 1, 1, 2}));
             request.collectionId = collection->id;
             request.key = "key " + std::to_string(i);
-            request.metadata = {{"label", "x"}};
+            request.metadata = store::replacedBy({{"label", "x"}});
             request.maxQueuedJobs = 100;
             request.maxQueuedBytes = 1 << 20;
             require(static_cast<bool>(store->putShape(request)), "the target works");

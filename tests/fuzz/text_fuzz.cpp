@@ -24,10 +24,14 @@ void tryFilter(const std::string& text) {
 }
 
 void tryCursor(const std::string& text) {
-    const catalog::Listing listing{3, "label=cup", 1};
-    const auto decoded = catalog::decodeCursor(listing, text);
-    if (fuzz::valueOrExplained(decoded) == nullptr || text.empty()) return;
-    require(catalog::encodeCursor(listing, *decoded) == text, "one place has one cursor");
+    for (const store::ShapeOrder order :
+         {store::ShapeOrder::kId, store::ShapeOrder::kKey, store::ShapeOrder::kUpdated}) {
+        catalog::Listing listing{3, "label=cup", 1};
+        listing.order = order;
+        const auto decoded = catalog::decodeCursor(listing, text);
+        if (fuzz::valueOrExplained(decoded) == nullptr || !*decoded) continue;
+        require(catalog::encodeCursor(listing, **decoded) == text, "one place has one cursor");
+    }
 }
 
 void tryNames(const std::string& text) {
