@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstring>
 #include <system_error>
 #include <utility>
 
 #include <fcntl.h>
 #include <sys/stat.h>
-#include <unistd.h>
+
+#include "client/io/text.h"
 
 namespace shapedb::io {
 
@@ -20,6 +20,12 @@ constexpr std::size_t kBufferBytes = std::size_t{1} << 20;
 // Lines may be long (a triangle strip of a big model is one line); the limit only stops binary files from
 // being read as a single line.
 constexpr std::size_t kLongestLine = std::size_t{256} << 20;
+
+// What may fill up the end of a text file: zero bytes, and the Ctrl-Z of old systems.
+constexpr std::string_view kFileEnds("\0\x1a \t", 4);
+
+// More of them may be points: a point of three floats has twelve bytes.
+constexpr int kMostBlanksOfPadding = 4;
 
 Error notReadable(const std::string& path, const std::string& why) {
     return {ErrorCode::kFileNotReadable, path + ": cannot be read: " + why};
@@ -33,33 +39,17 @@ std::string reason(int number) { return std::generic_category().message(number);
 Result<InputFile> InputFile::open(const std::string& path, const RunContext& context) {
     const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
     if (descriptor < 0) return fail(notReadable(path, reason(errno)));
-    InputFile file(path, descriptor, std::nullopt, context);
+    InputFile file(path, makeFileSource(path, descriptor), std::nullopt, context);
     struct stat status = {};
     if (::fstat(descriptor, &status) != 0) return fail(notReadable(path, reason(errno)));
     if (S_ISDIR(status.st_mode)) return fail(notReadable(path, "it is a folder; name a scan file"));
-    if (S_ISREG(status.st_mode)) file.size_ = static_cast<std::uint64_t>(status.st_size);
+    if (S_ISREG(status.st_mode)) file.size_ = file.fileSize_ = static_cast<std::uint64_t>(status.st_size);
     return file;
 }
 
-InputFile::InputFile(std::string path, int descriptor, std::optional<std::uint64_t> size,
+InputFile::InputFile(std::string path, std::unique_ptr<ByteSource> source, std::optional<std::uint64_t> size,
                      const RunContext& context)
-    : path_(std::move(path)), descriptor_(descriptor), size_(size), context_(&context) {}
-
-InputFile::InputFile(InputFile&& other) noexcept
-    : path_(std::move(other.path_)),
-      descriptor_(std::exchange(other.descriptor_, -1)),
-      size_(other.size_),
-      context_(other.context_),
-      buffer_(std::move(other.buffer_)),
-      begin_(other.begin_),
-      end_(other.end_),
-      bufferOffset_(other.bufferOffset_),
-      lineNumber_(other.lineNumber_),
-      failure_(std::move(other.failure_)) {}
-
-InputFile::~InputFile() {
-    if (descriptor_ >= 0) ::close(descriptor_);
-}
+    : path_(std::move(path)), source_(std::move(source)), size_(size), fileSize_(size), context_(&context) {}
 
 std::optional<std::uint64_t> InputFile::remaining() const {
     if (!size_) return std::nullopt;
@@ -85,14 +75,14 @@ bool InputFile::readMore() {
         begin_ = 0;
     }
     if (end_ == buffer_.size()) buffer_.resize(std::max(kBufferBytes, 2 * buffer_.size()));
-    ssize_t got = 0;
-    do {
-        got = ::read(descriptor_, buffer_.data() + end_, buffer_.size() - end_);
-    } while (got < 0 && errno == EINTR);
-    if (got < 0) failure_ = notReadable(path_, reason(errno));
-    if (got <= 0) return false;
-    end_ += static_cast<std::size_t>(got);
-    context_->report("read", bufferOffset_ + end_, size_.value_or(0));
+    const auto got = source_->read(buffer_.data() + end_, buffer_.size() - end_);
+    if (!got) failure_ = got.error();
+    if (!got || *got == 0) return false;
+    end_ += *got;
+    if (source_->position() > reported_) {
+        reported_ = source_->position();
+        context_->report("read", reported_, fileSize_.value_or(0));
+    }
     return true;
 }
 
@@ -122,44 +112,109 @@ bool InputFile::skip(std::uint64_t bytes) {
 }
 
 bool InputFile::onlyPaddingLeft() {
+    int blanks = 0;
     do {
         for (; begin_ < end_; ++begin_) {
-            if (buffer_[begin_] != '\0' && std::strchr(" \t\r\n", buffer_[begin_]) == nullptr) return false;
+            if (buffer_[begin_] == '\0') continue;
+            const bool blank = isBlank(buffer_[begin_]) || buffer_[begin_] == '\n';
+            if (!blank || ++blanks > kMostBlanksOfPadding) return false;
         }
     } while (readMore());
     return true;
 }
 
-void InputFile::skipByteOrderMark() {
-    if (peek(3) == "\xEF\xBB\xBF") consume(3);
+void InputFile::readAs(std::unique_ptr<ByteSource> (*make)(std::string, std::unique_ptr<ByteSource>, bool),
+                       bool bigEndian) {
+    source_ = make(path_, putBack(std::string(data(), available()), std::move(source_)), bigEndian);
+    begin_ = end_ = 0;
+    bufferOffset_ = 0;
+    size_ = std::nullopt;
+}
+
+void InputFile::decodeText() {
+    const std::string_view start = peek(4);
+    if (start.substr(0, 3) == "\xEF\xBB\xBF") return consume(3);
+    const bool little = start.substr(0, 2) == "\xFF\xFE";
+    const bool big = start.substr(0, 2) == "\xFE\xFF";
+    if (start == std::string_view("\xFF\xFE\0\0", 4) || start == std::string_view("\0\0\xFE\xFF", 4)) {
+        failure_ = malformed("UTF-32 text is not read; save the file as UTF-8");
+        return consume(available());
+    }
+    // Without a byte order mark every second byte of the first letters is zero.
+    const auto lettersAt = [&](std::size_t first) {
+        const auto isLetter = [](char c) { return c >= '\t' && c <= '~'; };
+        return start.size() == 4 && isLetter(start[first]) && isLetter(start[first + 2]) &&
+               start[1 - first] == '\0' && start[3 - first] == '\0';
+    };
+    if (little || big) consume(2);
+    if (!little && !big && !lettersAt(0) && !lettersAt(1)) return;
+    recoded_ = true;
+    readAs(makeUtf16Source, big || lettersAt(1));
+}
+
+/// Bytes before the next line end, or all that are left of the file.
+std::size_t InputFile::lengthOfLine() {
+    std::size_t length = 0;
+    for (;;) {
+        // Digits, letters and blanks are all greater than the two that are looked for.
+        while (length < available() &&
+               (data()[length] > '\r' || (data()[length] != '\n' && data()[length] != '\r'))) {
+            ++length;
+        }
+        if (length < available()) return length;
+        if (length > kLongestLine) {
+            ++lineNumber_;
+            failure_ = malformedLine("no line end within 256 MiB; this is not a text file");
+            return length;
+        }
+        if (!readMore()) return length;
+    }
+}
+
+InputFile::LineEnd InputFile::lineEndAt(std::size_t position) {
+    if (position == available()) return LineEnd::kNone;
+    if (data()[position] == '\n') return LineEnd::kLf;
+    return fill(position + 2) && data()[position + 1] == '\n' ? LineEnd::kCrLf : LineEnd::kCr;
 }
 
 bool InputFile::readLine(std::string_view& line) {
-    std::size_t searched = 0;
-    const char* newline = nullptr;
-    for (;;) {
-        if (available() > searched) {
-            newline = static_cast<const char*>(std::memchr(data() + searched, '\n', available() - searched));
-        }
-        if (newline != nullptr) break;
-        searched = available();
-        if (searched > kLongestLine) {
-            ++lineNumber_;
-            failure_ = malformedLine("no line end within 256 MiB; this is not a text file");
-            return false;
-        }
-        if (!readMore()) break;
-    }
-    if (failure_ || (newline == nullptr && available() == 0)) return false;
-    const std::size_t length = newline != nullptr ? static_cast<std::size_t>(newline - data()) : available();
+    const std::size_t length = lengthOfLine();
+    if (failure_) return false;
+    const LineEnd end = lineEndAt(length);
     line = std::string_view(data(), length);
-    begin_ += length + (newline != nullptr ? 1 : 0);
-    if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+    if (end == LineEnd::kNone && line.find_first_not_of(kFileEnds) == std::string_view::npos) {
+        consume(length);
+        return false;
+    }
+    consume(length + (end == LineEnd::kNone ? 0 : end == LineEnd::kCrLf ? 2 : 1));
+    lineEndBefore_ = std::exchange(lineEnd_, end);
     ++lineNumber_;
     return true;
 }
 
+void InputFile::beginBinary() {
+    // Still in the buffer: the line was read just now.
+    if (lineEnd_ == LineEnd::kCrLf && lineEndBefore_ == LineEnd::kCr) --begin_;
+}
+
+std::optional<std::uint64_t> InputFile::contentLinesLeft() {
+    std::string_view text = peek(kBufferBytes);
+    if (text.size() == kBufferBytes) return std::nullopt;
+    std::uint64_t lines = 0;
+    bool blank = true;
+    for (const char c : text) {
+        if (c == '\n' || c == '\r') {
+            blank = true;
+        } else if (blank && !isBlank(c)) {
+            blank = false;
+            ++lines;
+        }
+    }
+    return lines;
+}
+
 Error InputFile::malformedLine(const std::string& what) const {
+    if (lineNumber_ == 0) return malformed("the file is empty");
     return malformed("line " + std::to_string(lineNumber_) + ": " + what);
 }
 

@@ -10,6 +10,7 @@
 
 #include "client/io/formats.h"
 #include "client/io/text.h"
+#include "core/base/count_text.h"
 #include "core/base/return_if_error.h"
 
 namespace shapedb::io {
@@ -22,14 +23,16 @@ class ObjReader {
         : file_(file), sink_(file, content_.vertices, maxPoints), fan_(content_.triangles) {}
 
     Result<ScanContent> read() {
-        file_.skipByteOrderMark();
-        while (nextLogicalLine()) {
-            std::string_view rest = withoutComment(line_);
+        file_.decodeText();
+        std::string_view rest;
+        while (file_.readLine(rest)) {
+            rest = withoutComment(rest);
             const std::string_view keyword = nextWord(rest);
-            if (keyword == "v") {
-                RETURN_IF_ERROR(readVertex(rest));
-            } else if (keyword == "f" || keyword == "fo") {
-                RETURN_IF_ERROR(readFace(rest));
+            // In lower case, but nobody means anything else by these letters.
+            if (equalsIgnoringCase(keyword, "v")) {
+                RETURN_IF_ERROR(readVertex(continued(rest)));
+            } else if (equalsIgnoringCase(keyword, "f") || equalsIgnoringCase(keyword, "fo")) {
+                RETURN_IF_ERROR(readFace(continued(rest)));
             }
         }
         if (static_cast<std::uint64_t>(greatestIndex_) > content_.vertices.size()) {
@@ -44,18 +47,22 @@ class ObjReader {
     }
 
   private:
-    // A backslash at the end of a line continues it.
-    bool nextLogicalLine() {
-        if (!file_.readLine(line_)) return false;
-        if (line_.empty() || line_.back() != '\\') return true;
+    // A backslash at the end of a line continues it. Only of vertices and faces: in comments and in the names
+    // of files ("mtllib C:\textures\") it is a letter like any other, and the next line may be a vertex.
+    std::string_view continued(std::string_view rest) {
+        const auto withoutEnd = [](std::string_view line) {
+            while (!line.empty() && isBlank(line.back())) line.remove_suffix(1);
+            return line;
+        };
+        rest = withoutEnd(rest);
+        if (rest.empty() || rest.back() != '\\') return rest;
         joined_.clear();
-        while (!line_.empty() && line_.back() == '\\') {
-            joined_.append(line_.substr(0, line_.size() - 1)).push_back(' ');
-            if (!file_.readLine(line_)) line_ = {};
-        }
-        joined_.append(line_);
-        line_ = joined_;
-        return true;
+        do {
+            joined_.append(rest.substr(0, rest.size() - 1)).push_back(' ');
+            if (!file_.readLine(rest)) rest = {};
+            rest = withoutEnd(withoutComment(rest));
+        } while (!rest.empty() && rest.back() == '\\');
+        return joined_.append(rest);
     }
 
     Result<void> readVertex(std::string_view rest) {
@@ -66,7 +73,7 @@ class ObjReader {
             if (!parseReal(word, *coordinate)) {
                 return fail(file_.malformedLine("expected three numbers after 'v' for vertex " +
                                                 std::to_string(content_.vertices.size()) + ", found " +
-                                                inQuotes(word)));
+                                                inQuotesNotANumber(word)));
             }
         }
         if (!sink_.add(p)) return fail(sink_.refusal(p, "line " + std::to_string(file_.lineNumber())));
@@ -98,16 +105,15 @@ class ObjReader {
     }
 
     Error missingVertex(std::uint64_t line, const std::string& index) const {
-        return file_.malformed("line " + std::to_string(line) + ": a face names vertex " + index +
-                               ", but there are " + std::to_string(content_.vertices.size()) +
-                               " vertices, counted from 1");
+        return file_.malformed(
+            "line " + std::to_string(line) + ": a face names vertex " + index + ", but the file has " +
+            countText(content_.vertices.size(), "vertex", "vertices") + ", counted from 1");
     }
 
     InputFile& file_;
     ScanContent content_;
     VertexSink sink_;
     PolygonFan fan_;
-    std::string_view line_;
     std::string joined_;
     std::int64_t greatestIndex_ = 0;
     std::uint64_t greatestIndexLine_ = 0;

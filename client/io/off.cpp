@@ -1,4 +1,7 @@
 // OFF (Geomview object file format) as text, with the prefixes that only add data to vertices.
+//
+// Written here: Debian's readers (CGAL, libigl, assimp) take a face list that is cut short, or numbers after
+// the last face, without an error.
 #include <cstdint>
 #include <limits>
 #include <string>
@@ -7,6 +10,8 @@
 
 #include "client/io/formats.h"
 #include "client/io/text.h"
+#include "client/io/word_reader.h"
+#include "core/base/count_text.h"
 #include "core/base/return_if_error.h"
 
 namespace shapedb::io {
@@ -18,115 +23,152 @@ struct OffCounts {
     std::uint64_t faces = 0;
 };
 
+// The prefix of OFF in the first word, which may go on with the first count ("OFF8"): ST, C and N.
+struct OffPrefix {
+    bool known = false;
+    std::size_t length = 0;        ///< of the prefix
+    std::size_t extraNumbers = 0;  ///< of a vertex, after its coordinates
+};
+
+OffPrefix parsePrefix(std::string_view word) {
+    OffPrefix prefix;
+    const auto take = [&](std::string_view letters, std::size_t numbers) {
+        if (!equalsIgnoringCase(word.substr(prefix.length, letters.size()), letters)) return;
+        // "nOFF" has vertices of another dimension.
+        if (letters == "n" && word.size() > 1 && word.substr(prefix.length, 2) == "nO") return;
+        prefix.length += letters.size();
+        prefix.extraNumbers += numbers;
+    };
+    take("st", 2);
+    take("c", 4);
+    take("n", 3);
+    prefix.known = equalsIgnoringCase(word.substr(prefix.length, 3), "off");
+    return prefix;
+}
+
 class OffReader {
   public:
     OffReader(InputFile& file, std::size_t maxPoints)
-        : file_(file), sink_(file, content_.vertices, maxPoints), fan_(content_.triangles) {}
+        : file_(file), words_(file), sink_(file, content_.vertices, maxPoints), fan_(content_.triangles) {}
 
     Result<ScanContent> read() {
-        file_.skipByteOrderMark();
+        file_.decodeText();
         RETURN_IF_ERROR(readHeader());
+        if (counts_.faces <= std::numeric_limits<std::uint64_t>::max() - counts_.vertices) {
+            wordByWord_ = words_.hasFewerLinesThan(counts_.vertices + counts_.faces);
+        }
+        if (onCountsLine_) endRecord();
         for (std::uint64_t i = 0; i < counts_.vertices; ++i) {
             RETURN_IF_ERROR(readVertex(i));
         }
         for (std::uint64_t i = 0; i < counts_.faces; ++i) {
             RETURN_IF_ERROR(readFace(i));
         }
-        if (nextContentLine()) {
+        if (!words_.next().empty()) {
             return fail(file_.malformedLine("data after the last of the announced " +
-                                            std::to_string(counts_.vertices) + " vertices and " +
-                                            std::to_string(counts_.faces) + " faces"));
+                                            countText(counts_.vertices, "vertex", "vertices") + " and " +
+                                            countText(counts_.faces, "face")));
         }
         content_.format = "OFF";
         return std::move(content_);
     }
 
   private:
-    // Reads the next line with content into line_.
-    bool nextContentLine() {
-        while (file_.readLine(line_)) {
-            line_ = withoutComment(line_);
-            if (line_.find_first_not_of(" \t\v\f") != std::string_view::npos) return true;
-        }
-        return false;
-    }
-
     Result<void> readHeader() {
-        if (!nextContentLine()) return fail(file_.malformedLine("expected OFF; the file is empty"));
+        std::string_view word = words_.next();
+        if (word.empty()) return fail(file_.malformedLine("expected OFF; the file has no content"));
         // "OFF 8 6 12", "OFF8 6 12" (in well-known collections), or without the word.
-        std::string_view rest = line_;
-        while (!rest.empty() && isBlank(rest.front())) rest.remove_prefix(1);
-        const std::string_view magic = rest.substr(0, rest.find("OFF") + 3);
-        if (rest.find("OFF") != std::string_view::npos) {
-            if (magic != "OFF" && magic != "COFF" && magic != "NOFF" && magic != "CNOFF" &&
-                magic != "STOFF" && magic != "STCOFF" && magic != "STNOFF" && magic != "STCNOFF") {
-                return fail(file_.malformedLine(
-                    "expected OFF, COFF, NOFF, STOFF or a mix of these prefixes, found " + inQuotes(magic)));
+        const std::string lower = lowerCase(word);
+        const std::size_t name = lower.find("off");
+        if (name != std::string::npos) {
+            const OffPrefix prefix = parsePrefix(word);
+            if (!prefix.known) {
+                return fail(
+                    file_.malformedLine("expected OFF, COFF, NOFF, STOFF or a mix of these prefixes, found " +
+                                        inQuotes(word.substr(0, name + 3))));
             }
-            rest.remove_prefix(magic.size());
-            if (rest.find("BINARY") != std::string_view::npos) {
+            extraNumbers_ = prefix.extraNumbers;
+            word.remove_prefix(prefix.length + 3);
+            if (word.empty()) word = words_.next();
+            if (equalsIgnoringCase(word, "binary")) {
                 return fail(
                     file_.malformedLine("binary OFF is not read; convert the file to text OFF or PLY"));
             }
-            if (rest.find_first_not_of(" \t\v\f") == std::string_view::npos) {
-                if (!nextContentLine()) return fail(cutShort("the numbers of vertices and faces"));
-                rest = line_;
-            }
+            if (word.empty()) return fail(cutShort("the numbers of vertices and faces"));
         }
-        return readCounts(rest);
+        return readCounts(word);
     }
 
-    Result<void> readCounts(std::string_view rest) {
-        const std::string_view vertices = nextWord(rest);
-        const std::string_view faces = nextWord(rest);
-        if (!parseCount(vertices, counts_.vertices) || !parseCount(faces, counts_.faces)) {
-            return fail(file_.malformedLine("expected the numbers of vertices and faces, found " +
-                                            inQuotes(vertices) + " and " + inQuotes(faces)));
-        }
+    Result<void> readCounts(std::string_view vertices) {
+        if (!parseCount(vertices, counts_.vertices)) return fail(notCounts(vertices));
+        const std::string_view faces = words_.next();
+        if (!parseCount(faces, counts_.faces)) return fail(notCounts(faces));
+        // The number of edges may be missing. It is there if it is on the line, or on one of its own.
+        onCountsLine_ = !words_.atLineEnd();
+        if (onCountsLine_ || (words_.nextLine() && words_.wordsOnLine() == 1)) words_.next();
         return {};
     }
 
+    Error notCounts(std::string_view found) const {
+        return file_.malformedLine("expected the numbers of vertices and faces, found " +
+                                   inQuotesNotANumber(found));
+    }
+
+    // What follows what is needed on the line is ignored: normal, colour, texture position.
+    void endRecord() {
+        if (!wordByWord_) words_.endLine();
+    }
+
     Result<void> readVertex(std::uint64_t index) {
-        const std::string name =
-            "vertex " + std::to_string(index) + " of " + std::to_string(counts_.vertices);
-        if (!nextContentLine()) return fail(cutShort(name));
+        const auto name = [&] {
+            return "vertex " + std::to_string(index) + " of " + std::to_string(counts_.vertices);
+        };
         Point3 p;
-        // Ignore what follows: normal, colour, texture position.
         for (double* coordinate : {&p.x, &p.y, &p.z}) {
-            const std::string_view word = nextWord(line_);
+            const std::string_view word = words_.next();
+            if (word.empty()) return fail(cutShort(name()));
             if (!parseReal(word, *coordinate)) {
-                return fail(
-                    file_.malformedLine("expected three numbers for " + name + ", found " + inQuotes(word)));
+                return fail(file_.malformedLine("expected three numbers for " + name() + ", found " +
+                                                inQuotesNotANumber(word)));
             }
         }
         if (!sink_.add(p)) return fail(sink_.refusal(p, "line " + std::to_string(file_.lineNumber())));
+        if (wordByWord_) {
+            for (std::size_t i = 0; i < extraNumbers_; ++i) words_.next();
+        }
+        endRecord();
         return {};
     }
 
     Result<void> readFace(std::uint64_t index) {
-        const std::string name = "face " + std::to_string(index) + " of " + std::to_string(counts_.faces);
-        if (!nextContentLine()) return fail(cutShort(name));
-        std::string_view word = nextWord(line_);
+        const auto name = [&] {
+            return "face " + std::to_string(index) + " of " + std::to_string(counts_.faces);
+        };
+        std::string_view word = words_.next();
+        if (word.empty()) return fail(cutShort(name()));
         std::uint64_t corners = 0;
         if (!parseCount(word, corners)) {
-            return fail(file_.malformedLine("expected the number of corners of " + name + ", found " +
-                                            inQuotes(word)));
+            return fail(file_.malformedLine("expected the number of corners of " + name() + ", found " +
+                                            inQuotesNotANumber(word)));
         }
         fan_.begin();
         for (std::uint64_t i = 0; i < corners; ++i) {
-            word = nextWord(line_);
+            word = words_.next();
+            const auto corner = [&] { return "corner " + std::to_string(i) + " of " + name(); };
+            if (word.empty()) return fail(cutShort(corner()));
             std::uint64_t vertex = 0;
             if (!parseCount(word, vertex)) {
-                return fail(file_.malformedLine("expected corner " + std::to_string(i) + " of " + name +
-                                                ", found " + inQuotes(word)));
+                return fail(
+                    file_.malformedLine("expected " + corner() + ", found " + inQuotesNotANumber(word)));
             }
             if (vertex >= counts_.vertices || vertex > std::numeric_limits<std::uint32_t>::max()) {
-                return fail(file_.malformedLine(name + " names vertex " + std::to_string(vertex) +
-                                                ", but the file has " + std::to_string(counts_.vertices) +
-                                                " vertices, counted from 0"));
+                return fail(file_.malformedLine(
+                    name() + " names vertex " + std::to_string(vertex) + ", but the file has " +
+                    countText(counts_.vertices, "vertex", "vertices") + ", counted from 0"));
             }
             fan_.add(static_cast<std::uint32_t>(vertex));
         }
+        endRecord();
         return {};
     }
 
@@ -136,11 +178,14 @@ class OffReader {
     }
 
     InputFile& file_;
+    WordReader words_;
     ScanContent content_;
     VertexSink sink_;
     PolygonFan fan_;
     OffCounts counts_;
-    std::string_view line_;
+    std::size_t extraNumbers_ = 0;
+    bool onCountsLine_ = false;
+    bool wordByWord_ = false;
 };
 
 }  // namespace

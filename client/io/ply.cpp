@@ -2,8 +2,7 @@
 // Debian 12 packages no PLY library.
 //
 // Elements are read in the order of the header. A binary element without lists has records of one size and is
-// read (vertices) or skipped in one go; everything else goes through a record reader, TextRecord or
-// BinaryRecord, with the same interface.
+// read (vertices) or skipped in one go; everything else goes through a record reader (ply_record.h).
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -14,8 +13,11 @@
 
 #include "client/io/formats.h"
 #include "client/io/ply_header.h"
+#include "client/io/ply_record.h"
 #include "client/io/scalar.h"
 #include "client/io/text.h"
+#include "client/io/word_reader.h"
+#include "core/base/count_text.h"
 #include "core/base/return_if_error.h"
 
 namespace shapedb::io {
@@ -23,93 +25,6 @@ namespace shapedb::io {
 namespace {
 
 constexpr std::size_t kNoProperty = std::numeric_limits<std::size_t>::max();
-
-std::string recordName(const PlyElement& element, std::uint64_t index) {
-    return element.name + " " + std::to_string(index) + " of " + std::to_string(element.count);
-}
-
-// One element per line; blank lines do not count.
-class TextRecord {
-  public:
-    explicit TextRecord(InputFile& file) : file_(&file) {}
-
-    bool begin() {
-        do {
-            if (!file_->readLine(rest_)) {
-                ended_ = true;
-                return false;
-            }
-        } while (rest_.find_first_not_of(" \t\v\f") == std::string_view::npos);
-        return true;
-    }
-
-    bool real(ScalarType, double& value) { return parseReal(next(), value); }
-    bool integer(ScalarType, std::int64_t& value) { return parseInteger(next(), value); }
-    bool skip(ScalarType, std::uint64_t count) {
-        for (; count > 0; --count) {
-            if (next().empty()) return false;
-        }
-        return true;
-    }
-    bool end() { return next().empty(); }
-
-    std::string where() const { return "line " + std::to_string(file_->lineNumber()); }
-
-    Error error(const PlyElement& element, std::uint64_t index, const std::string& property) const {
-        if (ended_) {
-            return file_->malformed("the file ends after line " + std::to_string(file_->lineNumber()) +
-                                    ": expected " + recordName(element, index));
-        }
-        return file_->malformedLine("expected " + property + " of " + recordName(element, index) +
-                                    ", found " + inQuotes(word_));
-    }
-
-  private:
-    std::string_view next() { return word_ = nextWord(rest_); }
-
-    InputFile* file_;
-    std::string_view rest_;
-    std::string_view word_;
-    bool ended_ = false;
-};
-
-class BinaryRecord {
-  public:
-    BinaryRecord(InputFile& file, bool swapped) : file_(&file), swapped_(swapped) {}
-
-    bool begin() {
-        start_ = file_->offset();
-        return true;
-    }
-
-    bool real(ScalarType type, double& value) {
-        const std::size_t size = scalarSize(type);
-        if (!file_->fill(size)) return false;
-        value = loadScalar(file_->data(), type, swapped_);
-        file_->consume(size);
-        return true;
-    }
-    bool integer(ScalarType type, std::int64_t& value) {
-        double number = 0.0;
-        if (!real(type, number)) return false;
-        value = static_cast<std::int64_t>(number);
-        return true;
-    }
-    bool skip(ScalarType type, std::uint64_t count) { return file_->skip(count * scalarSize(type)); }
-    bool end() { return true; }
-
-    std::string where() const { return "byte " + std::to_string(start_); }
-
-    Error error(const PlyElement& element, std::uint64_t index, const std::string& property) const {
-        return file_->malformedByte(
-            start_, "the file ends inside " + recordName(element, index) + ": expected " + property);
-    }
-
-  private:
-    InputFile* file_;
-    bool swapped_;
-    std::uint64_t start_ = 0;
-};
 
 Error negativeLength(const InputFile& file, const std::string& where, const PlyElement& element,
                      std::uint64_t index) {
@@ -137,20 +52,22 @@ Result<void> endRecord(Record& record, const PlyElement& element, std::uint64_t 
     return {};
 }
 
-// Finds the properties x, y and z.
+// Finds the properties x, y and z. A name in capitals counts if there is none in lower case.
 Result<std::array<std::size_t, 3>> findCoordinates(const InputFile& file, const PlyElement& vertex) {
     std::array<std::size_t, 3> at = {kNoProperty, kNoProperty, kNoProperty};
-    for (std::size_t i = 0; i < vertex.properties.size(); ++i) {
-        const PlyProperty& property = vertex.properties[i];
-        if (property.name.size() != 1 || property.name[0] < 'x' || property.name[0] > 'z') continue;
-        std::size_t& place = at[static_cast<std::size_t>(property.name[0] - 'x')];
-        if (place != kNoProperty || property.isList) {
-            return fail(file.malformed("header: element vertex needs one number '" + property.name +
-                                       "', not a list or two of them"));
-        }
-        place = i;
-    }
     for (std::size_t axis = 0; axis < 3; ++axis) {
+        for (const char letter : {"xyz"[axis], "XYZ"[axis]}) {
+            if (at[axis] != kNoProperty) break;
+            for (std::size_t i = 0; i < vertex.properties.size(); ++i) {
+                const PlyProperty& property = vertex.properties[i];
+                if (property.name != std::string(1, letter)) continue;
+                if (at[axis] != kNoProperty || property.isList) {
+                    return fail(file.malformed("header: element vertex needs one number '" + property.name +
+                                               "', not a list or two of them"));
+                }
+                at[axis] = i;
+            }
+        }
         if (at[axis] == kNoProperty) {
             return fail(
                 file.malformed(std::string("header: element vertex has no property '") + "xyz"[axis] + "'"));
@@ -159,28 +76,87 @@ Result<std::array<std::size_t, 3>> findCoordinates(const InputFile& file, const 
     return at;
 }
 
+bool isFaceName(const std::string& name) {
+    return name == "face" || name == "faces" || name == "polygon" || name == "polygons" ||
+           name == "triangle" || name == "triangles";
+}
+
+// The list of an element that names the corners of faces or strips; kNoProperty if its lists mean something
+// else. Passing over faces in silence would take a mesh for a few points, so the only list of integers of a
+// face counts under any name, and a face without any list of integers is an error.
+Result<std::size_t> findIndices(const InputFile& file, const PlyElement& element) {
+    // A grid names the vertex at each place, of which there is one or none.
+    if (element.name == "vertex" || element.name == "range_grid") return kNoProperty;
+    const bool face = isFaceName(element.name) || element.name == "tristrips";
+    std::size_t named = kNoProperty;
+    std::size_t only = kNoProperty;
+    std::size_t lists = 0;
+    for (std::size_t i = 0; i < element.properties.size(); ++i) {
+        const PlyProperty& property = element.properties[i];
+        if (!property.isList) continue;
+        const std::string name = lowerCase(property.name);
+        if (name == "vertex_indices" || name == "vertex_index") named = i;
+        if (isFloating(property.type)) continue;
+        only = i;
+        ++lists;
+    }
+    if (named != kNoProperty) {
+        if (!isFloating(element.properties[named].type)) return named;
+        return fail(file.malformed("header: the indices of element " + element.name +
+                                   " must be integers, not float or double"));
+    }
+    if (!face || element.count == 0) return kNoProperty;
+    if (lists == 1) return only;
+    return fail(file.malformed("header: element " + element.name +
+                               " needs a list vertex_indices, which names " + "its corners" +
+                               (lists > 1 ? "; it has several lists under other names" : "")));
+}
+
 // Reads the elements of one file in order.
 class PlyBody {
   public:
     PlyBody(InputFile& file, const PlyHeader& header, ScanContent& content, std::size_t maxPoints)
-        : file_(file), header_(header), content_(content), sink_(file, content.vertices, maxPoints) {}
+        : file_(file),
+          header_(header),
+          content_(content),
+          words_(file),
+          sink_(file, content.vertices, maxPoints) {}
 
     Result<void> read() {
         RETURN_IF_ERROR(findVertexElement());
+        if (isText()) {
+            beginText();
+        } else if (file_.isRecoded()) {
+            return fail(file_.malformed("binary data cannot follow a header in UTF-16"));
+        } else {
+            file_.beginBinary();
+        }
         for (const PlyElement& element : header_.elements) {
             // Such an element has no body, whatever its count says.
             if (element.properties.empty()) continue;
-            RETURN_IF_ERROR(readElement(element));
+            const auto indices = findIndices(file_, element);
+            RETURN_IF_ERROR(indices);
+            RETURN_IF_ERROR(readElement(element, *indices));
         }
-        if (!file_.onlyPaddingLeft()) {
-            return fail(file_.malformedByte(file_.offset(),
-                                            "data after the last element; the header announces too few"));
-        }
+        const std::string after = "data after the last element; the header announces too few";
+        if (isText() && !words_.next().empty()) return fail(file_.malformedLine(after));
+        if (!isText() && !file_.onlyPaddingLeft()) return fail(file_.malformedByte(file_.offset(), after));
         return {};
     }
 
   private:
     bool isText() const { return header_.encoding == PlyEncoding::kAscii; }
+
+    void beginText() {
+        words_.skipLinesOf("comment", "obj_info");
+        std::uint64_t records = 0;
+        for (const PlyElement& element : header_.elements) {
+            if (element.properties.empty()) continue;
+            if (element.count > std::numeric_limits<std::uint64_t>::max() - records) return;
+            records += element.count;
+        }
+        wordByWord_ = words_.hasFewerLinesThan(records);
+    }
 
     Result<void> findVertexElement() {
         const PlyElement* vertex = nullptr;
@@ -197,17 +173,17 @@ class PlyBody {
         return {};
     }
 
-    Result<void> readElement(const PlyElement& element) {
-        if (isText()) return readElementWith(TextRecord(file_), element);
+    Result<void> readElement(const PlyElement& element, std::size_t indices) {
+        if (isText()) return readElementWith(TextRecord(file_, words_, wordByWord_), element, indices);
         const bool swapped = (header_.encoding == PlyEncoding::kLittleEndian) != machineIsLittleEndian();
         const auto size = element.fixedSize();
-        if (!size) return readElementWith(BinaryRecord(file_, swapped), element);
+        if (!size) return readElementWith(BinaryRecord(file_, swapped), element, indices);
         const auto left = file_.remaining();
         if (left && element.count > *left / *size) {
             return fail(file_.malformedByte(
-                file_.offset(), "the header announces " + std::to_string(element.count) + " " + element.name +
-                                    " records of " + std::to_string(*size) +
-                                    " bytes, but the file has room for " + std::to_string(*left / *size)));
+                file_.offset(), "the header announces " + countText(element.count, element.name + " record") +
+                                    " of " + countText(*size, "byte") + ", but the file has room for " +
+                                    std::to_string(*left / *size)));
         }
         if (element.name == "vertex") return readFixedVertices(element, *size, swapped);
         const std::uint64_t start = file_.offset();
@@ -245,19 +221,9 @@ class PlyBody {
     }
 
     template <typename Record>
-    Result<void> readElementWith(Record record, const PlyElement& element) {
+    Result<void> readElementWith(Record record, const PlyElement& element, std::size_t indices) {
         if (element.name == "vertex") return readVertices(record, element);
         const bool strips = element.name == "tristrips";
-        std::size_t indices = kNoProperty;
-        for (std::size_t i = 0; i < element.properties.size(); ++i) {
-            const PlyProperty& property = element.properties[i];
-            const bool named = property.name == "vertex_indices" || property.name == "vertex_index";
-            if ((strips || element.name == "face") && property.isList && named) indices = i;
-        }
-        if (indices != kNoProperty && isFloating(element.properties[indices].type)) {
-            return fail(file_.malformed("header: the indices of element " + element.name +
-                                        " must be integers, not float or double"));
-        }
         for (std::uint64_t i = 0; i < element.count; ++i) {
             if (!record.begin()) return fail(record.error(element, i, ""));
             for (std::size_t j = 0; j < element.properties.size(); ++j) {
@@ -322,10 +288,10 @@ class PlyBody {
             }
             if (vertex < 0 || static_cast<std::uint64_t>(vertex) >= vertexCount_ ||
                 vertex > std::numeric_limits<std::uint32_t>::max()) {
-                return fail(file_.malformed(record.where() + ": " + recordName(element, index) +
-                                            " names vertex " + std::to_string(vertex) +
-                                            ", but the file has " + std::to_string(vertexCount_) +
-                                            " vertices, counted from 0"));
+                return fail(
+                    file_.malformed(record.where() + ": " + recordName(element, index) + " names vertex " +
+                                    std::to_string(vertex) + ", but the file has " +
+                                    countText(vertexCount_, "vertex", "vertices") + ", counted from 0"));
             }
             builder.add(static_cast<std::uint32_t>(vertex));
         }
@@ -335,6 +301,8 @@ class PlyBody {
     InputFile& file_;
     const PlyHeader& header_;
     ScanContent& content_;
+    WordReader words_;
+    bool wordByWord_ = false;
     VertexSink sink_;
     std::array<std::size_t, 3> coordinates_ = {kNoProperty, kNoProperty, kNoProperty};
     std::uint64_t vertexCount_ = 0;

@@ -12,9 +12,9 @@ namespace shapedb::io {
 
 namespace {
 
-std::optional<ScalarType> scalarTypeFromName(std::string_view name) {
+std::optional<ScalarType> scalarTypeFromName(std::string_view word) {
     using Entry = std::pair<std::string_view, ScalarType>;
-    static constexpr std::array<Entry, 16> kNames = {{{"char", ScalarType::kInt8},
+    static constexpr std::array<Entry, 18> kNames = {{{"char", ScalarType::kInt8},
                                                       {"int8", ScalarType::kInt8},
                                                       {"uchar", ScalarType::kUint8},
                                                       {"uint8", ScalarType::kUint8},
@@ -26,10 +26,13 @@ std::optional<ScalarType> scalarTypeFromName(std::string_view name) {
                                                       {"int32", ScalarType::kInt32},
                                                       {"uint", ScalarType::kUint32},
                                                       {"uint32", ScalarType::kUint32},
+                                                      {"int64", ScalarType::kInt64},
+                                                      {"uint64", ScalarType::kUint64},
                                                       {"float", ScalarType::kFloat32},
                                                       {"float32", ScalarType::kFloat32},
                                                       {"double", ScalarType::kFloat64},
                                                       {"float64", ScalarType::kFloat64}}};
+    const std::string name = lowerCase(word);
     const auto* entry =
         std::find_if(kNames.begin(), kNames.end(), [&](const Entry& e) { return e.first == name; });
     if (entry == kNames.end()) return std::nullopt;
@@ -45,9 +48,9 @@ Error unknownType(const InputFile& file, std::string_view word) {
 // The rest of "format ascii 1.0".
 Result<PlyEncoding> parseFormat(const InputFile& file, std::string_view rest) {
     const std::string_view word = nextWord(rest);
-    if (word == "ascii") return PlyEncoding::kAscii;
-    if (word == "binary_little_endian") return PlyEncoding::kLittleEndian;
-    if (word == "binary_big_endian") return PlyEncoding::kBigEndian;
+    if (equalsIgnoringCase(word, "ascii")) return PlyEncoding::kAscii;
+    if (equalsIgnoringCase(word, "binary_little_endian")) return PlyEncoding::kLittleEndian;
+    if (equalsIgnoringCase(word, "binary_big_endian")) return PlyEncoding::kBigEndian;
     return fail(file.malformedLine(
         "expected format ascii, binary_little_endian or binary_big_endian, found " + inQuotes(word)));
 }
@@ -55,7 +58,7 @@ Result<PlyEncoding> parseFormat(const InputFile& file, std::string_view rest) {
 // The rest of "element vertex 8".
 Result<PlyElement> parseElement(const InputFile& file, std::string_view rest) {
     PlyElement element;
-    element.name = nextWord(rest);
+    element.name = lowerCase(nextWord(rest));
     const std::string_view count = nextWord(rest);
     if (element.name.empty() || !parseCount(count, element.count)) {
         return fail(file.malformedLine("expected 'element NAME COUNT', found count " + inQuotes(count)));
@@ -67,7 +70,7 @@ Result<PlyElement> parseElement(const InputFile& file, std::string_view rest) {
 Result<PlyProperty> parseProperty(const InputFile& file, std::string_view rest) {
     PlyProperty property;
     std::string_view word = nextWord(rest);
-    if (word == "list") {
+    if (equalsIgnoringCase(word, "list")) {
         property.isList = true;
         word = nextWord(rest);
         const auto countType = scalarTypeFromName(word);
@@ -109,9 +112,11 @@ std::uint64_t PlyElement::leastSize(PlyEncoding encoding) const {
 }
 
 Result<PlyHeader> readPlyHeader(InputFile& file) {
+    file.decodeText();
     // Before reading a line: a file of another kind may have no line ends.
-    if (!file.fill(4) || std::string_view(file.data(), 3) != "ply" ||
-        (file.data()[3] != '\n' && !isBlank(file.data()[3]))) {
+    const std::string_view start = file.peek(4);
+    if (start.size() < 4 || !equalsIgnoringCase(start.substr(0, 3), "ply") ||
+        (start[3] != '\n' && !isBlank(start[3]))) {
         return fail(file.malformed("line 1: expected 'ply'; this is not a PLY file"));
     }
     PlyHeader header;
@@ -119,7 +124,7 @@ Result<PlyHeader> readPlyHeader(InputFile& file) {
     std::string_view line;
     file.readLine(line);
     while (file.readLine(line)) {
-        const std::string_view keyword = nextWord(line);
+        const std::string keyword = lowerCase(nextWord(line));
         if (keyword == "end_header") {
             if (!hasFormat) return fail(file.malformedLine("the header has no 'format' line"));
             return header;

@@ -22,7 +22,7 @@ struct PlyProperty {
 };
 
 struct PlyElement {
-    std::string name;
+    std::string name;         ///< in lower case
     std::uint64_t count = 0;  ///< as announced, not yet verified
     std::vector<PlyProperty> properties;
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/base/count_text.h"
+
 namespace shapedb::io {
 
 namespace {
@@ -20,8 +22,9 @@ Error VertexSink::refusal(const Point3& p, const std::string& where) const {
                                                      " has a coordinate that is NaN or infinite; remove the "
                                                      "vertex"};
     }
-    return {ErrorCode::kPointLimitExceeded, place + "the file has more than " + std::to_string(maxPoints_) +
-                                                " points, which is the limit; remove some or raise "
+    return {ErrorCode::kPointLimitExceeded, place + "the file has more than " +
+                                                countText(maxPoints_, "point") +
+                                                ", which is the limit; remove some or raise "
                                                 "the limit"};
 }
 

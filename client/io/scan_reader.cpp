@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <new>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -33,15 +33,16 @@ struct Format {
     ReadFormat read;
 };
 
-constexpr std::array<Format, 9> kFormats = {{{".ply", io::readPly},
-                                             {".pcd", io::readPcd},
-                                             {".off", io::readOff},
-                                             {".obj", io::readObj},
-                                             {".stl", io::readStl},
-                                             {".xyz", io::readXyz},
-                                             {".txt", io::readXyz},
-                                             {".pts", io::readXyz},
-                                             {".asc", io::readXyz}}};
+constexpr std::array<Format, 10> kFormats = {{{".ply", io::readPly},
+                                              {".pcd", io::readPcd},
+                                              {".off", io::readOff},
+                                              {".obj", io::readObj},
+                                              {".stl", io::readStl},
+                                              {".xyz", io::readXyz},
+                                              {".txt", io::readXyz},
+                                              {".pts", io::readXyz},
+                                              {".asc", io::readXyz},
+                                              {".csv", io::readXyz}}};
 
 // Share of the area that must be in small triangles, and how small: see readScan.
 constexpr double kDenseAreaShare = 0.99;
@@ -62,18 +63,12 @@ std::string endingList() {
     return list;
 }
 
-std::string upperCase(std::string word) {
-    std::transform(word.begin(), word.end(), word.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
-    return word;
-}
-
 /// Endings of one reader are neighbours in kFormats, the first of them names the format.
 std::vector<std::string> formatNames() {
     std::vector<std::string> names;
     ReadFormat last = nullptr;
     for (const Format& format : kFormats) {
-        if (format.read != last) names.push_back(upperCase(format.ending + 1));
+        if (format.read != last) names.push_back(io::upperCase(format.ending + 1));
         last = format.read;
     }
     return names;
@@ -148,6 +143,16 @@ Result<PointCloud> samplePoints(const std::string& path, ScanContent&& content, 
     return points;
 }
 
+Result<void> checkHasContent(InputFile& file) {
+    constexpr std::string_view kPointer = "version https://git-lfs.github.com/spec/";
+    const std::string_view start = file.peek(kPointer.size());
+    const bool onlyMark = start == "\xEF\xBB\xBF" || start == "\xFF\xFE" || start == "\xFE\xFF";
+    if (onlyMark || (start.empty() && !file.failure())) return fail(file.malformed("the file is empty"));
+    if (start != kPointer) return {};
+    return fail(
+        file.malformed("this is a Git LFS pointer, not the file itself; fetch that with 'git lfs pull'"));
+}
+
 Result<Scan> readScanUnguarded(const std::string& path, const ReadOptions& options,
                                const RunContext& context) {
     if (options.meshSamples == 0) {
@@ -157,6 +162,7 @@ Result<Scan> readScanUnguarded(const std::string& path, const ReadOptions& optio
     RETURN_IF_ERROR(file);
     const Format* format = formatOf(path);
     if (format == nullptr) return fail(unknownFormat(path));
+    RETURN_IF_ERROR(checkHasContent(*file));
     auto content = format->read(*file, options.maxPoints);
     // The real reason comes before the parser's complaint about an early end.
     if (file->failure()) return fail(*file->failure());
@@ -182,10 +188,10 @@ Error notSearchable(const std::string& path, const std::string& why) {
     return {ErrorCode::kFileNotReadable, path + ": " + why};
 }
 
-// A .txt file may be anything.
+// Text and tables may be about anything.
 bool isScanFile(const std::string& path) {
     if (formatOf(path) == nullptr) return false;
-    if (endingOf(path) != ".txt") return true;
+    if (endingOf(path) != ".txt" && endingOf(path) != ".csv") return true;
     const RunContext context;
     auto file = InputFile::open(path, context);
     return file && io::looksLikeXyz(*file);

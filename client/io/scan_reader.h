@@ -92,8 +92,8 @@ struct ScanFile {
 };
 
 /// The scan files among files and folders, sorted by path, each once. Folders are searched to any depth for
-/// the known endings. Hidden entries are skipped, links to folders are not followed, and a .txt file counts
-/// only if its first line of content looks like a point, so that a README.txt does no harm.
+/// the known endings. Hidden entries are skipped, links to folders are not followed, and a .txt or .csv file
+/// counts only if its first line of content looks like a point, so that a README.txt does no harm.
 ///
 /// Errors: kFileNotReadable (a path does not exist, a folder cannot be searched or has no scan file);
 /// kUnknownFileFormat (a given file has an unknown ending).

@@ -11,6 +11,8 @@
 #include "client/io/formats.h"
 #include "client/io/scalar.h"
 #include "client/io/text.h"
+#include "client/io/word_reader.h"
+#include "core/base/count_text.h"
 #include "core/base/return_if_error.h"
 
 namespace shapedb::io {
@@ -70,6 +72,7 @@ class StlReader {
   public:
     StlReader(InputFile& file, std::size_t maxPoints)
         : file_(file),
+          words_(file),
           sink_(file, content_.vertices, maxPoints),
           fan_(content_.triangles),
           vertexAt_(content_.vertices) {}
@@ -85,17 +88,38 @@ class StlReader {
   private:
     // Binary files may start with "solid" too, so the exact size of a binary file, or a zero byte, decides.
     bool looksAscii() {
-        std::string_view head = file_.peek(kSniffedBytes);
-        if (head.substr(0, 3) == "\xEF\xBB\xBF") head.remove_prefix(3);
-        const std::size_t first = head.find_first_not_of(" \t\r\n");
-        if (first == std::string_view::npos || !equalsIgnoringCase(head.substr(first, 5), "solid"))
-            return false;
+        file_.peek(kSniffedBytes);
         const auto size = file_.remaining();
         if (size && file_.available() >= kHeaderBytes + 4 &&
             (*size - kHeaderBytes - 4) == kTriangleBytes * announcedTriangles()) {
             return false;
         }
-        return head.find('\0') == std::string_view::npos;
+        file_.decodeText();
+        std::string_view head = file_.peek(kSniffedBytes);
+        // Zero bytes may fill up the end of a text file.
+        head = head.substr(0, head.find_last_not_of('\0') + 1);
+        return equalsIgnoringCase(firstWord(head).substr(0, 5), "solid") &&
+               head.find('\0') == std::string_view::npos;
+    }
+
+    // Of text, after blank lines and comments.
+    static std::string_view firstWord(std::string_view text) {
+        while (!text.empty()) {
+            const std::size_t end = std::min(text.find_first_of("\r\n"), text.size());
+            std::string_view line = withoutComment(text.substr(0, end));
+            const std::string_view word = nextWord(line);
+            if (!word.empty()) return word;
+            text.remove_prefix(std::min(end + 1, text.size()));
+        }
+        return {};
+    }
+
+    // Text of another kind: what would be the number of triangles means nothing.
+    bool looksLikeText() {
+        const std::string_view head = file_.peek(kSniffedBytes);
+        return std::none_of(head.begin(), head.end(), [](char c) {
+            return (c >= 0 && c < ' ' && !isBlank(c) && c != '\n') || c == '\x7f';
+        });
     }
 
     // The header must be in the buffer.
@@ -109,13 +133,18 @@ class StlReader {
                 "expected 'solid' (ASCII STL) or the 84 bytes a binary STL starts with, found " +
                 std::to_string(file_.available()) + " bytes"));
         }
+        if (looksLikeText()) {
+            return fail(
+                file_.malformed("expected 'solid', found " + inQuotes(firstWord(file_.peek(kSniffedBytes))) +
+                                "; this is no ASCII STL file, and its size is not that of a binary one"));
+        }
         const std::uint64_t count = announcedTriangles();
         file_.consume(static_cast<std::size_t>(kHeaderBytes + 4));
         const auto left = file_.remaining();
         if (left && count > *left / kTriangleBytes) {
-            return fail(file_.malformedByte(kHeaderBytes, "the header announces " + std::to_string(count) +
-                                                              " triangles, but the file has room for " +
-                                                              std::to_string(*left / kTriangleBytes)));
+            return fail(file_.malformedByte(
+                kHeaderBytes, "the header announces " + countText(count, "triangle") +
+                                  ", but the file has room for " + std::to_string(*left / kTriangleBytes)));
         }
         const std::uint64_t start = file_.offset();
         Point3 p;
@@ -141,54 +170,74 @@ class StlReader {
                 sink_.refusal(p, "byte " + std::to_string(place) + ", triangle " + std::to_string(done)));
         }
         if (!file_.onlyPaddingLeft()) {
-            return fail(file_.malformedByte(file_.offset(), "data after the last of the announced " +
-                                                                std::to_string(count) + " triangles"));
+            return fail(file_.malformedByte(
+                file_.offset(), "data after the last of the announced " + countText(count, "triangle")));
         }
         return {};
     }
 
-    // solid (facet, outer loop, vertex x 3, endloop, endfacet)* endsolid, one or more times.
+    // solid (facet, outer loop, vertex x 3, endloop, endfacet)* endsolid, one or more times. Line ends are no
+    // more than blanks, but for the names of solids, which may have several words.
     Result<void> readAscii() {
-        file_.skipByteOrderMark();
-        std::string expected = "solid";
-        int corners = 0;
-        std::string_view rest;
-        while (file_.readLine(rest)) {
-            const std::string_view keyword = nextWord(rest);
-            if (keyword.empty()) continue;
-            const bool ends = expected == "facet" && equalsIgnoringCase(keyword, "endsolid");
-            if (!ends && !equalsIgnoringCase(keyword, expected)) {
-                return fail(file_.malformedLine("expected '" + expected + "', found " + inQuotes(keyword)));
+        for (std::string_view word = words_.next(); !word.empty(); word = words_.next()) {
+            if (!equalsIgnoringCase(word, "solid")) return fail(unexpected("solid", word));
+            skipName();
+            for (word = words_.next(); !equalsIgnoringCase(word, "endsolid"); word = words_.next()) {
+                if (words_.ended()) return fail(unexpected("endsolid", word));
+                if (!equalsIgnoringCase(word, "facet")) return fail(unexpected("facet", word));
+                RETURN_IF_ERROR(readFacet());
             }
-            if (ends) {
-                expected = "solid";
-            } else if (expected == "solid" || expected == "endfacet") {
-                expected = "facet";
-            } else if (expected == "facet") {
-                expected = "outer";
-            } else if (expected == "outer") {
-                expected = "vertex";
-                corners = 0;
-                fan_.begin();
-            } else if (expected == "vertex") {
-                RETURN_IF_ERROR(readCorner(rest));
-                if (++corners == 3) expected = "endloop";
-            } else {
-                expected = "endfacet";
-            }
+            words_.endLine();
         }
-        if (expected == "solid") return {};
-        return fail(file_.malformed("the file ends after line " + std::to_string(file_.lineNumber()) +
-                                    ": expected '" + (expected == "facet" ? "endsolid" : expected) + "'"));
+        return {};
     }
 
-    Result<void> readCorner(std::string_view rest) {
+    // A solid may also stand on one line with its facets.
+    void skipName() {
+        while (!words_.atLineEnd() && !words_.lineGoesOnWith("facet", "normal")) words_.nextOnLine();
+    }
+
+    Result<void> readFacet() {
+        std::string_view word = words_.next();
+        if (equalsIgnoringCase(word, "normal")) {
+            word = words_.next();
+            for (int i = 0; i < 3 && !equalsIgnoringCase(word, "outer"); ++i) word = words_.next();
+        }
+        if (!equalsIgnoringCase(word, "outer")) return fail(unexpected("outer", word));
+        RETURN_IF_ERROR(expect("loop"));
+        fan_.begin();
+        for (int corner = 0; corner < 3; ++corner) {
+            RETURN_IF_ERROR(expect("vertex"));
+            RETURN_IF_ERROR(readCorner());
+        }
+        RETURN_IF_ERROR(expect("endloop"));
+        return expect("endfacet");
+    }
+
+    Result<void> expect(const char* keyword) {
+        const std::string_view word = words_.next();
+        if (equalsIgnoringCase(word, keyword)) return {};
+        return fail(unexpected(keyword, word));
+    }
+
+    Error unexpected(const std::string& keyword, std::string_view word) const {
+        if (words_.ended()) {
+            return file_.malformed("the file ends after line " + std::to_string(file_.lineNumber()) +
+                                   ": expected '" + keyword + "'");
+        }
+        return file_.malformedLine("expected '" + keyword + "', found " + inQuotes(word));
+    }
+
+    Result<void> readCorner() {
         Point3 p;
+        const std::uint64_t begun = file_.lineNumber();
         for (double* coordinate : {&p.x, &p.y, &p.z}) {
-            const std::string_view word = nextWord(rest);
+            const std::string_view word = words_.next();
             if (!parseReal(word, *coordinate)) {
-                return fail(
-                    file_.malformedLine("expected three numbers after 'vertex', found " + inQuotes(word)));
+                const bool sameLine = begun == file_.lineNumber() && !words_.ended();
+                return fail(file_.malformed("line " + std::to_string(begun) +
+                                            ": expected three numbers after 'vertex', found " +
+                                            (sameLine ? inQuotesNotANumber(word) : "nothing")));
             }
         }
         if (!addCorner(p)) return fail(sink_.refusal(p, "line " + std::to_string(file_.lineNumber())));
@@ -207,6 +256,7 @@ class StlReader {
     }
 
     InputFile& file_;
+    WordReader words_;
     ScanContent content_;
     VertexSink sink_;
     PolygonFan fan_;

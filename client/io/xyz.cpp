@@ -1,12 +1,17 @@
-// Plain text points: three numbers at the start of each line (.xyz .txt .pts .asc).
+// Plain text points: three numbers at the start of each line, or in the columns that a header names x, y and
+// z.
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "client/io/formats.h"
 #include "client/io/text.h"
+#include "core/base/count_text.h"
 #include "core/base/return_if_error.h"
 
 namespace shapedb::io {
@@ -45,16 +50,58 @@ bool hasDecimalCommas(std::string_view line) {
     return inside && otherSeparator;
 }
 
-bool isComment(std::string_view line) { return line.empty() || line[0] == '#' || line.substr(0, 2) == "//"; }
+// The signs with which comments begin in one program or another.
+bool isComment(std::string_view line) {
+    return line.empty() || std::string_view("#;%!").find(line[0]) != std::string_view::npos ||
+           line.substr(0, 2) == "//";
+}
 
-// A line that only names the columns: x, y, z and perhaps more.
-bool namesColumns(std::string_view line) {
-    for (const std::string_view name : {"x", "y", "z"}) {
-        std::string_view column = nextColumn(line);
-        if (column.size() == 3 && column.front() == '"' && column.back() == '"') column = column.substr(1, 1);
-        if (!equalsIgnoringCase(column, name)) return false;
+/// Where x, y and z are on a line: columns counted from 0.
+struct Columns {
+    std::array<std::size_t, 3> at = {0, 1, 2};
+    std::size_t last = 2;
+    std::size_t named = 0;  ///< in the header
+};
+
+// The name of a column without quotes and without its unit: "X [m]" and "x(mm)" are "x".
+std::string columnName(std::string_view word) {
+    while (!word.empty() && isBlank(word.front())) word.remove_prefix(1);
+    while (!word.empty() && isBlank(word.back())) word.remove_suffix(1);
+    if (word.size() > 1 && word.front() == '"' && word.back() == '"') word = word.substr(1, word.size() - 2);
+    return lowerCase(word.substr(0, word.find_first_of("[( ")));
+}
+
+// A line that names the columns, x, y and z among them.
+std::optional<Columns> parseColumnNames(std::string_view line) {
+    // "X [m], Y [m]": names may have blanks if something else stands between them.
+    const bool marked = line.find_first_of(",;") != std::string_view::npos;
+    Columns columns;
+    std::array<bool, 3> found = {};
+    for (std::size_t i = 0; !line.empty(); ++i) {
+        const std::string_view word = marked ? line.substr(0, line.find_first_of(",;")) : nextColumn(line);
+        if (marked) line.remove_prefix(std::min(word.size() + 1, line.size()));
+        const std::string name = columnName(word);
+        const std::size_t axis =
+            name.size() == 1 ? std::string_view("xyz").find(name[0]) : std::string_view::npos;
+        ++columns.named;
+        if (axis == std::string_view::npos || found[axis]) continue;
+        found[axis] = true;
+        columns.at[axis] = i;
     }
-    return true;
+    if (!found[0] || !found[1] || !found[2]) return std::nullopt;
+    columns.last = *std::max_element(columns.at.begin(), columns.at.end());
+    return columns;
+}
+
+// The names may also be a comment: "//X,Y,Z" or "# id x y z".
+std::optional<Columns> columnNamesIn(std::string_view comment) {
+    return parseColumnNames(comment.substr(std::min(comment.find_first_not_of("#;%!/ \t"), comment.size())));
+}
+
+std::size_t countColumns(std::string_view line) {
+    std::size_t columns = 0;
+    for (; !line.empty(); ++columns) nextColumn(line);
+    return columns;
 }
 
 // A line that is one whole number: how many points follow.
@@ -65,65 +112,101 @@ std::optional<std::uint64_t> leadingCount(std::string_view line) {
     return count;
 }
 
-bool nextContentLine(InputFile& file, std::string_view& line) {
-    while (file.readLine(line)) {
-        while (!line.empty() && isBlank(line.front())) line.remove_prefix(1);
-        if (!isComment(line)) return true;
-    }
-    return false;
-}
-
-Result<Point3> parsePoint(const InputFile& file, std::string_view line) {
+Result<Point3> parsePoint(const InputFile& file, std::string_view line, const Columns& columns) {
     if (line.find(',') != std::string_view::npos && hasDecimalCommas(line)) {
         return fail(file.malformedLine(
             "commas inside numbers: write decimals with a point, or separate columns with commas only"));
     }
     Point3 p;
-    for (double* coordinate : {&p.x, &p.y, &p.z}) {
+    for (std::size_t i = 0; i <= columns.last; ++i) {
         const std::string_view column = nextColumn(line);
-        if (!parseReal(column, *coordinate)) {
-            return fail(file.malformedLine("expected three numbers x y z, found " + inQuotes(column)));
+        double* coordinate = i == columns.at[0]   ? &p.x
+                             : i == columns.at[1] ? &p.y
+                             : i == columns.at[2] ? &p.z
+                                                  : nullptr;
+        if (coordinate != nullptr && !parseReal(column, *coordinate)) {
+            return fail(
+                file.malformedLine("expected three numbers x y z, found " + inQuotesNotANumber(column)));
         }
     }
     return p;
 }
 
+class XyzReader {
+  public:
+    explicit XyzReader(InputFile& file) : file_(file) { file_.decodeText(); }
+
+    Result<ScanContent> read(std::size_t maxPoints) {
+        ScanContent content;
+        content.format = "XYZ text";
+        VertexSink sink(file_, content.vertices, maxPoints);
+        std::string_view line;
+        while (nextPointLine(line, content.vertices.size())) {
+            const auto p = parsePoint(file_, line, columns_);
+            RETURN_IF_ERROR(p);
+            if (!sink.add(*p)) return fail(sink.refusal(*p, "line " + std::to_string(file_.lineNumber())));
+        }
+        if (announced_ && *announced_ != content.vertices.size()) {
+            return fail(file_.malformed("the file announces " + countText(*announced_, "point") +
+                                        ", but has " + std::to_string(content.vertices.size())));
+        }
+        if (content.vertices.empty() && !announced_) {
+            return fail(file_.malformed("no point (a line of three numbers) found"));
+        }
+        return content;
+    }
+
+    bool beginsWithAPoint() {
+        std::string_view line;
+        return nextPointLine(line, 0) && parsePoint(file_, line, columns_).has_value();
+    }
+
+  private:
+    // The next line that should be a point: not a comment, a header or a count.
+    bool nextPointLine(std::string_view& line, std::uint64_t points) {
+        while (file_.readLine(line)) {
+            while (!line.empty() && isBlank(line.front())) line.remove_prefix(1);
+            if (isComment(line)) {
+                if (begins_ && !line.empty()) commented_ = columnNamesIn(line);
+                continue;
+            }
+            if (isCount(line, points)) continue;
+            if (!std::exchange(begins_, false)) return true;
+            if (const auto named = parseColumnNames(line)) {
+                columns_ = *named;
+                continue;
+            }
+            // A sentence with these words has another number of words than the lines have columns.
+            if (commented_ && commented_->named == countColumns(line)) columns_ = *commented_;
+            return true;
+        }
+        return false;
+    }
+
+    // The first line may be the number of points. In a file of several scans the number of the next follows
+    // the last point of each.
+    bool isCount(std::string_view line, std::uint64_t points) {
+        const bool first = begins_ && !announced_;
+        if (!first && (points == 0 || announced_ != points)) return false;
+        const auto count = leadingCount(line);
+        if (!count || *count > std::numeric_limits<std::uint64_t>::max() - points) return false;
+        announced_ = points + *count;
+        return true;
+    }
+
+    InputFile& file_;
+    Columns columns_;
+    std::optional<Columns> commented_;  // what a comment before the first point names
+    std::optional<std::uint64_t> announced_;
+    bool begins_ = true;
+};
+
 }  // namespace
 
 Result<ScanContent> readXyz(InputFile& file, std::size_t maxPoints) {
-    ScanContent content;
-    content.format = "XYZ text";
-    VertexSink sink(file, content.vertices, maxPoints);
-    std::optional<std::uint64_t> announced;
-    bool first = true;
-    std::string_view line;
-    file.skipByteOrderMark();
-    while (nextContentLine(file, line)) {
-        if (first) {
-            first = false;
-            announced = leadingCount(line);
-            if (announced || namesColumns(line)) continue;
-        }
-        const auto p = parsePoint(file, line);
-        RETURN_IF_ERROR(p);
-        if (!sink.add(*p)) return fail(sink.refusal(*p, "line " + std::to_string(file.lineNumber())));
-    }
-    if (announced && *announced != content.vertices.size()) {
-        return fail(file.malformed("the first line announces " + std::to_string(*announced) +
-                                   " points, but the file has " + std::to_string(content.vertices.size())));
-    }
-    if (content.vertices.empty() && !announced) {
-        return fail(file.malformed("no point (a line of three numbers) found"));
-    }
-    return content;
+    return XyzReader(file).read(maxPoints);
 }
 
-bool looksLikeXyz(InputFile& file) {
-    std::string_view line;
-    file.skipByteOrderMark();
-    if (!nextContentLine(file, line)) return false;
-    if ((leadingCount(line) || namesColumns(line)) && !nextContentLine(file, line)) return false;
-    return parsePoint(file, line).has_value();
-}
+bool looksLikeXyz(InputFile& file) { return XyzReader(file).beginsWithAPoint(); }
 
 }  // namespace shapedb::io

@@ -5,6 +5,7 @@
 #include <limits>
 #include <string>
 
+#include "core/base/count_text.h"
 #include "core/base/return_if_error.h"
 #include "core/geometry/box.h"
 
@@ -39,7 +40,7 @@ Result<void> checkCoordinates(const PointCloud& scan) {
 Result<Frame> frameOf(const PointCloud& scan) {
     if (scan.size() < 4) {
         return fail(ErrorCode::kTooFewPoints,
-                    "the scan has " + std::to_string(scan.size()) + " points; at least 4 are needed");
+                    "the scan has " + countText(scan.size(), "point") + "; at least 4 are needed");
     }
     if (scan.size() >= std::numeric_limits<std::uint32_t>::max()) {
         return fail(ErrorCode::kPointLimitExceeded, "the scan has more than 4,294,967,294 points");

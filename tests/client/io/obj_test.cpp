@@ -35,6 +35,13 @@ TEST_F(Obj, SamplesOfANegativeIndexFaceLieOnIt) {
     }
 }
 
+TEST_F(Obj, ReadsCapitalsWeightsAndColours) {
+    const Scan scan = readGood(
+        "a.obj", "V 0 0 0\nv 1 0 0 1.0\nv 1 1 0 0.5 0.5 0.5\nV\t0 1 0\nVN 0 0 1\nF 1 2 3 4\nFo 1 2 3\n");
+    EXPECT_EQ(scan.verticesInFile, 4U);
+    EXPECT_EQ(scan.trianglesInFile, 3U);
+}
+
 TEST_F(Obj, ToleratesCommentsBlankLinesAndUnknownKeywords) {
     const Scan scan =
         readGood("a.obj",
@@ -45,11 +52,11 @@ TEST_F(Obj, ToleratesCommentsBlankLinesAndUnknownKeywords) {
 }
 
 TEST_F(Obj, DefectsNameTheLine) {
-    expectError("empty.obj", "", kMalformed, {"no vertex"});
+    expectError("empty.obj", "", kMalformed, {"the file is empty"});
     expectError("a.obj", "MZ binary\n", kMalformed, {"no vertex"});
     expectError("b.obj", "v 1 2\n", kMalformed, {"line 1", "vertex 0", "nothing"});
     expectError("c.obj", "v 1 2 3\nv 1 abc 3\n", kMalformed, {"line 2", "vertex 1", "'abc'"});
-    expectError("d.obj", "v 1 2 3\n\nf 1 1 2\n", kMalformed, {"line 3", "vertex 2", "1 vertices"});
+    expectError("d.obj", "v 1 2 3\n\nf 1 1 2\n", kMalformed, {"line 3", "vertex 2", "has 1 vertex,"});
     expectError("e.obj", "v 1 2 3\nf -2 1 1\n", kMalformed, {"line 2", "vertex -2"});
     expectError("f.obj", "v 1 2 3\nf 0 1 1\n", kMalformed, {"line 2", "'0'", "from 1"});
     expectError("g.obj", "v 1 2 3\nf a b c\n", kMalformed, {"line 2", "'a'"});

@@ -62,6 +62,42 @@ TEST_F(Pcd, ReadsArrayFieldsPaddingAndMixedTypes) {
     EXPECT_EQ(readGood("d.pcd", packed + compressedPcdBody(row.str().substr(3))).points, text.points);
 }
 
+TEST_F(Pcd, FieldsOfCountZeroHaveNoBytes) {
+    const std::string start =
+        "FIELDS _ x y _ z rgb none\nSIZE 1 4 4 1 4 4 8\nTYPE U F F U F F F\nCOUNT 4 1 1 0 1 1 0\n";
+    const PointCloud expected = {{1, 2, 3}};
+    EXPECT_EQ(readGood("a.pcd", start + "POINTS 1\nDATA ascii\n0 0 0 0 1 2 3 nan\n").points, expected);
+    Bytes row;
+    row.text("pads").add(1.0F).add(2.0F).add(3.0F).add(9.0F);
+    EXPECT_EQ(readGood("b.pcd", start + "POINTS 1\nDATA binary\n" + row.str()).points, expected);
+    const std::string packed = start + "POINTS 1\nDATA binary_compressed\n";
+    EXPECT_EQ(readGood("c.pcd", packed + compressedPcdBody(row.str())).points, expected);
+    EXPECT_EQ(readGood("d.pcd", packed + compressedPcdBody(row.str().substr(4))).points, expected);
+    expectError("e.pcd", "FIELDS x y z\nCOUNT 1 1 0\nPOINTS 1\nDATA ascii\n1 2\n", kMalformed,
+                {"'z'", "0 x"});
+}
+
+TEST_F(Pcd, ReadsEveryVersionAndFieldOrder) {
+    const PointCloud expected = {{1, 2, 3}};
+    for (const std::string version :
+         {"", "VERSION .5\n", "VERSION .7\n", "VERSION 0.7\n", "version 0.7\n", "# .PCD v.7\n"}) {
+        EXPECT_EQ(
+            readGood("a.pcd",
+                     version +
+                         "FIELDS rgb z normal_x y x\nSIZE 4 4 4 4 4\nTYPE U F F F F\nWIDTH 1\nHEIGHT 1\n"
+                         "VIEWPOINT 0 0 0 1 0 0 0\nPOINTS 1\nDATA ascii\n4286611584 3 nan 2 1\n")
+                .points,
+            expected)
+            << version;
+    }
+    // As PCL: without rows there is one.
+    for (const std::string size :
+         {"WIDTH 1\nHEIGHT 0\n", "WIDTH 0\nHEIGHT 0\nPOINTS 1\n", "POINTS 1\n", "WIDTH 1\n"}) {
+        EXPECT_EQ(readGood("b.pcd", "FIELDS x y z\n" + size + "DATA ascii\n1 2 3\n").points, expected)
+            << size;
+    }
+}
+
 TEST_F(Pcd, ReadsOlderHeadersWithoutSizeAndCount) {
     EXPECT_EQ(
         readGood("a.pcd", "# .PCD v.5\r\nVERSION .5\r\nCOLUMNS x y z\r\nPOINTS 1\r\nDATA ascii\r\n1 2 3\r\n")
@@ -76,7 +112,7 @@ TEST_F(Pcd, EmptyCloudsAreEmptyScans) {
 }
 
 TEST_F(Pcd, HeaderDefectsNameTheLine) {
-    expectError("empty.pcd", "", kMalformed, {"DATA"});
+    expectError("empty.pcd", "", kMalformed, {"the file is empty"});
     expectError("a.pcd", "ply\n", kMalformed, {"line 1", "PCD keyword", "'ply'"});
     expectError("b.pcd", "FIELDS x y\n", kMalformed, {"line 1", "'z'"});
     expectError("c.pcd", "FIELDS x y z x\n", kMalformed, {"line 1", "'x'", "twice"});
@@ -116,7 +152,8 @@ TEST_F(Pcd, RefusesDamagedCompressedData) {
     EXPECT_EQ(readGood("good.pcd", start + body).points.size(), 2U);
     expectError("a.pcd", start + "abc", kMalformed, {"size"});
     expectError("b.pcd", start + body.substr(0, body.size() - 1), kMalformed, {"cut short"});
-    expectError("c.pcd", xyz("3", "1", "binary_compressed") + body, kMalformed, {"24", "3 points"});
+    expectError("c.pcd", xyz("3", "1", "binary_compressed") + body, kMalformed,
+                {"unpack", "3 points of 12 bytes"});
     std::string damaged = body;
     damaged[8] = '\xff';
     expectError("d.pcd", start + damaged, kMalformed, {"damaged"});

@@ -86,6 +86,60 @@ TEST_F(Ply, ToleratesBlankLinesPaddingAndAMissingLineEnd) {
               1U);
 }
 
+TEST_F(Ply, FacesCountUnderAnyName) {
+    const std::string vertices = "element vertex 4\n" + kXyz;
+    const std::string body = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
+    for (const std::string list :
+         {"vertex_indices", "vertex_index", "vertices", "Vertex_Indices", "indices"}) {
+        for (const std::string element : {"face", "Face", "faces", "polygon"}) {
+            const Scan scan =
+                readGood("a.ply", ascii(vertices + "element " + element +
+                                            " 1\nproperty list uchar float uv\nproperty list uchar int " +
+                                            list + "\nproperty uchar red\n",
+                                        body + "2 0.5 0.5 4 0 1 2 3 255\n"));
+            EXPECT_EQ(scan.trianglesInFile, 2U) << element << " " << list;
+        }
+    }
+    // A known name comes before another one; elements that are no faces are passed over.
+    EXPECT_EQ(
+        readGood("b.ply", ascii(vertices + "element edge 1\nproperty int vertex1\nproperty list uchar int a\n"
+                                           "element face 1\nproperty list uchar int other\n"
+                                           "property list uint16 int16 vertex_index\n"
+                                           "element camera 1\nproperty float view\n",
+                                body + "1 1 2\n2 7 8 3 0 1 2\n0.5\n"))
+            .trianglesInFile,
+        1U);
+    EXPECT_EQ(readGood("c.ply", ascii(vertices + "element face 0\n", body)).trianglesInFile, 0U);
+}
+
+TEST_F(Ply, FacesAreNeverPassedOverInSilence) {
+    const std::string start = "element vertex 1\n" + kXyz + "element face 1\n";
+    const std::string advice = "element face needs a list vertex_indices";
+    expectError("a.ply",
+                ascii(start + "property list uchar int a\nproperty list uchar int b\n", "1 2 3\n0 0\n"),
+                kMalformed, {advice, "several lists"});
+    expectError("b.ply", ascii(start + "property list uchar float uv\n", "1 2 3\n0\n"), kMalformed, {advice});
+    expectError("c.ply", ascii(start + "property int a\nproperty int b\n", "1 2 3\n0 0\n"), kMalformed,
+                {advice});
+    expectError("d.ply",
+                binary(start + "property int a\nproperty int b\n",
+                       Bytes().add(1.0F).add(2.0F).add(3.0F).add(std::uint64_t{0}).str()),
+                kMalformed, {advice});
+}
+
+TEST_F(Ply, ListsOfAbsurdLengthAreRefused) {
+    const std::string start = "element vertex 1\n" + kXyz + "element a 1\nproperty list ";
+    for (const std::string type : {"int64", "uint64"}) {
+        Bytes body;
+        body.add(1.0F).add(2.0F).add(3.0F).add(~std::uint64_t{0} >> (type == "int64" ? 1 : 0)).add(1.0);
+        expectError("a.ply", binary(start + type + " double b\n", body.str()), kMalformed,
+                    {"ends inside a 0 of 1"});
+        body.add(1.0);
+        expectError("b.ply", binary(start + type + " int64 vertex_indices\n", body.str()), kMalformed,
+                    {"a 0 of 1 names vertex"});
+    }
+}
+
 TEST_F(Ply, ElementsWithoutPropertiesHaveNoBody) {
     EXPECT_EQ(readGood("a.ply", ascii("element nothing 1000000000000\nelement vertex 1\n" + kXyz, "1 2 3\n"))
                   .points.size(),
@@ -107,7 +161,7 @@ TEST_F(Ply, AcceptsValuesBeyondSinglePrecision) {
 
 TEST_F(PlyHeader, EveryDefectNamesTheLine) {
     const auto malformed = ErrorCode::kMalformedFile;
-    expectError("empty.ply", "", malformed, {"line 1", "'ply'"});
+    expectError("empty.ply", "", malformed, {"the file is empty"});
     expectError("other.ply", "solid\n", malformed, {"line 1", "'ply'"});
     expectError("a.ply", "ply\nformat ascii 1.0\n", malformed, {"line 2", "end_header"});
     expectError("b.ply", "ply\nformat text 1.0\nend_header\n", malformed, {"line 2", "'text'", "ascii"});
@@ -140,7 +194,7 @@ TEST_F(Ply, TextDefectsNameTheLineAndWhatWasExpected) {
     const auto malformed = ErrorCode::kMalformedFile;
     const std::string two = "element vertex 2\n" + kXyz;
     expectError("a.ply", ascii(two, "1 2 3\n1 2\n"), malformed,
-                {"line 9", "vertex 1 of 2", "number z", "nothing"});
+                {"after line 9", "vertex 1 of 2", "number z"});
     expectError("b.ply", ascii(two, "1 2 3\n1 two 3\n"), malformed, {"line 9", "number y", "'two'"});
     expectError("c.ply", ascii(two, "1 2 3 4\n1 2 3\n"), malformed, {"line 8", "line end", "'4'"});
     expectError("d.ply", ascii(two, "1 2 3\n"), malformed, {"ends after line 8", "vertex 1 of 2"});

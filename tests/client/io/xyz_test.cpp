@@ -22,9 +22,31 @@ TEST_F(Xyz, EverySeparatorGivesTheSamePoints) {
 }
 
 TEST_F(Xyz, ReadsEveryEnding) {
-    for (const std::string ending : {".xyz", ".txt", ".pts", ".asc", ".XYZ"}) {
+    for (const std::string ending : {".xyz", ".txt", ".pts", ".asc", ".csv", ".XYZ"}) {
         EXPECT_EQ(readGood("a" + ending, "1 2 3\n").format, "XYZ text");
     }
+}
+
+TEST_F(Xyz, TakesTheColumnsThatAHeaderNames) {
+    const PointCloud expected = {{1, 2, 3}, {4, 5, 6}};
+    for (const std::string text :
+         {"id,x,y,z\n7,1,2,3\n8,4,5,6\n", "z y x\n3 2 1\n6 5 4\n",
+          "\"Z\";\"i\";\"Y\";\"X\"\n3;0;2;1\n6;0;5;4\n", "X [m], Y [m], Z [m]\n1,2,3\n4,5,6\n",
+          "x(mm) y(mm) z(mm) r g b\n1 2 3 0 0 0\n4 5 6 0 0 0\n", "//Intensity,X,Y,Z\n0.5,1,2,3\n0.5,4,5,6\n",
+          "# made by a test\n# t x y z\n0 1 2 3\n0 4 5 6\n", "2\nx y z\n1 2 3\n4 5 6\n",
+          // A sentence, and columns that are where they are without a header.
+          "# the axes x y z are in mm\n1 2 3\n4 5 6\n", "# x y z nx ny nz\n1 2 3 0 0 1\n4 5 6 0 0 1\n"}) {
+        EXPECT_EQ(readGood("a.csv", text).points, expected) << text;
+    }
+    expectError("b.csv", "id,x,y,z\n7,1,2\n", kMalformed, {"line 2", "nothing"});
+    expectError("c.csv", "lon,lat,height\n1,2,3\n", kMalformed, {"line 1", "'lon'"});
+}
+
+TEST_F(Xyz, ReadsSeveralCountedScans) {
+    EXPECT_EQ(readGood("a.pts", "2\n1 2 3 -5 0 0 0\n4 5 6 -5 0 0 0\n1\n7 8 9 -5 0 0 0\n").points.size(), 3U);
+    expectError("b.pts", "2\n1 2 3\n4 5 6\n2\n7 8 9\n", kMalformed, {"announces 4 points", "has 3"});
+    expectError("c.pts", "1\n1 2 3\n4 5 6\n", kMalformed, {"announces 1 point,", "has 2"});
+    expectError("d.pts", "1\n1 2 3\n18446744073709551615\n", kMalformed, {"line 3"});
 }
 
 TEST_F(Xyz, RefusesDecimalCommas) {
@@ -34,7 +56,7 @@ TEST_F(Xyz, RefusesDecimalCommas) {
 }
 
 TEST_F(Xyz, DefectsNameTheLine) {
-    expectError("empty.xyz", "", kMalformed, {"no point"});
+    expectError("empty.xyz", "", kMalformed, {"the file is empty"});
     expectError("a.xyz", "# only\n\n", kMalformed, {"no point"});
     expectError("b.xyz", "1 2 3\n1 2\n", kMalformed, {"line 2", "nothing"});
     expectError("c.xyz", "1 2 3\n\n1 b 3\n", kMalformed, {"line 3", "'b'"});
