@@ -1,7 +1,6 @@
 // OFF (Geomview object file format) as text, with the prefixes that only add data to vertices.
 //
-// Written here: Debian's readers (CGAL, libigl, assimp) take a face list that is cut short, or numbers after
-// the last face, without an error.
+// Not CGAL's reader, which does not notice what follows the last announced face.
 #include <cstdint>
 #include <limits>
 #include <string>
