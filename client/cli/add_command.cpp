@@ -53,10 +53,28 @@ struct Upload {
     std::optional<Error> failure;
 };
 
+/// Standard input has no name that a key could come from.
+Result<Upload> uploadOfStandardInput(const AddFlags& flags) {
+    if (flags.key.empty()) return fail(ErrorCode::kInvalidArgument, "standard input needs --key");
+    if (flags.each) {
+        return fail(ErrorCode::kInvalidArgument,
+                    "--each reads a scan twice, which standard input cannot be: give a file");
+    }
+    Upload upload;
+    upload.path = upload.name = "-";
+    return upload;
+}
+
 Result<std::vector<Upload>> listUploads(const AddFlags& flags) {
     std::vector<Upload> uploads;
     for (const std::string& path : flags.paths) {
-        const auto files = listScanFiles({path});
+        if (path == "-") {
+            auto upload = uploadOfStandardInput(flags);
+            RETURN_IF_ERROR(upload);
+            uploads.push_back(std::move(*upload));
+            continue;
+        }
+        const auto files = listScanFiles({path}, !flags.scan.format.empty());
         RETURN_IF_ERROR(files);
         for (const ScanFile& file : *files) {
             Upload upload;
@@ -282,8 +300,8 @@ int reportFailures(Session& session, const std::vector<Upload>& uploads) {
         ++failed;
         last = exitCodeOf(upload.failure->code);
         const std::string& message = upload.failure->message;
-        const bool named = message.find(upload.path) != std::string::npos;
-        session.console().note(named ? message : upload.path + ": " + message);
+        const bool named = message.find(scanName(upload.path)) != std::string::npos;
+        session.console().note(named ? message : scanName(upload.path) + ": " + message);
     }
     if (failed == 0) return kOk;
     if (uploads.size() > 1) {
@@ -323,7 +341,7 @@ CommandResult runAdd(Session& session, const AddFlags& flags) {
 void addAddCommand(CLI::App& app, Session& session) {
     auto flags = std::make_shared<AddFlags>();
     CLI::App* command = app.add_subcommand("add", "Store scans: files, or folders searched to any depth");
-    command->add_option("PATH", flags->paths, "Scan files or folders")->required();
+    command->add_option("PATH", flags->paths, "Scan files or folders, or - for standard input")->required();
     addCollectionOption(*command, flags->collection);
     command->add_option("--key", flags->key,
                         "Key, if there is only one scan [path below the current folder, without ending]");
@@ -350,6 +368,7 @@ void addAddCommand(CLI::App& app, Session& session) {
                                    "Store each of several separate objects of a scan, without the plane that "
                                    "they stand on, as KEY/1, KEY/2, ...");
     addScanFlags(*command, flags->scan);
+    addFormatFlag(*command, flags->scan);
     addUnitFlag(*command, flags->unit);
     for (const char* other : {"--drop-plane", "--largest", "--points"}) {
         each->excludes(command->get_option(other));

@@ -42,11 +42,12 @@ Result<SurfacePoints> surfaceOf(const std::string& path, const ScanFlags& flags,
     const auto scan = loadScan(path, flags, flags.seed, context);
     RETURN_IF_ERROR(scan);
     auto surface = makeSurfacePoints(scan->points, context);
-    if (!surface) return fail(surface.error().code, path + ": " + surface.error().message);
+    if (!surface) return fail(surface.error().code, scanName(path) + ": " + surface.error().message);
     return surface;
 }
 
 Result<client::Fit> alignFiles(const AlignFlags& flags, const RunContext& context) {
+    RETURN_IF_ERROR(checkReadOnce(flags.query, flags.other));
     const auto query = surfaceOf(flags.query, flags.scan, context);
     RETURN_IF_ERROR(query);
     const auto other = surfaceOf(flags.other, flags.scan, context);
@@ -82,14 +83,14 @@ CommandResult runAlign(Session& session, const AlignFlags& flags) {
     const RunContext context = session.context();
     const auto found = flags.key.empty() ? alignFiles(flags, context) : alignStored(session, flags, context);
     RETURN_IF_ERROR(found);
-    const std::string name = flags.key.empty() ? flags.other : flags.key;
+    const std::string name = flags.key.empty() ? scanName(flags.other) : flags.key;
     nlohmann::json document = toJson(*found);
     document["query"] = flags.query;
     document["other"] = name;
     session.console().document(document);
     session.console().text("score " + formatFixed(found->best.score, 3) + "  " + bar(found->best.score, 20) +
                            "\n\n" + fitMotionText(found->best.motion, name) +
-                           fitText(*found, flags.query, name));
+                           fitText(*found, scanName(flags.query), name));
     return kOk;
 }
 
@@ -113,6 +114,7 @@ void addAlignCommand(CLI::App& app, Session& session) {
     addUnitFlag(*command, flags->unit);
     addFreeScaleFlag(*command, flags->score);
     addScanFlags(*command, flags->scan);
+    addFormatFlag(*command, flags->scan);
     command->callback(
         [&session, flags] { session.action = [&session, flags] { return runAlign(session, *flags); }; });
 }

@@ -41,7 +41,7 @@ Result<Described> describeFile(Session& session, const CompareFlags& flags, cons
     const auto scan = loadScan(path, flags.scan, flags.scan.seed, context);
     RETURN_IF_ERROR(scan);
     auto description = describe(scan->points, parameters, context);
-    if (!description) return fail(withContext(description.error(), path + ": "));
+    if (!description) return fail(withContext(description.error(), scanName(path) + ": "));
     Described described{std::move(description->signature), std::nullopt};
     // Without surface points signatures alone are compared.
     auto surface = makeSurfacePoints(scan->points, context);
@@ -53,6 +53,7 @@ Result<Described> describeFile(Session& session, const CompareFlags& flags, cons
 Result<client::Comparison> compareFiles(Session& session, const CompareFlags& flags) {
     const auto parameters = flags.parameters.resolve();
     RETURN_IF_ERROR(parameters);
+    RETURN_IF_ERROR(checkReadOnce(flags.a, flags.b));
     const auto a = describeFile(session, flags, *parameters, flags.a);
     RETURN_IF_ERROR(a);
     const auto b = describeFile(session, flags, *parameters, flags.b);
@@ -102,11 +103,13 @@ CommandResult runCompare(Session& session, const CompareFlags& flags) {
                                {"verdict_reliability", comparison->verdictReliability}};
     if (comparison->fit) document["fit"] = toJson(*comparison->fit);
     session.console().document(document);
+    const std::string a = flags.files ? scanName(flags.a) : flags.a;
+    const std::string b = flags.files ? scanName(flags.b) : flags.b;
     session.console().text("score " + formatFixed(comparison->score, 3) + "  " + bar(comparison->score, 20) +
                            "  " + verdictText(comparison->verdict) + "\n\n" +
-                           explanationText(comparison->explanation, comparison->query, flags.a, flags.b) +
-                           (comparison->fit ? fitText(*comparison->fit, flags.a, flags.b) : "") + "\n" +
-                           flags.a + "\n" + signatureTable(comparison->query) + "\n" + flags.b + "\n" +
+                           explanationText(comparison->explanation, comparison->query, a, b) +
+                           (comparison->fit ? fitText(*comparison->fit, a, b) : "") + "\n" + a + "\n" +
+                           signatureTable(comparison->query) + "\n" + b + "\n" +
                            signatureTable(comparison->other));
     return kOk;
 }
@@ -124,6 +127,7 @@ void addCompareCommand(CLI::App& app, Session& session) {
     addScoreFlags(*command, flags->score);
     addFreeScaleFlag(*command, flags->score);
     addScanFlags(*command, flags->scan);
+    addFormatFlag(*command, flags->scan);
     addParameterFlags(*command, flags->parameters);
     command->callback(
         [&session, flags] { session.action = [&session, flags] { return runCompare(session, *flags); }; });

@@ -178,7 +178,7 @@ CommandResult runQuery(Session& session, const QueryFlags& flags) {
                                     : client->searchByScan(options, scan.points, context);
     if (!reply) {
         if (flags.path.empty()) return fail(reply.error());
-        return fail(reply.error().code, flags.path + ": " + reply.error().message);
+        return fail(reply.error().code, scanName(flags.path) + ": " + reply.error().message);
     }
     if (*factor != 1.0) scaleBy(1.0 / *factor, *reply);
     json document = replyJson(*reply);
@@ -199,7 +199,8 @@ void addQueryCommand(CLI::App& app, Session& session) {
     auto flags = std::make_shared<QueryFlags>();
     CLI::App* command =
         app.add_subcommand("query", "Find the stored shapes most like a scan, or like a stored shape");
-    command->add_option("PATH", flags->path, "Scan to search with; it is not stored");
+    command->add_option("PATH", flags->path,
+                        "Scan to search with, or - for standard input; it is not stored");
     command->add_option("--key", flags->key, "Search with this stored shape instead");
     command->add_flag("--include-self", flags->includeSelf,
                       "With --key: keep the shape itself among the hits");
@@ -221,6 +222,7 @@ void addQueryCommand(CLI::App& app, Session& session) {
     auto* none = command->add_flag("--no-explanation", flags->noExplanation, "Do not explain the hits");
     command->add_flag("--explain", flags->explain, "Explain every hit, not only the first")->excludes(none);
     addScanFlags(*command, flags->scan);
+    addFormatFlag(*command, flags->scan);
     command->callback(
         [&session, flags] { session.action = [&session, flags] { return runQuery(session, *flags); }; });
 }

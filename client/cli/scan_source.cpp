@@ -25,6 +25,18 @@ void addScanFlags(CLI::App& command, ScanFlags& flags) {
         ->check(atLeastZero());
 }
 
+void addFormatFlag(CLI::App& command, ScanFlags& flags) {
+    command.add_option("--format", flags.format,
+                       "Format of the file, e.g. ply, whatever its name; needed for standard input (-)");
+}
+
+std::string scanName(const std::string& path) { return path == "-" ? "standard input" : path; }
+
+Result<void> checkReadOnce(const std::string& path, const std::string& other) {
+    if (path != "-" || other != "-") return {};
+    return fail(ErrorCode::kInvalidArgument, "standard input can be only one of the two scans");
+}
+
 CLI::App& addScanFlagsButNoise(CLI::App& command, ScanFlags& flags) {
     const auto group = command.add_option_group("Scans", "Applied to a scan after reading it");
     group->add_option("--points", flags.points, "Keep a random subset of this many points, 4 or more");
@@ -52,7 +64,7 @@ double shareOf(std::uint64_t part, std::size_t points) {
 Result<void> isolate(const std::string& path, const ScanFlags& flags, LoadedScan& scan,
                      const RunContext& context) {
     auto scene = findScene(scan.points, context);
-    if (!scene) return fail(withContext(scene.error(), path + ": "));
+    if (!scene) return fail(withContext(scene.error(), scanName(path) + ": "));
     scan.pointsInScene = scan.points.size();
     if (flags.isolate.any()) scan.points = isolated(scan.points, *scene, flags.isolate);
     scan.scene = std::move(*scene);
@@ -112,6 +124,7 @@ Result<LoadedScan> loadScan(const std::string& path, const ScanFlags& flags, std
     ReadOptions options;
     options.meshSamples = flags.meshSamples;
     options.seed = flags.seed;
+    options.format = flags.format;
     auto read = readScan(path, options, context);
     RETURN_IF_ERROR(read);
     Result<LoadedScan> scan = LoadedScan{std::move(*read), std::nullopt, 0};
@@ -122,7 +135,7 @@ Result<LoadedScan> loadScan(const std::string& path, const ScanFlags& flags, std
     const std::uint64_t subsetSeed = random.next();
     if (flags.noise > 0.0) {
         if (const auto added = addGaussianNoise(scan->points, flags.noise, noiseSeed); !added) {
-            return fail(added.error().code, path + ": " + added.error().message);
+            return fail(added.error().code, scanName(path) + ": " + added.error().message);
         }
     }
     if (flags.points && *flags.points < scan->points.size()) {
@@ -138,11 +151,6 @@ std::string relativeName(const std::string& path, const std::string& folder) {
     return relative.generic_string();
 }
 
-std::string withoutEnding(const std::string& name) {
-    const fs::path path(name);
-    return (path.parent_path() / path.stem()).generic_string();
-}
-
 Result<std::string> keyOfFile(const std::string& path, const std::string& base) {
     std::error_code error;
     const fs::path here = fs::current_path(error);
@@ -150,8 +158,8 @@ Result<std::string> keyOfFile(const std::string& path, const std::string& base) 
     const fs::path file = (here / path).lexically_normal();
     const fs::path folder = (here / base / "").lexically_normal();
     const fs::path below = file.lexically_relative(folder);
-    if (!below.empty() && *below.begin() != "..") return withoutEnding(below.generic_string());
-    if (base.empty()) return withoutEnding(file.relative_path().generic_string());
+    if (!below.empty() && *below.begin() != "..") return withoutScanEnding(below.generic_string());
+    if (base.empty()) return withoutScanEnding(file.relative_path().generic_string());
     return fail(ErrorCode::kInvalidArgument, path + " is not below --base " + base);
 }
 

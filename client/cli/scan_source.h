@@ -18,12 +18,13 @@ class App;
 
 namespace shapedb::cli {
 
-/// --noise, --points, --seed, --mesh-samples, --drop-plane and --largest.
+/// --noise, --points, --seed, --mesh-samples, --drop-plane and --largest, and --format.
 struct ScanFlags {
     double noise = 0.0;                   ///< standard deviation, as a share of the bounding-box diagonal
     std::optional<std::uint64_t> points;  ///< size of a random subset
     std::uint64_t seed = 1;
     std::uint64_t meshSamples = ReadOptions{}.meshSamples;
+    std::string format;  ///< in place of the one that the file's ending names; empty: that one
     IsolateOptions isolate;
 };
 
@@ -32,6 +33,15 @@ void addScanFlags(CLI::App& command, ScanFlags& flags);
 
 /// For a command with several noise levels. Returns the group of the flags.
 CLI::App& addScanFlagsButNoise(CLI::App& command, ScanFlags& flags);
+
+/// --format, for commands that read files by name, and standard input.
+void addFormatFlag(CLI::App& command, ScanFlags& flags);
+
+/// For messages: the path, or what "-" means.
+[[nodiscard]] std::string scanName(const std::string& path);
+
+/// Errors: kInvalidArgument if both are standard input.
+[[nodiscard]] Result<void> checkReadOnce(const std::string& path, const std::string& other);
 
 /// The seed of one file. Depends only on the run's seed and the file's name in the collection: not on the
 /// order of files, the number of threads or the other files.
@@ -49,8 +59,8 @@ struct LoadedScan : Scan {
     std::size_t pointsInScene = 0;  ///< before any were left out
 };
 
-/// Reads `path`, leaves out what flags.isolate says, adds noise to all points, then takes the subset, with
-/// random numbers from `seed`. Points sampled from a mesh depend on flags.seed alone.
+/// Reads `path` ("-" is standard input), leaves out what flags.isolate says, adds noise to all points, then
+/// takes the subset, with random numbers from `seed`. Points sampled from a mesh depend on flags.seed alone.
 ///
 /// `look`: finds the scene also when nothing is left out.
 ///
@@ -60,9 +70,6 @@ struct LoadedScan : Scan {
 
 /// `path` relative to `folder`, with '/' as separator; the file name if `folder` is the file itself.
 [[nodiscard]] std::string relativeName(const std::string& path, const std::string& folder);
-
-/// "Hand/193.ply" -> "Hand/193".
-[[nodiscard]] std::string withoutEnding(const std::string& name);
 
 /// The key of an uploaded file: its path below `base` (empty: the current folder) without ending, with '/' as
 /// separator; without a base the whole path, from below the root, of a file that is not below the current

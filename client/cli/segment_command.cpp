@@ -46,7 +46,7 @@ nlohmann::json segmentJson(const SegmentFlags& flags, const LoadedScan& scan,
 
 std::string segmentText(const SegmentFlags& flags, const LoadedScan& scan, const ShapeParameters& parameters,
                         const client::SegmentationReport& report, const client::Signature& signature) {
-    std::string text = flags.file + ": " + scan.format + ", " +
+    std::string text = scanName(flags.file) + ": " + scan.format + ", " +
                        formatCount(report.points, "point", "points") +
                        (scan.sampledFromMesh ? " sampled from its surface" : "") + "\n";
     if (scan.skippedNonFinite > 0) {
@@ -74,7 +74,7 @@ CommandResult runSegment(Session& session, const SegmentFlags& flags) {
     RETURN_IF_ERROR(scan);
     const auto description = describe(scan->points, *parameters, context);
     if (!description) {
-        return fail(description.error().code, flags.file + ": " + description.error().message);
+        return fail(description.error().code, scanName(flags.file) + ": " + description.error().message);
     }
     if (!flags.out.empty()) {
         const auto written =
@@ -93,10 +93,12 @@ CommandResult runSegment(Session& session, const SegmentFlags& flags) {
 void addSegmentCommand(CLI::App& app, Session& session) {
     auto flags = std::make_shared<SegmentFlags>();
     CLI::App* command = app.add_subcommand("segment", "Cut one scan into its parts (needs no server)");
-    command->add_option("FILE", flags->file, "Scan file: " + scanFormatList())->required();
+    command->add_option("FILE", flags->file, "Scan file, or - for standard input: " + scanFormatList())
+        ->required();
     command->add_option("--out", flags->out, "Write the points, coloured and labelled by part")
         ->type_name("FILE.ply");
     addScanFlags(*command, flags->scan);
+    addFormatFlag(*command, flags->scan);
     addParameterFlags(*command, flags->parameters);
     command->callback(
         [&session, flags] { session.action = [&session, flags] { return runSegment(session, *flags); }; });

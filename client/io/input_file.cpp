@@ -7,7 +7,9 @@
 
 #include <fcntl.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
+#include "client/io/gzip_source.h"
 #include "client/io/text.h"
 
 namespace shapedb::io {
@@ -37,13 +39,19 @@ std::string reason(int number) { return std::generic_category().message(number);
 }  // namespace
 
 Result<InputFile> InputFile::open(const std::string& path, const RunContext& context) {
-    const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-    if (descriptor < 0) return fail(notReadable(path, reason(errno)));
-    InputFile file(path, makeFileSource(path, descriptor), std::nullopt, context);
+    const bool standardInput = path == "-";
+    const std::string name = standardInput ? "standard input" : path;
+    const int descriptor = standardInput ? ::fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 0)
+                                         : ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+    if (descriptor < 0) return fail(notReadable(name, reason(errno)));
+    InputFile file(name, makeFileSource(name, descriptor), std::nullopt, context);
     struct stat status = {};
-    if (::fstat(descriptor, &status) != 0) return fail(notReadable(path, reason(errno)));
-    if (S_ISDIR(status.st_mode)) return fail(notReadable(path, "it is a folder; name a scan file"));
-    if (S_ISREG(status.st_mode)) file.size_ = file.fileSize_ = static_cast<std::uint64_t>(status.st_size);
+    if (::fstat(descriptor, &status) != 0) return fail(notReadable(name, reason(errno)));
+    if (S_ISDIR(status.st_mode)) return fail(notReadable(name, "it is a folder; name a scan file"));
+    if (S_ISREG(status.st_mode) && !standardInput) {
+        file.size_ = file.fileSize_ = static_cast<std::uint64_t>(status.st_size);
+    }
+    if (file.peek(3) == "\x1f\x8b\x08") file.source_ = makeGzipSource(name, file.takeSource());
     return file;
 }
 
@@ -123,12 +131,13 @@ bool InputFile::onlyPaddingLeft() {
     return true;
 }
 
-void InputFile::readAs(std::unique_ptr<ByteSource> (*make)(std::string, std::unique_ptr<ByteSource>, bool),
-                       bool bigEndian) {
-    source_ = make(path_, putBack(std::string(data(), available()), std::move(source_)), bigEndian);
+// All that has not been consumed, for a source that reads it in another way.
+std::unique_ptr<ByteSource> InputFile::takeSource() {
+    auto source = putBack(std::string(data(), available()), std::move(source_));
     begin_ = end_ = 0;
     bufferOffset_ = 0;
     size_ = std::nullopt;
+    return source;
 }
 
 void InputFile::decodeText() {
@@ -149,7 +158,8 @@ void InputFile::decodeText() {
     if (little || big) consume(2);
     if (!little && !big && !lettersAt(0) && !lettersAt(1)) return;
     recoded_ = true;
-    readAs(makeUtf16Source, big || lettersAt(1));
+    const bool bigEndian = big || lettersAt(1);
+    source_ = makeUtf16Source(path_, takeSource(), bigEndian);
 }
 
 /// Bytes before the next line end, or all that are left of the file.

@@ -20,7 +20,8 @@ namespace shapedb::io {
 /// the real reason, which readScan reports in place of the parser's error. Not thread-safe.
 class InputFile {
   public:
-    /// Errors: kFileNotReadable. `context` must outlive the file.
+    /// `path` "-" is standard input. What gzip has packed is unpacked on the way (a kind that the file does
+    /// not have to say by its name). Errors: kFileNotReadable. `context` must outlive the file.
     static Result<InputFile> open(const std::string& path, const RunContext& context);
 
     InputFile(InputFile&&) = default;
@@ -32,9 +33,10 @@ class InputFile {
     const std::string& path() const { return path_; }
     const std::optional<Error>& failure() const { return failure_; }
 
-    /// Byte position of data() in the file.
+    /// Byte position of data() in the file, unpacked and as UTF-8.
     std::uint64_t offset() const { return bufferOffset_ + begin_; }
-    /// Bytes from offset() to the end of the file; unknown for a pipe, and after decodeText found UTF-16.
+    /// Bytes from offset() to the end of the file; unknown for a pipe, for packed data, and after decodeText
+    /// found UTF-16.
     std::optional<std::uint64_t> remaining() const;
     /// False only if fewer than `bytes` are known to remain.
     bool mayHold(std::uint64_t bytes) const;
@@ -88,8 +90,7 @@ class InputFile {
     bool readMore();
     std::size_t lengthOfLine();
     LineEnd lineEndAt(std::size_t position);
-    void readAs(std::unique_ptr<ByteSource> (*make)(std::string, std::unique_ptr<ByteSource>, bool),
-                bool bigEndian);
+    std::unique_ptr<ByteSource> takeSource();
 
     std::string path_;
     std::unique_ptr<ByteSource> source_;

@@ -48,14 +48,21 @@ constexpr std::array<Format, 10> kFormats = {{{".ply", io::readPly},
 constexpr double kDenseAreaShare = 0.99;
 constexpr double kDenseEdge = 3.0;
 
-std::string endingOf(const fs::path& path) { return io::lowerCase(path.extension().string()); }
+constexpr const char* kPacked = ".gz";
 
-const Format* formatOf(const std::string& path) {
-    const std::string ending = endingOf(path);
+/// Of the format, in lower case: ".ply" of "scan.PLY" and of "scan.ply.gz".
+std::string endingOf(const fs::path& path) {
+    const std::string ending = io::lowerCase(path.extension().string());
+    return ending == kPacked ? io::lowerCase(path.stem().extension().string()) : ending;
+}
+
+const Format* formatWithEnding(const std::string& ending) {
     const auto* format = std::find_if(kFormats.begin(), kFormats.end(),
                                       [&](const Format& candidate) { return ending == candidate.ending; });
     return format == kFormats.end() ? nullptr : format;
 }
+
+const Format* formatOf(const std::string& path) { return formatWithEnding(endingOf(path)); }
 
 std::string endingList() {
     std::string list;
@@ -79,7 +86,23 @@ Error unknownFormat(const std::string& path) {
     return {ErrorCode::kUnknownFileFormat,
             path + ": " +
                 (ending.empty() ? "no file ending" : "unknown file ending " + io::inQuotes(ending)) +
-                "; scan files end in " + endingList()};
+                "; scan files end in " + endingList() + ", and .gz after that if they are packed"};
+}
+
+Result<const Format*> chooseFormat(const std::string& path, const std::string& given) {
+    if (!given.empty()) {
+        const Format* format = formatWithEnding((given[0] == '.' ? "" : ".") + io::lowerCase(given));
+        if (format != nullptr) return format;
+        return fail(ErrorCode::kInvalidArgument,
+                    "there is no format " + io::inQuotes(given) + "; there are " + endingList());
+    }
+    if (path == "-") {
+        return fail(
+            ErrorCode::kInvalidArgument,
+            "standard input: has no ending that says its format; name it (--format), one of " + endingList());
+    }
+    if (const Format* format = formatOf(path)) return format;
+    return fail(unknownFormat(path));
 }
 
 bool mostVerticesAreLoose(const ScanContent& content) {
@@ -143,14 +166,33 @@ Result<PointCloud> samplePoints(const std::string& path, ScanContent&& content, 
     return points;
 }
 
+struct Archive {
+    std::string_view start;
+    const char* name;
+};
+constexpr std::array<Archive, 5> kArchives = {{{"PK\x03\x04", "ZIP archive"},
+                                               {"BZh", "file packed by bzip2"},
+                                               {"\xfd"
+                                                "7zXZ",
+                                                "file packed by xz"},
+                                               {"\x28\xb5\x2f\xfd", "file packed by zstd"},
+                                               {"7z\xbc\xaf\x27\x1c", "7-Zip archive"}}};
+
+/// What no reader can make anything of is named for what it is.
 Result<void> checkHasContent(InputFile& file) {
     constexpr std::string_view kPointer = "version https://git-lfs.github.com/spec/";
     const std::string_view start = file.peek(kPointer.size());
     const bool onlyMark = start == "\xEF\xBB\xBF" || start == "\xFF\xFE" || start == "\xFE\xFF";
     if (onlyMark || (start.empty() && !file.failure())) return fail(file.malformed("the file is empty"));
-    if (start != kPointer) return {};
-    return fail(
-        file.malformed("this is a Git LFS pointer, not the file itself; fetch that with 'git lfs pull'"));
+    if (start == kPointer) {
+        return fail(
+            file.malformed("this is a Git LFS pointer, not the file itself; fetch that with 'git lfs pull'"));
+    }
+    for (const Archive& archive : kArchives) {
+        if (start.substr(0, archive.start.size()) != archive.start) continue;
+        return fail(file.malformed(std::string("this is a ") + archive.name + "; unpack it first"));
+    }
+    return {};
 }
 
 Result<Scan> readScanUnguarded(const std::string& path, const ReadOptions& options,
@@ -158,12 +200,13 @@ Result<Scan> readScanUnguarded(const std::string& path, const ReadOptions& optio
     if (options.meshSamples == 0) {
         return fail(ErrorCode::kInvalidArgument, "the number of surface samples must be at least 1");
     }
+    if (path == "-") RETURN_IF_ERROR(chooseFormat(path, options.format));
     auto file = InputFile::open(path, context);
     RETURN_IF_ERROR(file);
-    const Format* format = formatOf(path);
-    if (format == nullptr) return fail(unknownFormat(path));
+    const auto format = chooseFormat(path, options.format);
+    RETURN_IF_ERROR(format);
     RETURN_IF_ERROR(checkHasContent(*file));
-    auto content = format->read(*file, options.maxPoints);
+    auto content = (*format)->read(*file, options.maxPoints);
     // The real reason comes before the parser's complaint about an early end.
     if (file->failure()) return fail(*file->failure());
     RETURN_IF_ERROR(content);
@@ -217,7 +260,7 @@ Result<void> searchFolder(const std::string& folder, std::vector<std::string>& f
     return {};
 }
 
-Result<std::vector<ScanFile>> listScanFilesUnguarded(const std::vector<std::string>& paths) {
+Result<std::vector<ScanFile>> listScanFilesUnguarded(const std::vector<std::string>& paths, bool anyEnding) {
     std::vector<std::string> found;
     for (const std::string& path : paths) {
         std::error_code error;
@@ -229,7 +272,7 @@ Result<std::vector<ScanFile>> listScanFilesUnguarded(const std::vector<std::stri
         }
         if (fs::is_directory(status)) {
             RETURN_IF_ERROR(searchFolder(path, found));
-        } else if (formatOf(path) == nullptr) {
+        } else if (!anyEnding && formatOf(path) == nullptr) {
             return fail(unknownFormat(path));
         } else {
             found.push_back(path);
@@ -279,14 +322,20 @@ std::string scanFormatList() {
     return list;
 }
 
-Result<std::vector<ScanFile>> listScanFiles(const std::vector<std::string>& paths) {
+Result<std::vector<ScanFile>> listScanFiles(const std::vector<std::string>& paths, bool anyEnding) {
     try {
-        return listScanFilesUnguarded(paths);
+        return listScanFilesUnguarded(paths, anyEnding);
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::kOutOfMemory, "not enough memory to list the scan files");
     } catch (const std::exception& e) {
         return fail(ErrorCode::kFileNotReadable, std::string("cannot list the scan files: ") + e.what());
     }
+}
+
+std::string withoutScanEnding(const std::string& name) {
+    const fs::path path(name);
+    const bool packed = io::lowerCase(path.extension().string()) == kPacked;
+    return (path.parent_path() / (packed ? path.stem().stem() : path.stem())).generic_string();
 }
 
 }  // namespace shapedb

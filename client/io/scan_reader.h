@@ -35,6 +35,9 @@ struct ReadOptions {
     /// memory.
     std::size_t maxPoints = std::numeric_limits<std::size_t>::max();
     MeshHandling meshHandling = MeshHandling::kAuto;
+    /// The format, in place of the one that the file's ending names: an ending, with or without its dot.
+    /// Empty: that of the file. Standard input has no ending and needs it.
+    std::string format;
 };
 
 struct Scan {
@@ -54,7 +57,9 @@ struct Scan {
     std::size_t trianglesInFile = 0;
 };
 
-/// Reads one scan. The format follows from the file's ending, in upper or lower case.
+/// Reads one scan. The format follows from the file's ending, in upper or lower case. `path` "-" is standard
+/// input (a file of that name is "./-"). A file packed by gzip is unpacked on the way; its name may end in
+/// .gz after the ending of its format.
 ///
 /// kAuto takes the vertices in place of samples if
 ///  - less than half of them belong to a triangle: a point cloud with a few faces; or
@@ -70,10 +75,13 @@ struct Scan {
 /// Errors, each naming the file:
 ///  - kFileNotReadable: missing, a folder, no permission, or a device error
 ///  - kUnknownFileFormat: the ending is not in scanFileEndings(); the message lists them
-///  - kMalformedFile: with the line (text) or byte and element (binary), and what was expected
+///  - kMalformedFile: with the line (text) or byte and element (binary), and what was expected; also gzip
+///  data
+///    that is damaged, or unpacks to absurdly much
 ///  - kNonFiniteCoordinate: NaN or infinity, except in PCD, with the vertex
 ///  - kPointLimitExceeded: see ReadOptions::maxPoints
-///  - kInvalidArgument: meshSamples is 0, or kSurface for a file without triangles
+///  - kInvalidArgument: meshSamples is 0, format is none, standard input without one, or kSurface for a file
+///    without triangles
 ///  - kCancelled, kDeadlineExceeded: from `context`
 ///  - kOutOfMemory
 [[nodiscard]] Result<Scan> readScan(const std::string& path, const ReadOptions& options = {},
@@ -95,8 +103,14 @@ struct ScanFile {
 /// the known endings. Hidden entries are skipped, links to folders are not followed, and a .txt or .csv file
 /// counts only if its first line of content looks like a point, so that a README.txt does no harm.
 ///
+/// A known ending may have .gz after it. `anyEnding`: for files that are given by name, any will do.
+///
 /// Errors: kFileNotReadable (a path does not exist, a folder cannot be searched or has no scan file);
 /// kUnknownFileFormat (a given file has an unknown ending).
-[[nodiscard]] Result<std::vector<ScanFile>> listScanFiles(const std::vector<std::string>& paths);
+[[nodiscard]] Result<std::vector<ScanFile>> listScanFiles(const std::vector<std::string>& paths,
+                                                          bool anyEnding = false);
+
+/// "Hand/193.ply" and "Hand/193.ply.gz" -> "Hand/193".
+[[nodiscard]] std::string withoutScanEnding(const std::string& name);
 
 }  // namespace shapedb

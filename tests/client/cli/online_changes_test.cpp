@@ -1,5 +1,6 @@
 // The commands that change many shapes, list them in other orders, count values and group hits, against a
 // real shapedbd.
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 
@@ -76,6 +77,21 @@ class OnlineChanges : public CommandTest {
 };
 
 using Keys = std::vector<std::string>;
+
+TEST_F(OnlineChanges, StandardInputIsStoredAndSearchedWith) {
+    const std::string file = scans() + "/mug/mug_01.ply";
+    const auto withInput = [&](const std::string& arguments) {
+        return std::system((std::string(SHAPEDB_PATH) + " " + arguments + " --format ply --collection " +
+                            collection + " --server " + server()->address() + " < " + file + " > " +
+                            path("out"))
+                               .c_str());
+    };
+    EXPECT_EQ(withInput("add - --key piped --wait"), 0);
+    EXPECT_EQ(listed({"--prefix", "piped"}), Keys{"piped"});
+    EXPECT_EQ(withInput("query - --json"), 0);
+    std::ifstream found(path("out"));
+    EXPECT_EQ(json::parse(found)["hits"][0]["score"], 1.0);
+}
 
 TEST_F(OnlineChanges, MetadataIsMergedRemovedAndReplaced) {
     EXPECT_EQ(in({"metadata", "--filter", "label=mug", "--set", "colour=blue", "--set", "size=3"})["changed"],

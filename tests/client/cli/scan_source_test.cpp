@@ -31,9 +31,9 @@ TEST_F(ScanSource, NameIsRelativeToTheFolder) {
 }
 
 TEST_F(ScanSource, KeyLosesOnlyTheLastEnding) {
-    EXPECT_EQ(withoutEnding("Hand/193.ply"), "Hand/193");
-    EXPECT_EQ(withoutEnding("193.ply"), "193");
-    EXPECT_EQ(withoutEnding("v1.2/cup.final.ply"), "v1.2/cup.final");
+    EXPECT_EQ(withoutScanEnding("Hand/193.ply"), "Hand/193");
+    EXPECT_EQ(withoutScanEnding("193.ply"), "193");
+    EXPECT_EQ(withoutScanEnding("v1.2/cup.final.ply"), "v1.2/cup.final");
 }
 
 TEST_F(ScanSource, WithoutFlagsPointsAreThoseOfTheFile) {

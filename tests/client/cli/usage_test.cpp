@@ -1,5 +1,9 @@
 // Command lines that are refused, and what all commands have in common.
 #include <csignal>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <string>
 
 #include <sys/wait.h>
 #include <unistd.h>
@@ -103,6 +107,42 @@ TEST_F(Usage, UnwritableResultIsAFailure) {
     const int status = std::system(line.c_str());
     ASSERT_TRUE(WIFEXITED(status));
     EXPECT_EQ(WEXITSTATUS(status), 3);
+}
+
+// The exit code, with a file as standard input.
+int runWithInput(const std::string& file, const std::string& arguments, const std::string& output) {
+    const std::string line =
+        std::string(SHAPEDB_PATH) + " " + arguments + " < " + file + " > " + output + " 2>&1";
+    const int status = std::system(line.c_str());
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+TEST_F(Usage, CommandsReadStandardInput) {
+    const std::string file = writePoints("a.xyz", dumbbellPoints());
+    const std::string out = path("out");
+    const auto contains = [&](const std::string& text) {
+        std::ifstream stream(out);
+        const std::string printed{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+        return printed.find(text) != std::string::npos ? ::testing::AssertionSuccess()
+                                                       : ::testing::AssertionFailure() << printed;
+    };
+    EXPECT_EQ(runWithInput(file, "segment - --format xyz", out), 0);
+    EXPECT_TRUE(contains("standard input: XYZ text, "));
+    EXPECT_EQ(runWithInput(file, "compare --files - " + file + " --format .xyz --json", out), 0);
+    EXPECT_TRUE(contains("\"score\": 1.0"));
+    EXPECT_EQ(runWithInput(file, "align " + file + " - --format XYZ", out), 0);
+    EXPECT_TRUE(contains("standard input is turned"));
+    EXPECT_EQ(runWithInput(file, "segment -", out), 2);
+    EXPECT_TRUE(contains("--format"));
+    EXPECT_EQ(runWithInput(file, "compare --files - - --format xyz", out), 2);
+    EXPECT_TRUE(contains("only one of the two"));
+    EXPECT_EQ(runWithInput(file, "align - - --format xyz", out), 2);
+    EXPECT_EQ(runWithInput(file, "add - --format xyz", out), 2);
+    EXPECT_TRUE(contains("needs --key"));
+    EXPECT_EQ(runWithInput(file, "add - --format xyz --key a --each", out), 2);
+    EXPECT_TRUE(contains("--each"));
+    EXPECT_EQ(runWithInput("/dev/null", "segment - --format xyz", out), 3);
+    EXPECT_TRUE(contains("standard input: the file is empty"));
 }
 
 TEST_F(Usage, InterruptHasItsOwnExitCode) {

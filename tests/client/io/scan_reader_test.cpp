@@ -178,7 +178,7 @@ TEST_F(ScanReader, ErrorsNameUnreadableAndUnknownFiles) {
         ::chmod(write("secret.ply", "ply\n").c_str(), 0);
         EXPECT_EQ(readScan(path("secret.ply")).error().code, ErrorCode::kFileNotReadable);
     }
-    for (const char* name : {"scan.las", "scan", "scan.ply.gz", ".ply"}) {
+    for (const char* name : {"scan.las", "scan", "scan.gz", "scan.zip.gz", ".ply"}) {
         scan = readScan(write(name, "ply\n"));
         ASSERT_FALSE(scan);
         EXPECT_EQ(scan.error().code, ErrorCode::kUnknownFileFormat) << name;
