@@ -158,7 +158,11 @@ class PcdBody {
         std::vector<char> bytes(unpacked);
         const unsigned written = lzf_decompress(file_.data(), static_cast<unsigned>(packed), bytes.data(),
                                                 static_cast<unsigned>(unpacked));
-        if (written != unpacked) return fail(tooShort("the compressed data is damaged"));
+        if (written != unpacked) {
+            // Some programs write data that does not get smaller as it is.
+            if (packed != unpacked) return fail(tooShort("the compressed data is damaged"));
+            std::copy_n(file_.data(), bytes.size(), bytes.begin());
+        }
         file_.consume(static_cast<std::size_t>(packed));
         return readFieldByField(bytes, !fits(false));
     }

@@ -14,10 +14,11 @@ namespace {
 
 std::optional<ScalarType> scalarTypeFromName(std::string_view word) {
     using Entry = std::pair<std::string_view, ScalarType>;
-    static constexpr std::array<Entry, 18> kNames = {{{"char", ScalarType::kInt8},
+    static constexpr std::array<Entry, 19> kNames = {{{"char", ScalarType::kInt8},
                                                       {"int8", ScalarType::kInt8},
                                                       {"uchar", ScalarType::kUint8},
                                                       {"uint8", ScalarType::kUint8},
+                                                      {"bool", ScalarType::kUint8},
                                                       {"short", ScalarType::kInt16},
                                                       {"int16", ScalarType::kInt16},
                                                       {"ushort", ScalarType::kUint16},
@@ -143,7 +144,9 @@ Result<PlyHeader> readPlyHeader(InputFile& file) {
             auto property = parseProperty(file, line);
             RETURN_IF_ERROR(property);
             header.elements.back().properties.push_back(std::move(*property));
-        } else if (!keyword.empty() && keyword != "comment" && keyword != "obj_info") {
+            // Blender 2.4 left out "comment" before "Created by".
+        } else if (!keyword.empty() && keyword != "comment" && keyword != "obj_info" &&
+                   keyword != "created") {
             return fail(file.malformedLine(
                 "expected format, element, property, comment, obj_info or end_header, found " +
                 inQuotes(keyword)));

@@ -179,10 +179,12 @@ class StlReader {
     // solid (facet, outer loop, vertex x 3, endloop, endfacet)* endsolid, one or more times. Line ends are no
     // more than blanks, but for the names of solids, which may have several words.
     Result<void> readAscii() {
-        for (std::string_view word = words_.next(); !word.empty(); word = words_.next()) {
+        for (std::string_view word = nextKeyword(); !word.empty(); word = nextKeyword()) {
             if (!equalsIgnoringCase(word, "solid")) return fail(unexpected("solid", word));
             skipName();
-            for (word = words_.next(); !equalsIgnoringCase(word, "endsolid"); word = words_.next()) {
+            // Some programs write the name after "endsolid" without a blank.
+            for (word = nextKeyword(); !equalsIgnoringCase(word.substr(0, 8), "endsolid");
+                 word = nextKeyword()) {
                 if (words_.ended()) return fail(unexpected("endsolid", word));
                 if (!equalsIgnoringCase(word, "facet")) return fail(unexpected("facet", word));
                 RETURN_IF_ERROR(readFacet());
@@ -190,6 +192,14 @@ class StlReader {
             words_.endLine();
         }
         return {};
+    }
+
+    // Some programs write "end loop", "end facet" and "end solid".
+    std::string_view nextKeyword() {
+        const std::string_view word = words_.next();
+        if (!equalsIgnoringCase(word, "end")) return word;
+        keyword_ = "end";
+        return keyword_.append(words_.nextOnLine());
     }
 
     // A solid may also stand on one line with its facets.
@@ -215,7 +225,7 @@ class StlReader {
     }
 
     Result<void> expect(const char* keyword) {
-        const std::string_view word = words_.next();
+        const std::string_view word = nextKeyword();
         if (equalsIgnoringCase(word, keyword)) return {};
         return fail(unexpected(keyword, word));
     }
@@ -257,6 +267,7 @@ class StlReader {
 
     InputFile& file_;
     WordReader words_;
+    std::string keyword_;  // what nextKeyword has joined
     ScanContent content_;
     VertexSink sink_;
     PolygonFan fan_;

@@ -146,6 +146,14 @@ TEST_F(Pcd, BodyDefectsNameLineOrByte) {
                 {"byte " + std::to_string(start.size()), "2 points", "room for 1"});
 }
 
+TEST_F(Pcd, ReadsDataThatDidNotGetSmaller) {
+    Bytes body;
+    body.add(std::uint32_t{24}).add(std::uint32_t{24});
+    for (const float c : {1.0F, 4.0F, 2.0F, 5.0F, 3.0F, 6.0F}) body.add(c);
+    EXPECT_EQ(readGood("a.pcd", xyz("2", "1", "binary_compressed") + body.str()).points,
+              (PointCloud{{1, 2, 3}, {4, 5, 6}}));
+}
+
 TEST_F(Pcd, RefusesDamagedCompressedData) {
     const std::string start = xyz("2", "1", "binary_compressed");
     const std::string body = compressedPcdBody(std::string(24, '\0'));

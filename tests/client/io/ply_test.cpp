@@ -112,6 +112,14 @@ TEST_F(Ply, FacesCountUnderAnyName) {
     EXPECT_EQ(readGood("c.ply", ascii(vertices + "element face 0\n", body)).trianglesInFile, 0U);
 }
 
+TEST_F(Ply, ReadsTheHeadersOfOtherPrograms) {
+    EXPECT_EQ(readGood("a.ply",
+                       "ply\nformat ascii 1.0\nCreated by Blender3D 247, source file:\nelement vertex 1\n" +
+                           kXyz + "property bool visible\nend_header\n1 2 3 1\n")
+                  .points.size(),
+              1U);
+}
+
 TEST_F(Ply, FacesAreNeverPassedOverInSilence) {
     const std::string start = "element vertex 1\n" + kXyz + "element face 1\n";
     const std::string advice = "element face needs a list vertex_indices";

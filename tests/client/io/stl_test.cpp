@@ -39,6 +39,21 @@ TEST_F(Stl, ReadsSeveralSolidsInAnyCase) {
     EXPECT_EQ(scan.trianglesInFile, 2U);
 }
 
+TEST_F(Stl, ReadsTheSpellingsOfOtherPrograms) {
+    const std::string one = facet("0 0 0", "1 0 0", "0 1 0");
+    std::string apart = one;
+    apart.replace(apart.find("endloop"), 7, "end loop").replace(apart.find("endfacet"), 8, "End  Facet");
+    std::string bare = one;
+    bare.replace(0, bare.find('\n'), "facet");
+    for (const std::string& text :
+         {"solid a\n" + apart + "end solid a\n", "solid AssimpScene\n" + one + "endsolidAssimpScene\n",
+          " solid\n" + bare + "endsolid", "solid facet\n" + one + "endsolid facet\n",
+          "solid\n" + one + "endsolid\nsolid b c\nendsolid b c\n"}) {
+        EXPECT_EQ(readGood("a.stl", text).trianglesInFile, 1U) << text;
+    }
+    expectError("b.stl", "solid\n" + one + "end\n", kMalformed, {"line 9", "'end'"});
+}
+
 TEST_F(Stl, ReadsBinaryFilesThatStartWithSolid) {
     EXPECT_EQ(readGood("a.stl", binary(2, triangle(0) + triangle(1), "solid exported by a test")).format,
               "STL binary");
