@@ -42,13 +42,24 @@ std::vector<Sample> sampleContent(catalog::Catalog& catalog) {
          number(stored.storedPointBytes)},
         {"shapedb_missing_commits", "Acknowledged changes that were gone when the server started.", kGauge,
          number(stored.missingCommits)},
-        {"shapedb_damaged_collections", "Collections whose signatures could not be read.", kGauge,
-         number(stats->damagedCollections)},
         {"shapedb_build_info",
          "Always 1; the labels tell the version and the database's schema.",
          kGauge,
          1.0,
          {{"version", config::version()}, {"schema", std::to_string(stored.schemaVersion)}}},
+    };
+}
+
+/// Also when the database cannot be read.
+std::vector<Sample> sampleCondition(const catalog::Catalog& catalog) {
+    const catalog::Condition condition = catalog.condition();
+    return {
+        {"shapedb_damaged_collections", "Collections that cannot be searched, for what is stored is damaged.",
+         kGauge, number(condition.damagedCollections)},
+        {"shapedb_segmentation_in_service", "1, or 0 while no scan is taken in, for the queue is damaged.",
+         kGauge, condition.segmentation ? 1.0 : 0.0},
+        {"shapedb_content_in_service", "1, or 0 while a restore replaces the collections.", kGauge,
+         condition.content ? 1.0 : 0.0},
     };
 }
 
@@ -87,6 +98,7 @@ std::vector<Sample> sampleDisk(const std::string& directory) {
 
 std::vector<Sample> sampleServer(const SampleSources& sources) {
     std::vector<Sample> samples = sampleContent(sources.catalog);
+    append(samples, sampleCondition(sources.catalog));
     append(samples, sampleCalls(sources));
     append(samples, sampleDisk(sources.dataDirectory));
     append(samples, telemetry::sampleProcess(sources.started));

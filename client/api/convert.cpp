@@ -342,6 +342,7 @@ Collection fromWire(const v1::Collection& from) {
     to.shapes = from.shapes();
     to.shapesReady = from.shapes_ready();
     to.shapesFailed = from.shapes_failed();
+    to.damage = from.damage();
     return to;
 }
 

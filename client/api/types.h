@@ -265,6 +265,8 @@ struct Collection {
     std::uint64_t shapesReady = 0;
     std::uint64_t shapesFailed = 0;
     std::vector<std::string> aliases;  ///< other names that stand for it, in ascending order
+    /// Why it cannot be searched, and what to do; empty: it can. `parameters` may be missing then.
+    std::string damage;
 };
 
 struct RebuildRequest {

@@ -35,6 +35,7 @@ json collectionJson(const client::Collection& collection) {
             {"shapes", collection.shapes},
             {"shapes_ready", collection.shapesReady},
             {"shapes_failed", collection.shapesFailed},
+            {"damage", collection.damage},
             {"parameters", cli::toJson(collection.parameters)}};
 }
 
@@ -58,7 +59,11 @@ std::string collectionsText(const std::vector<client::Collection>& collections) 
              std::to_string(one.generation), profileName(one.parameters.profile.value_or(Profile::kDefault)),
              lengthUnitName(one.parameters.unit.value_or(LengthUnit::kNone)), aliases, one.description});
     }
-    return table.render();
+    std::string text = table.render();
+    for (const client::Collection& one : collections) {
+        if (!one.damage.empty()) text += one.damage + "\n";
+    }
+    return text;
 }
 
 CommandResult show(Session& session, const Result<client::Collection>& collection) {

@@ -40,8 +40,12 @@ Catalog::Catalog(std::unique_ptr<store::Store> store, ingest::SignaturePipeline 
 Catalog::~Catalog() = default;
 
 Result<void> Catalog::start() {
-    // First, so that the index loads it with the others.
-    RETURN_IF_ERROR(ensureDefaultCollection(*store_));
+    // First, so that the index loads it with the others. Where that cannot be told, it is left as it is.
+    if (const auto ensured = ensureDefaultCollection(*store_); !ensured) {
+        if (ensured.error().code != ErrorCode::kDataLoss) return ensured;
+        log_->error("cannot tell whether the default collection is there",
+                    telemetry::fieldsOf(ensured.error()));
+    }
     const auto began = std::chrono::steady_clock::now();
     RETURN_IF_ERROR(index_.loadAll());
     const auto totals = index_.totals();
@@ -200,7 +204,16 @@ Result<void> Catalog::backup(const std::string& path, const RunContext& context)
     return store_->backup(path, context);
 }
 
-Result<std::vector<std::string>> Catalog::check(const RunContext& context) { return store_->check(context); }
+Result<std::vector<std::string>> Catalog::check(const RunContext& context) {
+    auto problems = store_->check(context);
+    RETURN_IF_ERROR(problems);
+    // The store does not know what the parameters of a collection mean.
+    for (const index::SnapshotPtr& snapshot : index_.all()) {
+        if (snapshot->damage) problems->push_back(snapshot->damage->message);
+    }
+    if (const auto trouble = workers_.trouble()) problems->push_back(trouble->message);
+    return problems;
+}
 
 Result<void> Catalog::restore(const std::string& path, const RunContext& context) {
     RETURN_IF_ERROR(restores_.beginRestore());
@@ -248,6 +261,8 @@ Result<void> Catalog::replaceContent(const std::string& path, const RunContext& 
                                          loaded.error().message + "; restart the server or restore again");
 }
 
+Condition Catalog::condition() const { return {!restores_.apart(), !workers_.trouble(), index_.damaged()}; }
+
 Result<CatalogStats> Catalog::stats() {
     const auto stored = store_->stats();
     RETURN_IF_ERROR(stored);
@@ -257,7 +272,6 @@ Result<CatalogStats> Catalog::stats() {
     stats.store = *stored;
     stats.queue = *depth;
     stats.index = index_.totals();
-    stats.damagedCollections = index_.damaged();
     stats.running = workers_.running();
     // Read one after the other: a job may have begun in between.
     stats.queued = depth->jobs - std::min(depth->jobs, stats.running);

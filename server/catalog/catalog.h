@@ -80,10 +80,16 @@ struct CatalogStats {
     store::StoreStats store;
     store::QueueDepth queue;  ///< waiting and running
     index::CollectionIndex::Totals index;
+    std::uint64_t queued = 0;    ///< jobs that wait for a worker
+    std::uint64_t running = 0;   ///< jobs
+    std::uint64_t ingested = 0;  ///< jobs since start that ended in a signature
+};
+
+/// What of the server is in service.
+struct Condition {
+    bool content = true;  ///< collections can be looked up: no restore is replacing them, and none failed
+    bool segmentation = true;            ///< scans are taken in and segmented
     std::size_t damagedCollections = 0;  ///< as CollectionIndex::damaged
-    std::uint64_t queued = 0;            ///< jobs that wait for a worker
-    std::uint64_t running = 0;           ///< jobs
-    std::uint64_t ingested = 0;          ///< jobs since start that ended in a signature
 };
 
 /// How well the interior of a shape was determined, in [0, 1]; empty when searches do not find the
@@ -322,10 +328,14 @@ class Catalog {
     /// Rises with each restore: ids read under one epoch may mean other shapes under another.
     [[nodiscard]] std::uint64_t epoch() const { return restores_.epoch(); }
     [[nodiscard]] Result<CatalogStats> stats();
+    /// Reads no disk.
+    [[nodiscard]] Condition condition() const;
 
   private:
     /// Errors: kUnavailable.
     Result<void> requireContent() const;
+    /// Before a scan is taken in. Errors: kDataLoss (its parameters could not be read; WorkerPool::trouble).
+    Result<void> requireIngest(const index::Snapshot& collection) const;
     /// Calls `onChange` with the row of a shape and its progress, at once and after each change, until it
     /// is no longer pending. Returns the final row.
     Result<store::Shape> followIngest(

@@ -94,6 +94,8 @@ Result<std::vector<store::Rebuild>> Catalog::beginRebuilds(const std::vector<std
         const auto found = collection(name);
         RETURN_IF_ERROR(found);
         Result<ShapeParameters> parameters = (*found)->parameters;
+        // With a profile, all of them are new: the way out when those there were are damaged.
+        if (!change || !change->profile) RETURN_IF_ERROR((*found)->requireParameters());
         if (change) parameters = change->applyTo(*parameters);
         RETURN_IF_ERROR(parameters);
         RETURN_IF_ERROR(validate(*parameters));

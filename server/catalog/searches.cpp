@@ -104,6 +104,7 @@ Result<FoundShape> Searches::shapeNamed(const ShapeName& name) const {
 Result<LengthUnit> Searches::unitOf(const ShapeName& name) const {
     const auto collection = catalog_.collection(name.collection);
     RETURN_IF_ERROR(collection);
+    RETURN_IF_ERROR((*collection)->requireParameters());
     return (*collection)->parameters.unit;
 }
 
@@ -111,6 +112,7 @@ Result<Searches::Compared> Searches::compared(const char* which, const ShapeName
     const auto read = [&]() -> Result<Compared> {
         const auto collection = catalog_.collection(name.collection);
         RETURN_IF_ERROR(collection);
+        RETURN_IF_ERROR((*collection)->requireParameters());
         auto found = catalog_.findShape(*collection, name.key);
         RETURN_IF_ERROR(found);
         auto signature = catalog_.signature(*found);

@@ -93,8 +93,16 @@ Result<void> Catalog::admitUpload(const ShapeHeader& header) const {
     RETURN_IF_ERROR(checkKey(header.key));
     RETURN_IF_ERROR(checkMetadataChange(header.metadata));
     RETURN_IF_ERROR(checkExpectedVersion(header.expectedVersion));
-    RETURN_IF_ERROR(collection(header.collection));
+    const auto found = collection(header.collection);
+    RETURN_IF_ERROR(found);
+    RETURN_IF_ERROR(requireIngest(**found));
     return restores_.requireNoRestore();
+}
+
+Result<void> Catalog::requireIngest(const index::Snapshot& collection) const {
+    RETURN_IF_ERROR(collection.requireParameters());
+    if (auto trouble = workers_.trouble()) return fail(std::move(*trouble));
+    return {};
 }
 
 Result<AddedShape> Catalog::put(const ShapeHeader& header, store::VerifiedScan scan) {
@@ -103,6 +111,7 @@ Result<AddedShape> Catalog::put(const ShapeHeader& header, store::VerifiedScan s
     // replaced by a restore.
     const auto found = collection(header.collection);
     RETURN_IF_ERROR(found);
+    RETURN_IF_ERROR(requireIngest(**found));
     store::PutRequest request(std::move(scan));
     request.collectionId = (*found)->collection.id;
     request.key = header.key;
@@ -223,6 +232,7 @@ Result<store::Shape> Catalog::followIngest(
         }
         RETURN_IF_ERROR(onChange(*shape, status));
         if (shape->state != store::ShapeState::kPending) return shape;
+        if (auto trouble = workers_.trouble()) return fail(std::move(*trouble));
         const auto lookAgain = ingest::ProgressBoard::Clock::now() + kReadStateAgain;
         while (watch->status().sequence == status.sequence &&
                ingest::ProgressBoard::Clock::now() < lookAgain) {
@@ -308,6 +318,7 @@ Result<Description> Catalog::describe(SegmentationSlots::Slot& slot, const store
 
 Result<DescribedScan> Catalog::describe(SegmentationSlots::Slot& slot, const FoundShape& found,
                                         const RunContext& context) {
+    RETURN_IF_ERROR(found.collection->requireParameters());
     RETURN_IF_ERROR(slot.acquire(context));
     auto points = store_->loadPoints(found.shape.id);
     RETURN_IF_ERROR(points);

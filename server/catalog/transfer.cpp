@@ -35,6 +35,8 @@ Result<void> Catalog::exportCollection(const std::string& name, const std::strin
                                        const RunContext& context) {
     const auto found = collection(name);
     RETURN_IF_ERROR(found);
+    // Nobody could import it.
+    RETURN_IF_ERROR((*found)->requireParameters());
     return store_->exportCollection((*found)->collection.id, path, context);
 }
 

@@ -12,6 +12,7 @@
 #include "core/base/return_if_error.h"
 #include "core/signature/signature_codec.h"
 #include "core/views/views_codec.h"
+#include "server/index/damaged_collection.h"
 #include "server/store/parameters_codec.h"
 
 namespace shapedb::index {
@@ -178,31 +179,31 @@ Result<SnapshotPtr> CollectionIndex::read(const store::Collection& collection, s
 
 Result<SnapshotPtr> CollectionIndex::readOrMark(const store::Collection& collection,
                                                 const RunContext& context) const {
-    auto whole = read(collection, batchesOfAllProcessors(), context);
-    if (whole || whole.error().code != ErrorCode::kDataLoss) return whole;
-    auto marked = withoutSignatures(collection);
-    RETURN_IF_ERROR(marked);
-    (*marked)->damage =
-        Error{ErrorCode::kDataLoss,
-              "collection '" + collection.name + "' cannot be searched, its signatures could not be read (" +
-                  whole.error().message +
-                  "): run 'shapedb admin check', then restore a backup, or try 'shapedb "
-                  "admin rebuild --collection " +
-                  collection.name + "'"};
-    log_->error("a collection is damaged; the others are served", telemetry::fieldsOf(*(*marked)->damage));
-    return SnapshotPtr(std::move(*marked));
+    std::shared_ptr<Snapshot> marked;
+    if (collection.damage) {
+        marked = withoutRow(collection);
+    } else if (auto empty = withoutSignatures(collection); !empty) {
+        marked = withoutParameters(collection, empty.error());
+    } else {
+        auto whole = read(collection, batchesOfAllProcessors(), context);
+        if (whole || whole.error().code != ErrorCode::kDataLoss) return whole;
+        marked = withoutSearches(**empty, whole.error());
+    }
+    log_->error("a collection is damaged; the others are served", telemetry::fieldsOf(*marked->damage));
+    return SnapshotPtr(std::move(marked));
 }
 
 std::size_t CollectionIndex::damaged() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
     std::size_t count = 0;
-    for (const SnapshotPtr& snapshot : all()) count += snapshot->damage ? 1 : 0;
+    for (const auto& [id, slot] : directory_.byId) count += slot->current()->damage ? 1 : 0;
     return count;
 }
 
 void CollectionIndex::insert(Directory& directory, SlotPtr slot) const {
     const store::Collection& collection = slot->current()->collection;
     directory.byId[collection.id] = slot;
-    directory.byName[collection.name] = std::move(slot);
+    if (!collection.name.empty()) directory.byName[collection.name] = std::move(slot);
 }
 
 Result<void> CollectionIndex::loadAll(const RunContext& context) {
@@ -220,13 +221,30 @@ Result<void> CollectionIndex::loadAllUnguarded(const RunContext& context) {
         slot->publish(*snapshot);
         insert(next, std::move(slot));
     }
-    const auto aliases = store_.listAliases();
-    RETURN_IF_ERROR(aliases);
-    for (const store::Alias& alias : *aliases) next.aliases[alias.name] = alias.collectionId;
+    RETURN_IF_ERROR(readAliases(next));
     surfaces_.clear();
     const std::lock_guard<std::mutex> lock(mutex_);
     // The old directory is freed with `next`, after the lock has been released.
     std::swap(directory_, next);
+    return {};
+}
+
+Result<void> CollectionIndex::readAliases(Directory& directory) const {
+    const auto aliases = store_.listAliases();
+    if (!aliases) {
+        if (aliases.error().code != ErrorCode::kDataLoss) return fail(aliases.error());
+        log_->error("aliases cannot be read: only the collections' own names are known",
+                    telemetry::fieldsOf(aliases.error()));
+        directory.aliasDamage = aliases.error();
+        return {};
+    }
+    for (const store::Alias& alias : *aliases) {
+        directory.aliases[alias.name] = alias.collectionId;
+        const auto slot = directory.byId.find(alias.collectionId);
+        if (slot == directory.byId.end() || !slot->second->current()->collection.name.empty()) continue;
+        log_->error("a collection whose name cannot be read has an alias",
+                    {{"collection_id", alias.collectionId}, {"alias", alias.name}});
+    }
     return {};
 }
 
@@ -239,8 +257,10 @@ void CollectionIndex::clear() {
 
 Result<SnapshotPtr> CollectionIndex::byName(const std::string& name) const {
     SlotPtr slot;
+    std::optional<Error> aliasDamage;
     {
         const std::lock_guard<std::mutex> lock(mutex_);
+        aliasDamage = directory_.aliasDamage;
         const auto found = directory_.byName.find(name);
         const auto alias = directory_.aliases.find(name);
         if (found != directory_.byName.end()) {
@@ -250,8 +270,12 @@ Result<SnapshotPtr> CollectionIndex::byName(const std::string& name) const {
             if (meant != directory_.byId.end()) slot = meant->second;
         }
     }
-    if (!slot) return fail(ErrorCode::kNotFound, "there is no collection '" + name + "': create it first");
-    return slot->current();
+    if (slot) return slot->current();
+    if (!aliasDamage) {
+        return fail(ErrorCode::kNotFound, "there is no collection '" + name + "': create it first");
+    }
+    return fail(aliasDamage->code, "there is no collection '" + name +
+                                       "', and whether it is an alias is not known: " + aliasDamage->message);
 }
 
 CollectionIndex::SlotPtr CollectionIndex::find(std::int64_t collectionId) const {

@@ -33,6 +33,13 @@ struct Snapshot {
     /// Why signatures are missing: those stored could not be read. The collection must not be searched, since
     /// nobody could tell what was not found.
     std::optional<Error> damage{};
+    /// False, with `damage`: they could not be read, and `parameters` are not those of the collection.
+    bool parametersKnown = true;
+
+    /// Before `parameters` are used. Errors: kDataLoss.
+    [[nodiscard]] Result<void> requireParameters() const {
+        return parametersKnown ? Result<void>() : Result<void>(fail(*damage));
+    }
 };
 
 using SnapshotPtr = std::shared_ptr<const Snapshot>;
@@ -49,18 +56,20 @@ class CollectionIndex {
     ~CollectionIndex();
 
     /// Reads everything on all processors and replaces the index at the end (start, restore). Damaged
-    /// signatures are logged and left out; a collection that cannot be read is logged and marked
-    /// (Snapshot::damage), the others are served. Errors: kCancelled, kDeadlineExceeded; kDataLoss
-    /// (parameters of a collection, which is named).
+    /// signatures are logged and left out; a collection that cannot be read, be it its signatures, its
+    /// parameters or its row, is logged and marked (Snapshot::damage), the others are served. Aliases that
+    /// cannot be read are logged. Errors: kCancelled, kDeadlineExceeded; kDataLoss (no list of collections
+    /// can be made).
     [[nodiscard]] Result<void> loadAll(const RunContext& context = {});
 
-    /// Collections marked as damaged.
+    /// Collections marked as damaged, also those whose name nobody knows.
     [[nodiscard]] std::size_t damaged() const;
 
     /// Forgets everything; running searches keep their snapshot.
     void clear();
 
-    /// By its name or an alias. Errors: kNotFound.
+    /// By its name or an alias. Errors: kNotFound; kDataLoss (no collection has the name, and aliases could
+    /// not be read).
     [[nodiscard]] Result<SnapshotPtr> byName(const std::string& name) const;
     /// Errors: kNotFound.
     [[nodiscard]] Result<SnapshotPtr> byId(std::int64_t collectionId) const;
@@ -127,10 +136,12 @@ class CollectionIndex {
         std::map<std::string, SlotPtr> byName;
         std::map<std::int64_t, SlotPtr> byId;
         std::map<std::string, std::int64_t> aliases;
+        std::optional<Error> aliasDamage;  ///< why some aliases may be missing
     };
 
     SlotPtr find(std::int64_t collectionId) const;
     Result<void> loadAllUnguarded(const RunContext& context);
+    Result<void> readAliases(Directory& directory) const;
     Result<SnapshotPtr> readOrMark(const store::Collection& collection, const RunContext& context) const;
     Result<SnapshotPtr> read(const store::Collection& collection, std::size_t batches,
                              const RunContext& context) const;

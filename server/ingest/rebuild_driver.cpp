@@ -61,7 +61,10 @@ Result<void> RebuildDriver::enqueueRunning() {
 }
 
 Result<void> RebuildDriver::start() {
-    RETURN_IF_ERROR(enqueueRunning());
+    if (const auto queued = enqueueRunning(); !queued) {
+        if (queued.error().code != ErrorCode::kDataLoss) return queued;
+        log_->error("rebuilds that were running do not go on", telemetry::fieldsOf(queued.error()));
+    }
     for (int i = 0; i < std::max(1, options_.threads); ++i) {
         threads_.emplace_back([this] {
             becomeBackgroundThread();

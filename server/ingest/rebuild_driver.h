@@ -52,7 +52,8 @@ class RebuildDriver {
     /// As `stop`.
     ~RebuildDriver();
 
-    /// Continues what a dead process left running. Call once. Errors: as Store::runningRebuilds.
+    /// Continues what a dead process left running; what cannot be read for damage is logged and left. Call
+    /// once. Errors: as Store::runningRebuilds, other than kDataLoss.
     [[nodiscard]] Result<void> start();
 
     /// Starts a rebuild, or returns the running one with the same parameters.

@@ -44,6 +44,14 @@ WorkerPool::~WorkerPool() { stop(); }
 Result<void> WorkerPool::recover() {
     // Those of a restore are of another server: it did not die of them.
     const auto quarantined = store_.recoverJobs(options_.maxAttempts, std::exchange(options_.crashes, {}));
+    {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        trouble_.reset();
+        if (!quarantined && quarantined.error().code == ErrorCode::kDataLoss) {
+            takeOutOfService(quarantined.error());
+            return {};
+        }
+    }
     RETURN_IF_ERROR(quarantined);
     for (const store::Shape& shape : *quarantined) {
         if (shape.failure) logQuarantine(*log_, shape, *shape.failure);
@@ -51,6 +59,17 @@ Result<void> WorkerPool::recover() {
         board_.settled(shape.id);
     }
     return {};
+}
+
+/// Under the lock. To try again and again would only fill the log: damage does not go away by itself.
+void WorkerPool::takeOutOfService(const Error& why) {
+    trouble_ = Error{why.code, "no scan is taken in, the queue is damaged: " + why.message};
+    log_->error("segmentation is out of service; searches are answered", telemetry::fieldsOf(*trouble_));
+}
+
+std::optional<Error> WorkerPool::trouble() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return trouble_;
 }
 
 Result<void> WorkerPool::start() {
@@ -195,13 +214,19 @@ Result<std::optional<store::Job>> WorkerPool::claim(std::unique_lock<std::mutex>
     auto job = store_.claimJob();
     lock.lock();
     if (job) return job;
+    if (job.error().code == ErrorCode::kDataLoss) {
+        takeOutOfService(job.error());
+        return job;
+    }
     log_->error("cannot take the next job", telemetry::fieldsOf(job.error()));
     rest(lock);
     ++signals_;
     return job;
 }
 
-bool WorkerPool::mayClaim() const { return !paused_ && (!probing_ || (claiming_ == 0 && running_.empty())); }
+bool WorkerPool::mayClaim() const {
+    return !paused_ && !trouble_ && (!probing_ || (claiming_ == 0 && running_.empty()));
+}
 
 /// Blocks until there is a job that this worker may have; null when the pool stops. Without a pass the job
 /// was cancelled before its turn.
@@ -279,6 +304,7 @@ WorkerPool::Outcome WorkerPool::attempt(Running& running) {
         }();
         return gone ? giveUp(job, collection.error()) : Outcome::kStoreFailed;
     }
+    if (const auto known = (*collection)->requireParameters(); !known) return giveUp(job, known.error());
     const InHand inHand(job.shapeId, job.pointsVersion);
     RunContext context;
     context.cancel = &running.cancel;
@@ -345,6 +371,10 @@ WorkerPool::Outcome WorkerPool::giveUp(const store::Job& job, const Error& why) 
     const auto failed = store_.failJob(job, why);
     if (!failed) {
         log_->error("cannot record that a scan failed", fieldsOf(job, failed.error()));
+        if (failed.error().code == ErrorCode::kDataLoss) {
+            const std::lock_guard<std::mutex> lock(mutex_);
+            takeOutOfService(failed.error());
+        }
         return Outcome::kStoreFailed;
     }
     if (!*failed) return Outcome::kDone;  // deleted or replaced meanwhile

@@ -51,8 +51,8 @@ class WorkerPool {
     ~WorkerPool();
 
     /// Recovers the jobs of a dead process (Store::recoverJobs) and starts the workers. Scans set aside
-    /// leave the index, which must be loaded. Call once.
-    /// Errors: as Store::recoverJobs.
+    /// leave the index, which must be loaded. If the jobs are damaged, it starts without them (`trouble`).
+    /// Call once. Errors: as Store::recoverJobs, other than kDataLoss.
     [[nodiscard]] Result<void> start();
 
     /// Call after a job was queued.
@@ -68,14 +68,17 @@ class WorkerPool {
 
     /// Stops claiming and puts running jobs back; returns when no worker uses the store.
     void pause();
-    /// Continues after `pause`. Replaced content is recovered as at the start. Errors: as
-    /// Store::recoverJobs; it has continued all the same.
+    /// Continues after `pause`. Replaced content is recovered as at the start. Errors: as `start`; it has
+    /// continued all the same.
     [[nodiscard]] Result<void> resume(Content content);
     /// As `pause`, and ends the threads. Idempotent.
     void stop();
 
     /// Whether `pause` or `stop` has been called and waits for a worker.
     [[nodiscard]] bool pauseWaits() const;
+    /// Why no jobs are taken any more, which names what to do: those stored are damaged. Empty: all is well.
+    /// A restore ends it.
+    [[nodiscard]] std::optional<Error> trouble() const;
     [[nodiscard]] std::size_t running() const;
     /// Jobs since start that ended in a signature.
     [[nodiscard]] std::uint64_t ingested() const { return ingested_.load(); }
@@ -106,6 +109,7 @@ class WorkerPool {
     void putBack(const store::Job& job);
     void rest(std::unique_lock<std::mutex>& lock);
     Result<void> recover();
+    void takeOutOfService(const Error& why);
 
     store::Store& store_;
     index::CollectionIndex& index_;
@@ -120,6 +124,7 @@ class WorkerPool {
     std::uint64_t signals_ = 0;        ///< rises when there may be a job
     std::atomic<bool> paused_{false};  ///< changes under mutex_
     bool stopping_ = false;
+    std::optional<Error> trouble_;
     /// True from the start until the first job that no dead process was segmenting (those come first,
     /// being older): jobs run one at a time and alone, so that a deadly one dies alone.
     bool probing_ = true;

@@ -128,9 +128,10 @@ grpc::Status AdminServiceHandler::ServerInfo(grpc::ServerContext* context, const
                                              v1::ServerInfoResponse* response) {
     return handle(services_, context, operations::kServerInfo, [&](Call&) -> Result<void> {
         const auto stats = services_.catalog.stats();
-        RETURN_IF_ERROR(stats);
+        // What a client must know to send anything does not depend on the database.
+        if (!stats && stats.error().code != ErrorCode::kDataLoss) return fail(stats.error());
         response->set_version(config::version());
-        response->set_schema_version(stats->store.schemaVersion);
+        if (stats) response->set_schema_version(stats->store.schemaVersion);
         const auto started = services_.started.time_since_epoch();
         rpc::toProto(std::chrono::duration_cast<std::chrono::milliseconds>(started).count(),
                      response->mutable_started());

@@ -10,11 +10,20 @@ namespace {
 /// The collection with its counts.
 Result<void> fill(const Services& services, const index::Snapshot& snapshot, v1::Collection* out) {
     const auto counts = services.catalog.countShapes(snapshot);
-    RETURN_IF_ERROR(counts);
+    // A damaged collection does not hide the others in a list.
+    if (!snapshot.damage) RETURN_IF_ERROR(counts);
     toProto(snapshot.collection, snapshot.parameters, out);
-    out->set_shapes(counts->all);
-    out->set_shapes_ready(counts->ready);
-    out->set_shapes_failed(counts->failed);
+    if (!snapshot.parametersKnown) {
+        out->clear_profile();
+        out->clear_segmentation();
+        out->clear_signature();
+    }
+    if (snapshot.damage) out->set_damage(snapshot.damage->message);
+    if (counts) {
+        out->set_shapes(counts->all);
+        out->set_shapes_ready(counts->ready);
+        out->set_shapes_failed(counts->failed);
+    }
     for (const std::string& alias : services.catalog.aliasesOf(snapshot)) out->add_aliases(alias);
     return {};
 }

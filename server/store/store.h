@@ -41,6 +41,9 @@ struct Collection {
     /// Of the signatures that serve queries; a finished rebuild raises it by one.
     std::int64_t generation = 1;
     TimestampMs createdAt = 0;
+    /// Set (by listCollections alone): its row cannot be read. Only the id is known, and the name unless that
+    /// is empty.
+    std::optional<Error> damage{};
 };
 
 /// Another name of a collection.
@@ -221,7 +224,7 @@ class Store {
                                                               const std::string& parameters) = 0;
     /// Errors: kNotFound.
     [[nodiscard]] virtual Result<Collection> getCollection(const std::string& name) = 0;
-    /// By name.
+    /// By name. A damaged page takes out the collections on it (Collection::damage), not the others.
     [[nodiscard]] virtual Result<std::vector<Collection>> listCollections() = 0;
     /// Deletes the collection with its shapes, jobs and aliases. Errors: kNotFound.
     [[nodiscard]] virtual Result<void> deleteCollection(std::int64_t collectionId) = 0;

@@ -1,13 +1,8 @@
 #include "server/store/sqlite/check.h"
 
-#include <cstdlib>
-#include <new>
-#include <string_view>
-
-#include <sqlite3.h>
-
 #include "common/safe_text.h"
 #include "server/store/key_rules.h"
+#include "server/store/sqlite/damage.h"
 #include "server/store/sqlite/rows.h"
 #include "server/store/sqlite/sequences.h"
 
@@ -146,23 +141,6 @@ class Checker {
         } catch (const Failure& failure) {
             if (failure.fromDatabase || failure.error.code == ErrorCode::kOutOfMemory) throw;
             add(failure.error.message);
-        }
-    }
-
-    /// SQLite lists a page that the device does not give like a damaged one. It is not: the next time it may
-    /// be there.
-    static void raiseUnreadable(const std::string& line) {
-        // A page of the list of free ones comes without a code; a wrong number would have been noticed
-        // before.
-        if (line.find("failed to get page") != std::string::npos)
-            raise(ErrorCode::kStorage, "the database cannot be read: " + line);
-        static constexpr std::string_view kReason = "error code=";
-        const std::size_t at = line.find(kReason);
-        if (at == std::string::npos) return;
-        switch (std::atoi(line.c_str() + at + kReason.size()) & 0xff) {
-            case SQLITE_IOERR: raise(ErrorCode::kStorage, "the database cannot be read: " + line);
-            case SQLITE_NOMEM: throw std::bad_alloc();
-            default: return;
         }
     }
 

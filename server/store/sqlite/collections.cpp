@@ -1,4 +1,5 @@
 // Collections and their aliases.
+#include "server/store/sqlite/damage.h"
 #include "server/store/sqlite/rows.h"
 #include "server/store/sqlite/sqlite_store_impl.h"
 
@@ -41,8 +42,13 @@ Result<Collection> SqliteStore::getCollection(const std::string& name) {
 Result<std::vector<Collection>> SqliteStore::listCollections() {
     return read("list the collections", [&](Connection& connection) {
         std::vector<Collection> all;
-        Query query(connection, sql::kListCollections);
-        while (query.step()) all.push_back(readCollection(query));
+        try {
+            Query query(connection, sql::kListCollections);
+            while (query.step()) all.push_back(readCollection(query));
+        } catch (const Failure& failure) {
+            if (failure.error.code != ErrorCode::kDataLoss) throw;
+            all = salvageCollections(connection, failure.error);
+        }
         return all;
     });
 }
@@ -84,9 +90,11 @@ Result<void> SqliteStore::deleteAlias(const std::string& name) {
 Result<std::vector<Alias>> SqliteStore::listAliases() {
     return read("list the aliases", [](Connection& connection) {
         std::vector<Alias> all;
-        Query query(connection, sql::kListAliases);
-        while (query.step()) all.push_back({query.text(0), query.integer(1)});
-        return all;
+        const bool whole = unlessDamaged([&] {
+            Query query(connection, sql::kListAliases);
+            while (query.step()) all.push_back({query.text(0), query.integer(1)});
+        });
+        return whole ? all : salvageAliases(connection);
     });
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <limits>
+#include <string_view>
 #include <vector>
 
 #include <sqlite3.h>
@@ -16,6 +17,8 @@ constexpr char kBeginRead[] = "BEGIN";
 constexpr char kBeginWrite[] = "BEGIN IMMEDIATE";
 constexpr char kCommit[] = "COMMIT";
 constexpr char kRollback[] = "ROLLBACK";
+// What a statement cannot be prepared without.
+constexpr char kSchema[] = "FROM sqlite_schema";
 
 // Virtual machine steps between two checks for cancellation: a few microseconds.
 constexpr int kProgressSteps = 10000;
@@ -65,6 +68,29 @@ bool filesAreFull(sqlite3* db) {
     return isFull(last);
 }
 
+/// " in table shape or job": SQLite does not say of which table a damaged page is, but the statement names
+/// those it can be of.
+std::string tablesOf(std::string_view sql) {
+    std::vector<std::string> tables;
+    std::string before;
+    for (std::size_t at = 0; at < sql.size();) {
+        const std::size_t end = std::min(sql.find_first_of(" (),", at), sql.size());
+        std::string word(sql.substr(at, end - at));
+        at = end + 1;
+        if (word.empty()) continue;
+        const bool isTable = before == "FROM" || before == "JOIN" || before == "INTO" || before == "UPDATE";
+        const bool isNew = std::find(tables.begin(), tables.end(), word) == tables.end();
+        if (isTable && isNew && word != "SELECT" && word != "SET") tables.push_back(word);
+        before = std::move(word);
+    }
+    std::string text;
+    for (std::size_t i = 0; i < tables.size(); ++i) {
+        text += i == 0 ? " in table " : i + 1 == tables.size() ? " or " : ", ";
+        text += tables[i];
+    }
+    return text;
+}
+
 int openFlags(OpenMode mode) {
     switch (mode) {
         case OpenMode::kReadOnly: return SQLITE_OPEN_READONLY;
@@ -107,7 +133,7 @@ Connection::Connection(const std::string& path, OpenMode mode, int busyTimeoutMs
         sqlite3_stmt* raw = nullptr;
         const int prepared = sqlite3_prepare_v3(db_, kRollback, -1, SQLITE_PREPARE_PERSISTENT, &raw, nullptr);
         rollback_.reset(raw);
-        if (prepared != SQLITE_OK) raiseLast(prepared);
+        if (prepared != SQLITE_OK) raiseLast(prepared, kSchema);
     } catch (...) {
         closeAll();
         throw;
@@ -122,7 +148,7 @@ void Connection::closeAll() noexcept {
     sqlite3_close(db_);
 }
 
-void Connection::raiseLast(int code) const {
+void Connection::raiseLast(int code, const char* sql) const {
     if (db_ == nullptr) throw std::bad_alloc();
     const bool full =
         isFull(sqlite3_system_errno(db_)) || ((code & 0xff) == SQLITE_IOERR && filesAreFull(db_));
@@ -130,13 +156,16 @@ void Connection::raiseLast(int code) const {
     message += " (SQLite code " + std::to_string(code) + ")";
     const ErrorCode mapped = codeOf(code, full);
     if (mapped == ErrorCode::kStorageFull) message += "; free some space on the device";
-    if (mapped == ErrorCode::kDataLoss) message += "; run 'shapedb admin check', restore a backup";
+    if (mapped == ErrorCode::kDataLoss) {
+        if (sql != nullptr) message += tablesOf(sql);
+        message += "; run 'shapedb admin check', then restore a backup with 'shapedb admin restore'";
+    }
     throw Failure(mapped, std::move(message), true);
 }
 
 void Connection::execute(const std::string& sql) {
     const int code = sqlite3_exec(db_, sql.c_str(), nullptr, nullptr, nullptr);
-    if (code != SQLITE_OK) raiseLast(code);
+    if (code != SQLITE_OK) raiseLast(code, sql.rfind("PRAGMA", 0) == 0 ? kSchema : sql.c_str());
 }
 
 std::int64_t Connection::integer(const std::string& sql) {
@@ -148,10 +177,10 @@ std::string Connection::text(const std::string& sql) {
     sqlite3_stmt* raw = nullptr;
     int code = sqlite3_prepare_v2(db_, sql.c_str(), -1, &raw, nullptr);
     const StatementPtr statement(raw);
-    if (code != SQLITE_OK) raiseLast(code);
+    if (code != SQLITE_OK) raiseLast(code, kSchema);
     code = sqlite3_step(raw);
     if (code == SQLITE_DONE) return {};
-    if (code != SQLITE_ROW) raiseLast(code);
+    if (code != SQLITE_ROW) raiseLast(code, sql.c_str());
     return textOf(db_, raw, 0);
 }
 
@@ -202,7 +231,7 @@ sqlite3_stmt* Connection::prepared(const char* sql) {
     sqlite3_stmt* raw = nullptr;
     const int code = sqlite3_prepare_v3(db_, sql, -1, SQLITE_PREPARE_PERSISTENT, &raw, nullptr);
     StatementPtr statement(raw);
-    if (code != SQLITE_OK) raiseLast(code);
+    if (code != SQLITE_OK) raiseLast(code, kSchema);
     statements_.emplace(sql, std::move(statement));
     return raw;
 }
@@ -244,7 +273,7 @@ bool Query::step() {
     const int code = sqlite3_step(statement_);
     if (code == SQLITE_ROW) return true;
     if (code == SQLITE_DONE) return false;
-    connection_.raiseLast(code);
+    connection_.raiseLast(code, sqlite3_sql(statement_));
 }
 
 void Query::run() {

@@ -4,6 +4,7 @@
 // Thread-safety: a connection and everything that uses it belong to one thread at a time.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -58,7 +59,8 @@ class Connection {
     void rewriteWal();
 
     sqlite3* handle() const noexcept { return db_; }
-    [[noreturn]] void raiseLast(int code) const;
+    /// `sql`, unless null, is the statement that failed: damage is told with the tables it reads.
+    [[noreturn]] void raiseLast(int code, const char* sql = nullptr) const;
 
   private:
     friend class Query;
@@ -168,6 +170,21 @@ class Transaction {
     Connection& connection_;
     bool open_ = true;
 };
+
+/// Runs `body`; damage that it meets is told with `remedy` in place of what helps a database that is served.
+template <typename Body>
+auto withRemedy(const std::string& remedy, Body&& body) {
+    try {
+        return body();
+    } catch (Failure& failure) {
+        std::string& message = failure.error.message;
+        if (failure.fromDatabase && failure.error.code == ErrorCode::kDataLoss) {
+            message.erase(std::min(message.find("; run "), message.size()));
+            message += "; " + remedy;
+        }
+        throw;
+    }
+}
 
 /// While it lives, `context` can interrupt a statement that runs on `connection` (Failure kCancelled).
 class Interruptible {

@@ -1,5 +1,6 @@
 // Listings and counts of shapes.
 #include "core/base/return_if_error.h"
+#include "server/store/sqlite/damage.h"
 #include "server/store/sqlite/rows.h"
 #include "server/store/sqlite/sqlite_store_impl.h"
 
@@ -102,6 +103,17 @@ void inOrder(Connection& connection, std::int64_t collectionId, const ShapeListi
     }
 }
 
+/// Slow, and right while the table can be read: searches tell how many shapes are pending, and a damaged
+/// index must not stop them.
+constexpr char kCountWithoutIndex[] =
+    "SELECT count(*) FROM shape NOT INDEXED WHERE collection_id = ?1 AND (?2 < 0 OR state = ?2)";
+
+std::uint64_t countWithoutIndex(Connection& connection, std::int64_t collectionId,
+                                std::optional<ShapeState> state) {
+    Query query(connection, kCountWithoutIndex, collectionId, state ? static_cast<int>(*state) : -1);
+    return query.step() ? static_cast<std::uint64_t>(query.integer(0)) : 0;
+}
+
 }  // namespace
 
 Result<std::vector<Shape>> SqliteStore::listShapes(std::int64_t collectionId, const ShapeListing& listing,
@@ -130,14 +142,16 @@ Result<std::uint64_t> SqliteStore::countShapes(std::int64_t collectionId, const 
             });
             return count;
         }
-        Query query(connection, filter.state ? sql::kCountShapesInState : sql::kCountShapes);
-        if (filter.state) {
-            query.bindAll(collectionId, static_cast<int>(*filter.state));
-        } else {
-            query.bindAll(collectionId);
-        }
-        if (query.step()) count = static_cast<std::uint64_t>(query.integer(0));
-        return count;
+        const bool whole = unlessDamaged([&] {
+            Query query(connection, filter.state ? sql::kCountShapesInState : sql::kCountShapes);
+            if (filter.state) {
+                query.bindAll(collectionId, static_cast<int>(*filter.state));
+            } else {
+                query.bindAll(collectionId);
+            }
+            if (query.step()) count = static_cast<std::uint64_t>(query.integer(0));
+        });
+        return whole ? count : countWithoutIndex(connection, collectionId, filter.state);
     });
 }
 

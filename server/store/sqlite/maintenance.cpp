@@ -3,6 +3,7 @@
 
 #include "server/store/failpoints.h"
 #include "server/store/sqlite/check.h"
+#include "server/store/sqlite/damage.h"
 #include "server/store/sqlite/database_file.h"
 #include "server/store/sqlite/migrator.h"
 #include "server/store/sqlite/rows.h"
@@ -16,18 +17,29 @@ namespace {
 /// 1 MiB between two checks for cancellation.
 constexpr int kStepPages = 256;
 
+/// No server gave out so many ids since the backup was made, for want of the last one.
+constexpr std::int64_t kBeyondUnknownIds = std::int64_t{1} << 40;
+
 /// Ids are never reused, not even across a restore: new rows continue after both histories, and jobs
 /// and rebuilds of the file get ids that the running server has never given out, so that a result in
 /// flight cannot meet the wrong row.
 /// Returns how many commits the copy counts then.
-std::int64_t separateIds(Connection& copy, Connection& live) {
-    const std::int64_t commits = std::max(countCommits(copy), countCommits(live)) + 1;
+///
+/// A restore is the way out of damage: what cannot be read of the live database must not stop it.
+std::int64_t separateIds(Connection& copy, Connection& live, std::int64_t marked) {
+    std::int64_t commits = countCommits(copy);
+    const bool counted = unlessDamaged([&] { commits = std::max(commits, countCommits(live)); });
+    if (!counted && marked <= kMostCounted) commits = std::max(commits, marked);
+    ++commits;
+    const auto lastOfBoth = [&](const std::string& table) {
+        std::int64_t last = lastId(copy, table);
+        const bool readable = unlessDamaged([&] { last = std::max(last, lastId(live, table)); });
+        return readable ? last : last + kBeyondUnknownIds;
+    };
     Transaction transaction(copy, Transaction::Kind::kWrite);
-    for (const char* table : {"collection", "shape"}) {
-        setLastId(copy, table, std::max(lastId(copy, table), lastId(live, table)));
-    }
+    for (const char* table : {"collection", "shape"}) setLastId(copy, table, lastOfBoth(table));
     for (const std::string table : {"job", "rebuild"}) {
-        const std::int64_t offset = std::max(lastId(copy, table), lastId(live, table));
+        const std::int64_t offset = lastOfBoth(table);
         // The offset is no less than any id, so that no row moves to an id that another still has.
         copy.execute("UPDATE " + table + " SET id = id + " + std::to_string(offset));
         setLastId(copy, table, offset + lastId(copy, table));
@@ -78,7 +90,7 @@ Result<void> SqliteStore::restore(const std::string& path, const RunContext& con
         // Until the end: no id may be given out between reading the last ones and replacing the tables.
         const std::lock_guard<std::mutex> lock(writerMutex_);
         SHAPEDB_FAILPOINT("restore.checked");
-        const std::int64_t commits = separateIds(*copy, *writer_);
+        const std::int64_t commits = separateIds(*copy, *writer_, mark_.read().value_or(0));
         SHAPEDB_FAILPOINT("restore.separated");
         if (replacing) replacing();
         copyDatabase(*copy, *writer_, kStepPages, [&](std::uint64_t done, std::uint64_t total) {

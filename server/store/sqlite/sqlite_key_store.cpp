@@ -41,6 +41,11 @@ constexpr char kSaveUsage[] =
 #undef KEY_COLUMNS
 constexpr char kReadVersion[] = "PRAGMA data_version";
 
+/// No backup holds keys.
+std::string remedyFor(const std::string& path) {
+    return "move '" + path + "' away and make new keys with 'shapedbd key create'";
+}
+
 std::string joinLines(const std::vector<std::string>& lines) {
     std::string text;
     for (const std::string& line : lines) text += line + "\n";
@@ -180,8 +185,10 @@ class SqliteKeyStore final : public security::KeyStore {
     auto locked(const char* operation, Body&& body) -> Result<std::invoke_result_t<Body>> {
         const std::lock_guard<std::mutex> lock(mutex_);
         return guarded(operation, [&] {
-            followFile();
-            return body();
+            return withRemedy(remedyFor(path_), [&] {
+                followFile();
+                return body();
+            });
         });
     }
 
@@ -221,7 +228,7 @@ class SqliteKeyStore final : public security::KeyStore {
 
 Result<std::unique_ptr<security::KeyStore>> openSqliteKeyStore(const std::string& path) {
     return guarded("open the API keys", [&]() -> std::unique_ptr<security::KeyStore> {
-        return std::make_unique<SqliteKeyStore>(path);
+        return withRemedy(remedyFor(path), [&] { return std::make_unique<SqliteKeyStore>(path); });
     });
 }
 

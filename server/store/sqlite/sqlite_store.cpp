@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "server/store/failpoints.h"
+#include "server/store/sqlite/damage.h"
 #include "server/store/sqlite/database_file.h"
 #include "server/store/sqlite/migrator.h"
 #include "server/store/sqlite/rows.h"
@@ -165,7 +166,19 @@ SqliteStore::SqliteStore(const SqliteOptions& options)
       walAttemptAt_(kWalBoundBytes) {
     // Without it deletions may be refused on a full disk; uploads ask again.
     static_cast<void>(reserve_.hold());
-    findings_ = mendSequences(*writer_);
+    findings_ = damagedTables(*writer_);
+    unlessDamaged([&] {
+        for (std::string& mended : mendSequences(*writer_)) findings_.push_back(std::move(mended));
+    });
+    unlessDamaged([&] { compareCommits(); });
+    // What a dead process had in hand: its copies of files, which may be as large as the database,
+    for (const char* copy : {".restore", ".import"})
+        static_cast<void>(TemporaryDatabase(options_.path + copy));
+    // and shapes, which are left where they are if the disk fails: no client sees them.
+    static_cast<void>(dropImport());
+}
+
+void SqliteStore::compareCommits() {
     const std::int64_t commits = countCommits(*writer_);
     missingCommits_ = std::max<std::int64_t>(0, mark_.read().value_or(0) - commits);
     if (missingCommits_ > 0) {
@@ -177,11 +190,6 @@ SqliteStore::SqliteStore(const SqliteOptions& options)
     }
     SHAPEDB_FAILPOINT("open.counted");
     mark_.write(commits);
-    // What a dead process had in hand: its copies of files, which may be as large as the database,
-    for (const char* copy : {".restore", ".import"})
-        static_cast<void>(TemporaryDatabase(options_.path + copy));
-    // and shapes, which are left where they are if the disk fails: no client sees them.
-    static_cast<void>(dropImport());
 }
 
 void SqliteStore::commit(Transaction& transaction, std::int64_t changesBefore) {
@@ -265,8 +273,13 @@ Result<void> SqliteStore::checkpoint() {
 }
 
 Result<std::unique_ptr<Store>> openSqliteStore(const SqliteOptions& options) {
-    return guarded("open the database",
-                   [&]() -> std::unique_ptr<Store> { return std::make_unique<SqliteStore>(options); });
+    return guarded("open the database", [&]() -> std::unique_ptr<Store> {
+        // Without a server there is nobody to check or to restore.
+        return withRemedy("move '" + options.path +
+                              "' and what is beside it under that name away, start again, and restore a "
+                              "backup with 'shapedb admin restore'",
+                          [&] { return std::make_unique<SqliteStore>(options); });
+    });
 }
 
 }  // namespace shapedb::store

@@ -147,6 +147,8 @@ class SqliteStore final : public Store {
         });
     }
 
+    /// At start: tells of commits that are gone, and brings the mark up to date. Throws Failure.
+    void compareCommits();
     /// Commits, counts the commit if anything changed since `changesBefore`, and leaves the mark.
     void commit(Transaction& transaction, std::int64_t changesBefore);
 

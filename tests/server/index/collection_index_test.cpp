@@ -229,13 +229,69 @@ TEST_F(Index, OtherErrorsOfTheStoreEndTheLoading) {
     EXPECT_EQ(index.loadAll().error().code, ErrorCode::kStorage);
 }
 
-TEST_F(Index, DamagedParametersNameTheCollection) {
+TEST_F(Index, DamagedParametersTakeOutTheirCollectionAlone) {
+    put("a", 1.0f);
     ASSERT_TRUE(store.createCollection("broken", "", "{}"));
-    const auto loaded = index.loadAll();
-    ASSERT_FALSE(loaded);
-    EXPECT_EQ(loaded.error().code, ErrorCode::kDataLoss);
-    EXPECT_NE(loaded.error().message.find("broken"), std::string::npos);
-    EXPECT_TRUE(index.byName("parts")) << "the old content still serves";
+    ASSERT_TRUE(index.loadAll());
+    EXPECT_EQ(snapshot()->signatures.size(), 1u);
+    EXPECT_FALSE(snapshot()->damage);
+    EXPECT_TRUE(snapshot()->requireParameters());
+    const auto broken = *index.byName("broken");
+    ASSERT_TRUE(broken->damage);
+    for (const char* word : {"'broken'", "parameters", "restore a backup", "--profile default"}) {
+        EXPECT_NE(broken->damage->message.find(word), std::string::npos) << broken->damage->message;
+    }
+    EXPECT_EQ(broken->requireParameters().error().code, ErrorCode::kDataLoss);
+    EXPECT_EQ(index.damaged(), 1u);
+}
+
+/// A store of which a page of the table of collections, or of the aliases, cannot be read.
+class DamagedTables : public MemoryStore {
+  public:
+    Result<std::vector<store::Collection>> listCollections() override {
+        auto all = MemoryStore::listCollections();
+        const Error damage{ErrorCode::kDataLoss, "a page is malformed"};
+        for (store::Collection& one : *all) {
+            if (one.name == "lost" || one.name == "nameless") one.damage = damage;
+            if (one.name == "nameless") one.name.clear();
+        }
+        return all;
+    }
+    Result<std::vector<store::Alias>> listAliases() override {
+        if (aliasesAreLost) return fail(ErrorCode::kDataLoss, "a page is malformed");
+        return MemoryStore::listAliases();
+    }
+    bool aliasesAreLost = false;
+};
+
+TEST(DamagedIndex, ARowThatCannotBeReadTakesOutItsCollectionAlone) {
+    DamagedTables store;
+    const auto log = std::make_shared<RecordingLogger>();
+    CollectionIndex index(store, log);
+    ASSERT_TRUE(store.createCollection("whole", "", paperParameters()));
+    ASSERT_TRUE(store.createCollection("lost", "", paperParameters()));
+    const auto nameless = *store.createCollection("nameless", "", paperParameters());
+    ASSERT_TRUE(store.setAlias("known", nameless.id));
+    ASSERT_TRUE(index.loadAll());
+    EXPECT_FALSE((*index.byName("whole"))->damage);
+    EXPECT_TRUE((*index.byName("lost"))->damage);
+    EXPECT_TRUE((*index.byName("known"))->damage) << "by its alias";
+    EXPECT_EQ(index.all().size(), 2u);
+    EXPECT_EQ(index.damaged(), 2u);
+    EXPECT_NE(log->all().find("alias=known"), std::string::npos) << log->all();
+}
+
+TEST(DamagedIndex, AliasesThatCannotBeReadAreNotTakenForNone) {
+    DamagedTables store;
+    CollectionIndex index(store, std::make_shared<RecordingLogger>());
+    ASSERT_TRUE(store.createCollection("whole", "", paperParameters()));
+    store.aliasesAreLost = true;
+    ASSERT_TRUE(index.loadAll());
+    EXPECT_TRUE(index.byName("whole"));
+    EXPECT_EQ(index.byName("other").error().code, ErrorCode::kDataLoss);
+    store.aliasesAreLost = false;
+    ASSERT_TRUE(index.loadAll());
+    EXPECT_EQ(index.byName("other").error().code, ErrorCode::kNotFound);
 }
 
 TEST_F(Index, LoadingCanBeCancelled) {
