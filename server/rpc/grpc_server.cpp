@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,6 +21,7 @@
 #include "server/rpc/align_service.h"
 #include "server/rpc/cancel_watcher.h"
 #include "server/rpc/collection_service.h"
+#include "server/rpc/health.h"
 #include "server/rpc/message_limits.h"
 #include "server/rpc/search_service.h"
 #include "server/rpc/services.h"
@@ -36,11 +36,6 @@ constexpr std::chrono::milliseconds kToLearnOfCancellation{200};
 
 /// Administrators and health checks of this machine.
 constexpr std::size_t kMaxLocalConnections = 64;
-
-/// Names the health service answers for.
-constexpr const char* kServiceNames[] = {"shapedb.v1.ShapeService", "shapedb.v1.SearchService",
-                                         "shapedb.v1.CollectionService", "shapedb.v1.AlignService",
-                                         "shapedb.v1.AdminService"};
 
 /// For servers that strangers reach: reflection asks for no key, and its streams hold threads for as long as
 /// they like. gRPC adds it to every server of a program that is linked with it.
@@ -110,8 +105,6 @@ struct GrpcServer::Parts {
     CollectionServiceHandler collectionService;
     AdminServiceHandler adminService;
 
-    /// Reports NOT_SERVING from now on; whatever the listener reports later.
-    void reportNotServing();
     void reportListening(const std::string& problem);
 
     /// One way in: a listener, and what gRPC does with its connections.
@@ -125,10 +118,8 @@ struct GrpcServer::Parts {
     std::unique_ptr<TlsCredentials> tls;  ///< null without TLS
     std::unique_ptr<grpc::Server> server;
     Entrance network;
-    Entrance local;  ///< the Unix socket
-    std::mutex healthMutex;
-    bool ending = false;
-    int inTrouble = 0;  ///< listeners that cannot accept
+    Entrance local;                  ///< the Unix socket
+    std::unique_ptr<Health> health;  ///< null until it listens
 };
 
 GrpcServer::GrpcServer(Surroundings surroundings)
@@ -136,21 +127,14 @@ GrpcServer::GrpcServer(Surroundings surroundings)
 
 GrpcServer::~GrpcServer() { shutDown(); }
 
-void GrpcServer::Parts::reportNotServing() {
-    const std::lock_guard<std::mutex> lock(healthMutex);
-    ending = true;
-    if (server) server->GetHealthCheckService()->SetServingStatus(false);
-}
-
 void GrpcServer::Parts::reportListening(const std::string& problem) {
-    const std::lock_guard<std::mutex> lock(healthMutex);
     if (problem.empty()) {
         services.log->info("connections are accepted again");
+        health->listenerRecovered();
     } else {
         services.log->error("connections cannot be accepted", {{"reason", problem}});
+        health->listenerFailed();
     }
-    inTrouble += problem.empty() ? -1 : 1;
-    if (!ending) server->GetHealthCheckService()->SetServingStatus(inTrouble == 0);
 }
 
 Result<std::shared_ptr<grpc::ServerCredentials>> GrpcServer::Parts::credentials() {
@@ -195,8 +179,9 @@ Result<void> GrpcServer::listen() {
     if (!parts_->server) {
         return fail(ErrorCode::kUnavailable, "the gRPC server on " + wanted->text() + " cannot be started");
     }
-    for (const char* name : kServiceNames)
-        parts_->server->GetHealthCheckService()->SetServingStatus(name, true);
+    parts_->health =
+        std::make_unique<Health>(*parts_->server->GetHealthCheckService(),
+                                 [&catalog = parts_->services.catalog] { return catalog.condition(); });
     startListening();
     return {};
 }
@@ -233,22 +218,22 @@ GrpcServer::State GrpcServer::state() const {
         state.connections += entrance->listener.connections();
         state.connectionsRefused += entrance->listener.refused();
     }
-    {
-        const std::lock_guard<std::mutex> lock(parts_->healthMutex);
-        state.accepting = parts_->inTrouble == 0;
-    }
+    if (parts_->health) state.accepting = parts_->health->accepting();
     if (parts_->tls) state.certificateExpires = parts_->tls->expires();
     return state;
 }
 
 const config::Endpoint& GrpcServer::endpoint() const { return parts_->network.listener.endpoint(); }
 
-void GrpcServer::reportNotServing() { parts_->reportNotServing(); }
+void GrpcServer::reportNotServing() {
+    if (parts_->health) parts_->health->end();
+}
 
 void GrpcServer::shutDown() {
     parts_->network.listener.stop();
     parts_->local.listener.stop();
     if (!parts_->server) return;
+    parts_->health->stop();
     // Also ends health and reflection streams, which never end by themselves.
     parts_->server->Shutdown(std::chrono::system_clock::now() + kToLearnOfCancellation);
     parts_->server->Wait();

@@ -23,7 +23,9 @@ constexpr const char* kServices[] = {"shapedb.v1.ShapeService", "shapedb.v1.Sear
 
 TEST_F(StandardServices, HealthCheckKnowsEachService) {
     HealthCheckRequest request;
-    for (const char* service : {"", kServices[0], kServices[1], kServices[2], kServices[3], kServices[4]}) {
+    std::vector<const char*> names(std::begin(kServices), std::end(kServices));
+    names.insert(names.end(), {"", "shapedb.segmentation"});
+    for (const char* service : names) {
         request.set_service(service);
         const auto reply = unary(*client.health, &Health::Stub::Check, request);
         ASSERT_TRUE(reply.ok()) << reply;

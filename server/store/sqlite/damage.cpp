@@ -66,6 +66,22 @@ std::map<std::int64_t, std::string> mentioned(Connection& connection) {
     return found;
 }
 
+/// Empty if the table can be read.
+std::optional<std::string> damageOf(Connection& connection, const SmallTable& table) {
+    std::string line;
+    try {
+        line = connection.text(std::string("PRAGMA quick_check(") + table.name + ")");
+    } catch (const Failure& failure) {
+        if (failure.error.code != ErrorCode::kDataLoss) throw;
+        line = failure.error.message;
+    }
+    raiseUnreadable(line);
+    if (line == "ok" || line.empty()) return std::nullopt;
+    std::replace(line.begin(), line.end(), '\n', ' ');
+    return "table " + std::string(table.name) + " is damaged (" + line + "): " + table.consequence +
+           "; run 'shapedb admin check', then restore a backup with 'shapedb admin restore'";
+}
+
 }  // namespace
 
 void raiseUnreadable(const std::string& line) {
@@ -85,20 +101,16 @@ void raiseUnreadable(const std::string& line) {
 std::vector<std::string> damagedTables(Connection& connection) {
     std::vector<std::string> damaged;
     for (const SmallTable& table : kSmallTables) {
-        std::string line;
-        try {
-            line = connection.text(std::string("PRAGMA quick_check(") + table.name + ")");
-        } catch (const Failure& failure) {
-            if (failure.error.code != ErrorCode::kDataLoss) throw;
-            line = failure.error.message;
-        }
-        raiseUnreadable(line);
-        if (line == "ok" || line.empty()) continue;
-        damaged.push_back("table " + std::string(table.name) + " is damaged (" + line +
-                          "): " + table.consequence +
-                          "; run 'shapedb admin check', then restore a backup with 'shapedb admin restore'");
+        if (auto line = damageOf(connection, table)) damaged.push_back(std::move(*line));
     }
     return damaged;
+}
+
+void requireSoundQueue(Connection& connection) {
+    for (const SmallTable& table : kSmallTables) {
+        if (table.name != std::string_view("job")) continue;
+        if (auto line = damageOf(connection, table)) raise(ErrorCode::kDataLoss, std::move(*line));
+    }
 }
 
 std::vector<Collection> salvageCollections(Connection& connection, const Error& listing) {

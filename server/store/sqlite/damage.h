@@ -21,6 +21,10 @@ void raiseUnreadable(const std::string& line);
 /// what to do. Throws Failure if they cannot be read for another reason.
 std::vector<std::string> damagedTables(Connection& connection);
 
+/// Throws Failure kDataLoss, as a line of the above, if the table of jobs is damaged: it may go unnoticed
+/// until the first is queued.
+void requireSoundQueue(Connection& connection);
+
 /// The collections, by name, when `listing` them has failed: those that can be read, and with
 /// Collection::damage those of which only the id is known, and the name if an index still tells it. Throws
 /// Failure other than kDataLoss.

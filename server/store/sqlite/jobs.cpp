@@ -2,6 +2,7 @@
 #include "server/store/failpoints.h"
 #include "server/store/put_rules.h"
 #include "server/store/quarantine.h"
+#include "server/store/sqlite/damage.h"
 #include "server/store/sqlite/rows.h"
 #include "server/store/sqlite/sqlite_store_impl.h"
 
@@ -86,6 +87,7 @@ Result<void> SqliteStore::releaseJob(const Job& job) {
 
 Result<std::vector<Shape>> SqliteStore::recoverJobs(int maxAttempts, const std::vector<Crash>& crashes) {
     return write("recover the jobs", [&](Connection& connection) {
+        requireSoundQueue(connection);
         struct Lost {
             std::int64_t shapeId;
             Deaths deaths;

@@ -1,0 +1,96 @@
+#include "server/rpc/health.h"
+
+#include <chrono>
+#include <utility>
+
+namespace shapedb::rpc {
+namespace {
+
+constexpr std::chrono::milliseconds kLook{100};
+
+/// What a name needs to be serving, beside a server that listens and is not about to end.
+enum class Need {
+    kNothing,
+    kContent,       ///< collections can be looked up
+    kSegmentation,  ///< and scans are taken in
+};
+
+struct Name {
+    const char* name;
+    Need need;
+};
+// The services of the API, and of one the part that fails alone. The empty name is the server as a whole. All
+// of them are documented; others are NOT_FOUND.
+constexpr Name kNames[] = {
+    {"", Need::kContent},
+    {"shapedb.v1.ShapeService", Need::kContent},
+    {"shapedb.v1.SearchService", Need::kContent},
+    {"shapedb.v1.CollectionService", Need::kContent},
+    {"shapedb.v1.AlignService", Need::kContent},
+    {"shapedb.v1.AdminService", Need::kNothing},  // a restore is the way out of lost content
+    {"shapedb.segmentation", Need::kSegmentation},
+};
+
+bool has(const catalog::Condition& condition, Need need) {
+    switch (need) {
+        case Need::kNothing: return true;
+        case Need::kContent: return condition.content;
+        case Need::kSegmentation: return condition.content && condition.segmentation;
+    }
+    return false;
+}
+
+}  // namespace
+
+Health::Health(grpc::HealthCheckServiceInterface& service, std::function<catalog::Condition()> condition)
+    : service_(service), condition_(std::move(condition)) {
+    look();
+    looking_ = std::make_unique<RepeatingThread>(kLook, [this] { look(); });
+}
+
+Health::~Health() { stop(); }
+
+void Health::look() {
+    const catalog::Condition condition = condition_();
+    const std::lock_guard<std::mutex> lock(mutex_);
+    now_ = condition;
+    tell();
+}
+
+/// Under the lock. Only what changed, for watchers are woken by it.
+void Health::tell() {
+    for (const Name& name : kNames) {
+        const bool serving = !ending_ && inTrouble_ == 0 && has(now_, name.need);
+        const auto [told, isNew] = told_.emplace(name.name, serving);
+        if (!isNew && told->second == serving) continue;
+        told->second = serving;
+        service_.SetServingStatus(name.name, serving);
+    }
+}
+
+void Health::listenerFailed() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++inTrouble_;
+    tell();
+}
+
+void Health::listenerRecovered() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    --inTrouble_;
+    tell();
+}
+
+bool Health::accepting() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return inTrouble_ == 0;
+}
+
+void Health::end() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ending_ = true;
+    tell();
+}
+
+void Health::stop() { looking_.reset(); }
+
+}  // namespace shapedb::rpc
