@@ -1,5 +1,7 @@
 #include "client/api/status.h"
 
+#include "common/cut_off.h"
+
 namespace shapedb::client {
 
 namespace {
@@ -36,6 +38,7 @@ Error errorOf(const grpc::Status& status, const TrailingMetadata& trailing, cons
         return {errorCodeFromName(*name), status.error_message()};
     }
     const Error error{codeOf(status.error_code()), status.error_message()};
+    if (error.message.rfind(kCutOffPrefix, 0) == 0) return error;
     switch (status.error_code()) {
         case grpc::StatusCode::UNAVAILABLE: {
             // What becomes of a call without TLS to a server that wants it.

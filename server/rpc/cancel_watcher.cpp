@@ -1,6 +1,12 @@
 #include "server/rpc/cancel_watcher.h"
 
+#include <string>
+
+#include <grpc/grpc.h>
+
+#include "common/cut_off.h"
 #include "server/catalog/limits.h"
+#include "server/rpc/status.h"
 
 namespace shapedb::rpc {
 
@@ -40,26 +46,37 @@ void CancelWatcher::look(Registration& call) const {
     const auto altogether = now + Clock::duration(call.blocked_);
     const std::chrono::duration<double> beyond = altogether - stall_;
     if (now >= stall_) {
-        call.stalled_ = true;
+        const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(stall_);
+        cutOff(call, {ErrorCode::kDeadlineExceeded, "the client neither sent nor read anything for " +
+                                                        std::to_string(seconds.count()) +
+                                                        " seconds (limits.stall_seconds)"});
     } else if (beyond.count() * static_cast<double>(leastRate_) > static_cast<double>(call.bytes_)) {
-        call.tooSlow_ = true;
-    } else {
-        return;
+        cutOff(call, {ErrorCode::kDeadlineExceeded, "the client sent or read less than " +
+                                                        std::to_string(leastRate_) +
+                                                        " bytes per second (limits.min_bytes_per_second)"});
     }
-    call.context_.TryCancel();
 }
 
-std::optional<std::string> CancelWatcher::Registration::cutOff() const {
-    if (stalled_) {
-        const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(watcher_.stall_);
-        return "the client neither sent nor read anything for " + std::to_string(seconds.count()) +
-               " seconds";
-    }
-    if (tooSlow_) {
-        return "the client sent or read less than " + std::to_string(watcher_.leastRate_) +
-               " bytes per second";
-    }
-    return std::nullopt;
+// A handler that is blocked in a read or write can only be freed by cancelling the call, and then has no say
+// in its status. What ServerContext::TryCancel does, a bare CANCELLED, is this call with that code: of a
+// server's call gRPC sends the client the code and the message it is cancelled with, if no status was sent
+// before.
+void CancelWatcher::cutOff(Registration& call, const Error& why) {
+    if (call.cutOff_) return;
+    call.cutOff_ = withContext(why, kCutOffPrefix);
+    grpc_call_cancel_with_status(call.context_.c_call(),
+                                 static_cast<grpc_status_code>(statusCodeOf(why.code)),
+                                 call.cutOff_->message.c_str(), nullptr);
+}
+
+void CancelWatcher::cutOffAll(const Error& why) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    for (Registration* call : calls_) cutOff(*call, why);
+}
+
+std::optional<Error> CancelWatcher::Registration::cutOff() const {
+    const std::lock_guard<std::mutex> lock(watcher_.mutex_);
+    return cutOff_;
 }
 
 CancelWatcher::Registration::Registration(CancelWatcher& watcher, grpc::ServerContext& context)

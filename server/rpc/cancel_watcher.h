@@ -1,5 +1,5 @@
 // Turns gRPC's "is this call cancelled?" into a flag for long-running work, and cuts off clients that
-// send or read nothing, or hardly anything: each holds a thread.
+// send or read nothing, or hardly anything: each holds a thread. Their status says why.
 #pragma once
 
 #include <atomic>
@@ -10,10 +10,11 @@
 #include <mutex>
 #include <optional>
 #include <set>
-#include <string>
 #include <thread>
 
 #include <grpcpp/server_context.h>
+
+#include "core/base/error.h"
 
 namespace shapedb::rpc {
 
@@ -25,12 +26,16 @@ class CancelWatcher {
   public:
     using Clock = std::chrono::steady_clock;
 
-    /// Cancels calls that are blocked in a read or write for longer than `stall`, and those that move fewer
-    /// than `leastRate` bytes in a second of being blocked, not counting the first `stall`. 0: any rate.
+    /// Cuts off calls that are blocked in a read or write for longer than `stall`, and those that move fewer
+    /// than `leastRate` bytes in a second of being blocked, not counting the first `stall`. 0: any rate. Both
+    /// get the status of kDeadlineExceeded.
     CancelWatcher(std::chrono::milliseconds stall, std::uint64_t leastRate);
     ~CancelWatcher();
     CancelWatcher(const CancelWatcher&) = delete;
     CancelWatcher& operator=(const CancelWatcher&) = delete;
+
+    /// Cuts off all calls that are running now, with the status of `why`.
+    void cutOffAll(const Error& why);
 
     /// One running call; `context` must outlive this.
     class Registration {
@@ -49,8 +54,8 @@ class CancelWatcher {
             blocked_ += Clock::now().time_since_epoch().count() - blockedSince_.exchange(0);
             bytes_ += bytes;
         }
-        /// Why the call was cancelled here, if it was.
-        [[nodiscard]] std::optional<std::string> cutOff() const;
+        /// Why the call was cut off here, if it was: what its client has been told.
+        [[nodiscard]] std::optional<Error> cutOff() const;
 
       private:
         friend class CancelWatcher;
@@ -58,8 +63,7 @@ class CancelWatcher {
         CancelWatcher& watcher_;
         grpc::ServerContext& context_;
         std::atomic<bool> flag_{false};
-        std::atomic<bool> stalled_{false};
-        std::atomic<bool> tooSlow_{false};
+        std::optional<Error> cutOff_;              ///< guarded by the watcher's mutex
         std::atomic<Clock::rep> blockedSince_{0};  ///< 0: not blocked
         std::atomic<Clock::rep> blocked_{0};       ///< in earlier transfers
         std::atomic<std::uint64_t> bytes_{0};      ///< moved so far
@@ -68,6 +72,7 @@ class CancelWatcher {
   private:
     void run();
     void look(Registration& call) const;
+    static void cutOff(Registration& call, const Error& why);
 
     const std::chrono::milliseconds stall_;
     const std::uint64_t leastRate_;

@@ -234,6 +234,8 @@ void GrpcServer::shutDown() {
     parts_->local.listener.stop();
     if (!parts_->server) return;
     parts_->health->stop();
+    parts_->cancellations.cutOffAll(
+        {ErrorCode::kUnavailable, "the server is shutting down: send it again after its restart"});
     // Also ends health and reflection streams, which never end by themselves.
     parts_->server->Shutdown(std::chrono::system_clock::now() + kToLearnOfCancellation);
     parts_->server->Wait();

@@ -20,6 +20,7 @@ import health_pb2_grpc
 from shapedb.v1 import admin_service_pb2 as admin
 from shapedb.v1 import admin_service_pb2_grpc as admin_grpc
 from shapedb.v1 import align_service_pb2 as align
+from shapedb.v1 import align_service_pb2_grpc as align_grpc
 from shapedb.v1 import collection_service_pb2 as collections
 from shapedb.v1 import collection_service_pb2_grpc as collections_grpc
 from shapedb.v1 import search_service_pb2 as search
@@ -140,6 +141,7 @@ class Client:
         self.channel = grpc.intercept_channel(self._connection, *([Bearer(key)] if key else []))
         self.shapes = shapes_grpc.ShapeServiceStub(self.channel)
         self.search = search_grpc.SearchServiceStub(self.channel)
+        self.align = align_grpc.AlignServiceStub(self.channel)
         self.collections = collections_grpc.CollectionServiceStub(self.channel)
         self.admin = admin_grpc.AdminServiceStub(self.channel)
         self.health = health_pb2_grpc.HealthStub(self.channel)

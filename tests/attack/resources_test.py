@@ -6,7 +6,8 @@ import threading
 import time
 import unittest
 
-from attacker import MIB, Server, admin, ball, collections, eventually, grpc, main, reason, shapes, types
+from attacker import (MIB, Server, admin, align, ball, collections, eventually, grpc, main, reason, search, shapes,
+                      types)
 
 
 class CompressedMessages(unittest.TestCase):
@@ -145,7 +146,10 @@ class SlowUploads(unittest.TestCase):
                 with self.assertRaises(grpc.RpcError) as failure:
                     client.shapes.AddShape(self.drip(0.1, stop), timeout=60)
                 stop.set()
-                self.assertEqual(failure.exception.code(), grpc.StatusCode.CANCELLED)
+                self.assertEqual(failure.exception.code(), grpc.StatusCode.DEADLINE_EXCEEDED)
+                self.assertEqual(failure.exception.details(),
+                                 "cut off by the server: the client sent or read less than 1000 bytes per second "
+                                 "(limits.min_bytes_per_second)")
                 self.assertLess(time.monotonic() - began, 15)
             self.assertTrue(eventually(lambda: "less than 1000 bytes per second" in server.log()), server.log())
 
@@ -160,6 +164,74 @@ class Messages(unittest.TestCase):
                     call(b"\xff" * 100, timeout=10)
                 self.assertIn(failure.exception.code(), (grpc.StatusCode.INVALID_ARGUMENT, grpc.StatusCode.INTERNAL))
             self.assertEqual(client.count(), 0)
+
+
+def stalled_uploads(client, stop):
+    """One call of each kind of upload: its beginning, then nothing until `stop`. By name."""
+    def then_nothing(*messages):
+        yield from messages
+        stop.wait(60)
+
+    some = types.PointChunk(xyz=b"\0" * 12)
+    uploads = {
+        "AddShape": (client.shapes.AddShape, [shapes.AddShapeRequest(header=shapes.AddShapeHeader(
+            key="idle", point_count=100)), shapes.AddShapeRequest(chunk=some)]),
+        "SearchByScan": (client.search.SearchByScan, [search.SearchByScanRequest(header=search.SearchByScanHeader(
+            options=search.SearchOptions(k=1), point_count=100))]),
+        "Align": (client.align.Align, [align.AlignRequest(header=align.AlignHeader(
+            query_points=100, other_points=100)), align.AlignRequest(chunk=some)]),
+        "Segment": (client.shapes.Segment, [shapes.SegmentRequest(header=shapes.SegmentHeader(point_count=100))]),
+        "Restore": (client.admin.Restore, [admin.BackupChunk(total_bytes=4096, data=b"SQLite")]),
+        "ImportCollection": (client.admin.ImportCollection, [admin.ImportCollectionRequest(
+            header=admin.ImportCollectionHeader(collection="new"))]),
+        "no header": (client.shapes.AddShape, []),
+    }
+    for name, (method, messages) in uploads.items():
+        if name == "Segment":
+            call = method(then_nothing(*messages), timeout=60)
+            yield name, lambda call=call: list(call)
+        else:
+            yield name, method.future(then_nothing(*messages), timeout=60).result
+
+
+class CutOffCalls(unittest.TestCase):
+    """A client that is cut off learns why, from the status alone."""
+
+    def assert_cut_off(self, name, call, code, why):
+        with self.assertRaises(grpc.RpcError, msg=name) as failure:
+            call()
+        self.assertEqual(failure.exception.code(), code, name)
+        self.assertEqual(failure.exception.details(), "cut off by the server: " + why, name)
+
+    def test_idle_uploads(self):
+        with Server("--limits-stall-seconds", "1") as server, server.connect() as client:
+            stop = threading.Event()
+            # Restore and ImportCollection one after the other: only one of them may run.
+            for name, call in stalled_uploads(client, stop):
+                self.assert_cut_off(name, call, grpc.StatusCode.DEADLINE_EXCEEDED,
+                                    "the client neither sent nor read anything for 1 seconds (limits.stall_seconds)")
+            stop.set()
+            self.assertEqual(client.count(), 0)
+
+    def test_idle_downloads(self):
+        with Server("--limits-stall-seconds", "1") as server, server.connect() as client:
+            client.add("large", [(i % 1000, i // 1000, (i * i) % 999) for i in range(1_500_000)], timeout=120)
+            points = client.shapes.GetPoints(shapes.GetPointsRequest(shape=shapes.ShapeRef(key="large")), timeout=60)
+            self.assertEqual(next(points).shape.key, "large")
+            self.assertTrue(eventually(lambda: "neither sent nor read" in server.log(), 30), server.log())
+            self.assert_cut_off("GetPoints", lambda: list(points), grpc.StatusCode.DEADLINE_EXCEEDED,
+                                "the client neither sent nor read anything for 1 seconds (limits.stall_seconds)")
+
+    def test_uploads_that_outlast_the_server(self):
+        with Server("--shutdown-drain-seconds", "1") as server, server.connect() as client:
+            stop = threading.Event()
+            calls = [(name, call) for name, call in stalled_uploads(client, stop) if name != "ImportCollection"]
+            time.sleep(1)
+            self.assertEqual(server.stop(), 0, server.log())
+            for name, call in calls:
+                self.assert_cut_off(name, call, grpc.StatusCode.UNAVAILABLE,
+                                    "the server is shutting down: send it again after its restart")
+            stop.set()
 
 
 class Floods(unittest.TestCase):

@@ -366,7 +366,10 @@ TEST_F(Lifecycle, StalledUploadIsCutOff) {
     ASSERT_TRUE(upload->Write(message));
     const auto began = std::chrono::steady_clock::now();
     const grpc::Status status = upload->Finish();
-    EXPECT_FALSE(status.ok());
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
+    EXPECT_EQ(status.error_message(),
+              "cut off by the server: the client neither sent nor read anything for 1 seconds "
+              "(limits.stall_seconds)");
     const auto took = std::chrono::steady_clock::now() - began;
     EXPECT_GT(took, std::chrono::milliseconds(700));
     EXPECT_LT(took, std::chrono::seconds(5));

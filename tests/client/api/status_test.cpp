@@ -1,6 +1,10 @@
 #include "client/api/status.h"
 
+#include <string>
+
 #include <gtest/gtest.h>
+
+#include "common/cut_off.h"
 
 namespace shapedb::client {
 namespace {
@@ -33,6 +37,15 @@ TEST(Status, MessageNamesAnUnreachableServer) {
     for (const auto code : {grpc::StatusCode::UNAVAILABLE, grpc::StatusCode::DEADLINE_EXCEEDED,
                             grpc::StatusCode::UNIMPLEMENTED}) {
         EXPECT_NE(translate(code).message.find("host:1"), std::string::npos);
+    }
+}
+
+TEST(Status, ACallThatTheServerCutOffKeepsItsReason) {
+    for (const auto code : {grpc::StatusCode::UNAVAILABLE, grpc::StatusCode::DEADLINE_EXCEEDED}) {
+        const grpc::Status status(code, kCutOffPrefix + std::string("too slow"));
+        const Error error = errorOf(status, {}, "host:1");
+        EXPECT_EQ(error.message, "cut off by the server: too slow");
+        EXPECT_EQ(error.code, translate(code).code);
     }
 }
 
