@@ -36,7 +36,8 @@ if(SHAPEDB_SANITIZE)
     # With sanitizers g++ takes initialised values for uninitialised ones, even in its own library.
     add_compile_options(-Wno-maybe-uninitialized)
   endif()
-  add_compile_options(-fsanitize=${SHAPEDB_SANITIZE} -fno-omit-frame-pointer -g)
+  # Lines are enough for reports; to follow variables takes g++ minutes and gigabytes for some sources.
+  add_compile_options(-fsanitize=${SHAPEDB_SANITIZE} -fno-omit-frame-pointer -g1)
   add_link_options(-fsanitize=${SHAPEDB_SANITIZE})
 endif()
 
