@@ -12,13 +12,13 @@ build_packages=(
   libcgal-dev libgmp-dev libmpfr-dev libeigen3-dev libtbb-dev libexpected-dev
   libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc
   libsqlite3-dev libzstd-dev libssl-dev libspdlog-dev libtomlplusplus-dev prometheus-cpp-dev
-  libcli11-dev nlohmann-json3-dev libpng-dev liblzf-dev zlib1g-dev
+  libcli11-dev nlohmann-json3-dev libpng-dev liblzf-dev zlib1g-dev libzip-dev libexpat1-dev
   libgtest-dev libgmock-dev clang-format-14 valgrind
   python3-grpcio python3-protobuf openssl
 )
 runtime_packages=(
   ca-certificates libgmpxx4ldbl libmpfr6 libtbb12 libgrpc++1.51 libprotobuf32 libsqlite3-0
-  libzstd1 libssl3 libspdlog1.10 libprometheus-cpp-pull1.0 libpng16-16 liblzf1 zlib1g
+  libzstd1 libssl3 libspdlog1.10 libprometheus-cpp-pull1.0 libpng16-16 liblzf1 zlib1g libzip4 libexpat1
 )
 analysis_packages=(clang-14 clang-tidy-14 libclang-rt-14-dev)
 bench_packages=(libpcl-dev libfaiss-dev libopenblas-dev)

@@ -18,6 +18,10 @@ Result<ScanContent> readPcd(InputFile& file, std::size_t maxPoints);
 Result<ScanContent> readOff(InputFile& file, std::size_t maxPoints);
 Result<ScanContent> readObj(InputFile& file, std::size_t maxPoints);
 Result<ScanContent> readStl(InputFile& file, std::size_t maxPoints);
+Result<ScanContent> readLas(InputFile& file, std::size_t maxPoints);
+/// Also kFileNotReadable: a file that the document names.
+Result<ScanContent> readGltf(InputFile& file, std::size_t maxPoints);
+Result<ScanContent> read3mf(InputFile& file, std::size_t maxPoints);
 Result<ScanContent> readXyz(InputFile& file, std::size_t maxPoints);
 
 /// True if the first line of content, after a count or column names, is a point: tells scans from notes.

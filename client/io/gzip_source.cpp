@@ -7,15 +7,12 @@
 
 #include <zlib.h>
 
+#include "client/io/unpacked_limit.h"
 #include "core/base/return_if_error.h"
 
 namespace shapedb::io {
 
 namespace {
-
-// Scans as text shrink to a third, those of few different numbers to a twentieth.
-constexpr std::uint64_t kGreatestRatio = 200;
-constexpr std::uint64_t kAlwaysAllowed = std::uint64_t{64} << 20;
 
 // For inflateInit2: the largest window, with the header of gzip.
 constexpr int kGzipWindow = 15 + 16;
@@ -42,11 +39,7 @@ class GzipSource : public ByteSource {
         }
         const std::size_t got = size - stream_.avail_out;
         unpacked_ += got;
-        if (unpacked_ > kAlwaysAllowed && unpacked_ / kGreatestRatio > packed_->position()) {
-            return fail(malformed("more than " + std::to_string(kGreatestRatio) +
-                                  " times as large when unpacked, which is not read from compressed files; "
-                                  "if it is meant to be, unpack it with gunzip first"));
-        }
+        if (isBomb(unpacked_, packed_->position())) return fail(malformed(bombText()));
         return got;
     }
     std::uint64_t position() const override { return packed_->position(); }

@@ -45,6 +45,7 @@ Result<InputFile> InputFile::open(const std::string& path, const RunContext& con
                                          : ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
     if (descriptor < 0) return fail(notReadable(name, reason(errno)));
     InputFile file(name, makeFileSource(name, descriptor), std::nullopt, context);
+    file.standardInput_ = standardInput;
     struct stat status = {};
     if (::fstat(descriptor, &status) != 0) return fail(notReadable(name, reason(errno)));
     if (S_ISDIR(status.st_mode)) return fail(notReadable(name, "it is a folder; name a scan file"));

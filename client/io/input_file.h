@@ -30,7 +30,10 @@ class InputFile {
     InputFile& operator=(InputFile&&) = delete;
     ~InputFile() = default;
 
+    /// For messages; "standard input" for that.
     const std::string& path() const { return path_; }
+    bool isStandardInput() const { return standardInput_; }
+    const RunContext& context() const { return *context_; }
     const std::optional<Error>& failure() const { return failure_; }
 
     /// Byte position of data() in the file, unpacked and as UTF-8.
@@ -106,6 +109,7 @@ class InputFile {
     LineEnd lineEnd_ = LineEnd::kNone;  // of the line last read
     LineEnd lineEndBefore_ = LineEnd::kNone;
     bool recoded_ = false;
+    bool standardInput_ = false;
     std::optional<Error> failure_;
 };
 

@@ -9,6 +9,7 @@
 #include <system_error>
 #include <utility>
 
+#include "client/io/conversion.h"
 #include "client/io/formats.h"
 #include "client/io/input_file.h"
 #include "client/io/scan_content.h"
@@ -33,12 +34,18 @@ struct Format {
     ReadFormat read;
 };
 
-constexpr std::array<Format, 10> kFormats = {{{".ply", io::readPly},
+constexpr std::array<Format, 16> kFormats = {{{".ply", io::readPly},
                                               {".pcd", io::readPcd},
                                               {".off", io::readOff},
                                               {".obj", io::readObj},
                                               {".stl", io::readStl},
+                                              {".las", io::readLas},
+                                              {".gltf", io::readGltf},
+                                              {".glb", io::readGltf},
+                                              {".3mf", io::read3mf},
                                               {".xyz", io::readXyz},
+                                              {".xyzn", io::readXyz},
+                                              {".xyzrgb", io::readXyz},
                                               {".txt", io::readXyz},
                                               {".pts", io::readXyz},
                                               {".asc", io::readXyz},
@@ -83,10 +90,12 @@ std::vector<std::string> formatNames() {
 
 Error unknownFormat(const std::string& path) {
     const std::string ending = endingOf(path);
+    const std::string advice = io::conversionAdvice(ending);
     return {ErrorCode::kUnknownFileFormat,
             path + ": " +
                 (ending.empty() ? "no file ending" : "unknown file ending " + io::inQuotes(ending)) +
-                "; scan files end in " + endingList() + ", and .gz after that if they are packed"};
+                (advice.empty() ? "" : ": " + advice) + "; scan files end in " + endingList() +
+                ", and .gz after that if they are packed"};
 }
 
 Result<const Format*> chooseFormat(const std::string& path, const std::string& given) {
@@ -179,7 +188,7 @@ constexpr std::array<Archive, 5> kArchives = {{{"PK\x03\x04", "ZIP archive"},
                                                {"7z\xbc\xaf\x27\x1c", "7-Zip archive"}}};
 
 /// What no reader can make anything of is named for what it is.
-Result<void> checkHasContent(InputFile& file) {
+Result<void> checkHasContent(InputFile& file, const Format& format) {
     constexpr std::string_view kPointer = "version https://git-lfs.github.com/spec/";
     const std::string_view start = file.peek(kPointer.size());
     const bool onlyMark = start == "\xEF\xBB\xBF" || start == "\xFF\xFE" || start == "\xFE\xFF";
@@ -188,6 +197,7 @@ Result<void> checkHasContent(InputFile& file) {
         return fail(
             file.malformed("this is a Git LFS pointer, not the file itself; fetch that with 'git lfs pull'"));
     }
+    if (format.read == io::read3mf) return {};  // a ZIP archive
     for (const Archive& archive : kArchives) {
         if (start.substr(0, archive.start.size()) != archive.start) continue;
         return fail(file.malformed(std::string("this is a ") + archive.name + "; unpack it first"));
@@ -205,7 +215,7 @@ Result<Scan> readScanUnguarded(const std::string& path, const ReadOptions& optio
     RETURN_IF_ERROR(file);
     const auto format = chooseFormat(path, options.format);
     RETURN_IF_ERROR(format);
-    RETURN_IF_ERROR(checkHasContent(*file));
+    RETURN_IF_ERROR(checkHasContent(*file, **format));
     auto content = (*format)->read(*file, options.maxPoints);
     // The real reason comes before the parser's complaint about an early end.
     if (file->failure()) return fail(*file->failure());

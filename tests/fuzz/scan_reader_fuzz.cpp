@@ -1,5 +1,5 @@
 // Fuzzes the readers of scan files: any bytes give points or an error with a message, and nothing else.
-// The first byte chooses the format, the rest is the file.
+// The first byte chooses the format, A for the first in scanFileEndings(), the rest is the file.
 #include <cmath>
 
 #include "client/io/scan_reader.h"
@@ -12,7 +12,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if (size == 0) return 0;
     fuzz::Input input(data, size);
     const auto& endings = scanFileEndings();
-    const std::string ending = endings[input.byte() % endings.size()];
+    const std::string ending = endings[static_cast<std::uint8_t>(input.byte() - 'A') % endings.size()];
     const std::string path = fuzz::writeFile(ending, input.rest());
     ReadOptions options;
     options.meshSamples = 50;

@@ -178,7 +178,7 @@ TEST_F(ScanReader, ErrorsNameUnreadableAndUnknownFiles) {
         ::chmod(write("secret.ply", "ply\n").c_str(), 0);
         EXPECT_EQ(readScan(path("secret.ply")).error().code, ErrorCode::kFileNotReadable);
     }
-    for (const char* name : {"scan.las", "scan", "scan.gz", "scan.zip.gz", ".ply"}) {
+    for (const char* name : {"scan.e57", "scan", "scan.gz", "scan.zip.gz", ".ply"}) {
         scan = readScan(write(name, "ply\n"));
         ASSERT_FALSE(scan);
         EXPECT_EQ(scan.error().code, ErrorCode::kUnknownFileFormat) << name;
@@ -188,7 +188,26 @@ TEST_F(ScanReader, ErrorsNameUnreadableAndUnknownFiles) {
     }
 }
 
-TEST_F(ScanReader, NamesEachFormatOnce) { EXPECT_EQ(scanFormatList(), "PLY, PCD, OFF, OBJ, STL or XYZ"); }
+TEST_F(ScanReader, UnknownEndingsComeWithAWayOut) {
+    for (const auto& [name, advice] :
+         std::vector<std::pair<std::string, std::string>>{{"a.laz", "laszip"},
+                                                          {"a.LAZ.gz", "laszip"},
+                                                          {"a.e57", "CloudCompare"},
+                                                          {"a.fbx", "Blender"},
+                                                          {"a.step", "FreeCAD"},
+                                                          {"a.vtk", "meshio"},
+                                                          {"a.zip", "unpack"},
+                                                          {"a.doc", "scan files end in .ply"}}) {
+        const auto scan = readScan(write(name, "data"));
+        ASSERT_FALSE(scan);
+        EXPECT_EQ(scan.error().code, ErrorCode::kUnknownFileFormat);
+        EXPECT_NE(scan.error().message.find(advice), std::string::npos) << scan.error().message;
+    }
+}
+
+TEST_F(ScanReader, NamesEachFormatOnce) {
+    EXPECT_EQ(scanFormatList(), "PLY, PCD, OFF, OBJ, STL, LAS, GLTF, 3MF or XYZ");
+}
 
 TEST_F(ScanReader, ReadsPipes) {
     for (const SampleFile& file : sampleFiles()) {
@@ -252,7 +271,7 @@ TEST_F(ScanFiles, SearchesFoldersAndLabelsByFolder) {
 
 TEST_F(ScanFiles, ErrorsNameBadPaths) {
     EXPECT_EQ(listScanFiles({path("missing")}).error().code, ErrorCode::kFileNotReadable);
-    const auto unknown = listScanFiles({write("a.las", "")});
+    const auto unknown = listScanFiles({write("a.e57", "")});
     ASSERT_FALSE(unknown);
     EXPECT_EQ(unknown.error().code, ErrorCode::kUnknownFileFormat);
     fs::create_directory(path("empty"));

@@ -3,9 +3,12 @@
 #include <array>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 
 #include <lzf.h>
 #include <stdlib.h>
+#include <unistd.h>
+#include <zip.h>
 
 namespace shapedb {
 
@@ -218,6 +221,61 @@ std::string binaryStl(std::string header) {
     return bytes.str();
 }
 
+// The JSON text of a document whose buffer has the vertices and then the corners of kFaces.
+std::string gltfJson(const std::string& bufferMembers) {
+    return R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],)"
+           R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],)"
+           R"("accessors":[{"bufferView":0,"componentType":5126,"count":5,"type":"VEC3"},)"
+           R"({"bufferView":1,"componentType":5123,"count":12,"type":"SCALAR"}],)"
+           R"("bufferViews":[{"buffer":0,"byteLength":60},{"buffer":0,"byteOffset":60,"byteLength":24}],)"
+           R"("buffers":[{"byteLength":84)" +
+           bufferMembers + "}]}";
+}
+
+std::string gltfBuffer() {
+    Bytes bytes;
+    for (const Point3& p : sampleVertices()) {
+        bytes.add(static_cast<float>(p.x)).add(static_cast<float>(p.y)).add(static_cast<float>(p.z));
+    }
+    for (const auto& f : kFaces) {
+        for (const std::uint32_t v : f) bytes.add(static_cast<std::uint16_t>(v));
+    }
+    return bytes.str();
+}
+
+std::string las() {
+    Bytes bytes;
+    bytes.text("LASF" + std::string(20, '\0'))
+        .add(std::uint8_t{1})
+        .add(std::uint8_t{2})
+        .text(std::string(68, ' '));
+    bytes.add(std::uint16_t{227}).add(std::uint32_t{227}).add(std::uint32_t{0});
+    bytes.add(std::uint8_t{0}).add(std::uint16_t{20}).add(std::uint32_t{5}).text(std::string(20, '\0'));
+    for (int axis = 0; axis < 3; ++axis) bytes.add(0.25);
+    bytes.add(0.0).add(1.0).add(-1.0).text(std::string(48, '\0'));
+    for (const Point3& p : sampleVertices()) {
+        for (const double c : {p.x, p.y - 1.0, p.z + 1.0}) bytes.add(static_cast<std::int32_t>(4.0 * c));
+        bytes.text("the rest");
+    }
+    return bytes.str();
+}
+
+std::string threeMf() {
+    std::string model =
+        R"(<?xml version="1.0"?><model unit="millimeter"><resources><object id="7"><mesh><vertices>)";
+    for (const Point3& p : sampleVertices()) {
+        model += "<vertex x=\"" + std::to_string(p.x) + "\" y=\"" + std::to_string(p.y) + "\" z=\"" +
+                 std::to_string(p.z) + "\"/>";
+    }
+    model += "</vertices><triangles>";
+    for (const auto& f : kFaces) {
+        model += "<triangle v1=\"" + std::to_string(f[0]) + "\" v2=\"" + std::to_string(f[1]) + "\" v3=\"" +
+                 std::to_string(f[2]) + "\"/>";
+    }
+    model += R"(</triangles></mesh></object></resources><build><item objectid="7"/></build></model>)";
+    return zipArchive({{"3D/3dmodel.model", model}});
+}
+
 }  // namespace
 
 std::string compressedPcdBody(const std::string& fieldByField) {
@@ -228,6 +286,55 @@ std::string compressedPcdBody(const std::string& fieldByField) {
     Bytes sizes;
     sizes.add(static_cast<std::uint32_t>(size)).add(static_cast<std::uint32_t>(fieldByField.size()));
     return sizes.str() + packed;
+}
+
+std::string zipArchive(const std::vector<std::pair<std::string, std::string>>& entries) {
+    std::string pattern = (fs::temp_directory_path() / "shapedb-zip-XXXXXX").string();
+    ::close(::mkstemp(pattern.data()));
+    zip_t* archive = ::zip_open(pattern.c_str(), ZIP_CREATE | ZIP_TRUNCATE, nullptr);
+    EXPECT_NE(archive, nullptr);
+    for (const auto& [name, content] : entries) {
+        zip_source_t* source = ::zip_source_buffer(archive, content.data(), content.size(), 0);
+        EXPECT_GE(::zip_file_add(archive, name.c_str(), source, 0), 0);
+    }
+    EXPECT_EQ(::zip_close(archive), 0);
+    std::ifstream stream(pattern, std::ios::binary);
+    std::string bytes{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+    fs::remove(pattern);
+    return bytes;
+}
+
+std::string glb(const std::string& json, const std::string& binary) {
+    const auto padded = [](std::string text, char filler) {
+        text.resize((text.size() + 3) / 4 * 4, filler);
+        return text;
+    };
+    const auto chunk = [&](const char* type, const std::string& content) {
+        return Bytes()
+            .add(static_cast<std::uint32_t>(content.size()))
+            .text(std::string(type, 4))
+            .text(content)
+            .str();
+    };
+    std::string chunks = chunk("JSON", padded(json, ' '));
+    if (!binary.empty()) chunks += chunk("BIN", padded(binary, '\0'));
+    const auto length = static_cast<std::uint32_t>(12 + chunks.size());
+    return Bytes().text("glTF").add(std::uint32_t{2}).add(length).text(chunks).str();
+}
+
+std::string base64(const std::string& bytes) {
+    const char* letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    std::string text;
+    for (std::size_t i = 0; i < bytes.size(); i += 3) {
+        std::uint32_t bits = 0;
+        for (std::size_t j = i; j < i + 3; ++j) {
+            bits = bits * 256 + (j < bytes.size() ? static_cast<unsigned char>(bytes[j]) : 0);
+        }
+        for (std::size_t j = 0; j < 4; ++j) {
+            text += i + j > bytes.size() ? '=' : letters[(bits >> (18 - 6 * j)) & 63U];
+        }
+    }
+    return text;
 }
 
 std::vector<SampleFile> sampleFiles() {
@@ -248,6 +355,11 @@ std::vector<SampleFile> sampleFiles() {
         {"ascii.stl", asciiStl(), 4, 4},
         {"binary.stl", binaryStl("made by a test"), 4, 4},
         {"solid.stl", binaryStl("solid but binary"), 4, 4},
+        {"points.las", las(), 5, 0},
+        {"scene.gltf",
+         gltfJson(",\"uri\":\"data:application/octet-stream;base64," + base64(gltfBuffer()) + "\""), 5, 4},
+        {"scene.glb", glb(gltfJson(""), gltfBuffer()), 5, 4},
+        {"part.3mf", threeMf(), 5, 4},
         {"plain.xyz", "# points\n" + textVertices("\n"), 5, 0},
         {"crlf.txt", textVertices("\r\n", "255 0 0"), 5, 0},
         {"counted.pts", "5\n" + textVertices("\n", "-17 255 0 0"), 5, 0},

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -70,6 +71,12 @@ struct SampleFile {
 /// (STL: the first four).
 std::vector<SampleFile> sampleFiles();
 PointCloud sampleVertices();
+
+/// A ZIP archive of these entries.
+std::string zipArchive(const std::vector<std::pair<std::string, std::string>>& entries);
+/// A .glb file of a JSON and a binary chunk; no BIN chunk if that is empty.
+std::string glb(const std::string& json, const std::string& binary);
+std::string base64(const std::string& bytes);
 
 /// Body of a binary_compressed PCD file: both sizes, then the LZF-compressed data, field by field.
 std::string compressedPcdBody(const std::string& fieldByField);
