@@ -63,11 +63,17 @@ struct Columns {
     std::size_t named = 0;  ///< in the header
 };
 
+// Tables may have quotes around names and numbers.
+std::string_view withoutQuotes(std::string_view word) {
+    const bool quoted = word.size() > 1 && word.front() == '"' && word.back() == '"';
+    return quoted ? word.substr(1, word.size() - 2) : word;
+}
+
 // The name of a column without quotes and without its unit: "X [m]" and "x(mm)" are "x".
 std::string columnName(std::string_view word) {
     while (!word.empty() && isBlank(word.front())) word.remove_prefix(1);
     while (!word.empty() && isBlank(word.back())) word.remove_suffix(1);
-    if (word.size() > 1 && word.front() == '"' && word.back() == '"') word = word.substr(1, word.size() - 2);
+    word = withoutQuotes(word);
     return lowerCase(word.substr(0, word.find_first_of("[( ")));
 }
 
@@ -124,7 +130,7 @@ Result<Point3> parsePoint(const InputFile& file, std::string_view line, const Co
                              : i == columns.at[1] ? &p.y
                              : i == columns.at[2] ? &p.z
                                                   : nullptr;
-        if (coordinate != nullptr && !parseReal(column, *coordinate)) {
+        if (coordinate != nullptr && !parseReal(withoutQuotes(column), *coordinate)) {
             return fail(
                 file.malformedLine("expected three numbers x y z, found " + inQuotesNotANumber(column)));
         }

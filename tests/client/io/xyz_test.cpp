@@ -16,7 +16,8 @@ TEST_F(Xyz, EverySeparatorGivesTheSamePoints) {
           "\"X\",\"Y\",\"Z\",R\n1.5,-2,3e2,9\n4,5,6,9\n",
           "\xEF\xBB\xBF"
           "2\n1.5 -2 3e2\n4 5 6\n",
-          "1.5 -2 3e2 255 n/a\n4 5 6 -7\n", "//X Y Z\n1.5 -2 3e2\n4 5 6\n"}) {
+          "1.5 -2 3e2 255 n/a\n4 5 6 -7\n", "\"1.5\",\"-2\",\"3e2\"\n\"4\",\"5\",\"6\"\n",
+          "//X Y Z\n1.5 -2 3e2\n4 5 6\n"}) {
         EXPECT_EQ(readGood("a.xyz", text).points, expected) << text;
     }
 }
