@@ -59,6 +59,7 @@ catalog::CatalogOptions catalogOptions(const config::ServerConfig& config,
     catalog::CatalogOptions options;
     options.maxQueuedJobs = config.ingest.maxQueuedJobs;
     options.maxQueuedBytes = config.ingest.maxQueuedBytes;
+    options.maxPoints = config.limits.maxPoints;
     options.segmentations = config::threadsOrProcessors(config.search.threads);
     options.workers.threads = config::threadsOrProcessors(config.ingest.threads);
     options.workers.maxAttempts = config.ingest.maxAttempts;

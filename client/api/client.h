@@ -273,8 +273,7 @@ class Client {
 
     /// Adds the collection at `path`, which exportCollection wrote, under the name `collection`, or under its
     /// own if that is empty; nothing is segmented again. Not retried. Errors: kFileNotReadable,
-    /// kMalformedFile, kSchemaTooNew, kAlreadyExists, kInvalidArgument (the name), kQueueFull (its pending
-    /// shapes).
+    /// kMalformedFile, kSchemaTooNew, kAlreadyExists, kInvalidArgument (the name), kPointLimitExceeded.
     [[nodiscard]] Result<ImportReport> importCollection(const std::string& path,
                                                         const std::string& collection = {},
                                                         const RunContext& context = {}) const;

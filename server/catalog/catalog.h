@@ -35,6 +35,7 @@ class CallFrame;
 struct CatalogOptions {
     std::uint64_t maxQueuedJobs = 0;   ///< as store::PutRequest
     std::uint64_t maxQueuedBytes = 0;  ///< as store::PutRequest
+    std::uint64_t maxPoints = 0;       ///< of a scan that is imported; 0: any
     int segmentations = 1;             ///< for callers, at a time
     ingest::WorkerOptions workers;
     ingest::RebuildOptions rebuilds;

@@ -17,7 +17,13 @@ Result<void> checkImported(const store::Collection& collection) {
     return fail(ErrorCode::kMalformedFile, "the export cannot be imported: " + parameters.error().message);
 }
 
-Result<void> checkImported(const store::Shape& shape) {
+Result<void> checkImported(const store::Shape& shape, std::uint64_t maxPoints) {
+    if (maxPoints > 0 && shape.pointCount > maxPoints) {
+        return fail(ErrorCode::kPointLimitExceeded,
+                    "shape '" + shape.key + "' has " + std::to_string(shape.pointCount) +
+                        " points, this server takes at most " + std::to_string(maxPoints) +
+                        " (limits.max_points): raise it to import the collection");
+    }
     const auto checked = checkMetadata(shape.metadata);
     if (checked) return {};
     return fail(withContext(checked.error(), "shape '" + shape.key + "': "));
@@ -58,14 +64,14 @@ Result<index::SnapshotPtr> Catalog::importCollection(const std::string& path, co
         RETURN_IF_ERROR(checkImported(collection));
         return mayUse(collection.name);
     };
-    request.acceptShape = [](const store::Shape& shape) { return checkImported(shape); };
+    request.acceptShape = [most = options_.maxPoints](const store::Shape& shape) {
+        return checkImported(shape, most);
+    };
     // Before its jobs are queued: a worker's result must find its collection in the index.
     request.beforeVisible = [&](const store::Collection& collection) {
         prepared = collection.id;
         return index_.prepare(collection, context);
     };
-    request.maxQueuedJobs = options_.maxQueuedJobs;
-    request.maxQueuedBytes = options_.maxQueuedBytes;
     const auto imported = store_->importCollection(path, request, context);
     if (!imported) {
         if (prepared) index_.remove(*prepared);

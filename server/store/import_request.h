@@ -1,7 +1,6 @@
 // What Store::importCollection is asked to do.
 #pragma once
 
-#include <cstdint>
 #include <functional>
 #include <string>
 
@@ -22,8 +21,6 @@ struct ImportRequest {
     /// Called once all is stored, before the collection is seen and its jobs are queued. Until this returns,
     /// nobody else changes the collection; its id and those of its shapes are final.
     std::function<Result<void>(const Collection&)> beforeVisible{};
-    std::uint64_t maxQueuedJobs = 0;   ///< as PutRequest, with all its pending shapes in the queue
-    std::uint64_t maxQueuedBytes = 0;  ///< as PutRequest
 };
 
 }  // namespace shapedb::store

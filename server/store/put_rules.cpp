@@ -44,20 +44,18 @@ Result<void> requireVersion(const std::string& key, std::int64_t actual,
                                                  ", not the expected version " + std::to_string(*expected));
 }
 
-Result<void> requireRoom(const QueueDepth& more, std::uint64_t maxQueuedJobs, std::uint64_t maxQueuedBytes,
+Result<void> requireRoom(std::uint64_t bytes, std::uint64_t maxQueuedJobs, std::uint64_t maxQueuedBytes,
                          const QueueDepth& others) {
-    if (maxQueuedJobs > 0 && more.jobs > 0 && others.jobs + more.jobs > maxQueuedJobs) {
-        return fail(ErrorCode::kQueueFull,
-                    more.jobs == 1 ? "the ingest queue is full (" + std::to_string(others.jobs) + " of " +
-                                         std::to_string(maxQueuedJobs) + " scans); retry later"
-                                   : "the ingest queue has no room for " + std::to_string(more.jobs) +
-                                         " more scans (" + std::to_string(others.jobs) + " of " +
-                                         std::to_string(maxQueuedJobs) + " taken); retry later");
+    if (maxQueuedJobs > 0 && others.jobs >= maxQueuedJobs) {
+        return fail(ErrorCode::kQueueFull, "the ingest queue is full (" + std::to_string(others.jobs) +
+                                               " of " + std::to_string(maxQueuedJobs) +
+                                               " scans, ingest.max_queued_jobs); retry later");
     }
-    if (maxQueuedBytes > 0 && more.jobs > 0 && others.bytes + more.bytes > maxQueuedBytes) {
-        return fail(ErrorCode::kQueueFull, "the ingest queue has no room for " + std::to_string(more.bytes) +
+    if (maxQueuedBytes > 0 && others.bytes + bytes > maxQueuedBytes) {
+        return fail(ErrorCode::kQueueFull, "the ingest queue has no room for " + std::to_string(bytes) +
                                                " more bytes (" + std::to_string(others.bytes) + " of " +
-                                               std::to_string(maxQueuedBytes) + " bytes taken); retry later");
+                                               std::to_string(maxQueuedBytes) +
+                                               " bytes taken, ingest.max_queued_bytes); retry later");
     }
     return {};
 }

@@ -22,15 +22,10 @@ namespace shapedb::store {
 [[nodiscard]] Result<void> requireVersion(const std::string& key, std::int64_t actual,
                                           std::optional<std::int64_t> expected);
 
-/// Whether `more` jobs fit into the queue beside `others`: all jobs but those that they replace. Bounds as in
-/// PutRequest. Errors: kQueueFull.
-[[nodiscard]] Result<void> requireRoom(const QueueDepth& more, std::uint64_t maxQueuedJobs,
+/// Whether the job of a scan of `bytes` fits into the queue beside `others`: all jobs but the one that it
+/// replaces. Bounds as in PutRequest. Errors: kQueueFull.
+[[nodiscard]] Result<void> requireRoom(std::uint64_t bytes, std::uint64_t maxQueuedJobs,
                                        std::uint64_t maxQueuedBytes, const QueueDepth& others);
-/// The same for the job of one scan of `bytes`.
-[[nodiscard]] inline Result<void> requireRoom(std::uint64_t bytes, std::uint64_t maxQueuedJobs,
-                                              std::uint64_t maxQueuedBytes, const QueueDepth& others) {
-    return requireRoom(QueueDepth{1, bytes}, maxQueuedJobs, maxQueuedBytes, others);
-}
 
 /// kNotFound for a key.
 [[nodiscard]] Error noSuchShape(const std::string& collectionName, const std::string& key);

@@ -406,10 +406,11 @@ class Store {
     /// Adds the one collection of such a file (or of a backup that holds no other) beside those that are
     /// there. Prepares and checks the file as `restore` does. The collection and its shapes get new ids,
     /// which are in the same order; generation, versions and times stay. Pending shapes are queued as if
-    /// untried. Nothing of it is seen before it is complete, no write waits for long, and an error leaves
-    /// nothing. Reports as `restore`, with "import" (shapes) in place of "restore". Errors: those of
-    /// `restore`, kMalformedFile also for more collections or none; kAlreadyExists (the name is taken),
-    /// kQueueFull, kRejected (another import is running), those of the functions in `request`.
+    /// untried, however long the queue becomes. Nothing of it is seen before it is complete, no write waits
+    /// for long, and an error leaves nothing. Reports as `restore`, with "import" (shapes) in place of
+    /// "restore". Errors: those of `restore`, kMalformedFile also for more collections or none;
+    /// kAlreadyExists (the name is taken), kRejected (another import is running), those of the functions in
+    /// `request`.
     [[nodiscard]] virtual Result<Collection> importCollection(const std::string& path,
                                                               const ImportRequest& request,
                                                               const RunContext& context) = 0;

@@ -102,12 +102,6 @@ void insertCopy(Connection& target, std::int64_t collectionId, const CopiedShape
     }
 }
 
-QueueDepth pendingOf(Connection& connection, std::int64_t collectionId) {
-    Query query(connection, sql::kPendingOf, collectionId);
-    if (!query.step()) return {};
-    return {static_cast<std::uint64_t>(query.integer(0)), static_cast<std::uint64_t>(query.integer(1))};
-}
-
 void queuePending(Connection& connection, std::int64_t collectionId, TimestampMs now) {
     Query(connection, sql::kQueuePending, collectionId, now).run();
 }

@@ -30,9 +30,7 @@ struct CopiedShape {
 std::int64_t insertCollection(Connection& target, const Collection& collection, const std::string& name);
 void insertCopy(Connection& target, std::int64_t collectionId, const CopiedShape& copied);
 
-/// Shapes of the collection that are pending.
-[[nodiscard]] QueueDepth pendingOf(Connection& connection, std::int64_t collectionId);
-/// Queues a job for each of them, which must have none; in the caller's transaction.
+/// Queues a job for each pending shape of the collection, which must have none; in the caller's transaction.
 void queuePending(Connection& connection, std::int64_t collectionId, TimestampMs now);
 
 /// The first shapes of the collection: as many as one transaction should delete.

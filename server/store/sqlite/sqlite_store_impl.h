@@ -171,9 +171,9 @@ class SqliteStore final : public Store {
     bool jobIsCurrent(Connection& connection, const Job& job, std::int64_t generation);
 
     /// The first part of an import: the collection, with no shapes and a name that nobody else uses.
-    Collection beginImport(const Collection& wanted, const ImportRequest& request, const QueueDepth& pending);
+    Collection beginImport(const Collection& wanted);
     /// The last part of an import: its name and its jobs.
-    Collection finishImport(const Collection& imported, const ImportRequest& request);
+    Collection finishImport(const Collection& imported);
     void importShapes(Connection& file, const Collection& from, const Collection& to,
                       const ImportRequest& request, const RunContext& context);
     /// Removes what an import has stored, some shapes at a time, if it was not completed.

@@ -1,6 +1,5 @@
 // Export and import of one collection.
 #include "core/base/return_if_error.h"
-#include "server/store/put_rules.h"
 #include "server/store/sqlite/collection_copy.h"
 #include "server/store/sqlite/database_file.h"
 #include "server/store/sqlite/rows.h"
@@ -112,23 +111,21 @@ Result<Collection> SqliteStore::importCollection(const std::string& path, const 
         if (!request.name.empty()) wanted.name = request.name;
         if (request.accept) orRaise(request.accept(wanted));
         orRaise(dropImport());  // what the last one could not remove
-        const Collection hidden = beginImport(wanted, request, pendingOf(*file, from.id));
+        const Collection hidden = beginImport(wanted);
         importShapes(*file, from, hidden, request, context);
         if (request.beforeVisible) orRaise(request.beforeVisible(hidden));
-        return finishImport(hidden, request);
+        return finishImport(hidden);
     });
     // The disk may be full: then it goes with the next import, or at the next start.
     if (!imported) static_cast<void>(dropImport());
     return imported;
 }
 
-Collection SqliteStore::beginImport(const Collection& wanted, const ImportRequest& request,
-                                    const QueueDepth& pending) {
+Collection SqliteStore::beginImport(const Collection& wanted) {
     orRaise(reserve_.hold());
     return orRaise(write("import the collection", [&](Connection& connection) {
         // Asked again at the end; to be refused here saves the time.
         requireFreeName(connection, wanted.name);
-        orRaise(requireRoom(pending, request.maxQueuedJobs, request.maxQueuedBytes, readTally(connection)));
         Collection hidden = wanted;
         hidden.id = insertCollection(connection, wanted, kImporting);
         return hidden;
@@ -158,12 +155,11 @@ void SqliteStore::importShapes(Connection& file, const Collection& from, const C
     }
 }
 
-Collection SqliteStore::finishImport(const Collection& imported, const ImportRequest& request) {
+Collection SqliteStore::finishImport(const Collection& imported) {
     return orRaise(write("import the collection", [&](Connection& connection) {
         requireHidden(connection, imported);
         requireFreeName(connection, imported.name);
-        orRaise(requireRoom(pendingOf(connection, imported.id), request.maxQueuedJobs, request.maxQueuedBytes,
-                            readTally(connection)));
+        // However long the queue is: the bounds hold back uploads, whose points are not stored yet.
         Query(connection, sql::kRenameCollection, imported.id, imported.name).run();
         queuePending(connection, imported.id, now());
         return requireCollection(connection, imported.id);

@@ -23,7 +23,8 @@ class CatalogTransferTest : public ::testing::Test {
             return std::nullopt;
         };
         CatalogOptions options;
-        options.maxQueuedJobs = 100;
+        options.maxQueuedJobs = 1;
+        options.maxPoints = taggedPoints(5.0f).size() / 3;
         catalog = std::make_unique<Catalog>(std::move(owned), quickDescribe,
                                             std::make_shared<RecordingLogger>(), options);
         EXPECT_TRUE(catalog->start());
@@ -104,6 +105,42 @@ TEST_F(CatalogTransferTest, RefusesWhatNoClientCouldHaveMade) {
 }
 
 TEST_F(CatalogTransferTest, AFailureAtTheEndLeavesNothingInTheIndex) {
+TEST_F(CatalogTransferTest, TakesMorePendingShapesThanTheQueueTakesUploads) {
+    const auto made = store->createCollection("made", "", parameters).value();
+    for (const char* key : {"a", "b", "c"}) {
+        store::PutRequest put(store::VerifiedScan::verify(taggedPoints(5.0f)).value());
+        put.collectionId = made.id;
+        put.key = key;
+        ASSERT_TRUE(store->putShape(put));
+    }
+    ASSERT_TRUE(store->exportCollection(made.id, "three", {}));
+    ASSERT_TRUE(store->deleteCollection(made.id));
+    const auto imported = bring("three", "copy");
+    ASSERT_TRUE(imported) << imported.error().message;
+    EXPECT_EQ(catalog->countShapes(**imported)->all, 3u);
+}
+
+TEST_F(CatalogTransferTest, RefusesAShapeWithMorePointsThanTheServerTakes) {
+    const auto made = store->createCollection("made", "", parameters).value();
+    std::vector<float> points = taggedPoints(5.0f);
+    points.insert(points.end(), {7.0f, 8.0f, 9.0f});
+    store::PutRequest put(store::VerifiedScan::verify(points).value());
+    put.collectionId = made.id;
+    put.key = "large";
+    ASSERT_TRUE(store->putShape(put));
+    ASSERT_TRUE(store->exportCollection(made.id, "export", {}));
+    ASSERT_TRUE(store->deleteCollection(made.id));
+    const auto refused = bring("export", "copy");
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::kPointLimitExceeded);
+    for (const std::string& word :
+         {std::string("'large'"), std::to_string(points.size() / 3), std::to_string(points.size() / 3 - 1),
+          std::string("limits.max_points")}) {
+        EXPECT_NE(refused.error().message.find(word), std::string::npos) << refused.error().message;
+    }
+    expectOnlyDefault();
+}
+
     for (const char* function : {"loadIndex", "finishImport"}) {
         const std::string file = fileOf(parameters);
         failing = function;

@@ -167,11 +167,12 @@ TEST_F(PutRules, TheQueueHoldsAtMostItsLimits) {
     request.maxQueuedJobs = 3;
     EXPECT_TRUE(room({2, 1000}));
     expectError(room({3, 0}).error(), ErrorCode::kQueueFull,
-                "the ingest queue is full (3 of 3 scans); retry later");
+                "the ingest queue is full (3 of 3 scans, ingest.max_queued_jobs); retry later");
     request.maxQueuedBytes = 100;
     EXPECT_TRUE(room({2, 52}));
     expectError(room({2, 53}).error(), ErrorCode::kQueueFull,
-                "the ingest queue has no room for 48 more bytes (53 of 100 bytes taken); retry later");
+                "the ingest queue has no room for 48 more bytes (53 of 100 bytes taken, "
+                "ingest.max_queued_bytes); retry later");
 }
 
 }  // namespace

@@ -300,9 +300,6 @@ TEST_F(MemoryStoreTest, ImportsAsSqliteDoes) {
         ImportRequest import;
         EXPECT_FAILS(store.importCollection(file, import, {}), ErrorCode::kAlreadyExists);
         import.name = "copy";
-        import.maxQueuedJobs = 1;
-        EXPECT_FAILS(store.importCollection(file, import, {}), ErrorCode::kQueueFull);
-        import.maxQueuedJobs = 2;
         side->collection = store.importCollection(file, import, {})->id;
         EXPECT_GT(side->collection, original);
         EXPECT_FAILS(store.importCollection("unknown", import, {}), ErrorCode::kFileNotReadable);

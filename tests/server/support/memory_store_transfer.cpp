@@ -53,7 +53,6 @@ Result<Collection> MemoryStore::importCollection(const std::string& path, const 
     for (const auto& [id, shape] : from.shapes) {
         if (request.acceptShape) RETURN_IF_ERROR(request.acceptShape(shape));
     }
-    QueueDepth pending;
     const auto begun = guarded("importCollection", [&]() -> Result<void> {
         if (isTaken(wanted.name)) return fail(ErrorCode::kAlreadyExists, "the name is taken");
         wanted.id = content_.nextId++;
@@ -72,9 +71,6 @@ Result<Collection> MemoryStore::importCollection(const std::string& path, const 
             }
             if (const auto row = from.surfaces.find(id); row != from.surfaces.end())
                 content_.surfaces[copy.id] = row->second;
-            if (copy.state != ShapeState::kPending) continue;
-            ++pending.jobs;
-            pending.bytes += content_.points[copy.id].size() * sizeof(float);
         }
         return {};
     });
@@ -83,8 +79,6 @@ Result<Collection> MemoryStore::importCollection(const std::string& path, const 
     if (done) {
         done = guarded("finishImport", [&]() -> Result<void> {
             if (isTaken(wanted.name)) return fail(ErrorCode::kAlreadyExists, "the name is taken");
-            RETURN_IF_ERROR(
-                requireRoom(pending, request.maxQueuedJobs, request.maxQueuedBytes, queueWithout(0)));
             content_.collections[wanted.id].name = wanted.name;
             for (const auto& [id, shape] : content_.shapes) {
                 if (shape.collectionId == wanted.id && shape.state == ShapeState::kPending) queueJob(shape);
