@@ -380,6 +380,9 @@ ServerInfo fromWire(const v1::ServerInfoResponse& from) {
     to.limits = {from.limits().max_points(),       from.limits().max_k(),
                  from.limits().max_batch(),        from.limits().max_queued_jobs(),
                  from.limits().max_queued_bytes(), from.limits().max_chunk_bytes()};
+    for (const v1::Limit& limit : from.limit_table()) {
+        to.limitTable.push_back({limit.name(), limit.value(), limit.unit(), limit.bounds(), limit.refusal()});
+    }
     to.ingestThreads = from.ingest_threads();
     return to;
 }

@@ -339,11 +339,21 @@ struct Limits {
     std::uint32_t maxChunkBytes = 0;
 };
 
+/// One row of the server's table of limits (docs/limits.md).
+struct Limit {
+    std::string name;         ///< with a dot, the setting that changes it
+    std::uint64_t value = 0;  ///< the most that is allowed; the least where the name says min
+    std::string unit;
+    std::string bounds;   ///< for people: what it bounds
+    std::string refusal;  ///< name of the error beyond it; empty: none
+};
+
 struct ServerInfo {
     std::string version;
-    std::int32_t schemaVersion = 0;
+    std::int32_t schemaVersion = 0;  ///< 0: its database is damaged and cannot tell
     Timestamp started;
     Limits limits;
+    std::vector<Limit> limitTable;  ///< all of them; empty from a server that is older
     std::uint32_t ingestThreads = 0;
 };
 

@@ -160,6 +160,16 @@ CommandResult runInfo(Session& session) {
     const auto info = client->serverInfo(session.context());
     RETURN_IF_ERROR(info);
     const client::Limits& limits = info->limits;
+    json all = json::array();
+    Table limitTable({{"limit"}, {"value", Table::Align::kRight}, {"unit"}, {"beyond it"}, {"bounds"}});
+    for (const client::Limit& one : info->limitTable) {
+        all.push_back({{"name", one.name},
+                       {"value", one.value},
+                       {"unit", one.unit},
+                       {"bounds", one.bounds},
+                       {"refusal", one.refusal}});
+        limitTable.add({one.name, formatCount(one.value), one.unit, one.refusal, one.bounds});
+    }
     session.console().document({{"server", client->address()},
                                 {"version", info->version},
                                 {"schema_version", info->schemaVersion},
@@ -170,7 +180,8 @@ CommandResult runInfo(Session& session) {
                                   {"max_batch", limits.maxBatch},
                                   {"max_queued_jobs", limits.maxQueuedJobs},
                                   {"max_queued_bytes", limits.maxQueuedBytes},
-                                  {"max_chunk_bytes", limits.maxChunkBytes}}}});
+                                  {"max_chunk_bytes", limits.maxChunkBytes}}},
+                                {"limit_table", all}});
     Table table({{""}, {""}});
     table.add({"server", client->address()});
     table.add({"version", info->version + ", database schema " + std::to_string(info->schemaVersion)});
@@ -179,7 +190,7 @@ CommandResult runInfo(Session& session) {
     table.add({"hits per search", "up to " + formatCount(limits.maxK)});
     table.add({"ingest queue", "up to " + formatCount(limits.maxQueuedJobs, "scan", "scans") + " and " +
                                    formatBytes(limits.maxQueuedBytes)});
-    session.console().text(table.render());
+    session.console().text(table.render() + "\n" + limitTable.render());
     return kOk;
 }
 

@@ -21,7 +21,7 @@ Result<void> CallGate::enter(security::CallClass kind) {
     }
     if (running_.ordinary >= limits_.ordinary) return full("calls", limits_.ordinary);
     if (kind == security::CallClass::kUpload) {
-        if (running_.uploads >= limits_.uploads) return full("uploads", limits_.uploads);
+        if (running_.uploads >= limits_.uploads) return full("uploads (limits.max_uploads)", limits_.uploads);
         ++running_.uploads;
     }
     ++running_.ordinary;
@@ -101,7 +101,7 @@ Result<void> Budget::Share::take(std::uint64_t amount) {
 
 Admission::Admission(std::uint64_t uploadBytes, int uploadCalls)
     : calls({kMaxOrdinaryCalls, uploadCalls, kMaxAdminCalls}),
-      uploads(uploadBytes, "bytes of points that uploads in progress may hold"),
+      uploads(uploadBytes, "bytes of points that uploads in progress may hold (limits.max_upload_bytes)"),
       followers(kMaxFollowers, "calls that may wait for shapes and rebuilds"),
       answers(kMaxAnswersBytes, "bytes that answers to searches may take together"),
       copies(kMaxCopies, "places for a backup or restore in transit") {}

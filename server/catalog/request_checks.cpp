@@ -111,12 +111,13 @@ Result<void> checkMetadata(const Metadata& metadata) {
 
 Result<void> checkK(std::uint32_t k, std::uint32_t maxK) {
     if (k >= 1 && k <= maxK) return {};
-    return bad("k: " + std::to_string(k) + " is outside 1 to " + std::to_string(maxK));
+    return bad("k: " + std::to_string(k) + " is outside 1 to " + std::to_string(maxK) + " (limits.max_k)");
 }
 
 Result<void> checkBatchSize(std::uint64_t queries, std::uint32_t maxBatch) {
     if (queries >= 1 && queries <= maxBatch) return {};
-    return bad("queries: " + std::to_string(queries) + " is outside 1 to " + std::to_string(maxBatch));
+    return bad("queries: " + std::to_string(queries) + " is outside 1 to " + std::to_string(maxBatch) +
+               " (limits.max_batch)");
 }
 
 Result<void> checkVerifyOptions(const VerifyOptions& options) {
@@ -143,7 +144,7 @@ Result<void> checkGrouping(const std::string& groupBy, std::uint32_t perGroup, s
     }
     if (std::uint64_t{k} * perGroup > maxK) {
         return bad("per_group: " + std::to_string(k) + " groups of " + std::to_string(perGroup) +
-                   " are more than " + std::to_string(maxK) + " hits");
+                   " are more than " + std::to_string(maxK) + " hits (limits.max_k)");
     }
     return {};
 }

@@ -16,9 +16,9 @@ Result<void> ScanUpload::begin(std::uint64_t announced, const std::string& sha25
                                                   std::to_string(kMinPoints));
     }
     if (announced > maxPoints_) {
-        return fail(ErrorCode::kPointLimitExceeded, "point_count: " + std::to_string(announced) +
-                                                        " points, this server takes at most " +
-                                                        std::to_string(maxPoints_) + ": send fewer points");
+        return fail(ErrorCode::kPointLimitExceeded,
+                    "point_count: " + std::to_string(announced) + " points, this server takes at most " +
+                        std::to_string(maxPoints_) + " (limits.max_points): send fewer points");
     }
     if (!sha256.empty()) {
         store::Checksum& expected = expected_.emplace();

@@ -8,6 +8,7 @@
 #include "server/config/load.h"
 #include "server/rpc/call.h"
 #include "server/rpc/convert.h"
+#include "server/rpc/limit_table.h"
 
 namespace shapedb::rpc {
 namespace {
@@ -142,6 +143,14 @@ grpc::Status AdminServiceHandler::ServerInfo(grpc::ServerContext* context, const
         limits->set_max_queued_jobs(services_.config.ingest.maxQueuedJobs);
         limits->set_max_queued_bytes(services_.config.ingest.maxQueuedBytes);
         limits->set_max_chunk_bytes(static_cast<std::uint32_t>(catalog::kMaxChunkBytes));
+        for (const LimitRow& row : limitTable(services_.config)) {
+            v1::Limit* limit = response->add_limit_table();
+            limit->set_name(row.name);
+            limit->set_value(row.value);
+            limit->set_unit(row.unit);
+            limit->set_bounds(row.bounds);
+            limit->set_refusal(row.refusal);
+        }
         response->set_ingest_threads(
             static_cast<std::uint32_t>(config::threadsOrProcessors(services_.config.ingest.threads)));
         return {};

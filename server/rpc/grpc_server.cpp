@@ -34,9 +34,6 @@ namespace {
 /// For calls that are cancelled: long enough to learn of it.
 constexpr std::chrono::milliseconds kToLearnOfCancellation{200};
 
-/// Administrators and health checks of this machine.
-constexpr std::size_t kMaxLocalConnections = 64;
-
 /// For servers that strangers reach: reflection asks for no key, and its streams hold threads for as long as
 /// they like. gRPC adds it to every server of a program that is linked with it.
 class WithoutReflection final : public grpc::ServerBuilderOption {

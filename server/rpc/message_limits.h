@@ -26,5 +26,7 @@ constexpr std::chrono::milliseconds kShortestClientPing{10'000};
 /// A connection that says nothing intelligible within this time is closed.
 constexpr std::chrono::milliseconds kHandshakeTime{10'000};
 constexpr int kMaxStreamsOfConnection = 100;
+/// At the Unix socket: administrators and health checks of this machine.
+constexpr std::size_t kMaxLocalConnections = 64;
 
 }  // namespace shapedb::rpc

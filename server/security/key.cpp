@@ -16,8 +16,6 @@ namespace {
 constexpr const char* kPrefix = "shapedb_";
 constexpr std::size_t kIdBytes = 8;
 constexpr std::size_t kSecretBytes = 32;
-constexpr std::size_t kMaxNameBytes = 128;
-constexpr std::size_t kMaxCollections = 1'000;
 
 Result<std::string> randomHex(std::size_t bytes) {
     std::array<unsigned char, kSecretBytes> random{};

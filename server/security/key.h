@@ -1,6 +1,7 @@
 // API keys: who a caller is, and what it may do.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -14,6 +15,9 @@ namespace shapedb::security {
 
 /// Milliseconds since 1970 (UTC).
 using UnixMs = std::int64_t;
+
+constexpr std::size_t kMaxNameBytes = 128;      ///< of a key's name
+constexpr std::size_t kMaxCollections = 1'000;  ///< that a key names
 
 /// What the holder of a key may use; 0: without limit.
 struct KeyLimits {
@@ -55,7 +59,7 @@ struct KeyUsage {
 /// Errors: kInvalidArgument.
 [[nodiscard]] Result<Role> roleFromName(const std::string& name);
 
-/// Errors: kInvalidArgument (the name is not 1 to 128 bytes of safe UTF-8; more than 1,000 collections, or
+/// Errors: kInvalidArgument (the name is not 1 to kMaxNameBytes of safe UTF-8; more than kMaxCollections, or
 /// one with a name that no collection can have; an expiry that is not after `now`).
 [[nodiscard]] Result<void> validate(const KeySpec& spec, UnixMs now);
 

@@ -38,7 +38,8 @@ TEST(CallGate, NoKindOfCallShutsTheOthersOut) {
     const auto third = gate.enter(CallClass::kUpload);
     ASSERT_FALSE(third);
     EXPECT_EQ(third.error().code, ErrorCode::kQueueFull);
-    EXPECT_EQ(third.error().message, "all of the 2 places for uploads are taken: try again later");
+    EXPECT_EQ(third.error().message,
+              "all of the 2 places for uploads (limits.max_uploads) are taken: try again later");
 
     ASSERT_TRUE(gate.enter(CallClass::kOrdinary));
     ASSERT_TRUE(gate.enter(CallClass::kOrdinary));
