@@ -16,8 +16,9 @@ namespace {
 const prometheus::Histogram::BucketBoundaries kCallSeconds = {0.001, 0.003, 0.01, 0.03, 0.1,  0.3,
                                                               1.0,   3.0,   10.0, 30.0, 100.0};
 
-/// Each may be held by a client that says nothing.
-constexpr std::size_t kHttpThreads = 8;
+/// Each may be held by a client that says nothing, or reads nothing, but not for long.
+constexpr const char* kHttpThreads = "16";
+constexpr const char* kHttpTimeoutMs = "2000";
 
 prometheus::ClientMetric metricOf(const Sample& sample) {
     prometheus::ClientMetric metric;
@@ -94,7 +95,8 @@ void Metrics::setSampler(Sampler sampler) {
 
 Result<int> Metrics::serve(const std::string& address) {
     try {
-        parts_->exposer = std::make_unique<prometheus::Exposer>(address, kHttpThreads);
+        parts_->exposer = std::make_unique<prometheus::Exposer>(std::vector<std::string>{
+            "listening_ports", address, "num_threads", kHttpThreads, "request_timeout_ms", kHttpTimeoutMs});
         parts_->exposer->RegisterCollectable(parts_->registry);
         if (parts_->state) parts_->exposer->RegisterCollectable(parts_->state);
         const auto ports = parts_->exposer->GetListeningPorts();

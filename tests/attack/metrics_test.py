@@ -1,9 +1,12 @@
 """The numbers for Prometheus, as Prometheus reads them; and that the dashboard, the alert rules and the documentation
 speak of the ones that exist."""
 
+import contextlib
 import json
 import os
 import re
+import socket
+import time
 import unittest
 import urllib.request
 
@@ -102,6 +105,33 @@ class Numbers(unittest.TestCase):
             with self.assertRaises(RuntimeError) as error:
                 Server("--metrics-listen", f"127.0.0.1:{port}")
             self.assertIn("metrics cannot be served", str(error.exception))
+
+
+class SlowReaders(unittest.TestCase):
+    def test_cannot_hold_the_listener(self):
+        with serve() as server:
+            port = int(re.search(r"metrics are served .*port=(\d+)", server.log())[1])
+            halves = [socket.create_connection(("127.0.0.1", port)) for _ in range(32)]
+            for i, half in enumerate(halves):  # mute ones, and some that never end their request
+                if i % 2:
+                    half.sendall(b"GET /metrics HTTP/1.1\r\nHost: a\r\nX-Long: ")
+            began = time.monotonic()
+            self.assertTrue(eventually(lambda: answers(server), 30))
+            self.assertLess(time.monotonic() - began, 20)
+            for half in halves:
+                half.settimeout(30)
+                with contextlib.suppress(ConnectionResetError):
+                    while half.recv(1_000):
+                        pass
+                half.close()
+
+
+def answers(server):
+    try:
+        scrape(server)
+        return True
+    except OSError:
+        return False
 
 
 class Names(unittest.TestCase):
