@@ -1,9 +1,14 @@
 #include "server/telemetry/audit_log.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <optional>
+#include <ratio>
+#include <string_view>
 #include <utility>
+#include <variant>
 
+#include "common/safe_text.h"
 #include "core/base/return_if_error.h"
 
 namespace shapedb::telemetry {
@@ -45,6 +50,27 @@ std::string refusalsBeside(const std::string& path) {
     return (whole.parent_path() / (whole.stem().string() + ".refused" + whole.extension().string())).string();
 }
 
+constexpr std::size_t kMostFieldBytes = 200;
+constexpr std::size_t kMostSummaryBytes = 1'000;
+constexpr std::size_t kToldSources = 12;
+
+/// The text of a field; empty if there is none.
+std::string textOf(const std::vector<Field>& fields, std::string_view name) {
+    for (const Field& field : fields) {
+        const auto* text = std::get_if<std::string>(&field.value);
+        if (field.name == name && text != nullptr) return *text;
+    }
+    return {};
+}
+
+/// Address without port, and the id of the key.
+std::string sourceOf(const std::vector<Field>& call) {
+    std::string source = textOf(call, "peer");
+    source.erase(std::min(source.rfind(':'), source.size()));
+    const std::string key = textOf(call, "caller");
+    return key.empty() ? source : source + " key " + key;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<AuditLog>> AuditLog::open(const std::string& path, const LoggerPtr& log) {
@@ -55,25 +81,70 @@ Result<std::unique_ptr<AuditLog>> AuditLog::open(const std::string& path, const 
     return std::make_unique<AuditLog>(std::move(*administration), std::move(*refusals));
 }
 
+AuditLog::AuditLog(LoggerPtr administration, LoggerPtr refusals)
+    : administration_(std::move(administration)),
+      refusals_(std::move(refusals)),
+      refilled_(std::chrono::steady_clock::now()),
+      everyMinute_(std::make_unique<RepeatingThread>(std::chrono::minutes(1), [this] { summarize(); })) {}
+
+AuditLog::~AuditLog() {
+    everyMinute_.reset();
+    summarize();
+}
+
 void AuditLog::recordAdministration(const std::vector<Field>& call) {
     administration_->info("administration", call);
+}
+
+/// Under the lock.
+bool AuditLog::mayWrite() {
+    const auto now = std::chrono::steady_clock::now();
+    const std::chrono::duration<double, std::ratio<60>> minutes = now - refilled_;
+    refilled_ = now;
+    lines_ = std::min<double>(kRefusalBurst, lines_ + kRefusalsPerMinute * minutes.count());
+    if (lines_ < 1.0) return false;
+    lines_ -= 1.0;
+    return true;
 }
 
 void AuditLog::recordRefusal(std::vector<Field> call) {
     {
         const std::lock_guard<std::mutex> lock(mutex_);
-        const auto now = std::chrono::steady_clock::now();
-        if (now - second_ >= std::chrono::seconds(1)) {
-            second_ = now;
-            inSecond_ = 0;
-        }
-        if (++inSecond_ > kRefusalsPerSecond) {
+        if (!mayWrite()) {
             ++leftOut_;
+            const std::string source = sourceOf(call);
+            const bool counted = ofSources_.size() < kCountedSources || ofSources_.count(source) > 0;
+            if (counted) ++ofSources_[source];
             return;
         }
-        if (leftOut_ > 0) call.push_back({"left_out", std::exchange(leftOut_, 0)});
+    }
+    for (Field& field : call) {
+        if (auto* text = std::get_if<std::string>(&field.value)) *text = cutText(*text, kMostFieldBytes);
     }
     refusals_->warn("refused", call);
+}
+
+void AuditLog::summarize() {
+    std::uint64_t leftOut = 0;
+    std::map<std::string, std::uint64_t> ofSources;
+    {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        leftOut = std::exchange(leftOut_, 0);
+        ofSources = std::exchange(ofSources_, {});
+    }
+    if (leftOut == 0) return;
+    std::vector<std::pair<std::uint64_t, std::string>> most;
+    for (const auto& [source, count] : ofSources) most.emplace_back(count, source);
+    std::sort(most.rbegin(), most.rend());
+    std::string told;
+    std::uint64_t others = leftOut;
+    for (std::size_t i = 0; i < std::min(most.size(), kToldSources); ++i) {
+        told += (i == 0 ? "" : "; ") + most[i].second + ": " + std::to_string(most[i].first);
+        others -= most[i].first;
+    }
+    if (others > 0) told += "; others: " + std::to_string(others);
+    refusals_->warn("refusals that were only counted",
+                    {{"left_out", leftOut}, {"of", cutText(told, kMostSummaryBytes)}});
 }
 
 }  // namespace shapedb::telemetry
