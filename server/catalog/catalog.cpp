@@ -215,20 +215,22 @@ Result<std::vector<std::string>> Catalog::check(const RunContext& context) {
     return problems;
 }
 
-Result<void> Catalog::restore(const std::string& path, const RunContext& context) {
+Result<void> Catalog::restore(const std::string& path, const RunContext& context,
+                              const MayReplace& mayReplace) {
     RETURN_IF_ERROR(restores_.beginRestore());
-    Result<void> restored = restoreExclusively(path, context);
+    Result<void> restored = restoreExclusively(path, context, mayReplace);
     restores_.endRestore();
     if (!restored) return fail(named(restored.error(), path, "the backup"));
     return restored;
 }
 
-Result<void> Catalog::restoreExclusively(const std::string& path, const RunContext& context) {
+Result<void> Catalog::restoreExclusively(const std::string& path, const RunContext& context,
+                                         const MayReplace& mayReplace) {
     const auto exclusive = restores_.exclusive();
     rebuilds_.pause();
     workers_.pause();
     bool replaced = false;
-    const Result<void> restored = replaceContent(path, context, replaced);
+    const Result<void> restored = replaceContent(path, context, mayReplace, replaced);
     // Whatever happened: work continues on what the store holds now.
     const auto content = replaced ? ingest::Content::kReplaced : ingest::Content::kSame;
     const auto workers = workers_.resume(content);
@@ -238,8 +240,13 @@ Result<void> Catalog::restoreExclusively(const std::string& path, const RunConte
 }
 
 /// `replaced` tells whether the store holds other content, also after an error.
-Result<void> Catalog::replaceContent(const std::string& path, const RunContext& context, bool& replaced) {
-    Result<void> restored = store_->restore(path, context, [&] { restores_.replacing(); });
+Result<void> Catalog::replaceContent(const std::string& path, const RunContext& context,
+                                     const MayReplace& mayReplace, bool& replaced) {
+    Result<void> restored = store_->restore(path, context, [&]() -> Result<void> {
+        if (mayReplace) RETURN_IF_ERROR(mayReplace());
+        restores_.replacing();
+        return {};
+    });
     replaced = restored.has_value();
     if (!restored) {
         if (restores_.apart() && !lost_) restores_.replaced();

@@ -129,6 +129,9 @@ struct IngestEvent {
 /// Called again and again while a caller waits; an error ends the waiting and is returned.
 using Checkpoint = std::function<Result<void>()>;
 
+/// Asked once a backup has passed all checks, before it replaces anything; an error ends the restore.
+using MayReplace = std::function<Result<void>()>;
+
 /// Thread-safe between `start` and `stop`, which belong to one thread. Errors of the store (store.h)
 /// are possible everywhere and not repeated below. The same goes for kUnavailable: every call that looks up a
 /// collection returns it while a restore replaces the content, and after one whose content could not be
@@ -188,8 +191,9 @@ class Catalog {
     [[nodiscard]] Result<void> admitImport(const std::string& name) const;
     /// Adds the collection of an exported file under `name`, or under its own if that is empty; searches find
     /// it, and workers get its pending shapes, when this returns. `mayUse` is asked for the name before
-    /// anything is stored. Errors, which call the file "the export": kInvalidArgument (name, description,
-    /// metadata), kMalformedFile (also: parameters), those of `mayUse` and of store::Store::importCollection.
+    /// anything is stored, and once more before any of it is seen. Errors, which call the file "the export":
+    /// kInvalidArgument (name, description, metadata), kMalformedFile (also: parameters), those of `mayUse`
+    /// and of store::Store::importCollection.
     using MayUse = std::function<Result<void>(const std::string& name)>;
     [[nodiscard]] Result<index::SnapshotPtr> importCollection(const std::string& path,
                                                               const std::string& name, const MayUse& mayUse,
@@ -321,9 +325,10 @@ class Catalog {
     [[nodiscard]] Result<std::vector<std::string>> check(const RunContext& context);
     /// Replaces everything by the backup `path` while workers and rebuilds pause, and loads the index.
     /// Errors, which call the file "the backup": kRejected (another restore is running), those of
-    /// store::Store::restore; those of CollectionIndex::loadAll, after which the content is replaced but
-    /// cannot be looked up.
-    [[nodiscard]] Result<void> restore(const std::string& path, const RunContext& context);
+    /// store::Store::restore and of `mayReplace`; those of CollectionIndex::loadAll, after which the content
+    /// is replaced but cannot be looked up.
+    [[nodiscard]] Result<void> restore(const std::string& path, const RunContext& context,
+                                       const MayReplace& mayReplace = nullptr);
     /// Calls that wait for a restore to end before they change something.
     [[nodiscard]] int waitingWrites() const { return restores_.waitingWrites(); }
     /// Rises with each restore: ids read under one epoch may mean other shapes under another.
@@ -345,8 +350,10 @@ class Catalog {
             onChange);
     IngestEvent eventOf(const store::Shape& shape, const ingest::ProgressBoard::Status& status) const;
     Result<void> reloadAll(const std::vector<std::string>& names, const OnRebuildProgress& onProgress);
-    Result<void> restoreExclusively(const std::string& path, const RunContext& context);
-    Result<void> replaceContent(const std::string& path, const RunContext& context, bool& replaced);
+    Result<void> restoreExclusively(const std::string& path, const RunContext& context,
+                                    const MayReplace& mayReplace);
+    Result<void> replaceContent(const std::string& path, const RunContext& context,
+                                const MayReplace& mayReplace, bool& replaced);
     /// After a change that the store has acknowledged, which must not be reported as refused.
     void refreshOrLog(const store::Shape& shape, const char* consequence);
     /// The same for shapes of one collection; there may be none.

@@ -68,9 +68,11 @@ Result<index::SnapshotPtr> Catalog::importCollection(const std::string& path, co
         return checkImported(shape, most);
     };
     // Before its jobs are queued: a worker's result must find its collection in the index.
-    request.beforeVisible = [&](const store::Collection& collection) {
+    request.beforeVisible = [&](const store::Collection& collection) -> Result<void> {
         prepared = collection.id;
-        return index_.prepare(collection, context);
+        RETURN_IF_ERROR(index_.prepare(collection, context));
+        // Once more: all this may have taken long.
+        return mayUse(collection.name);
     };
     const auto imported = store_->importCollection(path, request, context);
     if (!imported) {

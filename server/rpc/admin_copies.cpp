@@ -127,12 +127,14 @@ grpc::Status AdminServiceHandler::Restore(grpc::ServerContext* context,
         v1::BackupChunk chunk;
         while (call.read(*reader, &chunk)) {
             RETURN_IF_ERROR(call.run().checkpoint());
+            RETURN_IF_ERROR(call.authorization().requireStill());
             RETURN_IF_ERROR(file->add(chunk));
         }
         if (call.clientGone()) return fail(ErrorCode::kCancelled, "the client cancelled the restore");
         RETURN_IF_ERROR(file->finish(call));
 
-        RETURN_IF_ERROR(services_.catalog.restore(file->path(), call.run()));
+        const auto mayReplace = [&] { return call.authorization().requireStill(); };
+        RETURN_IF_ERROR(services_.catalog.restore(file->path(), call.run(), mayReplace));
         const auto stats = services_.catalog.stats();
         RETURN_IF_ERROR(stats);
         const store::StoreStats& stored = stats->store;
@@ -169,7 +171,7 @@ grpc::Status AdminServiceHandler::ImportCollection(grpc::ServerContext* context,
         RETURN_IF_ERROR(name);
         const auto mayUse = [&](const std::string& wanted) -> Result<void> {
             RETURN_IF_ERROR(call.useCollection(wanted));
-            return {};
+            return call.authorization().requireStill();
         };
         const auto imported = services_.catalog.importCollection(file->path(), *name, mayUse, call.run());
         RETURN_IF_ERROR(imported);

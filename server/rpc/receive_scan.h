@@ -11,12 +11,14 @@
 namespace shapedb::rpc {
 
 /// Calls `take(message)` with each message of an upload, which has a header or a chunk, until the client has
-/// sent all. Errors: those of `take`; kMalformedStream (neither of the two); kCancelled, kDeadlineExceeded.
+/// sent all. Errors: those of `take`; kMalformedStream (neither of the two); kUnauthenticated (the key was
+/// revoked meanwhile); kCancelled, kDeadlineExceeded.
 template <typename Request, typename Reader, typename Take>
 Result<void> receiveMessages(Reader& reader, Call& call, Take&& take) {
     Request request;
     while (call.read(reader, &request)) {
         RETURN_IF_ERROR(call.run().checkpoint());
+        RETURN_IF_ERROR(call.authorization().requireStill());
         if (!request.has_header() && !request.has_chunk()) {
             return fail(ErrorCode::kMalformedStream, "message with neither header nor chunk");
         }
@@ -24,7 +26,7 @@ Result<void> receiveMessages(Reader& reader, Call& call, Take&& take) {
     }
     // `Read` also returns false when the client has gone: then the upload is not complete.
     if (call.clientGone()) return fail(ErrorCode::kCancelled, "the client cancelled the upload");
-    return {};
+    return call.authorization().requireStill();
 }
 
 /// One chunk of an upload. Errors: those of ScanUpload::add.

@@ -80,6 +80,10 @@ Result<void> Authorization::useScan(std::uint64_t bytes) {
     return spend(holder_->takeScan(bytes, policy_.keyring.clock().wall()));
 }
 
+Result<void> Authorization::requireStill() const {
+    return holder_ ? policy_.keyring.requireUsable(*holder_) : Result<void>();
+}
+
 Result<void> Authorization::spend(tl::expected<void, Refusal> taken) {
     if (taken) return {};
     retryAfter_ = taken.error().retryAfter;

@@ -46,6 +46,10 @@ class Authorization {
     /// Before a scan of so many bytes is received. Errors: kRateLimited.
     [[nodiscard]] Result<void> useScan(std::uint64_t bytes);
 
+    /// Again, while a stream lasts and before what it sent is stored: a key that was revoked or has expired
+    /// since `begin` stores nothing any more. Cheap. Errors: kUnauthenticated.
+    [[nodiscard]] Result<void> requireStill() const;
+
     /// At the end of a call: `result`, unless a collection should have been asked for and never was: a
     /// mistake of ours, and nobody's answer.
     [[nodiscard]] Result<void> settle(Result<void> result) const;

@@ -214,12 +214,21 @@ Result<std::shared_ptr<KeyHolder>> Keyring::find(const std::string& presented) {
         return refused("unknown API key: check that it is complete and belongs to this server");
     }
     // Whoever knows the secret may know the rest.
-    if (holder->revoked()) return refused("the API key '" + holder->key().spec.name + "' was revoked");
-    const auto& expires = holder->key().spec.expires;
-    if (expires && clock_.wall() >= *expires) {
-        return refused("the API key '" + holder->key().spec.name + "' has expired");
-    }
+    if (auto usable = usableNow(*holder); !usable) return fail(std::move(usable.error()));
     return holder;
+}
+
+Result<void> Keyring::usableNow(const KeyHolder& holder) const {
+    const std::string named = "the API key '" + holder.key().spec.name + "' ";
+    if (holder.revoked()) return fail(ErrorCode::kUnauthenticated, named + "was revoked");
+    const auto& expires = holder.key().spec.expires;
+    if (expires && clock_.wall() >= *expires) return fail(ErrorCode::kUnauthenticated, named + "has expired");
+    return {};
+}
+
+Result<void> Keyring::requireUsable(const KeyHolder& holder) {
+    lookForChanges();
+    return usableNow(holder);
 }
 
 bool Keyring::hasUsableKey() const {

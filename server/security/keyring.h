@@ -92,6 +92,8 @@ class Keyring {
     /// While the store cannot be read those that are known count. Errors: kUnauthenticated (no such key,
     /// revoked, expired).
     [[nodiscard]] Result<std::shared_ptr<KeyHolder>> find(const std::string& presented);
+    /// Whether who presented this key may still use it. Errors: kUnauthenticated (revoked or expired since).
+    [[nodiscard]] Result<void> requireUsable(const KeyHolder& holder);
     /// Whether there is a key that can be used.
     [[nodiscard]] bool hasUsableKey() const;
     [[nodiscard]] const Clock& clock() const { return clock_; }
@@ -102,6 +104,7 @@ class Keyring {
 
   private:
     Result<void> reload();
+    Result<void> usableNow(const KeyHolder& holder) const;
     void lookForChanges();
     void report(const Result<void>& looked);
     std::shared_ptr<KeyHolder> holderOf(const std::string& id) const;

@@ -388,12 +388,12 @@ class Store {
     /// Collections and shapes keep their ids and generations; jobs come back queued. Jobs and
     /// rebuilds get new ids and no id is ever given out twice, so that results still in flight for
     /// the old content are dropped. The caller reloads whatever it has cached. `replacing`, unless null, is
-    /// called once the file has passed, before any read can see its content; it must not call the store.
-    /// Reports "copy" (bytes), "integrity", "points", "restore" (pages).
-    /// Errors: kFileNotReadable, kMalformedFile (says what is wrong), kSchemaTooNew, kCancelled,
+    /// called once the file has passed, before any read can see its content; an error that it returns ends
+    /// the restore; it must not call the store. Reports "copy" (bytes), "integrity", "points", "restore"
+    /// (pages). Errors: kFileNotReadable, kMalformedFile (says what is wrong), kSchemaTooNew, kCancelled,
     /// kDeadlineExceeded.
     [[nodiscard]] virtual Result<void> restore(const std::string& path, const RunContext& context,
-                                               const std::function<void()>& replacing) = 0;
+                                               const std::function<Result<void>()>& replacing) = 0;
     /// About how many bytes exportCollection writes. Errors: kNotFound.
     [[nodiscard]] virtual Result<std::uint64_t> exportBytes(std::int64_t collectionId) = 0;
     /// Copies one collection, as it is now, to a new file while others read and write: its parameters,

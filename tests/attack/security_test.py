@@ -5,10 +5,12 @@ import glob
 import json
 import os
 import subprocess
+import threading
 import time
 import unittest
 
-from attacker import SecuredServer, Server, admin, align, ball, collections, eventually, grpc, main, reason, search, shapes
+from attacker import (SecuredServer, Server, admin, align, ball, collections, eventually, grpc, main, pack, reason, search,
+                      shapes, types)
 from google.protobuf import timestamp_pb2
 
 READER, WRITER, ADMIN = admin.ROLE_READER, admin.ROLE_WRITER, admin.ROLE_ADMIN
@@ -378,6 +380,73 @@ class Secrets(unittest.TestCase):
                         found = content.read().lower()
                     self.assertNotIn(secret[:16].encode(), found, path)
                     self.assertNotIn(wrong[-20:].encode(), found, path)
+
+    def test_that_are_revoked_meanwhile_store_nothing_any_more(self):
+        def chunks(points):
+            for first in range(0, len(points), 100):
+                yield shapes.AddShapeRequest(chunk=types.PointChunk(xyz=pack(points[first:first + 100])))
+
+        with SecuredServer() as server, server.local() as local:
+            local.add("kept", ball(300))
+            backup = [chunk for chunk in local.admin.Backup(admin.BackupRequest(), timeout=30)]
+
+            def add(begun, revoked):
+                yield shapes.AddShapeRequest(header=shapes.AddShapeHeader(key="late", point_count=1_000))
+                yield from chunks(ball(1_000))
+                begun.set()
+                revoked.wait(30)  # all is sent but the end
+
+            def restore(begun, revoked):
+                yield from backup
+                begun.set()
+                revoked.wait(30)
+
+            for role, messages, call in ((WRITER, add, lambda client: client.shapes.AddShape.future),
+                                         (ADMIN, restore, lambda client: client.admin.Restore.future)):
+                key = server.make(role)
+                begun, revoked = threading.Event(), threading.Event()
+                with server.connect(key=key.secret) as client:
+                    running = call(client)(messages(begun, revoked), timeout=60)
+                    self.assertTrue(begun.wait(30))
+                    local.add("after the backup", ball(200))
+                    local.admin.RevokeKey(admin.RevokeKeyRequest(id=key.key.id), timeout=10)
+                    revoked.set()
+                    error = running.exception()
+                    self.assertEqual(reason(error), "unauthenticated", error)
+                    self.assertIn("was revoked", error.details())
+                self.assertEqual(local.count(), 2, "what is there is as it was")
+
+    def test_a_long_upload_ends_soon_after_its_key(self):
+        with SecuredServer() as server:
+            key = server.make(WRITER)
+            stop = threading.Event()
+
+            def drip():
+                yield shapes.AddShapeRequest(header=shapes.AddShapeHeader(key="slow", point_count=100_000))
+                while not stop.wait(0.1):
+                    yield shapes.AddShapeRequest(chunk=types.PointChunk(xyz=b"\0" * 12_000))
+
+            with server.connect(key=key.secret) as client:
+                running = client.shapes.AddShape.future(drip(), timeout=60)
+                time.sleep(0.5)
+                # By another process: it is noticed within a second.
+                server.key_command("revoke", key.key.id)
+                began = time.monotonic()
+                self.assertEqual(reason(running.exception()), "unauthenticated")
+                self.assertLess(time.monotonic() - began, 8)
+                stop.set()
+
+    def test_a_flood_of_refusals_pushes_nothing_out_of_the_audit_log(self):
+        with SecuredServer() as server:
+            with server.connect() as stranger:
+                calls = [stranger.shapes.CountShapes.future(shapes.CountShapesRequest(), timeout=60)
+                         for _ in range(1_500)]
+                self.assertTrue(all(call.exception() is not None for call in calls))
+            self.assertLess(len(self.lines(server, "audit.refused.log")), 220)
+            server.stop()
+            told = self.lines(server, "audit.refused.log")[-1]
+            self.assertGreater(told["left_out"], 1_200)
+            self.assertIn("127.0.0.1: ", told["of"])
 
     def test_the_audit_log_tells_who_did_what(self):
         with SecuredServer() as server:

@@ -56,7 +56,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     static Target target;
     fuzz::Input input(data, size);
     const std::string path = fuzz::writeFile(".restore", damaged(target.backup, input));
-    const auto restored = target.store->restore(path, {}, [] {});
+    const auto restored = target.store->restore(path, {}, {});
     if (!restored) require(!restored.error().message.empty(), "errors have a message");
     const auto problems = target.store->check({});
     require(static_cast<bool>(problems), "the database can be checked");

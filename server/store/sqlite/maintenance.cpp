@@ -83,7 +83,7 @@ Result<void> SqliteStore::backup(const std::string& path, const RunContext& cont
 }
 
 Result<void> SqliteStore::restore(const std::string& path, const RunContext& context,
-                                  const std::function<void()>& replacing) {
+                                  const std::function<Result<void>()>& replacing) {
     return guarded("restore the backup", [&] {
         const TemporaryDatabase temporary(options_.path + ".restore");
         const auto copy = checkedCopy(path, "restored", temporary.path(), options_, context);
@@ -92,7 +92,7 @@ Result<void> SqliteStore::restore(const std::string& path, const RunContext& con
         SHAPEDB_FAILPOINT("restore.checked");
         const std::int64_t commits = separateIds(*copy, *writer_, mark_.read().value_or(0));
         SHAPEDB_FAILPOINT("restore.separated");
-        if (replacing) replacing();
+        if (replacing) orRaise(replacing());
         copyDatabase(*copy, *writer_, kStepPages, [&](std::uint64_t done, std::uint64_t total) {
             context.report("restore", done, total);
             orRaise(context.checkpoint());

@@ -94,7 +94,7 @@ class SqliteStore final : public Store {
 
     Result<void> backup(const std::string& path, const RunContext& context) override;
     Result<void> restore(const std::string& path, const RunContext& context,
-                         const std::function<void()>& replacing) override;
+                         const std::function<Result<void>()>& replacing) override;
     Result<std::uint64_t> exportBytes(std::int64_t collectionId) override;
     Result<void> exportCollection(std::int64_t collectionId, const std::string& path,
                                   const RunContext& context) override;

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <utility>
 
+#include "core/base/return_if_error.h"
 #include "server/store/put_rules.h"
 #include "server/store/quarantine.h"
 
@@ -329,12 +330,12 @@ Result<void> MemoryStore::backup(const std::string& path, const RunContext& cont
 }
 
 Result<void> MemoryStore::restore(const std::string& path, const RunContext& context,
-                                  const std::function<void()>& replacing) {
+                                  const std::function<Result<void>()>& replacing) {
     return guarded("restore", [&]() -> Result<void> {
         if (const auto go = context.checkpoint(); !go) return go;
         const auto found = backups_.find(path);
         if (found == backups_.end()) return fail(ErrorCode::kFileNotReadable, path + " is missing");
-        if (replacing) replacing();
+        if (replacing) RETURN_IF_ERROR(replacing());
         // New ids continue after both histories, and jobs and rebuilds get new ones.
         const std::int64_t nextId = std::max(content_.nextId, found->second.nextId);
         content_ = found->second;

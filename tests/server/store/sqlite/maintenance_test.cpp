@@ -203,7 +203,11 @@ TEST_F(SqliteMaintenanceTest, CancelledBackupLeavesNothing) {
         } else {
             put(collection_.id, "live", 98);
             bool replacing = false;
-            EXPECT_FAILS(store_->restore(large, context, [&] { replacing = true; }), ErrorCode::kCancelled);
+            const auto told = [&] {
+                replacing = true;
+                return Result<void>();
+            };
+            EXPECT_FAILS(store_->restore(large, context, told), ErrorCode::kCancelled);
             EXPECT_EQ(replacing, stop == "restore") << stop;
             EXPECT_TRUE(store_->getShape(collection_.id, "live")) << stop;
         }
