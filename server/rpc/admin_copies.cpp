@@ -6,7 +6,10 @@
 #include <algorithm>
 #include <optional>
 #include <string>
+#include <utility>
 
+#include "common/backup_manifest.h"
+#include "common/sha256.h"
 #include "core/base/return_if_error.h"
 #include "server/files/free_space.h"
 #include "server/files/temporary_file.h"
@@ -21,17 +24,20 @@ namespace {
 /// The received file, its private copy that is checked, and the log or the rows that take its content.
 constexpr std::uint64_t kCopiesOfReceived = 3;
 
-/// Has `make(path)` write a file of about `bytes`, and sends it. `what` begins messages, as "the backup".
+/// Has `make(path)` write a file of about `bytes`, and sends it, or only what has changed since `since`.
+/// `what` begins messages, as "the backup".
 template <typename Make>
 Result<void> sendCopy(const Services& services, Call& call, grpc::ServerWriter<v1::BackupChunk>& writer,
-                      const char* what, const Result<std::uint64_t>& bytes, Make&& make) {
+                      const char* what, const Result<std::uint64_t>& bytes, Make&& make,
+                      std::optional<BackupManifest> since = std::nullopt) {
     RETURN_IF_ERROR(bytes);
     RETURN_IF_ERROR(files::requireFreeSpace(services.temporaryDirectory, *bytes, what));
     const auto file = files::TemporaryFile::create(services.temporaryDirectory);
     RETURN_IF_ERROR(file);
     RETURN_IF_ERROR(make(file->path()));
-    return sendFile(file->path(), call.run(),
-                    [&](const v1::BackupChunk& chunk) { return call.write(writer, chunk); });
+    const SendChunk send = [&](const v1::BackupChunk& chunk) { return call.write(writer, chunk); };
+    if (!since) return sendFile(file->path(), call.run(), send);
+    return sendIncrement(file->path(), std::move(*since), call.run(), send);
 }
 
 /// Where the chunks of a client go.
@@ -103,15 +109,24 @@ Result<std::string> receiveExport(const Services& services, Call& call, catalog:
 
 }  // namespace
 
-grpc::Status AdminServiceHandler::Backup(grpc::ServerContext* context, const v1::BackupRequest*,
+grpc::Status AdminServiceHandler::Backup(grpc::ServerContext* context, const v1::BackupRequest* request,
                                          grpc::ServerWriter<v1::BackupChunk>* writer) {
     return handle(services_, context, operations::kBackup, [&](Call& call) -> Result<void> {
+        std::optional<BackupManifest> since;
+        if (request->has_since()) {
+            auto manifest = checkedManifest(request->since());
+            RETURN_IF_ERROR(manifest);
+            call.note({"since", toHex(manifest->backup.sha256)});
+            since = std::move(*manifest);
+        }
         catalog::Budget::Share copy(services_.admission.copies);
         RETURN_IF_ERROR(copy.take(1));
         const auto stats = services_.catalog.stats();
         RETURN_IF_ERROR(stats);
-        return sendCopy(services_, call, *writer, "the backup", stats->store.databaseBytes,
-                        [&](const std::string& path) { return services_.catalog.backup(path, call.run()); });
+        return sendCopy(
+            services_, call, *writer, "the backup", stats->store.databaseBytes,
+            [&](const std::string& path) { return services_.catalog.backup(path, call.run()); },
+            std::move(since));
     });
 }
 

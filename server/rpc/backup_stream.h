@@ -1,4 +1,4 @@
-// Sends and receives a database file in chunks.
+// Sends and receives a database file, or what has changed in it, in chunks.
 #pragma once
 
 #include <cstdint>
@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 
+#include "common/backup_manifest.h"
 #include "core/base/error.h"
 #include "core/base/run_context.h"
 #include "server/catalog/backup_upload.h"
@@ -14,10 +15,21 @@
 
 namespace shapedb::rpc {
 
+using SendChunk = std::function<Result<void>(const v1::BackupChunk&)>;
+
 /// Sends a file: its size with the first chunk, its SHA-256 in a last message of its own.
 /// Errors: those of `send`; kFileNotReadable, kCancelled, kDeadlineExceeded.
 [[nodiscard]] Result<void> sendFile(const std::string& path, const RunContext& context,
-                                    const std::function<Result<void>(const v1::BackupChunk&)>& send);
+                                    const SendChunk& send);
+
+/// Sends the increment that leads from `base` to a database file, as sendFile sends a file. Reads the file
+/// twice. Its blocks are as large as those of `base`, or larger if they would be too many. Errors: those of
+/// sendFile.
+[[nodiscard]] Result<void> sendIncrement(const std::string& path, BackupManifest base,
+                                         const RunContext& context, const SendChunk& send);
+
+/// A manifest that a client sent. Errors: kInvalidArgument (a size or a length is wrong).
+[[nodiscard]] Result<BackupManifest> checkedManifest(const v1::BackupManifest& manifest);
 
 /// Writes chunks to a new file as far as catalog::BackupUpload takes them. After an error only destruction.
 class FileReceiver {

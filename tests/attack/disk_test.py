@@ -50,7 +50,10 @@ class Copies(unittest.TestCase):
                 client.add(f"ball {i}", ball(20_000, 1 + i), wait=False)
             self.assertTrue(eventually(lambda: client.admin.Stats(admin.StatsRequest()).shapes_pending == 0, 300))
             clients = [server.connect() for _ in range(8)]
-            streams = [other.admin.Backup(admin.BackupRequest(), timeout=60) for other in clients]
+            # Increments hold a copy as whole backups do.
+            since = admin.BackupManifest(bytes=4096, sha256=bytes(32), block_bytes=4096, block_hashes=bytes(32))
+            requests = [admin.BackupRequest(), admin.BackupRequest(since=since)]
+            streams = [other.admin.Backup(requests[i % 2], timeout=60) for i, other in enumerate(clients)]
             outcomes = []
 
             def first(stream):
