@@ -260,10 +260,22 @@ class Client {
     [[nodiscard]] Result<BackupReport> backupToFile(const std::string& path,
                                                     const RunContext& context = {}) const;
 
+    /// Writes to `path`, as backupToFile, only what has changed since an earlier backup: `since` is its file,
+    /// or that of the last increment, which knows the backup that it leads to; nothing else is read here.
+    /// Errors: those of backupToFile; kAlreadyExists (the file `path`), kFileNotReadable, kMalformedFile
+    /// (`since` is neither of both, or damaged), kRejected (the server is too old).
+    [[nodiscard]] Result<IncrementReport> incrementToFile(const std::string& path, const std::string& since,
+                                                          const RunContext& context = {}) const;
+
     /// Replaces everything on the server with the backup at `path`. Not retried.
     /// Errors: kFileNotReadable.
     [[nodiscard]] Result<RestoreReport> restoreFromFile(const std::string& path,
                                                         const RunContext& context = {}) const;
+
+    /// The same with the backup that a chain leads to, as mergeBackups. Needs no room on the disk here.
+    /// Errors also those of mergeBackups.
+    [[nodiscard]] Result<RestoreReport> restoreFromFiles(const std::vector<std::string>& files,
+                                                         const RunContext& context = {}) const;
 
     /// Writes a consistent copy of one collection to `path`, as backupToFile. Aliases stay behind. Errors:
     /// kNotFound, and those of backupToFile.
@@ -306,5 +318,15 @@ class Client {
 
     std::unique_ptr<Impl> impl_;
 };
+
+/// Makes a full backup at `path` of a chain: the file of a full backup, and each increment after the one it
+/// continues. Needs no server, nor memory for more than the hashes of the blocks that the increments bring.
+/// Written under another name first; never one of the `files`. Reports the stages "read" (the full backup, to
+/// be sure of it) and "merge" in bytes. Errors: kInvalidArgument (no increment, or an increment does not
+/// continue the file before it: the message says what is missing), kMalformedFile (not an increment, or
+/// damaged), kChecksumMismatch (not the full backup that the first increment continues, or damaged),
+/// kFileNotReadable, kFileNotWritable, kCancelled, kDeadlineExceeded.
+[[nodiscard]] Result<BackupReport> mergeBackups(const std::vector<std::string>& files,
+                                                const std::string& path, const RunContext& context = {});
 
 }  // namespace shapedb::client

@@ -1,11 +1,15 @@
 // The part of AdminService that moves files: backup and restore of everything, export and import of one
 // collection.
-#include <algorithm>
-#include <fstream>
+#include <filesystem>
+#include <system_error>
 
-#include "client/api/backup_file.h"
 #include "client/api/call.h"
 #include "client/api/client.h"
+#include "client/backup/backup_chain.h"
+#include "client/backup/backup_file.h"
+#include "client/backup/increment_file.h"
+#include "client/backup/source_file.h"
+#include "common/backup_manifest.h"
 #include "common/sha256.h"
 #include "core/base/return_if_error.h"
 
@@ -17,10 +21,16 @@ constexpr std::size_t kBackupChunkBytes = std::size_t{1} << 20;
 
 std::string asBytes(const Sha256Digest& digest) { return {digest.begin(), digest.end()}; }
 
-/// `what` is the stage of progress and part of messages: "backup" or "export".
+/// What is asked for.
+struct Wanted {
+    const char* name;  ///< the stage of progress and part of messages: "backup"
+    bool increment = false;
+};
+
 template <typename Stream>
-Result<BackupReport> receiveBackup(Stream& stream, BackupFile& file, const char* what,
+Result<BackupReport> receiveBackup(Stream& stream, BackupFile& file, const Wanted& wanted,
                                    const RunContext& context) {
+    const std::string what = wanted.name;
     RETURN_IF_ERROR(file.open());
     BackupReport report;
     Sha256 checksum;
@@ -30,89 +40,108 @@ Result<BackupReport> receiveBackup(Stream& stream, BackupFile& file, const char*
     while (stream.Read(&chunk)) {
         if (chunk.total_bytes() != 0) announced = chunk.total_bytes();
         if (!chunk.sha256().empty()) expected = chunk.sha256();
-        checksum.update(chunk.data().data(), chunk.data().size());
-        RETURN_IF_ERROR(file.write(chunk.data()));
-        report.bytes += chunk.data().size();
-        context.report(what, report.bytes, announced);
+        const std::string& data = chunk.data();
+        if (wanted.increment && report.bytes == 0 && !data.empty() && !looksLikeIncrement(data)) {
+            return fail(ErrorCode::kRejected,
+                        "the server does not know increments and sent a full backup: update it; nothing was "
+                        "kept");
+        }
+        checksum.update(data.data(), data.size());
+        RETURN_IF_ERROR(file.write(data.data(), data.size()));
+        report.bytes += data.size();
+        context.report(wanted.name, report.bytes, announced);
     }
     report.sha256 = asBytes(checksum.finish());
     if (expected.empty() || report.bytes != announced) {
-        return fail(ErrorCode::kCountMismatch, std::string("the ") + what + " ended after " +
+        return fail(ErrorCode::kCountMismatch, "the " + what + " ended after " +
                                                    std::to_string(report.bytes) + " of " +
                                                    std::to_string(announced) + " bytes; nothing was kept");
     }
     if (expected != report.sha256) {
         return fail(ErrorCode::kChecksumMismatch,
-                    std::string("the ") + what + " was damaged in transfer; nothing was kept");
+                    "the " + what + " was damaged in transfer; nothing was kept");
     }
     return report;
 }
 
-/// Calls an rpc that answers with chunks (`start` makes its stream) and writes them to `path`.
+/// Calls an rpc that answers with chunks (`start` makes its stream) and writes them to `file`, which the
+/// caller commits.
 template <typename Start>
-Result<BackupReport> receiveToFile(const ClientOptions& options, const std::string& path, const char* what,
+Result<BackupReport> receiveToFile(const ClientOptions& options, BackupFile& file, const Wanted& wanted,
                                    const RunContext& context, Start&& start) {
-    BackupFile file(path);
     Result<BackupReport> report;
     const auto made =
         makeCall(options, context, kIdempotentUnbounded, [&](grpc::ClientContext& rpc, Result<void>& local) {
             const auto stream = start(rpc);
-            report = receiveBackup(*stream, file, what, context);
-            // Only a full disk here ends the call from this side; a short stream has
-            // its reason in the status.
-            if (!report && report.error().code == ErrorCode::kFileNotWritable) {
+            report = receiveBackup(*stream, file, wanted, context);
+            // Only a full disk here, or the wrong answer, ends the call from this side; a
+            // short stream has its reason in the status.
+            if (!report && (report.error().code == ErrorCode::kFileNotWritable ||
+                            report.error().code == ErrorCode::kRejected)) {
                 local = fail(report.error());
                 rpc.TryCancel();
             }
             return stream->Finish();
         });
     RETURN_IF_ERROR(made);
-    RETURN_IF_ERROR(report);
-    RETURN_IF_ERROR(file.commit());
     return report;
 }
 
-/// A file to be sent.
-struct OutgoingFile {
-    std::ifstream stream;
-    std::uint64_t bytes = 0;
-    std::string path;
+v1::BackupRequest requestSince(const BackupManifest& manifest) {
+    v1::BackupRequest request;
+    v1::BackupManifest& since = *request.mutable_since();
+    since.set_bytes(manifest.backup.bytes);
+    since.set_sha256(asBytes(manifest.backup.sha256));
+    since.set_block_bytes(manifest.blockBytes);
+    std::string& hashes = *since.mutable_block_hashes();
+    hashes.reserve(manifest.blocks.size() * sizeof(Sha256Digest));
+    for (const Sha256Digest& hash : manifest.blocks) hashes.append(hash.begin(), hash.end());
+    return request;
+}
 
-    /// Errors: kFileNotReadable.
-    static Result<OutgoingFile> open(const std::string& path) {
-        std::ifstream file(path, std::ios::binary | std::ios::ate);
-        const std::streamoff size = file ? static_cast<std::streamoff>(file.tellg()) : -1;
-        if (size < 0) return fail(ErrorCode::kFileNotReadable, path + ": cannot be opened for reading");
-        if (size == 0) return fail(ErrorCode::kFileNotReadable, path + ": is empty, not a backup");
-        file.seekg(0);
-        return OutgoingFile{std::move(file), static_cast<std::uint64_t>(size), path};
+/// An increment that others may build on is not replaced, least of all by one that builds on it.
+Result<void> requireNoFile(const std::string& path) {
+    std::error_code unknown;
+    if (!std::filesystem::exists(path, unknown)) return {};
+    return fail(ErrorCode::kAlreadyExists,
+                "'" + path + "' exists, and an increment replaces no file: choose a new name");
+}
+
+/// What was received must fit what was asked for.
+Result<IncrementReport> reportOf(BackupFile& file, const BackupReport& received, const BackupId& base) {
+    RETURN_IF_ERROR(file.flush());
+    const auto written = SourceFile::open(file.partPath());
+    RETURN_IF_ERROR(written);
+    const auto head = readIncrementHead(*written);
+    RETURN_IF_ERROR(head);
+    if (!(head->base == base)) {
+        return fail(ErrorCode::kInternal, "the server sent an increment to another backup; nothing was kept");
     }
-};
+    IncrementReport report;
+    report.bytes = received.bytes;
+    report.changedBytes = changedBytes(*head);
+    report.backup = {head->result.backup.bytes, asBytes(head->result.backup.sha256)};
+    return report;
+}
 
 /// The size goes with the first chunk, the checksum with the last. `write(chunk)` returns false when the call
 /// is over, whose status says why.
 template <typename Write>
-Result<void> sendChunks(OutgoingFile& file, const char* stage, const RunContext& context, Write&& write) {
+Result<void> sendChunks(BackupChain& chain, const char* stage, const RunContext& context, Write&& write) {
     Sha256 checksum;
     std::string buffer(kBackupChunkBytes, '\0');
     std::uint64_t sent = 0;
-    while (sent < file.bytes) {
-        // Never beyond the announced size, even if the file grows meanwhile.
-        file.stream.read(buffer.data(), static_cast<std::streamsize>(
-                                            std::min<std::uint64_t>(buffer.size(), file.bytes - sent)));
-        const auto count = static_cast<std::size_t>(file.stream.gcount());
-        if (count == 0) {
-            return fail(ErrorCode::kFileNotReadable,
-                        file.path + ": cannot be read beyond byte " + std::to_string(sent));
-        }
-        checksum.update(buffer.data(), count);
+    while (sent < chain.bytes()) {
+        const auto count = chain.read(buffer.data(), buffer.size());
+        RETURN_IF_ERROR(count);
+        checksum.update(buffer.data(), *count);
         v1::BackupChunk chunk;
-        if (sent == 0) chunk.set_total_bytes(file.bytes);
-        chunk.set_data(buffer.data(), count);
-        sent += count;
-        if (sent == file.bytes) chunk.set_sha256(asBytes(checksum.finish()));
+        if (sent == 0) chunk.set_total_bytes(chain.bytes());
+        chunk.set_data(buffer.data(), *count);
+        sent += *count;
+        if (sent == chain.bytes()) chunk.set_sha256(asBytes(checksum.finish()));
         if (!write(std::move(chunk))) return {};
-        context.report(stage, sent, file.bytes);
+        context.report(stage, sent, chain.bytes());
     }
     return {};
 }
@@ -131,28 +160,57 @@ grpc::Status finishUpload(Stream& stream, grpc::ClientContext& rpc, const Result
 }  // namespace
 
 Result<BackupReport> Client::backupToFile(const std::string& path, const RunContext& context) const {
-    return receiveToFile(impl_->options, path, "backup", context, [&](grpc::ClientContext& rpc) {
-        return impl_->admin->Backup(&rpc, v1::BackupRequest());
-    });
+    BackupFile file(path);
+    const auto report = receiveToFile(
+        impl_->options, file, {"backup"}, context,
+        [&](grpc::ClientContext& rpc) { return impl_->admin->Backup(&rpc, v1::BackupRequest()); });
+    RETURN_IF_ERROR(report);
+    RETURN_IF_ERROR(file.commit());
+    return report;
+}
+
+Result<IncrementReport> Client::incrementToFile(const std::string& path, const std::string& since,
+                                                const RunContext& context) const {
+    RETURN_IF_ERROR(requireNoFile(path));
+    const auto manifest = readManifest(since, context);
+    RETURN_IF_ERROR(manifest);
+    BackupFile file(path);
+    const auto received = receiveToFile(
+        impl_->options, file, {"increment", true}, context,
+        [&](grpc::ClientContext& rpc) { return impl_->admin->Backup(&rpc, requestSince(*manifest)); });
+    RETURN_IF_ERROR(received);
+    auto report = reportOf(file, *received, manifest->backup);
+    RETURN_IF_ERROR(report);
+    RETURN_IF_ERROR(file.commit());
+    return report;
 }
 
 Result<BackupReport> Client::exportCollection(const std::string& collection, const std::string& path,
                                               const RunContext& context) const {
     v1::ExportCollectionRequest request;
     request.set_collection(collection);
-    return receiveToFile(impl_->options, path, "export", context, [&](grpc::ClientContext& rpc) {
-        return impl_->admin->ExportCollection(&rpc, request);
-    });
+    BackupFile file(path);
+    const auto report = receiveToFile(
+        impl_->options, file, {"export"}, context,
+        [&](grpc::ClientContext& rpc) { return impl_->admin->ExportCollection(&rpc, request); });
+    RETURN_IF_ERROR(report);
+    RETURN_IF_ERROR(file.commit());
+    return report;
 }
 
 Result<RestoreReport> Client::restoreFromFile(const std::string& path, const RunContext& context) const {
-    auto file = OutgoingFile::open(path);
-    RETURN_IF_ERROR(file);
+    return restoreFromFiles({path}, context);
+}
+
+Result<RestoreReport> Client::restoreFromFiles(const std::vector<std::string>& files,
+                                               const RunContext& context) const {
+    auto chain = BackupChain::open(files, context);
+    RETURN_IF_ERROR(chain);
     v1::RestoreResponse response;
     const auto made =
         makeCall(impl_->options, context, kOnceUnbounded, [&](grpc::ClientContext& rpc, Result<void>& local) {
             const auto stream = impl_->admin->Restore(&rpc, &response);
-            local = sendChunks(*file, "restore", context,
+            local = sendChunks(*chain, "restore", context,
                                [&](const v1::BackupChunk& chunk) { return stream->Write(chunk); });
             return finishUpload(*stream, rpc, local);
         });
@@ -162,7 +220,7 @@ Result<RestoreReport> Client::restoreFromFile(const std::string& path, const Run
 
 Result<ImportReport> Client::importCollection(const std::string& path, const std::string& collection,
                                               const RunContext& context) const {
-    auto file = OutgoingFile::open(path);
+    auto file = BackupChain::open({path}, context);
     RETURN_IF_ERROR(file);
     v1::ImportCollectionResponse response;
     const auto made =

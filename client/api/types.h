@@ -290,6 +290,13 @@ struct BackupReport {
     std::string sha256;  ///< 32 bytes
 };
 
+/// Of an increment.
+struct IncrementReport {
+    std::uint64_t bytes = 0;         ///< of its file
+    std::uint64_t changedBytes = 0;  ///< of the database, in blocks of some pages
+    BackupReport backup;             ///< the one that it leads to
+};
+
 struct RestoreReport {
     std::uint64_t collections = 0;
     std::uint64_t shapes = 0;

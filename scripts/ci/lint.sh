@@ -46,6 +46,7 @@ forbid 'server/(rpc|catalog|ingest|index|config)/' "the store may not include wh
 forbid 'server/rpc/' "server/rpc is the outermost layer" server/catalog server/ingest server/index server/telemetry server/config
 forbid 'server/catalog/' "the catalog is built on these" server/ingest server/index server/telemetry
 forbid "$transport" "gRPC or protobuf in a public client header" client/api/client.h client/api/shape_types.h client/api/types.h
+forbid "$transport|client/(api|cli|io)/" "files of backups know neither gRPC nor the rest of the client" client/backup
 forbid 'server/|bench/' "client/ may not include the server" client
 forbid 'server/|client/|bench/' "common/ may not include client or server" common
 

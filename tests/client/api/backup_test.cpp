@@ -10,6 +10,7 @@
 #include "client/api/client.h"
 #include "common/sha256.h"
 #include "tests/client/api/fake_server.h"
+#include "tests/client/backup/backup_files.h"
 
 namespace shapedb::client {
 namespace {
@@ -132,6 +133,76 @@ TEST_F(ClientBackup, ExportsAndImportsOneCollection) {
     EXPECT_EQ(messages[1].chunk().data(), content_);
     EXPECT_EQ(messages[1].chunk().sha256(), digestOf(content_));
     EXPECT_EQ(server_.client().importCollection(folder_).error().code, ErrorCode::kFileNotReadable);
+}
+
+/// The chunks that a server sends of an increment.
+void offer(FakeAdmin& admin, const std::string& increment) {
+    admin.backup.assign(2, v1::BackupChunk());
+    admin.backup[0].set_total_bytes(increment.size());
+    admin.backup[0].set_data(increment);
+    admin.backup[1].set_sha256(digestOf(increment));
+}
+
+TEST_F(ClientBackup, AnIncrementIsAskedForByTheManifest) {
+    const std::string before = testing::database(5, 1);
+    const std::string after = testing::database(6, 2);
+    const std::string full = testing::writeBytes(folder_ + "/full", before);
+    const std::string increment = testing::incrementBetween(before, after);
+    offer(server_.admin, increment);
+    const auto report = server_.client().incrementToFile(file(), full);
+    ASSERT_TRUE(report) << report.error().message;
+    EXPECT_EQ(written(), increment);
+    EXPECT_EQ(report->bytes, increment.size());
+    EXPECT_EQ(report->changedBytes, after.size());
+    EXPECT_EQ(report->backup.bytes, after.size());
+    EXPECT_EQ(report->backup.sha256, digestOf(after));
+    const v1::BackupManifest& asked = server_.admin.backupRequest.since();
+    const BackupManifest manifest = testing::manifestOf(before, kBackupPageBytes);
+    EXPECT_EQ(asked.bytes(), before.size());
+    EXPECT_EQ(asked.sha256(), digestOf(before));
+    EXPECT_EQ(asked.block_bytes(), kBackupPageBytes);
+    ASSERT_EQ(asked.block_hashes().size(), manifest.blocks.size() * 32);
+    EXPECT_EQ(asked.block_hashes().compare(32, 32, digestOf(before.substr(4'096, 4'096))), 0);
+
+    // The next one follows from the increment alone.
+    const std::string later = testing::database(6, 3);
+    offer(server_.admin, testing::incrementBetween(after, later));
+    ASSERT_TRUE(server_.client().incrementToFile(folder_ + "/next", file()));
+    EXPECT_EQ(server_.admin.backupRequest.since().sha256(), digestOf(after));
+    const auto restored = server_.client().restoreFromFiles({full, file(), folder_ + "/next"});
+    ASSERT_TRUE(restored) << restored.error().message;
+    ASSERT_EQ(server_.admin.restored.size(), 1u);
+    EXPECT_EQ(server_.admin.restored[0].data(), later);
+    EXPECT_EQ(server_.admin.restored[0].sha256(), digestOf(later));
+}
+
+TEST_F(ClientBackup, WhatIsNotTheIncrementAskedForIsNotKept) {
+    const std::string before = testing::database(5, 1);
+    const std::string full = testing::writeBytes(folder_ + "/full", before);
+    const auto refused = [&](ErrorCode code, const std::string& words) {
+        const auto report = server_.client().incrementToFile(file(), full);
+        ASSERT_FALSE(report) << words;
+        EXPECT_EQ(report.error().code, code) << report.error().message;
+        EXPECT_NE(report.error().message.find(words), std::string::npos) << report.error().message;
+        EXPECT_FALSE(fs::exists(file()));
+        EXPECT_FALSE(fs::exists(file() + ".part"));
+    };
+    refused(ErrorCode::kRejected, "does not know increments");  // an older server sends everything
+    const std::string good = testing::incrementBetween(before, testing::database(5, 2));
+    offer(server_.admin, testing::incrementBetween(testing::database(5, 3), before));
+    refused(ErrorCode::kInternal, "to another backup");
+    std::string damaged = good;
+    damaged[200] ^= 1;
+    offer(server_.admin, damaged);
+    refused(ErrorCode::kMalformedFile, "checksum");
+    offer(server_.admin, good);
+    server_.admin.backup[1].set_sha256(digestOf("other"));
+    refused(ErrorCode::kChecksumMismatch, "damaged in transfer");
+    offer(server_.admin, good);
+    server_.admin.backup.pop_back();
+    refused(ErrorCode::kCountMismatch, "ended after");
+    server_.admin.backup.clear();
+    refused(ErrorCode::kCountMismatch, "ended after");
 }
 
 TEST_F(ClientBackup, ADamagedExportLeavesNoFile) {

@@ -59,8 +59,9 @@ grpc::Status FakeShapes::Segment(grpc::ServerContext* context,
     return answer(*context, ++calls);
 }
 
-grpc::Status FakeAdmin::Backup(grpc::ServerContext*, const v1::BackupRequest*,
+grpc::Status FakeAdmin::Backup(grpc::ServerContext*, const v1::BackupRequest* request,
                                grpc::ServerWriter<v1::BackupChunk>* writer) {
+    backupRequest = *request;
     for (const v1::BackupChunk& chunk : backup) writer->Write(chunk);
     return backupStatus;
 }

@@ -62,6 +62,7 @@ class FakeAdmin final : public v1::AdminService::Service {
 
     std::string exported;                               ///< the name asked for
     std::vector<v1::ImportCollectionRequest> imported;  ///< as received
+    v1::BackupRequest backupRequest;                    ///< the last one
     std::vector<v1::BackupChunk> backup;
     grpc::Status backupStatus;
     std::vector<v1::BackupChunk> restored;

@@ -1,4 +1,4 @@
-#include "client/api/backup_file.h"
+#include "client/backup/backup_file.h"
 
 #include <cerrno>
 #include <cstring>
@@ -28,8 +28,13 @@ Result<void> BackupFile::open() {
     return {};
 }
 
-Result<void> BackupFile::write(const std::string& data) {
-    if (std::fwrite(data.data(), 1, data.size(), file_) != data.size()) return failed("write");
+Result<void> BackupFile::write(const char* data, std::size_t size) {
+    if (std::fwrite(data, 1, size, file_) != size) return failed("write");
+    return {};
+}
+
+Result<void> BackupFile::flush() {
+    if (std::fflush(file_) != 0) return failed("write");
     return {};
 }
 

@@ -1,6 +1,7 @@
-// The file that a backup is written to. Private to client/api.
+// The file that a backup or an increment is written to. Private to client/.
 #pragma once
 
+#include <cstddef>
 #include <cstdio>
 #include <string>
 
@@ -19,8 +20,11 @@ class BackupFile {
 
     /// Creates an empty file, dropping what an earlier attempt wrote.
     [[nodiscard]] Result<void> open();
-    [[nodiscard]] Result<void> write(const std::string& data);
-    /// Flushes to disk and renames. Errors of all three: kFileNotWritable.
+    [[nodiscard]] Result<void> write(const char* data, std::size_t size);
+    /// What was written can then be read at `partPath`.
+    [[nodiscard]] Result<void> flush();
+    [[nodiscard]] const std::string& partPath() const { return part_; }
+    /// Flushes to disk and renames. Errors of all four: kFileNotWritable.
     [[nodiscard]] Result<void> commit();
 
   private:
