@@ -1,4 +1,4 @@
-// `shapedb admin rebuild|backup|restore|check|stats|info`.
+// `shapedb admin rebuild|check|stats|info`.
 #include <memory>
 
 #include <CLI/CLI.hpp>
@@ -10,7 +10,6 @@
 #include "client/cli/session.h"
 #include "client/cli/shape_output.h"
 #include "client/cli/text.h"
-#include "common/sha256.h"
 #include "core/base/return_if_error.h"
 
 namespace shapedb::cli {
@@ -65,31 +64,6 @@ CommandResult runRebuild(Session& session, const RebuildFlags& flags) {
     }
     session.console().document({{"rebuilt", list}});
     session.console().text(table.empty() ? "nothing to rebuild\n" : table.render());
-    return kOk;
-}
-
-CommandResult runBackup(Session& session, const std::string& file) {
-    const auto client = connectToServer(session);
-    RETURN_IF_ERROR(client);
-    const auto report = client->backupToFile(file, session.context());
-    RETURN_IF_ERROR(report);
-    session.console().document({{"file", file},
-                                {"bytes", report->bytes},
-                                {"sha256", toHex(report->sha256.data(), report->sha256.size())}});
-    session.console().text(formatBytes(report->bytes) + " written to " + file + "\n");
-    return kOk;
-}
-
-CommandResult runRestore(Session& session, const std::string& file) {
-    const auto client = connectToServer(session);
-    RETURN_IF_ERROR(client);
-    const auto report = client->restoreFromFile(file, session.context());
-    RETURN_IF_ERROR(report);
-    session.console().document(
-        {{"file", file}, {"collections", report->collections}, {"shapes", report->shapes}});
-    session.console().text(formatCount(report->shapes, "shape", "shapes") + " in " +
-                           formatCount(report->collections, "collection", "collections") + " restored from " +
-                           file + "\n");
     return kOk;
 }
 
@@ -210,16 +184,6 @@ void addRebuild(CLI::App& group, Session& session) {
         [&session, flags] { session.action = [&session, flags] { return runRebuild(session, *flags); }; });
 }
 
-void addFileCommand(CLI::App& group, Session& session, const char* name, const char* help,
-                    CommandResult (*runner)(Session&, const std::string&)) {
-    auto file = std::make_shared<std::string>();
-    CLI::App* command = group.add_subcommand(name, help);
-    command->add_option("FILE", *file, "Backup file")->required();
-    command->callback([&session, file, runner] {
-        session.action = [&session, file, runner] { return runner(session, *file); };
-    });
-}
-
 void addPlainCommand(CLI::App& group, Session& session, const char* name, const char* help,
                      CommandResult (*runner)(Session&)) {
     group.add_subcommand(name, help)->callback([&session, runner] {
@@ -233,9 +197,7 @@ void addAdminCommands(CLI::App& app, Session& session) {
     CLI::App* group = app.add_subcommand("admin", "Maintain a running server");
     group->require_subcommand(1);
     addRebuild(*group, session);
-    addFileCommand(*group, session, "backup", "Copy the whole database to a file while the server runs",
-                   &runBackup);
-    addFileCommand(*group, session, "restore", "Replace the whole database with a backup", &runRestore);
+    addBackupCommands(*group, session);
     addPlainCommand(*group, session, "check", "Read the whole database and report damage", &runCheck);
     addPlainCommand(*group, session, "stats", "Show counts and sizes", &runStats);
     addPlainCommand(*group, session, "info", "Show version and limits", &runInfo);

@@ -66,6 +66,7 @@ void addCollectionCommands(CLI::App& app, Session& session);
 void addAdminCommands(CLI::App& app, Session& session);
 void addHealthCommand(CLI::App& app, Session& session);
 /// Below `shapedb admin`.
+void addBackupCommands(CLI::App& admin, Session& session);
 void addKeyCommands(CLI::App& admin, Session& session);
 
 /// The whole program without its signal handler: reads the command line, runs the command, prints the result
