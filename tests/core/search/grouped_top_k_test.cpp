@@ -78,7 +78,7 @@ std::vector<SearchHit> plainGroups(const GroupedLibrary& library, const SearchOp
     return hits;
 }
 
-void expectSameHits(const std::vector<SearchHit>& found, const std::vector<SearchHit>& expected) {
+void expectSameGroupedHits(const std::vector<SearchHit>& found, const std::vector<SearchHit>& expected) {
     ASSERT_EQ(found.size(), expected.size());
     for (std::size_t i = 0; i < expected.size(); ++i) {
         EXPECT_EQ(found[i].id, expected[i].id) << i;
@@ -106,7 +106,7 @@ TEST(GroupedTopK, FindsTheGroupsOfAPlainRanking) {
                              std::to_string(perGroup));
                 const auto found = topK(scorer, library.set, options);
                 ASSERT_TRUE(found) << found.error().message;
-                expectSameHits(found->hits, plainGroups(library, options));
+                expectSameGroupedHits(found->hits, plainGroups(library, options));
             }
         }
     }
