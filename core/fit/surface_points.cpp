@@ -180,6 +180,11 @@ Result<SurfacePoints> makeOrThrow(const PointCloud& scan, const RunContext& cont
 
 }  // namespace
 
+void moveBy(const Point3& offset, SurfacePoints& surface) {
+    // Not even the sign of a zero changes for nothing.
+    if (offset != Point3{}) surface.centre = surface.centre + offset;
+}
+
 Point3 SurfacePoints::position(std::size_t i) const {
     const auto& p = points[i].position;
     const double step = unit / kSurfaceSteps;

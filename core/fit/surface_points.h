@@ -60,6 +60,9 @@ struct SurfacePoints {
 /// kCancelled, kDeadlineExceeded.
 [[nodiscard]] Result<SurfacePoints> makeSurfacePoints(const PointCloud& scan, const RunContext& context = {});
 
+/// Moves the points, which keep their places in the frame: adds to every position, scan units.
+void moveBy(const Point3& offset, SurfacePoints& surface);
+
 /// The two numbers that stand for a unit normal, and the normal they stand for.
 [[nodiscard]] std::array<std::int8_t, 2> packNormal(const Point3& normal);
 [[nodiscard]] Point3 unpackNormal(const std::array<std::int8_t, 2>& packed);

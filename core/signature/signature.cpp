@@ -43,6 +43,11 @@ bool sameShape(const Signature& a, const Signature& b) noexcept {
     return true;
 }
 
+void moveBy(const Point3& offset, Signature& signature) {
+    // Not even the sign of a zero changes for nothing.
+    if (offset != Point3{}) signature.origin = signature.origin + offset;
+}
+
 Point3 pointPosition(const Signature& signature, std::size_t i) {
     const auto& p = signature.points[i].position;
     return signature.origin + signature.scale * Point3{p[0], p[1], p[2]};

@@ -74,6 +74,9 @@ struct Signature {
 /// Standard deviations of that segment's matter along its principal axes, falling, scan units.
 [[nodiscard]] std::array<double, 3> pointExtents(const Signature& signature, std::size_t i);
 
+/// Moves the shape, whose numbers that enter a score stay: adds to every position, scan units.
+void moveBy(const Point3& offset, Signature& signature);
+
 /// Errors: kInvalidArgument (options); kNoInterior (no segment heavy enough for single precision);
 /// kCancelled, kDeadlineExceeded; kOutOfMemory.
 [[nodiscard]] Result<Signature> makeSignature(const Segmentation& segmentation,

@@ -67,7 +67,7 @@ struct AddedShape {
 
 /// A stored scan, segmented again.
 struct DescribedScan {
-    std::vector<float> points;  ///< packed, in the order of the upload
+    store::StoredPoints points;  ///< in the order of the upload
     Description description;
 };
 
@@ -263,12 +263,12 @@ class Catalog {
     /// The signature behind a hit, with what the index leaves out. Errors: kNotFound, kNotReady (also:
     /// of another generation than `searched`), kDataLoss.
     [[nodiscard]] Result<Signature> storedSignature(const index::Snapshot& searched, std::int64_t shapeId);
-    /// The points of a shape in the order of the upload, packed, and the shape that they are of, which may
+    /// The points of a shape in the order of the upload, and the shape that they are of, which may
     /// have changed since it was looked up. Takes their bytes from `share`. Errors: kNotFound (deleted
     /// meanwhile), kQueueFull, kDataLoss.
     struct StoredScan {
         store::Shape shape;
-        std::vector<float> points;
+        std::vector<float> points;  ///< packed, relative to shape.origin
     };
     [[nodiscard]] Result<StoredScan> storedScan(const FoundShape& found, Budget::Share& share);
     /// The surface points of a shape, null if it has none (yet). Errors: kDataLoss.

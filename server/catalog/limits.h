@@ -20,8 +20,8 @@ constexpr std::size_t kMaxMetadataKeyBytes = 128;
 constexpr std::size_t kMaxMetadataValueBytes = 1'024;
 constexpr std::size_t kMaxFilterBytes = 16'384;
 
-/// Metadata keys that begin so describe the points (the client library keeps their offset under one): whoever
-/// replaces all metadata without sending points does not mean them.
+/// Metadata keys that begin so describe the points (earlier client libraries kept an offset under one):
+/// whoever replaces all metadata without sending points does not mean them.
 constexpr char kMetadataOfPoints[] = "shapedb.";
 
 // Scans.

@@ -1,9 +1,11 @@
 #include "server/catalog/request_checks.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "common/safe_text.h"
 #include "core/base/return_if_error.h"
+#include "core/preparation/frame.h"
 #include "server/catalog/limits.h"
 #include "server/store/key_rules.h"
 
@@ -145,6 +147,22 @@ Result<void> checkGrouping(const std::string& groupBy, std::uint32_t perGroup, s
     if (std::uint64_t{k} * perGroup > maxK) {
         return bad("per_group: " + std::to_string(k) + " groups of " + std::to_string(perGroup) +
                    " are more than " + std::to_string(maxK) + " hits (limits.max_k)");
+    }
+    return {};
+}
+
+Result<void> checkOrigin(const Point3& origin) {
+    const double coordinates[3] = {origin.x, origin.y, origin.z};
+    for (int axis = 0; axis < 3; ++axis) {
+        const double value = coordinates[axis];
+        const std::string name = std::string("origin: ") + static_cast<char>('x' + axis);
+        if (!std::isfinite(value)) {
+            return fail(ErrorCode::kNonFiniteCoordinate,
+                        name + (std::isnan(value) ? " is NaN" : " is infinite"));
+        }
+        if (std::abs(value) > kMaxCoordinate) {
+            return fail(ErrorCode::kCoordinateOutOfRange, name + " exceeds the largest magnitude 3.4e38");
+        }
     }
     return {};
 }

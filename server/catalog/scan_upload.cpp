@@ -4,10 +4,11 @@
 
 #include "core/base/return_if_error.h"
 #include "server/catalog/limits.h"
+#include "server/catalog/request_checks.h"
 
 namespace shapedb::catalog {
 
-Result<void> ScanUpload::begin(std::uint64_t announced, const std::string& sha256) {
+Result<void> ScanUpload::begin(std::uint64_t announced, const std::string& sha256, const Point3& origin) {
     if (announced_)
         return fail(ErrorCode::kMalformedStream, "a second header arrived; send one, before the chunks");
     if (announced < kMinPoints) {
@@ -28,8 +29,10 @@ Result<void> ScanUpload::begin(std::uint64_t announced, const std::string& sha25
         }
         std::copy(sha256.begin(), sha256.end(), expected.begin());
     }
+    RETURN_IF_ERROR(checkOrigin(origin));
     announced_ = announced;
     verifier_.expect(announced);
+    verifier_.setOrigin(origin);
     return {};
 }
 
@@ -87,7 +90,7 @@ Result<store::VerifiedScan> isolated(store::VerifiedScan scan, const IsolateOpti
         kept.insert(kept.end(), first, first + 3);
     }
     if (kept.size() == scan.points().size()) return scan;
-    auto rest = store::VerifiedScan::verify(std::move(kept));
+    auto rest = store::VerifiedScan::verify(std::move(kept), scan.origin());
     if (!rest) return fail(withContext(rest.error(), "without its plane and other objects: "));
     return rest;
 }

@@ -22,9 +22,11 @@ class ScanUpload {
     /// returned with this object.
     ScanUpload(std::uint64_t maxPoints, Budget& budget) : maxPoints_(maxPoints), share_(budget) {}
 
-    /// Errors: kMalformedStream (second header), kTooFewPoints, kPointLimitExceeded,
-    /// kInvalidArgument (sha256 neither empty nor 32 bytes).
-    [[nodiscard]] Result<void> begin(std::uint64_t announced, const std::string& sha256);
+    /// The points to come are relative to `origin`. Errors: kMalformedStream (second header), kTooFewPoints,
+    /// kPointLimitExceeded, kInvalidArgument (sha256 neither empty nor 32 bytes), kNonFiniteCoordinate and
+    /// kCoordinateOutOfRange (origin).
+    [[nodiscard]] Result<void> begin(std::uint64_t announced, const std::string& sha256,
+                                     const Point3& origin = {});
 
     /// Errors: kMalformedStream (before the header; empty, too long or not whole points; after the last
     /// announced point), kCountMismatch (more points than announced), kNonFiniteCoordinate, kQueueFull

@@ -139,6 +139,12 @@ Result<std::shared_ptr<const SurfacePoints>> Searches::surfaceOf(const ShapeName
     return surface;
 }
 
+Result<SurfacePoints> Searches::surfaceOfScan(const store::VerifiedScan& scan, const RunContext& context) {
+    auto surface = makeSurfacePoints(store::toCloud(scan.points()), context);
+    if (surface) moveBy(scan.origin(), *surface);
+    return surface;
+}
+
 Result<FitResult> Searches::align(const store::VerifiedScan& query,
                                   const std::variant<ShapeName, const store::VerifiedScan*>& other,
                                   FitOptions options, bool freeScale, const RunContext& context) const {
@@ -153,7 +159,7 @@ Result<FitResult> Searches::align(const store::VerifiedScan& query,
     options.keepScale = *keepScale;
     SegmentationSlots::Slot slot(catalog_.segmentationSlots());
     RETURN_IF_ERROR(slot.acquire(context));
-    const auto surface = makeSurfacePoints(store::toCloud(query.points()), context);
+    const auto surface = surfaceOfScan(query, context);
     if (!surface) return fail(withContext(surface.error(), "query: "));
     if (const auto* name = std::get_if<ShapeName>(&other)) {
         const auto stored = surfaceOf(*name);
@@ -161,7 +167,7 @@ Result<FitResult> Searches::align(const store::VerifiedScan& query,
         return shapedb::align(FitQuery(*surface), **stored, options, context);
     }
     const store::VerifiedScan& scan = *std::get<const store::VerifiedScan*>(other);
-    const auto sent = makeSurfacePoints(store::toCloud(scan.points()), context);
+    const auto sent = surfaceOfScan(scan, context);
     if (!sent) return fail(withContext(sent.error(), "other: "));
     return shapedb::align(FitQuery(*surface), *sent, options, context);
 }
@@ -224,7 +230,7 @@ Result<ScanSearch> Searches::byScan(const PreparedSearch& search, const store::V
     RETURN_IF_ERROR(description);
     VerifiableQuery query{{description->signature, std::nullopt}, nullptr};
     if (search.verify) {
-        auto surface = makeSurfacePoints(store::toCloud(scan.points()), context);
+        auto surface = surfaceOfScan(scan, context);
         if (surface) {
             query.surface = std::make_shared<const SurfacePoints>(std::move(*surface));
         } else {

@@ -171,6 +171,7 @@ class Searches {
     Result<std::optional<Explanation>> explain(const PreparedSearch& search, const Signature& query,
                                                const VerifiedResult& found, const VerifiedHit& hit) const;
     SurfaceOf surfaces() const;
+    static Result<SurfacePoints> surfaceOfScan(const store::VerifiedScan& scan, const RunContext& context);
     Result<std::shared_ptr<const SurfacePoints>> surfaceOf(const ShapeName& name) const;
 
     Catalog& catalog_;

@@ -303,7 +303,7 @@ Result<Catalog::StoredScan> Catalog::storedScan(const FoundShape& found, Budget:
             RETURN_IF_ERROR(share.take((now->pointCount - shape.pointCount) * kPointBytes));
         }
         shape = std::move(*now);
-        if (same) return StoredScan{std::move(shape), std::move(*points)};
+        if (same) return StoredScan{std::move(shape), std::move(points->xyz)};
         // Replaced while they were read: again, so that shape and points belong together.
     }
 }
@@ -313,7 +313,7 @@ Result<Catalog::StoredScan> Catalog::storedScan(const FoundShape& found, Budget:
 Result<Description> Catalog::describe(SegmentationSlots::Slot& slot, const store::VerifiedScan& scan,
                                       const ShapeParameters& parameters, const RunContext& context) {
     RETURN_IF_ERROR(slot.acquire(context));
-    return pipeline_.describe(scan.points(), parameters, context);
+    return pipeline_.describe(scan.points(), scan.origin(), parameters, context);
 }
 
 Result<DescribedScan> Catalog::describe(SegmentationSlots::Slot& slot, const FoundShape& found,
@@ -322,7 +322,7 @@ Result<DescribedScan> Catalog::describe(SegmentationSlots::Slot& slot, const Fou
     RETURN_IF_ERROR(slot.acquire(context));
     auto points = store_->loadPoints(found.shape.id);
     RETURN_IF_ERROR(points);
-    auto description = pipeline_.describe(*points, found.collection->parameters, context);
+    auto description = pipeline_.describe(points->xyz, points->origin, found.collection->parameters, context);
     RETURN_IF_ERROR(description);
     return DescribedScan{std::move(*points), std::move(*description)};
 }

@@ -40,6 +40,7 @@ Result<void> waitFor(std::chrono::milliseconds time, const RunContext& context) 
 PipelineOutcome runOrThrow(const Describe& describe, store::Store& store, std::int64_t shapeId,
                            const ShapeParameters& parameters, const RunContext& context) {
     PointCloud cloud;
+    Point3 origin;
     {
         // The packed points are half as large as the cloud: not kept beside it.
         const auto points = store.loadPoints(shapeId);
@@ -48,7 +49,8 @@ PipelineOutcome runOrThrow(const Describe& describe, store::Store& store, std::i
                           points.error());
         }
         context.report("start", 0, 0);
-        cloud = store::toCloud(*points);
+        cloud = store::toCloud(points->xyz);
+        origin = points->origin;
     }
     Result<Description> description = fail(ErrorCode::kInternal, "not described");
     Result<SurfacePoints> surface = fail(ErrorCode::kInternal, "no surface points");
@@ -65,6 +67,9 @@ PipelineOutcome runOrThrow(const Describe& describe, store::Store& store, std::i
     if (isCancelled(surface)) return failed(Kind::kCancelled, surface.error());
     if (isCancelled(views)) return failed(Kind::kCancelled, views.error());
     if (!description) return failed(Kind::kScanFailed, description.error());
+    // Last: near 0, 0, 0 all digits of what was computed are those of the shape.
+    moveBy(origin, description->signature);
+    if (surface) moveBy(origin, *surface);
     PipelineOutcome outcome;
     outcome.signature = encodeSignature(description->signature);
     // A scan that has a signature but no surface points is searched all the same.
@@ -76,10 +81,12 @@ PipelineOutcome runOrThrow(const Describe& describe, store::Store& store, std::i
 
 }  // namespace
 
-Result<Description> SignaturePipeline::describe(const std::vector<float>& points,
+Result<Description> SignaturePipeline::describe(const std::vector<float>& points, const Point3& origin,
                                                 const ShapeParameters& parameters,
                                                 const RunContext& context) const {
-    return describe_(store::toCloud(points), parameters, context);
+    auto description = describe_(store::toCloud(points), parameters, context);
+    if (description) moveBy(origin, description->signature);
+    return description;
 }
 
 PipelineOutcome SignaturePipeline::run(store::Store& store, std::int64_t shapeId,

@@ -42,9 +42,10 @@ class SignaturePipeline {
     template <typename Function, std::enable_if_t<std::is_constructible_v<Describe, Function>, int> = 0>
     SignaturePipeline(Function&& describe) : describe_(std::forward<Function>(describe)) {}
 
-    /// `points` are packed x y z. Uses the threads of the calling task arena. Errors: those of the
-    /// function; throws what it throws, and std::bad_alloc.
-    [[nodiscard]] Result<Description> describe(const std::vector<float>& points,
+    /// `points` are packed x y z relative to `origin`, which positions of the signature have added (those of
+    /// the segmentation do not). Uses the threads of the calling task arena. Errors: those of the function;
+    /// throws what it throws, and std::bad_alloc.
+    [[nodiscard]] Result<Description> describe(const std::vector<float>& points, const Point3& origin,
                                                const ShapeParameters& parameters,
                                                const RunContext& context) const;
 

@@ -36,7 +36,8 @@ class Uploads {
 
   private:
     Result<void> begin(const v1::AlignHeader& header) {
-        auto begun = query_.begin(header.query_points(), header.query_sha256());
+        auto begun =
+            query_.begin(header.query_points(), header.query_sha256(), fromProto(header.query_origin()));
         if (!begun) return fail(withContext(begun.error(), "query: "));
         if (header.other_case() == v1::AlignHeader::OTHER_NOT_SET) {
             return fail(ErrorCode::kInvalidArgument, "other: give a key, or other_points and a second scan");
@@ -49,7 +50,8 @@ class Uploads {
         }
         RETURN_IF_ERROR(call_.useScan(header.query_points()));
         if (header.has_other_points()) {
-            begun = other_.begin(header.other_points(), header.other_sha256());
+            begun =
+                other_.begin(header.other_points(), header.other_sha256(), fromProto(header.other_origin()));
             if (!begun) return fail(withContext(begun.error(), "other: "));
             RETURN_IF_ERROR(call_.useScan(header.other_points()));
         }

@@ -53,6 +53,7 @@ void toProto(const store::Shape& shape, const std::string& collection, std::opti
     out->set_state(toProto(shape.state));
     out->set_point_count(shape.pointCount);
     out->set_sha256(shape.checksum.data(), shape.checksum.size());
+    if (shape.origin != Point3{}) toProto(shape.origin, out->mutable_origin());
     for (const auto& [key, value] : shape.metadata) (*out->mutable_metadata())[key] = value;
     toProto(shape.createdAt, out->mutable_created());
     toProto(shape.updatedAt, out->mutable_updated());

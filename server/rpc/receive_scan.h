@@ -4,6 +4,7 @@
 #include <string>
 
 #include "common/point_stream.h"
+#include "common/wire_vector.h"
 #include "core/base/return_if_error.h"
 #include "server/catalog/scan_upload.h"
 #include "server/rpc/call.h"
@@ -52,7 +53,8 @@ Result<store::VerifiedScan> receiveScan(Reader& reader, catalog::ScanUpload& upl
         const auto& header = request.header();
         // First, since it asks whether the caller may.
         RETURN_IF_ERROR(onHeader(header));
-        RETURN_IF_ERROR(upload.begin(header.point_count(), header.sha256()));
+        RETURN_IF_ERROR(
+            upload.begin(header.point_count(), header.sha256(), wire::fromProto(header.origin())));
         isolation = isolationFrom(header.isolation());
         return call.useScan(header.point_count());
     };

@@ -51,10 +51,11 @@ Result<catalog::ShapeHeader> headerFrom(const pb::AddShapeHeader& message) {
 /// One summary, then the points in the order they were uploaded, each with its segment.
 template <typename Writer>
 Result<void> sendSegments(Call& call, Writer& writer, const Description& description,
-                          const std::vector<float>& xyz, bool summaryOnly) {
+                          const std::vector<float>& xyz, const Point3& origin, bool summaryOnly) {
     pb::SegmentedPoints message;
     toProto(description.segmentation, message.mutable_summary()->mutable_report());
     toProto(description.signature, message.mutable_summary()->mutable_signature());
+    if (origin != Point3{}) toProto(origin, message.mutable_summary()->mutable_origin());
     if (const auto sent = call.write(writer, message); !sent || summaryOnly) return sent;
 
     const auto& labels = description.segmentation.pointSegment;
@@ -372,8 +373,9 @@ grpc::Status ShapeServiceHandler::GetSegments(grpc::ServerContext* context,
         catalog::SegmentationSlots::Slot slot(services_.catalog.segmentationSlots());
         const auto scan = services_.catalog.describe(slot, *found, call.run());
         RETURN_IF_ERROR(scan);
-        call.addPoints(scan->points.size() / 3, scan->points.size() * sizeof(float));
-        return sendSegments(call, *writer, scan->description, scan->points, false);
+        const store::StoredPoints& points = scan->points;
+        call.addPoints(points.xyz.size() / 3, points.xyz.size() * sizeof(float));
+        return sendSegments(call, *writer, scan->description, points.xyz, points.origin, false);
     });
 }
 
@@ -397,7 +399,7 @@ grpc::Status ShapeServiceHandler::Segment(
         catalog::SegmentationSlots::Slot slot(services_.catalog.segmentationSlots());
         const auto description = services_.catalog.describe(slot, *scan, parameters, call.run());
         RETURN_IF_ERROR(description);
-        return sendSegments(call, *stream, *description, scan->points(), summaryOnly);
+        return sendSegments(call, *stream, *description, scan->points(), scan->origin(), summaryOnly);
     });
 }
 

@@ -7,7 +7,8 @@ namespace shapedb::store {
 
 Result<PutOutcome> decidePut(const PutRequest& request, const std::string& collectionName,
                              const Shape* existing) {
-    const bool samePoints = existing != nullptr && existing->checksum == request.scan.checksum();
+    const bool samePoints = existing != nullptr && existing->checksum == request.scan.checksum() &&
+                            existing->origin == request.scan.origin();
     const Metadata before = existing != nullptr ? existing->metadata : Metadata();
     const Metadata after = request.metadata.of(before);
     if (request.checkMetadata) RETURN_IF_ERROR(request.checkMetadata(after));

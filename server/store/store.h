@@ -22,6 +22,7 @@
 #include "core/base/error.h"
 #include "core/base/metadata.h"
 #include "core/base/run_context.h"
+#include "core/geometry/point.h"
 #include "server/store/import_request.h"
 #include "server/store/metadata_change.h"
 #include "server/store/quarantine.h"
@@ -68,10 +69,17 @@ struct Shape {
     ShapeState state = ShapeState::kPending;
     std::uint64_t pointCount = 0;
     Checksum checksum{};
+    Point3 origin;  ///< what the points are relative to: VerifiedScan::origin
     Metadata metadata;
     TimestampMs createdAt = 0;
     TimestampMs updatedAt = 0;     ///< last change of points, metadata, state or failure
     std::optional<Error> failure;  ///< set exactly when state is kFailed
+};
+
+/// The points of a shape as they were uploaded.
+struct StoredPoints {
+    std::vector<float> xyz;  ///< packed x y z, relative to `origin`
+    Point3 origin;
 };
 
 enum class PutMode {
@@ -243,10 +251,10 @@ class Store {
 
     /// Stores a scan and queues its job in one transaction; durable when it returns.
     ///
-    /// The same checksum, and metadata that do not change: kUnchanged, also in insert-only mode. A failed
-    /// shape is tried again: kRetried. New metadata alone raise the version and leave state, job and
-    /// signature alone. New points make the shape pending and replace its job; the old signature serves until
-    /// finishJob replaces it or failJob removes it.
+    /// The same points (checksum and origin), and metadata that do not change: kUnchanged, also in
+    /// insert-only mode. A failed shape is tried again: kRetried. New metadata alone raise the version and
+    /// leave state, job and signature alone. New points make the shape pending and replace its job; the old
+    /// signature serves until finishJob replaces it or failJob removes it.
     ///
     /// Errors (nothing is stored): kNotFound (collection, or the key in update-only mode),
     /// kAlreadyExists, kVersionConflict (names both versions), kQueueFull, those of request.checkMetadata.
@@ -287,8 +295,8 @@ class Store {
     [[nodiscard]] virtual Result<std::vector<Shape>> changeMetadata(
         const std::vector<std::int64_t>& shapeIds,
         const std::function<std::optional<Metadata>(const Shape&)>& change) = 0;
-    /// Packed x y z, compared with the stored checksum. Errors: kNotFound, kDataLoss.
-    [[nodiscard]] virtual Result<std::vector<float>> loadPoints(std::int64_t shapeId) = 0;
+    /// Compared with the stored checksum. Errors: kNotFound, kDataLoss.
+    [[nodiscard]] virtual Result<StoredPoints> loadPoints(std::int64_t shapeId) = 0;
     /// The signature that serves now. Errors: kNotFound (shape), kNotReady.
     [[nodiscard]] virtual Result<SignatureRow> getSignature(std::int64_t shapeId) = 0;
     /// The surface points of the shape; empty if none were stored yet. Errors: kNotFound (shape).

@@ -4,11 +4,12 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
-#include <limits>
 #include <new>
 #include <string>
 
 #include "core/base/return_if_error.h"
+#include "core/geometry/resolution.h"
+#include "core/preparation/frame.h"
 #include "core/preparation/sanitise.h"
 
 // What travels and is stored is little-endian and used as it is.
@@ -18,9 +19,6 @@ static_assert(sizeof(float) == 4, "points travel as 32-bit floats");
 namespace shapedb::store {
 
 namespace {
-
-/// Steps of single precision across a scan: fewer are coarser than its noise.
-constexpr double kLeastSteps = 1'000.0;
 
 /// Enough that a sample of a real scan spans space.
 constexpr std::size_t kSamplePoints = 256;
@@ -38,12 +36,13 @@ PointCloud toCloud(const std::vector<float>& xyz) {
     return points;
 }
 
-Result<VerifiedScan> VerifiedScan::verify(std::vector<float> xyz) {
+Result<VerifiedScan> VerifiedScan::verify(std::vector<float> xyz, const Point3& origin) {
     if (xyz.size() % 3 != 0) {
         return fail(ErrorCode::kInvalidArgument,
                     std::to_string(xyz.size()) + " numbers are not packed x y z");
     }
     ScanVerifier verifier;
+    verifier.setOrigin(origin);
     verifier.xyz_ = std::move(xyz);
     RETURN_IF_ERROR(verifier.take(0));
     return verifier.finish();
@@ -79,32 +78,41 @@ Result<void> ScanVerifier::take(std::size_t first) {
     return {};
 }
 
+Box ScanVerifier::box() const {
+    Box box;
+    for (const std::size_t i : extremes_) box.add(pointAt(xyz_, i));
+    return box;
+}
+
+// A shape far from the origin loses its details in single precision.
+Result<void> ScanVerifier::checkResolution() const {
+    const Box box = this->box();
+    if (const auto coarse = coarseInSinglePrecision(box, xyz_.size() / 3)) {
+        return fail(ErrorCode::kCoordinateOutOfRange,
+                    coarse->text() +
+                        ": send points relative to an origin near them, which the field origin of the "
+                        "header names (their differences from it, in double precision)");
+    }
+    if (origin_ == Point3{}) return {};
+    const Box placed{box.low + origin_, box.high + origin_};
+    for (const double value :
+         {placed.low.x, placed.low.y, placed.low.z, placed.high.x, placed.high.y, placed.high.z}) {
+        if (std::abs(value) <= kMaxCoordinate) continue;
+        char text[128];
+        std::snprintf(text, sizeof text,
+                      "origin: with the points it gives coordinates up to %.3g, beyond 3.4e38", value);
+        return fail(ErrorCode::kCoordinateOutOfRange, text);
+    }
+    if (const auto coarse = coarseInDoublePrecision(box, origin_)) {
+        return fail(ErrorCode::kCoordinateOutOfRange, "origin: " + coarse->text("double precision") +
+                                                          ": use coordinates that begin nearer to the scan");
+    }
+    return {};
+}
+
 /// Looks at a sample first: adding points cannot flatten a sample that spans space, and the
 /// points at the extremes decide what is wrong with size or magnitude. Only when the sample is
 /// refused are all points looked at, which takes about 80 bytes a point.
-// A shape far from the origin loses its details in single precision.
-Result<void> ScanVerifier::checkResolution() const {
-    double squared = 0.0;
-    float largest = 0.0f;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-        const float low = xyz_[3 * extremes_[axis] + axis];
-        const float high = xyz_[3 * extremes_[axis + 3] + axis];
-        const double extent = static_cast<double>(high) - static_cast<double>(low);
-        squared += extent * extent;
-        largest = std::max({largest, std::abs(low), std::abs(high)});
-    }
-    const double size = std::sqrt(squared);
-    const double step = std::nextafter(largest, std::numeric_limits<float>::infinity()) - largest;
-    if (!(size > 0.0) || step * kLeastSteps <= size) return {};
-    char text[256];
-    std::snprintf(
-        text, sizeof text,
-        "coordinates up to %.6g are %.3g apart in single precision, but the scan is only %.3g across: "
-        "subtract its middle from all points before sending them, and add it to what comes back",
-        static_cast<double>(largest), step, size);
-    return fail(ErrorCode::kCoordinateOutOfRange, text);
-}
-
 Result<void> ScanVerifier::checkUsable() const {
     const std::size_t count = xyz_.size() / 3;
     if (count > 0) {
@@ -127,7 +135,7 @@ Result<VerifiedScan> ScanVerifier::finish(const Checksum* expected) {
                         ", which is not the one in the header: send the scan again");
     }
     RETURN_IF_ERROR(checkUsable());
-    return VerifiedScan(std::move(xyz_), checksum);
+    return VerifiedScan(std::move(xyz_), checksum, origin_);
 }
 
 }  // namespace shapedb::store

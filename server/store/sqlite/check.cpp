@@ -77,6 +77,9 @@ constexpr Rule kRules[] = {
     {"SELECT s.key FROM shape s JOIN shape_surface f ON f.shape_id = s.id WHERE f.points_version > "
      "s.points_version",
      "has surface points of points that it never had"},
+    // A read-only connection knows no CHECK constraints.
+    {"SELECT s.key FROM shape s WHERE max(abs(s.origin_x), abs(s.origin_y), abs(s.origin_z)) > 3.4e38",
+     "has points relative to an origin that is out of range"},
 };
 
 class Checker {

@@ -82,7 +82,8 @@ void insertCopy(Connection& target, std::int64_t collectionId, const CopiedShape
     Query(target, sql::kCopyShape, collectionId, shape.key, shape.version, shape.pointsVersion,
           static_cast<int>(shape.state), shape.pointCount,
           BlobView{shape.checksum.data(), shape.checksum.size()}, shape.createdAt, shape.updatedAt,
-          std::string(errorCodeName(failure.code)), failure.message)
+          std::string(errorCodeName(failure.code)), failure.message, shape.origin.x, shape.origin.y,
+          shape.origin.z)
         .run();
     const std::int64_t shapeId = target.lastInsertId();
     for (const auto& [name, value] : shape.metadata) {

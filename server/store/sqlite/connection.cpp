@@ -265,6 +265,8 @@ void Query::bind(int position, ZeroBlob value) {
     check(sqlite3_bind_zeroblob64(statement_, position, value.size));
 }
 
+void Query::bind(int position, double value) { check(sqlite3_bind_double(statement_, position, value)); }
+
 void Query::bindInteger(int position, std::int64_t value) {
     check(sqlite3_bind_int64(statement_, position, value));
 }
@@ -282,6 +284,8 @@ void Query::run() {
 }
 
 std::int64_t Query::integer(int column) const { return sqlite3_column_int64(statement_, column); }
+
+double Query::real(int column) const { return sqlite3_column_double(statement_, column); }
 
 bool Query::isNull(int column) const { return sqlite3_column_type(statement_, column) == SQLITE_NULL; }
 

@@ -116,6 +116,7 @@ class Query {
     void run();
 
     std::int64_t integer(int column) const;
+    double real(int column) const;
     bool isNull(int column) const;
     std::string text(int column) const;
     /// Valid until the next step.
@@ -126,6 +127,7 @@ class Query {
     void bind(int position, Number value) {
         bindInteger(position, static_cast<std::int64_t>(value));
     }
+    void bind(int position, double value);
     void bind(int position, const std::string& value);
     void bind(int position, BlobView value);
     void bind(int position, ZeroBlob value);

@@ -31,6 +31,10 @@ ShapeState readState(const Query& query, int column, const std::string& key) {
 
 }  // namespace
 
+Point3 readPoint(const Query& query, int column) {
+    return {query.real(column), query.real(column + 1), query.real(column + 2)};
+}
+
 Shape readShape(const Query& query) {
     Shape shape;
     shape.id = query.integer(0);
@@ -46,6 +50,7 @@ Shape readShape(const Query& query) {
     if (shape.state == ShapeState::kFailed) {
         shape.failure = Error{errorCodeFromName(query.text(10)), query.text(11)};
     }
+    shape.origin = readPoint(query, 12);
     return shape;
 }
 

@@ -11,10 +11,10 @@
 namespace shapedb::store {
 
 // Columns of SHAPEDB_SHAPE_COLUMNS.
-inline constexpr int kColumnMetadataName = 12;
-inline constexpr int kColumnMetadataValue = 13;
+inline constexpr int kColumnMetadataName = 15;
+inline constexpr int kColumnMetadataValue = 16;
 
-/// Columns 0 to 11 of the current row; metadata stays empty. Throws Failure kDataLoss for values that
+/// Columns 0 to 14 of the current row; metadata stays empty. Throws Failure kDataLoss for values that
 /// the store never writes.
 Shape readShape(const Query& query);
 
@@ -59,7 +59,10 @@ std::optional<SurfaceRow> readSurface(const Query& query);
 /// Persisted.
 std::int64_t digestOf(const std::string& first, const std::string& second = {});
 
-/// Decodes the points of a kLoadPoints row and verifies their checksum. Throws Failure.
+/// Three columns from `column` on.
+Point3 readPoint(const Query& query, int column);
+
+/// Decodes the points of columns 0 to 3 of a kLoadPoints row and verifies their checksum. Throws Failure.
 std::vector<float> readPoints(const Query& query);
 
 /// Transactions that changed something, since the database was made. Throws Failure kDataLoss.

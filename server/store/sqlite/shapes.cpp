@@ -60,7 +60,8 @@ void SqliteStore::queueJob(Connection& connection, const PutRequest& request, st
 PutResult SqliteStore::insertShape(Connection& connection, const PutRequest& request,
                                    const PointEncoding& encoding) {
     Query(connection, sql::kInsertShape, request.collectionId, request.key, request.scan.pointCount(),
-          view(request.scan.checksum()), now())
+          view(request.scan.checksum()), now(), request.scan.origin().x, request.scan.origin().y,
+          request.scan.origin().z)
         .run();
     const std::int64_t shapeId = connection.lastInsertId();
     SHAPEDB_FAILPOINT("insert.shape");
@@ -92,7 +93,8 @@ PutResult SqliteStore::replacePoints(Connection& connection, const PutRequest& r
     const std::int64_t shapeId = existing.id;
     rewriteMetadata(connection, existing, request.metadata.of(existing.metadata));
     Query(connection, sql::kReplacePointsOfShape, shapeId, request.scan.pointCount(),
-          view(request.scan.checksum()), now())
+          view(request.scan.checksum()), now(), request.scan.origin().x, request.scan.origin().y,
+          request.scan.origin().z)
         .run();
     Query(connection, sql::kDeletePoints, shapeId).run();
     SHAPEDB_FAILPOINT("replace.deleted");
@@ -201,11 +203,11 @@ Result<std::vector<Shape>> SqliteStore::changeMetadata(
     });
 }
 
-Result<std::vector<float>> SqliteStore::loadPoints(std::int64_t shapeId) {
+Result<StoredPoints> SqliteStore::loadPoints(std::int64_t shapeId) {
     return read("read the points", [&](Connection& connection) {
         Query query(connection, sql::kLoadPoints, shapeId);
         if (!query.step()) raiseNoShape(shapeId);
-        return readPoints(query);
+        return StoredPoints{readPoints(query), readPoint(query, 4)};
     });
 }
 

@@ -6,11 +6,12 @@
 
 namespace shapedb::store::sql {
 
-// Columns 0 to 13 in the order `readShape` and `forEachShape` (rows.h) expect: one row per metadata entry, so
+// Columns 0 to 16 in the order `readShape` and `forEachShape` (rows.h) expect: one row per metadata entry, so
 // that one statement lists shapes and their metadata.
-#define SHAPEDB_SHAPE_COLUMNS                                                             \
-    "s.id, s.collection_id, s.key, s.version, s.points_version, s.state, s.point_count, " \
-    "s.checksum, s.created_at, s.updated_at, s.failure_code, s.failure_message, m.name, m.value"
+#define SHAPEDB_SHAPE_COLUMNS                                                                             \
+    "s.id, s.collection_id, s.key, s.version, s.points_version, s.state, s.point_count, "                 \
+    "s.checksum, s.created_at, s.updated_at, s.failure_code, s.failure_message, s.origin_x, s.origin_y, " \
+    "s.origin_z, m.name, m.value"
 #define SHAPEDB_FROM_SHAPE " FROM shape s LEFT JOIN shape_metadata m ON m.shape_id = s.id "
 
 /// The name, as an SQL text, of a collection that is being imported. No client can give it or ask for it.

@@ -65,7 +65,7 @@ class SqliteStore final : public Store {
     Result<std::vector<Shape>> changeMetadata(
         const std::vector<std::int64_t>& shapeIds,
         const std::function<std::optional<Metadata>(const Shape&)>& change) override;
-    Result<std::vector<float>> loadPoints(std::int64_t shapeId) override;
+    Result<StoredPoints> loadPoints(std::int64_t shapeId) override;
     Result<SignatureRow> getSignature(std::int64_t shapeId) override;
     Result<std::optional<SurfaceRow>> getSurface(std::int64_t shapeId) override;
 

@@ -1,6 +1,8 @@
 #include "server/catalog/request_checks.h"
 
 #include <cmath>
+#include <limits>
+#include <string>
 
 #include <gtest/gtest.h>
 
@@ -83,6 +85,23 @@ TEST(RequestChecks, LimitsNumbersAndTexts) {
 }
 
 // Encodes every code point; exactly the valid ones must pass.
+TEST(RequestChecks, LimitsOrigins) {
+    const double infinity = std::numeric_limits<double>::infinity();
+    const auto refusal = [](const Point3& origin) {
+        const auto checked = checkOrigin(origin);
+        return checked ? ""
+                       : std::string(errorCodeName(checked.error().code)) + " " + checked.error().message;
+    };
+    EXPECT_EQ(refusal({}), "");
+    EXPECT_EQ(refusal({-3.4e38, 3.4e38, 5e-324}), "");
+    EXPECT_EQ(refusal({std::nextafter(3.4e38, infinity), 0.0, 0.0}),
+              "coordinate_out_of_range origin: x exceeds the largest magnitude 3.4e38");
+    EXPECT_EQ(refusal({0.0, -1e300, 0.0}),
+              "coordinate_out_of_range origin: y exceeds the largest magnitude 3.4e38");
+    EXPECT_EQ(refusal({0.0, 0.0, -infinity}), "non_finite_coordinate origin: z is infinite");
+    EXPECT_EQ(refusal({0.0, std::nan(""), 0.0}), "non_finite_coordinate origin: y is NaN");
+}
+
 TEST(IsUtf8, AcceptsExactlyTheValidCodePoints) {
     const auto encode = [](std::uint32_t code) {
         std::string text;

@@ -43,6 +43,17 @@ TEST_F(PutRules, PointsWeighMoreThanMetadata) {
     EXPECT_EQ(onTakenKey().value(), PutOutcome::kReplaced);
 }
 
+TEST_F(PutRules, TheSamePointsElsewhereAreOtherPoints) {
+    existing.origin = {1.0, 0.0, 0.0};
+    EXPECT_EQ(onTakenKey().value(), PutOutcome::kReplaced);
+    existing.state = ShapeState::kFailed;
+    EXPECT_EQ(onTakenKey().value(), PutOutcome::kReplaced) << "no retry of the others";
+    request.mode = PutMode::kSamePoints;
+    EXPECT_EQ(onTakenKey().error().code, ErrorCode::kAlreadyExists);
+    request.mode = PutMode::kInsertOnly;
+    EXPECT_EQ(onTakenKey().error().code, ErrorCode::kAlreadyExists);
+}
+
 TEST_F(PutRules, InsertOnlyAcceptsARepeatedRequest) {
     request.mode = PutMode::kInsertOnly;
     EXPECT_EQ(onFreeKey().value(), PutOutcome::kCreated);

@@ -148,9 +148,37 @@ TEST(VerifiedScan, TooFarFromTheOriginForSinglePrecisionIsRefused) {
         const auto refused = at(far);
         ASSERT_FALSE(refused) << far;
         EXPECT_EQ(refused.error().code, ErrorCode::kCoordinateOutOfRange);
-        EXPECT_NE(refused.error().message.find("subtract its middle"), std::string::npos)
+        EXPECT_NE(refused.error().message.find("relative to an origin near them"), std::string::npos)
             << refused.error().message;
     }
+}
+
+TEST(VerifiedScan, KeepsItsOriginBesideTheChecksumOfThePoints) {
+    const auto xyz = cube(1'000);
+    const Point3 origin{4.4e6, -5.2e6, 120.5};
+    const auto placed = VerifiedScan::verify(xyz, origin);
+    ASSERT_TRUE(placed) << placed.error().message;
+    EXPECT_EQ(placed->origin(), origin);
+    EXPECT_EQ(placed->points(), xyz);
+    const auto plain = VerifiedScan::verify(xyz);
+    EXPECT_EQ(plain->origin(), Point3{});
+    EXPECT_EQ(placed->checksum(), plain->checksum());
+}
+
+TEST(VerifiedScan, TheOriginIsNearEnoughForDoublePrecision) {
+    const auto xyz = cube(1'000);  // 3.5 across
+    EXPECT_TRUE(VerifiedScan::verify(xyz, {0.0, 1.7e10, 0.0}));
+    const auto beyond = VerifiedScan::verify(xyz, {0.0, 3.5e10, 0.0});
+    ASSERT_FALSE(beyond);
+    EXPECT_EQ(beyond.error().code, ErrorCode::kCoordinateOutOfRange);
+    EXPECT_EQ(beyond.error().message.rfind("origin: ", 0), 0u) << beyond.error().message;
+    auto huge = xyz;
+    for (float& value : huge) value *= 1e38f;
+    EXPECT_TRUE(VerifiedScan::verify(huge));
+    EXPECT_TRUE(VerifiedScan::verify(huge, {-2.3e38, 0.0, 0.0}));
+    const auto sum = VerifiedScan::verify(huge, {0.0, 0.0, 3e38});
+    ASSERT_FALSE(sum);
+    EXPECT_NE(sum.error().message.find("beyond 3.4e38"), std::string::npos) << sum.error().message;
 }
 
 }  // namespace

@@ -108,6 +108,7 @@ Result<PutResult> MemoryStore::putShape(const PutRequest& request) {
         if (*outcome == PutOutcome::kMetadataChanged) return PutResult{*outcome, *existing};
         existing->pointsVersion = existing->version;
         existing->checksum = request.scan.checksum();
+        existing->origin = request.scan.origin();
         existing->pointCount = request.scan.pointCount();
         existing->state = ShapeState::kPending;
         existing->failure.reset();
@@ -135,11 +136,11 @@ Result<Shape> MemoryStore::getShapeById(std::int64_t shapeId) {
     });
 }
 
-Result<std::vector<float>> MemoryStore::loadPoints(std::int64_t shapeId) {
-    return guarded("loadPoints", [&]() -> Result<std::vector<float>> {
+Result<store::StoredPoints> MemoryStore::loadPoints(std::int64_t shapeId) {
+    return guarded("loadPoints", [&]() -> Result<store::StoredPoints> {
         const auto found = content_.points.find(shapeId);
         if (found == content_.points.end()) return notFound("shape");
-        return found->second;
+        return store::StoredPoints{found->second, content_.shapes.at(shapeId).origin};
     });
 }
 

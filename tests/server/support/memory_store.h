@@ -48,7 +48,7 @@ class MemoryStore : public store::Store {
     Result<std::vector<store::Shape>> changeMetadata(
         const std::vector<std::int64_t>& shapeIds,
         const std::function<std::optional<Metadata>(const store::Shape&)>& change) override;
-    Result<std::vector<float>> loadPoints(std::int64_t shapeId) override;
+    Result<store::StoredPoints> loadPoints(std::int64_t shapeId) override;
     Result<store::SignatureRow> getSignature(std::int64_t shapeId) override;
     Result<std::optional<store::SurfaceRow>> getSurface(std::int64_t shapeId) override;
 

@@ -16,6 +16,7 @@ using GoldenTest = StoreTest;
 const std::vector<float> kTetrahedron = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
 
 std::vector<float> ball() { return cloud(42, 300); }
+const Point3 kSite{4.4e6 + 1.0 / 3.0, -5.2e6, 120.5};
 
 /// A ready, a replaced (pending, old signature serving), a failed and a running shape, beside
 /// a rebuild in progress, an empty collection and an alias.
@@ -34,7 +35,7 @@ void fill(Store& store) {
     finish();
     ASSERT_TRUE(store.putShape(request(c.id, "failed", kTetrahedron)));
     ASSERT_TRUE(store.failJob(**store.claimJob(), {ErrorCode::kNoInterior, "no closed interior"}));
-    ASSERT_TRUE(store.putShape(request(c.id, "replaced", round, {{"label", "ball"}})));
+    ASSERT_TRUE(store.putShape(request(c.id, "replaced", round, {{"label", "ball"}}, kSite)));
     const Rebuild rebuild = store.startRebuild(c.id, "theta=25").value();
     ASSERT_TRUE(store.putRebuilt(rebuild.id, signatureFor(1, 1, 2)));
     ASSERT_TRUE(store.claimJob().value());
@@ -42,7 +43,7 @@ void fill(Store& store) {
 
 class EachGoldenTest : public GoldenTest, public ::testing::WithParamInterface<int> {};
 
-INSTANTIATE_TEST_SUITE_P(Versions, EachGoldenTest, ::testing::Values(1, 2, 3, 4, 5));
+INSTANTIATE_TEST_SUITE_P(Versions, EachGoldenTest, ::testing::Values(1, 2, 3, 4, 5, 6));
 
 /// The database of a schema version; empty if it is missing.
 std::string golden(int version) {
@@ -108,7 +109,7 @@ TEST_P(EachGoldenTest, OpensAndAnswers) {
     const Shape ready = store_->getShape(c.id, "ready").value();
     EXPECT_EQ(ready.state, ShapeState::kReady);
     EXPECT_EQ(ready.metadata, (Metadata{{"label", "tetrahedron"}, {"n", "4"}}));
-    EXPECT_EQ(store_->loadPoints(ready.id).value(), kTetrahedron);
+    EXPECT_EQ(store_->loadPoints(ready.id)->xyz, kTetrahedron);
     EXPECT_EQ(store_->getSignature(ready.id)->bytes, "signature of 1/1/1");
     EXPECT_EQ(store_->getSignature(ready.id)->views, GetParam() >= 3 ? "views of 1/1" : "");
     const auto surface = store_->getSurface(ready.id).value();
@@ -119,7 +120,9 @@ TEST_P(EachGoldenTest, OpensAndAnswers) {
     const Shape replaced = store_->getShape(c.id, "replaced").value();
     EXPECT_EQ(replaced.state, ShapeState::kPending);
     EXPECT_EQ(replaced.version, 2);
-    EXPECT_EQ(store_->loadPoints(replaced.id).value(), ball());
+    EXPECT_EQ(store_->loadPoints(replaced.id)->xyz, ball());
+    EXPECT_EQ(replaced.origin, GetParam() >= 6 ? kSite : Point3{});
+    EXPECT_EQ(ready.origin, Point3{});
     EXPECT_EQ(store_->getSignature(replaced.id)->pointsVersion, 1);
     const Shape failed = store_->getShape(c.id, "failed").value();
     EXPECT_EQ(failed.failure->code, ErrorCode::kNoInterior);
@@ -139,6 +142,109 @@ TEST_P(EachGoldenTest, OpensAndAnswers) {
     }
     EXPECT_TRUE(store_->finishRebuild(rebuild.id).value());
     expectSound();
+}
+
+using OffsetMigration = GoldenTest;
+
+/// The last database of before shape.origin, with an offset in the metadata of each shape, opened.
+void openWithOffset(const std::string& path, const std::string& offset) {
+    spill(path, golden(5));
+    std::filesystem::remove(path + ".commits");
+    Connection connection(path, OpenMode::kReadWrite, 0);
+    connection.execute("INSERT INTO shape_metadata SELECT id, 'shapedb.offset', '" + offset + "' FROM shape");
+}
+
+TEST_F(OffsetMigration, OffsetsInMetadataBecomeOrigins) {
+    store_.reset();
+    openWithOffset(options().path, "4500000.1000000001 -0.5 1e-300");
+    open();
+    expectSound();
+    const Collection c = store_->getCollection("golden").value();
+    for (const char* key : {"ready", "replaced", "failed"}) {
+        const Shape shape = store_->getShape(c.id, key).value();
+        EXPECT_NEAR(shape.origin.x, 4500000.1, 1e-9) << key;
+        EXPECT_EQ(shape.origin.y, -0.5) << key;
+        EXPECT_EQ(shape.metadata.count("shapedb.offset"), 0u) << key;
+        EXPECT_EQ(shape.state == ShapeState::kFailed, key == std::string("failed"));
+    }
+    // Found as before until it is segmented again.
+    const Shape ready = store_->getShape(c.id, "ready").value();
+    EXPECT_EQ(ready.state, ShapeState::kPending);
+    EXPECT_EQ(ready.metadata, (Metadata{{"label", "tetrahedron"}, {"n", "4"}}));
+    EXPECT_EQ(store_->getSignature(ready.id)->bytes, "signature of 1/1/1");
+    EXPECT_EQ(store_->loadIndex(c.id, 0, 10)->size(), 2u);
+    EXPECT_EQ(store_->queueDepth()->jobs, 2u) << "that one, and one that was pending";
+    ASSERT_TRUE(store_->recoverJobs(2, {})->empty());
+    finishAll();
+    EXPECT_EQ(store_->getShape(c.id, "ready")->state, ShapeState::kReady);
+    const Rebuild rebuild = store_->runningRebuilds()->front();
+    EXPECT_EQ(rebuild.done, 0u) << "what it had made was relative to the offset";
+    const auto missing = store_->rebuildBatch(rebuild.id, 0, 10).value();
+    EXPECT_EQ(missing.size(), 3u);
+    for (const Shape& shape : missing) {
+        ASSERT_TRUE(store_->putRebuilt(rebuild.id, signatureFor(shape.id, shape.pointsVersion, 2)));
+    }
+    EXPECT_TRUE(store_->finishRebuild(rebuild.id).value());
+    expectSound();
+}
+
+TEST_F(OffsetMigration, OtherTextUnderThatKeyIsLeftAlone) {
+    for (const char* text :
+         {"", "a cup", "1 2", "1 2 3 4", "1  2 3", "1,2,3,4", "[1] 2 3", "nan 0 0", "true 1 2", "null 1 2",
+          "1 2 \"3\"", "1e39 0 0", "1e999 0 0", "{\"a\":1} 2 3", "1] [2 3"}) {
+        store_.reset();
+        openWithOffset(options().path, text);
+        open();
+        const Collection c = store_->getCollection("golden").value();
+        const Shape shape = store_->getShape(c.id, "ready").value();
+        EXPECT_EQ(shape.origin, Point3{}) << text;
+        EXPECT_EQ(shape.metadata.at("shapedb.offset"), text);
+        EXPECT_EQ(shape.state, ShapeState::kReady) << text;
+        EXPECT_EQ(store_->queueDepth()->jobs, 1u) << text;
+    }
+    // The smallest integer has no absolute value as one.
+    store_.reset();
+    openWithOffset(options().path, "-9223372036854775808 0 9223372036854775807");
+    open();
+    EXPECT_EQ(store_->getShape(store_->getCollection("golden")->id, "ready")->origin,
+              (Point3{-0x1p63, 0.0, 0x1p63}));
+    expectSound();
+}
+
+TEST_F(OffsetMigration, ExportsOfEarlierVersionsAreImportedWithTheirOrigins) {
+    const std::string path = folder_.file("old.db");
+    openWithOffset(path, "4500000 0 -3");
+    Connection(path, OpenMode::kReadWrite, 0).execute("DELETE FROM collection WHERE name = 'empty'");
+    const auto imported = store_->importCollection(path, {}, {});
+    ASSERT_TRUE(imported) << imported.error().message;
+    const Shape shape = store_->getShape(imported->id, "ready").value();
+    EXPECT_EQ(shape.origin, (Point3{4.5e6, 0.0, -3.0}));
+    EXPECT_EQ(shape.state, ShapeState::kPending);
+    EXPECT_EQ(store_->queueDepth()->jobs, 2u);
+    finishAll();
+    expectSound();
+}
+
+TEST_F(OffsetMigration, AnOriginThatNoClientCouldSendIsDamage) {
+    const Collection c = collection();
+    put(c.id, "a", 1);
+    finishAll();
+    store_.reset();
+    {
+        Connection connection(options().path, OpenMode::kReadWrite, 0);
+        EXPECT_THROW(connection.execute("UPDATE shape SET origin_x = 3.5e38"), Failure);
+        EXPECT_THROW(connection.execute("UPDATE shape SET origin_y = 9e999"), Failure);
+        EXPECT_THROW(connection.execute("UPDATE shape SET origin_z = NULL"), Failure);
+        connection.execute("PRAGMA ignore_check_constraints = ON; UPDATE shape SET origin_x = 9e999");
+        EXPECT_EQ(connection.text("SELECT origin_x FROM shape"), "Inf");
+    }
+    open();
+    const auto problems = store_->check({}).value();
+    ASSERT_EQ(problems.size(), 1u);
+    EXPECT_EQ(problems.front(), "shape 'a' has points relative to an origin that is out of range");
+    const std::string copy = folder_.file("copy.db");
+    ASSERT_TRUE(store_->backup(copy, {}));
+    EXPECT_FAILS(store_->restore(copy, {}, nullptr), ErrorCode::kMalformedFile);
 }
 
 }  // namespace

@@ -70,7 +70,7 @@ TEST_F(SqliteMaintenanceTest, RestoreReproducesTheContent) {
         for (std::size_t i = 0; i < after.size(); ++i) EXPECT_TRUE(after[i] == before[i]);
         EXPECT_EQ(store_->loadIndex(collection_.id, 0, 100)->size(), index.size());
         EXPECT_EQ(store_->listCollections()->size(), 1u);
-        EXPECT_EQ(store_->loadPoints(before[0].id).value(), cloud(10));
+        EXPECT_EQ(store_->loadPoints(before[0].id)->xyz, cloud(10));
         EXPECT_EQ(store_->queueDepth()->jobs, 2u);
         open();
     }

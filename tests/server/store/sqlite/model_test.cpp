@@ -386,7 +386,7 @@ class ModelTest : public StoreTest, public ::testing::WithParamInterface<int> {
         for (const Shape& shape : listed) {
             const ModelShape& model = model_.at(shape.key);
             EXPECT_TRUE(shape == model.shape) << shape.key;
-            EXPECT_EQ(store_->loadPoints(shape.id).value(), cloud(model.seed));
+            EXPECT_EQ(store_->loadPoints(shape.id)->xyz, cloud(model.seed));
             const auto signature = store_->getSignature(shape.id);
             ASSERT_EQ(signature.has_value(), model.serving.has_value()) << shape.key;
             if (!signature) continue;

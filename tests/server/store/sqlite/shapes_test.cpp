@@ -23,12 +23,44 @@ TEST_F(SqliteShapesTest, PutStoresEverythingAndQueuesAJob) {
     EXPECT_FALSE(put.shape.failure);
     EXPECT_TRUE(store_->getShape(c.id, "cup").value() == put.shape);
     EXPECT_TRUE(store_->getShapeById(put.shape.id).value() == put.shape);
-    EXPECT_EQ(store_->loadPoints(put.shape.id).value(), points);
+    EXPECT_EQ(store_->loadPoints(put.shape.id)->xyz, points);
     EXPECT_EQ(store_->queueDepth()->jobs, 1u);
     EXPECT_EQ(store_->queueDepth()->bytes, 6000u);
     open();
     EXPECT_TRUE(store_->getShape(c.id, "cup").value() == put.shape);
-    EXPECT_EQ(store_->loadPoints(put.shape.id).value(), points);
+    EXPECT_EQ(store_->loadPoints(put.shape.id)->xyz, points);
+}
+
+TEST_F(SqliteShapesTest, KeepsWhatPointsAreRelativeTo) {
+    const Collection c = collection();
+    const auto points = cloud(1);
+    const Point3 site{4.4e6 + 1.0 / 3.0, -5.2e6, 0.1};
+    const Point3 limit{-3.3e38, 1e-300, 5e-324};
+    const PutResult put = store_->putShape(request(c.id, "far", points, {{"label", "cup"}}, site)).value();
+    EXPECT_EQ(put.shape.origin, site);
+    EXPECT_EQ(put.shape.checksum, checksumOf(points)) << "of the points alone";
+    finishAll();
+    open();
+    const Shape stored = store_->getShape(c.id, "far").value();
+    EXPECT_EQ(stored.origin, site) << "to the last bit";
+    EXPECT_EQ(stored.metadata, (Metadata{{"label", "cup"}}));
+    EXPECT_EQ(store_->listShapes(c.id, 0, 10, {})->front().origin, site);
+    EXPECT_EQ(store_->loadPoints(stored.id)->origin, site);
+    EXPECT_EQ(store_->loadPoints(stored.id)->xyz, points);
+    EXPECT_EQ(store_->putShape(request(c.id, "far", points, {{"label", "cup"}}, site))->outcome,
+              PutOutcome::kUnchanged);
+
+    const PutResult moved = store_->putShape(request(c.id, "far", points, {{"label", "cup"}})).value();
+    EXPECT_EQ(moved.outcome, PutOutcome::kReplaced);
+    EXPECT_EQ(moved.shape.origin, Point3{});
+    EXPECT_EQ(moved.shape.pointsVersion, 2);
+    EXPECT_EQ(moved.shape.state, ShapeState::kPending);
+    EXPECT_EQ(store_->loadPoints(stored.id)->origin, Point3{});
+    std::vector<float> huge = points;
+    for (float& value : huge) value *= 1e37f;
+    EXPECT_EQ(store_->putShape(request(c.id, "far", huge, {}, limit))->shape.origin, limit);
+    finishAll();
+    expectSound();
 }
 
 // Above PointEncoding::kWholeBytes: written into the row in pieces.
@@ -38,12 +70,12 @@ TEST_F(SqliteShapesTest, StoresAndReplacesLargeScans) {
         const auto points = cloud(count, count);
         const auto put = store_->putShape(request(c.id, "large", points));
         ASSERT_TRUE(put) << put.error().message;
-        EXPECT_EQ(store_->loadPoints(put->shape.id).value(), points);
+        EXPECT_EQ(store_->loadPoints(put->shape.id)->xyz, points);
         EXPECT_EQ(store_->stats()->pointBytes, 12 * count);
         EXPECT_LT(store_->stats()->storedPointBytes, 12 * count);
         EXPECT_EQ(store_->putShape(request(c.id, "large", points))->outcome, PutOutcome::kUnchanged);
         open();
-        EXPECT_EQ(store_->loadPoints(put->shape.id).value(), points);
+        EXPECT_EQ(store_->loadPoints(put->shape.id)->xyz, points);
     }
     finishAll();
     expectSound();
@@ -105,7 +137,7 @@ TEST_F(SqliteShapesTest, OtherPointsServeTheOldSignatureUntilTheJobEnds) {
     EXPECT_EQ(second.pointsVersion, 2);
     EXPECT_EQ(second.state, ShapeState::kPending);
     EXPECT_EQ(store_->getSignature(first.id)->pointsVersion, 1);
-    EXPECT_EQ(store_->loadPoints(first.id).value(), cloud(2));
+    EXPECT_EQ(store_->loadPoints(first.id)->xyz, cloud(2));
     const auto rows = store_->loadIndex(c.id, 0, 10).value();
     ASSERT_EQ(rows.size(), 1u);
     EXPECT_EQ(rows[0].signature.pointsVersion, 1);
@@ -196,7 +228,7 @@ TEST_F(SqliteShapesTest, FullQueueStoresNothing) {
     EXPECT_TRUE(bounded("b", b, 1, 96));
     EXPECT_FAILS(bounded("a", a, 1, 0), ErrorCode::kQueueFull);
     EXPECT_EQ(store_->getShape(c.id, "a")->version, 2) << "a refused replacement changes nothing";
-    EXPECT_EQ(store_->loadPoints(store_->getShape(c.id, "a")->id).value(), b);
+    EXPECT_EQ(store_->loadPoints(store_->getShape(c.id, "a")->id)->xyz, b);
     expectSound();
 }
 
@@ -307,7 +339,7 @@ TEST_F(SqliteShapesTest, ARefusedCheckOfTheMetadataStoresNothing) {
     ASSERT_FALSE(result);
     EXPECT_EQ(result.error().message, "2 entries");
     EXPECT_TRUE(store_->getShape(c.id, "cup").value() == before);
-    EXPECT_EQ(store_->loadPoints(before.id).value(), cloud(1));
+    EXPECT_EQ(store_->loadPoints(before.id)->xyz, cloud(1));
     expectSound();
 }
 

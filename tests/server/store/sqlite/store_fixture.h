@@ -29,8 +29,8 @@ inline Checksum checksumOf(const std::vector<float>& points) {
 }
 
 inline PutRequest request(std::int64_t collectionId, const std::string& key, const std::vector<float>& points,
-                          Metadata metadata = {}) {
-    PutRequest put(VerifiedScan::verify(points).value());
+                          Metadata metadata = {}, const Point3& origin = {}) {
+    PutRequest put(VerifiedScan::verify(points, origin).value());
     put.collectionId = collectionId;
     put.key = key;
     put.metadata = replacedBy(std::move(metadata));
@@ -57,7 +57,8 @@ inline bool operator==(const Shape& a, const Shape& b) {
     };
     return a.id == b.id && a.collectionId == b.collectionId && a.key == b.key && a.version == b.version &&
            a.pointsVersion == b.pointsVersion && a.state == b.state && a.pointCount == b.pointCount &&
-           a.checksum == b.checksum && a.metadata == b.metadata && failureOf(a) == failureOf(b);
+           a.checksum == b.checksum && a.origin == b.origin && a.metadata == b.metadata &&
+           failureOf(a) == failureOf(b);
 }
 
 inline std::string slurp(const std::string& path) {

@@ -24,6 +24,11 @@ struct Held {
     std::string signature;  ///< that serves; empty: none
 };
 
+/// Of every third scan.
+Point3 originOf(std::uint64_t seed) {
+    return seed % 3 == 0 ? Point3{1e6 + static_cast<double>(seed), -2.5e6, 0.1} : Point3{};
+}
+
 void expectHolds(Store& store, std::int64_t collectionId, const std::vector<Held>& held) {
     const auto shapes = store.listShapes(collectionId, 0, 1000, {}).value();
     ASSERT_EQ(shapes.size(), held.size());
@@ -35,7 +40,8 @@ void expectHolds(Store& store, std::int64_t collectionId, const std::vector<Held
         EXPECT_EQ(shape.pointsVersion, wanted.pointsVersion) << wanted.key;
         EXPECT_EQ(shape.state, wanted.state) << wanted.key;
         EXPECT_EQ(shape.metadata, wanted.metadata) << wanted.key;
-        EXPECT_EQ(store.loadPoints(shape.id).value(), cloud(wanted.seed)) << wanted.key;
+        EXPECT_EQ(store.loadPoints(shape.id)->xyz, cloud(wanted.seed)) << wanted.key;
+        EXPECT_EQ(shape.origin, originOf(wanted.seed)) << wanted.key;
         const auto signature = store.getSignature(shape.id);
         EXPECT_EQ(signature ? signature->bytes : "", wanted.signature) << wanted.key;
     }
@@ -77,7 +83,8 @@ class Changes {
         fresh.key = "k" + std::to_string(next_++);
         fresh.seed = random_.below(50);
         fresh.metadata = {{"label", std::to_string(random_.below(3))}};
-        ASSERT_TRUE(store_.putShape(request(collectionId_, fresh.key, cloud(fresh.seed), fresh.metadata)));
+        ASSERT_TRUE(store_.putShape(
+            request(collectionId_, fresh.key, cloud(fresh.seed), fresh.metadata, originOf(fresh.seed))));
         held_.push_back(fresh);
     }
 
@@ -85,7 +92,8 @@ class Changes {
         Held* one = any();
         if (one == nullptr) return;
         one->seed += 50;
-        ASSERT_TRUE(store_.putShape(request(collectionId_, one->key, cloud(one->seed), one->metadata)));
+        ASSERT_TRUE(store_.putShape(
+            request(collectionId_, one->key, cloud(one->seed), one->metadata, originOf(one->seed))));
         one->pointsVersion = ++one->version;
         one->state = ShapeState::kPending;
     }
@@ -236,7 +244,7 @@ TEST_F(SqliteTransferTest, TakesLargeScansAndAllGenerationsButTheServingOneStay)
     EXPECT_EQ(copy.parameters, "finer");
     EXPECT_EQ(other_->stats()->signatures, 2u);
     EXPECT_TRUE(other_->runningRebuilds()->empty());
-    EXPECT_TRUE(other_->loadPoints(other_->getShape(copy.id, "large")->id).value() == large);
+    EXPECT_TRUE(other_->loadPoints(other_->getShape(copy.id, "large")->id)->xyz == large);
     expectSoundStore(*other_);
 }
 
