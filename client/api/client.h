@@ -77,7 +77,8 @@ struct ClientOptions {
 /// Errors of every call, not repeated below: the server's, with its name and message; kUnauthenticated and
 /// kPermissionDenied (the API key); kRateLimited; kUnavailable (cannot be reached); kDeadlineExceeded;
 /// kCancelled; kOutOfMemory; kInternal. Scans are checked before they are sent: kTooFewPoints (none),
-/// kNonFiniteCoordinate, kCoordinateOutOfRange (beyond single precision).
+/// kNonFiniteCoordinate, kCoordinateOutOfRange (beyond single precision, or rounded to it so far from the
+/// origin that the shape is lost).
 ///
 /// Thread-safety: all member functions may be called from any number of threads at once.
 class Client {
@@ -100,9 +101,10 @@ class Client {
     /// unless expectedVersion is set. Without metadata a shape that has the key keeps what it has.
     ///
     /// Points travel in single precision. If the scan lies so far from the origin that rounding would hurt it
-    /// (a coordinate beyond 16 diagonals of the bounding box, as in surveyed coordinates), the centre of the
-    /// box is subtracted first. The offset is returned, and kept in the metadata under kOffsetKey;
-    /// coordinates of this shape that the server returns are relative to it.
+    /// (a coordinate beyond 16 diagonals of the bounding box, as in surveyed coordinates), they are sent
+    /// relative to the middle of the box, which the server keeps as Shape::origin. All points, positions and
+    /// motions that come back are in the coordinates of the scan. The same points elsewhere are other points:
+    /// kReplaced.
     [[nodiscard]] Result<AddReply> addShape(const AddRequest& request, const PointCloud& points,
                                             const RunContext& context = {}) const;
 
@@ -173,8 +175,7 @@ class Client {
     [[nodiscard]] Result<SegmentedScan> getSegments(const ShapeRef& shape,
                                                     const RunContext& context = {}) const;
 
-    /// Segments a scan on the server without storing it. The points come back as they were sent (see
-    /// addShape). Errors: those of a segmentation.
+    /// Segments a scan on the server without storing it. Errors: those of a segmentation.
     [[nodiscard]] Result<SegmentedScan> segment(const PointCloud& points, const Parameters& parameters,
                                                 bool summaryOnly, const RunContext& context = {}) const;
 
@@ -186,7 +187,7 @@ class Client {
                                                   bool includeSelf = false,
                                                   const RunContext& context = {}) const;
 
-    /// The query travels as in addShape; motions lead to its coordinates relative to the offset.
+    /// The query travels as in addShape.
     [[nodiscard]] Result<SearchReply> searchByScan(const SearchOptions& options, const PointCloud& points,
                                                    const RunContext& context = {}) const;
 
@@ -204,7 +205,7 @@ class Client {
                                              const RunContext& context = {}) const;
 
     /// Lays a stored shape, or another scan, on a scan; nothing is stored. Motions lead from the coordinates
-    /// of the other (of a stored shape relative to its offset) to those of `query`. Errors: kNotFound;
+    /// of the other to those of `query`. Errors: kNotFound;
     /// kNotReady (the shape has no surface points yet).
     [[nodiscard]] Result<Fit> align(const PointCloud& query, const ShapeRef& other,
                                     const CompareOptions& options = {}, const RunContext& context = {}) const;

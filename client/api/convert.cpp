@@ -146,6 +146,7 @@ Shape fromWire(const v1::Shape& from) {
     to.updated = fromWire(from.updated());
     if (from.has_failure()) to.failure = fromWire(from.failure());
     if (from.has_quality()) to.quality = from.quality();
+    to.origin = wire::fromProto(from.origin());
     return to;
 }
 

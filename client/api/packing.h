@@ -7,6 +7,7 @@
 #include <string>
 
 #include "common/point_stream.h"
+#include "common/wire_vector.h"
 #include "core/base/error.h"
 #include "core/base/run_context.h"
 #include "core/geometry/point.h"
@@ -16,20 +17,27 @@ namespace shapedb::client {
 /// Bytes of one chunk: the most whole points that fit.
 constexpr std::size_t kChunkBytes = kMaxChunkBytes / kPointBytes * kPointBytes;
 
-/// A float32 rounds a coordinate beyond this many box diagonals by more than 2^-20 (a millionth) of the
-/// diagonal: it has 24 significant bits, and 24 = 20 + log2(16).
-constexpr double kFarFromOrigin = 16.0;
-
 struct PackedPoints {
     std::string bytes;  ///< kPointBytes * count
     std::uint64_t count = 0;
     std::string sha256;  ///< 32 bytes, of `bytes`
-    Point3 offset;       ///< subtracted from every point, scan units
+    Point3 origin;       ///< subtracted from every point, scan units; zero unless they lie far from it
 };
 
-/// Errors: kTooFewPoints (none); kNonFiniteCoordinate; kCoordinateOutOfRange (beyond the largest float32, or
-/// the whole scan too small for one). The message names the first such point.
+/// The origin is the middle of the box around the points if they lie far from 0, 0, 0 (isFarFromOrigin) or
+/// single precision cannot hold them there.
+///
+/// Errors: kTooFewPoints (none); kNonFiniteCoordinate; kCoordinateOutOfRange (beyond the largest float32, the
+/// whole scan too small for one, or rounded before: checkNotRounded). The message names the first such point.
 [[nodiscard]] Result<PackedPoints> packPoints(const PointCloud& points);
+
+/// The fields of a header that describe its points.
+template <typename Header>
+void fill(const PackedPoints& points, Header* header) {
+    header->set_point_count(points.count);
+    header->set_sha256(points.sha256);
+    if (points.origin != Point3{}) wire::toProto(points.origin, header->mutable_origin());
+}
 
 /// Writes the points in chunks. False, early, if the server has already answered. `Request` has a chunk.
 template <typename Request, typename Stream>
@@ -51,12 +59,8 @@ void writeScan(Stream& stream, const Request& header, const PackedPoints& points
     if (stream.Write(header) && writeChunks<Request>(stream, points, context)) stream.WritesDone();
 }
 
-/// Appends to `points`. Errors: kMalformedStream (not a multiple of kPointBytes).
-[[nodiscard]] Result<void> unpackPoints(const std::string& bytes, PointCloud& points);
-
-/// "12 0.5 -3", with enough digits to read the same doubles back.
-[[nodiscard]] std::string offsetText(const Point3& offset);
-/// The inverse. Errors: kDataLoss (other text).
-[[nodiscard]] Result<Point3> offsetOf(const std::string& text);
+/// Appends to `points` what `bytes` has relative to `origin`, with the bits of single precision if that is
+/// zero. Errors: kMalformedStream (not a multiple of kPointBytes).
+[[nodiscard]] Result<void> unpackPoints(const std::string& bytes, const Point3& origin, PointCloud& points);
 
 }  // namespace shapedb::client

@@ -25,11 +25,8 @@ Result<SearchReply> Client::searchByScan(const SearchOptions& options, const Poi
     RETURN_IF_ERROR(packed);
     v1::SearchByScanRequest request;
     v1::SearchByScanHeader* header = request.mutable_header();
-    SearchOptions moved = options;
-    if (moved.viewpoint) moved.viewpoint = *moved.viewpoint - packed->offset;
-    fill(moved, header->mutable_options());
-    header->set_point_count(packed->count);
-    header->set_sha256(packed->sha256);
+    fill(options, header->mutable_options());
+    fill(*packed, header);
     v1::SearchResponse response;
     const auto made =
         makeCall(impl_->options, context, kIdempotent, [&](grpc::ClientContext& rpc, Result<void>&) {
@@ -39,9 +36,7 @@ Result<SearchReply> Client::searchByScan(const SearchOptions& options, const Poi
             return stream->Finish();
         });
     RETURN_IF_ERROR(made);
-    SearchReply reply = fromWire(response);
-    reply.offset = packed->offset;
-    return reply;
+    return fromWire(response);
 }
 
 Result<SearchReply> Client::searchBySignature(const SearchOptions& options,
@@ -99,9 +94,11 @@ Result<Fit> alignScans(const ClientOptions& options, v1::AlignService::Stub& stu
     v1::AlignHeader* header = request.mutable_header();
     header->set_query_points(query.count);
     header->set_query_sha256(query.sha256);
+    wire::toProto(query.origin, header->mutable_query_origin());
     if (other != nullptr) {
         header->set_other_points(other->count);
         header->set_other_sha256(other->sha256);
+        wire::toProto(other->origin, header->mutable_other_origin());
     }
     v1::AlignResponse response;
     const auto made = makeCall(options, context, kIdempotent, [&](grpc::ClientContext& rpc, Result<void>&) {
@@ -114,17 +111,7 @@ Result<Fit> alignScans(const ClientOptions& options, v1::AlignService::Stub& stu
         return stream->Finish();
     });
     RETURN_IF_ERROR(made);
-    Fit fit = fromWire(response.fit());
-    // From and to the coordinates that the caller knows.
-    const Point3 from = other != nullptr ? other->offset : Point3{};
-    const auto shift = [&](FitPose& pose) {
-        pose.motion.translation =
-            pose.motion.translation + query.offset - pose.motion.scale * rotate(pose.motion.rotation, from);
-    };
-    shift(fit.best);
-    for (FitPose& pose : fit.alternatives) shift(pose);
-    for (FreeAxis& axis : fit.axes) axis.point = axis.point + query.offset;
-    return fit;
+    return fromWire(response.fit());
 }
 
 v1::AlignRequest alignRequest(const CompareOptions& options) {

@@ -16,23 +16,13 @@ v1::AddShapeRequest addHeader(const AddRequest& request, const PackedPoints& pac
     header->set_collection(request.shape.collection);
     header->set_key(request.shape.key);
     header->set_mode(toWire(request.mode));
-    const bool moved = packed.offset != Point3{};
-    if (request.metadata && (moved || !request.metadata->empty())) {
+    if (request.metadata && !request.metadata->empty()) {
         header->mutable_metadata()->insert(request.metadata->begin(), request.metadata->end());
-        if (moved) (*header->mutable_metadata())[kOffsetKey] = offsetText(packed.offset);
-    } else {
-        // What the shape has stays, except for the offset, which is of these points.
-        v1::MetadataChange* change = header->mutable_metadata_change();
-        change->set_replace_all(request.metadata.has_value());
-        if (moved) {
-            (*change->mutable_set())[kOffsetKey] = offsetText(packed.offset);
-        } else if (!request.metadata) {
-            change->add_remove(kOffsetKey);
-        }
+    } else if (request.metadata) {
+        header->mutable_metadata_change()->set_replace_all(true);
     }
     if (request.expectedVersion) header->set_expected_version(*request.expectedVersion);
-    header->set_point_count(packed.count);
-    header->set_sha256(packed.sha256);
+    fill(packed, header);
     header->set_wait(request.wait);
     return message;
 }
@@ -40,14 +30,16 @@ v1::AddShapeRequest addHeader(const AddRequest& request, const PackedPoints& pac
 /// Reads the reply of GetSegments or Segment.
 template <typename Stream>
 Result<void> readSegments(Stream& stream, SegmentedScan& scan, const RunContext& context) {
+    Point3 origin;
     v1::SegmentedPoints message;
     while (stream.Read(&message)) {
         if (message.has_summary()) {
             scan.report = fromWire(message.summary().report());
             scan.signature = fromWire(message.summary().signature());
+            origin = wire::fromProto(message.summary().origin());
         } else if (message.has_chunk()) {
             const v1::LabelledChunk& chunk = message.chunk();
-            RETURN_IF_ERROR(unpackPoints(chunk.xyz(), scan.points));
+            RETURN_IF_ERROR(unpackPoints(chunk.xyz(), origin, scan.points));
             scan.segments.insert(scan.segments.end(), chunk.segments().begin(), chunk.segments().end());
             context.report("download", scan.points.size(), scan.report.points);
         }
@@ -76,7 +68,7 @@ Result<AddReply> Client::addShape(const AddRequest& request, const PointCloud& p
         return stream->Finish();
     });
     RETURN_IF_ERROR(made);
-    return AddReply{fromWire(response.outcome()), fromWire(response.shape()), packed->offset};
+    return AddReply{fromWire(response.outcome()), fromWire(response.shape())};
 }
 
 Result<Shape> Client::getShape(const ShapeRef& shape, const RunContext& context) const {
@@ -114,7 +106,7 @@ Result<void> readPoints(grpc::ClientReader<v1::StoredPoints>& stream, StoredPoin
         } else if (message.has_chunk()) {
             const std::string& xyz = message.chunk().xyz();
             hash.update(xyz.data(), xyz.size());
-            RETURN_IF_ERROR(unpackPoints(xyz, scan.points));
+            RETURN_IF_ERROR(unpackPoints(xyz, scan.shape.origin, scan.points));
             context.report("download", scan.points.size(), scan.shape.pointCount);
         }
     }
@@ -147,12 +139,6 @@ Result<StoredPoints> Client::getPoints(const ShapeRef& shape, const RunContext& 
         return fail(ErrorCode::kCountMismatch, "the server sent " + std::to_string(scan.points.size()) +
                                                    " of " + std::to_string(scan.shape.pointCount) +
                                                    " points");
-    }
-    const auto offset = scan.shape.metadata.find(kOffsetKey);
-    if (offset != scan.shape.metadata.end()) {
-        const auto read = offsetOf(offset->second);
-        RETURN_IF_ERROR(read);
-        scan.offset = *read;
     }
     return scan;
 }
@@ -268,8 +254,7 @@ Result<SegmentedScan> Client::segment(const PointCloud& points, const Parameters
     RETURN_IF_ERROR(packed);
     v1::SegmentRequest request;
     v1::SegmentHeader* header = request.mutable_header();
-    header->set_point_count(packed->count);
-    header->set_sha256(packed->sha256);
+    fill(*packed, header);
     header->set_summary_only(summaryOnly);
     fillParameters(parameters, header);
     SegmentedScan scan;

@@ -17,10 +17,6 @@ using shapedb::Metadata;
 
 using Timestamp = std::chrono::system_clock::time_point;
 
-/// Metadata key of the offset that an upload subtracted from the coordinates (see Client::addShape): three
-/// numbers separated by blanks, in scan units.
-constexpr const char* kOffsetKey = "shapedb.offset";
-
 /// Names one shape. An empty collection is "default".
 struct ShapeRef {
     std::string collection;
@@ -44,13 +40,15 @@ struct Shape {
     std::int64_t version = 0;  ///< 1 when inserted, one more with every change
     ShapeState state = ShapeState::kPending;
     std::uint64_t pointCount = 0;
-    std::string sha256;  ///< 32 bytes, of the points as sent
+    std::string sha256;  ///< 32 bytes, of the points as sent, so relative to `origin`
     Metadata metadata;
     Timestamp created;
     Timestamp updated;
     std::optional<Error> failure;  ///< set exactly when state is kFailed
     /// How certain the interior is, [0, 1]. Not set before there is a signature with attributes.
     std::optional<double> quality;
+    /// What the points were sent relative to (see Client::addShape); usually zero.
+    Point3 origin;
 };
 
 enum class AddMode {
@@ -86,7 +84,6 @@ enum class AddOutcome {
 struct AddReply {
     AddOutcome outcome = AddOutcome::kCreated;
     Shape shape;
-    Point3 offset;  ///< subtracted from the coordinates before upload, scan units; usually zero
 };
 
 enum class ShapeOrder {
@@ -129,9 +126,8 @@ struct FoundShapes {
 /// The points of a shape as they are stored.
 struct StoredPoints {
     Shape shape;  ///< as of when the points were read
-    /// As they were sent: relative to the offset, if there is one, with the bits of single precision.
+    /// Where they were scanned: what was sent, in single precision, with shape.origin added.
     PointCloud points;
-    Point3 offset;  ///< of kOffsetKey; add it to have the coordinates of the scan. Usually zero
 };
 
 struct ValueCountRequest {
@@ -175,7 +171,7 @@ struct RetryReply {
 struct MetadataChange {
     Metadata set{};                     ///< in place of what the shape has under these keys
     std::vector<std::string> remove{};  ///< keys; those it does not have are ignored
-    /// The shape keeps only what `set` has, and kOffsetKey unless that is set too.
+    /// The shape keeps only what `set` has, and what is under keys that begin with "shapedb.".
     bool replaceAll = false;
 };
 

@@ -14,8 +14,8 @@ namespace shapedb::client {
 using TrailingMetadata = std::multimap<grpc::string_ref, grpc::string_ref>;
 
 /// The error of a failed call. Its code is the one the server names in the trailing metadata `shapedb-error`;
-/// without that (a proxy answered, there was no reply, or the server cut the call off) it follows from the gRPC
-/// code. `address` is for the message.
+/// without that (a proxy answered, there was no reply, or the server cut the call off) it follows from the
+/// gRPC code. `address` is for the message.
 [[nodiscard]] Error errorOf(const grpc::Status& status, const TrailingMetadata& trailing,
                             const std::string& address);
 

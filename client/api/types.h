@@ -111,7 +111,7 @@ struct SegmentationReport {
 struct SegmentedScan {
     SegmentationReport report;
     Signature signature;
-    PointCloud points;                   ///< as uploaded, in order; empty for a summary
+    PointCloud points;                   ///< where they were scanned, in order; empty for a summary
     std::vector<std::int32_t> segments;  ///< per point, 0 being the largest segment; -1: none
 };
 
@@ -235,7 +235,6 @@ struct SearchReply {
     double secondsSegment = 0.0;   ///< searchByScan only
     double secondsSearch = 0.0;
     std::optional<SegmentationReport> report;  ///< searchByScan only
-    Point3 offset;  ///< subtracted from the query's coordinates before upload; usually zero
 };
 
 /// One query of a batch: a stored shape (left out of its own hits), or an encoded signature.

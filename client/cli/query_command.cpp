@@ -34,13 +34,11 @@ struct QueryFlags {
     bool noExplanation = false;
 };
 
-/// From coordinates of the hit to those of the query as the user has them.
-std::optional<Motion> motionOf(const client::Hit& hit, const Point3& offset) {
-    std::optional<Motion> motion;
-    if (hit.explanation) motion = hit.explanation->motion;
-    if (hit.fit) motion = hit.fit->best.motion;
-    if (motion) motion->translation = motion->translation + offset;
-    return motion;
+/// From coordinates of the hit to those of the query.
+std::optional<Motion> motionOf(const client::Hit& hit) {
+    if (hit.fit) return hit.fit->best.motion;
+    if (hit.explanation) return hit.explanation->motion;
+    return std::nullopt;
 }
 
 /// The group of each hit; nothing without groups.
@@ -69,7 +67,7 @@ json replyJson(const client::SearchReply& reply) {
                       {"verdict", verdictJson(hit.verdict)},
                       {"verdict_reliability", hit.verdictReliability},
                       {"shape", toJson(hit.shape)}};
-        if (const auto motion = motionOf(hit, reply.offset)) entry["matrix"] = matrixOf(*motion);
+        if (const auto motion = motionOf(hit)) entry["matrix"] = matrixOf(*motion);
         if (!groups.empty()) entry["group"] = valueOf(groups[i]);
         if (hit.fit) entry["fit"] = toJson(*hit.fit);
         if (hit.explanation) entry["explanation"] = toJson(*hit.explanation);
@@ -86,7 +84,6 @@ json replyJson(const client::SearchReply& reply) {
                      {"seconds_segment", reply.secondsSegment},
                      {"seconds_search", reply.secondsSearch}};
     if (reply.report) document["report"] = toJson(*reply.report);
-    if (reply.offset != Point3{}) document["offset"] = {reply.offset.x, reply.offset.y, reply.offset.z};
     return document;
 }
 

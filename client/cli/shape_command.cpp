@@ -41,6 +41,7 @@ std::string shapeText(const client::Shape& shape) {
             {"failure", std::string(errorCodeName(shape.failure->code)) + ": " + shape.failure->message});
     }
     table.add({"points", formatCount(shape.pointCount)});
+    if (shape.origin != Point3{}) table.add({"sent relative to", formatPoint(shape.origin)});
     if (shape.quality) table.add({"quality", formatFixed(*shape.quality, 2) + " of 1"});
     for (const auto& [name, value] : shape.metadata) table.add({name, value});
     return table.render();
@@ -48,13 +49,10 @@ std::string shapeText(const client::Shape& shape) {
 
 /// --points: writes the scan as it was sent, where it was.
 CommandResult writeScan(Session& session, const client::Client& client, const KeyFlags& flags) {
-    auto scan = client.getPoints(flags.shape, session.context());
+    const auto scan = client.getPoints(flags.shape, session.context());
     RETURN_IF_ERROR(scan);
-    const bool moved = scan->offset != Point3{};
-    if (moved) {
-        for (Point3& point : scan->points) point = point + scan->offset;
-    }
-    // Moved back, the coordinates have more digits than single precision.
+    // With an origin the coordinates have more digits than single precision.
+    const bool moved = scan->shape.origin != Point3{};
     RETURN_IF_ERROR(
         writePointsPly(flags.out, scan->points, moved ? PlyPrecision::kDouble : PlyPrecision::kSingle));
     json document = toJson(scan->shape);

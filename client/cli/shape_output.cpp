@@ -263,6 +263,7 @@ json toJson(const client::Shape& shape) {
     if (shape.failure) {
         out["failure"] = {{"name", errorCodeName(shape.failure->code)}, {"message", shape.failure->message}};
     }
+    if (shape.origin != Point3{}) out["origin"] = {shape.origin.x, shape.origin.y, shape.origin.z};
     if (shape.quality) out["quality"] = *shape.quality;
     return out;
 }

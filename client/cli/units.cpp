@@ -58,7 +58,6 @@ void scaleBy(double factor, client::SearchReply& reply) {
         reply.report->volume *= cube;
         reply.report->noise *= factor;
     }
-    reply.offset = factor * reply.offset;
 }
 
 }  // namespace shapedb::cli

@@ -10,6 +10,8 @@
 
 #include "client/io/output_file.h"
 #include "core/base/return_if_error.h"
+#include "core/geometry/box.h"
+#include "core/geometry/resolution.h"
 
 namespace shapedb {
 
@@ -147,7 +149,8 @@ Result<void> writeLabelledPly(const std::string& path, const PointCloud& points,
                                                      " labels for " + std::to_string(points.size()) +
                                                      " points; one each is needed");
     }
-    return writePlyGuarded(path, points, &labels, PlyPrecision::kSingle);
+    const bool far = !points.empty() && isFarFromOrigin(boxOf(points));
+    return writePlyGuarded(path, points, &labels, far ? PlyPrecision::kDouble : PlyPrecision::kSingle);
 }
 
 Result<void> writePointsPly(const std::string& path, const PointCloud& points, PlyPrecision precision) {

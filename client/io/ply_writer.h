@@ -28,8 +28,9 @@ struct Rgb {
 /// labels are grey, which no segment is.
 [[nodiscard]] Rgb segmentColour(std::int32_t label);
 
-/// Writes binary little-endian PLY with the vertex properties float x y z, uchar red green blue
-/// (segmentColour) and int segment (the label). `labels` has one entry per point, -1 for none.
+/// Writes binary little-endian PLY with the vertex properties x y z, uchar red green blue (segmentColour) and
+/// int segment (the label). Coordinates are float, or double for points so far from the origin that single
+/// precision would cost them digits (isFarFromOrigin). `labels` has one entry per point, -1 for none.
 ///
 /// Errors: kInvalidArgument (not as many labels as points); kNonFiniteCoordinate and kCoordinateOutOfRange
 /// (beyond single precision), naming the point; kFileNotWritable; kOutOfMemory. An error leaves no new file

@@ -16,6 +16,7 @@
 #include "client/io/text.h"
 #include "core/base/return_if_error.h"
 #include "core/geometry/mesh.h"
+#include "core/geometry/resolution.h"
 
 namespace shapedb {
 
@@ -220,6 +221,9 @@ Result<Scan> readScanUnguarded(const std::string& path, const ReadOptions& optio
     // The real reason comes before the parser's complaint about an early end.
     if (file->failure()) return fail(*file->failure());
     RETURN_IF_ERROR(content);
+    // The vertices: samples of their triangles have digits that tell nothing.
+    const auto intact = checkNotRounded(content->vertices);
+    if (!intact) return fail(withContext(intact.error(), path + ": "));
 
     Scan scan;
     scan.skippedNonFinite = content->skippedNonFinite;

@@ -79,6 +79,8 @@ struct Scan {
 ///  data
 ///    that is damaged, or unpacks to absurdly much
 ///  - kNonFiniteCoordinate: NaN or infinity, except in PCD, with the vertex
+///  - kCoordinateOutOfRange: the vertices were rounded to single precision so far from the origin that their
+///    shape is lost (checkNotRounded)
 ///  - kPointLimitExceeded: see ReadOptions::maxPoints
 ///  - kInvalidArgument: meshSamples is 0, format is none, standard input without one, or kSurface for a file
 ///    without triangles

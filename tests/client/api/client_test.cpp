@@ -198,47 +198,35 @@ TEST(Client, ARetriedUploadIsComplete) {
     EXPECT_EQ(server.shapes.points, packPoints(points)->bytes);
 }
 
-TEST(Client, OffsetIsRecordedInTheMetadata) {
+TEST(Client, FarScansAreSentRelativeToAnOrigin) {
     FakeServer server;
     PointCloud points = cloud(1000);
+    ASSERT_TRUE(server.client().addShape({{"", "a"}}, points));
+    EXPECT_FALSE(server.shapes.header.has_origin());
     for (Point3& p : points) p = p + Point3{5e6, 0.0, 0.0};
-    const auto reply = server.client().addShape({{"", "a"}}, points);
-    ASSERT_TRUE(reply);
-    EXPECT_NEAR(reply->offset.x, 5e6 + 49.5, 1.0);
-    EXPECT_EQ(server.shapes.header.metadata_change().set().at(kOffsetKey), offsetText(reply->offset));
+    ASSERT_TRUE(server.client().addShape({{"", "a"}}, points));
+    EXPECT_NEAR(server.shapes.header.origin().x(), 5e6 + 49.5, 1.0);
+    EXPECT_EQ(server.shapes.header.metadata().size(), 0u);
 }
 
-// A client that gives no metadata is told apart from one that gives an empty set; the offset is always that
-// of the points.
+// A client that gives no metadata is told apart from one that gives an empty set.
 TEST(Client, UploadsWithoutMetadataLeaveThoseOfTheShape) {
     FakeServer server;
-    PointCloud far = cloud(1000);
-    for (Point3& p : far) p = p + Point3{5e6, 0.0, 0.0};
-    const auto sent = [&](const std::optional<Metadata>& metadata, const PointCloud& points) {
+    const auto sent = [&](const std::optional<Metadata>& metadata) {
         AddRequest request;
         request.shape.key = "a";
         request.metadata = metadata;
-        EXPECT_TRUE(server.client().addShape(request, points));
+        EXPECT_TRUE(server.client().addShape(request, cloud(1000)));
         return server.shapes.header;
     };
-    const auto none = sent(std::nullopt, cloud(1000));
+    const auto none = sent(std::nullopt);
     EXPECT_TRUE(none.metadata().empty());
-    EXPECT_FALSE(none.metadata_change().replace_all());
-    EXPECT_TRUE(none.metadata_change().set().empty());
-    ASSERT_EQ(none.metadata_change().remove_size(), 1) << "of earlier points";
-    EXPECT_EQ(none.metadata_change().remove(0), kOffsetKey);
-    const auto noneFar = sent(std::nullopt, far);
-    EXPECT_FALSE(noneFar.metadata_change().replace_all());
-    EXPECT_EQ(noneFar.metadata_change().set().count(kOffsetKey), 1u);
-    const auto empty = sent(Metadata{}, cloud(1000));
+    EXPECT_FALSE(none.has_metadata_change());
+    const auto empty = sent(Metadata{});
     EXPECT_TRUE(empty.metadata_change().replace_all());
     EXPECT_TRUE(empty.metadata_change().set().empty());
-    const auto emptyFar = sent(Metadata{}, far);
-    EXPECT_FALSE(emptyFar.has_metadata_change());
-    EXPECT_EQ(emptyFar.metadata().size(), 1u);
-    const auto some = sent(Metadata{{"label", "cup"}}, far);
+    const auto some = sent(Metadata{{"label", "cup"}});
     EXPECT_EQ(some.metadata().at("label"), "cup");
-    EXPECT_EQ(some.metadata().count(kOffsetKey), 1u);
     EXPECT_FALSE(some.has_metadata_change());
 }
 

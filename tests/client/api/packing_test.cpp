@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
 #include <gtest/gtest.h>
 
 #include "common/sha256.h"
 #include "core/base/random.h"
+#include "core/geometry/resolution.h"
 
 namespace shapedb::client {
 namespace {
@@ -25,7 +25,7 @@ PointCloud cloud(double size, const Point3& at, std::size_t count = 200) {
 
 PointCloud unpacked(const PackedPoints& packed) {
     PointCloud points;
-    EXPECT_TRUE(unpackPoints(packed.bytes, points));
+    EXPECT_TRUE(unpackPoints(packed.bytes, packed.origin, points));
     return points;
 }
 
@@ -36,7 +36,7 @@ TEST(Packing, BytesAreLittleEndianFloats) {
     EXPECT_EQ(packed->count, 1u);
     const Sha256Digest digest = sha256(packed->bytes.data(), packed->bytes.size());
     EXPECT_EQ(packed->sha256, std::string(digest.begin(), digest.end()));
-    EXPECT_EQ(packed->offset, Point3{});
+    EXPECT_EQ(packed->origin, Point3{});
 }
 
 TEST(Packing, RoundTripsAtEverySize) {
@@ -44,7 +44,7 @@ TEST(Packing, RoundTripsAtEverySize) {
         const PointCloud points = cloud(size, {});
         const auto packed = packPoints(points);
         ASSERT_TRUE(packed) << size << packed.error().message;
-        EXPECT_EQ(packed->offset, Point3{});
+        EXPECT_EQ(packed->origin, Point3{});
         const PointCloud back = unpacked(*packed);
         for (std::size_t i = 0; i < points.size(); ++i) {
             EXPECT_LT(std::sqrt(3.0) * std::abs(back[i].x - points[i].x), 1e-6 * size);
@@ -57,24 +57,24 @@ TEST(Packing, KeepsTheShapeFarFromTheOrigin) {
     const PointCloud points = cloud(2.0, far);
     const auto packed = packPoints(points);
     ASSERT_TRUE(packed);
-    EXPECT_LT(distance(packed->offset, far), 2.0);
+    EXPECT_LT(distance(packed->origin, far), 2.0);
     const PointCloud back = unpacked(*packed);
     for (std::size_t i = 0; i < points.size(); ++i) {
-        EXPECT_LT(distance(back[i] + packed->offset, points[i]), 2e-6) << "a millionth of the size";
+        EXPECT_LT(distance(back[i], points[i]), 2e-6) << "a millionth of the size";
     }
 }
 
-TEST(Packing, OffsetStartsWhereRoundingWouldHurt) {
+TEST(Packing, TheOriginMovesWhereRoundingWouldHurt) {
     const double size = 1.0;
-    const auto offsetAt = [&](double distanceFromOrigin) {
+    const auto originAt = [&](double distanceFromOrigin) {
         PointCloud corners = {{0, 0, 0}, {size, 0, 0}, {0, size, 0}, {0, 0, size}};
         for (Point3& p : corners) p.x += distanceFromOrigin;
-        return packPoints(corners)->offset;
+        return packPoints(corners)->origin;
     };
     const double diagonal = std::sqrt(3.0);
-    EXPECT_EQ(offsetAt(kFarFromOrigin * diagonal - 1.1), Point3{});
-    EXPECT_NE(offsetAt(kFarFromOrigin * diagonal), Point3{});
-    // Without an offset no coordinate moves by more than a millionth of the diagonal.
+    EXPECT_EQ(originAt(kFarFromOrigin * diagonal - 1.1), Point3{});
+    EXPECT_NE(originAt(kFarFromOrigin * diagonal), Point3{});
+    // Without an origin no coordinate moves by more than a millionth of the diagonal.
     const double x = kFarFromOrigin * diagonal - 1.1 + 0.123456789;
     EXPECT_LE(std::abs(static_cast<double>(static_cast<float>(x)) - x), diagonal * 0x1p-20);
 }
@@ -112,22 +112,39 @@ TEST(Packing, ChunksHoldWholePointsAndAtMostOneMebibyte) {
 
 TEST(Packing, UnpackRefusesAPartialPoint) {
     PointCloud points;
-    const auto result = unpackPoints(std::string(13, '\0'), points);
+    const auto result = unpackPoints(std::string(13, '\0'), {}, points);
     ASSERT_FALSE(result);
     EXPECT_EQ(result.error().code, ErrorCode::kMalformedStream);
 }
 
-TEST(Packing, OffsetTextRoundTrips) {
-    const Point3 offset{1.0 / 3.0, -4.5e6, 1e-300};
-    double x = 0.0;
-    double y = 0.0;
-    double z = 0.0;
-    ASSERT_EQ(std::sscanf(offsetText(offset).c_str(), "%lf %lf %lf", &x, &y, &z), 3);
-    EXPECT_EQ((Point3{x, y, z}), offset);
-    EXPECT_EQ(offsetOf(offsetText(offset)).value(), offset);
-    for (const char* text : {"", "1 2", "1 2 3 4", "1 2 x", "1,2,3", "nan 0 0", "1 2 3 "}) {
-        EXPECT_EQ(offsetOf(text).error().code, ErrorCode::kDataLoss) << text;
+TEST(Packing, UnpackingKeepsEveryBitWithoutAnOrigin) {
+    PointCloud points;
+    ASSERT_TRUE(
+        unpackPoints(std::string("\x00\x00\x00\x80\x00\x00\x80\x3f\x01\x00\x00\x00", 12), {}, points));
+    EXPECT_TRUE(std::signbit(points[0].x));
+    EXPECT_EQ(points[0].z, 0x1p-149);
+}
+
+TEST(Packing, PointsThatWereRoundedBeforeAreRefused) {
+    PointCloud points = cloud(2.0, {4.5e6, -5.4e6, 300.0});
+    EXPECT_TRUE(packPoints(points));
+    for (Point3& p : points) {
+        for (double* c : {&p.x, &p.y, &p.z}) *c = static_cast<double>(static_cast<float>(*c));
     }
+    const auto refused = packPoints(points);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::kCoordinateOutOfRange);
+}
+
+TEST(Packing, AThinStripIsSentRelativeToItself) {
+    // 5 diagonals away, so not far, but its width has few steps there.
+    PointCloud strip = cloud(1.0, {});
+    for (Point3& p : strip) p = {p.x, 5.0 + 1e-5 * p.y, p.z};
+    const auto packed = packPoints(strip);
+    ASSERT_TRUE(packed);
+    EXPECT_NEAR(packed->origin.y, 5.0, 1e-5);
+    const PointCloud back = unpacked(*packed);
+    for (std::size_t i = 0; i < strip.size(); ++i) EXPECT_LT(std::abs(back[i].y - strip[i].y), 1e-11);
 }
 
 }  // namespace

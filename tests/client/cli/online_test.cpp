@@ -6,8 +6,7 @@
 #include "client/io/scan_reader.h"
 #include "core/base/random.h"
 #include "core/geometry/motion.h"
-#include "tests/client/cli/run_command.h"
-#include "tests/integration/support/server_process.h"
+#include "tests/client/cli/online_fixture.h"
 
 namespace shapedb::cli {
 namespace {
@@ -16,55 +15,6 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 using testing::ServerProcess;
 using testing::TemporaryDirectory;
-
-/// One server for all tests, one collection per test.
-class Online : public CommandTest {
-  protected:
-    static void SetUpTestSuite() {
-        data() = std::make_unique<TemporaryDirectory>();
-        server() =
-            std::make_unique<ServerProcess>(data()->path(), std::vector<std::string>{"--limits-max-k", "50"});
-        scans() = data()->path() + "/scans";
-        const CommandRun run = runCommand(
-            {"sample", scans(), "--count", "2", "--points", "2000", "--families", "human,mug,fish"});
-        ASSERT_EQ(run.exitCode, 0) << run.err;
-    }
-    static void TearDownTestSuite() {
-        server().reset();
-        data().reset();
-    }
-
-    static std::unique_ptr<TemporaryDirectory>& data() {
-        static std::unique_ptr<TemporaryDirectory> directory;
-        return directory;
-    }
-    static std::unique_ptr<ServerProcess>& server() {
-        static std::unique_ptr<ServerProcess> process;
-        return process;
-    }
-    static std::string& scans() {
-        static std::string folder;
-        return folder;
-    }
-
-    static CommandRun online(std::vector<std::string> arguments) {
-        arguments.insert(arguments.end(), {"--server", server()->address(), "--timeout", "60"});
-        return runCommand(arguments);
-    }
-    static json onlineJson(std::vector<std::string> arguments, int exitCode = 0) {
-        arguments.emplace_back("--json");
-        const CommandRun run = online(arguments);
-        EXPECT_EQ(run.exitCode, exitCode) << arguments[0] << ": " << run.err;
-        return run.json();
-    }
-    /// A collection with the six samples, segmented.
-    static void fill(const std::string& collection) {
-        onlineJson({"collection", "create", collection, "--profile", "paper"});
-        const json added = onlineJson(
-            {"add", scans(), "--base", scans(), "--collection", collection, "--label-from-folder", "--wait"});
-        ASSERT_EQ(added["added"].size(), 6u);
-    }
-};
 
 TEST_F(Online, HealthIsServing) {
     EXPECT_EQ(onlineJson({"health"})["status"], "SERVING");
@@ -129,27 +79,6 @@ TEST_F(Online, AddRefusesTwoFilesWithOneKey) {
     EXPECT_EQ(onlineJson({"add", path("in"), "--key", "x"}, 2)["error"]["name"], "invalid_argument");
     EXPECT_EQ(onlineJson({"add", path("in/a.xyz"), "--meta", "nonsense"}, 2)["error"]["name"],
               "invalid_argument");
-}
-
-TEST_F(Online, SurveyedCoordinatesKeepTheirShape) {
-    onlineJson({"collection", "create", "survey", "--profile", "paper"});
-    PointCloud local = dumbbellPoints(2000);
-    PointCloud surveyed = local;
-    for (Point3& p : surveyed) p = p + Point3{4.5e6, 5.4e6, 312.5};
-    writePoints("local.xyz", local);
-    std::string text;
-    for (const Point3& p : surveyed) {
-        text += std::to_string(p.x) + " " + std::to_string(p.y) + " " + std::to_string(p.z) + "\n";
-    }
-    write("surveyed.xyz", text);
-    onlineJson({"add", path("local.xyz"), path("surveyed.xyz"), "--base", folder(), "--collection", "survey",
-                "--wait"});
-    const json shape = onlineJson({"get", "surveyed", "--collection", "survey"});
-    EXPECT_NEAR(std::stod(shape["metadata"]["shapedb.offset"].get<std::string>()), 4.5e6, 0.01);
-    EXPECT_FALSE(
-        onlineJson({"get", "local", "--collection", "survey"})["metadata"].contains("shapedb.offset"));
-    EXPECT_GT(onlineJson({"compare", "local", "surveyed", "--collection", "survey"})["score"].get<double>(),
-              0.99);
 }
 
 TEST_F(Online, QueryByKeyAndByScanRankTheSame) {
