@@ -200,7 +200,7 @@ struct Fit {
     double misfit = 0.0;                ///< 0: the shapes coincide; about 1: typical of unrelated shapes
     double certainty = 0.0;             ///< [0, 1]: 0 if a clearly different pose is as good
     bool handednessOpen = false;        ///< the points do not tell left from right
-    std::vector<FitPose> alternatives;  ///< clearly different poses that are as good, best first
+    std::vector<FitPose> alternatives;  ///< clearly different poses as good, best first; 4 at most
     std::vector<FreeAxis> axes;         ///< one for a bottle, three for a ball
 };
 

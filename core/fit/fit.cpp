@@ -40,6 +40,9 @@ constexpr Stage kStages[] = {
     {4, 512, 0.85, 10, 0.035f, 0.02f, 0.02f, false},
 };
 
+// The others that enter the last stage, and one of the other hand.
+static_assert(std::end(kStages)[-1].poses == kMostAlternatives);
+
 constexpr std::size_t kTurnedPoses = 2;
 constexpr int kTurns = 24;
 
@@ -204,7 +207,7 @@ FitResult resultOf(std::vector<Candidate> candidates, Comparison& comparison, co
         const Candidate& c = candidates[i];
         if (isTurned(comparison, best.pose, c.pose, axes, kDifferent)) continue;
         second = std::max(second, c.score());
-        if (c.score() < kAsGood * best.score() || result.alternatives.size() == kMostAlternatives) continue;
+        if (c.score() < kAsGood * best.score()) continue;
         result.alternatives.push_back(poseOf(c, comparison, options.keepScale));
     }
     const double score = best.score();

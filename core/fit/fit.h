@@ -73,7 +73,7 @@ struct FitResult {
     /// and count as none. Turns about a free axis are not different poses.
     double certainty = 0.0;
     /// Clearly different poses (more than 4 % of the query's diagonal apart) whose score is within 3 % of the
-    /// best, best first; at most kMostAlternatives.
+    /// best, best first; at most kMostAlternatives, of however many there are.
     std::vector<FitPose> alternatives;
     /// A mirrored and an unmirrored pose are as good (both score within 1 % of the better): the points do not
     /// tell left from right. `best` is then the unmirrored one. Never without FitOptions::reflection. `fit`
@@ -82,7 +82,9 @@ struct FitResult {
     std::vector<FreeAxis> axes;  ///< one for a bottle; three for a ball, which may be turned any way
 };
 
-constexpr std::size_t kMostAlternatives = 8;
+/// So many poses are refined to the end beside the best: three, and one of the other hand if they are all of
+/// one. More would take more time of every fit of a search, for shapes that few ask about (a cube has 24).
+constexpr std::size_t kMostAlternatives = 4;
 
 struct FitPoints;
 

@@ -218,6 +218,14 @@ TEST(Fit, ReturnsEquallyGoodPoses) {
         EXPECT_LE(pose.score, result.best.score);
         EXPECT_LT(twoWayError(other, pose.motion, motion), 0.02);
     }
+    // Mirrored ones are as good; no more than promised are returned.
+    options.reflection = true;
+    const FitResult either =
+        fitted(applyToCloud(motion, *sampleBoundary(makeBox().solid, 20000, 2)), other, options);
+    EXPECT_TRUE(either.handednessOpen);
+    EXPECT_GE(either.alternatives.size(), 3u);
+    EXPECT_LE(either.alternatives.size(), kMostAlternatives);
+    options.reflection = false;
     const FitResult sure = fitted(scanOfMember("human", 1, 1), scanOfMember("human", 1, 2), options);
     EXPECT_TRUE(sure.alternatives.empty());
     EXPECT_GT(sure.certainty, 0.1);
