@@ -207,10 +207,12 @@ class Client {
     /// Lays a stored shape, or another scan, on a scan; nothing is stored. Motions lead from the coordinates
     /// of the other to those of `query`. Errors: kNotFound;
     /// kNotReady (the shape has no surface points yet).
-    [[nodiscard]] Result<Fit> align(const PointCloud& query, const ShapeRef& other,
-                                    const CompareOptions& options = {}, const RunContext& context = {}) const;
-    [[nodiscard]] Result<Fit> align(const PointCloud& query, const PointCloud& other,
-                                    const CompareOptions& options = {}, const RunContext& context = {}) const;
+    [[nodiscard]] Result<Alignment> align(const PointCloud& query, const ShapeRef& other,
+                                          const CompareOptions& options = {},
+                                          const RunContext& context = {}) const;
+    [[nodiscard]] Result<Alignment> align(const PointCloud& query, const PointCloud& other,
+                                          const CompareOptions& options = {},
+                                          const RunContext& context = {}) const;
 
     // ------------------------------------------------------------------------------- collections
 

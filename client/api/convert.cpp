@@ -279,6 +279,8 @@ Comparison fromWire(const v1::CompareResponse& from) {
     if (from.has_fit()) to.fit = fromWire(from.fit());
     to.verdict = wire::fromProto(from.verdict());
     to.verdictReliability = from.verdict_reliability();
+    to.unit = wire::fromProto(from.unit()).value_or(LengthUnit::kNone);
+    to.leftRightUntold = from.left_right_untold();
     return to;
 }
 
@@ -307,6 +309,8 @@ SearchReply fromWire(const v1::SearchResponse& from) {
     to.verified = from.candidates_verified();
     to.exact = !from.not_exact();
     to.pending = from.pending();
+    to.unit = wire::fromProto(from.unit()).value_or(LengthUnit::kNone);
+    to.leftRightUntold = from.left_right_untold();
     to.query = fromWire(from.query());
     to.secondsSegment = from.seconds_segment();
     to.secondsSearch = from.seconds_search();

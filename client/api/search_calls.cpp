@@ -89,8 +89,9 @@ Result<Comparison> Client::compare(const ShapeRef& query, const ShapeRef& other,
 namespace {
 
 // `other`: null for a stored shape, which the header names.
-Result<Fit> alignScans(const ClientOptions& options, v1::AlignService::Stub& stub, v1::AlignRequest request,
-                       const PackedPoints& query, const PackedPoints* other, const RunContext& context) {
+Result<Alignment> alignScans(const ClientOptions& options, v1::AlignService::Stub& stub,
+                             v1::AlignRequest request, const PackedPoints& query, const PackedPoints* other,
+                             const RunContext& context) {
     v1::AlignHeader* header = request.mutable_header();
     header->set_query_points(query.count);
     header->set_query_sha256(query.sha256);
@@ -111,7 +112,7 @@ Result<Fit> alignScans(const ClientOptions& options, v1::AlignService::Stub& stu
         return stream->Finish();
     });
     RETURN_IF_ERROR(made);
-    return fromWire(response.fit());
+    return Alignment{fromWire(response.fit()), wire::fromProto(response.unit()).value_or(LengthUnit::kNone)};
 }
 
 v1::AlignRequest alignRequest(const CompareOptions& options) {
@@ -125,8 +126,8 @@ v1::AlignRequest alignRequest(const CompareOptions& options) {
 
 }  // namespace
 
-Result<Fit> Client::align(const PointCloud& query, const ShapeRef& other, const CompareOptions& options,
-                          const RunContext& context) const {
+Result<Alignment> Client::align(const PointCloud& query, const ShapeRef& other, const CompareOptions& options,
+                                const RunContext& context) const {
     const auto packed = packPoints(query);
     RETURN_IF_ERROR(packed);
     v1::AlignRequest request = alignRequest(options);
@@ -134,8 +135,8 @@ Result<Fit> Client::align(const PointCloud& query, const ShapeRef& other, const 
     return alignScans(impl_->options, *impl_->align, std::move(request), *packed, nullptr, context);
 }
 
-Result<Fit> Client::align(const PointCloud& query, const PointCloud& other, const CompareOptions& options,
-                          const RunContext& context) const {
+Result<Alignment> Client::align(const PointCloud& query, const PointCloud& other,
+                                const CompareOptions& options, const RunContext& context) const {
     const auto packed = packPoints(query);
     RETURN_IF_ERROR(packed);
     const auto packedOther = packPoints(other);

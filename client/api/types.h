@@ -204,6 +204,11 @@ struct Fit {
     std::vector<FreeAxis> axes;         ///< one for a bottle, three for a ball
 };
 
+/// How a shape lies on a scan.
+struct Alignment : Fit {
+    LengthUnit unit = LengthUnit::kNone;  ///< of its lengths: that of the stored shape's collection
+};
+
 struct Hit {
     Shape shape;
     double score = 0.0;                      ///< [0, 1]; 1 exactly for identical signatures
@@ -231,8 +236,13 @@ struct SearchReply {
     std::uint64_t verified = 0;    ///< candidates that were laid on the query
     bool exact = true;             ///< false: verifying more candidates could change the hits
     std::uint64_t pending = 0;     ///< shapes of the collection that have no signature yet
-    Signature query;               ///< as it was scored
-    double secondsSegment = 0.0;   ///< searchByScan only
+    /// Of all lengths: that of the collection.
+    LengthUnit unit = LengthUnit::kNone;
+    /// Mirror images were to count as different (SearchOptions::reflection), but nothing was laid on the
+    /// query: they score nearly alike.
+    bool leftRightUntold = false;
+    Signature query;              ///< as it was scored
+    double secondsSegment = 0.0;  ///< searchByScan only
     double secondsSearch = 0.0;
     std::optional<SegmentationReport> report;  ///< searchByScan only
 };
@@ -252,6 +262,9 @@ struct Comparison {
     std::optional<Fit> fit{};  ///< how `other` lies on `query`, if both have surface points
     Verdict verdict = Verdict::kNone;
     double verdictReliability = 0.0;  ///< as in Hit
+    /// Of all lengths; kNone if the two are in collections of different units, and each in its own.
+    LengthUnit unit = LengthUnit::kNone;
+    bool leftRightUntold = false;  ///< as in SearchReply
 };
 
 struct Collection {

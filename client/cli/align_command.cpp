@@ -26,12 +26,12 @@ struct AlignFlags {
     std::string key;
     std::string collection;
     ScoreFlags score;
-    std::optional<LengthUnit> unit;  // with --key
+    std::optional<LengthUnit> unit;
     ScanFlags scan;
 
-    [[nodiscard]] FitOptions resolve() const {
+    [[nodiscard]] FitOptions resolve(bool keepScale) const {
         FitOptions options;
-        options.keepScale = score.keepScale;
+        options.keepScale = keepScale;
         options.reflection = !score.noReflection;
         options.kinds.whole = !score.partial;
         return options;
@@ -46,18 +46,21 @@ Result<SurfacePoints> surfaceOf(const std::string& path, const ScanFlags& flags,
     return surface;
 }
 
-Result<client::Fit> alignFiles(const AlignFlags& flags, const RunContext& context) {
+Result<client::Alignment> alignFiles(const AlignFlags& flags, const RunContext& context) {
+    const auto sizesCount = sizesOfFilesCount(flags.unit, flags.score);
+    RETURN_IF_ERROR(sizesCount);
     RETURN_IF_ERROR(checkReadOnce(flags.query, flags.other));
     const auto query = surfaceOf(flags.query, flags.scan, context);
     RETURN_IF_ERROR(query);
     const auto other = surfaceOf(flags.other, flags.scan, context);
     RETURN_IF_ERROR(other);
-    const auto found = align(FitQuery(*query), *other, flags.resolve(), context);
+    const auto found = align(FitQuery(*query), *other, flags.resolve(*sizesCount), context);
     RETURN_IF_ERROR(found);
-    return toClient(*found);
+    return client::Alignment{toClient(*found), flags.unit.value_or(LengthUnit::kNone)};
 }
 
-Result<client::Fit> alignStored(const Session& session, const AlignFlags& flags, const RunContext& context) {
+Result<client::Alignment> alignStored(const Session& session, const AlignFlags& flags,
+                                      const RunContext& context) {
     auto scan = loadScan(flags.query, flags.scan, flags.scan.seed, context);
     RETURN_IF_ERROR(scan);
     const auto client = connectToServer(session, Work::kHeavy);
@@ -77,9 +80,6 @@ CommandResult runAlign(Session& session, const AlignFlags& flags) {
         return fail(ErrorCode::kInvalidArgument, "give a second scan, or --key with a stored shape" +
                                                      std::string(flags.key.empty() ? "" : ", not both"));
     }
-    if (flags.key.empty() && (flags.unit || flags.score.freeScale)) {
-        return fail(ErrorCode::kInvalidArgument, "--unit and --free-scale need --key: files have no unit");
-    }
     const RunContext context = session.context();
     const auto found = flags.key.empty() ? alignFiles(flags, context) : alignStored(session, flags, context);
     RETURN_IF_ERROR(found);
@@ -87,6 +87,7 @@ CommandResult runAlign(Session& session, const AlignFlags& flags) {
     nlohmann::json document = toJson(*found);
     document["query"] = flags.query;
     document["other"] = name;
+    document["unit"] = unitJson(unitOfAnswer(flags.unit, found->unit));
     session.console().document(document);
     session.console().text("score " + formatFixed(found->best.score, 3) + "  " + bar(found->best.score, 20) +
                            "\n\n" + fitMotionText(found->best.motion, name) +

@@ -13,6 +13,7 @@
 #include "client/cli/session.h"
 #include "client/cli/shape_output.h"
 #include "client/cli/text.h"
+#include "client/cli/units.h"
 #include "core/base/return_if_error.h"
 #include "core/search/verify.h"
 
@@ -26,6 +27,7 @@ struct CompareFlags {
     std::string collection;
     bool files = false;
     ScoreFlags score;
+    std::optional<LengthUnit> unit;
     ScanFlags scan;
     ParameterFlags parameters;
 };
@@ -51,6 +53,8 @@ Result<Described> describeFile(Session& session, const CompareFlags& flags, cons
 }
 
 Result<client::Comparison> compareFiles(Session& session, const CompareFlags& flags) {
+    const auto sizesCount = sizesOfFilesCount(flags.unit, flags.score);
+    RETURN_IF_ERROR(sizesCount);
     const auto parameters = flags.parameters.resolve();
     RETURN_IF_ERROR(parameters);
     RETURN_IF_ERROR(checkReadOnce(flags.a, flags.b));
@@ -58,7 +62,8 @@ Result<client::Comparison> compareFiles(Session& session, const CompareFlags& fl
     RETURN_IF_ERROR(a);
     const auto b = describeFile(session, flags, *parameters, flags.b);
     RETURN_IF_ERROR(b);
-    const ScoreOptions options = flags.score.resolve();
+    ScoreOptions options = flags.score.resolve();
+    options.keepScale = *sizesCount;
     const auto surfaceOf = [](const Described& one) { return one.surface ? &*one.surface : nullptr; };
     const auto verified =
         explainVerified(a->signature, surfaceOf(*a), b->signature, surfaceOf(*b), options, session.context());
@@ -72,6 +77,8 @@ Result<client::Comparison> compareFiles(Session& session, const CompareFlags& fl
     comparison.verdictReliability = reliabilityOf(verified->verdict);
     comparison.query = toClient(a->signature);
     comparison.other = toClient(b->signature);
+    comparison.unit = flags.unit.value_or(LengthUnit::kNone);
+    comparison.leftRightUntold = leftRightUntold(a->signature, options, verified->fit.has_value());
     return comparison;
 }
 
@@ -82,14 +89,17 @@ Result<client::Comparison> compareStored(Session& session, const CompareFlags& f
     }
     const auto client = connectToServer(session);
     RETURN_IF_ERROR(client);
-    return client->compare({flags.collection, flags.a}, {flags.collection, flags.b}, flags.score.forServer(),
-                           session.context());
+    const RunContext context = session.context();
+    const auto factor = factorToCollection(*client, flags.collection, flags.unit, context);
+    RETURN_IF_ERROR(factor);
+    auto comparison = client->compare({flags.collection, flags.a}, {flags.collection, flags.b},
+                                      flags.score.forServer(), context);
+    RETURN_IF_ERROR(comparison);
+    if (*factor != 1.0) scaleBy(1.0 / *factor, *comparison);
+    return comparison;
 }
 
 CommandResult runCompare(Session& session, const CompareFlags& flags) {
-    if (flags.files && flags.score.freeScale) {
-        return fail(ErrorCode::kInvalidArgument, "--free-scale is for stored shapes: files have no unit");
-    }
     const auto comparison = flags.files ? compareFiles(session, flags) : compareStored(session, flags);
     RETURN_IF_ERROR(comparison);
     nlohmann::json document = {{"query_name", flags.a},
@@ -100,13 +110,16 @@ CommandResult runCompare(Session& session, const CompareFlags& flags) {
                                {"query", toJson(comparison->query)},
                                {"other", toJson(comparison->other)},
                                {"verdict", verdictJson(comparison->verdict)},
-                               {"verdict_reliability", comparison->verdictReliability}};
+                               {"verdict_reliability", comparison->verdictReliability},
+                               {"left_right_untold", comparison->leftRightUntold},
+                               {"unit", unitJson(unitOfAnswer(flags.unit, comparison->unit))}};
     if (comparison->fit) document["fit"] = toJson(*comparison->fit);
     session.console().document(document);
     const std::string a = flags.files ? scanName(flags.a) : flags.a;
     const std::string b = flags.files ? scanName(flags.b) : flags.b;
     session.console().text("score " + formatFixed(comparison->score, 3) + "  " + bar(comparison->score, 20) +
-                           "  " + verdictText(comparison->verdict) + "\n\n" +
+                           "  " + verdictText(comparison->verdict) + "\n" +
+                           (comparison->leftRightUntold ? kLeftRightUntold : "") + "\n" +
                            explanationText(comparison->explanation, comparison->query, a, b) +
                            (comparison->fit ? fitText(*comparison->fit, a, b) : "") + "\n" + a + "\n" +
                            signatureTable(comparison->query) + "\n" + b + "\n" +
@@ -126,6 +139,7 @@ void addCompareCommand(CLI::App& app, Session& session) {
     addCollectionOption(*command, flags->collection);
     addScoreFlags(*command, flags->score);
     addFreeScaleFlag(*command, flags->score);
+    addUnitFlag(*command, flags->unit);
     addScanFlags(*command, flags->scan);
     addFormatFlag(*command, flags->scan);
     addParameterFlags(*command, flags->parameters);

@@ -25,6 +25,11 @@ namespace shapedb::cli {
 /// verdictName, or null for none.
 [[nodiscard]] nlohmann::json verdictJson(Verdict verdict);
 
+/// What is said of SearchReply::leftRightUntold, a line.
+constexpr const char* kLeftRightUntold =
+    "mirror images score nearly alike here: only laying shapes on the query (--verify) tells left from "
+    "right\n";
+
 /// How well the shape fits and how certain its pose is; a few lines.
 [[nodiscard]] std::string fitText(const client::Fit& fit, const std::string& queryName,
                                   const std::string& otherName);

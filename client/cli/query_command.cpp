@@ -80,6 +80,7 @@ json replyJson(const client::SearchReply& reply) {
                      {"candidates_verified", reply.verified},
                      {"exact", reply.exact},
                      {"pending", reply.pending},
+                     {"left_right_untold", reply.leftRightUntold},
                      {"query", toJson(reply.query)},
                      {"seconds_segment", reply.secondsSegment},
                      {"seconds_search", reply.secondsSearch}};
@@ -102,6 +103,7 @@ std::string replyText(const QueryFlags& flags, const client::SearchReply& reply)
     if (reply.verified > 0) text += ", " + formatCount(reply.verified) + " laid on the query";
     text += ", in " + formatSeconds(reply.secondsSearch) + "\n";
     if (!reply.exact) text += "others might fit as well: --candidates lays more on the query\n";
+    if (reply.leftRightUntold) text += kLeftRightUntold;
     if (reply.pending > 0) {
         text += formatCount(reply.pending, "shape has", "shapes have") +
                 " no signature yet and could not be searched\n";
@@ -179,7 +181,7 @@ CommandResult runQuery(Session& session, const QueryFlags& flags) {
     }
     if (*factor != 1.0) scaleBy(1.0 / *factor, *reply);
     json document = replyJson(*reply);
-    if (flags.unit) document["unit"] = lengthUnitName(*flags.unit);
+    document["unit"] = unitJson(unitOfAnswer(flags.unit, reply->unit));
     std::string text = replyText(flags, *reply);
     if (scan.scene) {
         document["scene"] = sceneJson(*scan.scene, scan.pointsInScene, flags.scan.isolate);

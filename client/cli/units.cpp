@@ -1,5 +1,7 @@
 #include "client/cli/units.h"
 
+#include <nlohmann/json.hpp>
+
 #include "core/base/return_if_error.h"
 
 namespace shapedb::cli {
@@ -37,6 +39,24 @@ Result<double> factorToCollection(const client::Client& client, const std::strin
     return metresIn(*unit) / metresIn(own);
 }
 
+LengthUnit unitOfAnswer(std::optional<LengthUnit> asked, LengthUnit ofCollection) noexcept {
+    return asked.value_or(LengthUnit::kNone) == LengthUnit::kNone ? ofCollection : *asked;
+}
+
+nlohmann::json unitJson(LengthUnit unit) {
+    return unit == LengthUnit::kNone ? nlohmann::json(nullptr) : nlohmann::json(lengthUnitName(unit));
+}
+
+Result<bool> sizesOfFilesCount(std::optional<LengthUnit> asked, const ScoreFlags& score) {
+    const bool known = asked.value_or(LengthUnit::kNone) != LengthUnit::kNone;
+    if (score.freeScale && !known) {
+        return fail(
+            ErrorCode::kInvalidArgument,
+            "--free-scale: files have no unit of length, so sizes do not count unless --unit says it");
+    }
+    return score.keepScale || (known && !score.freeScale);
+}
+
 void scaleBy(double factor, PointCloud& points) {
     for (Point3& point : points) point = factor * point;
 }
@@ -45,6 +65,13 @@ void scaleBy(double factor, client::Fit& fit) {
     scaleBy(factor, fit.best.motion);
     for (client::FitPose& pose : fit.alternatives) scaleBy(factor, pose.motion);
     for (client::FreeAxis& axis : fit.axes) axis.point = factor * axis.point;
+}
+
+void scaleBy(double factor, client::Comparison& comparison) {
+    scaleBy(factor, comparison.explanation.motion);
+    if (comparison.fit) scaleBy(factor, *comparison.fit);
+    scaleBy(factor, comparison.query);
+    scaleBy(factor, comparison.other);
 }
 
 void scaleBy(double factor, client::SearchReply& reply) {

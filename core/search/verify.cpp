@@ -222,6 +222,10 @@ double misfitShare(const QueryTraits& traits, const ScoreOptions& score) noexcep
     return traits.reliable && score.reflection ? kMisfitShare : kMisfitShareUnsure;
 }
 
+bool leftRightUntold(const Signature& query, const ScoreOptions& score, bool verified) noexcept {
+    return !score.reflection && !verified && query.attributes.has_value();
+}
+
 std::size_t candidatesFor(const QueryTraits& traits) noexcept {
     if (traits.piece) return kCandidatesOfPiece;
     return traits.reliable ? kCandidates : kCandidatesUnsure;

@@ -99,6 +99,11 @@ struct QueryTraits {
 /// The weight of the misfit, in (0, 1).
 [[nodiscard]] double misfitShare(const QueryTraits& traits, const ScoreOptions& score) noexcept;
 
+/// Whether an answer tells left from right no better than a guess, although mirror images were to count as
+/// different: nothing was laid on the query, and all statistics of a signature but the parts are those of its
+/// mirror image too.
+[[nodiscard]] bool leftRightUntold(const Signature& query, const ScoreOptions& score, bool verified) noexcept;
+
 /// How many candidates are verified unless the caller says so.
 [[nodiscard]] std::size_t candidatesFor(const QueryTraits& traits) noexcept;
 

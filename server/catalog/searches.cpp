@@ -145,7 +145,7 @@ Result<SurfacePoints> Searches::surfaceOfScan(const store::VerifiedScan& scan, c
     return surface;
 }
 
-Result<FitResult> Searches::align(const store::VerifiedScan& query,
+Result<Alignment> Searches::align(const store::VerifiedScan& query,
                                   const std::variant<ShapeName, const store::VerifiedScan*>& other,
                                   FitOptions options, bool freeScale, const RunContext& context) const {
     auto unit = LengthUnit::kNone;
@@ -161,15 +161,20 @@ Result<FitResult> Searches::align(const store::VerifiedScan& query,
     RETURN_IF_ERROR(slot.acquire(context));
     const auto surface = surfaceOfScan(query, context);
     if (!surface) return fail(withContext(surface.error(), "query: "));
+    const auto on = [&](const SurfacePoints& laid) -> Result<Alignment> {
+        auto fitted = shapedb::align(FitQuery(*surface), laid, options, context);
+        RETURN_IF_ERROR(fitted);
+        return Alignment{std::move(*fitted), unit};
+    };
     if (const auto* name = std::get_if<ShapeName>(&other)) {
         const auto stored = surfaceOf(*name);
         if (!stored) return fail(withContext(stored.error(), "other: "));
-        return shapedb::align(FitQuery(*surface), **stored, options, context);
+        return on(**stored);
     }
     const store::VerifiedScan& scan = *std::get<const store::VerifiedScan*>(other);
     const auto sent = surfaceOfScan(scan, context);
     if (!sent) return fail(withContext(sent.error(), "other: "));
-    return shapedb::align(FitQuery(*surface), *sent, options, context);
+    return on(*sent);
 }
 
 Result<Comparison> Searches::compare(const ShapeName& query, const ShapeName& other, ScoreOptions options,
@@ -184,8 +189,8 @@ Result<Comparison> Searches::compare(const ShapeName& query, const ShapeName& ot
                                                      std::string(lengthUnitName(first->unit)) + " and " +
                                                      lengthUnitName(second->unit));
     }
-    const auto keepScale =
-        sizesCount(options.keepScale, freeScale, sameUnit ? first->unit : LengthUnit::kNone);
+    const auto unit = sameUnit ? first->unit : LengthUnit::kNone;
+    const auto keepScale = sizesCount(options.keepScale, freeScale, unit);
     RETURN_IF_ERROR(keepScale);
     options.keepScale = *keepScale;
     auto verified = explainVerified(first->signature, first->surface.get(), second->signature,
@@ -195,6 +200,7 @@ Result<Comparison> Searches::compare(const ShapeName& query, const ShapeName& ot
     comparison.verified = std::move(*verified);
     comparison.query = std::move(first->signature);
     comparison.other = std::move(second->signature);
+    comparison.unit = unit;
     return comparison;
 }
 

@@ -65,6 +65,12 @@ struct Comparison {
     Signature query;
     Signature other;
     VerifiedExplanation verified;
+    LengthUnit unit = LengthUnit::kNone;  ///< of both collections; kNone if they differ
+};
+
+struct Alignment {
+    FitResult fit;
+    LengthUnit unit = LengthUnit::kNone;  ///< of the stored shape's collection; kNone of two scans
 };
 
 struct FoundHit {
@@ -108,7 +114,7 @@ class Searches {
     /// Lays a scan or a stored shape on a scan; stores nothing. With a stored shape `query` is taken to be in
     /// the unit of its collection; sizes then count as in a search. Errors: those of makeSurfacePoints and
     /// fit; kInvalidArgument (key), kNotFound, kNotReady (no surface points yet), kDataLoss.
-    [[nodiscard]] Result<FitResult> align(const store::VerifiedScan& query,
+    [[nodiscard]] Result<Alignment> align(const store::VerifiedScan& query,
                                           const std::variant<ShapeName, const store::VerifiedScan*>& other,
                                           FitOptions options, bool freeScale,
                                           const RunContext& context) const;

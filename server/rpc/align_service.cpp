@@ -98,16 +98,17 @@ grpc::Status AlignServiceHandler::Align(grpc::ServerContext* context,
             return services_.searches.align(*query, other, optionsFrom(header), header.free_scale(),
                                             call.run());
         };
-        Result<FitResult> fitted = fail(ErrorCode::kInternal, "not aligned");
+        Result<catalog::Alignment> aligned = fail(ErrorCode::kInternal, "not aligned");
         if (header.has_key()) {
-            fitted = align(catalog::ShapeName{uploads.collection(), header.key().key()});
+            aligned = align(catalog::ShapeName{uploads.collection(), header.key().key()});
         } else {
             const auto other = uploads.other();
             RETURN_IF_ERROR(other);
-            fitted = align(&*other);
+            aligned = align(&*other);
         }
-        RETURN_IF_ERROR(fitted);
-        toProto(*fitted, response->mutable_fit());
+        RETURN_IF_ERROR(aligned);
+        toProto(aligned->fit, response->mutable_fit());
+        response->set_unit(wire::toProto(aligned->unit));
         return {};
     });
 }

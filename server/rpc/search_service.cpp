@@ -67,6 +67,8 @@ Result<void> answer(const Services& services, const catalog::PreparedSearch& pre
     response->set_candidates_verified(found.verified);
     response->set_not_exact(!found.exact);
     response->set_pending(prepared.pending);
+    response->set_unit(wire::toProto(prepared.collection->parameters.unit));
+    response->set_left_right_untold(leftRightUntold(query, prepared.options.score, found.verified > 0));
     toProto(query, response->mutable_query());
     if (response->query().has_attributes()) {
         response->mutable_query()->mutable_attributes()->clear_statistics();
@@ -230,6 +232,9 @@ grpc::Status SearchServiceHandler::Compare(grpc::ServerContext* context, const v
         response->set_verdict_reliability(reliabilityOf(verified.verdict));
         toProto(compared->query, response->mutable_query());
         toProto(compared->other, response->mutable_other());
+        response->set_unit(wire::toProto(compared->unit));
+        response->set_left_right_untold(
+            leftRightUntold(compared->query, scoreOptionsFrom(*request), verified.fit.has_value()));
         return {};
     });
 }
