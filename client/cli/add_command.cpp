@@ -1,5 +1,8 @@
 // `shapedb add`: stores files and folders of scans in a collection.
 #include <algorithm>
+#include <atomic>
+#include <iterator>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <thread>
@@ -48,7 +51,6 @@ struct Upload {
     std::string name;  ///< relative to the given path; decides the seed
     std::string key;
     std::string label;
-    std::optional<std::size_t> object;  ///< --each: which of the objects of the scan
     std::optional<client::AddReply> reply;
     std::optional<Error> failure;
 };
@@ -97,27 +99,6 @@ Result<std::vector<Upload>> listUploads(const AddFlags& flags) {
     return uploads;
 }
 
-/// --each: one upload for each object of a scan, with keys KEY/1, KEY/2, ... if there are several. A file
-/// that cannot be read is left as it is: its upload says why.
-Result<std::vector<Upload>> oneForEachObject(const std::vector<Upload>& files, const AddFlags& flags,
-                                             const RunContext& context) {
-    std::vector<Upload> uploads;
-    for (const Upload& file : files) {
-        RETURN_IF_ERROR(context.checkpoint());
-        const auto scan =
-            loadScan(file.path, flags.scan, fileSeed(flags.scan.seed, file.name), context, true);
-        const std::size_t objects = scan ? scan->scene->objects.size() : 0;
-        if (objects == 0) uploads.push_back(file);
-        for (std::size_t i = 0; i < objects; ++i) {
-            Upload one = file;
-            one.object = i;
-            if (objects > 1) one.key += "/" + std::to_string(i + 1);
-            uploads.push_back(std::move(one));
-        }
-    }
-    return uploads;
-}
-
 /// Errors: kInvalidArgument naming two files with one key.
 Result<void> checkKeys(const std::vector<Upload>& uploads) {
     std::map<std::string, std::string> taken;
@@ -130,6 +111,28 @@ Result<void> checkKeys(const std::vector<Upload>& uploads) {
                                                                " would both get the key '" + upload.key +
                                                                "'; add them one by one with --key");
         }
+    }
+    return {};
+}
+
+/// Whether `key` is one that --each may give an object of the scan with the key `of`: of/1, of/2, ...
+bool mayBeObjectOf(const std::string& key, const std::string& of) {
+    const std::size_t slash = key.rfind('/');
+    return slash == of.size() && key.compare(0, slash, of) == 0 && slash + 1 < key.size() &&
+           key.find_first_not_of("0123456789", slash + 1) == std::string::npos;
+}
+
+/// How many objects a scan has is known once it is read. Errors: kInvalidArgument naming two files of which
+/// an object of one may get the key of the other.
+Result<void> checkKeysOfObjects(const std::vector<Upload>& uploads) {
+    std::map<std::string, std::string> taken;
+    for (const Upload& upload : uploads) taken.emplace(upload.key, upload.path);
+    for (const Upload& upload : uploads) {
+        const auto parent = taken.find(upload.key.substr(0, upload.key.rfind('/')));
+        if (parent == taken.end() || !mayBeObjectOf(upload.key, parent->first)) continue;
+        return fail(ErrorCode::kInvalidArgument, "an object of " + parent->second + " and " + upload.path +
+                                                     " might both get the key '" + upload.key +
+                                                     "'; add them one by one with --key");
     }
     return {};
 }
@@ -153,17 +156,10 @@ struct Terms {
     double factor = 1.0;  ///< to the unit of the collection
 };
 
-void uploadOne(const client::Client& client, const AddFlags& flags, const Terms& terms, Upload& upload,
-               const RunContext& context) {
-    auto scan = loadScan(upload.path, flags.scan, fileSeed(flags.scan.seed, upload.name), context,
-                         upload.object.has_value());
-    if (!scan) {
-        upload.failure = scan.error();
-        return;
-    }
-    if (upload.object) scan->points = pointsOfObject(scan->points, *scan->scene, *upload.object);
-    if (terms.factor != 1.0) scaleBy(terms.factor, scan->points);
-    auto reply = client.addShape(requestFor(flags, terms.metadata, upload), scan->points, context);
+void send(const client::Client& client, const AddFlags& flags, const Terms& terms, PointCloud points,
+          Upload& upload, const RunContext& context) {
+    if (terms.factor != 1.0) scaleBy(terms.factor, points);
+    auto reply = client.addShape(requestFor(flags, terms.metadata, upload), points, context);
     if (!reply) {
         upload.failure = reply.error();
         if (reply.error().code == ErrorCode::kAlreadyExists && !flags.insertOnly) {
@@ -180,37 +176,72 @@ bool endsTheRun(const Error& error) {
            error.code == ErrorCode::kDeadlineExceeded;
 }
 
-/// `jobs` threads take one file after the other until all are done or the server is gone.
-void uploadAll(Session& session, const client::Client& client, const AddFlags& flags, const Terms& terms,
-               std::vector<Upload>& uploads) {
+/// Reads a file once and sends it: the whole scan, or with --each each of its objects, with keys KEY/1,
+/// KEY/2, ... if there are several. Returns what was sent, or not.
+std::vector<Upload> uploadFile(const client::Client& client, const AddFlags& flags, const Terms& terms,
+                               const Upload& file, const RunContext& context) {
+    std::vector<Upload> uploads{file};
+    auto scan = loadScan(file.path, flags.scan, fileSeed(flags.scan.seed, file.name), context, flags.each);
+    if (!scan) {
+        uploads.front().failure = scan.error();
+        return uploads;
+    }
+    const std::size_t objects = flags.each ? scan->scene->objects.size() : 0;
+    if (objects == 0) {
+        send(client, flags, terms, std::move(scan->points), uploads.front(), context);
+        return uploads;
+    }
+    uploads.assign(objects, file);
+    for (std::size_t i = 0; i < objects; ++i) {
+        if (objects > 1) uploads[i].key += "/" + std::to_string(i + 1);
+        if (i > 0 && uploads[i - 1].failure && endsTheRun(*uploads[i - 1].failure)) {
+            uploads[i].failure = uploads[i - 1].failure;
+            continue;
+        }
+        send(client, flags, terms, pointsOfObject(scan->points, *scan->scene, i), uploads[i], context);
+    }
+    return uploads;
+}
+
+/// `jobs` threads take one file after the other until all are done or the server is gone. Returns the uploads
+/// in the order of the files.
+std::vector<Upload> uploadAll(Session& session, const client::Client& client, const AddFlags& flags,
+                              const Terms& terms, const std::vector<Upload>& files) {
     RunContext context = session.context();
     context.progress = nullptr;  // progress counts files
+    std::vector<std::vector<Upload>> uploadsOf(files.size());
     std::atomic<std::size_t> next{0};
     std::atomic<std::size_t> done{0};
     std::mutex mutex;
     std::optional<Error> stop;  // guarded by mutex
     const auto work = [&] {
-        for (std::size_t i = next++; i < uploads.size(); i = next++) {
+        for (std::size_t i = next++; i < files.size(); i = next++) {
             {
                 const std::lock_guard<std::mutex> lock(mutex);
                 if (stop) {
-                    uploads[i].failure = Error{stop->code, "not sent: " + stop->message};
+                    uploadsOf[i] = {files[i]};
+                    uploadsOf[i].front().failure = Error{stop->code, "not sent: " + stop->message};
                     continue;
                 }
             }
-            uploadOne(client, flags, terms, uploads[i], context);
-            if (uploads[i].failure && endsTheRun(*uploads[i].failure)) {
+            uploadsOf[i] = uploadFile(client, flags, terms, files[i], context);
+            const std::optional<Error>& failure = uploadsOf[i].back().failure;
+            if (failure && endsTheRun(*failure)) {
                 const std::lock_guard<std::mutex> lock(mutex);
-                if (!stop) stop = uploads[i].failure;
+                if (!stop) stop = failure;
             }
-            session.console().progress("upload", ++done, uploads.size());
+            session.console().progress("upload", ++done, files.size());
         }
     };
     std::vector<std::thread> workers;
-    const std::size_t count = std::min<std::size_t>(std::max(1u, flags.jobs), uploads.size());
+    const std::size_t count = std::min<std::size_t>(std::max(1u, flags.jobs), files.size());
     for (std::size_t i = 1; i < count; ++i) workers.emplace_back(work);
     work();
     for (std::thread& worker : workers) worker.join();
+    std::vector<Upload> uploads;
+    for (std::vector<Upload>& some : uploadsOf)
+        std::move(some.begin(), some.end(), std::back_inserter(uploads));
+    return uploads;
 }
 
 /// Follows the shapes one after the other; the server segments all of them meanwhile.
@@ -318,22 +349,19 @@ int reportFailures(Session& session, const std::vector<Upload>& uploads) {
 CommandResult runAdd(Session& session, const AddFlags& flags) {
     const auto metadata = parseMetadata(flags.metadata, "--meta");
     RETURN_IF_ERROR(metadata);
-    auto uploads = listUploads(flags);
-    RETURN_IF_ERROR(uploads);
-    if (flags.each) {
-        uploads = oneForEachObject(*uploads, flags, session.context());
-        RETURN_IF_ERROR(uploads);
-    }
-    RETURN_IF_ERROR(checkKeys(*uploads));
+    const auto files = listUploads(flags);
+    RETURN_IF_ERROR(files);
+    RETURN_IF_ERROR(checkKeys(*files));
+    if (flags.each) RETURN_IF_ERROR(checkKeysOfObjects(*files));
     const auto client = connectToServer(session, Work::kHeavy);
     RETURN_IF_ERROR(client);
     const auto factor = factorToCollection(*client, flags.collection, flags.unit, session.context());
     RETURN_IF_ERROR(factor);
-    uploadAll(session, *client, flags, {*metadata, *factor}, *uploads);
-    if (flags.wait) waitForAll(session, *client, flags, *uploads);
-    session.console().document(uploadsJson(*uploads));
-    session.console().text(uploadsText(*uploads));
-    return reportFailures(session, *uploads);
+    auto uploads = uploadAll(session, *client, flags, {*metadata, *factor}, *files);
+    if (flags.wait) waitForAll(session, *client, flags, uploads);
+    session.console().document(uploadsJson(uploads));
+    session.console().text(uploadsText(uploads));
+    return reportFailures(session, uploads);
 }
 
 }  // namespace

@@ -228,5 +228,18 @@ TEST_F(OnlineLengths, AddEachStoresTheObjectsOfATable) {
     EXPECT_NE(text.out.find("of the points lie on one plane: --drop-plane"), std::string::npos) << text.out;
 }
 
+TEST_F(OnlineLengths, AddEachReadsAFileOnce) {
+    // What comes through a pipe can be read once only.
+    const std::string pipe = path("pipe.xyz");
+    ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+    std::thread writer([&] { std::ofstream(pipe) << twoBallsOnATable(); });
+    onlineJson({"collection", "create", "pipe"});
+    const json added = onlineJson({"add", pipe, "--key", "pair", "--collection", "pipe", "--each"});
+    writer.join();
+    ASSERT_EQ(added["added"].size(), 2u) << added;
+    EXPECT_EQ(added["added"][0]["key"], "pair/1");
+    EXPECT_EQ(added["added"][1]["key"], "pair/2");
+}
+
 }  // namespace
 }  // namespace shapedb::cli
