@@ -57,6 +57,7 @@ namespace shapedb::wire {
         case InteriorDoubt::kNone: return v1::INTERIOR_DOUBT_NONE;
         case InteriorDoubt::kNoSurface: return v1::INTERIOR_DOUBT_NO_SURFACE;
         case InteriorDoubt::kThinWalls: return v1::INTERIOR_DOUBT_THIN_WALLS;
+        case InteriorDoubt::kFewPoints: return v1::INTERIOR_DOUBT_FEW_POINTS;
     }
     return v1::INTERIOR_DOUBT_UNSPECIFIED;
 }
@@ -105,6 +106,7 @@ namespace shapedb::wire {
     switch (doubt) {
         case v1::INTERIOR_DOUBT_NO_SURFACE: return InteriorDoubt::kNoSurface;
         case v1::INTERIOR_DOUBT_THIN_WALLS: return InteriorDoubt::kThinWalls;
+        case v1::INTERIOR_DOUBT_FEW_POINTS: return InteriorDoubt::kFewPoints;
         default: return InteriorDoubt::kNone;
     }
 }

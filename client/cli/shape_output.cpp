@@ -211,6 +211,9 @@ std::string interiorText(const client::SegmentationReport& report, double scale)
         case InteriorDoubt::kThinWalls:
             text += "walls are as thin as the points resolve: scan more densely, or with less noise\n";
             break;
+        case InteriorDoubt::kFewPoints:
+            text += "few points: walls and hollows may have been missed; scan more densely\n";
+            break;
     }
     const double dropped = static_cast<double>(report.outliers) / static_cast<double>(report.points);
     if (report.points > 0 && dropped > kManyOutliers) {

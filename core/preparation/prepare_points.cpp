@@ -139,6 +139,7 @@ Result<PreparedPoints> preparePoints(const PointCloud& points, const Preparation
         RETURN_IF_ERROR(begin("outliers"));
         RETURN_IF_ERROR(leaveOutOutliers(work, options.outlierRatio, context));
     }
+    work.prepared.distinct = work.prepared.sites.size();
     if (options.smoothingReach > 0.0) {
         RETURN_IF_ERROR(begin("smooth"));
         RETURN_IF_ERROR(smoothNoise(work, options.smoothingReach, context));

@@ -23,6 +23,7 @@ struct PreparedPoints {
     std::vector<std::uint32_t> siteOfPoint;  ///< input point -> index into `sites`, or kNoSite
     std::uint64_t duplicates = 0;       ///< input points that repeated another; not counted (0) when the scan
                                         ///< was decimated by gridScan
+    std::uint64_t distinct = 0;         ///< sites before smoothing and thinning: what the scan shows
     std::uint64_t outliers = 0;         ///< input points left out
     std::uint64_t outlierClusters = 0;  ///< separate groups of nine sites or more among them
     NoiseEstimate noise;                ///< before smoothing, unit frame; zero when not measured

@@ -26,14 +26,16 @@ enum class InteriorDoubt : int {
     kNoSurface =
         1,  ///< the points fill space, or noise is as thick as the parts: there is no surface to be inside of
     kThinWalls = 2,  ///< walls as thin as the sampling resolves: their sides cannot be told apart
+    kFewPoints = 3,  ///< fewer than 1,000: they leave open what the shape is like
 };
 
-/// "none", "no_surface" or "thin_walls".
+/// "none", "no_surface", "thin_walls" or "few_points".
 [[nodiscard]] inline const char* interiorDoubtName(InteriorDoubt doubt) noexcept {
     switch (doubt) {
         case InteriorDoubt::kNone: return "none";
         case InteriorDoubt::kNoSurface: return "no_surface";
         case InteriorDoubt::kThinWalls: return "thin_walls";
+        case InteriorDoubt::kFewPoints: return "few_points";
     }
     return "none";
 }

@@ -38,6 +38,11 @@ constexpr double kNoSurfaceFlatness = 0.78;
 constexpr double kMostQualityWithoutSurface = 0.1;
 constexpr double kMostQualityOfThinWalls = 0.4;
 
+// So many points show the parts of a shape and the mouths of its hollows: where the boundary alone looks
+// certain, 43 of 45 synthetic scans of 1,000 points have about the right volume, 20 of 40 of 200, 4 of 44 of
+// 50.
+constexpr double kEnoughPoints = 1000.0;
+
 using Clock = std::chrono::steady_clock;
 
 double secondsSince(Clock::time_point start) {
@@ -234,14 +239,22 @@ void toScanUnits(const Frame& frame, PointCloud sites, Segmentation& result) {
     for (double& r : result.tetrahedra.circumradii) r *= frame.unit;
 }
 
-InteriorDoubt doubtOf(const NoiseEstimate& noise) {
-    if (noise.flatness > kNoSurfaceFlatness) return InteriorDoubt::kNoSurface;
-    return noise.layered ? InteriorDoubt::kThinWalls : InteriorDoubt::kNone;
+// How fine the spacing would have to be, over what it is: at most 1. Thinning does not count: it leaves out
+// what noise makes worthless, not what the scan shows.
+double shareResolved(const PreparedPoints& prepared) {
+    return std::min(1.0, std::sqrt(static_cast<double>(prepared.distinct) / kEnoughPoints));
+}
+
+InteriorDoubt doubtOf(const PreparedPoints& prepared) {
+    if (prepared.noise.flatness > kNoSurfaceFlatness) return InteriorDoubt::kNoSurface;
+    if (prepared.noise.layered) return InteriorDoubt::kThinWalls;
+    return shareResolved(prepared) < 1.0 ? InteriorDoubt::kFewPoints : InteriorDoubt::kNone;
 }
 
 double mostQuality(InteriorDoubt doubt) {
     switch (doubt) {
-        case InteriorDoubt::kNone: return 1.0;
+        case InteriorDoubt::kNone:
+        case InteriorDoubt::kFewPoints: return 1.0;
         case InteriorDoubt::kNoSurface: return kMostQualityWithoutSurface;
         case InteriorDoubt::kThinWalls: return kMostQualityOfThinWalls;
     }
@@ -257,7 +270,7 @@ Result<PreparedPoints> prepare(const PointCloud& points, const SegmentationOptio
     result.outliers = prepared->outliers;
     result.outlierClusters = prepared->outlierClusters;
     result.noise = prepared->noise.sigma * prepared->frame.unit;
-    if (options.interiorMethod == InteriorMethod::kAdaptive) result.doubt = doubtOf(prepared->noise);
+    if (options.interiorMethod == InteriorMethod::kAdaptive) result.doubt = doubtOf(*prepared);
     result.siteOfPoint = std::move(prepared->siteOfPoint);
     return prepared;
 }
@@ -281,24 +294,27 @@ double shareTrusted(const Segmentation& result) {
 }
 
 // Per tetrahedron 1 when it is interior; records in the result how it was found.
-Result<std::vector<std::uint8_t>> findInterior(const PointCloud& sites, const std::vector<std::uint8_t>& big,
+Result<std::vector<std::uint8_t>> findInterior(const PreparedPoints& prepared,
+                                               const std::vector<std::uint8_t>& big,
                                                const std::vector<double>& spacings,
                                                const SegmentationOptions& options, const RunContext& context,
                                                Segmentation& result) {
     if (options.interiorMethod == InteriorMethod::kWalk) {
         result.angleDegrees = options.deepAngleDegrees;
-        return interiorTetrahedra(sites, result.tetrahedra, big, options, context);
+        return interiorTetrahedra(prepared.sites, result.tetrahedra, big, options, context);
     }
-    auto interior = adaptiveInterior(sites, result.tetrahedra, big, spacings, context);
+    auto interior = adaptiveInterior(prepared.sites, result.tetrahedra, big, spacings, context);
     RETURN_IF_ERROR(interior);
     result.interiorSource = interior->source;
     result.angleDegrees = interior->angleDegrees;
-    result.quality = std::min(interior->quality * shareTrusted(result), mostQuality(result.doubt));
+    result.quality = shareResolved(prepared) *
+                     std::min(interior->quality * shareTrusted(result), mostQuality(result.doubt));
     return std::move(interior->inside);
 }
 
-Result<SegmentLabels> findSegments(const PointCloud& sites, const SegmentationOptions& options,
+Result<SegmentLabels> findSegments(const PreparedPoints& prepared, const SegmentationOptions& options,
                                    const RunContext& context, StageClock& clock, Segmentation& result) {
+    const PointCloud& sites = prepared.sites;
     const Tetrahedra& tetrahedra = result.tetrahedra;
     RETURN_IF_ERROR(clock.begin("point_scale"));
     const auto spacings = localSpacings(sites, context);
@@ -306,7 +322,7 @@ Result<SegmentLabels> findSegments(const PointCloud& sites, const SegmentationOp
     RETURN_IF_ERROR(clock.begin("interior"));
     const std::vector<std::uint8_t> big = bigBalls(tetrahedra, *spacings, options.bigBallRatio);
     result.bigBalls = static_cast<std::uint64_t>(std::count(big.begin(), big.end(), 1));
-    const auto interior = findInterior(sites, big, *spacings, options, context, result);
+    const auto interior = findInterior(prepared, big, *spacings, options, context, result);
     RETURN_IF_ERROR(interior);
     RETURN_IF_ERROR(clock.begin("flow"));
     const auto flow = flowMasks(sites, tetrahedra, *interior, context);
@@ -339,7 +355,7 @@ Result<Segmentation> segmentOrThrow(const PointCloud& points, const Segmentation
     result.tetrahedra = std::move(*tetrahedra);
     clock.end();
     result.delaunaySeconds = clock.lastSeconds();
-    auto labels = findSegments(prepared->sites, options, context, clock, result);
+    auto labels = findSegments(*prepared, options, context, clock, result);
     RETURN_IF_ERROR(labels);
     RETURN_IF_ERROR(clock.begin("describe"));
     // The published method merges by a criterion of its own and keeps whatever is left.

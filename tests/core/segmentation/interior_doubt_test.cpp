@@ -7,6 +7,7 @@
 #include "core/base/random.h"
 #include "core/pipeline.h"
 #include "core/synthetic/families.h"
+#include "core/synthetic/named_shapes.h"
 #include "core/synthetic/noise.h"
 
 namespace shapedb {
@@ -66,6 +67,40 @@ TEST(InteriorDoubt, OpenCupsAreRightOrSayThatTheirWallsAreThin) {
             EXPECT_LE(cup.quality, 0.4) << count << " points, noise " << noise;
         }
     }
+}
+
+TEST(InteriorDoubt, FewPointsLowerTheQualityHoweverWellAnInteriorFits) {
+    const double volume = kPi * (0.55 * 0.55 * 1.2 - 0.5 * 0.5 * 1.15);
+    double before = 0.0;
+    for (const std::size_t count : {50, 100, 200, 300, 500}) {
+        const Segmentation cup = segmented(openCup(count, 0.0));
+        EXPECT_GT(std::abs(cup.volume - volume), 0.2 * volume) << count << ": so few do not show its hollow";
+        EXPECT_LT(cup.quality, 0.69) << count;
+        EXPECT_NE(cup.doubt, InteriorDoubt::kNone) << count;
+        // A ball is right with so few; nobody can know.
+        ScanOptions options;
+        options.count = count;
+        const Segmentation ball = segmented(scanOf(makeSphere().solid, options).value());
+        EXPECT_EQ(ball.doubt, InteriorDoubt::kFewPoints) << count;
+        EXPECT_GT(ball.quality, before) << count << ": more with more points";
+        EXPECT_LE(ball.quality, std::sqrt(static_cast<double>(count) / 1000.0)) << count;
+        before = ball.quality;
+    }
+    const ScanOptions options{1000, 0.0, 1, true};
+    EXPECT_EQ(segmented(scanOf(makeSphere().solid, options).value()).doubt, InteriorDoubt::kNone);
+    // The published walk rates nothing.
+    const auto paper = describe(scanOf(makeSphere().solid, ScanOptions{500, 0.0, 1, true}).value(),
+                                parametersOf(Profile::kPaper));
+    ASSERT_TRUE(paper);
+    EXPECT_EQ(paper->segmentation.doubt, InteriorDoubt::kNone);
+}
+
+TEST(InteriorDoubt, PointsRepeatedManyTimesAreNoMore) {
+    const PointCloud few = scanOf(makeSphere().solid, ScanOptions{200, 0.0, 1, true}).value();
+    PointCloud many;
+    for (int i = 0; i < 30; ++i) many.insert(many.end(), few.begin(), few.end());
+    EXPECT_EQ(segmented(many).quality, segmented(few).quality);
+    EXPECT_EQ(segmented(many).doubt, InteriorDoubt::kFewPoints);
 }
 
 TEST(InteriorDoubt, PointsThatFillSpaceHaveNoSurface) {
