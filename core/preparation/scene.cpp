@@ -1,11 +1,14 @@
 #include "core/preparation/scene.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <iterator>
 #include <new>
 #include <numeric>
 #include <utility>
 
+#include "core/base/math.h"
 #include "core/base/random.h"
 #include "core/base/random_subset.h"
 #include "core/base/return_if_error.h"
@@ -42,6 +45,9 @@ constexpr double kOneSideShare = 0.95;
 // beyond if it has so many cells with nothing above, for one with something above.
 constexpr double kCell = 1.0 / 48.0;
 constexpr double kBeyond = 0.3;
+// It does so in so many of these directions, seen from the middle of what is above.
+constexpr std::size_t kDirections = 16;
+constexpr std::size_t kLeastDirections = 11;
 // And so much of what is above is above the convex hull of the plane's points: a handle is not above a blade.
 constexpr double kAbovePlane = 0.8;
 
@@ -137,6 +143,26 @@ bool isInside(const Footprint::Cell& cell, const std::vector<Footprint::Cell>& h
     return true;
 }
 
+// Whether the cells of a plane lie on all sides of what is covered, or nearly so: a table reaches beyond what
+// stands on it wherever one looks from there, the flat handle of a spoon only beyond one end of the bowl.
+bool isAround(const std::vector<Footprint::Cell>& cells, const std::vector<Footprint::Cell>& covered) {
+    double x = 0.0;
+    double y = 0.0;
+    for (const Footprint::Cell& cell : covered) {
+        x += cell.first;
+        y += cell.second;
+    }
+    const auto count = static_cast<double>(covered.size());
+    std::array<std::size_t, kDirections> seen{};
+    for (const Footprint::Cell& cell : cells) {
+        const double turn = std::atan2(cell.second - y / count, cell.first - x / count) / (2.0 * kPi) + 0.5;
+        ++seen[std::min(kDirections - 1, static_cast<std::size_t>(turn * kDirections))];
+    }
+    const auto open = static_cast<std::size_t>(
+        std::count_if(seen.begin(), seen.end(), [](std::size_t n) { return n > 0; }));
+    return open >= kLeastDirections;
+}
+
 // Whether what is not on the plane stands on it; turns the normal towards it.
 bool supports(const PointCloud& points, Plane& plane, double within, double diagonal) {
     std::size_t above = 0;
@@ -170,10 +196,10 @@ bool supports(const PointCloud& points, Plane& plane, double within, double diag
         std::sort(cells->begin(), cells->end());
         cells->erase(std::unique(cells->begin(), cells->end()), cells->end());
     }
-    const auto beyond = std::count_if(flat.begin(), flat.end(), [&](const Footprint::Cell& cell) {
-        return !std::binary_search(covered.begin(), covered.end(), cell);
-    });
-    if (static_cast<double>(beyond) < kBeyond * static_cast<double>(covered.size())) return false;
+    std::vector<Footprint::Cell> beyond;
+    std::set_difference(flat.begin(), flat.end(), covered.begin(), covered.end(), std::back_inserter(beyond));
+    if (static_cast<double>(beyond.size()) < kBeyond * static_cast<double>(covered.size())) return false;
+    if (!isAround(beyond, covered)) return false;
     const std::vector<Footprint::Cell> hull = hullOf(flat);
     const auto inside = std::count_if(points.begin(), points.end(), [&](const Point3& p) {
         return plane.height(p) > within && isInside(footprint.cellOf(p), hull);

@@ -15,7 +15,8 @@
 namespace shapedb {
 
 /// A plane that objects stand on: most points beside it lie on one side of it, and it reaches well beyond
-/// them. A flat face of an object does not, nor does a wall that hides nothing behind it.
+/// them, to most sides. A flat face of an object does not, nor does the flat handle of a spoon, nor a wall
+/// that hides nothing behind it.
 struct SupportPlane {
     Point3 point;              ///< on the plane, scan units
     Point3 normal;             ///< unit vector, towards the objects
