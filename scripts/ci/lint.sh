@@ -76,6 +76,11 @@ unfinished=$(git grep -nE 'TODO|FIXME|\bXXX\b|DISABLED_' -- '*.cpp' '*.h')
 
 python3 scripts/constants.py || complain "docs/constants.md does not list the constants of core/ as they are"
 
+for row in $(scripts/bench-figures.sh --list); do
+  grep -q "^| \`$row\` |[^|]*|[^|]*|[^|]*|\$" docs/retrieval.md ||
+    complain "the first table of docs/retrieval.md has no row \`$row\`, which scripts/bench-figures.sh repeats"
+done
+
 # Not an error: many small files are harder to read than a few.
 short=$(awk '$1 < 40 { n++ } END { printf "%d of %d sources are shorter than 40 lines", n, NR }' <<< "$lengths")
 [ "$failed" -eq 0 ] && echo "lint: clean ($short)"
