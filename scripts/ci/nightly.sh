@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # Everything that is too slow for every change. Runs all lanes, even after one has failed, and says which failed.
-#   scripts/ci/nightly.sh [LANE]...    sanitize, threads, bench, tidy, fuzz, mutate, reliability; all by default
+#   scripts/ci/nightly.sh [LANE]...    sanitize, threads, bench, tidy, fuzz, mutate, reliability, docs; all by default
 set -uo pipefail
 cd "$(dirname "$0")/../.."
 lanes=("$@")
-[ ${#lanes[@]} -gt 0 ] || lanes=(sanitize threads bench tidy fuzz mutate reliability)
+[ ${#lanes[@]} -gt 0 ] || lanes=(sanitize threads bench tidy fuzz mutate reliability docs)
 
 # The long counts of docs/reliability.md. Not by ctest, whose limits of time are those of the short ones.
 reliability() {
@@ -28,6 +28,7 @@ for lane in "${lanes[@]}"; do
     # Another part of the mutants each day. Survivors are printed, not failures.
     mutate) scripts/mutate.sh --seed "$(date +%j)" ;;
     reliability) reliability ;;
+    docs) scripts/install-deps.sh && scripts/build.sh dev && scripts/documented-commands.py ;;
     *) echo "nightly: unknown lane $lane" >&2; exit 2 ;;
   esac || failed+=("$lane")
 done
