@@ -46,6 +46,7 @@ void addSegmentOperation(CLI::App& app, Bench& bench);
 void addTypicalOperation(CLI::App& app, Bench& bench);
 void addVerdictsOperation(CLI::App& app, Bench& bench);
 void addFindOperation(CLI::App& app, Bench& bench);
+void addLeaveOutOperation(CLI::App& app, Bench& bench);
 void addFingerprintOperation(CLI::App& app, Bench& bench);
 
 }  // namespace shapedb::bench

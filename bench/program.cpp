@@ -55,6 +55,7 @@ int run(int argc, const char* const* argv, cli::Console& console, const std::ato
         addTypicalOperation(app, bench);
         addVerdictsOperation(app, bench);
         addFindOperation(app, bench);
+        addLeaveOutOperation(app, bench);
         addFingerprintOperation(app, bench);
         try {
             app.parse(argc, argv);
