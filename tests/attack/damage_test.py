@@ -67,18 +67,19 @@ class Damage(unittest.TestCase):
                     for chunk in client.admin.Backup(admin.BackupRequest(), timeout=300):
                         file.write(chunk.data)
                 for i in range(3):  # some are pending when it stops
-                    client.add(f"big {i}", ball(40_000, 1 + i), collection="second", wait=False)
+                    client.add(f"big {i}", ball(20_000, 1 + i), collection="second", wait=False)
             assert server.stop() == 0
 
     @classmethod
     def fill(cls, client):
         for name in ["first", "second", *(f"more-{i}" for i in range(COLLECTIONS))]:
             client.collections.CreateCollection(
-                collections.CreateCollectionRequest(name=name, description="x" * 200), timeout=10)
+                collections.CreateCollectionRequest(name=name, description="x" * 200, profile=types.PROFILE_PAPER),
+                timeout=60)
             client.collections.SetAlias(collections.SetAliasRequest(alias=f"{name}-alias", collection=name), timeout=10)
         for name in ("first", "second"):
             for i in range(60):
-                client.add(f"ball {i}", ball(200, 1 + 0.05 * i), collection=name, wait=False,
+                client.add(f"ball {i}", ball(100, 1 + 0.05 * i), collection=name, wait=False,
                            metadata={"note": "n" * 100})
         assert eventually(lambda: client.admin.Stats(admin.StatsRequest(), timeout=10).shapes_pending == 0, 300)
         for _ in client.admin.Rebuild(admin.RebuildRequest(collection="first"), timeout=300):
@@ -205,7 +206,7 @@ class Damage(unittest.TestCase):
             self.assertEqual((shown.shapes, shown.HasField("segmentation")), (60, False))
             self.assertTrue(any("'first'" in problem for problem in self.check(client)))
             for _ in client.admin.Rebuild(
-                    admin.RebuildRequest(collection="first", profile=types.PROFILE_DEFAULT), timeout=300):
+                    admin.RebuildRequest(collection="first", profile=types.PROFILE_PAPER), timeout=300):
                 pass
             self.assertEqual(find(client, "first"), "ball 1")
             self.assertEqual(self.check(client), [])
