@@ -74,6 +74,7 @@ long=$(awk '$1 > 500 { print $2 " (" $1 " lines)" }' <<< "$lengths")
 unfinished=$(git grep -nE 'TODO|FIXME|\bXXX\b|DISABLED_' -- '*.cpp' '*.h')
 [ -z "$unfinished" ] || complain "unfinished:"$'\n'"$unfinished"
 
+python3 scripts/python-sync.py || complain "the Python client that blocks is not what scripts/python-sync.py --update makes"
 python3 scripts/constants.py || complain "docs/constants.md does not list the constants of core/ as they are"
 
 for row in $(scripts/bench-figures.sh --list); do

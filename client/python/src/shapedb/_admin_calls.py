@@ -1,0 +1,283 @@
+"""The calls about collections and the server itself, as values."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import tempfile
+from datetime import datetime, timezone
+from typing import Any, BinaryIO, Callable, Dict, Iterator, List, Optional, Sequence, Tuple
+
+from shapedb.v1 import admin_service_pb2 as admin_pb
+from shapedb.v1 import collection_service_pb2 as collection_pb
+
+from . import _admin_types as types
+from ._call import Call, Collector
+from ._connection import PathLike
+from ._errors import InvalidInput, ShapeDBError
+from ._shape_calls import listener
+from ._types import CollectionInfo, Parameters, Profile, Progress, ProgressListener
+from ._wire import collection_of, enum_number, fill_parameters, info_of, key_of, plain
+
+_CHUNK = 1 << 20
+
+
+def create_collection(name: str, description: str, profile: Optional[Profile],
+                      parameters: Optional[Parameters]) -> Call[CollectionInfo]:
+    """CreateCollection."""
+    request = collection_pb.CreateCollectionRequest(name=name, description=description)
+    fill_parameters(profile, parameters, request)
+    return Call("CollectionService/CreateCollection", request, collection_of, idempotent=False)
+
+
+def get_collection(name: str) -> Call[CollectionInfo]:
+    """GetCollection."""
+    return Call("CollectionService/GetCollection", collection_pb.GetCollectionRequest(name=name), collection_of)
+
+
+def list_collections() -> Call[Tuple[CollectionInfo, ...]]:
+    """ListCollections."""
+    return Call("CollectionService/ListCollections", collection_pb.ListCollectionsRequest(),
+                lambda message: tuple(map(collection_of, message.collections)))
+
+
+def delete_collection(name: str, force: bool) -> Call[None]:
+    """DeleteCollection."""
+    return Call("CollectionService/DeleteCollection",
+                collection_pb.DeleteCollectionRequest(name=name, force=force), _nothing, idempotent=False)
+
+
+def _nothing(message: Any) -> None:
+    del message
+
+
+def rename_collection(name: str, new_name: str) -> Call[CollectionInfo]:
+    """RenameCollection."""
+    return Call("CollectionService/RenameCollection",
+                collection_pb.RenameCollectionRequest(name=name, new_name=new_name), collection_of,
+                idempotent=False)
+
+
+def set_alias(alias: str, collection: str) -> Call[CollectionInfo]:
+    """SetAlias."""
+    return Call("CollectionService/SetAlias", collection_pb.SetAliasRequest(alias=alias, collection=collection),
+                collection_of)
+
+
+def delete_alias(alias: str) -> Call[None]:
+    """DeleteAlias."""
+    return Call("CollectionService/DeleteAlias", collection_pb.DeleteAliasRequest(alias=alias), _nothing,
+                idempotent=False)
+
+
+class _Rebuild(Collector[Tuple[types.RebuildProgress, ...]]):
+    def __init__(self, progress: Optional[Callable[[types.RebuildProgress], None]]) -> None:
+        self._progress = progress
+        self._last: Dict[str, types.RebuildProgress] = {}
+
+    def take(self, message: Any) -> None:
+        now = plain(types.RebuildProgress, message)
+        self._last[now.collection] = now
+        if self._progress is not None:
+            self._progress(now)
+
+    def result(self) -> Tuple[types.RebuildProgress, ...]:
+        return tuple(self._last.values())
+
+
+def rebuild(collection: str, cache_only: bool, profile: Optional[Profile], parameters: Optional[Parameters],
+            detach: bool,
+            progress: Optional[Callable[[types.RebuildProgress], None]]) -> Call[Tuple[types.RebuildProgress, ...]]:
+    """Rebuild."""
+    request = admin_pb.RebuildRequest(collection=collection, cache_only=cache_only, detach=detach)
+    fill_parameters(profile, parameters, request)
+    return Call("AdminService/Rebuild", request, collect=lambda: _Rebuild(progress), idempotent=False, bounded=False)
+
+
+def cancel_rebuild(collection: str) -> Call[None]:
+    """CancelRebuild."""
+    return Call("AdminService/CancelRebuild", admin_pb.CancelRebuildRequest(collection=collection), _nothing,
+                idempotent=False)
+
+
+class _Backup(Collector[types.BackupReport]):
+    """Writes to another name first; the file appears complete or not at all."""
+
+    def __init__(self, path: str, progress: Optional[ProgressListener]) -> None:
+        self._path = path
+        self._progress = progress
+        self._sum = hashlib.sha256()
+        self._bytes = 0
+        self._total = 0
+        self._told = b""
+        try:
+            handle, self._partial = tempfile.mkstemp(prefix=os.path.basename(path) + ".", suffix=".partial",
+                                                     dir=os.path.dirname(path) or ".")
+        except OSError as error:
+            raise _unwritable(path, error) from None
+        self._file: BinaryIO = os.fdopen(handle, "wb")
+
+    def take(self, message: Any) -> None:
+        self._total = message.total_bytes or self._total
+        self._told = message.sha256 or self._told
+        try:
+            self._file.write(message.data)
+        except OSError as error:
+            raise _unwritable(self._path, error) from None
+        self._sum.update(message.data)
+        self._bytes += len(message.data)
+        if self._progress is not None:
+            self._progress(Progress("download", self._bytes, self._total))
+
+    def result(self) -> types.BackupReport:
+        if self._bytes != self._total:
+            raise ShapeDBError("count_mismatch", f"the server sent {self._bytes} of {self._total} bytes")
+        if self._sum.digest() != self._told:
+            raise ShapeDBError("checksum_mismatch", "the copy was damaged in transfer: make it again")
+        try:
+            self._file.flush()
+            os.fsync(self._file.fileno())
+            self._file.close()
+            os.replace(self._partial, self._path)
+        except OSError as error:
+            raise _unwritable(self._path, error) from None
+        return types.BackupReport(self._bytes, self._sum.hexdigest())
+
+    def __del__(self) -> None:
+        if hasattr(self, "_file"):
+            self._file.close()
+            with contextlib.suppress(OSError):
+                os.unlink(self._partial)  # gone if it was renamed
+
+
+def _unwritable(path: str, error: OSError) -> ShapeDBError:
+    return ShapeDBError("file_not_writable", f"{path} cannot be written: {error.strerror}")
+
+
+def backup(path: PathLike, progress: Optional[ProgressListener]) -> Call[types.BackupReport]:
+    """Backup."""
+    return Call("AdminService/Backup", admin_pb.BackupRequest(),
+                collect=lambda: _Backup(os.fspath(path), progress), bounded=False)
+
+
+def export(collection: str, path: PathLike, progress: Optional[ProgressListener]) -> Call[types.BackupReport]:
+    """ExportCollection."""
+    return Call("AdminService/ExportCollection", admin_pb.ExportCollectionRequest(collection=collection),
+                collect=lambda: _Backup(os.fspath(path), progress), bounded=False)
+
+
+def _chunks_of(path: str, progress: Optional[ProgressListener]) -> Callable[[], Iterator[Any]]:
+    """The size goes with the first chunk, the checksum with the last."""
+    try:
+        with open(path, "rb") as file:  # while it can still be said
+            size = os.fstat(file.fileno()).st_size
+    except OSError as error:
+        raise ShapeDBError("file_not_readable", f"{path} cannot be read: {error.strerror}") from None
+    if size == 0:
+        raise ShapeDBError("file_not_readable", f"{path} is empty, not a backup")
+
+    def chunks() -> Iterator[Any]:
+        report = listener(progress, "upload", size)
+        checksum = hashlib.sha256()
+        sent = 0
+        with open(path, "rb") as file:
+            # Never beyond the announced size, even if the file grows meanwhile.
+            while data := file.read(min(_CHUNK, size - sent)):
+                checksum.update(data)
+                chunk = admin_pb.BackupChunk(data=data, total_bytes=size if sent == 0 else 0)
+                sent += len(data)
+                if sent == size:
+                    chunk.sha256 = checksum.digest()
+                yield chunk
+                if report is not None:
+                    report(sent)
+
+    return chunks
+
+
+def restore(path: PathLike, progress: Optional[ProgressListener]) -> Call[types.Restored]:
+    """Restore."""
+    return Call("AdminService/Restore", _chunks_of(os.fspath(path), progress),
+                lambda message: plain(types.Restored, message), idempotent=False, bounded=False)
+
+
+def import_collection(path: PathLike, name: str, progress: Optional[ProgressListener]) -> Call[types.Imported]:
+    """ImportCollection."""
+    chunks = _chunks_of(os.fspath(path), progress)
+
+    def messages() -> Iterator[Any]:
+        yield admin_pb.ImportCollectionRequest(header=admin_pb.ImportCollectionHeader(collection=name))
+        for chunk in chunks():
+            yield admin_pb.ImportCollectionRequest(chunk=chunk)
+
+    return Call("AdminService/ImportCollection", messages, lambda message: plain(types.Imported, message),
+                idempotent=False, bounded=False)
+
+
+class _Check(Collector[Tuple[str, ...]]):
+    def __init__(self, progress: Optional[ProgressListener]) -> None:
+        self._progress = progress
+        self._problems: List[str] = []
+
+    def take(self, message: Any) -> None:
+        self._problems.extend(message.problems)
+        if self._progress is not None:
+            self._progress(Progress("check", message.done, message.total))
+
+    def result(self) -> Tuple[str, ...]:
+        return tuple(self._problems)
+
+
+def check(progress: Optional[ProgressListener]) -> Call[Tuple[str, ...]]:
+    """Check."""
+    return Call("AdminService/Check", admin_pb.CheckRequest(), collect=lambda: _Check(progress), bounded=False)
+
+
+def stats() -> Call[types.Stats]:
+    """Stats."""
+    return Call("AdminService/Stats", admin_pb.StatsRequest(), lambda message: plain(types.Stats, message))
+
+
+def server_info() -> Call[types.ServerInfo]:
+    """ServerInfo."""
+    return Call("AdminService/ServerInfo", admin_pb.ServerInfoRequest(), info_of)
+
+
+_HEALTH: Tuple[types.Health, ...] = ("unknown", "serving", "not_serving")
+
+
+def health(service: str) -> Call[types.Health]:
+    """grpc.health.v1: asked and answered with messages of the same bytes, see `_transport`."""
+    return Call("Health/Check", collection_pb.GetCollectionRequest(name=service),
+                lambda message: _HEALTH[message.count] if message.count < len(_HEALTH) else "unknown",
+                idempotent=False)
+
+
+def create_key(name: str, role: types.Role, collections: Sequence[str], expires: Optional[datetime],
+               limits: types.KeyLimits) -> Call[types.CreatedKey]:
+    """CreateKey."""
+    if isinstance(collections, str):
+        raise InvalidInput("invalid_argument", "collections is a text; give a list of names")
+    request = admin_pb.CreateKeyRequest(name=name, collections=collections)
+    request.role = enum_number(admin_pb.Role, "ROLE_", role, "role")  # type: ignore[assignment]
+    for limit in ("calls_per_second", "scans_per_day", "bytes_per_day"):
+        setattr(request.limits, limit, getattr(limits, limit))
+    if expires is not None:
+        if expires.tzinfo is None:
+            raise InvalidInput("invalid_argument", "expires has no time zone: give e.g. datetime.now(timezone.utc) + ...")
+        request.expires.FromDatetime(expires.astimezone(timezone.utc))
+    return Call("AdminService/CreateKey", request,
+                lambda message: types.CreatedKey(key_of(message.key), message.secret), idempotent=False)
+
+
+def list_keys() -> Call[Tuple[types.Key, ...]]:
+    """ListKeys."""
+    return Call("AdminService/ListKeys", admin_pb.ListKeysRequest(),
+                lambda message: tuple(map(key_of, message.keys)))
+
+
+def revoke_key(id: str) -> Call[types.Key]:
+    """RevokeKey."""
+    return Call("AdminService/RevokeKey", admin_pb.RevokeKeyRequest(id=id), lambda message: key_of(message.key),
+                idempotent=False)

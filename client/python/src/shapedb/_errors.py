@@ -1,0 +1,90 @@
+"""Errors: one class, told apart by the stable names of docs/api.md."""
+
+from __future__ import annotations
+
+from typing import Any, Iterable, Optional, Tuple
+
+import grpc
+
+REASONS: Tuple[str, ...] = (
+    "non_finite_coordinate", "coordinate_out_of_range", "too_few_points", "all_points_equal", "collinear",
+    "coplanar", "no_interior", "point_limit_exceeded", "file_not_readable", "unknown_file_format",
+    "malformed_file", "file_not_writable", "invalid_argument", "malformed_filter", "malformed_cursor",
+    "malformed_signature", "malformed_stream", "checksum_mismatch", "count_mismatch", "not_found",
+    "already_exists", "version_conflict", "not_ready", "rejected", "unauthenticated", "permission_denied",
+    "queue_full", "rate_limited", "unavailable", "cancelled", "deadline_exceeded", "out_of_memory", "storage",
+    "storage_full", "data_loss", "schema_too_new", "internal",
+)
+"""All names that `ShapeDBError.reason` can have; a newer server may send others."""
+
+# What a gRPC code means where no server of ours has named the error: a proxy answered, or nobody.
+_REASON_OF_CODE = {
+    grpc.StatusCode.INVALID_ARGUMENT: "invalid_argument",
+    grpc.StatusCode.OUT_OF_RANGE: "point_limit_exceeded",
+    grpc.StatusCode.NOT_FOUND: "not_found",
+    grpc.StatusCode.ALREADY_EXISTS: "already_exists",
+    grpc.StatusCode.ABORTED: "version_conflict",
+    grpc.StatusCode.FAILED_PRECONDITION: "rejected",
+    grpc.StatusCode.UNIMPLEMENTED: "rejected",
+    grpc.StatusCode.PERMISSION_DENIED: "permission_denied",
+    grpc.StatusCode.UNAUTHENTICATED: "unauthenticated",
+    grpc.StatusCode.UNAVAILABLE: "unavailable",
+    grpc.StatusCode.CANCELLED: "cancelled",
+    grpc.StatusCode.DEADLINE_EXCEEDED: "deadline_exceeded",
+    grpc.StatusCode.DATA_LOSS: "data_loss",
+}
+
+
+class ShapeDBError(Exception):
+    """A call that failed.
+
+    `reason` is a stable name ("not_found", "queue_full", ...; all are in `shapedb.REASONS`): what programs
+    should look at. `message` is for people: what was wrong, where, and what to do.
+    """
+
+    def __init__(self, reason: str, message: str) -> None:
+        super().__init__(reason, message)
+        self.reason = reason
+        self.message = message
+
+    def __str__(self) -> str:
+        return f"{self.message} [{self.reason}]"
+
+
+class InvalidInput(ShapeDBError, ValueError):
+    """The arguments cannot be used; nothing was sent."""
+
+
+class Failure:
+    """A failed attempt at a call: its error, and whether the server says when to come back."""
+
+    def __init__(self, rpc_error: Any, address: str) -> None:
+        code = rpc_error.code()
+        trailing = _texts(rpc_error.trailing_metadata() or ())
+        self.pushback: Optional[str] = trailing.get("grpc-retry-pushback-ms")
+        self.error = _error_of(code, rpc_error.details() or "", trailing.get("shapedb-error"), address)
+        self.retry_reason = self.error.reason
+        if code == grpc.StatusCode.RESOURCE_EXHAUSTED and self.pushback is not None:
+            self.retry_reason = "queue_full"  # rate_limited and the like: there will be room
+
+
+def _texts(metadata: Iterable[Any]) -> dict[str, str]:
+    return {key: value for key, value in metadata if isinstance(value, str)}
+
+
+def _error_of(code: Any, details: str, name: Optional[str], address: str) -> ShapeDBError:
+    if name is not None:
+        return ShapeDBError(name, details)
+    reason = _REASON_OF_CODE.get(code, "internal")
+    if code == grpc.StatusCode.UNAVAILABLE:
+        # What becomes of a call without TLS to a server that wants it.
+        closed = ", and does it want TLS" if "Socket closed" in details else ""
+        return ShapeDBError(
+            reason, f"cannot reach a server at {address}: is shapedbd running there{closed}? ({details})")
+    if code == grpc.StatusCode.DEADLINE_EXCEEDED:
+        return ShapeDBError(reason, f"the server at {address} did not answer before the deadline")
+    if code == grpc.StatusCode.UNIMPLEMENTED:
+        return ShapeDBError(
+            reason, f"the server at {address} does not support this call ({details}): is it a ShapeDB server, "
+            "and new enough?")
+    return ShapeDBError(reason, details)

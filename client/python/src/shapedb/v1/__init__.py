@@ -1,0 +1,1 @@
+"""The messages and stubs of the API, made by protoc. Not part of the public interface."""
