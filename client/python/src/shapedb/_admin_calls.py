@@ -144,11 +144,11 @@ class _Backup(Collector[types.BackupReport]):
             raise _unwritable(self._path, error) from None
         return types.BackupReport(self._bytes, self._sum.hexdigest())
 
-    def __del__(self) -> None:
-        if hasattr(self, "_file"):
+    def abandon(self) -> None:
+        with contextlib.suppress(OSError):
             self._file.close()
-            with contextlib.suppress(OSError):
-                os.unlink(self._partial)  # gone if it was renamed
+        with contextlib.suppress(OSError):
+            os.unlink(self._partial)
 
 
 def _unwritable(path: str, error: OSError) -> ShapeDBError:

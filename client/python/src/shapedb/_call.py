@@ -21,6 +21,9 @@ class Collector(Generic[T]):
         """What they come to; called once, after the last."""
         raise NotImplementedError
 
+    def abandon(self) -> None:
+        """The call has failed; nothing is to be left of it."""
+
 
 @dataclass(frozen=True)
 class Call(Generic[T]):

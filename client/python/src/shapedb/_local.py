@@ -24,14 +24,17 @@ class LocalServer:
 
     def __init__(self, data: Optional[PathLike] = None, *, program: Optional[PathLike] = None,
                  flags: Sequence[str] = (), address: str = "127.0.0.1:0") -> None:
+        program = _find(program)
         self._own = None if data is not None else tempfile.TemporaryDirectory(prefix="shapedb-")
         self.data = Path(self._own.name, "data") if self._own is not None else Path(os.fspath(data or ""))
         """The data directory."""
         self._log = tempfile.NamedTemporaryFile(prefix="shapedb-", suffix=".log")
         self._process: Optional["subprocess.Popen[str]"] = None
         self._banner = ""
+        self.address = ""
+        """HOST:PORT."""
         self._started = threading.Event()
-        command = [_find(program), "--data", os.fspath(self.data), "--listen", address, *flags]
+        command = [program, "--data", os.fspath(self.data), "--listen", address, *flags]
         # When the thread that started it ends, the kernel stops the server (setpriv is part of every Debian): this
         # thread ends only after the server, or with the process.
         self._thread = threading.Thread(target=self._run, args=(_guarded(command),), name="shapedbd", daemon=True)
@@ -43,13 +46,15 @@ class LocalServer:
             self.stop()
             raise ShapeDBError("unavailable", f"the server did not start: {log.strip() or 'see its program'}")
         self.address = self._banner[len("listening on "):].strip()
-        """HOST:PORT."""
 
     def _run(self, command: List[str]) -> None:
+        # What the environment says of servers is said of others.
+        environment = {name: value for name, value in os.environ.items() if not name.startswith("SHAPEDB_")}
         try:
             # A session of its own: Ctrl-C is for this program, which stops the server in its own time.
             self._process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                                             stderr=self._log, text=True, start_new_session=True)
+                                             stderr=self._log, text=True, start_new_session=True,
+                                             env=environment)
         except OSError as error:
             self._log.write(f"{command[0]} cannot be run: {error.strerror}".encode())
             self._log.flush()

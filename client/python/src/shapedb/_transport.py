@@ -127,9 +127,13 @@ class Transport:
                 assert call.decode is not None
                 return call.decode(rpc.result())
             collector = call.collect()
-            for message in rpc:
-                collector.take(message)
-            return collector.result()
+            try:
+                for message in rpc:
+                    collector.take(message)
+                return collector.result()
+            except BaseException:
+                collector.abandon()
+                raise
         except BaseException:
             rpc.cancel()
             raise
@@ -194,9 +198,13 @@ class AsyncTransport:
                 assert call.decode is not None
                 return call.decode(await rpc)
             collector = call.collect()
-            async for message in rpc:
-                collector.take(message)
-            return collector.result()
+            try:
+                async for message in rpc:
+                    collector.take(message)
+                return collector.result()
+            except BaseException:
+                collector.abandon()
+                raise
         except asyncio.CancelledError:
             if self._closed:  # by close(), not by a cancellation of this task
                 raise cancelled() from None
