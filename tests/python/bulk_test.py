@@ -118,9 +118,9 @@ def test_a_generator_that_fails_ends_it(collection):
 
 
 def test_a_full_queue_is_waited_for():
-    full = fails(grpc.StatusCode.RESOURCE_EXHAUSTED, "queue_full", pushback=1)
+    full = fails(grpc.StatusCode.RESOURCE_EXHAUSTED, "queue_full", pushback=10)
     with Fake(*[full] * 20, pb.AddShapeResponse(outcome="OUTCOME_CREATED")) as server:
-        with shapedb.Client(server.address) as client:
+        with shapedb.Client(server.address, timeout=0.1) as client:
             result = client.collection().add_many({"a": solids.ball(20)}, resume=False, progress=False)
         assert result.outcomes == {"a": "created"} and len(server.uploads) == 21
 

@@ -1,5 +1,6 @@
 """What is taken for a scan, and how it is packed."""
 
+import pickle
 import types
 
 import hypothesis.extra.numpy as arrays
@@ -99,6 +100,12 @@ def test_chunks_hold_whole_points_and_tell_what_was_taken():
     assert b"".join(chunks) == packed.data and len(chunks) == 3
     assert all(len(chunk) % 12 == 0 and len(chunk) <= CHUNK_BYTES <= 1 << 20 for chunk in chunks)
     assert sent[-1] == len(packed.data) and sent == sorted(sent)
+
+
+def test_errors_travel_between_processes():
+    for error in (shapedb.ShapeDBError("not_found", "none"), shapedb.InvalidInput("too_few_points", "none")):
+        copy = pickle.loads(pickle.dumps(error))
+        assert type(copy) is type(error) and (copy.reason, copy.message) == (error.reason, error.message)
 
 
 def test_transform_is_the_matrix_product():

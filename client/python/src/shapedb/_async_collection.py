@@ -82,7 +82,7 @@ class AsyncCollection:
         queue is full it waits.
 
         After an interruption call it again: with `resume` scans that are there already, with the same points and
-        metadata, are not sent again. `timeout` is for each upload. `progress`: True for a bar on stderr, or a function
+        metadata, are not sent again. `timeout` is for each upload, an hour if it is not given. `progress`: True for a bar on stderr, or a function
         of `shapedb.Progress`; by default a bar in terminals and notebooks.
         """
         if workers < 1:
@@ -91,11 +91,12 @@ class AsyncCollection:
         ledger = bulk.Ledger(each, progress)
         stop = Stop()
         retry = bulk.patient(self._transport.retry)
+        limit = bulk.UPLOAD_SECONDS if timeout is None else timeout
 
         async def store(item: bulk.Item, packed: Packed) -> None:
             call = calls.add(self._name, item.key, packed, metadata=item.metadata, mode=mode, expected_version=None,
                              wait=wait, drop_plane=drop_plane, largest_object=largest_object, progress=None)
-            added = await self._transport.run(call, timeout, stop, retry)
+            added = await self._transport.run(call, limit, stop, retry)
             ledger.done(item.key, added.outcome)
 
         async def work(batch: Sequence[bulk.Item]) -> None:
@@ -304,8 +305,8 @@ class AsyncCollection:
                            free_scale: bool = False, partial: bool = False, explain: bool = False,
                            verify: Optional[bool] = None, candidates: int = 0, group_by: Optional[str] = None,
                            per_group: int = 0, timeout: Optional[float] = None) -> Tuple[SearchResult, ...]:
-        """Searches for many stored shapes (by key) and signatures, with the same options, which are those of `search`.
-        The results are in the order of the queries; the first error ends it. `timeout` is for a hundred at a time."""
+        """Searches for many stored shapes (by key) and signatures, with the same options, which are those of `search`;
+        motions and explanations only with `explain`. The results are in the order of the queries; the first error ends it. `timeout` is for a hundred at a time."""
         options = search_calls.Options(k, threshold, filter, reflection, keep_scale, free_scale, partial, explain,
                                        verify, candidates, None, None, group_by, per_group)
         results: List[SearchResult] = []

@@ -56,9 +56,12 @@ class BulkResult:
         return self
 
 
+UPLOAD_SECONDS = 3600.0
+"""What one of many uploads may take, waiting for room in the queue included."""
+
 # What the next upload would meet too.
 _FATAL = frozenset(("unauthenticated", "permission_denied", "unavailable", "not_found", "storage_full", "storage",
-                    "cancelled", "schema_too_new"))
+                    "cancelled", "rate_limited"))
 
 
 def patient(policy: RetryPolicy) -> RetryPolicy:
