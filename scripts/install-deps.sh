@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Installs the Debian 12 packages that ShapeDB needs, and only those that are missing.
 #   scripts/install-deps.sh             everything to build, test and check, the Python package too
-#   scripts/install-deps.sh --build     only what is needed to build
 #   scripts/install-deps.sh --analysis  that, and clang for scripts/ci/tidy.sh and scripts/ci/fuzz.sh
+#   scripts/install-deps.sh --build     only what is needed to build
 #   scripts/install-deps.sh --runtime   only what the programs need to run
 #   scripts/install-deps.sh --open3d    Open3D, for client/python/examples/open3d_interop.py and its test
 #   scripts/install-deps.sh --bench     everything to build, and the Point Cloud Library and FAISS, which

@@ -9,6 +9,7 @@ import shapedb
 
 import solids
 from conftest import QUICK
+from shapedb import _origin
 
 
 SAME = ("same_object", "same_object_bent")
@@ -78,6 +79,20 @@ def test_scans_far_from_the_origin_stay_where_they_are(client, collection):
     assert collection.add("hammer", stored).outcome == "unchanged"
     collection.add("hammer", solids.hammer(), wait=True)
     np.testing.assert_allclose(collection.points("hammer"), solids.hammer(), rtol=0, atol=1e-6)
+
+
+@pytest.mark.skipif(not _origin.NATIVE, reason="the API of this server has no origins")
+def test_so_they_do_in_searches_by_key(collection):
+    far = np.array([4.5e6, 5.4e6, 120.0])
+    first, second = solids.hammer() + far, moved(solids.hammer(seed=9)) - far
+    collection.add("first", first, wait=True)
+    collection.add("second", second, wait=True)
+    hit = collection.search(key="second", k=1)[0]
+    assert_lies_on(shapedb.transform(first, hit.motion), second)
+    assert_lies_on(shapedb.transform(first, collection.compare("second", "first").motion), second)
+    low, high = first.min(axis=0), first.max(axis=0)
+    position = collection.signature("first").points[0].position
+    assert (low < position).all() and (position < high).all()
 
 
 def test_what_is_returned_does_not_change(tools):
