@@ -26,7 +26,7 @@ RULES = (
     (r"\brun_async_workers\b", "run_workers"),
     (r'\A"""A connection for asyncio\..*?"""\n', '"""A connection that blocks. Made of `_async_client.py` by '
      'scripts/python-sync.py: change that, not this."""\n'),
-    (r'\A"""One collection, as `Client` sees it\..*?"""\n', '"""One collection, as `Client` sees it. Made of '
+    (r'\A"""One collection, as `Client` sees it\..*?"""\n', '"""One collection, for `Client`. Made of '
      '`_async_collection.py` by scripts/python-sync.py: change that, not this."""\n'),
 )
 

@@ -32,6 +32,9 @@ class Fake(stubs.ShapeServiceServicer):
         self.uploads.append([message.SerializeToString(deterministic=True) for message in requests])
         return self._next(context)
 
+    def WatchIngest(self, request, context):
+        yield self._next(context)
+
     def __enter__(self):
         # The pool of the server: one thread for each call that may hang.
         self._server = grpc.server(concurrent.futures.ThreadPoolExecutor(4))

@@ -74,13 +74,15 @@ def test_ply_of_anything_is_read_or_refused(tmp_path_factory, junk, cut):
         try:
             shapedb.as_points(read(folder, "junk.ply", content))
         except shapedb.ShapeDBError as error:
-            assert error.reason in ("malformed_file", "non_finite_coordinate", "coordinate_out_of_range", "too_few_points")
+            assert error.reason in ("malformed_file", "non_finite_coordinate", "coordinate_out_of_range",
+                                    "too_few_points")
 
 
 @pytest.mark.parametrize("content, words", [
     (b"plx\n", "line 1: expected 'ply'"), (b"ply\nformat ascii 1.0\n", "header"),
     (b"ply\nformat ascii 1.0\nelement vertex 1\nproperty real x\nend_header\n", "line 4: not understood"),
-    (b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nend_header\n1 2\n", "no property z"),
+    (b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nend_header\n1 2\n",
+     "no property z"),
     (ply(POINTS, "")[:-40], "fewer than 20"), (ply(POINTS, "<")[:-4], "fewer than 20"),
     (ply(CORNERS, "<", faces=[(0, 1, 9)]), "a triangle names a vertex"),
     (ply(CORNERS, "", faces=[(0, 1, -1)]), "a triangle names a vertex"),

@@ -192,13 +192,14 @@ def test_cancelling_a_task_ends_its_call():
         assert cancelled.wait(5)
 
 
-def test_ctrl_c_ends_a_call_at_once():
-    program = """
+@pytest.mark.parametrize("call", ["count()", "add('egg', [(0, 0, n) for n in range(9)], wait=True)", "wait('egg')"])
+def test_ctrl_c_ends_a_call_at_once(call):
+    program = f"""
 import sys, shapedb
 client = shapedb.Client(sys.argv[1])
 print("calling", flush=True)
 try:
-    client.collection().count()
+    client.collection().{call}
 except KeyboardInterrupt:
     print("interrupted", flush=True)
     client.close()

@@ -22,7 +22,8 @@ def tools(client):
     scans = {"hammer": solids.hammer(), "ball": solids.ball(), "egg": solids.ball(axes=(1, 1, 2)),
              "box": solids.box(), "plank": solids.box(sides=(0.3, 1, 4))}
     for key, points in scans.items():
-        made.add(key, points, metadata={"label": "tool" if key == "hammer" else "solid", "points": len(points)}, wait=True)
+        metadata = {"label": "tool" if key == "hammer" else "solid", "points": len(points)}
+        made.add(key, points, metadata=metadata, wait=True)
     return made
 
 
@@ -216,7 +217,8 @@ def test_a_picture(tools, tmp_path):
     query = solids.hammer(seed=9)
     hit = tools.search(query, k=1)[0]
     axes = tools.show(query, hit)
-    assert len(axes.collections) == 2 and [text.get_text() for text in axes.get_legend().get_texts()] == ["query", "hammer"]
+    assert len(axes.collections) == 2
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["query", "hammer"]
     axes.figure.savefig(tmp_path / "overlay.png")
     assert (tmp_path / "overlay.png").stat().st_size > 5000
     tools.show(query, "hammer", max_points=100)

@@ -57,6 +57,8 @@ def test_a_shape_and_its_life(collection):
     ({"metadata": {"a": object()}}, "invalid_argument"), ({"metadata": {"a": True}}, "invalid_argument"),
     ({"metadata": {"a b": "x"}}, "invalid_argument"), ({"metadata": {"shapedb.offset": "1 2 3"}}, "invalid_argument"),
     ({"mode": "overwrite"}, "invalid_argument"), ({"key": ""}, "invalid_argument"),
+    ({"key": 7}, "invalid_argument"), ({"key": "\udcff"}, "invalid_argument"), ({"key": None}, "invalid_argument"),
+    ({"metadata": {"a": "\udcff"}}, "invalid_argument"), ({"metadata": {7: "x"}}, "invalid_argument"),
     ({"scan": [(0, 0, 0)] * 10}, "all_points_equal"), ({"scan": np.eye(3)}, "too_few_points"),
     ({"scan": [(i, 0, 0) for i in range(9)]}, "collinear"), ({"scan": [(i, i * i, 0) for i in range(9)]}, "coplanar"),
     ({"scan": "nothing.npy"}, "file_not_readable"), ({"scan": "scan.pcd"}, "unknown_file_format"),

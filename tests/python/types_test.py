@@ -56,7 +56,8 @@ def test_users_are_told_types_and_mistakes(tmp_path):
     revealed = re.findall(r'Revealed type is "(.*)"', found)
     assert [name.replace("shapedb._types.", "").replace("shapedb._search_types.", "") for name in revealed] == [
         "Shape", "SearchResult",
-        "Union[Literal['created'], Literal['replaced'], Literal['metadata_changed'], Literal['unchanged'], Literal['retried']]",
+        "Union[Literal['created'], Literal['replaced'], Literal['metadata_changed'], Literal['unchanged'], "
+        "Literal['retried']]",
         "Union[Why, None]", "Union[numpy.ndarray[Any, numpy.dtype[numpy.floating[numpy._typing._64Bit]]], None]", "Hit",
         "builtins.tuple[Hit, ...]"], found
     mistakes = re.findall(r"error: (.*)", found)

@@ -20,8 +20,9 @@ import shapedb
 
 def models() -> "dict[str, o3d.geometry.TriangleMesh]":
     """What is searched: a mug, a table and a screw, more or less."""
-    mug = o3d.geometry.TriangleMesh.create_cylinder(1.0, 2.0) + \
-        o3d.geometry.TriangleMesh.create_torus(0.6, 0.15).rotate(np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])).translate((1.3, 0, 0))
+    handle = o3d.geometry.TriangleMesh.create_torus(0.6, 0.15)
+    handle.rotate(handle.get_rotation_matrix_from_xyz((np.pi / 2, 0, 0))).translate((1.3, 0, 0))
+    mug = o3d.geometry.TriangleMesh.create_cylinder(1.0, 2.0) + handle
     table = o3d.geometry.TriangleMesh.create_box(3.0, 2.0, 0.2)
     for x, y in ((0.1, 0.1), (2.7, 0.1), (0.1, 1.7), (2.7, 1.7)):
         table += o3d.geometry.TriangleMesh.create_box(0.2, 0.2, 1.5).translate((x, y, -1.5))

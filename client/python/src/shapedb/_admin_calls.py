@@ -16,8 +16,8 @@ from . import _admin_types as types
 from ._call import Call, Collector
 from ._connection import PathLike
 from ._errors import InvalidInput, ShapeDBError
-from ._shape_calls import listener
-from ._types import CollectionInfo, Parameters, Profile, Progress, ProgressListener
+from ._progress import Showing, reporter
+from ._types import CollectionInfo, Parameters, Profile
 from ._wire import collection_of, enum_number, fill_parameters, info_of, key_of, plain
 
 _CHUNK = 1 << 20
@@ -104,9 +104,9 @@ def cancel_rebuild(collection: str) -> Call[None]:
 class _Backup(Collector[types.BackupReport]):
     """Writes to another name first; the file appears complete or not at all."""
 
-    def __init__(self, path: str, progress: Optional[ProgressListener]) -> None:
+    def __init__(self, path: str, progress: Showing) -> None:
         self._path = path
-        self._progress = progress
+        self._report = reporter(progress, "download")
         self._sum = hashlib.sha256()
         self._bytes = 0
         self._total = 0
@@ -127,8 +127,7 @@ class _Backup(Collector[types.BackupReport]):
             raise _unwritable(self._path, error) from None
         self._sum.update(message.data)
         self._bytes += len(message.data)
-        if self._progress is not None:
-            self._progress(Progress("download", self._bytes, self._total))
+        self._report(self._bytes, self._total)
 
     def result(self) -> types.BackupReport:
         if self._bytes != self._total:
@@ -155,19 +154,19 @@ def _unwritable(path: str, error: OSError) -> ShapeDBError:
     return ShapeDBError("file_not_writable", f"{path} cannot be written: {error.strerror}")
 
 
-def backup(path: PathLike, progress: Optional[ProgressListener]) -> Call[types.BackupReport]:
+def backup(path: PathLike, progress: Showing) -> Call[types.BackupReport]:
     """Backup."""
     return Call("AdminService/Backup", admin_pb.BackupRequest(),
                 collect=lambda: _Backup(os.fspath(path), progress), bounded=False)
 
 
-def export(collection: str, path: PathLike, progress: Optional[ProgressListener]) -> Call[types.BackupReport]:
+def export(collection: str, path: PathLike, progress: Showing) -> Call[types.BackupReport]:
     """ExportCollection."""
     return Call("AdminService/ExportCollection", admin_pb.ExportCollectionRequest(collection=collection),
                 collect=lambda: _Backup(os.fspath(path), progress), bounded=False)
 
 
-def _chunks_of(path: str, progress: Optional[ProgressListener]) -> Callable[[], Iterator[Any]]:
+def _chunks_of(path: str, progress: Showing) -> Callable[[], Iterator[Any]]:
     """The size goes with the first chunk, the checksum with the last."""
     try:
         with open(path, "rb") as file:  # while it can still be said
@@ -178,7 +177,7 @@ def _chunks_of(path: str, progress: Optional[ProgressListener]) -> Callable[[], 
         raise ShapeDBError("file_not_readable", f"{path} is empty, not a backup")
 
     def chunks() -> Iterator[Any]:
-        report = listener(progress, "upload", size)
+        report = reporter(progress, "upload")
         checksum = hashlib.sha256()
         sent = 0
         with open(path, "rb") as file:
@@ -190,19 +189,18 @@ def _chunks_of(path: str, progress: Optional[ProgressListener]) -> Callable[[], 
                 if sent == size:
                     chunk.sha256 = checksum.digest()
                 yield chunk
-                if report is not None:
-                    report(sent)
+                report(sent, size)
 
     return chunks
 
 
-def restore(path: PathLike, progress: Optional[ProgressListener]) -> Call[types.Restored]:
+def restore(path: PathLike, progress: Showing) -> Call[types.Restored]:
     """Restore."""
     return Call("AdminService/Restore", _chunks_of(os.fspath(path), progress),
                 lambda message: plain(types.Restored, message), idempotent=False, bounded=False)
 
 
-def import_collection(path: PathLike, name: str, progress: Optional[ProgressListener]) -> Call[types.Imported]:
+def import_collection(path: PathLike, name: str, progress: Showing) -> Call[types.Imported]:
     """ImportCollection."""
     chunks = _chunks_of(os.fspath(path), progress)
 
@@ -216,20 +214,19 @@ def import_collection(path: PathLike, name: str, progress: Optional[ProgressList
 
 
 class _Check(Collector[Tuple[str, ...]]):
-    def __init__(self, progress: Optional[ProgressListener]) -> None:
-        self._progress = progress
+    def __init__(self, progress: Showing) -> None:
+        self._report = reporter(progress, "check")
         self._problems: List[str] = []
 
     def take(self, message: Any) -> None:
         self._problems.extend(message.problems)
-        if self._progress is not None:
-            self._progress(Progress("check", message.done, message.total))
+        self._report(message.done, message.total)
 
     def result(self) -> Tuple[str, ...]:
         return tuple(self._problems)
 
 
-def check(progress: Optional[ProgressListener]) -> Call[Tuple[str, ...]]:
+def check(progress: Showing) -> Call[Tuple[str, ...]]:
     """Check."""
     return Call("AdminService/Check", admin_pb.CheckRequest(), collect=lambda: _Check(progress), bounded=False)
 
@@ -265,7 +262,7 @@ def create_key(name: str, role: types.Role, collections: Sequence[str], expires:
         setattr(request.limits, limit, getattr(limits, limit))
     if expires is not None:
         if expires.tzinfo is None:
-            raise InvalidInput("invalid_argument", "expires has no time zone: give e.g. datetime.now(timezone.utc) + ...")
+            raise InvalidInput("invalid_argument", "expires has no time zone: add one to it, e.g. timezone.utc")
         request.expires.FromDatetime(expires.astimezone(timezone.utc))
     return Call("AdminService/CreateKey", request,
                 lambda message: types.CreatedKey(key_of(message.key), message.secret), idempotent=False)

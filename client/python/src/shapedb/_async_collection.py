@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from typing import (TYPE_CHECKING, Any, AsyncIterator, Callable, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple,
-                    Union)
+from typing import (TYPE_CHECKING, Any, AsyncIterator, Callable, Dict, Iterable, List, Mapping, Optional, Sequence,
+                    Tuple, Union)
 
 import numpy.typing as npt
 
@@ -30,10 +30,11 @@ _LONGEST_POLL_SECONDS = 2.0
 
 
 class AsyncCollection:
-    """The shapes of one collection. Made by `AsyncClient.collection`, which does not ask the server whether there is one.
+    """The shapes of one collection. Made by `AsyncClient.collection`, without asking the server whether there is one.
 
     Every call raises `ShapeDBError`, and takes `timeout`: the most seconds it may take with all its tries, in place of
-    the client's; `math.inf` for no limit.
+    the client's; `math.inf` for no limit. progress: True for a bar, or a function that is told (see `Progress`; an
+    upload calls it from another thread, and what it raises is logged).
     """
 
     def __init__(self, transport: AsyncTransport, name: str) -> None:
@@ -53,7 +54,7 @@ class AsyncCollection:
     async def add(self, key: str, scan: Scan, *, metadata: Optional[types.Metadata] = None,
                   mode: types.AddMode = "upsert", expected_version: Optional[int] = None, wait: bool = False,
                   drop_plane: bool = False, largest_object: bool = False,
-                  progress: Optional[types.ProgressListener] = None, timeout: Optional[float] = None) -> types.Added:
+                  progress: Showing = False, timeout: Optional[float] = None) -> types.Added:
         """Uploads one scan: an (n, 3) array, the path of a file, or an object with `.points` (see `shapedb.Scan`).
 
         On return the scan is on the server's disk; with `wait` it is segmented too, and searches find it. The same key
@@ -82,8 +83,8 @@ class AsyncCollection:
         queue is full it waits.
 
         After an interruption call it again: with `resume` scans that are there already, with the same points and
-        metadata, are not sent again. `timeout` is for each upload, an hour if it is not given. `progress`: True for a bar on stderr, or a function
-        of `shapedb.Progress`; by default a bar in terminals and notebooks.
+        metadata, are not sent again. `timeout` is for each upload, an hour if it is not given. By default a bar shows
+        the progress in terminals and notebooks.
         """
         if workers < 1:
             raise InvalidInput("invalid_argument", f"workers is {workers}; it must be at least 1")
@@ -140,9 +141,10 @@ class AsyncCollection:
         Without limit but `timeout`."""
         return await self._transport.run(calls.watch(self._name, key, progress), timeout)
 
-    async def wait_until_ready(self, *, progress: Showing = None, timeout: Optional[float] = None) -> types.CollectionInfo:
+    async def wait_until_ready(self, *, progress: Showing = None,
+                               timeout: Optional[float] = None) -> types.CollectionInfo:
         """Waits until no shape of the collection is pending, and returns how many are ready and failed. Without limit
-        but `timeout`. `progress` as in `add_many`."""
+        but `timeout`. By default a bar shows the progress in terminals and notebooks."""
         listener = shown(progress)
         left = timeout
         pause = _POLL_SECONDS
@@ -155,7 +157,8 @@ class AsyncCollection:
                     return info
                 if left is not None:
                     if left <= 0.0:
-                        raise ShapeDBError("deadline_exceeded", f"{info.pending} shapes of '{self._name}' are still pending")
+                        raise ShapeDBError("deadline_exceeded",
+                                           f"{info.pending} shapes of '{self._name}' are still pending")
                     pause = min(pause, left)
                     left -= pause
                 await self._transport.sleep(pause)
@@ -185,8 +188,8 @@ class AsyncCollection:
         return types.Found(tuple(shapes), tuple(missing))
 
     async def points(self, key: str, *, timeout: Optional[float] = None) -> FloatArray:
-        """The points of a shape as they are stored, in the coordinates of the scan: (n, 3), float64 with the precision of
-        float32."""
+        """The points of a shape as they are stored, in the coordinates of the scan: (n, 3), float64 with the precision
+        of float32."""
         return await self._transport.run(calls.points(self._name, key), timeout)
 
     async def shapes(self, *, filter: str = "", state: Optional[types.State] = None, order: types.Order = "id",
@@ -219,7 +222,8 @@ class AsyncCollection:
 
     async def count_by_value(self, metadata_key: str, *, filter: str = "", state: Optional[types.State] = None,
                              max_values: int = 0, timeout: Optional[float] = None) -> types.ValueCounts:
-        """How many shapes have which value under a metadata key; at most `max_values` are named (up to 1,000; 0: 100)."""
+        """How many shapes have which value under a metadata key; at most `max_values` are named (up to 1,000; 0:
+        100)."""
         return await self._transport.run(
             calls.count_by_value(self._name, metadata_key, filter, state, max_values), timeout)
 
@@ -275,7 +279,7 @@ class AsyncCollection:
                      verify: Optional[bool] = None, candidates: int = 0, one_sided: Optional[bool] = None,
                      viewpoint: Optional[npt.ArrayLike] = None, group_by: Optional[str] = None, per_group: int = 0,
                      include_self: bool = False, drop_plane: bool = False, largest_object: bool = False,
-                     progress: Optional[types.ProgressListener] = None, timeout: Optional[float] = None) -> SearchResult:
+                     progress: Showing = False, timeout: Optional[float] = None) -> SearchResult:
         """The k shapes most like a scan (as in `add`; it is not stored), like a `Signature`, or like the stored shape
         that has `key`.
 
@@ -306,7 +310,8 @@ class AsyncCollection:
                            verify: Optional[bool] = None, candidates: int = 0, group_by: Optional[str] = None,
                            per_group: int = 0, timeout: Optional[float] = None) -> Tuple[SearchResult, ...]:
         """Searches for many stored shapes (by key) and signatures, with the same options, which are those of `search`;
-        motions and explanations only with `explain`. The results are in the order of the queries; the first error ends it. `timeout` is for a hundred at a time."""
+        motions and explanations only with `explain`. The results are in the order of the queries; the first error ends
+        it. `timeout` is for a hundred at a time."""
         options = search_calls.Options(k, threshold, filter, reflection, keep_scale, free_scale, partial, explain,
                                        verify, candidates, None, None, group_by, per_group)
         results: List[SearchResult] = []
@@ -326,7 +331,7 @@ class AsyncCollection:
 
     async def align(self, scan: Scan, key: str, *, reflection: bool = True, keep_scale: bool = False,
                     free_scale: bool = False, partial: bool = False, drop_plane: bool = False,
-                    largest_object: bool = False, progress: Optional[types.ProgressListener] = None,
+                    largest_object: bool = False, progress: Showing = False,
                     timeout: Optional[float] = None) -> Fit:
         """Lays a stored shape on a scan, which is not stored. `fit.motion` leads from the shape's coordinates to the
         scan's. With `partial` the scan may show one side or a piece."""
@@ -337,8 +342,8 @@ class AsyncCollection:
 
     async def show(self, query: Scan, hit: Union[Hit, str], *, ax: Optional["Axes"] = None, max_points: int = 4000,
                    timeout: Optional[float] = None) -> "Axes":
-        """Draws a scan and a stored shape laid on it, with matplotlib: a hit of a search with the motion it has, or a key,
-        which is aligned first."""
+        """Draws a scan and a stored shape laid on it, with matplotlib: a hit of a search with the motion it has, or a
+        key, which is aligned first."""
         from ._show import show
         if isinstance(hit, str):
             motion = (await self.align(query, hit, timeout=timeout)).motion
@@ -364,8 +369,8 @@ class AsyncCollection:
                       cache_only: bool = False, detach: bool = False,
                       progress: Optional[Callable[[RebuildProgress], None]] = None,
                       timeout: Optional[float] = None) -> Tuple[RebuildProgress, ...]:
-        """Segments all shapes again, with new parameters if some are given, and follows that to its end. It survives the
-        loss of this call, and calling again follows it. `cache_only` reloads the stored signatures and no more,
+        """Segments all shapes again, with new parameters if some are given, and follows that to its end. It survives
+        the loss of this call, and calling again follows it. `cache_only` reloads the stored signatures and no more,
         `detach` returns at once. Without limit but `timeout`."""
         return await self._transport.run(
             admin_calls.rebuild(self._name, cache_only, profile, parameters, detach, progress), timeout)
@@ -374,7 +379,7 @@ class AsyncCollection:
         """Stops a running rebuild and discards what it has made. Raises not_found."""
         await self._transport.run(admin_calls.cancel_rebuild(self._name), timeout)
 
-    async def export(self, path: PathLike, *, progress: Optional[types.ProgressListener] = None,
+    async def export(self, path: PathLike, *, progress: Showing = False,
                      timeout: Optional[float] = None) -> BackupReport:
         """Writes the collection to a file, which appears complete or not at all; `AsyncClient.import_collection` reads
         it. Without limit but `timeout`."""

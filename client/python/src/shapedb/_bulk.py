@@ -8,7 +8,8 @@ import threading
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import (Any, Awaitable, Callable, Dict, Iterable, Iterator, List, Mapping, Optional, Sequence, Sized, Tuple, Union)
+from typing import (Any, Awaitable, Callable, Dict, Iterable, Iterator, List, Mapping, Optional, Sequence, Sized, Tuple,
+                    Union)
 
 from ._connection import PathLike
 from ._errors import InvalidInput, ShapeDBError
@@ -97,7 +98,8 @@ def scan_folder(folder: PathLike, *, label_from_folder: bool = False,
     items.sort(key=lambda item: item.key)
     for one, next_one in zip(items, items[1:]):
         if one.key == next_one.key:
-            raise InvalidInput("invalid_argument", f"{one.scan!r} and {next_one.scan!r} would have the same key; rename one")
+            raise InvalidInput("invalid_argument",
+                               f"{one.scan!r} and {next_one.scan!r} would have the same key; rename one")
     return items
 
 

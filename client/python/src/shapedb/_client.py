@@ -15,7 +15,8 @@ from . import _types as types
 from ._collection import Collection
 from ._connection import PathLike, target_of
 from ._errors import ShapeDBError
-from ._points import Scan, pack
+from ._points import Scan, pack, text_of
+from ._progress import Showing
 from ._retry import RetryPolicy, seconds_of
 from ._search_types import Fit
 from ._transport import Transport
@@ -35,10 +36,12 @@ class Client:
     SHAPEDB_API_KEY_FILE, SHAPEDB_TLS, SHAPEDB_TLS_CA, SHAPEDB_CLIENT_CERTIFICATE, SHAPEDB_CLIENT_KEY. `environment`
     replaces them; `{}` to ignore them.
 
-    timeout: the most seconds one call may take with all its tries; `math.inf` for no limit. It does not limit calls that
-    follow work on the server or change many shapes, which say so. retry: see `RetryPolicy`.
+    timeout: the most seconds one call may take with all its tries; `math.inf` for no limit. It does not limit calls
+    that follow work on the server or change many shapes, which say so. retry: see `RetryPolicy`.
 
-    Every call raises `ShapeDBError`, and takes `timeout` for itself. See docs/python.md for threads, tasks and forks.
+    Every call raises `ShapeDBError`, and takes `timeout` for itself. progress: True for a bar, or a function that is
+    told (see `Progress`; an upload calls it from another thread, and what it raises is logged). See docs/python.md for
+    threads, tasks and forks.
     """
 
     def __init__(self, address: Optional[str] = None, *, api_key: Optional[str] = None,
@@ -75,7 +78,7 @@ class Client:
 
     def collection(self, name: str = "default") -> Collection:
         """A collection by its name or an alias. Does not ask the server whether there is one."""
-        return Collection(self._transport, name)
+        return Collection(self._transport, text_of(name, "the name of a collection"))
 
     def create_collection(self, name: str, *, description: str = "", profile: Optional[types.Profile] = None,
                                 unit: Optional[types.Unit] = None, parameters: Optional[types.Parameters] = None,
@@ -85,8 +88,9 @@ class Client:
         given = parameters or types.Parameters()
         if unit is not None:
             given = replace(given, unit=unit)
+        call = calls.create_collection(text_of(name, "name"), text_of(description, "description"), profile, given)
         try:
-            self._transport.run(calls.create_collection(name, description, profile, given), timeout)
+            self._transport.run(call, timeout)
         except ShapeDBError as error:
             if not exist_ok or error.reason != "already_exists":
                 raise
@@ -106,7 +110,8 @@ class Client:
         self._transport.run(calls.delete_collection(name, force), timeout)
 
     def set_alias(self, alias: str, collection: str, *, timeout: Optional[float] = None) -> types.CollectionInfo:
-        """Makes a name stand for a collection, or for another one than before, at one moment. Returns that collection."""
+        """Makes a name stand for a collection, or for another one than before, at one moment. Returns that
+        collection."""
         return self._transport.run(calls.set_alias(alias, collection), timeout)
 
     def delete_alias(self, alias: str, *, timeout: Optional[float] = None) -> None:
@@ -114,7 +119,7 @@ class Client:
         self._transport.run(calls.delete_alias(alias), timeout)
 
     def import_collection(self, path: PathLike, name: str = "", *,
-                                progress: Optional[types.ProgressListener] = None,
+                                progress: Showing = False,
                                 timeout: Optional[float] = None) -> admin.Imported:
         """Adds the collection of a file that `Collection.export` wrote, under its own name or another. Nothing is
         segmented again. Not repeated by itself, without limit but `timeout`."""
@@ -125,7 +130,7 @@ class Client:
     def segment(self, scan: Scan, *, profile: Optional[types.Profile] = None,
                       parameters: Optional[types.Parameters] = None, summary_only: bool = False,
                       drop_plane: bool = False, largest_object: bool = False,
-                      progress: Optional[types.ProgressListener] = None,
+                      progress: Showing = False,
                       timeout: Optional[float] = None) -> types.Segmentation:
         """The parts of a scan. With `summary_only` without the points."""
         packed = self._transport.offload(pack, scan)
@@ -135,7 +140,7 @@ class Client:
 
     def align(self, query: Scan, other: Scan, *, reflection: bool = True, keep_scale: bool = False,
                     partial: bool = False, drop_plane: bool = False, largest_object: bool = False,
-                    progress: Optional[types.ProgressListener] = None, timeout: Optional[float] = None) -> Fit:
+                    progress: Showing = False, timeout: Optional[float] = None) -> Fit:
         """Lays a scan on another. `fit.motion` leads from the coordinates of `other` to those of `query`. `keep_scale`:
         both have the same unit. `partial`: the query may show one side or a piece of the other."""
         first = self._transport.offload(pack, query)
@@ -164,18 +169,18 @@ class Client:
         """Segments the shapes of all collections again, see `Collection.rebuild`."""
         return self._transport.run(calls.rebuild("", cache_only, None, None, detach, progress), timeout)
 
-    def backup(self, path: PathLike, *, progress: Optional[types.ProgressListener] = None,
+    def backup(self, path: PathLike, *, progress: Showing = False,
                      timeout: Optional[float] = None) -> admin.BackupReport:
         """Writes a consistent copy of everything to a file, which appears complete or not at all. Without limit but
         `timeout`."""
         return self._transport.run(calls.backup(path, progress), timeout)
 
-    def restore(self, path: PathLike, *, progress: Optional[types.ProgressListener] = None,
+    def restore(self, path: PathLike, *, progress: Showing = False,
                       timeout: Optional[float] = None) -> admin.Restored:
         """Replaces everything on the server with a backup. Not repeated by itself, without limit but `timeout`."""
         return self._transport.run(calls.restore(path, progress), timeout)
 
-    def check(self, *, progress: Optional[types.ProgressListener] = None,
+    def check(self, *, progress: Showing = False,
                     timeout: Optional[float] = None) -> Tuple[str, ...]:
         """Reads the whole database and returns the problems found; none if it is sound. Without limit but `timeout`."""
         return self._transport.run(calls.check(progress), timeout)

@@ -1,4 +1,4 @@
-"""Reads scan files: what is common among researchers. The `shapedb` command reads more, and says more of what is wrong."""
+"""Reads the scan files that are common among researchers. The `shapedb` command reads more of them."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ def read_scan(path: PathLike, *, mesh_samples: int = SAMPLES, seed: int = 1) -> 
     reader = _READERS.get(Path(name).suffix.lower())
     if reader is None:
         raise InvalidInput("unknown_file_format",
-                           f"{name}: this package reads {', '.join(sorted(ENDINGS))}; load other formats with trimesh or "
-                           "Open3D and give the object, or use `shapedb add`")
+                           f"{name}: this package reads {', '.join(sorted(ENDINGS))}; load other formats with trimesh "
+                           "or Open3D and give the object, or use `shapedb add`")
     if mesh_samples < 1:
         raise InvalidInput("invalid_argument", f"mesh_samples is {mesh_samples}; it must be at least 1")
     try:
@@ -71,7 +71,8 @@ def _read_table(data: bytes) -> Tuple[FloatArray, Triangles]:
         try:
             x, y, z = (float(field) for field in fields[:3])
         except ValueError:
-            raise InvalidInput("malformed_file", f"line {number}: expected three numbers, found '{line[:40]}'") from None
+            raise InvalidInput("malformed_file",
+                               f"line {number}: expected three numbers, found '{line[:40]}'") from None
         rows.append((x, y, z))
     if announced is not None and announced != len(rows):
         raise InvalidInput("malformed_file", f"the first line announces {announced} points, there are {len(rows)}")

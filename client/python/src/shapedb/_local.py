@@ -110,8 +110,8 @@ def _find(program: Optional[PathLike]) -> str:
     name = os.fspath(program) if program is not None else os.environ.get("SHAPEDBD") or "shapedbd"
     found = shutil.which(name)
     if found is None:
-        raise ShapeDBError("file_not_readable", f"no program {name}: build shapedbd (scripts/build.sh) and name it with "
-                           "program=..., the variable SHAPEDBD, or a folder on the PATH")
+        raise ShapeDBError("file_not_readable", f"no program {name}: build shapedbd (scripts/build.sh) and name it "
+                           "with program=..., the variable SHAPEDBD, or a folder on the PATH")
     return found
 
 

@@ -17,7 +17,8 @@ _DENSE_AREA = 0.99
 _LONGEST_EDGE = 3.0
 
 
-def points_of_mesh(vertices: Any, triangles: npt.NDArray[np.int64], samples: int = SAMPLES, seed: int = 1) -> FloatArray:
+def points_of_mesh(vertices: Any, triangles: npt.NDArray[np.int64], samples: int = SAMPLES,
+                   seed: int = 1) -> FloatArray:
     """The vertices if less than half of them belong to a triangle, if they are a dense sample of the surface
     themselves, or if the triangles have no area; else `samples` points of the surface, uniform by area. The same mesh
     gives the same points."""
@@ -38,8 +39,9 @@ def points_of_mesh(vertices: Any, triangles: npt.NDArray[np.int64], samples: int
     if len(points) >= samples and fine >= _DENSE_AREA * area:
         return points
     random = np.random.default_rng(seed)
-    chosen = corners[np.searchsorted(np.cumsum(areas), random.random(samples) * area, side="right").clip(max=len(areas) - 1)]
+    chosen = np.searchsorted(np.cumsum(areas), random.random(samples) * area, side="right").clip(max=len(areas) - 1)
+    a, b, c = corners[chosen].transpose(1, 0, 2)
     # Uniform in a triangle (Osada et al., "Shape distributions", section 3.1).
     root, along = np.sqrt(random.random((samples, 1))), random.random((samples, 1))
-    sampled: FloatArray = (1.0 - root) * chosen[:, 0] + root * (1.0 - along) * chosen[:, 1] + root * along * chosen[:, 2]
+    sampled: FloatArray = (1.0 - root) * a + root * (1.0 - along) * b + root * along * c
     return sampled

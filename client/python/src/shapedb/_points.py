@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 from dataclasses import dataclass
-from typing import Any, Callable, Iterator, Optional, Protocol, Union
+from typing import Any, Iterator, Protocol, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -78,8 +78,8 @@ def _array(scan: Any) -> FloatArray:
         raise InvalidInput("invalid_argument", f"the scan is not an (n, 3) array: {error}") from None
     if array.dtype.kind not in "fiu":
         what = type(scan).__name__ if array.dtype.kind == "O" else f"an array of {array.dtype}"
-        raise InvalidInput(
-            "invalid_argument", f"a scan is an (n, 3) array of numbers, a path, or an object with .points; this is {what}")
+        raise InvalidInput("invalid_argument",
+                           f"a scan is an (n, 3) array of numbers, a path, or an object with .points; this is {what}")
     if array.size == 0:
         raise InvalidInput("too_few_points", "the scan has no points; a shape needs at least 4")
     if array.ndim != 2 or array.shape[1] != 3:
@@ -113,12 +113,10 @@ class Packed:
     origin: FloatArray
     """What was subtracted from every point: zero, unless the scan lies far from there."""
 
-    def chunks(self, sent: Optional[Callable[[int], None]] = None) -> Iterator[bytes]:
-        """The data in pieces; `sent` is told how many bytes were taken from the iterator so far."""
+    def chunks(self) -> Iterator[bytes]:
+        """The data in pieces that may be sent."""
         for at in range(0, len(self.data), CHUNK_BYTES):
             yield self.data[at:at + CHUNK_BYTES]
-            if sent is not None:
-                sent(min(at + CHUNK_BYTES, len(self.data)))
 
 
 def pack(scan: Scan) -> Packed:
@@ -141,6 +139,17 @@ def pack(scan: Scan) -> Packed:
 def unpack(data: bytes, origin: FloatArray) -> FloatArray:
     """The points of packed data in the coordinates of their scan."""
     return np.frombuffer(data, dtype="<f4").reshape(-1, 3).astype(np.float64) + origin
+
+
+def text_of(value: Any, what: str) -> str:
+    """Text that can be sent. Raises `InvalidInput` for what is no text, or is not UTF-8, as names of files may be."""
+    if not isinstance(value, str):
+        raise InvalidInput("invalid_argument", f"{what} is {value!r:.60}; it must be text")
+    try:
+        value.encode()
+    except UnicodeEncodeError:
+        raise InvalidInput("invalid_argument", f"{what} {value!r:.60} is not UTF-8") from None
+    return value
 
 
 def read_only(array: Any) -> FloatArray:

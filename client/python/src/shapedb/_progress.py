@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 import threading
 import time
@@ -13,6 +14,7 @@ Showing = Union[bool, None, Callable[[Progress], None]]
 """Whether to show a bar on stderr: True, False, None (if stderr is a terminal or this is a notebook); or a function
 that is told instead."""
 
+_log = logging.getLogger("shapedb")
 _WIDTH = 30
 _SECONDS_BETWEEN = 0.1
 
@@ -69,6 +71,24 @@ def shown(showing: Showing) -> Optional[Callable[[Progress], None]]:
         # ipykernel's stderr is no terminal, but shows a line that is written again.
         showing = sys.stderr is not None and (sys.stderr.isatty() or "ipykernel" in sys.modules)
     return Bar() if showing else None
+
+
+def reporter(showing: Showing, stage: str) -> Callable[[int, int], None]:
+    """Tells who is to be told how much is done of how much. What a listener raises is logged: in the middle of a
+    stream it would look like a failure of gRPC."""
+    listener = shown(showing)
+
+    def report(done: int, total: int) -> None:
+        if listener is None:
+            return
+        try:
+            listener(Progress(stage, done, total))
+        except Exception:
+            _log.exception("a progress listener failed")
+        if done == total:
+            close(listener)
+
+    return report
 
 
 def close(listener: Optional[Callable[[Progress], None]]) -> None:

@@ -15,10 +15,11 @@ from . import _origin
 from . import _search_types as types
 from ._call import Call
 from ._errors import InvalidInput
-from ._points import Packed
+from ._points import Packed, text_of
+from ._progress import Showing
 from ._search_wire import comparison_of, fit_of, result_of
 from ._shape_calls import fill_isolation, fill_scan, upload
-from ._types import ProgressListener, Signature
+from ._types import Signature
 
 BATCH = 100
 """Queries in one call: what they answer must fit into a message."""
@@ -45,12 +46,13 @@ class Options:
 
     def message(self, collection: str, query: Optional[Packed]) -> pb.SearchOptions:
         """As it is sent; the viewpoint like the query's points."""
+        filter, group_by = text_of(self.filter, "filter"), text_of(self.group_by or "", "group_by")
         try:
             message = pb.SearchOptions(
-                collection=collection, k=self.k, threshold=self.threshold, filter=self.filter,
+                collection=collection, k=self.k, threshold=self.threshold, filter=filter,
                 forbid_reflection=not self.reflection, keep_scale=self.keep_scale, free_scale=self.free_scale,
                 partial=self.partial, no_explanation=not self.explain, verify_candidates=self.candidates,
-                group_by=self.group_by or "", per_group=self.per_group)
+                group_by=group_by, per_group=self.per_group)
         except (TypeError, ValueError) as error:
             raise InvalidInput("invalid_argument", f"a search option is not of its type or range: {error}") from None
         if self.verify is not None:
@@ -61,12 +63,13 @@ class Options:
             place = np.asarray(self.viewpoint, dtype=np.float64)
             if place.shape != (3,) or not np.isfinite(place).all():
                 raise InvalidInput("invalid_argument", f"viewpoint is {self.viewpoint!r}; it must be three numbers")
-            _origin.fill_vector(message.viewpoint, place - (_origin.ZERO if query is None else _origin.moved(query.origin)))
+            moved = _origin.ZERO if query is None else _origin.moved(query.origin)
+            _origin.fill_vector(message.viewpoint, place - moved)
         return message
 
 
 def by_scan(collection: str, options: Options, scan: Packed, drop_plane: bool, largest_object: bool,
-            progress: Optional[ProgressListener]) -> Call[types.SearchResult]:
+            progress: Showing) -> Call[types.SearchResult]:
     """SearchByScan."""
     header = pb.SearchByScanHeader(options=options.message(collection, scan))
     fill_scan(header, scan)
@@ -77,9 +80,9 @@ def by_scan(collection: str, options: Options, scan: Packed, drop_plane: bool, l
 
 def by_key(collection: str, options: Options, key: str, include_self: bool) -> Call[types.SearchResult]:
     """SearchByKey."""
-    return Call("SearchService/SearchByKey",
-                pb.SearchByKeyRequest(options=options.message(collection, None), key=key, include_self=include_self),
-                result_of)
+    request = pb.SearchByKeyRequest(options=options.message(collection, None), key=text_of(key, "key"),
+                                    include_self=include_self)
+    return Call("SearchService/SearchByKey", request, result_of)
 
 
 def by_signature(collection: str, options: Options, signature: Signature) -> Call[types.SearchResult]:
@@ -97,7 +100,7 @@ def batch(collection: str, options: Options,
         if isinstance(query, Signature):
             request.queries.add(signature=query.encoded)
         elif isinstance(query, str):
-            request.queries.add(key=query)
+            request.queries.add(key=text_of(query, "key"))
         else:
             raise InvalidInput("invalid_argument",
                                f"a query of a batch is a key or a signature, not a {type(query).__name__}")
@@ -131,14 +134,14 @@ class CompareOptions:
 def compare(query: Tuple[str, str], other: Tuple[str, str], options: CompareOptions) -> Call[types.Comparison]:
     """Compare; shapes are (collection, key)."""
     request = pb.CompareRequest()
-    request.query.collection, request.query.key = query
-    request.other.collection, request.other.key = other
+    request.query.collection, request.query.key = query[0], text_of(query[1], "key")
+    request.other.collection, request.other.key = other[0], text_of(other[1], "key")
     options.fill(request)
     return Call("SearchService/Compare", request, lambda message: comparison_of(message, other[1]))
 
 
 def align(query: Packed, other: Union[Packed, Tuple[str, str]], options: CompareOptions, drop_plane: bool,
-          largest_object: bool, progress: Optional[ProgressListener]) -> Call[types.Fit]:
+          largest_object: bool, progress: Showing) -> Call[types.Fit]:
     """Align: a scan, and another or a stored shape (collection, key)."""
     header = align_pb.AlignHeader(query_points=query.count, query_sha256=query.sha256)
     options.fill(header)
@@ -153,6 +156,6 @@ def align(query: Packed, other: Union[Packed, Tuple[str, str]], options: Compare
         scans.append(other)
         moved = _origin.moved(other.origin)
     else:
-        header.key.collection, header.key.key = other
+        header.key.collection, header.key.key = other[0], text_of(other[1], "key")
     return Call("AlignService/Align", upload(align_pb.AlignRequest, header, scans, progress),
                 lambda message: fit_of(message.fit, _origin.moved(query.origin), moved))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import logging
 from typing import Any, Callable, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
@@ -14,43 +13,26 @@ from . import _origin
 from . import _types as types
 from ._call import Call, Collector, Last
 from ._errors import InvalidInput, ShapeDBError
-from ._points import FloatArray, Packed, unpack
+from ._points import FloatArray, Packed, text_of, unpack
+from ._progress import Showing, reporter
 from ._wire import (added_of, enum_number, event_of, fill_metadata_change, fill_parameters, metadata_texts,
                     metadata_update_of, report_of, shape_of, signature_of, state_number, value_counts_of)
 
-_log = logging.getLogger("shapedb")
-
-
-def listener(progress: Optional[types.ProgressListener], stage: str, total: int) -> Optional[Callable[[int], None]]:
-    """Tells progress in bytes. What the listener raises is logged: in the middle of a stream it would look like a
-    failure of gRPC."""
-    if progress is None:
-        return None
-    told = progress
-
-    def report(done: int) -> None:
-        try:
-            told(types.Progress(stage, done, total))
-        except Exception:
-            _log.exception("a progress listener failed")
-
-    return report
-
 
 def upload(request: Any, header: Any, scans: Sequence[Packed],
-           progress: Optional[types.ProgressListener]) -> Callable[[], Iterator[Any]]:
+           progress: Showing) -> Callable[[], Iterator[Any]]:
     """Makes the messages of an upload: a header, then the chunks of each scan. `request` is their class."""
     def messages() -> Iterator[Any]:
         yield request(header=header)
-        before = 0
-        report = listener(progress, "upload", sum(len(scan.data) for scan in scans))
-        for scan in scans:
-            sent = None if report is None else (lambda done, at=before: report(at + done))
-            for chunk in scan.chunks(sent):
-                message = request()
-                message.chunk.xyz = chunk
-                yield message
-            before += len(scan.data)
+        report = reporter(progress, "upload")
+        total = sum(len(scan.data) for scan in scans)
+        sent = 0
+        for chunk in (chunk for scan in scans for chunk in scan.chunks()):
+            message = request()
+            message.chunk.xyz = chunk
+            yield message
+            sent += len(chunk)
+            report(sent, total)
 
     return messages
 
@@ -71,10 +53,10 @@ def fill_scan(header: Any, scan: Packed) -> None:
 
 def add(collection: str, key: str, scan: Packed, *, metadata: Optional[types.Metadata], mode: types.AddMode,
         expected_version: Optional[int], wait: bool, drop_plane: bool, largest_object: bool,
-        progress: Optional[types.ProgressListener]) -> Call[types.Added]:
+        progress: Showing) -> Call[types.Added]:
     """AddShape. The same key with the same points is the same shape, so it is repeated; not if it depends on the
     version, which a first try whose reply was lost may have changed."""
-    header = pb.AddShapeHeader(collection=collection, key=key, wait=wait)
+    header = pb.AddShapeHeader(collection=collection, key=text_of(key, "key"), wait=wait)
     header.mode = enum_number(pb.AddMode, "ADD_MODE_", mode, "mode")  # type: ignore[assignment]
     if expected_version is not None:
         header.expected_version = expected_version
@@ -91,19 +73,25 @@ def get(collection: str, key: str) -> Call[types.Shape]:
                 lambda message: shape_of(message.shape))
 
 
+def _keys(keys: Sequence[str]) -> List[str]:
+    if isinstance(keys, str):
+        raise InvalidInput("invalid_argument", "keys is a text; give a list of keys")
+    return [text_of(key, "key") for key in keys]
+
+
 def _ref(collection: str, key: str) -> pb.ShapeRef:
-    return pb.ShapeRef(collection=collection, key=key)
+    return pb.ShapeRef(collection=collection, key=text_of(key, "key"))
 
 
 def get_messages(collection: str, keys: Sequence[str]) -> Call[Any]:
     """GetShapes, answered with the message itself."""
-    return Call("ShapeService/GetShapes", pb.GetShapesRequest(collection=collection, keys=keys),
+    return Call("ShapeService/GetShapes", pb.GetShapesRequest(collection=collection, keys=_keys(keys)),
                 lambda message: message)
 
 
 def get_many(collection: str, keys: Sequence[str]) -> Call[types.Found]:
     """GetShapes."""
-    return Call("ShapeService/GetShapes", pb.GetShapesRequest(collection=collection, keys=keys),
+    return Call("ShapeService/GetShapes", pb.GetShapesRequest(collection=collection, keys=_keys(keys)),
                 lambda message: types.Found(tuple(map(shape_of, message.shapes)), tuple(message.missing)))
 
 
@@ -137,7 +125,7 @@ def points(collection: str, key: str) -> Call[FloatArray]:
 def page(collection: str, *, filter: str, state: Optional[types.State], order: types.Order, descending: bool,
          key_prefix: str, page_size: int, cursor: str) -> Call[types.Page]:
     """ListShapes."""
-    request = pb.ListShapesRequest(collection=collection, filter=filter, state=state_number(state),
+    request = pb.ListShapesRequest(collection=collection, filter=text_of(filter, "filter"), state=state_number(state),
                                    page_size=page_size, cursor=cursor, descending=descending, key_prefix=key_prefix)
     request.order = enum_number(pb.ShapeOrder, "SHAPE_ORDER_", order, "order")  # type: ignore[assignment]
     return Call("ShapeService/ListShapes", request,
@@ -147,8 +135,9 @@ def page(collection: str, *, filter: str, state: Optional[types.State], order: t
 def count(collection: str, filter: str, state: Optional[types.State], key_prefix: str) -> Call[int]:
     """CountShapes."""
     return Call("ShapeService/CountShapes",
-                pb.CountShapesRequest(collection=collection, filter=filter, state=state_number(state),
-                                      key_prefix=key_prefix), lambda message: int(message.count))
+                pb.CountShapesRequest(collection=collection, filter=text_of(filter, "filter"),
+                                      state=state_number(state), key_prefix=key_prefix),
+                lambda message: int(message.count))
 
 
 def count_by_value(collection: str, metadata_key: str, filter: str, state: Optional[types.State],
@@ -170,13 +159,11 @@ def delete(collection: str, key: str, expected_version: Optional[int]) -> Call[t
 def _select(selection: Any, keys: Optional[Sequence[str]], filter: Optional[str]) -> None:
     if (keys is None) == (filter is None):
         raise InvalidInput("invalid_argument", "give either keys or a filter; the filter \"\" means all shapes")
-    if isinstance(keys, str):
-        raise InvalidInput("invalid_argument", "keys is a text; give a list of keys")
     if keys is not None:
         selection.keys.SetInParent()
-        selection.keys.keys.extend(keys)
+        selection.keys.keys.extend(_keys(keys))
     else:
-        selection.filter = filter
+        selection.filter = text_of(filter, "filter")
 
 
 def delete_many(collection: str, keys: Optional[Sequence[str]], filter: Optional[str]) -> Call[types.Deleted]:
@@ -202,9 +189,9 @@ def update_metadata(collection: str, key: Optional[str], filter: Optional[str], 
     """UpdateMetadata, by key or by filter. One by key can be repeated: what it sets stays set."""
     request = pb.UpdateMetadataRequest(collection=collection)
     if key is not None:
-        request.key = key
-    elif filter is not None:
-        request.filter = filter
+        request.key = text_of(key, "key")
+    else:
+        request.filter = text_of(filter, "filter")
     fill_metadata_change(request.change, put, tuple(remove), replace_all)
     if expected_version is not None:
         request.expected_version = expected_version
@@ -262,7 +249,7 @@ def get_origin(collection: str, key: str) -> Call[FloatArray]:
 
 def segment(scan: Packed, *, profile: Optional[types.Profile], parameters: Optional[types.Parameters],
             summary_only: bool, drop_plane: bool, largest_object: bool,
-            progress: Optional[types.ProgressListener]) -> Call[types.Segmentation]:
+            progress: Showing) -> Call[types.Segmentation]:
     """Segment."""
     header = pb.SegmentHeader(summary_only=summary_only)
     fill_scan(header, scan)

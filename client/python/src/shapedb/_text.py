@@ -52,7 +52,8 @@ def why(explanation: "Why") -> str:
     name = safe(explanation.name)
     lines: List[str] = []
     if explanation.verdict is not None:
-        lines.append(f"{name}: {explanation.words} (such verdicts are right in {percent(explanation.reliability)} of cases)")
+        right = percent(explanation.reliability)
+        lines.append(f"{name}: {explanation.words} (such verdicts are right in {right} of cases)")
     if explanation.matches:
         matched = {match.query for match in explanation.matches}
         volume = sum(_at(explanation.query_shares, index) for index in matched)

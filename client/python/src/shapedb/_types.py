@@ -37,7 +37,7 @@ class Progress:
 
 
 ProgressListener = Callable[[Progress], None]
-"""Is told about progress. An upload calls it from another thread; what it raises is logged and does not end the call."""
+"""Is told about progress."""
 
 
 @dataclass(frozen=True)
@@ -172,7 +172,8 @@ class MetadataUpdate:
 
 @dataclass(frozen=True)
 class Parameters:
-    """How signatures are made. None: the profile's value; in a rebuild, as it was. docs/command-line.md explains each."""
+    """How signatures are made; docs/command-line.md explains each. None: the profile's value; in a rebuild, as it
+    was."""
 
     big_ball_ratio: Optional[float] = None
     deep_angle_degrees: Optional[float] = None

@@ -16,7 +16,7 @@ from . import _admin_types as admin
 from . import _origin
 from . import _types as types
 from ._errors import InvalidInput
-from ._points import FloatArray, read_only
+from ._points import FloatArray, read_only, text_of
 
 T = TypeVar("T")
 
@@ -70,10 +70,10 @@ def metadata_texts(metadata: types.Metadata) -> Dict[str, str]:
         if isinstance(value, bool) or not isinstance(value, (str, int, float, np.integer, np.floating)):
             raise InvalidInput("invalid_argument",
                                f"metadata '{key}' is of {type(value).__name__}; it must be text or a number")
-        if key.startswith("shapedb."):
+        if text_of(key, "a metadata key").startswith("shapedb."):
             raise InvalidInput("invalid_argument",
                                f"metadata '{key}': keys that begin with shapedb. are kept for the client itself")
-        texts[key] = value if isinstance(value, str) else str(value)
+        texts[key] = text_of(value if isinstance(value, str) else str(value), f"metadata '{key}'")
     return texts
 
 
@@ -191,10 +191,11 @@ def signature_of(message: Any, move: FloatArray = _origin.ZERO) -> types.Signatu
 
 def report_of(message: Any) -> types.SegmentationReport:
     """Of a `SegmentationReport`."""
+    source = enum_name(types_pb.InteriorSource, "INTERIOR_SOURCE_", message.interior_source)
+    doubt = enum_name(types_pb.InteriorDoubt, "INTERIOR_DOUBT_", message.doubt)
     return plain(types.SegmentationReport, message,
                  quality=message.quality if message.HasField("quality") else 1.0,
-                 interior_source=enum_name(types_pb.InteriorSource, "INTERIOR_SOURCE_", message.interior_source) or "walk",
-                 doubt=enum_name(types_pb.InteriorDoubt, "INTERIOR_DOUBT_", message.doubt) or "none",
+                 interior_source=source or "walk", doubt=doubt or "none",
                  stages={stage.stage: stage.seconds for stage in message.stages})
 
 
