@@ -108,6 +108,20 @@ def test_what_every_scan_would_meet_ends_it(client):
         client.collection("missing").add_many(["abc"])
 
 
+def test_closing_the_client_ends_it(client, collection):
+    other = shapedb.Client(client.address, environment={})
+
+    def items():
+        for n in range(10_000):
+            yield f"s{n}", solids.ball(20, seed=n)
+            if n == 200:
+                other.close()
+
+    with pytest.raises(shapedb.ShapeDBError, match="cancelled"):
+        collection_of_other = other.collection(collection.name)
+        collection_of_other.add_many(items(), progress=False)
+
+
 def test_a_generator_that_fails_ends_it(collection):
     def items():
         yield "a", solids.ball(20)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 import time
-from typing import Any, Callable, Dict, Optional, Set, TypeVar
+from typing import Any, Callable, Dict, Optional, Sequence, Set, TypeVar
 
 import grpc
 import grpc.aio
@@ -103,25 +103,26 @@ class Transport:
         the call on the server too."""
         attempts = Attempts(retry or self.retry, call.idempotent,
                             seconds_of(timeout, self._timeout if call.bounded else None))
+        stops = [self._stop] if stop is None else [self._stop, stop]
         while True:
             try:
-                return self._attempt(call, attempts.remaining(), stop or self._stop)
-            except (grpc.FutureCancelledError, ValueError):  # the latter: the channel is closed
-                if not (stop or self._stop).stopped:
-                    raise
-                raise cancelled() from None
-            except grpc.RpcError as error:
-                if (stop or self._stop).stopped:
+                return self._attempt(call, attempts.remaining(), stops)
+            except (grpc.FutureCancelledError, grpc.RpcError, ValueError) as error:
+                # The ValueError is that of a closed channel.
+                if any(one.stopped for one in stops):
                     raise cancelled() from None
+                if not isinstance(error, grpc.RpcError):
+                    raise
                 delay = attempts.after(Failure(error, self.target.name))
             self.sleep(delay)
 
-    def _attempt(self, call: Call[T], timeout: Optional[float], stop: Stop) -> T:
+    def _attempt(self, call: Call[T], timeout: Optional[float], stops: Sequence[Stop]) -> T:
         method = self._find(call.rpc)
         if call.collect is None:
             method = method.future
         rpc = method(call.requests(), timeout=timeout, metadata=self.target.metadata)
-        stop.enter(rpc)
+        for stop in stops:
+            stop.enter(rpc)
         try:
             if call.collect is None:
                 assert call.decode is not None
@@ -138,7 +139,8 @@ class Transport:
             rpc.cancel()
             raise
         finally:
-            stop.leave(rpc)
+            for stop in stops:
+                stop.leave(rpc)
 
     def sleep(self, seconds: float) -> None:
         """Waits."""
