@@ -101,7 +101,7 @@ def test_what_every_scan_would_meet_ends_it(client):
 
     with pytest.raises(shapedb.ShapeDBError) as error:
         client.collection("missing").add_many(items(), progress=False, workers=2)
-    assert error.value.reason == "not_found" and len(asked) < 200
+    assert error.value.reason == "not_found" and len(asked) < 200 and "0 were stored before" in error.value.message
     with pytest.raises(shapedb.InvalidInput, match="workers"):
         client.collection("missing").add_many([], workers=0)
     with pytest.raises(shapedb.InvalidInput, match="an item is"):

@@ -89,8 +89,8 @@ def test_the_wait_is_as_long_as_the_server_asks_for():
 
 def test_there_is_no_wait_beyond_the_deadline():
     start = time.monotonic()
-    error, tries = error_of(fails(grpc.StatusCode.RESOURCE_EXHAUSTED, "queue_full", pushback=60_000), timeout=2)
-    assert error.reason == "queue_full" and tries == 1 and time.monotonic() - start < 2
+    error, tries = error_of(fails(grpc.StatusCode.RESOURCE_EXHAUSTED, "queue_full", pushback=60_000), timeout=20)
+    assert error.reason == "queue_full" and tries == 1 and time.monotonic() - start < 20
 
 
 def test_exhausted_resources_without_a_hint_are_final():

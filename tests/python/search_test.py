@@ -130,8 +130,10 @@ def test_by_key_signature_and_batch(tools):
     batch = tools.search_batch(["egg", signature, "box"], k=2, explain=True)
     assert len(batch) == 3 and batch[1][0].key == "egg"
     assert [hit.key for hit in batch[0]] == [hit.key for hit in by_key] and batch[0][0].why is not None
-    many = tools.search_batch(["box"] * 130, k=1, verify=False)
-    assert len(many) == 130 and len({result[0].key for result in many}) == 1
+    told = []
+    many = tools.search_batch(["box"] * 60, k=1, verify=False, progress=told.append)
+    assert len(many) == 60 and len({result[0].key for result in many}) == 1
+    assert told == [shapedb.Progress("search", done, 60) for done in (25, 50, 60)]
 
 
 def test_from_a_file(tools, tmp_path):

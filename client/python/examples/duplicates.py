@@ -21,7 +21,7 @@ SAME = ("same_object", "same_object_bent")
 def same_objects(collection: shapedb.Collection, keys: Sequence[str], neighbours: int) -> Dict[str, Dict[str, float]]:
     """Of each shape the others that are the same object, with their scores."""
     found: Dict[str, Dict[str, float]] = {}
-    for key, result in zip(keys, collection.search_batch(keys, k=neighbours)):
+    for key, result in zip(keys, collection.search_batch(keys, k=neighbours, progress=None)):
         found[key] = {hit.key: hit.score for hit in result if hit.verdict in SAME}
     return found
 

@@ -171,7 +171,9 @@ class Ledger:
         """The result. Raises the error that stopped it, if one did."""
         close(self._listener)
         if self.fatal is not None:
-            raise self.fatal
+            stored = len(self._outcomes)
+            raise ShapeDBError(self.fatal.reason,
+                               f"{self.fatal.message} ({stored} were stored before; call again for the others)")
         return BulkResult(dict(self._outcomes), dict(self._errors))
 
 

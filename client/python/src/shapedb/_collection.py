@@ -17,7 +17,7 @@ from ._connection import PathLike
 from ._errors import InvalidInput, ShapeDBError
 from ._origin import same
 from ._points import FloatArray, Packed, Scan, pack
-from ._progress import Showing, close, shown
+from ._progress import Showing, close, reporter, shown
 from ._search_types import Comparison, Fit, Hit, SearchResult
 from ._transport import Transport, Stop
 from ._wire import metadata_texts
@@ -308,16 +308,19 @@ class Collection:
                            threshold: float = 0.0, filter: str = "", reflection: bool = True, keep_scale: bool = False,
                            free_scale: bool = False, partial: bool = False, explain: bool = False,
                            verify: Optional[bool] = None, candidates: int = 0, group_by: Optional[str] = None,
-                           per_group: int = 0, timeout: Optional[float] = None) -> Tuple[SearchResult, ...]:
+                           per_group: int = 0, progress: Showing = False,
+                           timeout: Optional[float] = None) -> Tuple[SearchResult, ...]:
         """Searches for many stored shapes (by key) and signatures, with the same options, which are those of `search`;
         motions and explanations only with `explain`. The results are in the order of the queries; the first error ends
-        it. `timeout` is for a hundred at a time."""
+        it. It takes a call for each 25 of them, which `timeout` is for."""
         options = search_calls.Options(k, threshold, filter, reflection, keep_scale, free_scale, partial, explain,
                                        verify, candidates, None, None, group_by, per_group)
+        report = reporter(progress, "search")
         results: List[SearchResult] = []
         for batch in search_calls.query_batches(queries):
             found = self._transport.run(search_calls.batch(self._name, options, batch), timeout)
             results += found
+            report(len(results), len(queries))
         return tuple(results)
 
     def compare(self, key: str, other: str, *, other_collection: Optional[str] = None, reflection: bool = True,

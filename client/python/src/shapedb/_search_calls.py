@@ -21,8 +21,8 @@ from ._search_wire import comparison_of, fit_of, result_of
 from ._shape_calls import fill_isolation, fill_scan, upload
 from ._types import Signature
 
-BATCH = 100
-"""Queries in one call: what they answer must fit into a message."""
+BATCH = 25
+"""Queries in one call: it must be done in the time of one, and its answer fit into a message."""
 
 
 @dataclass(frozen=True)
