@@ -23,6 +23,9 @@ def test_what_a_server_says_of_itself(client):
     assert reason_of(client.health, "shapedb.v1.NoService") == "not_found"
     info = client.server_info()
     assert info.version == shapedb.__version__ and info.limits.max_k > 0 and info.limits.max_chunk_bytes == 1 << 20
+    table = {limit.name: limit for limit in info.limit_table}
+    assert table["limits.max_points"].value == info.limits.max_points
+    assert table["limits.max_points"].refusal == "point_limit_exceeded" and table["limits.max_points"].bounds
     stats = client.stats()
     assert stats.collections >= 1 and stats.uptime_seconds > 0 and stats.missing_commits == 0
 

@@ -98,6 +98,11 @@ def test_exhausted_resources_without_a_hint_are_final():
     assert error.reason == "internal" and tries == 1
 
 
+def test_why_a_call_was_cut_off():
+    error, _ = error_of(fails(grpc.StatusCode.DEADLINE_EXCEEDED, message="cut off by the server: too slow"))
+    assert error.reason == "deadline_exceeded" and error.message == "cut off by the server: too slow"
+
+
 @pytest.mark.parametrize("code, name, reason", [
     (grpc.StatusCode.NOT_FOUND, None, "not_found"),
     (grpc.StatusCode.INVALID_ARGUMENT, "malformed_filter", "malformed_filter"),

@@ -12,7 +12,7 @@
 walks through both.
 """
 
-from ._admin_types import (BackupReport, CreatedKey, Health, Imported, Key, KeyLimits, Limits, RebuildProgress,
+from ._admin_types import (BackupReport, CreatedKey, Health, Imported, Key, KeyLimits, Limit, Limits, RebuildProgress,
                            Restored, Role, ServerInfo, Stats)
 from ._async_client import AsyncClient
 from ._async_collection import AsyncCollection
@@ -39,10 +39,10 @@ __all__ = [
     "AddMode", "Added", "AsyncClient", "AsyncCollection", "BackupReport", "BulkResult", "Client", "Collection",
     "CollectionInfo", "Comparison", "CreatedKey", "Deleted", "Fit", "FitKind", "Found", "FreeAxis", "Group", "Health",
     "Hit", "Imported", "IngestEvent", "InteriorDoubt", "InteriorMethod", "InteriorSource", "InvalidInput", "Item",
-    "Key", "KeyLimits", "Limits", "LocalClient", "LocalServer", "Metadata", "MetadataUpdate", "Order", "Outcome",
-    "Page", "Parameters", "Pose", "Profile", "Progress", "ProgressListener", "REASONS", "RebuildProgress", "Restored",
-    "Retried", "RetryPolicy", "Role", "Scan", "SearchResult", "SegmentMatch", "Segmentation", "SegmentationReport",
-    "ServerInfo", "Shape", "ShapeDBError", "ShapeFailure", "Signature", "State", "Statistic", "Stats", "Term", "Unit",
-    "ValueCounts", "Verdict", "WeightedPoint", "Why", "__version__", "as_points", "local", "quote", "read_scan",
-    "scan_folder", "shapes_frame", "show", "transform",
+    "Key", "KeyLimits", "Limit", "Limits", "LocalClient", "LocalServer", "Metadata", "MetadataUpdate", "Order",
+    "Outcome", "Page", "Parameters", "Pose", "Profile", "Progress", "ProgressListener", "REASONS", "RebuildProgress",
+    "Restored", "Retried", "RetryPolicy", "Role", "Scan", "SearchResult", "SegmentMatch", "Segmentation",
+    "SegmentationReport", "ServerInfo", "Shape", "ShapeDBError", "ShapeFailure", "Signature", "State", "Statistic",
+    "Stats", "Term", "Unit", "ValueCounts", "Verdict", "WeightedPoint", "Why", "__version__", "as_points", "local",
+    "quote", "read_scan", "scan_folder", "shapes_frame", "show", "transform",
 ]

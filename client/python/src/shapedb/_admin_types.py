@@ -40,7 +40,7 @@ class Stats:
 
 @dataclass(frozen=True)
 class Limits:
-    """The most a request may ask for."""
+    """The most a request may ask for; `ServerInfo.limit_table` has all limits."""
 
     max_points: int
     max_k: int
@@ -51,14 +51,33 @@ class Limits:
 
 
 @dataclass(frozen=True)
+class Limit:
+    """One limit that a client can meet; docs/limits.md lists all."""
+
+    name: str
+    """With a dot: the setting that changes it."""
+    value: int
+    """The most that is allowed; the least where the name says min."""
+    unit: str
+    """bytes, points, calls, s, ms, ..."""
+    bounds: str
+    """For people: what it bounds."""
+    refusal: str
+    """The `ShapeDBError.reason` beyond it; empty: no call fails with a name, `bounds` says what happens."""
+
+
+@dataclass(frozen=True)
 class ServerInfo:
     """Which server this is."""
 
     version: str
     schema_version: int
+    """0: the database is damaged and cannot tell."""
     started: datetime
     limits: Limits
     ingest_threads: int
+    limit_table: Tuple[Limit, ...] = field(repr=False)
+    """Every limit that a client can meet, in the order of docs/limits.md."""
 
 
 @dataclass(frozen=True)

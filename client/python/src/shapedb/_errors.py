@@ -35,6 +35,10 @@ _REASON_OF_CODE = {
 }
 
 
+# So begins the message if the server ended a call while it was sent or read: the code stands for the error then.
+_CUT_OFF = "cut off by the server: "
+
+
 class ShapeDBError(Exception):
     """A call that failed.
 
@@ -76,6 +80,8 @@ def _error_of(code: Any, details: str, name: Optional[str], address: str) -> Sha
     if name is not None:
         return ShapeDBError(name, details)
     reason = _REASON_OF_CODE.get(code, "internal")
+    if details.startswith(_CUT_OFF):
+        return ShapeDBError(reason, details)
     if code == grpc.StatusCode.UNAVAILABLE:
         # What becomes of a call without TLS to a server that wants it.
         closed = ", and does it want TLS" if "Socket closed" in details else ""

@@ -203,7 +203,7 @@ class CollectionInfo:
     description: str
     profile: Profile
     parameters: Parameters = field(repr=False)
-    """All of them set."""
+    """All of them set, unless they could not be read."""
     generation: int
     """One more with every finished rebuild."""
     created: datetime = field(repr=False)
@@ -214,6 +214,8 @@ class CollectionInfo:
     failed: int
     aliases: Tuple[str, ...]
     """Other names that stand for it."""
+    damage: str = ""
+    """Why it cannot be searched, and what to do: what is stored of it is damaged. Empty: it can."""
 
     @property
     def pending(self) -> int:

@@ -158,11 +158,11 @@ def fill_parameters(profile: Optional[types.Profile], parameters: Optional[types
 
 def _parameters_of(message: Any) -> types.Parameters:
     units = {types_pb.LengthUnit.Value("LENGTH_UNIT_" + name): unit for unit, name in _UNITS.items()}
-    values = {field.name: getattr(part, field.name) for part in (message.segmentation, message.signature)
-              for field in part.DESCRIPTOR.fields}
+    values = {field.name: optional(part, field.name) if field.has_presence else getattr(part, field.name)
+              for part in (message.segmentation, message.signature) for field in part.DESCRIPTOR.fields}
     known = {field.name for field in dataclasses.fields(types.Parameters)}
     values["unit"] = units.get(values["unit"])
-    values["interior_method"] = enum_name(types_pb.InteriorMethod, "INTERIOR_METHOD_", values["interior_method"])
+    values["interior_method"] = enum_name(types_pb.InteriorMethod, "INTERIOR_METHOD_", values["interior_method"] or 0)
     return types.Parameters(**{name: value for name, value in values.items() if name in known})
 
 
@@ -205,7 +205,8 @@ def report_of(message: Any) -> types.SegmentationReport:
 def info_of(message: Any) -> admin.ServerInfo:
     """Of a `ServerInfoResponse`."""
     return plain(admin.ServerInfo, message, started=time_of(message.started),
-                 limits=plain(admin.Limits, message.limits))
+                 limits=plain(admin.Limits, message.limits),
+                 limit_table=tuple(plain(admin.Limit, limit) for limit in message.limit_table))
 
 
 def key_of(message: Any) -> admin.Key:
