@@ -2,9 +2,12 @@
 
 import itertools
 import os
+import tempfile
 
 # Servers are started while channels are open, and grpcio would wait for these before each fork.
 os.environ["GRPC_ENABLE_FORK_SUPPORT"] = "0"
+# What it caches belongs to no source tree.
+os.environ.setdefault("HYPOTHESIS_STORAGE_DIRECTORY", os.path.join(tempfile.gettempdir(), "shapedb-hypothesis"))
 for variable in list(os.environ):
     if variable.startswith("SHAPEDB_"):
         del os.environ[variable]
