@@ -15,11 +15,11 @@ from . import _types as types
 from ._admin_types import BackupReport, RebuildProgress
 from ._connection import PathLike
 from ._errors import InvalidInput, ShapeDBError
-from ._origin import same
 from ._points import FloatArray, Packed, Scan, pack
 from ._progress import Showing, close, reporter, shown
 from ._search_types import Comparison, Fit, Hit, SearchResult
 from ._transport import AsyncTransport, Stop
+from ._vectors import vector_of
 from ._wire import metadata_texts
 
 if TYPE_CHECKING:
@@ -233,8 +233,7 @@ class AsyncCollection:
 
     async def segments(self, key: str, *, timeout: Optional[float] = None) -> types.Segmentation:
         """The stored points with their segments; they are segmented again for it."""
-        origin = await self._transport.run(calls.get_origin(self._name, key), timeout)
-        return await self._transport.run(calls.segments(self._name, key, origin), timeout)
+        return await self._transport.run(calls.segments(self._name, key), timeout)
 
     # ------------------------------------------------------------------------------------------ changing shapes
 
@@ -395,7 +394,7 @@ def _packed(item: bulk.Item) -> Packed:
 
 def _is_stored(shape: Any, item: bulk.Item, packed: Packed) -> bool:
     """Whether adding the item would change nothing."""
-    if shape.sha256 != packed.sha256 or not same(shape, packed.origin) or shape.HasField("failure"):
+    if shape.sha256 != packed.sha256 or (vector_of(shape.origin) != packed.origin).any() or shape.HasField("failure"):
         return False
     if item.metadata is None:
         return True

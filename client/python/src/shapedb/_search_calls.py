@@ -11,7 +11,6 @@ import numpy.typing as npt
 from shapedb.v1 import align_service_pb2 as align_pb
 from shapedb.v1 import search_service_pb2 as pb
 
-from . import _origin
 from . import _search_types as types
 from ._call import Call
 from ._errors import InvalidInput
@@ -20,6 +19,7 @@ from ._progress import Showing
 from ._search_wire import comparison_of, fit_of, result_of
 from ._shape_calls import fill_isolation, fill_scan, upload
 from ._types import Signature
+from ._vectors import fill_vector, send_origin
 
 BATCH = 25
 """Queries in one call: it must be done in the time of one, and its answer fit into a message."""
@@ -44,8 +44,8 @@ class Options:
     group_by: Optional[str]
     per_group: int
 
-    def message(self, collection: str, query: Optional[Packed]) -> pb.SearchOptions:
-        """As it is sent; the viewpoint like the query's points."""
+    def message(self, collection: str) -> pb.SearchOptions:
+        """As it is sent."""
         filter, group_by = text_of(self.filter, "filter"), text_of(self.group_by or "", "group_by")
         try:
             message = pb.SearchOptions(
@@ -63,24 +63,23 @@ class Options:
             place = np.asarray(self.viewpoint, dtype=np.float64)
             if place.shape != (3,) or not np.isfinite(place).all():
                 raise InvalidInput("invalid_argument", f"viewpoint is {self.viewpoint!r}; it must be three numbers")
-            moved = _origin.ZERO if query is None else _origin.moved(query.origin)
-            _origin.fill_vector(message.viewpoint, place - moved)
+            fill_vector(message.viewpoint, place)
         return message
 
 
 def by_scan(collection: str, options: Options, scan: Packed, drop_plane: bool, largest_object: bool,
             progress: Showing) -> Call[types.SearchResult]:
     """SearchByScan."""
-    header = pb.SearchByScanHeader(options=options.message(collection, scan))
+    header = pb.SearchByScanHeader(options=options.message(collection))
     fill_scan(header, scan)
     fill_isolation(header.isolation, drop_plane, largest_object)
     return Call("SearchService/SearchByScan", upload(pb.SearchByScanRequest, header, [scan], progress),
-                lambda message: result_of(message, _origin.moved(scan.origin)))
+                result_of)
 
 
 def by_key(collection: str, options: Options, key: str, include_self: bool) -> Call[types.SearchResult]:
     """SearchByKey."""
-    request = pb.SearchByKeyRequest(options=options.message(collection, None), key=text_of(key, "key"),
+    request = pb.SearchByKeyRequest(options=options.message(collection), key=text_of(key, "key"),
                                     include_self=include_self)
     return Call("SearchService/SearchByKey", request, result_of)
 
@@ -88,14 +87,14 @@ def by_key(collection: str, options: Options, key: str, include_self: bool) -> C
 def by_signature(collection: str, options: Options, signature: Signature) -> Call[types.SearchResult]:
     """SearchBySignature."""
     return Call("SearchService/SearchBySignature",
-                pb.SearchBySignatureRequest(options=options.message(collection, None), signature=signature.encoded),
+                pb.SearchBySignatureRequest(options=options.message(collection), signature=signature.encoded),
                 result_of)
 
 
 def batch(collection: str, options: Options,
           queries: Sequence[Union[str, Signature]]) -> Call[Tuple[types.SearchResult, ...]]:
     """SearchBatch."""
-    request = pb.SearchBatchRequest(options=options.message(collection, None))
+    request = pb.SearchBatchRequest(options=options.message(collection))
     for query in queries:
         if isinstance(query, Signature):
             request.queries.add(signature=query.encoded)
@@ -146,16 +145,14 @@ def align(query: Packed, other: Union[Packed, Tuple[str, str]], options: Compare
     header = align_pb.AlignHeader(query_points=query.count, query_sha256=query.sha256)
     options.fill(header)
     fill_isolation(header.query_isolation, drop_plane, largest_object)
-    _origin.send(header, query.origin, "query_origin")
+    send_origin(header, query.origin, "query_origin")
     scans = [query]
-    moved = _origin.ZERO
     if isinstance(other, Packed):
         header.other_points, header.other_sha256 = other.count, other.sha256
         fill_isolation(header.other_isolation, drop_plane, largest_object)
-        _origin.send(header, other.origin, "other_origin")
+        send_origin(header, other.origin, "other_origin")
         scans.append(other)
-        moved = _origin.moved(other.origin)
     else:
         header.key.collection, header.key.key = other[0], text_of(other[1], "key")
     return Call("AlignService/Align", upload(align_pb.AlignRequest, header, scans, progress),
-                lambda message: fit_of(message.fit, _origin.moved(query.origin), moved))
+                lambda message: fit_of(message.fit))

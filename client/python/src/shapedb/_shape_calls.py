@@ -9,12 +9,12 @@ import numpy as np
 
 from shapedb.v1 import shape_service_pb2 as pb
 
-from . import _origin
 from . import _types as types
 from ._call import Call, Collector, Last
 from ._errors import InvalidInput, ShapeDBError
 from ._points import FloatArray, Packed, text_of, unpack
 from ._progress import Showing, reporter
+from ._vectors import send_origin, vector_of
 from ._wire import (added_of, enum_number, event_of, fill_metadata_change, fill_parameters, metadata_texts,
                     metadata_update_of, report_of, shape_of, signature_of, state_number, value_counts_of)
 
@@ -48,7 +48,7 @@ def fill_scan(header: Any, scan: Packed) -> None:
     """Count, checksum and origin, into the header of one scan."""
     header.point_count = scan.count
     header.sha256 = scan.sha256
-    _origin.send(header, scan.origin)
+    send_origin(header, scan.origin)
 
 
 def add(collection: str, key: str, scan: Packed, *, metadata: Optional[types.Metadata], mode: types.AddMode,
@@ -61,7 +61,11 @@ def add(collection: str, key: str, scan: Packed, *, metadata: Optional[types.Met
     if expected_version is not None:
         header.expected_version = expected_version
     fill_scan(header, scan)
-    _origin.send_with_metadata(header, scan.origin, None if metadata is None else metadata_texts(metadata))
+    if metadata is not None:
+        header.metadata_change.replace_all = True
+        header.metadata_change.set.update(metadata_texts(metadata))
+    else:
+        header.metadata_change.SetInParent()  # a shape that has the key keeps its metadata
     fill_isolation(header.isolation, drop_plane, largest_object)
     return Call("ShapeService/AddShape", upload(pb.AddShapeRequest, header, [scan], progress), added_of,
                 idempotent=expected_version is None, bounded=not wait)
@@ -114,7 +118,7 @@ class _Points(Collector[FloatArray]):
         if hashlib.sha256(data).digest() != self._shape.sha256:
             raise ShapeDBError("checksum_mismatch",
                                f"the points of '{self._shape.key}' were damaged in transfer: ask for them again")
-        return unpack(data, _origin.of_shape(self._shape))
+        return unpack(data, vector_of(self._shape.origin))
 
 
 def points(collection: str, key: str) -> Call[FloatArray]:
@@ -213,8 +217,7 @@ def signature(collection: str, key: str) -> Call[types.Signature]:
 
 
 class _Segments(Collector[types.Segmentation]):
-    def __init__(self, origin: FloatArray) -> None:
-        self._origin = origin
+    def __init__(self) -> None:
         self._summary: Any = None
         self._chunks: List[bytes] = []
         self._segments: List[int] = []
@@ -230,21 +233,15 @@ class _Segments(Collector[types.Segmentation]):
         data = b"".join(self._chunks)
         if self._summary is None or len(data) != 12 * len(self._segments):
             raise ShapeDBError("malformed_stream", "the server sent points and segments that do not belong together")
-        return types.Segmentation(report_of(self._summary.report),
-                                  signature_of(self._summary.signature, _origin.moved(self._origin)),
-                                  unpack(data, self._origin), np.array(self._segments, dtype=np.int32))
+        return types.Segmentation(report_of(self._summary.report), signature_of(self._summary.signature),
+                                  unpack(data, vector_of(self._summary.origin)),
+                                  np.array(self._segments, dtype=np.int32))
 
 
-def segments(collection: str, key: str, origin: FloatArray) -> Call[types.Segmentation]:
-    """GetSegments; `origin` is that of the shape."""
+def segments(collection: str, key: str) -> Call[types.Segmentation]:
+    """GetSegments."""
     return Call("ShapeService/GetSegments", pb.GetSegmentsRequest(shape=_ref(collection, key)),
-                collect=lambda: _Segments(origin))
-
-
-def get_origin(collection: str, key: str) -> Call[FloatArray]:
-    """GetShape, for the origin alone."""
-    return Call("ShapeService/GetShape", pb.GetShapeRequest(shape=_ref(collection, key)),
-                lambda message: _origin.of_shape(message.shape))
+                collect=_Segments)
 
 
 def segment(scan: Packed, *, profile: Optional[types.Profile], parameters: Optional[types.Parameters],
@@ -256,7 +253,7 @@ def segment(scan: Packed, *, profile: Optional[types.Profile], parameters: Optio
     fill_parameters(profile, parameters, header)
     fill_isolation(header.isolation, drop_plane, largest_object)
     return Call("ShapeService/Segment", upload(pb.SegmentRequest, header, [scan], progress),
-                collect=lambda: _Segments(scan.origin))
+                collect=_Segments)
 
 
 KEYS_AT_ONCE = 1000

@@ -13,10 +13,10 @@ from shapedb.v1 import shape_service_pb2 as shape_pb
 from shapedb.v1 import types_pb2 as types_pb
 
 from . import _admin_types as admin
-from . import _origin
 from . import _types as types
 from ._errors import InvalidInput
-from ._points import FloatArray, read_only, text_of
+from ._points import read_only, text_of
+from ._vectors import vector_of
 
 T = TypeVar("T")
 
@@ -98,7 +98,7 @@ def state_number(state: Optional[types.State]) -> Any:
 
 def shape_of(message: Any) -> types.Shape:
     """Of a `Shape`."""
-    return plain(types.Shape, message, state=state_of(message.state), metadata=_origin.user_metadata(message),
+    return plain(types.Shape, message, state=state_of(message.state), metadata=dict(sorted(message.metadata.items())),
                  created=time_of(message.created), updated=time_of(message.updated),
                  failure=failure_of(message.failure) if message.HasField("failure") else None,
                  quality=optional(message, "quality"))
@@ -177,10 +177,10 @@ def collection_of(message: Any) -> types.CollectionInfo:
 # ------------------------------------------------------------------------------------------------------ signatures
 
 
-def signature_of(message: Any, move: FloatArray = _origin.ZERO) -> types.Signature:
-    """Of a `Signature`; `move` is added to positions."""
+def signature_of(message: Any) -> types.Signature:
+    """Of a `Signature`."""
     points = tuple(
-        plain(types.WeightedPoint, point, position=read_only(_origin.vector_of(point.position) + move),
+        plain(types.WeightedPoint, point, position=read_only(vector_of(point.position)),
               extents=tuple(point.extents)) for point in message.points)
     attributes = message.attributes if message.HasField("attributes") else None
     statistics = () if attributes is None else tuple(
