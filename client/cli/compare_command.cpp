@@ -117,13 +117,12 @@ CommandResult runCompare(Session& session, const CompareFlags& flags) {
     session.console().document(document);
     const std::string a = flags.files ? scanName(flags.a) : flags.a;
     const std::string b = flags.files ? scanName(flags.b) : flags.b;
-    session.console().text("score " + formatFixed(comparison->score, 3) + "  " + bar(comparison->score, 20) +
-                           "  " + verdictText(comparison->verdict) + "\n" +
-                           (comparison->leftRightUntold ? kLeftRightUntold : "") + "\n" +
-                           explanationText(comparison->explanation, comparison->query, a, b) +
-                           (comparison->fit ? fitText(*comparison->fit, a, b) : "") + "\n" + a + "\n" +
-                           signatureTable(comparison->query) + "\n" + b + "\n" +
-                           signatureTable(comparison->other));
+    session.console().text(
+        "score " + formatFixed(comparison->score, 3) + "  " + bar(comparison->score, 20) + "  " +
+        verdictText(comparison->verdict) + "\n" + (comparison->leftRightUntold ? kLeftRightUntold : "") +
+        "\n" + explanationText(comparison->explanation, comparison->query, a, b) +
+        (comparison->fit ? fitText(*comparison->fit, a, b) : "") + "\n" + a + "\n" +
+        signatureTable(comparison->query) + "\n" + b + "\n" + signatureTable(comparison->other));
     return kOk;
 }
 

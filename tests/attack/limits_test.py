@@ -410,7 +410,9 @@ class Stored(unittest.TestCase):
         def add(collection, count, metadata):
             first, = database.execute("SELECT coalesce(max(id), 0) + 1 FROM shape").fetchone()
             database.executemany(
-                "INSERT INTO shape VALUES (?, ?, ?, 1, 1, 2, 4, zeroblob(32), 0, 0, 'internal', 'made up')",
+                "INSERT INTO shape (id, collection_id, key, version, points_version, state, point_count, checksum, "
+                "created_at, updated_at, failure_code, failure_message) "
+                "VALUES (?, ?, ?, 1, 1, 2, 4, zeroblob(32), 0, 0, 'internal', 'made up')",
                 ((first + i, ids[collection], f"k{i}") for i in range(count)))
             database.executemany("INSERT INTO shape_metadata VALUES (?, ?, ?)",
                                  ((first + i, name, text) for i in range(count) for name, text in metadata(i)))
