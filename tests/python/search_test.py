@@ -117,6 +117,20 @@ def test_the_explanation_says_why(tools):
     assert tools.search(solids.hammer(seed=9), k=1, explain=False)[0].why is None
 
 
+def test_an_answer_says_its_unit_and_what_it_cannot_tell(client, collection):
+    assert collection.search(solids.hammer(), k=1).unit == "none"
+    metres = client.create_collection(collection.name + "-m", parameters=shapedb.Parameters(unit="m"))
+    try:
+        metres.add("hammer", solids.hammer(), wait=True)
+        metres.add("twin", solids.hammer() * [-1, 1, 1], wait=True)
+        found = metres.search(solids.hammer(seed=9), k=2, reflection=False, verify=False)
+        assert found.unit == "m" and found.left_right_untold
+        assert not metres.search(solids.hammer(seed=9), k=2).left_right_untold
+        assert metres.compare("hammer", "twin").unit == "m"
+    finally:
+        client.delete_collection(metres.name, force=True)
+
+
 def test_by_key_signature_and_batch(tools):
     by_key = tools.search(key="egg", k=2)
     assert "egg" not in [hit.key for hit in by_key]

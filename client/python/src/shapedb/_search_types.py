@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Dict, Iterator, Literal, Optional, Sequence, T
 
 from . import _text
 from ._points import FloatArray
-from ._types import SegmentationReport, Shape, Signature
+from ._types import SegmentationReport, Shape, Signature, Unit
 
 if TYPE_CHECKING:
     import pandas
@@ -194,6 +194,10 @@ class SearchResult(Sequence[Hit]):
     """False: verifying more candidates could change the hits."""
     pending: int
     """Shapes of the collection that have no signature yet."""
+    unit: Optional[Unit]
+    """Of all lengths of the query; None or "none" if the collection has no unit."""
+    left_right_untold: bool
+    """With `reflection=False`: nothing was laid on the query, so mirrored twins may be among the hits."""
     query: Signature = field(repr=False)
     """As it was scored."""
     seconds_segment: float
@@ -242,5 +246,9 @@ class Comparison:
     why: Why = field(repr=False)
     fit: Optional[Fit] = field(repr=False)
     """None if one of them has no surface points."""
+    unit: Optional[Unit]
+    """Of all lengths of the first shape."""
+    left_right_untold: bool
+    """With `reflection=False`: without a fit a mirrored twin scores nearly as the shape itself."""
     query: Signature = field(repr=False)
     other: Signature = field(repr=False)

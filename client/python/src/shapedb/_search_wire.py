@@ -11,7 +11,7 @@ from shapedb.v1 import search_service_pb2 as search_pb
 from . import _search_types as types
 from ._points import FloatArray, read_only
 from ._vectors import vector_of
-from ._wire import enum_name, plain, report_of, shape_of, signature_of
+from ._wire import enum_name, plain, report_of, shape_of, signature_of, unit_of
 
 
 def matrix_of(motion: Any) -> FloatArray:
@@ -80,6 +80,7 @@ def result_of(message: Any) -> types.SearchResult:
     return types.SearchResult(
         hits=hits, groups=groups, candidates=message.candidates, filtered=message.filtered, scored=message.scored,
         verified=message.candidates_verified, exact=not message.not_exact, pending=message.pending,
+        unit=unit_of(message.unit), left_right_untold=message.left_right_untold,
         query=signature_of(message.query), seconds_segment=message.seconds_segment,
         seconds_search=message.seconds_search,
         report=report_of(message.report) if message.HasField("report") else None)
@@ -92,4 +93,5 @@ def comparison_of(message: Any, name: str) -> types.Comparison:
     return types.Comparison(
         score=message.score, verdict=why.verdict, verdict_reliability=why.reliability,
         signature_score=message.signature_score, motion=why.fit.motion if why.fit is not None else why.motion,
-        why=why, fit=why.fit, query=signature_of(message.query), other=signature_of(message.other))
+        why=why, fit=why.fit, unit=unit_of(message.unit), left_right_untold=message.left_right_untold,
+        query=signature_of(message.query), other=signature_of(message.other))

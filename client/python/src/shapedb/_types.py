@@ -19,7 +19,7 @@ Profile = Literal["default", "paper"]
 Unit = Literal["none", "mm", "cm", "m", "in"]
 InteriorMethod = Literal["walk", "adaptive"]
 InteriorSource = Literal["walk", "potential", "thickened"]
-InteriorDoubt = Literal["none", "no_surface", "thin_walls"]
+InteriorDoubt = Literal["none", "no_surface", "thin_walls", "few_points"]
 
 Metadata = Mapping[str, Union[str, int, float]]
 """Up to 64 entries of text; numbers are written as text."""

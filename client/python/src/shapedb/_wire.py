@@ -20,7 +20,7 @@ from ._vectors import vector_of
 
 T = TypeVar("T")
 
-_UNITS = {"none": "NONE", "mm": "MILLIMETRE", "cm": "CENTIMETRE", "m": "METRE", "in": "INCH"}
+_UNITS: Dict[types.Unit, str] = {"none": "NONE", "mm": "MILLIMETRE", "cm": "CENTIMETRE", "m": "METRE", "in": "INCH"}
 
 
 def enum_number(enum: Any, prefix: str, name: str, what: str) -> int:
@@ -156,12 +156,18 @@ def fill_parameters(profile: Optional[types.Profile], parameters: Optional[types
             raise InvalidInput("invalid_argument", f"{field.name} is {value!r}: not a value of its type") from None
 
 
+def unit_of(number: int) -> Optional[types.Unit]:
+    """Of a `LengthUnit`; None for one that a later version may have."""
+    units: Dict[int, types.Unit] = {types_pb.LengthUnit.Value("LENGTH_UNIT_" + name): unit
+                                    for unit, name in _UNITS.items()}
+    return units.get(number)
+
+
 def _parameters_of(message: Any) -> types.Parameters:
-    units = {types_pb.LengthUnit.Value("LENGTH_UNIT_" + name): unit for unit, name in _UNITS.items()}
     values = {field.name: optional(part, field.name) if field.has_presence else getattr(part, field.name)
               for part in (message.segmentation, message.signature) for field in part.DESCRIPTOR.fields}
     known = {field.name for field in dataclasses.fields(types.Parameters)}
-    values["unit"] = units.get(values["unit"])
+    values["unit"] = unit_of(values["unit"])
     values["interior_method"] = enum_name(types_pb.InteriorMethod, "INTERIOR_METHOD_", values["interior_method"] or 0)
     return types.Parameters(**{name: value for name, value in values.items() if name in known})
 
