@@ -13,9 +13,9 @@ build_packages=(
   ca-certificates g++ cmake ninja-build ccache mold pkg-config git
   libcgal-dev libgmp-dev libmpfr-dev libeigen3-dev libtbb-dev libexpected-dev
   libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc
-  libsqlite3-dev libzstd-dev libssl-dev libspdlog-dev libtomlplusplus-dev prometheus-cpp-dev
+  libsqlite3-dev libzstd-dev libssl-dev libboost-dev libspdlog-dev libtomlplusplus-dev prometheus-cpp-dev
   libcli11-dev nlohmann-json3-dev libpng-dev liblzf-dev zlib1g-dev libzip-dev libexpat1-dev
-  libgtest-dev libgmock-dev clang-format-14 valgrind
+  libgtest-dev libgmock-dev clang-format-14 valgrind curl
   python3-grpcio python3-protobuf openssl
 )
 python_packages=(

@@ -10,6 +10,7 @@
 #include "server/catalog/searches.h"
 #include "server/config/settings.h"
 #include "server/files/data_directory.h"
+#include "server/http/http_server.h"
 #include "server/ingest/crash_marker.h"
 #include "server/rpc/grpc_server.h"
 #include "server/security/authorization.h"
@@ -105,10 +106,13 @@ struct Daemon::Parts {
           admission(config.limits.maxUploadBytes, config.limits.maxUploads),
           runner(config::threadsOrProcessors(config.search.threads)),
           searches(catalog, runner, config.limits.maxK),
-          grpc({config, catalog, admission, searches, access, *audit, metrics, log, temporaryDirectory()}) {}
+          http(config, log),
+          grpc({config, catalog, admission, searches, access, *audit, metrics, log, temporaryDirectory(),
+                [this](const security::TlsIdentity& identity) { return http.useTls(identity); }}) {}
 
     std::string temporaryDirectory() const { return config.data + "/" + kTemporaryFolder; }
     Result<void> serve();
+    Result<void> serveHttp();
     Result<void> serveMetrics();
     Result<void> drain();
 
@@ -123,6 +127,7 @@ struct Daemon::Parts {
     catalog::Admission admission;
     catalog::SearchRunner runner;
     catalog::Searches searches;
+    http::HttpServer http;  // before gRPC, whose watcher of the TLS files tells it of new ones
     rpc::GrpcServer grpc;
     bool drained = false;
 };
@@ -131,14 +136,22 @@ Result<void> Daemon::Parts::serve() {
     RETURN_IF_ERROR(files::prepareTemporaryDirectory(temporaryDirectory()));
     RETURN_IF_ERROR(catalog.start());
     RETURN_IF_ERROR(grpc.listen());
+    RETURN_IF_ERROR(serveHttp());
     return serveMetrics();
+}
+
+Result<void> Daemon::Parts::serveHttp() {
+    if (config.http.listen.empty()) return {};
+    RETURN_IF_ERROR(http.listen(grpc.inside(), [this] { return grpc.serving(); }));
+    log->info("HTTP is served", {{"address", http.endpoint().text()}});
+    return {};
 }
 
 Result<void> Daemon::Parts::serveMetrics() {
     if (config.metrics.listen.empty()) return {};
     const auto started = std::chrono::system_clock::now();
     metrics.setSampler([this, started] {
-        return sampleServer({catalog, admission, runner, grpc, config.data, started});
+        return sampleServer({catalog, admission, runner, grpc, http, config.data, started});
     });
     const auto port = metrics.serve(config.metrics.listen);
     RETURN_IF_ERROR(port);
@@ -150,10 +163,12 @@ Result<void> Daemon::Parts::drain() {
     if (std::exchange(drained, true)) return {};
     const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(config.shutdown.drainSeconds);
     grpc.reportNotServing();
+    http.drain();
     admission.calls.drain();
     const bool empty = admission.calls.waitUntilEmpty(until);
     metrics.stop();
     if (!empty) log->warn("drain time has run out: cancelling the calls still running");
+    http.shutDown();
     grpc.shutDown();
     return catalog.stop();
 }
@@ -188,6 +203,11 @@ Result<std::unique_ptr<Daemon>> Daemon::start(const config::ServerConfig& config
 }
 
 const config::Endpoint& Daemon::endpoint() const { return parts_->grpc.endpoint(); }
+
+std::optional<config::Endpoint> Daemon::httpEndpoint() const {
+    if (parts_->config.http.listen.empty()) return std::nullopt;
+    return parts_->http.endpoint();
+}
 
 Result<void> Daemon::drain() { return parts_->drain(); }
 

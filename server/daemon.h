@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "core/base/error.h"
 #include "server/config/server_config.h"
@@ -22,7 +23,7 @@ class Daemon {
   public:
     /// Returns once it serves. Errors: kFileNotWritable (data directory), those of
     /// store::openSqliteStore and openKeyring, kRejected (API keys are required and there is none), those of
-    /// GrpcServer::listen.
+    /// GrpcServer::listen and HttpServer::listen.
     [[nodiscard]] static Result<std::unique_ptr<Daemon>> start(const config::ServerConfig& config,
                                                                telemetry::LoggerPtr log,
                                                                ingest::SignaturePipeline pipeline);
@@ -31,6 +32,9 @@ class Daemon {
 
     /// Where it listens: the configured host and the port in use.
     [[nodiscard]] const config::Endpoint& endpoint() const;
+
+    /// The same of HTTP, if it is served.
+    [[nodiscard]] std::optional<config::Endpoint> httpEndpoint() const;
 
     /// Reports NOT_SERVING, refuses new calls, gives running calls shutdown.drain_seconds before it
     /// cancels them, puts jobs back into the queue and checkpoints the database. Idempotent. Errors: of

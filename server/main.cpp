@@ -1,8 +1,8 @@
 // shapedbd: reads the configuration, serves until SIGTERM or SIGINT, shuts down cleanly.
 //
-// Prints one line to standard output, `listening on HOST:PORT`; everything else is logged. `shapedbd key`
-// makes, lists and revokes API keys instead. Exit codes: 0 success, 1 could not start or not shut down
-// cleanly, 2 wrong configuration, 130 stopped at once by a second signal.
+// Prints one line to standard output, `listening on HOST:PORT`, and if it serves HTTP a second one;
+// everything else is logged. `shapedbd key` makes, lists and revokes API keys instead. Exit codes: 0 success,
+// 1 could not start or not shut down cleanly, 2 wrong configuration, 130 stopped at once by a second signal.
 
 #include <algorithm>
 #include <csignal>
@@ -39,6 +39,18 @@ Result<telemetry::LoggerPtr> openLog(const config::ServerConfig::Log& log) {
     return telemetry::makeLogger({*level, log.format == "json", log.file});
 }
 
+/// What an operator has allowed, and should not have without thinking.
+void warnOfOpenDoors(const config::ServerConfig& config, const config::Endpoint& endpoint,
+                     const telemetry::LoggerPtr& log) {
+    if (endpoint.isLoopback()) return;
+    if (!config::keysRequired(config)) {
+        log->warn("anyone who can reach this port can read, change and delete everything, as configured",
+                  {{"address", endpoint.text()}});
+    } else if (config.tls.certificate.empty()) {
+        log->warn("API keys travel unprotected, as configured", {{"address", endpoint.text()}});
+    }
+}
+
 int serve(const config::ServerConfig& config) {
     const StopSignals signals;
     const auto log = openLog(config.log);
@@ -52,15 +64,14 @@ int serve(const config::ServerConfig& config) {
         return kCannotServe;
     }
     const config::Endpoint& endpoint = (*daemon)->endpoint();
-    if (!endpoint.isLoopback() && !config::keysRequired(config)) {
-        (*log)->warn("anyone who can reach this port can read, change and delete everything, as configured",
-                     {{"address", endpoint.text()}});
-    }
-    if (!endpoint.isLoopback() && config::keysRequired(config) && config.tls.certificate.empty()) {
-        (*log)->warn("API keys travel unprotected, as configured", {{"address", endpoint.text()}});
-    }
+    warnOfOpenDoors(config, endpoint, *log);
     (*log)->info("listening", {{"address", endpoint.text()}});
     std::printf("listening on %s\n", endpoint.text().c_str());
+    if (const auto http = (*daemon)->httpEndpoint()) {
+        warnOfOpenDoors(config, *http, *log);
+        std::printf("http on %s://%s\n", config.tls.certificate.empty() ? "http" : "https",
+                    http->text().c_str());
+    }
     std::fflush(stdout);
 
     const int received = signals.wait(kStoppedAtOnce);

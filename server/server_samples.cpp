@@ -66,6 +66,7 @@ std::vector<Sample> sampleCondition(const catalog::Catalog& catalog) {
 std::vector<Sample> sampleCalls(const SampleSources& sources) {
     const catalog::CallCounts running = sources.admission.calls.running();
     const rpc::GrpcServer::State state = sources.grpc.state();
+    const http::HttpServer::State http = sources.http.state();
     const char* calls = "Calls that run, by kind; uploads also count as ordinary.";
     std::vector<Sample> samples = {
         {"shapedb_calls_running", calls, kGauge, number(running.ordinary), {{"kind", "ordinary"}}},
@@ -73,11 +74,12 @@ std::vector<Sample> sampleCalls(const SampleSources& sources) {
         {"shapedb_calls_running", calls, kGauge, number(running.admin), {{"kind", "admin"}}},
         {"shapedb_searches_total", "Searches answered since the start.", kCounter,
          number(sources.searches.count())},
-        {"shapedb_connections", "Open network connections.", kGauge, number(state.connections)},
+        {"shapedb_connections", "Open network connections.", kGauge,
+         number(state.connections + http.connections)},
         {"shapedb_connections_refused_total", "Connections closed at once because there were too many.",
-         kCounter, number(state.connectionsRefused)},
+         kCounter, number(state.connectionsRefused + http.connectionsRefused)},
         {"shapedb_accepting_connections", "1, or 0 while connections cannot be accepted.", kGauge,
-         state.accepting ? 1.0 : 0.0},
+         state.accepting && http.accepting ? 1.0 : 0.0},
     };
     if (state.certificateExpires) {
         samples.push_back({"shapedb_tls_certificate_expiry_timestamp_seconds",

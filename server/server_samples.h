@@ -8,6 +8,7 @@
 #include "server/catalog/catalog.h"
 #include "server/catalog/gates.h"
 #include "server/catalog/search_runner.h"
+#include "server/http/http_server.h"
 #include "server/rpc/grpc_server.h"
 #include "server/telemetry/metrics.h"
 
@@ -19,6 +20,7 @@ struct SampleSources {
     catalog::Admission& admission;
     const catalog::SearchRunner& searches;
     const rpc::GrpcServer& grpc;
+    const http::HttpServer& http;
     const std::string& dataDirectory;
     std::chrono::system_clock::time_point started;
 };

@@ -41,9 +41,11 @@ forbid 'core/matching/attributed/' "the published score does not know the one wi
 forbid 'CGAL' "CGAL in a header that others include" 'core/**/*.h'
 forbid 'sqlite3' "sqlite3.h outside server/store/sqlite/" \
   server client tests bench common ':!server/store/sqlite' ':!tests/server/store/sqlite' ':!tests/reliability'
-forbid "$transport" "gRPC or protobuf below server/rpc/" server ':!server/rpc'
+forbid "$transport" "gRPC or protobuf below the transports" server ':!server/rpc' ':!server/http'
 forbid 'server/(rpc|catalog|ingest|index|config)/' "the store may not include what is built on it" server/store
-forbid 'server/rpc/' "server/rpc is the outermost layer" server/catalog server/ingest server/index server/telemetry server/config
+forbid 'server/(rpc|http)/' "the transports are the outermost layers" server/catalog server/ingest server/index server/telemetry server/config
+forbid 'server/http/' "gRPC does not know who else calls its handlers" server/rpc
+forbid 'boost/(asio|beast)' "Boost.Beast outside server/http/" core server client bench common ':!server/http'
 forbid 'server/catalog/' "the catalog is built on these" server/ingest server/index server/telemetry
 forbid "$transport" "gRPC or protobuf in a public client header" client/api/client.h client/api/shape_types.h client/api/types.h
 forbid "$transport|client/(api|cli|io)/" "files of backups know neither gRPC nor the rest of the client" client/backup

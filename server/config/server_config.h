@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 namespace shapedb::config {
 
@@ -23,6 +24,11 @@ struct ServerConfig {
         std::string key;          ///< PEM file
         std::string clientCa;  ///< PEM file: clients need a certificate signed by one of these; empty: none
     } tls;
+
+    struct Http {
+        std::string listen;  ///< HOST:PORT; empty: no HTTP
+        std::string hosts;   ///< names by which browsers may ask for it, separated by commas
+    } http;
 
     struct Security {
         std::string keys = "network";       ///< who must have an API key: "network" or "always"
@@ -79,8 +85,14 @@ struct ServerConfig {
     } shutdown;
 };
 
-/// Whether callers at `listen` must have an API key.
+/// Whether callers must have an API key: it is demanded, or one of the addresses is beyond this machine.
 [[nodiscard]] bool keysRequired(const ServerConfig& config);
+
+/// How many servers share the connections that the process may have: gRPC, and HTTP if it listens.
+[[nodiscard]] int transports(const ServerConfig& config) noexcept;
+
+/// The names of http.hosts.
+[[nodiscard]] std::vector<std::string> splitNames(const std::string& names);
 
 /// `configured`, or the number of processors (at least 1) when it is 0.
 [[nodiscard]] int threadsOrProcessors(int configured) noexcept;

@@ -4,6 +4,7 @@
 #include <cctype>
 #include <charconv>
 #include <limits>
+#include <sstream>
 #include <thread>
 #include <utility>
 
@@ -15,6 +16,11 @@ namespace shapedb::config {
 namespace {
 
 std::string quoted(const std::string& text) { return "'" + text + "'"; }
+
+bool isHostByte(char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) || c == '.' || c == '-' || c == ':' || c == '_' ||
+           c == '%';
+}
 
 Result<std::uint64_t> parseUnsigned(const std::string& text) {
     std::uint64_t value = 0;
@@ -147,15 +153,32 @@ Setting listenSetting() {
     return setting;
 }
 
-Setting metricsSetting() {
-    Setting setting = named("metrics.listen", SettingKind::kText, "HOST:PORT or empty",
-                            "Address to serve numbers for Prometheus on (http, /metrics). Empty: none.");
-    setting.assign = [](ServerConfig& config, const std::string& text) -> Result<void> {
+/// HOST:PORT, or empty: none.
+template <typename Field>
+Setting optionalAddress(const std::string& key, Field field, std::string help) {
+    Setting setting = named(key, SettingKind::kText, "HOST:PORT or empty", std::move(help));
+    setting.assign = [=](ServerConfig& config, const std::string& text) -> Result<void> {
         if (!text.empty()) RETURN_IF_ERROR(parseEndpoint(text));
-        config.metrics.listen = text;
+        field(config) = text;
         return {};
     };
-    setting.show = [](const ServerConfig& config) { return config.metrics.listen; };
+    setting.show = [=](const ServerConfig& config) { return field(const_cast<ServerConfig&>(config)); };
+    return setting;
+}
+
+Setting hostsSetting() {
+    Setting setting =
+        named("http.hosts", SettingKind::kText, "names or empty",
+              "Names, separated by commas, by which browsers may ask for a server without keys.");
+    setting.assign = [](ServerConfig& config, const std::string& text) -> Result<void> {
+        for (const std::string& name : splitNames(text)) {
+            const bool good = !name.empty() && std::all_of(name.begin(), name.end(), isHostByte);
+            if (!good) return fail(ErrorCode::kInvalidArgument, quoted(name) + " is not the name of a host");
+        }
+        config.http.hosts = text;
+        return {};
+    };
+    setting.show = [](const ServerConfig& config) { return config.http.hosts; };
     return setting;
 }
 
@@ -191,6 +214,18 @@ Setting optionalPath(const std::string& key, Field field, std::string help) {
 constexpr const char* kAnyoneMayDoAll =
     "security.anyone_on_the_network_may_read_change_and_delete_everything";
 
+/// The setting of an address that others than this machine reach, with its value; empty: there is none.
+std::string addressBeyond(const ServerConfig& config) {
+    const std::pair<const char*, const std::string&> addresses[] = {{"listen", config.listen},
+                                                                    {"http.listen", config.http.listen}};
+    for (const auto& [key, address] : addresses) {
+        const auto endpoint = parseEndpoint(address);
+        const bool local = address.empty() || (endpoint && endpoint->isLoopback());
+        if (!local) return std::string(key) + " = " + address;
+    }
+    return {};
+}
+
 /// What must not be reachable beyond this machine without TLS.
 Result<void> validateSecurity(const ServerConfig& config) {
     const bool tls = !config.tls.certificate.empty();
@@ -201,12 +236,12 @@ Result<void> validateSecurity(const ServerConfig& config) {
     if (!tls && !config.tls.clientCa.empty()) {
         return fail(ErrorCode::kInvalidArgument, "tls.client_ca takes tls.certificate and tls.key");
     }
-    const auto endpoint = parseEndpoint(config.listen);
-    RETURN_IF_ERROR(endpoint);
-    if (tls || endpoint->isLoopback() || config.security.anyoneMayDoAll == "yes") return {};
+    if (tls || config.security.anyoneMayDoAll == "yes") return {};
+    const std::string beyond = addressBeyond(config);
+    if (beyond.empty()) return {};
     return fail(
         ErrorCode::kInvalidArgument,
-        "listen = " + config.listen +
+        beyond +
             " is beyond this machine, which takes TLS (tls.certificate, tls.key) and API keys (shapedbd "
             "key create); see docs/security.md. For a network where everybody may do everything set " +
             kAnyoneMayDoAll + " = yes");
@@ -225,6 +260,10 @@ std::vector<Setting> makeSettings() {
             "unix_socket", [](C& c) -> std::string& { return c.unixSocket; },
             "Unix socket to serve on as well, for the owner of this process and without API key. Empty: "
             "none."),
+        optionalAddress(
+            "http.listen", [](C& c) -> std::string& { return c.http.listen; },
+            "Address to serve HTTP on: the API with JSON, and the web page. Empty: none."),
+        hostsSetting(),
         optionalPath(
             "tls.certificate", [](C& c) -> std::string& { return c.tls.certificate; },
             "Certificate of the server and those above it (PEM). Empty: no TLS."),
@@ -309,7 +348,9 @@ std::vector<Setting> makeSettings() {
         optionalPath(
             "log.file", [](C& c) -> std::string& { return c.log.file; },
             "File to append the log to. Empty: standard error."),
-        metricsSetting(),
+        optionalAddress(
+            "metrics.listen", [](C& c) -> std::string& { return c.metrics.listen; },
+            "Address to serve numbers for Prometheus on (http, /metrics). Empty: none."),
         number(
             "shutdown.drain_seconds", kInteger, 0, 3'600,
             [](C& c) -> int& { return c.shutdown.drainSeconds; },
@@ -342,8 +383,16 @@ const std::vector<Setting>& settings() {
 
 bool keysRequired(const ServerConfig& config) {
     if (config.security.keys == "always") return true;
-    const auto endpoint = parseEndpoint(config.listen);
-    return !(endpoint && endpoint->isLoopback()) && config.security.anyoneMayDoAll == "no";
+    return !addressBeyond(config).empty() && config.security.anyoneMayDoAll == "no";
+}
+
+int transports(const ServerConfig& config) noexcept { return config.http.listen.empty() ? 1 : 2; }
+
+std::vector<std::string> splitNames(const std::string& names) {
+    std::vector<std::string> list;
+    std::istringstream stream(names);
+    for (std::string name; std::getline(stream, name, ',');) list.push_back(name);
+    return list;
 }
 
 Result<void> validateTogether(const ServerConfig& config) {
@@ -377,11 +426,7 @@ Result<Endpoint> parseEndpoint(const std::string& listen) {
         return bad("an IPv6 host needs brackets");
     }
     if (endpoint.host.empty()) return bad("there is no host");
-    const auto hostByte = [](char c) {
-        return std::isalnum(static_cast<unsigned char>(c)) || c == '.' || c == '-' || c == ':' || c == '_' ||
-               c == '%';
-    };
-    if (!std::all_of(endpoint.host.begin(), endpoint.host.end(), hostByte)) {
+    if (!std::all_of(endpoint.host.begin(), endpoint.host.end(), isHostByte)) {
         return bad("the host has a character no host has");
     }
     const Result<std::uint64_t> port = parseUnsigned(listen.substr(colon + 1));

@@ -15,9 +15,9 @@ std::size_t raiseDescriptorLimit() {
     return static_cast<std::size_t>(limit.rlim_cur);
 }
 
-std::size_t connectionsWithin(std::size_t descriptors, std::size_t wanted) {
+std::size_t connectionsWithin(std::size_t descriptors, std::size_t wanted, std::size_t transports) {
     const std::size_t beside = descriptors > kReservedDescriptors ? descriptors - kReservedDescriptors : 0;
-    return std::min(wanted, std::max(beside, descriptors / 2));
+    return std::min(wanted, std::max(beside, descriptors / 2) / transports);
 }
 
 }  // namespace shapedb::net

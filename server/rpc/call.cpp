@@ -8,10 +8,13 @@
 
 #include <grpc/grpc_security_constants.h>
 
+#include "common/sha256.h"
 #include "core/base/return_if_error.h"
 #include "server/catalog/limits.h"
 #include "server/catalog/request_checks.h"
+#include "server/rpc/inside.h"
 #include "server/rpc/status.h"
+#include "server/security/key.h"
 
 namespace shapedb::rpc {
 namespace {
@@ -96,13 +99,18 @@ std::optional<std::string> traceOf(const grpc::ServerContext& context) {
     return std::string(trace);
 }
 
-security::Credentials credentialsOf(const grpc::ServerContext& context) {
-    security::Credentials credentials;
-    credentials.key = keyPresented(context);
-    const auto kind = context.auth_context()->FindPropertyValues(GRPC_TRANSPORT_SECURITY_TYPE_PROPERTY_NAME);
-    // Given by gRPC to connections at the Unix socket, and to no others.
-    credentials.localAdmin = !kind.empty() && kind.front() == "local";
-    return credentials;
+std::string metadatum(const grpc::ServerContext& context, const char* key) {
+    const auto found = context.client_metadata().find(key);
+    if (found == context.client_metadata().end()) return {};
+    return {found->second.data(), found->second.size()};
+}
+
+/// Strangers may send anything; only this process knows the secret.
+bool comesFromInside(const grpc::ServerContext& context, const std::string& secret) {
+    const std::string shown = metadatum(context, kInsideKey);
+    if (shown.empty()) return false;
+    const auto digest = [](const std::string& text) { return sha256(text.data(), text.size()); };
+    return security::equalInConstantTime(digest(shown), digest(secret));
 }
 
 }  // namespace
@@ -111,7 +119,8 @@ Call::Call(const Services& services, grpc::ServerContext& context, const securit
     : services_(services),
       context_(context),
       operation_(operation),
-      peer_(context.peer()),
+      inside_(comesFromInside(context, services.insideSecret)),
+      peer_(inside_ ? metadatum(context, kPeerKey) : context.peer()),
       began_(std::chrono::steady_clock::now()),
       cancellation_(services.cancellations, context),
       frame_(services.catalog, services.admission, run_),
@@ -120,8 +129,17 @@ Call::Call(const Services& services, grpc::ServerContext& context, const securit
     run_.deadline = steadyDeadline(context);
 }
 
+security::Credentials Call::credentials() const {
+    security::Credentials credentials;
+    credentials.key = keyPresented(context_);
+    const auto kind = context_.auth_context()->FindPropertyValues(GRPC_TRANSPORT_SECURITY_TYPE_PROPERTY_NAME);
+    // Given by gRPC to connections at the Unix socket, and to no others.
+    credentials.localAdmin = !inside_ && !kind.empty() && kind.front() == "local";
+    return credentials;
+}
+
 Result<void> Call::begin() {
-    RETURN_IF_ERROR(authorization_.begin(credentialsOf(context_)));
+    RETURN_IF_ERROR(authorization_.begin(credentials()));
     return frame_.admit(operation_.callClass);
 }
 
@@ -166,6 +184,7 @@ void Call::logLine(const grpc::Status& status, const Error* error) {
                                             {"peer", peer_},
                                             {"code", std::string(statusName(status.error_code()))},
                                             {"ms", took.count()}};
+    if (inside_) fields.push_back({"via", std::string("http")});
     if (const auto trace = traceOf(context_)) fields.push_back({"trace", *trace});
     if (const std::string key = authorization_.keyId(); !key.empty()) {
         fields.push_back({"caller", key});

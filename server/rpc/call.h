@@ -93,11 +93,13 @@ class Call {
         return message.ByteSizeLong();
     }
     static std::size_t sizeOf(const grpc::ByteBuffer& encoded) { return encoded.Length(); }
+    [[nodiscard]] security::Credentials credentials() const;
     void logLine(const grpc::Status& status, const Error* error);
 
     const Services& services_;
     grpc::ServerContext& context_;
     const security::Operation& operation_;
+    const bool inside_;       ///< made by another transport of this process
     const std::string peer_;  ///< asked at the start: a cancelled call has none
     std::chrono::steady_clock::time_point began_;
     CancelWatcher::Registration cancellation_;

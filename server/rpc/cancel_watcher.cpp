@@ -11,7 +11,7 @@
 namespace shapedb::rpc {
 
 CancelWatcher::CancelWatcher(std::chrono::milliseconds stall, std::uint64_t leastRate)
-    : stall_(stall), leastRate_(leastRate), thread_([this] { run(); }) {}
+    : limits_{stall, leastRate}, thread_([this] { run(); }) {}
 
 CancelWatcher::~CancelWatcher() {
     {
@@ -43,18 +43,8 @@ void CancelWatcher::look(Registration& call) const {
     const Clock::rep since = call.blockedSince_;
     if (since == 0) return;
     const auto now = Clock::now() - Clock::time_point(Clock::duration(since));
-    const auto altogether = now + Clock::duration(call.blocked_);
-    const std::chrono::duration<double> beyond = altogether - stall_;
-    if (now >= stall_) {
-        const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(stall_);
-        cutOff(call, {ErrorCode::kDeadlineExceeded, "the client neither sent nor read anything for " +
-                                                        std::to_string(seconds.count()) +
-                                                        " seconds (limits.stall_seconds)"});
-    } else if (beyond.count() * static_cast<double>(leastRate_) > static_cast<double>(call.bytes_)) {
-        cutOff(call, {ErrorCode::kDeadlineExceeded, "the client sent or read less than " +
-                                                        std::to_string(leastRate_) +
-                                                        " bytes per second (limits.min_bytes_per_second)"});
-    }
+    const net::Pace pace = net::paceOf(limits_, now, now + Clock::duration(call.blocked_), call.bytes_);
+    if (pace != net::Pace::kGood) cutOff(call, {ErrorCode::kDeadlineExceeded, net::reasonOf(pace, limits_)});
 }
 
 // A handler that is blocked in a read or write can only be freed by cancelling the call, and then has no say

@@ -15,6 +15,7 @@
 #include <grpcpp/server_context.h>
 
 #include "core/base/error.h"
+#include "server/net/transfer_pace.h"
 
 namespace shapedb::rpc {
 
@@ -26,9 +27,8 @@ class CancelWatcher {
   public:
     using Clock = std::chrono::steady_clock;
 
-    /// Cuts off calls that are blocked in a read or write for longer than `stall`, and those that move fewer
-    /// than `leastRate` bytes in a second of being blocked, not counting the first `stall`. 0: any rate. Both
-    /// get the status of kDeadlineExceeded.
+    /// Cuts off calls that are blocked in reads or writes for longer than net::paceOf allows, with the status
+    /// of kDeadlineExceeded.
     CancelWatcher(std::chrono::milliseconds stall, std::uint64_t leastRate);
     ~CancelWatcher();
     CancelWatcher(const CancelWatcher&) = delete;
@@ -74,8 +74,7 @@ class CancelWatcher {
     void look(Registration& call) const;
     static void cutOff(Registration& call, const Error& why);
 
-    const std::chrono::milliseconds stall_;
-    const std::uint64_t leastRate_;
+    const net::PaceLimits limits_;
     std::mutex mutex_;
     std::condition_variable changed_;
     std::set<Registration*> calls_;

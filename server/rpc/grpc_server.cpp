@@ -27,6 +27,7 @@
 #include "server/rpc/services.h"
 #include "server/rpc/shape_service.h"
 #include "server/rpc/tls_credentials.h"
+#include "server/security/key.h"
 
 namespace shapedb::rpc {
 namespace {
@@ -87,7 +88,9 @@ struct GrpcServer::Parts {
                    given.metrics,
                    std::move(given.log),
                    std::move(given.temporaryDirectory),
-                   std::chrono::system_clock::now()},
+                   std::chrono::system_clock::now(),
+                   {}},
+          alsoUseTls(std::move(given.alsoUseTls)),
           shapeService(services),
           searchService(services),
           alignService(services),
@@ -96,6 +99,7 @@ struct GrpcServer::Parts {
 
     CancelWatcher cancellations;
     Services services;
+    const TlsCredentials::AlsoUse alsoUseTls;
     ShapeServiceHandler shapeService;
     SearchServiceHandler searchService;
     AlignServiceHandler alignService;
@@ -137,7 +141,8 @@ void GrpcServer::Parts::reportListening(const std::string& problem) {
 Result<std::shared_ptr<grpc::ServerCredentials>> GrpcServer::Parts::credentials() {
     const config::ServerConfig::Tls& files = services.config.tls;
     if (files.certificate.empty()) return grpc::InsecureServerCredentials();
-    auto started = TlsCredentials::start({files.certificate, files.key, files.clientCa}, services.log);
+    auto started =
+        TlsCredentials::start({files.certificate, files.key, files.clientCa}, alsoUseTls, services.log);
     RETURN_IF_ERROR(started);
     tls = std::move(*started);
     return tls->credentials();
@@ -151,8 +156,21 @@ Result<void> GrpcServer::listen() {
     if (!config.unixSocket.empty()) {
         RETURN_IF_ERROR(parts_->local.listener.openUnix(config.unixSocket));
     }
+    auto secret = security::makeSecret();
+    RETURN_IF_ERROR(secret);
+    parts_->services.insideSecret = std::move(*secret);
     const auto credentials = parts_->credentials();
     RETURN_IF_ERROR(credentials);
+    RETURN_IF_ERROR(build(*credentials));
+    parts_->health =
+        std::make_unique<Health>(*parts_->server->GetHealthCheckService(),
+                                 [&catalog = parts_->services.catalog] { return catalog.condition(); });
+    startListening();
+    return {};
+}
+
+Result<void> GrpcServer::build(const std::shared_ptr<grpc::ServerCredentials>& credentials) {
+    const config::ServerConfig& config = parts_->services.config;
     grpc::EnableDefaultHealthCheckService(true);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
     grpc::ServerBuilder builder;
@@ -160,7 +178,7 @@ Result<void> GrpcServer::listen() {
     // Connections come from our own listeners: see net/listener.h.
     constexpr auto kFromDescriptor = grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD;
     parts_->network.acceptor =
-        builder.experimental().AddExternalConnectionAcceptor(kFromDescriptor, *credentials);
+        builder.experimental().AddExternalConnectionAcceptor(kFromDescriptor, credentials);
     if (!config.unixSocket.empty()) {
         // Marks the calls that come through the Unix socket (call.cpp), and takes nothing else.
         parts_->local.acceptor = builder.experimental().AddExternalConnectionAcceptor(
@@ -174,18 +192,16 @@ Result<void> GrpcServer::listen() {
     limitTransport(builder, parts_->services.config.limits);
     parts_->server = builder.BuildAndStart();
     if (!parts_->server) {
-        return fail(ErrorCode::kUnavailable, "the gRPC server on " + wanted->text() + " cannot be started");
+        return fail(ErrorCode::kUnavailable,
+                    "the gRPC server on " + endpoint().text() + " cannot be started");
     }
-    parts_->health =
-        std::make_unique<Health>(*parts_->server->GetHealthCheckService(),
-                                 [&catalog = parts_->services.catalog] { return catalog.condition(); });
-    startListening();
     return {};
 }
 
 void GrpcServer::startListening() {
     const std::size_t wanted = parts_->services.config.limits.maxConnections;
-    const std::size_t most = net::connectionsWithin(net::raiseDescriptorLimit(), wanted);
+    const std::size_t most = net::connectionsWithin(net::raiseDescriptorLimit(), wanted,
+                                                    config::transports(parts_->services.config));
     const telemetry::LoggerPtr& log = parts_->services.log;
     if (most < wanted) {
         log->warn("the limit of open files leaves room for fewer connections than limits.max_connections",
@@ -218,6 +234,14 @@ GrpcServer::State GrpcServer::state() const {
     if (parts_->health) state.accepting = parts_->health->accepting();
     if (parts_->tls) state.certificateExpires = parts_->tls->expires();
     return state;
+}
+
+bool GrpcServer::serving() const { return parts_->health->serving(); }
+
+Inside GrpcServer::inside() const {
+    grpc::ChannelArguments arguments;
+    arguments.SetMaxReceiveMessageSize(-1);  // as for clients: answers are bounded where they are built
+    return {parts_->server->InProcessChannel(arguments), parts_->services.insideSecret};
 }
 
 const config::Endpoint& GrpcServer::endpoint() const { return parts_->network.listener.endpoint(); }

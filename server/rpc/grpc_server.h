@@ -12,6 +12,8 @@
 #include "server/catalog/gates.h"
 #include "server/catalog/searches.h"
 #include "server/config/server_config.h"
+#include "server/rpc/inside.h"
+#include "server/rpc/tls_credentials.h"
 #include "server/security/authorization.h"
 #include "server/telemetry/audit_log.h"
 #include "server/telemetry/logger.h"
@@ -32,7 +34,8 @@ class GrpcServer {
         telemetry::AuditLog& audit;
         telemetry::Metrics& metrics;
         telemetry::LoggerPtr log;
-        std::string temporaryDirectory;  ///< must exist: backup and restore put their files there
+        std::string temporaryDirectory;        ///< must exist: backup and restore put their files there
+        TlsCredentials::AlsoUse alsoUseTls{};  ///< of another transport; may be empty
     };
     explicit GrpcServer(Surroundings surroundings);
     /// As `shutDown`.
@@ -54,12 +57,19 @@ class GrpcServer {
     };
     [[nodiscard]] State state() const;
 
+    /// What health says, from any thread between `listen` and `shutDown`.
+    [[nodiscard]] bool serving() const;
+    /// How other transports of this process call the handlers, after `listen`. Their calls end, or are
+    /// cancelled, before `shutDown`.
+    [[nodiscard]] Inside inside() const;
+
     /// Health says NOT_SERVING from now on; calls are still answered.
     void reportNotServing();
     /// Cancels the calls still running and waits for them. Idempotent.
     void shutDown();
 
   private:
+    Result<void> build(const std::shared_ptr<grpc::ServerCredentials>& credentials);
     void startListening();
 
     struct Parts;

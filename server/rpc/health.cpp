@@ -1,6 +1,7 @@
 #include "server/rpc/health.h"
 
 #include <chrono>
+#include <string_view>
 #include <utility>
 
 namespace shapedb::rpc {
@@ -41,6 +42,13 @@ bool has(const catalog::Condition& condition, Need need) {
 }
 
 }  // namespace
+
+std::vector<const char*> serviceNames() {
+    std::vector<const char*> names;
+    for (const Name& name : kNames)
+        if (std::string_view(name.name).rfind("shapedb.v1.", 0) == 0) names.push_back(name.name);
+    return names;
+}
 
 Health::Health(grpc::HealthCheckServiceInterface& service, std::function<catalog::Condition()> condition)
     : service_(service), condition_(std::move(condition)) {
@@ -83,6 +91,11 @@ void Health::listenerRecovered() {
 bool Health::accepting() const {
     const std::lock_guard<std::mutex> lock(mutex_);
     return inTrouble_ == 0;
+}
+
+bool Health::serving() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return told_.at("");
 }
 
 void Health::end() {

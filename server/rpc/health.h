@@ -6,6 +6,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <vector>
 
 #include <grpcpp/health_check_service_interface.h>
 
@@ -13,6 +14,9 @@
 #include "server/catalog/catalog.h"
 
 namespace shapedb::rpc {
+
+/// The full names of all services of the API: "shapedb.v1.ShapeService" and so on.
+[[nodiscard]] std::vector<const char*> serviceNames();
 
 /// Thread-safe.
 class Health {
@@ -26,6 +30,8 @@ class Health {
     /// A listener cannot accept connections, or can again.
     void listenerFailed();
     void listenerRecovered();
+    /// What is told of the server as a whole.
+    [[nodiscard]] bool serving() const;
     /// Whether all listeners accept connections.
     [[nodiscard]] bool accepting() const;
     /// From now on nothing is served, whatever happens.

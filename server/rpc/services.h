@@ -29,6 +29,7 @@ struct Services {
     telemetry::LoggerPtr log;
     std::string temporaryDirectory;  ///< exists; for backup and restore files
     std::chrono::system_clock::time_point started;
+    std::string insideSecret;  ///< what calls of other transports of this process show (inside.h)
 };
 
 }  // namespace shapedb::rpc

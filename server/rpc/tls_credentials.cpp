@@ -61,12 +61,13 @@ Result<void> TlsCredentials::MemoryFile::replace(const std::string& content) {
     return replaced ? Result<void>() : noMemoryFile();
 }
 
-TlsCredentials::TlsCredentials(security::TlsFiles files, telemetry::LoggerPtr log)
-    : files_(std::move(files)), log_(std::move(log)) {}
+TlsCredentials::TlsCredentials(security::TlsFiles files, AlsoUse alsoUse, telemetry::LoggerPtr log)
+    : files_(std::move(files)), alsoUse_(std::move(alsoUse)), log_(std::move(log)) {}
 
-Result<std::unique_ptr<TlsCredentials>> TlsCredentials::start(security::TlsFiles files,
+Result<std::unique_ptr<TlsCredentials>> TlsCredentials::start(security::TlsFiles files, AlsoUse alsoUse,
                                                               telemetry::LoggerPtr log) {
-    std::unique_ptr<TlsCredentials> tls(new TlsCredentials(std::move(files), std::move(log)));
+    std::unique_ptr<TlsCredentials> tls(
+        new TlsCredentials(std::move(files), std::move(alsoUse), std::move(log)));
     const auto identity = security::loadTlsIdentity(tls->files_, security::systemClock().wall());
     RETURN_IF_ERROR(identity);
     RETURN_IF_ERROR(tls->use(*identity));
@@ -88,6 +89,7 @@ Result<std::unique_ptr<TlsCredentials>> TlsCredentials::start(security::TlsFiles
 }
 
 Result<void> TlsCredentials::use(const security::TlsIdentity& identity) {
+    if (alsoUse_) RETURN_IF_ERROR(alsoUse_(identity));
     if (!identity.clientCas.empty()) {
         RETURN_IF_ERROR(clientCas_.replace(identity.clientCas));
     }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -23,8 +24,14 @@ namespace shapedb::rpc {
 /// therefore watches not the files but one private copy of both in memory, which is replaced as a whole.
 class TlsCredentials {
   public:
-    /// Errors: those of security::loadTlsIdentity; kInternal (no memory file).
+    /// Another transport that uses the same files; called with each identity before gRPC gets it, which it
+    /// then does only after success.
+    using AlsoUse = std::function<Result<void>(const security::TlsIdentity&)>;
+
+    /// `alsoUse` may be empty. Errors: those of security::loadTlsIdentity and of `alsoUse`; kInternal (no
+    /// memory file).
     [[nodiscard]] static Result<std::unique_ptr<TlsCredentials>> start(security::TlsFiles files,
+                                                                       AlsoUse alsoUse,
                                                                        telemetry::LoggerPtr log);
     TlsCredentials(const TlsCredentials&) = delete;
     TlsCredentials& operator=(const TlsCredentials&) = delete;
@@ -49,12 +56,13 @@ class TlsCredentials {
         long modified_ = 1;  ///< seconds; gRPC compares them to tell versions apart
     };
 
-    TlsCredentials(security::TlsFiles files, telemetry::LoggerPtr log);
+    TlsCredentials(security::TlsFiles files, AlsoUse alsoUse, telemetry::LoggerPtr log);
     Result<void> use(const security::TlsIdentity& identity);
     void warnOfTrouble(const security::TlsIdentity& identity);
     void look();
 
     const security::TlsFiles files_;
+    const AlsoUse alsoUse_;
     const telemetry::LoggerPtr log_;
     MemoryFile identity_;
     MemoryFile clientCas_;

@@ -73,10 +73,12 @@ Result<void> validate(const KeySpec& spec, UnixMs now) {
 
 std::string ApiKey::text() const { return kPrefix + id + "_" + secret; }
 
+Result<std::string> makeSecret() { return randomHex(kSecretBytes); }
+
 Result<ApiKey> makeApiKey() {
     auto id = randomHex(kIdBytes);
     RETURN_IF_ERROR(id);
-    auto secret = randomHex(kSecretBytes);
+    auto secret = makeSecret();
     RETURN_IF_ERROR(secret);
     return ApiKey{std::move(*id), std::move(*secret)};
 }

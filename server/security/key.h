@@ -71,6 +71,8 @@ struct ApiKey {
     [[nodiscard]] std::string text() const;
 };
 
+/// 32 random bytes of the operating system, in hexadecimal digits. Errors: kInternal (it has none).
+[[nodiscard]] Result<std::string> makeSecret();
 /// From the operating system's random numbers. Errors: kInternal (it has none).
 [[nodiscard]] Result<ApiKey> makeApiKey();
 /// Empty if `text` has another form.
