@@ -29,7 +29,9 @@ void ConnectCall::start() {
 }
 
 bool ConnectCall::wantsBody() const {
-    return client_ != nullptr && !bodyEnded_ && !writing_ && queue_.empty();
+    if (client_ == nullptr || bodyEnded_) return false;
+    // A call that has not begun has its one message, at most, and waits for the end.
+    return !inner_ || (!writing_ && queue_.empty());
 }
 
 void ConnectCall::body(std::string_view bytes) {

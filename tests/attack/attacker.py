@@ -70,6 +70,9 @@ class Server:
             self.process.stdout.close()
             raise RuntimeError("the server did not start: " + self.log())
         self.port = int(banner.rsplit(":", 1)[1])
+        self.http_port = None
+        if "--http-listen" in self._flags:
+            self.http_port = int(self.process.stdout.readline().rsplit(":", 1)[1])
         self.address = f"127.0.0.1:{self.port}"
 
     def key_command(self, *arguments):

@@ -1,0 +1,663 @@
+"""HTTP and the Connect protocol: that every call works, that no rule of gRPC is missing, and what a hostile client may
+try with sockets of its own."""
+
+import base64
+import gzip
+import json
+import os
+import re
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import unittest
+
+from attacker import (MIB, SecuredServer, Server, admin, ball, collections, eventually, grpc, main, pack, shapes, types,
+                      upload)
+from connect import Http, Raw, envelope, head
+from security_test import ADMIN, COLLECTION, READER, RULES, WHOLE_SERVER, WRITER, methods, request_of
+from tls_test import Certificates
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+HTTP = ("--http-listen", "127.0.0.1:0")
+JSON = "Content-Type: application/json"
+COUNT = "/shapedb.v1.ShapeService/CountShapes"
+
+
+def serve(*flags, **options):
+    return Server(*HTTP, *flags, **options)
+
+
+def secured(*flags, **options):
+    return SecuredServer(*HTTP, *flags, **options)
+
+
+def count_request(*fields, body="{}", host="localhost"):
+    return head(COUNT, JSON, f"Content-Length: {len(body)}", *fields, host=host) + body
+
+
+def answers(server):
+    with Http(server) as client:
+        return client.json("ShapeService/CountShapes").status == 200
+
+
+class Calls(unittest.TestCase):
+    def test_of_every_service_work_in_json(self):
+        points = ball()
+        xyz = base64.b64encode(pack(points)).decode()
+        with serve() as server, Http(server) as client:
+            made = client.json("CollectionService/CreateCollection", {"name": "parts"})
+            self.assertEqual((made.status, made.json()["name"]), (200, "parts"))
+            header = {"collection": "parts", "key": "ball", "pointCount": len(points), "wait": True,
+                      "metadata": {"label": "ball"}}
+            added, end = client.stream("ShapeService/AddShape", [{"header": header}, {"chunk": {"xyz": xyz}}]).stream()
+            self.assertEqual(end, {})
+            self.assertEqual(json.loads(added[0])["shape"]["state"], "SHAPE_STATE_READY")
+            self.assertIsNone(client.stream("ShapeService/AddShape", upload(
+                "egg", ball(stretch=1.5), wait=True, collection="parts")).error())
+            ref = {"shape": {"collection": "parts", "key": "ball"}}
+            self.assertEqual(client.json("ShapeService/GetShape", ref).json()["shape"]["metadata"], {"label": "ball"})
+            events, _ = client.stream("ShapeService/WatchIngest", [ref]).stream()
+            self.assertEqual(json.loads(events[-1])["state"], "SHAPE_STATE_READY")
+            options = {"options": {"collection": "parts", "k": 1}}
+            found = client.json("SearchService/SearchByKey", {"key": "ball", **options}).json()
+            self.assertEqual(found["hits"][0]["shape"]["key"], "egg")
+            hits, _ = client.stream("SearchService/SearchByScan",
+                                    [{"header": {"pointCount": len(points), **options}}, {"chunk": {"xyz": xyz}}]).stream()
+            self.assertEqual(json.loads(hits[0])["hits"][0]["shape"]["key"], "ball")
+            laid, _ = client.stream("AlignService/Align", [
+                {"header": {"queryPoints": len(points), "key": ref["shape"]}}, {"chunk": {"xyz": xyz}}]).stream()
+            self.assertTrue(json.loads(laid[0]))
+            progress, end = client.stream("AdminService/Rebuild", [{"collection": "parts"}]).stream()
+            self.assertEqual((bool(progress), end), (True, {}))
+            self.assertEqual(client.json("AdminService/Stats").json()["collections"], "2")
+            gone = client.json("ShapeService/DeleteShape", ref)
+            self.assertEqual(gone.status, 200)
+            missing = client.json("ShapeService/GetShape", ref)
+            self.assertEqual((missing.status, missing.json()["code"]), (404, "not_found"))
+            self.assertEqual(missing.headers["trailer-shapedb-error"], "not_found")
+
+    def test_carry_points_bit_for_bit(self):
+        points = [(0.1 * i, float(i % 7), (i % 13) / 3.0) for i in range(200_000)]
+        with serve() as server, Http(server) as client:
+            added = client.stream("ShapeService/AddShape", upload("cloud", points))
+            self.assertIsNone(added.error())
+            parts, end = client.stream("ShapeService/GetPoints", [shapes.GetPointsRequest(
+                shape=shapes.ShapeRef(key="cloud"))]).stream()
+            self.assertEqual(end, {})
+            xyz = b"".join(shapes.StoredPoints.FromString(part).chunk.xyz for part in parts)
+            self.assertEqual(xyz, pack(points))
+
+    def test_keep_their_connection_and_their_order(self):
+        with serve() as server, Raw(server) as raw:
+            raw.send(count_request() * 3 + head("/healthz", "Connection: close", method="GET"))
+            text = raw.rest()
+            self.assertEqual(text.count(b"HTTP/1.1 200 OK"), 4, text)
+            self.assertTrue(text.endswith(b'{"status":"SERVING"}\n'), text)
+
+    def test_have_a_deadline(self):
+        with serve("--ingest-threads", "1") as server, Http(server) as client:
+            self.assertEqual(client.json("ShapeService/CountShapes", connect_timeout_ms="5000").status, 200)
+            began = time.monotonic()
+            header = shapes.AddShapeRequest(header=shapes.AddShapeHeader(key="k", point_count=1000))
+            with Raw(server) as raw:
+                body = envelope(header.SerializeToString())
+                raw.send(head("/shapedb.v1.ShapeService/AddShape", "Content-Type: application/connect+proto",
+                              "Content-Length: 100000", "Connect-Timeout-Ms: 1000").encode() + body)
+                self.assertIn(b"deadline_exceeded", raw.rest())
+            self.assertLess(time.monotonic() - began, 10)
+
+    def test_are_logged_with_the_address_of_the_client(self):
+        trace = "0af7651916cd43dd8448eb211c80319c"
+        with serve() as server, Http(server) as client:
+            client.json("ShapeService/CountShapes", traceparent=f"00-{trace}-b7ad6b7169203331-01")
+            port = client.connection.sock.getsockname()[1]
+            line = re.search(r"call rpc=CountShapes .*", server.log())[0]
+            self.assertIn(f"peer=ipv4:127.0.0.1:{port} ", line)
+            self.assertIn("via=http", line)
+            self.assertIn("trace=" + trace, line)
+
+    def test_that_do_not_exist_are_told_apart(self):
+        with serve() as server, Http(server) as client:
+            for path in ("ShapeService/Nothing", "NoService/GetShape", "ShapeService/", "ShapeService/GetShape/"):
+                answer = client.json(path)
+                self.assertEqual((answer.status, answer.json()["code"]), (404, "unimplemented"), path)
+            self.assertEqual(client.request("GET", COUNT).headers["allow"], "POST")
+            self.assertEqual(client.request("POST", "/").status, 405)
+            self.assertEqual(client.request("DELETE", "/healthz").status, 405)
+            self.assertEqual(client.request("POST", "/grpc.health.v1.Health/Check", content_type="application/json",
+                                            body="{}").status, 405)
+
+
+class Documentation(unittest.TestCase):
+    def test_examples_work_as_they_stand(self):
+        with open(os.path.join(ROOT, "docs", "http.md")) as page:
+            examples = re.findall(r"^```(sh|python)\n(.*?)^```", page.read(), re.M | re.S)
+        self.assertGreaterEqual(len(examples), 4)
+        # The shape that the others speak of is made by the Python program.
+        examples.sort(key=lambda example: "SearchByKey" in example[1] or "WatchIngest" in example[1])
+        with serve() as server:
+            environment = dict(os.environ, SHAPEDB=f"http://127.0.0.1:{server.http_port}")
+            for language, text in examples:
+                with self.subTest(example=text):
+                    program = ["sh", "-ec", text] if language == "sh" else [sys.executable, "-c", text]
+                    run = subprocess.run(program, env=environment, capture_output=True, timeout=60)
+                    self.assertEqual(run.returncode, 0, run.stderr)
+                    self.assertNotIn(b'"code"', run.stdout)
+                    self.assertTrue(run.stdout)
+            with Http(server) as client:
+                self.assertEqual(client.json("ShapeService/CountShapes", {"collection": "parts"}).json(), {"count": "1"})
+
+
+class Roles(unittest.TestCase):
+    def test_are_those_of_grpc(self):
+        with secured() as server:
+            with server.local() as local:
+                for name in ("open", "closed"):
+                    local.collections.CreateCollection(collections.CreateCollectionRequest(name=name), timeout=10)
+            keys = {(role, some): Http(server, server.make(role, collections=["open"] if some else []).secret)
+                    for role in (READER, WRITER, ADMIN) for some in (False, True)}
+            for service, method in methods():
+                needed, touches = RULES[service.name][method.name]
+                for key in (None, "shapedb_1_2"):
+                    with Http(server, key) as stranger, self.subTest(rpc=method.name, key=key):
+                        self.assertEqual(stranger.call(service, method, request_of(method, "open")),
+                                         grpc.StatusCode.UNAUTHENTICATED)
+                for (role, some), client in keys.items():
+                    with self.subTest(rpc=method.name, role=role, some=some):
+                        code = client.call(service, method, request_of(method, "closed"))
+                        denied = role < needed or (some and touches in (WHOLE_SERVER, COLLECTION))
+                        self.assertEqual(code == grpc.StatusCode.PERMISSION_DENIED, denied, code)
+                        self.assertNotIn(code, (grpc.StatusCode.UNAUTHENTICATED, grpc.StatusCode.INTERNAL))
+                with server.local() as local:
+                    try:
+                        local.collections.CreateCollection(collections.CreateCollectionRequest(name="closed"), timeout=10)
+                    except grpc.RpcError:
+                        pass
+            for client in keys.values():
+                client.connection.close()
+
+    def test_say_what_is_wanted_before_an_upload_arrives(self):
+        with secured() as server, Raw(server) as raw:
+            raw.send(head("/shapedb.v1.ShapeService/AddShape", "Content-Type: application/connect+proto",
+                          "Content-Length: 100000000"))
+            self.assertIn(b'"unauthenticated"', raw.rest())
+        with secured() as server, Http(server) as client:
+            answer = client.json("ShapeService/CountShapes")
+            self.assertEqual((answer.status, answer.headers["www-authenticate"]), (401, "Bearer"))
+
+    def test_nobody_is_the_local_administrator(self):
+        with serve("--unix-socket", "{data}.sock") as server, Http(server) as client:
+            self.assertEqual(client.json("AdminService/CreateKey", {"name": "mine", "role": "ROLE_ADMIN"}).status, 401)
+            self.assertEqual(client.json("AdminService/ListKeys").status, 401)
+
+    def test_refusals_are_audited(self):
+        with secured() as server, Http(server) as client:
+            client.json("AdminService/Stats")
+            port = client.connection.sock.getsockname()[1]
+            with open(server.data + "/audit.refused.log") as log:
+                line = json.loads(log.read().splitlines()[-1])
+            self.assertEqual((line["rpc"], line["peer"], line["via"]), ("Stats", f"ipv4:127.0.0.1:{port}", "http"))
+
+    def test_no_secret_is_told(self):
+        with secured("--log-level", "trace") as server:
+            key = server.make(READER)
+            secret = key.secret.rsplit("_", 1)[1]
+            for presented in (key.secret, key.secret[:-4] + "beef"):
+                with Http(server, presented) as client:
+                    self.assertNotIn(secret[:16], client.json("AdminService/Stats").body.decode())
+            self.assertNotIn(secret[:16], server.log())
+
+    def test_limits_of_keys_say_when_to_come_back(self):
+        with secured() as server:
+            with Http(server, server.make(READER, limits=admin.KeyLimits(calls_per_second=1)).secret) as client:
+                told = [client.json("ShapeService/CountShapes") for _ in range(6)]
+            refused = [answer for answer in told if answer.status == 429]
+            self.assertGreaterEqual(len(refused), 3)
+            self.assertEqual(refused[0].headers["retry-after"], "1")
+            self.assertEqual(refused[0].headers["trailer-shapedb-error"], "rate_limited")
+            self.assertLessEqual(int(refused[0].json()["details"][0]["debug"]["retryAfterMs"]), 1_000)
+
+
+class Spoofing(unittest.TestCase):
+    def test_an_address_counts_only_from_inside(self):
+        forged = "ipv4:6.6.6.6:666"
+        with serve() as server:
+            with server.connect() as client:
+                for secret in ("", "0" * 64, "x"):
+                    client.shapes.CountShapes(shapes.CountShapesRequest(), timeout=10, metadata=(
+                        ("shapedb-inside", secret), ("shapedb-peer", forged)))
+            with Http(server) as client:
+                client.json("ShapeService/CountShapes", shapedb_inside="x", shapedb_peer=forged, x_forwarded_for="6.6.6.6",
+                            forwarded="for=6.6.6.6")
+            self.assertEqual(server.log().count("call rpc=CountShapes peer=ipv4:127.0.0.1:"), 4, server.log())
+            self.assertNotIn("6.6.6.6", server.log())
+
+    def test_metadata_that_grpc_would_not_take_do_no_harm(self):
+        with serve() as server:
+            for name in ("Authorization", "Traceparent", "Shapedb-Peer", "Grpc-Timeout", "Te", "Content-Type"):
+                for value in (b"Bearer \x80\xff", b"a\tb", b"\xc3\xa9" * 100, b"x" * 8_000):
+                    with Raw(server) as raw:
+                        raw.send(head(COUNT, JSON, "Content-Length: 2", "Connection: close")[:-2].encode()
+                                 + name.encode() + b": " + value + b"\r\n\r\n{}")
+                        raw.rest()
+            self.assertTrue(answers(server), server.log())
+
+
+class Browsers(unittest.TestCase):
+    def test_pages_of_others_can_do_nothing(self):
+        with serve() as server:
+            for host in ("evil.example", f"evil.example:{server.http_port}", "localhost.evil.example", ""):
+                with Raw(server) as raw:
+                    self.assertEqual(raw.send(count_request(host=host)).status(), 421, host)
+                with Raw(server) as raw:
+                    self.assertEqual(raw.send(head("/", method="GET", host=host)).status(), 421, host)
+            with Http(server) as client:
+                crossed = client.json("ShapeService/CountShapes", origin="http://evil.example")
+                self.assertEqual((crossed.status, crossed.json()["code"]), (403, "permission_denied"))
+                own = client.json("ShapeService/CountShapes", origin=f"http://127.0.0.1:{server.http_port}")
+                self.assertEqual(own.status, 200)
+                asked = client.request("OPTIONS", COUNT, origin="http://evil.example",
+                                       access_control_request_method="POST")
+                self.assertEqual(asked.status, 405)
+                for answer in (crossed, own, asked):
+                    self.assertFalse([name for name in answer.headers if name.startswith("access-control-")])
+                for kind in ("text/plain", "application/x-www-form-urlencoded", "multipart/form-data"):
+                    self.assertEqual(client.request("POST", COUNT, "{}", content_type=kind).status, 415)
+
+    def test_a_server_has_the_names_it_is_given(self):
+        with serve("--http-hosts", "shapes.example,other.example") as server:
+            for host, status in (("shapes.example", 200), ("other.example:80", 200), ("evil.example", 421)):
+                with Raw(server) as raw:
+                    self.assertEqual(raw.send(count_request(host=host)).status(), status, host)
+        with secured() as server, Raw(server) as raw:
+            self.assertEqual(raw.send(count_request(host="any.example")).status(), 401, "a key is wanted anyway")
+
+    def test_the_page_is_served_and_closed_up(self):
+        with serve() as server, Http(server) as client:
+            page = client.request("GET", "/", accept_encoding="gzip")
+            self.assertIn(b"<title>ShapeDB", gzip.decompress(page.body))
+            self.assertIn("default-src 'none'", page.headers["content-security-policy"])
+            self.assertEqual(client.request("GET", "/", if_none_match=page.headers["etag"]).status, 304)
+            first = client.request("HEAD", "/")
+            self.assertEqual((first.status, first.body), (200, b""))
+            for path in ("/nothing", "/../../etc/passwd", "/%2e%2e/", "/index.html%00"):
+                self.assertEqual(client.request("GET", path).status, 404, path)
+
+
+class Requests(unittest.TestCase):
+    """That are no good, or too much."""
+
+    def test_that_are_malformed_are_refused_by_name(self):
+        with serve() as server, Http(server) as client:
+            for text in ("", "{", "[]", "nonsense", '{"collectoin": "a"}', '{"collection": 5}', "\xff", "{" * 100_000):
+                answer = client.request("POST", COUNT, text.encode("latin-1"), content_type="application/json")
+                self.assertEqual((answer.status, answer.json()["code"]), (400, "invalid_argument"), text[:20])
+            packed = gzip.compress(b"\0" * (64 * MIB))
+            bomb = client.request("POST", COUNT, packed, content_type="application/json", content_encoding="gzip")
+            self.assertEqual((bomb.status, bomb.json()["code"]), (501, "unimplemented"))
+            client.connection.close()
+            watch = "/shapedb.v1.ShapeService/WatchIngest"
+            for body in (b"", b"\0", b"\0\0\0\0\x05{}", envelope(b"{}") * 2, envelope(packed, 1), envelope(b"{}", 2),
+                         envelope(b"{}", 0xff)):
+                answer = client.request("POST", watch, body, content_type="application/connect+json")
+                self.assertIn(answer.error()["code"], ("invalid_argument", "unimplemented"), body[:20])
+                client.connection.close()
+
+    def test_that_two_could_read_in_two_ways_are_refused(self):
+        """Request smuggling."""
+        hidden = head("/healthz", method="GET")
+        with serve() as server:
+            for fields in (["Content-Length: 2", "Transfer-Encoding: chunked"],
+                           ["Transfer-Encoding: chunked", "Content-Length: 2"], ["Content-Length: 2", "Content-Length: 3"],
+                           ["Transfer-Encoding: xchunked"], ["Transfer-Encoding: gzip, chunked"],
+                           ["Transfer-Encoding: chunked", "Transfer-Encoding: identity"],
+                           ["Content-Length : 2"], ["Content-Length: +2"], ["Content-Length: 0x2"], ["Content-Length: 2,2"],
+                           ["Content-Length: -1"], ["Content-Length: 99999999999999999999999"]):
+                with Raw(server) as raw:
+                    text = raw.send(head(COUNT, JSON, *fields) + "{}" + hidden).rest()
+                    self.assertTrue(re.match(rb"HTTP/1.1 (400|501) ", text), (fields, text))
+                    self.assertEqual(text.count(b"HTTP/1.1 "), 1, (fields, text))
+            for chunks in ("2;\n\r\n{}\r\n0\r\n\r\n", "2\n{}\r\n0\r\n\r\n", "2\r\n{}0\r\n\r\n", "-2\r\n{}\r\n0\r\n\r\n",
+                           "ffffffffffffffffff\r\n{}", "x\r\n"):
+                with Raw(server) as raw:
+                    text = raw.send(head(COUNT, JSON, "Transfer-Encoding: chunked") + chunks + hidden).rest()
+                    self.assertNotIn(b"SERVING", text, chunks)
+            for first in ("GET / HTTP/1.1\nHost: localhost\n\n", "GET  / HTTP/1.1\r\nHost: localhost\r\n\r\n",
+                          "GET / HTTP/2.0\r\nHost: localhost\r\n\r\n", "PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n",
+                          "GET / HTTP/1.1\r\n\r\n", "GET / HTTP/1.1\r\nHost: a\r\nHost: b\r\n\r\n",
+                          "\x16\x03\x01\x02\0\x01\0\x01\xfc", "GET http://localhost/ HTTP/1.1\r\nHost: localhost\r\n\r\n",
+                          "GET / HTTP/1.1\r\nHost: localhost\r\nA: b\0c\r\n\r\n"):
+                with Raw(server, timeout=20) as raw:
+                    text = raw.send(first).rest()
+                    self.assertTrue(re.match(rb"HTTP/1.1 (400|408|421|505) ", text), (first, text))
+            self.assertTrue(answers(server))
+
+    def test_that_are_too_large_are_cut_short(self):
+        with serve() as server:
+            before = server.peak()
+            with Raw(server) as raw:
+                self.assertEqual(raw.send(head(COUNT, JSON, "X: " + "a" * 20_000)).status(), 431)
+            with Raw(server) as raw:
+                self.assertEqual(raw.send("GET /" + "a" * 20_000).status(), 431)
+            with Raw(server) as raw:
+                self.assertEqual(raw.send(head("/", *[f"X{i}: {i}" for i in range(5_000)], method="GET")).status(), 431)
+            for field in ("Content-Length: 100000000", "Transfer-Encoding: chunked"):
+                with Raw(server) as raw:
+                    raw.send(head(COUNT, JSON, field))
+                    block = b"a" * MIB
+                    if "chunked" in field:
+                        block = b"100000\r\n" + block + b"\r\n"
+                    try:
+                        for _ in range(50):
+                            raw.send(block)
+                    except OSError:
+                        pass  # it has stopped to listen
+                    self.assertIn(b" 429 ", raw.rest()[:20])
+            with Raw(server) as raw:
+                raw.send(head("/shapedb.v1.ShapeService/WatchIngest", "Content-Type: application/connect+proto",
+                              "Content-Length: 100000000").encode() + b"\0\xff\xff\xff\xff")
+                self.assertIn(b'"resource_exhausted"', raw.rest())
+            with Raw(server) as raw:  # a head of a chunk without end
+                raw.send(head(COUNT, JSON, "Transfer-Encoding: chunked"))
+                try:
+                    for _ in range(100):
+                        raw.send("1;" + "a" * 10_000)
+                except OSError:
+                    pass
+                self.assertNotIn(b" 200 ", raw.rest()[:20])
+            self.assertLess(server.peak() - before, 64 * MIB)
+            self.assertTrue(answers(server))
+
+    def test_a_large_one_is_taken_and_a_larger_one_refused_as_by_grpc(self):
+        with serve() as server, Http(server) as client:
+            def ask(size):
+                message = collections.CreateCollectionRequest(name="a", description="x" * size)
+                return client.request("POST", "/shapedb.v1.CollectionService/CreateCollection",
+                                      message.SerializeToString(), content_type="application/proto")
+            self.assertEqual(ask(4 * MIB - 100).json()["details"][0]["debug"], {"name": "invalid_argument"})
+            self.assertEqual(ask(4 * MIB).json()["code"], "resource_exhausted")
+
+    def test_random_bytes_do_no_harm(self):
+        seed = b"POST / HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\n5\r\nhello\r\n0\r\n\r\n"
+        with serve() as server:
+            for i in range(200):
+                data = bytearray(seed * 3)
+                for at in range(i % 40):
+                    data[(i * 7919 + at * 104_729) % len(data)] = (i * 31 + at * 17) % 256
+                with Raw(server) as raw:
+                    raw.send(bytes(data))
+                    raw.socket.shutdown(socket.SHUT_WR)
+                    raw.rest()
+            self.assertTrue(server.running())
+            self.assertTrue(answers(server))
+
+
+class SlowClients(unittest.TestCase):
+    def test_have_ten_seconds_for_a_head(self):
+        with serve() as server:
+            mute, slow = Raw(server), Raw(server)
+            slow.send("POST / HTTP/1.1\r\nHo")
+            began = time.monotonic()
+            self.assertEqual(slow.status(), 408)
+            self.assertEqual(mute.rest(), b"")
+            self.assertLess(time.monotonic() - began, 20)
+            for raw in (mute, slow):
+                raw.socket.close()
+
+    def drip(self, raw, data, pause):
+        """One byte at a time, until the server has had enough."""
+        began = time.monotonic()
+        raw.socket.settimeout(0.01)
+        answer = b""
+        for i in range(600):
+            try:
+                raw.send(data[i % len(data):][:1])
+            except OSError:
+                break
+            try:
+                piece = raw.socket.recv(65_536)
+                answer += piece
+                if not piece:
+                    break
+            except socket.timeout:
+                pass
+            except OSError:
+                break
+            time.sleep(pause)
+        return answer, time.monotonic() - began
+
+    def test_of_unary_calls_are_cut_off(self):
+        with serve("--limits-stall-seconds", "2", "--limits-min-bytes-per-second", "1000") as server:
+            with Raw(server) as raw:
+                raw.send(head(COUNT, JSON, "Content-Length: 1000"))
+                began = time.monotonic()
+                text = raw.rest()
+                self.assertIn(b"neither sent nor read anything for 2 seconds", text)
+                self.assertLess(time.monotonic() - began, 10)
+            with Raw(server) as raw:
+                raw.send(head(COUNT, JSON, "Content-Length: 100000"))
+                text, took = self.drip(raw, b" ", 0.05)
+                self.assertIn(b"less than 1000 bytes per second", text)
+                self.assertLess(took, 20)
+            with Raw(server) as raw:
+                raw.send(head("/shapedb.v1.ShapeService/WatchIngest", "Content-Type: application/connect+json",
+                              "Content-Length: 100000"))
+                self.assertIn(b'"canceled"', raw.rest())
+
+    def test_of_uploads_are_cut_off_as_by_grpc(self):
+        with serve("--limits-stall-seconds", "2", "--limits-min-bytes-per-second", "1000") as server:
+            with Raw(server) as raw:
+                header = shapes.AddShapeRequest(header=shapes.AddShapeHeader(key="slow", point_count=100_000))
+                chunk = shapes.AddShapeRequest(chunk=types.PointChunk(xyz=b"\0" * 120_000))
+                raw.send(head("/shapedb.v1.ShapeService/AddShape", "Content-Type: application/connect+proto",
+                              "Content-Length: 1000000").encode() + envelope(header.SerializeToString()))
+                text, took = self.drip(raw, envelope(chunk.SerializeToString()), 0.05)
+                self.assertIn(b'"canceled"', text)
+                self.assertLess(took, 20)
+            self.assertTrue(eventually(lambda: "neither sent nor read" in server.log()), server.log())
+
+    def test_that_do_not_read_are_cut_off(self):
+        with serve("--limits-stall-seconds", "2") as server:
+            with server.connect() as client:
+                client.add("cloud", [(0.1 * i, float(i % 7), (i % 13) / 3.0) for i in range(1_500_000)], wait=False)
+            body = envelope(shapes.GetPointsRequest(shape=shapes.ShapeRef(key="cloud")).SerializeToString())
+            with Raw(server) as raw:
+                raw.send(head("/shapedb.v1.ShapeService/GetPoints", "Content-Type: application/connect+proto",
+                              f"Content-Length: {len(body)}").encode() + body)
+                self.assertTrue(eventually(lambda: "call rpc=GetPoints" in server.log(), 30), server.log())
+                self.assertIn("CANCELLED", re.search("call rpc=GetPoints.*", server.log())[0])
+            self.assertTrue(answers(server))
+
+    def test_that_are_idle_are_closed(self):
+        with serve("--limits-idle-seconds", "1") as server, Raw(server) as raw:
+            raw.send(count_request())
+            self.assertEqual(raw.status(), 200)
+            began = time.monotonic()
+            raw.rest()
+            self.assertLess(time.monotonic() - began, 10)
+
+    def test_take_no_memory_that_they_announce(self):
+        with serve("--limits-max-connections", "500") as server:
+            before = server.resident()
+            waiting = [Raw(server) for _ in range(300)]
+            for raw in waiting:
+                raw.send(head(COUNT, JSON, "Content-Length: 4000000") + "{")
+            time.sleep(1)
+            self.assertLess(server.resident() - before, 60 * MIB)
+            self.assertTrue(answers(server))
+            for raw in waiting:
+                raw.socket.close()
+
+
+class Connections(unittest.TestCase):
+    def test_beyond_their_number_are_closed_at_once(self):
+        with serve("--limits-max-connections", "20") as server:
+            idle = [Raw(server) for _ in range(60)]
+            closed = 0
+            for raw in idle:
+                raw.socket.settimeout(0.2)
+                try:
+                    closed += raw.socket.recv(1) == b""
+                except ConnectionResetError:
+                    closed += 1
+                except socket.timeout:
+                    pass
+            self.assertEqual(closed, 40)
+            for raw in idle:
+                raw.socket.close()
+            self.assertTrue(eventually(lambda: self.served(server)), server.log())
+            self.assertIn("too many HTTP connections", server.log())
+            with server.connect() as client:
+                self.assertEqual(client.count(), 0, "gRPC has places of its own")
+
+    def served(self, server):
+        try:
+            return answers(server)
+        except OSError:
+            return False
+
+    def test_that_end_cancel_their_call(self):
+        header = shapes.AddShapeRequest(header=shapes.AddShapeHeader(key="k", point_count=1000))
+        for end in ("close", "half"):
+            with serve() as server, Raw(server) as raw:
+                raw.send(head("/shapedb.v1.ShapeService/AddShape", "Content-Type: application/connect+proto",
+                              "Content-Length: 100000").encode() + envelope(header.SerializeToString()))
+                time.sleep(0.5)
+                raw.socket.close() if end == "close" else raw.socket.shutdown(socket.SHUT_WR)
+                self.assertTrue(eventually(lambda: "call rpc=AddShape" in server.log(), 10), end)
+                self.assertIn("CANCELLED", re.search("call rpc=AddShape.*", server.log())[0])
+
+    def test_that_end_while_the_server_works_cancel_too(self):
+        with serve("--ingest-threads", "1") as server:
+            cloud = ball(400_000, 2.0)
+            with server.connect() as client:
+                for i in range(3):
+                    client.add(f"k{i}", cloud, wait=False)
+            body = envelope(shapes.WatchIngestRequest(shape=shapes.ShapeRef(key="k2")).SerializeToString())
+            with Raw(server) as raw:
+                raw.send(head("/shapedb.v1.ShapeService/WatchIngest", "Content-Type: application/connect+proto",
+                              f"Content-Length: {len(body)}").encode() + body)
+                self.assertEqual(raw.status(), 200)
+                raw.socket.shutdown(socket.SHUT_WR)
+                self.assertTrue(eventually(lambda: "call rpc=WatchIngest" in server.log(), 5), server.log())
+                self.assertIn("CANCELLED", re.search("call rpc=WatchIngest.*", server.log())[0])
+
+    def test_floods_are_refused_by_name_and_pass(self):
+        with serve() as server:
+            codes = []
+
+            def flood():
+                with Http(server) as client:
+                    for _ in range(100):
+                        codes.append(client.json("ShapeService/CountShapes").status)
+
+            threads = [threading.Thread(target=flood) for _ in range(30)]
+            for thread in threads:
+                thread.start()
+            for thread in threads:
+                thread.join()
+            self.assertEqual(len(codes), 3_000)
+            self.assertLessEqual(set(codes), {200, 429})
+
+    def test_a_stop_ends_them_and_lets_answers_finish(self):
+        with serve("--ingest-threads", "1") as server:
+            with server.connect() as client:
+                client.add("big", ball(400_000, 2.0), wait=False)
+            idle = Raw(server)
+            body = envelope(b'{"shape": {"key": "big"}}')
+            with Raw(server) as watching:
+                watching.send(head("/shapedb.v1.ShapeService/WatchIngest", "Content-Type: application/connect+json",
+                                   f"Content-Length: {len(body)}").encode() + body)
+                self.assertEqual(watching.status(), 200)
+                began = time.monotonic()
+                self.assertEqual(server.stop(), 0)
+                self.assertLess(time.monotonic() - began, 15)
+                text = watching.rest()
+                self.assertTrue("unavailable" in text.decode("latin-1") or "READY" in text.decode("latin-1"), text)
+                self.assertTrue(text.endswith(b"0\r\n\r\n"), "the answer is whole")
+            self.assertEqual(idle.rest(), b"")
+            idle.socket.close()
+
+
+class Tls(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory(prefix="shapedb-http-")
+        self.addCleanup(folder.cleanup)
+        self.certificates = Certificates(folder.name)
+        for name in ("first", "second", "client"):
+            self.certificates.sign(name)
+        self.install("first")
+        self.files = ("--tls-certificate", self.certificates.path("server.pem"), "--tls-key",
+                      self.certificates.path("server.key"))
+
+    def install(self, name):
+        self.certificates.install(name, "pem")
+        self.certificates.install(name, "key")
+
+    def subject(self, server):
+        shown = subprocess.run(["openssl", "s_client", "-connect", f"127.0.0.1:{server.http_port}"], input=b"",
+                               capture_output=True).stdout
+        return subprocess.run(["openssl", "x509", "-noout", "-subject"], input=shown, capture_output=True,
+                              check=True).stdout.decode()
+
+    def test_beyond_loopback_only_with_tls_and_a_key(self):
+        with self.assertRaises(RuntimeError) as error:
+            Server("--http-listen", "0.0.0.0:0")
+        self.assertIn("http.listen = 0.0.0.0:0 is beyond this machine", str(error.exception))
+        with self.assertRaises(RuntimeError) as error:
+            Server("--http-listen", "0.0.0.0:0", *self.files)
+        self.assertIn("shapedbd key create", str(error.exception))
+
+    def test_serves_curl_and_refuses_who_does_not_speak_it(self):
+        with SecuredServer("--http-listen", "0.0.0.0:0", *self.files) as server:
+            key = server.make(READER).secret
+            address = f"https://localhost:{server.http_port}"
+            run = subprocess.run(["curl", "-sS", "--cacert", self.certificates.path("ca.pem"), "-H", JSON, "-H",
+                                  "Authorization: Bearer " + key, "-d", "{}", address + COUNT], capture_output=True)
+            self.assertEqual((run.stdout, run.stderr), (b"{}", b""))
+            with Http(server, authority=self.certificates.path("ca.pem")) as stranger:
+                self.assertEqual(stranger.json("ShapeService/CountShapes").status, 401)
+            with Raw(server, timeout=15) as plain:
+                self.assertNotIn(b"HTTP/1.1", plain.send(count_request()).rest())
+            with Raw(server, timeout=15) as mute:
+                began = time.monotonic()
+                self.assertEqual(mute.rest(), b"")
+                self.assertLess(time.monotonic() - began, 14, "a handshake has ten seconds")
+            old = subprocess.run(["openssl", "s_client", "-connect", f"127.0.0.1:{server.http_port}", "-tls1_1"], input=b"",
+                                 capture_output=True)
+            self.assertNotEqual(old.returncode, 0)
+
+    def test_certificates_are_replaced_under_large_uploads(self):
+        cloud = [(0.1 * i, float(i % 7), (i % 13) / 3.0) for i in range(300_000)]
+        with SecuredServer(*HTTP, *self.files) as server:
+            key = server.make(WRITER).secret
+            authority = self.certificates.path("ca.pem")
+            self.assertIn("first", self.subject(server))
+            with Http(server, key, authority=authority) as lasting:
+                self.assertIsNone(lasting.stream("ShapeService/AddShape", upload("a", cloud)).error())
+                self.install("second")
+                self.assertTrue(eventually(lambda: "second" in self.subject(server), 30))
+                self.assertEqual(lasting.json("ShapeService/CountShapes").json(), {"count": "1"})
+                parts, end = lasting.stream("ShapeService/GetPoints", [shapes.GetPointsRequest(
+                    shape=shapes.ShapeRef(key="a"))]).stream()
+                self.assertEqual(end, {})
+                self.assertEqual(b"".join(shapes.StoredPoints.FromString(part).chunk.xyz for part in parts), pack(cloud))
+            with Http(server, key, authority=authority) as fresh:
+                self.assertEqual(fresh.json("ShapeService/CountShapes").json(), {"count": "1"})
+
+    def test_clients_may_have_to_show_a_certificate(self):
+        path = self.certificates.path
+        with SecuredServer(*HTTP, *self.files, "--tls-client-ca", path("ca.pem")) as server:
+            curl = ["curl", "-sS", "--cacert", path("ca.pem"), "-H", JSON, "-d", "{}", "-H",
+                    "Authorization: Bearer " + server.make(READER).secret,
+                    f"https://localhost:{server.http_port}{COUNT}"]
+            self.assertNotEqual(subprocess.run(curl, capture_output=True).returncode, 0)
+            shown = subprocess.run([*curl, "--cert", path("client.pem"), "--key", path("client.key")], capture_output=True)
+            self.assertEqual((shown.stdout, shown.stderr), (b"{}", b""))
+
+
+if __name__ == "__main__":
+    main()
