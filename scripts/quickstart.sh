@@ -25,16 +25,17 @@ rm -rf "$demo"
 mkdir -p "$demo/data"
 
 step "Start a server; its database is in $demo/data"
-build/bin/shapedbd --listen 127.0.0.1:0 --data "$demo/data" > "$demo/server.out" 2> "$demo/server.log" &
+build/bin/shapedbd --listen 127.0.0.1:0 --http-listen 127.0.0.1:0 --data "$demo/data" > "$demo/server.out" 2> "$demo/server.log" &
 server=$!
 stop_server() { kill -TERM "$server" 2>/dev/null && wait "$server" 2>/dev/null || true; }
 trap stop_server EXIT
 for _ in $(seq 100); do
-  grep -q '^listening on ' "$demo/server.out" && break
+  grep -q '^http on ' "$demo/server.out" && break
   kill -0 "$server" 2>/dev/null || { cat "$demo/server.log" >&2; exit 1; }
   sleep 0.1
 done
 SHAPEDB_SERVER=$(sed -n 's/^listening on //p' "$demo/server.out")
+http=$(sed -n 's/^http on //p' "$demo/server.out")
 export SHAPEDB_SERVER
 run build/bin/shapedb health
 
@@ -52,10 +53,14 @@ step "Search with a new animal, scanned with more noise"
 build/bin/shapedb sample "$demo/new" --families animal --first 7 --count 1 --points 10000 --noise 0.004 > /dev/null
 run build/bin/shapedb query "$demo"/new/animal/*.ply -k 5
 
+step "The same server speaks HTTP: for curl, and for browsers at $http"
+run curl -sS -H 'Content-Type: application/json' -d '{}' "$http/shapedb.v1.ShapeService/CountShapes"
+echo
+
 if [ "${1:-}" = "--keep" ]; then
   trap - EXIT
-  printf '\nThe server is still running at %s (process %s). Try:\n  build/bin/shapedb --server %s list\n' \
-    "$SHAPEDB_SERVER" "$server" "$SHAPEDB_SERVER"
+  printf '\nThe server is still running at %s and %s (process %s). Try:\n  build/bin/shapedb --server %s list\n' \
+    "$SHAPEDB_SERVER" "$http" "$server" "$SHAPEDB_SERVER"
 else
-  printf '\nTo start the server again with the same data:\n  build/bin/shapedbd --listen 127.0.0.1:7878 --data %s/data\n' "$demo"
+  printf '\nTo start the server again with the same data:\n  build/bin/shapedbd --listen 127.0.0.1:7878 --http-listen 127.0.0.1:7879 --data %s/data\n' "$demo"
 fi

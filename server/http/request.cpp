@@ -124,6 +124,10 @@ OrFailure<void> checkHead(const Head& head, const Hosts& hosts) {
     if (head.count("transfer-encoding") > 0 && lower(head.field("transfer-encoding")) != "chunked") {
         return refuseWith(501, Code::kUnimplemented, "the only Transfer-Encoding is chunked");
     }
+    const std::string_view length = head.field("content-length");
+    if (!std::all_of(length.begin(), length.end(), [](char c) { return c >= '0' && c <= '9'; })) {
+        return refuseWith(400, Code::kInvalidArgument, "Content-Length is no number");
+    }
     for (const char* single : {"host", "content-length", "transfer-encoding", "content-type",
                                "content-encoding", "connect-content-encoding", "connect-timeout-ms",
                                "connect-protocol-version", "authorization", "origin"}) {

@@ -232,22 +232,38 @@ TEST_F(Load, RefusesSettingsThatContradictEachOther) {
 
 TEST_F(Load, BeyondThisMachineTlsIsNeeded) {
     const std::string anyone = "--security-anyone-on-the-network-may-read-change-and-delete-everything";
-    for (const char* address :
-         {"0.0.0.0:1", "[::]:1", "192.168.1.2:1", "shapes.example:1", "[::ffff:1.2.3.4]:1"}) {
-        expectRefused(loadWith({"--listen", address}), ErrorCode::kInvalidArgument,
-                      {address, "tls.certificate", "docs/security.md"});
-        const auto secured = loadWith({"--listen", address, "--tls-certificate", "c", "--tls-key", "k"});
-        ASSERT_TRUE(secured) << secured.error().message;
-        EXPECT_TRUE(keysRequired(secured->config));
-        const auto open = loadWith({"--listen", address, anyone.c_str(), "yes"});
-        ASSERT_TRUE(open) << open.error().message;
-        EXPECT_FALSE(keysRequired(open->config));
+    for (const char* flag : {"--listen", "--http-listen"}) {
+        for (const char* address :
+             {"0.0.0.0:1", "[::]:1", "192.168.1.2:1", "shapes.example:1", "[::ffff:1.2.3.4]:1"}) {
+            expectRefused(loadWith({flag, address}), ErrorCode::kInvalidArgument,
+                          {std::string(flag + 2, 4), address, "tls.certificate", "docs/security.md"});
+            const auto secured = loadWith({flag, address, "--tls-certificate", "c", "--tls-key", "k"});
+            ASSERT_TRUE(secured) << secured.error().message;
+            EXPECT_TRUE(keysRequired(secured->config));
+            const auto open = loadWith({flag, address, anyone.c_str(), "yes"});
+            ASSERT_TRUE(open) << open.error().message;
+            EXPECT_FALSE(keysRequired(open->config));
+        }
+        for (const char* address : {"127.0.0.1:1", "127.9.9.9:1", "[::1]:1", "localhost:1"}) {
+            const auto loaded = loadWith({flag, address});
+            ASSERT_TRUE(loaded) << loaded.error().message;
+            EXPECT_FALSE(keysRequired(loaded->config));
+            EXPECT_TRUE(keysRequired(loadWith({flag, address, "--security-keys", "always"})->config));
+        }
     }
-    for (const char* address : {"127.0.0.1:1", "127.9.9.9:1", "[::1]:1", "localhost:1"}) {
-        const auto loaded = loadWith({"--listen", address});
-        ASSERT_TRUE(loaded) << loaded.error().message;
-        EXPECT_FALSE(keysRequired(loaded->config));
-        EXPECT_TRUE(keysRequired(loadWith({"--listen", address, "--security-keys", "always"})->config));
+}
+
+TEST_F(Load, HttpIsOffAndKnowsItsNames) {
+    EXPECT_EQ(loadWith({})->config.http.listen, "");
+    EXPECT_EQ(transports(loadWith({})->config), 1);
+    EXPECT_EQ(transports(loadWith({"--http-listen", "127.0.0.1:0"})->config), 2);
+    const auto named = loadWith({"--http-hosts", "a.example,b"});
+    ASSERT_TRUE(named);
+    EXPECT_EQ(splitNames(named->config.http.hosts), (std::vector<std::string>{"a.example", "b"}));
+    EXPECT_TRUE(splitNames("").empty());
+    for (const char* bad : {"a,,b", "http://a", "a b", "a/b", ",a"}) {
+        expectRefused(loadWith({"--http-hosts", bad}), ErrorCode::kInvalidArgument,
+                      {"http.hosts", "name of a host"});
     }
 }
 

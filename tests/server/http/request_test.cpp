@@ -45,6 +45,10 @@ TEST(CheckHead, TakesOneMeaningOnly) {
     for (const char* coding : {"gzip, chunked", "chunked, chunked", "xchunked", "identity", ""}) {
         EXPECT_EQ(statusOf(checkHead(with({"transfer-encoding", coding}), hosts)), 501u) << coding;
     }
+    EXPECT_EQ(statusOf(checkHead(with({"content-length", "12"}), hosts)), 200u);
+    for (const char* length : {"1,1", "+1", "0x1", "1 1", "-1"}) {
+        EXPECT_EQ(statusOf(checkHead(with({"content-length", length}), hosts)), 400u) << length;
+    }
     EXPECT_EQ(statusOf(checkHead(with({"host", "localhost:2"}), hosts)), 400u);
     EXPECT_EQ(statusOf(checkHead(with({"content-type", "application/json"}), hosts)), 400u);
     EXPECT_EQ(statusOf(checkHead(post({{"host", "evil.example"}}), hosts)), 421u);

@@ -242,6 +242,8 @@ TEST(DescriptorLimit, LeavesRoomForTheDatabase) {
     EXPECT_EQ(connectionsWithin(65'536, 1'000), 1'000u);
     EXPECT_EQ(connectionsWithin(1'024, 1'000), 1'024u - kReservedDescriptors);
     EXPECT_EQ(connectionsWithin(64, 1'000), 32u);
+    EXPECT_EQ(connectionsWithin(65'536, 1'000, 2), 1'000u);
+    EXPECT_EQ(connectionsWithin(1'024, 1'000, 2), (1'024u - kReservedDescriptors) / 2);
 }
 
 TEST(DescriptorLimit, IsRaisedToTheHardLimit) {
