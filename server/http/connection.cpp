@@ -1,12 +1,9 @@
 #include "server/http/connection.h"
 
 #include <algorithm>
-#include <cctype>
-#include <limits>
 #include <utility>
 
 #include <boost/asio/post.hpp>
-#include <boost/beast/http/error.hpp>
 
 #include "server/rpc/message_limits.h"
 
@@ -14,13 +11,9 @@ namespace shapedb::http {
 namespace {
 
 namespace asio = boost::asio;
-namespace beast = boost::beast;
 
-constexpr std::size_t kMostHeadBytes = 16'384;
 /// A client that goes on before it has its answer: so much is kept, and its end is noticed within that.
 constexpr std::size_t kMostAhead = 16'384;
-/// The head of a chunk, with its extensions, or the fields after the last.
-constexpr std::size_t kMostChunkHeadBytes = 16'384;
 constexpr std::size_t kWriteBytes = 65'536;
 constexpr std::chrono::milliseconds kLook{500};
 constexpr std::chrono::milliseconds kLingerTime{2'000};
@@ -35,8 +28,6 @@ std::string inChunk(std::string_view bytes) {
 }
 
 constexpr const char* kLastChunk = "0\r\n\r\n";
-
-bool isBadLength(const beast::error_code& error) { return error == beast::http::error::header_limit; }
 
 }  // namespace
 
@@ -95,10 +86,7 @@ void Connection::closeNow() {
 void Connection::nextRequest(std::chrono::milliseconds patience) {
     call_.reset();
     if (services_.draining) return linger();
-    parser_.emplace();
-    parser_->header_limit(kMostHeadBytes);
-    // Of uploads without end; a call limits its messages. "None" would mean 0 in Beast of Boost 1.74.
-    parser_->body_limit(std::numeric_limits<std::uint64_t>::max());
+    parser_.begin();
     readPace_ = {};
     writePace_ = {};
     answered_ = false;
@@ -109,30 +97,21 @@ void Connection::nextRequest(std::chrono::milliseconds patience) {
 }
 
 void Connection::process() {
-    if (state_ == State::kIdle && buffer_.size() > 0) {
+    if (state_ == State::kIdle && parser_.waiting() > 0) {
         state_ = State::kHead;
         deadline_ = Clock::now() + rpc::kHandshakeTime;
     }
     if (state_ == State::kHead) processHead();
     if (state_ == State::kBody) processBody();
-    if (state_ == State::kLinger) buffer_.consume(buffer_.size());
+    if (state_ == State::kLinger) parser_.dropWaiting();
     read();
 }
 
-Connection::Parsed Connection::parse(beast::error_code& error) {
-    error = {};
-    const std::size_t bytes = parser_->put(buffer_.data(), error);
-    buffer_.consume(bytes);
-    if (error == beast::http::error::need_more) return bytes > 0 ? Parsed::kSome : Parsed::kTooLittle;
-    return error ? Parsed::kBad : Parsed::kSome;
-}
-
 void Connection::processHead() {
-    while (!parser_->is_header_done()) {
-        beast::error_code error;
-        const Parsed parsed = buffer_.size() == 0 ? Parsed::kTooLittle : parse(error);
-        if (parsed == Parsed::kTooLittle) return;
-        if (parsed == Parsed::kBad) return refuseMalformed(error);
+    while (!parser_.headDone()) {
+        const RequestParser::Step step = parser_.step();
+        if (step == RequestParser::Step::kTooLittle) return;
+        if (step == RequestParser::Step::kBad) return answer(responseOf(parser_.problem()));
     }
     state_ = State::kAnswer;
     route();
@@ -140,43 +119,18 @@ void Connection::processHead() {
 
 void Connection::processBody() {
     const auto call = call_;
-    while (state_ == State::kBody && !parser_->is_done() && buffer_.size() > 0 && call->wantsBody()) {
-        beast::error_code error;
-        const Parsed parsed = parse(error);
-        if (parsed == Parsed::kTooLittle && buffer_.size() < kMostChunkHeadBytes) return;
-        if (parsed != Parsed::kSome) {
-            call->cutOff("the body of the request is malformed: " + error.message());
-            return;
-        }
+    while (state_ == State::kBody && !parser_.done() && call->wantsBody()) {
+        const RequestParser::Step step = parser_.step();
+        if (step == RequestParser::Step::kTooLittle) return;
+        if (step == RequestParser::Step::kBad) return call->cutOff(parser_.problem().message);
     }
-    if (state_ != State::kBody || !parser_->is_done()) return;
+    if (state_ != State::kBody || !parser_.done()) return;
     state_ = State::kAnswer;
     call->bodyEnd();
 }
 
-void Connection::refuseMalformed(const beast::error_code& error) {
-    state_ = State::kAnswer;
-    const unsigned status = isBadLength(error) ? 431 : 400;
-    answer(responseOf(
-        refuseWith(status, Code::kInvalidArgument, "this is no HTTP/1.1: " + error.message()).value()));
-}
-
-Head Connection::head() const {
-    const auto& message = parser_->get();
-    Head head;
-    head.method = std::string(message.method_string());
-    head.target = std::string(message.target());
-    head.version = static_cast<int>(message.version());
-    for (const auto& field : message) {
-        std::string name(field.name_string());
-        for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-        head.fields.emplace_back(std::move(name), std::string(field.value()));
-    }
-    return head;
-}
-
 void Connection::route() {
-    const Head asked = head();
+    const Head asked = parser_.head();
     headOnly_ = asked.method == "HEAD";
     if (const auto good = checkHead(asked, services_.hosts); !good) {
         Response refused = responseOf(good.error());
@@ -217,18 +171,18 @@ void Connection::startCall(const Method& method, CallForm form, bool clientWaits
         });
     };
     call_ = std::make_shared<ConnectCall>(services_.calls, *this, method, std::move(form), peer_, post);
-    parser_->get().body() = [call = call_.get()](std::string_view bytes) { call->body(bytes); };
+    parser_.onBody([call = call_.get()](std::string_view bytes) { call->body(bytes); });
     state_ = State::kBody;
-    if (clientWaits && !parser_->is_done()) enqueue("HTTP/1.1 100 Continue\r\n\r\n");
+    if (clientWaits && !parser_.done()) enqueue("HTTP/1.1 100 Continue\r\n\r\n");
     const auto call = call_;
     call->start();
-    if (state_ == State::kBody && parser_->is_done()) processBody();
+    if (state_ == State::kBody && parser_.done()) processBody();
 }
 
 void Connection::read() {
     if (reading_ || clientEnded_ || state_ == State::kClosed) return;
-    if (state_ == State::kBody && (parser_->is_done() || !call_->wantsBody())) return;
-    if (state_ == State::kAnswer && buffer_.size() >= kMostAhead) return;
+    if (state_ == State::kBody && (parser_.done() || !call_->wantsBody())) return;
+    if (state_ == State::kAnswer && parser_.waiting() >= kMostAhead) return;
     reading_ = true;
     if (state_ == State::kBody) readPace_.begin(Clock::now());
     stream_.readSome(asio::buffer(incoming_), guarded([this](const boost::system::error_code& error,
@@ -240,7 +194,7 @@ void Connection::onRead(const boost::system::error_code& error, std::size_t byte
     if (state_ == State::kClosed) return;
     readPace_.end(Clock::now(), bytes);
     if (error) return onEndOfClient();
-    buffer_.commit(asio::buffer_copy(buffer_.prepare(bytes), asio::buffer(incoming_)));
+    parser_.add({incoming_.data(), bytes});
     process();
 }
 
@@ -255,7 +209,7 @@ void Connection::onEndOfClient() {
 void Connection::wantsMore() { process(); }
 
 bool Connection::decideToKeep() {
-    return parser_->is_header_done() && parser_->is_done() && parser_->keep_alive() && !services_.draining;
+    return parser_.headDone() && parser_.done() && parser_.keepAlive() && !services_.draining;
 }
 
 void Connection::answer(Response response) {
@@ -279,7 +233,7 @@ void Connection::beginStream(Response response) {
 void Connection::send(std::string bytes) { enqueue(inChunk(bytes), true); }
 
 void Connection::endStream(std::string bytes) {
-    if (!parser_->is_done()) keep_ = false;
+    if (!parser_.done()) keep_ = false;
     state_ = State::kAnswer;
     answered_ = true;
     enqueue(inChunk(bytes) + kLastChunk);

@@ -10,20 +10,16 @@
 #include <deque>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/steady_timer.hpp>
-#include <boost/beast/core/buffers_range.hpp>
-#include <boost/beast/core/flat_buffer.hpp>
-#include <boost/beast/http/parser.hpp>
 
 #include "server/http/byte_stream.h"
 #include "server/http/connect_call.h"
 #include "server/http/files.h"
+#include "server/http/request_parser.h"
 #include "server/net/transfer_pace.h"
 
 namespace shapedb::http {
@@ -38,34 +34,6 @@ struct ConnectionServices {
     std::chrono::seconds idle{};  ///< between two requests
     /// No further request is taken: each connection closes after its answer.
     std::atomic<bool> draining{false};
-};
-
-/// Hands the bytes of a body to a function as they are parsed (a Body of Boost.Beast).
-struct BodySink {
-    using value_type = std::function<void(std::string_view)>;
-
-    class reader {
-      public:
-        template <bool isRequest, typename Fields>
-        reader(boost::beast::http::header<isRequest, Fields>& /*head*/, value_type& sink) : sink_(sink) {}
-        void init(const boost::optional<std::uint64_t>& /*length*/, boost::system::error_code& error) {
-            error = {};
-        }
-        template <typename Buffers>
-        std::size_t put(const Buffers& buffers, boost::system::error_code& error) {
-            error = {};
-            std::size_t bytes = 0;
-            for (const boost::asio::const_buffer one : boost::beast::buffers_range_ref(buffers)) {
-                if (sink_) sink_({static_cast<const char*>(one.data()), one.size()});
-                bytes += one.size();
-            }
-            return bytes;
-        }
-        void finish(boost::system::error_code& error) { error = {}; }
-
-      private:
-        value_type& sink_;
-    };
 };
 
 /// Lives as long as the network or its call need it. All of it on the socket's strand; `start`, `drain` and
@@ -100,7 +68,6 @@ class Connection final : public CallClient, public std::enable_shared_from_this<
         kLinger,  ///< answered for the last time; the client may still be sending
         kClosed,
     };
-    enum class Parsed { kSome, kTooLittle, kBad };
     struct Piece {
         std::string bytes;
         bool tellCall = false;
@@ -112,9 +79,6 @@ class Connection final : public CallClient, public std::enable_shared_from_this<
     void process();
     void processHead();
     void processBody();
-    Parsed parse(boost::beast::error_code& error);
-    void refuseMalformed(const boost::beast::error_code& error);
-    [[nodiscard]] Head head() const;
     void route();
     void startCall(const Method& method, CallForm form, bool clientWaits);
     void read();
@@ -140,8 +104,7 @@ class Connection final : public CallClient, public std::enable_shared_from_this<
     State state_ = State::kHandshake;
     Clock::time_point deadline_;           ///< of kHandshake, kIdle, kHead and kLinger
     std::array<char, 16'384> incoming_{};  ///< of the read under way
-    boost::beast::flat_buffer buffer_;     ///< what has come and is not parsed
-    std::optional<boost::beast::http::request_parser<BodySink>> parser_;
+    RequestParser parser_;
     std::shared_ptr<ConnectCall> call_;
     bool reading_ = false;
     bool clientEnded_ = false;

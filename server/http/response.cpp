@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <ctime>
+#include <ostream>  // which Boost 1.74 leaves out
 #include <string_view>
 
 #include <boost/beast/http/status.hpp>

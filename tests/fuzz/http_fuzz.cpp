@@ -1,5 +1,5 @@
-// Fuzzes what HTTP clients send: envelopes in any pieces, heads of requests, and messages as JSON. The first
-// byte chooses.
+// Fuzzes what HTTP clients send: envelopes in any pieces, requests and their heads, and messages as JSON. The
+// first byte chooses.
 #include <nlohmann/json.hpp>
 
 #include "server/http/envelope.h"
@@ -7,6 +7,7 @@
 #include "server/http/files.h"
 #include "server/http/methods.h"
 #include "server/http/request.h"
+#include "server/http/request_parser.h"
 #include "tests/fuzz/fuzz.h"
 
 using namespace shapedb;
@@ -92,16 +93,44 @@ void tryJson(fuzz::Input& input) {
     require(static_cast<bool>(json), "what was read can be written");
     const auto again = methods().requestFromJson(method, *json);
     require(static_cast<bool>(again), "what was written can be read");
-    require(methods().responseToJson(method, *again) == json, "and means the same");
+    require(*methods().responseToJson(method, *again) == *json, "and means the same");
+}
+
+/// As Connection does, in pieces: requests one after another until the bytes end or make no sense.
+void tryRequests(fuzz::Input& input) {
+    http::RequestParser parser;
+    const auto hosts = http::Hosts::named({});
+    std::size_t sent = 0;
+    std::size_t received = 0;
+    parser.begin();
+    while (input.left() > 0) {
+        const std::string piece = input.bytes(1 + input.byte());
+        sent += piece.size();
+        parser.add(piece);
+        while (true) {
+            const bool hadHead = parser.headDone();
+            const auto step = parser.step();
+            if (step == http::RequestParser::Step::kBad) return requireExplained(parser.problem());
+            if (step == http::RequestParser::Step::kTooLittle) break;
+            if (!hadHead && parser.headDone()) {
+                if (const auto good = http::checkHead(parser.head(), hosts); !good)
+                    return requireExplained(good.error());
+                parser.onBody([&](std::string_view bytes) { received += bytes.size(); });
+            }
+            if (parser.done()) parser.begin();
+        }
+        require(received + parser.waiting() <= sent, "a body holds no more than was sent");
+    }
 }
 
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     fuzz::Input input(data, size);
-    const int kind = input.byte() % 3;
+    const int kind = input.byte() % 4;
     if (kind == 0) tryEnvelopes(input);
     if (kind == 1) tryHead(input);
     if (kind == 2) tryJson(input);
+    if (kind == 3) tryRequests(input);
     return 0;
 }
