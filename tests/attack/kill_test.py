@@ -52,10 +52,10 @@ class Outcomes:
 class Load:
     """Clients that change one server until it dies."""
 
-    def __init__(self, seed):
+    def __init__(self, seed, max_points):
         self.random = random.Random(seed)
         self.shapes = {f"writer {w} key {k}": Outcomes(None) for w in range(WRITERS) for k in range(KEYS)}
-        self.max_points = Outcomes(7)
+        self.max_points = Outcomes(max_points)
         self.unexpected = []
 
     def acknowledged(self):
@@ -118,6 +118,11 @@ class Load:
             time.sleep(0.02)
 
 
+def max_points_of(client):
+    collection = client.collections.GetCollection(collections.GetCollectionRequest(name="default"), timeout=30)
+    return collection.signature.max_points
+
+
 def stored(client):
     found = {}
     cursor = ""
@@ -132,9 +137,10 @@ def stored(client):
 
 class Kills(unittest.TestCase):
     def test_lose_nothing_that_was_acknowledged(self):
-        load = Load(SEED)
         dice = random.Random(SEED)
         with Server() as server:
+            with server.connect() as client:
+                load = Load(SEED, max_points_of(client))
             for kill in range(KILLS):
                 load.start(server)
                 time.sleep(dice.uniform(0.02, 0.6))
@@ -159,9 +165,8 @@ class Kills(unittest.TestCase):
             possible = list(outcomes.possible)
             self.assertTrue(outcomes.found(found.pop(key, None)), f"kill {kill}: {key} is none of {possible}")
         self.assertEqual(found, {}, f"kill {kill}: nobody asked for these")
-        collection = client.collections.GetCollection(collections.GetCollectionRequest(name="default"), timeout=30)
         # A rebuild that was running goes on, and may end later: what was possible stays so.
-        self.assertIn(collection.signature.max_points, load.max_points.possible, f"kill {kill}")
+        self.assertIn(max_points_of(client), load.max_points.possible, f"kill {kill}")
         problems = [line for part in client.admin.Check(admin.CheckRequest(), timeout=60) for line in part.problems]
         self.assertEqual(problems, [], f"kill {kill}")
         self.assertEqual(client.admin.Stats(admin.StatsRequest(), timeout=30).missing_commits, 0, f"kill {kill}")
