@@ -109,6 +109,10 @@ void InnerCall::OnReadDone(bool good) {
 }
 
 void InnerCall::OnDone(const grpc::Status& status) {
+    // gRPC's in-process transport (1.51) keeps both sides of a call in memory for good if it was over before
+    // all of the request was written, as when a caller is refused. A cancelled one it lets go; the status is
+    // known by now.
+    context_.TryCancel();
     // The last that gRPC knows of this object, which may be gone as soon as this is posted.
     InnerCalls& calls = calls_;
     const auto post = events_.post;

@@ -566,6 +566,30 @@ class Connections(unittest.TestCase):
             self.assertEqual(len(codes), 3_000)
             self.assertLessEqual(set(codes), {200, 429})
 
+    def test_and_calls_leave_nothing_behind(self):
+        """However they end: gRPC's in-process transport keeps calls that were not ended in its way."""
+        header = envelope(shapes.AddShapeRequest(header=shapes.AddShapeHeader(key="k", point_count=1000)).SerializeToString())
+        wrong = envelope(shapes.AddShapeRequest(header=shapes.AddShapeHeader(key="k", point_count=1)).SerializeToString())
+
+        def work(server, times):
+            with Http(server) as client:
+                for _ in range(times):
+                    client.json("ShapeService/CountShapes")
+                    client.json("ShapeService/GetShape", {"shape": {"key": "nobody"}})
+                    client.stream("ShapeService/WatchIngest", [{"shape": {"key": "nobody"}}])
+            for i in range(times // 2):
+                with Raw(server) as raw:  # an upload that is refused, and one whose client goes
+                    raw.send(head("/shapedb.v1.ShapeService/AddShape", "Content-Type: application/connect+proto",
+                                  "Content-Length: 100000").encode() + (wrong if i % 2 else header))
+                    if i % 2:
+                        raw.status()
+
+        with serve() as server:
+            work(server, 200)
+            before = server.resident()
+            work(server, 800)
+            self.assertLess(server.resident() - before, 5 * MIB)
+
     def test_a_stop_ends_them_and_lets_answers_finish(self):
         with serve("--ingest-threads", "1") as server:
             with server.connect() as client:
