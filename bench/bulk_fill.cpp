@@ -29,7 +29,7 @@ struct Scan {
 void insertReady(Connection& connection, std::int64_t collectionId, const FillShape& shape, const Scan& scan,
                  TimestampMs now) {
     Query(connection, sql::kInsertShape, collectionId, shape.key, scan.points.size() / 3,
-          BlobView{scan.checksum.data(), scan.checksum.size()}, now)
+          BlobView{scan.checksum.data(), scan.checksum.size()}, now, 0.0, 0.0, 0.0)
         .run();
     const std::int64_t id = connection.lastInsertId();
     for (const auto& [name, value] : shape.metadata)
