@@ -1,11 +1,13 @@
 #include "server/rpc/shape_service.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <utility>
 
 #include "core/base/return_if_error.h"
 #include "core/search/filter.h"
+#include "server/catalog/even_sample.h"
 #include "server/catalog/listing.h"
 #include "server/catalog/scan_upload.h"
 #include "server/catalog/shape_addition.h"
@@ -48,28 +50,60 @@ Result<catalog::ShapeHeader> headerFrom(const pb::AddShapeHeader& message) {
     return header;
 }
 
-/// One summary, then the points in the order they were uploaded, each with its segment.
+/// One summary, then the points of the sample in the order they were uploaded, each with its segment.
 template <typename Writer>
 Result<void> sendSegments(Call& call, Writer& writer, const Description& description,
-                          const std::vector<float>& xyz, const Point3& origin, bool summaryOnly) {
+                          const std::vector<float>& xyz, const Point3& origin,
+                          const catalog::EvenSample& sample) {
     pb::SegmentedPoints message;
     toProto(description.segmentation, message.mutable_summary()->mutable_report());
     toProto(description.signature, message.mutable_summary()->mutable_signature());
     if (origin != Point3{}) toProto(origin, message.mutable_summary()->mutable_origin());
-    if (const auto sent = call.write(writer, message); !sent || summaryOnly) return sent;
+    RETURN_IF_ERROR(call.write(writer, message));
 
     const auto& labels = description.segmentation.pointSegment;
-    for (std::size_t first = 0; first < labels.size(); first += kLabelledChunkPoints) {
-        const std::size_t count = std::min(kLabelledChunkPoints, labels.size() - first);
+    for (std::size_t first = 0; first < sample.size(); first += kLabelledChunkPoints) {
+        const std::size_t count = std::min(kLabelledChunkPoints, sample.size() - first);
         message.Clear();
         pb::LabelledChunk* chunk = message.mutable_chunk();
         chunk->mutable_xyz()->resize(count * catalog::kPointBytes);
-        std::memcpy(chunk->mutable_xyz()->data(), xyz.data() + 3 * first, count * catalog::kPointBytes);
-        chunk->mutable_segments()->Add(labels.begin() + static_cast<std::ptrdiff_t>(first),
-                                       labels.begin() + static_cast<std::ptrdiff_t>(first + count));
+        for (std::size_t i = 0; i < count; ++i) {
+            const std::size_t point = sample.at(first + i);
+            std::memcpy(chunk->mutable_xyz()->data() + i * catalog::kPointBytes, xyz.data() + 3 * point,
+                        catalog::kPointBytes);
+            chunk->add_segments(labels[point]);
+        }
         RETURN_IF_ERROR(call.write(writer, message));
     }
     return {};
+}
+
+/// Replaces the points by those of a sample.
+void keepSample(std::vector<float>& xyz, const catalog::EvenSample& sample) {
+    for (std::size_t i = 0; i < sample.size(); ++i) {
+        // No sample names a point before its own place, so that none is overwritten too early.
+        std::copy_n(xyz.begin() + static_cast<std::ptrdiff_t>(3 * sample.at(i)), 3,
+                    xyz.begin() + static_cast<std::ptrdiff_t>(3 * i));
+    }
+    xyz.resize(3 * sample.size());
+}
+
+void toProto(const SurfacePoints& surface, std::size_t most, pb::Preview* preview) {
+    const std::size_t count = most == 0 ? surface.size() : std::min(most, surface.size());
+    std::vector<float> xyz;
+    std::string normals;
+    for (std::size_t i = 0; i < count; ++i) {
+        const Point3 position = surface.position(i) - surface.centre;
+        const Point3 normal = surface.normal(i);
+        for (const double value : {position.x, position.y, position.z}) {
+            xyz.push_back(static_cast<float>(value));
+        }
+        for (const double value : {normal.x, normal.y, normal.z}) {
+            normals.push_back(static_cast<char>(std::lround(127 * value)));
+        }
+    }
+    preview->set_xyz(xyz.data(), xyz.size() * sizeof(float));
+    preview->set_normals(std::move(normals));
 }
 
 template <typename Writer>
@@ -153,14 +187,42 @@ grpc::Status ShapeServiceHandler::GetPoints(grpc::ServerContext* context, const 
         const auto found = call.shape(request->shape());
         RETURN_IF_ERROR(found);
         catalog::Budget::Share share(services_.admission.uploads);
-        const auto scan = services_.catalog.storedScan(*found, share);
+        auto scan = services_.catalog.storedScan(*found, share);
         RETURN_IF_ERROR(scan);
+        keepSample(scan->points, {scan->points.size() / 3, request->max_points()});
         call.addPoints(scan->points.size() / 3, scan->points.size() * sizeof(float));
         v1::StoredPoints message;
         toProto(scan->shape, found->collection->collection.name,
                 services_.catalog.servingQuality(scan->shape), message.mutable_shape());
         RETURN_IF_ERROR(call.write(*writer, message));
         return sendPoints(call, *writer, scan->points);
+    });
+}
+
+grpc::Status ShapeServiceHandler::GetPreviews(grpc::ServerContext* context,
+                                              const v1::GetPreviewsRequest* request,
+                                              v1::GetPreviewsResponse* response) {
+    return handle(services_, context, operations::kGetPreviews, [&](Call& call) -> Result<void> {
+        const auto collection = call.collection(request->collection());
+        RETURN_IF_ERROR(collection);
+        call.note({"keys", std::int64_t{request->keys_size()}});
+        Result<void> read;
+        const auto visit = [&](const store::Shape& shape, std::optional<double> /*quality*/) -> std::size_t {
+            if (!read) return 0;
+            pb::Preview* preview = response->add_previews();
+            preview->set_key(shape.key);
+            preview->set_version(shape.version);
+            const auto surface = services_.catalog.surface(shape.id);
+            if (!surface) {
+                read = fail(surface.error());
+            } else if (*surface) {
+                toProto(**surface, request->max_points(), preview);
+            }
+            return preview->ByteSizeLong();
+        };
+        RETURN_IF_ERROR(catalog::visitShapes(services_.catalog, **collection,
+                                             {request->keys().begin(), request->keys().end()}, visit));
+        return read;
     });
 }
 
@@ -374,8 +436,9 @@ grpc::Status ShapeServiceHandler::GetSegments(grpc::ServerContext* context,
         const auto scan = services_.catalog.describe(slot, *found, call.run());
         RETURN_IF_ERROR(scan);
         const store::StoredPoints& points = scan->points;
-        call.addPoints(points.xyz.size() / 3, points.xyz.size() * sizeof(float));
-        return sendSegments(call, *writer, scan->description, points.xyz, points.origin, false);
+        const catalog::EvenSample sample(points.xyz.size() / 3, request->max_points());
+        call.addPoints(sample.size(), sample.size() * catalog::kPointBytes);
+        return sendSegments(call, *writer, scan->description, points.xyz, points.origin, sample);
     });
 }
 
@@ -399,7 +462,9 @@ grpc::Status ShapeServiceHandler::Segment(
         catalog::SegmentationSlots::Slot slot(services_.catalog.segmentationSlots());
         const auto description = services_.catalog.describe(slot, *scan, parameters, call.run());
         RETURN_IF_ERROR(description);
-        return sendSegments(call, *stream, *description, scan->points(), scan->origin(), summaryOnly);
+        // Without points: a sample of none.
+        const catalog::EvenSample sample(summaryOnly ? 0 : scan->points().size() / 3, 0);
+        return sendSegments(call, *stream, *description, scan->points(), scan->origin(), sample);
     });
 }
 

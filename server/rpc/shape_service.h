@@ -21,6 +21,8 @@ class ShapeServiceHandler final : public shapedb::v1::ShapeService::Service {
                            v1::GetShapesResponse* response) override;
     grpc::Status GetPoints(grpc::ServerContext* context, const v1::GetPointsRequest* request,
                            grpc::ServerWriter<v1::StoredPoints>* writer) override;
+    grpc::Status GetPreviews(grpc::ServerContext* context, const v1::GetPreviewsRequest* request,
+                             v1::GetPreviewsResponse* response) override;
     grpc::Status ListShapes(grpc::ServerContext* context, const v1::ListShapesRequest* request,
                             v1::ListShapesResponse* response) override;
     grpc::Status CountShapes(grpc::ServerContext* context, const v1::CountShapesRequest* request,

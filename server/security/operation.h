@@ -48,6 +48,8 @@ inline constexpr Operation kGetShapes{"ShapeService", "GetShapes", Role::kReader
                                       Scope::kCollections};
 inline constexpr Operation kGetPoints{"ShapeService", "GetPoints", Role::kReader, CallClass::kOrdinary,
                                       Scope::kCollections};
+inline constexpr Operation kGetPreviews{"ShapeService", "GetPreviews", Role::kReader, CallClass::kOrdinary,
+                                        Scope::kCollections};
 inline constexpr Operation kListShapes{"ShapeService", "ListShapes", Role::kReader, CallClass::kOrdinary,
                                        Scope::kCollections};
 inline constexpr Operation kCountShapes{"ShapeService", "CountShapes", Role::kReader, CallClass::kOrdinary,
@@ -126,10 +128,11 @@ inline constexpr Operation kRevokeKey{"AdminService", "RevokeKey", Role::kAdmin,
                                       Scope::kKeys};
 
 /// All of the above. A test compares it with the services in proto/.
-inline constexpr std::array<const Operation*, 40> kAll{&kAddShape,
+inline constexpr std::array<const Operation*, 41> kAll{&kAddShape,
                                                        &kGetShape,
                                                        &kGetShapes,
                                                        &kGetPoints,
+                                                       &kGetPreviews,
                                                        &kListShapes,
                                                        &kCountShapes,
                                                        &kCountByValue,
