@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Installs the Debian 12 packages that ShapeDB needs, and only those that are missing.
-#   scripts/install-deps.sh             everything to build, test and check, the Python package too
+#   scripts/install-deps.sh             everything to build, test and check, the Python package too, and the npm
+#                                       packages of web/, as do all but --runtime and --open3d
 #   scripts/install-deps.sh --analysis  that, and clang for scripts/ci/tidy.sh and scripts/ci/fuzz.sh
 #   scripts/install-deps.sh --build     only what is needed to build
 #   scripts/install-deps.sh --runtime   only what the programs need to run
@@ -27,12 +28,16 @@ runtime_packages=(
   libzstd1 libssl3 libspdlog1.10 libprometheus-cpp-pull1.0 libpng16-16 liblzf1 zlib1g libzip4 libexpat1
 )
 open3d_packages=(python3-open3d)
+browser_packages=(chromium)
+# Node may come from elsewhere than Debian, and then brings its own npm.
+command -v node >/dev/null || build_packages+=(nodejs)
+command -v npm >/dev/null || build_packages+=(npm)
 analysis_packages=(clang-14 clang-tidy-14 libclang-rt-14-dev)
 bench_packages=(libpcl-dev libfaiss-dev libopenblas-dev)
 
 case "${1:-}" in
-  "") packages=("${build_packages[@]}" "${python_packages[@]}") ;;
-  --analysis) packages=("${build_packages[@]}" "${python_packages[@]}" "${analysis_packages[@]}") ;;
+  "") packages=("${build_packages[@]}" "${python_packages[@]}" "${browser_packages[@]}") ;;
+  --analysis) packages=("${build_packages[@]}" "${python_packages[@]}" "${browser_packages[@]}" "${analysis_packages[@]}") ;;
   --build) packages=("${build_packages[@]}") ;;
   --runtime) packages=("${runtime_packages[@]}") ;;
   --open3d) packages=("${open3d_packages[@]}") ;;
@@ -40,13 +45,26 @@ case "${1:-}" in
   *) echo "install-deps: unknown option $1; there are --build, --analysis, --runtime, --bench and --open3d" >&2; exit 2 ;;
 esac
 
+# Exactly what web/package-lock.json names, and no script of any package is run.
+install_npm_packages() {
+  local web
+  web=$(dirname "$0")/../web
+  case "${1:-}" in --runtime | --open3d) return 0 ;; esac
+  [ -f "$web/package-lock.json" ] || return 0
+  [ "$web/node_modules/.package-lock.json" -nt "$web/package-lock.json" ] && return 0
+  (cd "$web" && npm ci --ignore-scripts --no-audit --no-fund) >&2
+}
+
 missing=()
 for package in "${packages[@]}"; do
   if [ "$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null || true)" != installed ]; then
     missing+=("$package")
   fi
 done
-[ ${#missing[@]} -eq 0 ] && exit 0
+if [ ${#missing[@]} -eq 0 ]; then
+  install_npm_packages "$@"
+  exit 0
+fi
 
 as_root=()
 if [ "$(id -u)" -ne 0 ]; then
@@ -56,3 +74,4 @@ fi
 echo "installing ${#missing[@]} packages: ${missing[*]}" >&2
 "${as_root[@]}" apt-get update -q >&2
 "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends "${missing[@]}" >&2
+install_npm_packages "$@"
