@@ -6,6 +6,7 @@ failed=0
 complain() { echo "lint: $1" >&2; failed=1; }
 
 sources() { git ls-files -- '*.h' '*.cpp'; }
+scripts() { git ls-files -- 'web/*.ts' 'web/*.mjs' 'tests/web/*.mjs'; }
 
 unformatted=$(sources | xargs -r clang-format-14 --dry-run -Werror 2>&1 | grep -oE '^[^:]+' | sort -u | grep -E '\.(h|cpp)$')
 [ -z "$unformatted" ] || complain "not formatted (clang-format-14 -i): $(echo $unformatted)"
@@ -70,10 +71,14 @@ for test in $(git ls-files -- '*_test.cpp'); do
   esac
 done
 
-lengths=$(sources | xargs -r wc -l | awk '$2 != "total"')
+# Words of strangers become text, never markup (docs/web.md).
+markup=$(git grep -nE 'innerHTML|outerHTML|insertAdjacentHTML|document\.write|\beval\(|new Function' -- web/src)
+[ -z "$markup" ] || complain "web/src/ makes markup or code of text:"$'\n'"$markup"
+
+lengths=$( (sources; scripts) | xargs -r wc -l | awk '$2 != "total"')
 long=$(awk '$1 > 500 { print $2 " (" $1 " lines)" }' <<< "$lengths")
 [ -z "$long" ] || complain "longer than 500 lines: $long"
-unfinished=$(git grep -nE 'TODO|FIXME|\bXXX\b|DISABLED_' -- '*.cpp' '*.h')
+unfinished=$(git grep -nE 'TODO|FIXME|\bXXX\b|DISABLED_' -- '*.cpp' '*.h' '*.ts')
 [ -z "$unfinished" ] || complain "unfinished:"$'\n'"$unfinished"
 
 python3 scripts/python-sync.py || complain "the Python client that blocks is not what scripts/python-sync.py --update makes"

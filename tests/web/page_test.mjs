@@ -1,0 +1,214 @@
+// The page as people use it, in a headless Chromium against a real server; what is drawn is judged by its pixels.
+import assert from 'node:assert/strict';
+import { writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { after, before, test } from 'node:test';
+
+import {
+  boxOf, complaints, createKey, openPage, pixelsOf, sample, scanAgain, settled, startBrowser, startServer, temporaryFolder, visit,
+} from './harness.mjs';
+
+const isBlue = ([r, g, b]) => b > 90 && b > r + 40 && b > g + 15;
+const isOrange = ([r, g, b]) => r > 90 && r > b + 40 && r > g + 15;
+const kNasty = '<img src=x onerror=document.title="taken">';
+
+let temporary, server, browser, scan;
+
+before(async () => {
+  temporary = temporaryFolder();
+  const folder = temporary.folder;
+  sample(join(folder, 'scans'), '--families', 'dumbbell,human,mug', '--count', '3', '--points', '3000');
+  scan = join(folder, 'again.xyz');
+  scanAgain(join(folder, 'scans/human/human_01.ply'), scan);
+  [server, browser] = await Promise.all([startServer(join(folder, 'data')), startBrowser()]);
+  server.command('collection', 'create', 'parts');
+  server.command('add', join(folder, 'scans'), '--base', join(folder, 'scans'), '--collection', 'parts', '--label-from-folder', '--wait');
+  server.command('add', scan, '--key', kNasty, '--meta', `note=${kNasty}`, '--collection', 'parts', '--wait');
+});
+
+after(async () => {
+  await browser?.close();
+  await server?.stop();
+  temporary?.remove();
+});
+
+/** A test with a page of its own, on which nothing may go wrong. */
+function pageTest(name, run, options) {
+  test(name, async () => {
+    const { page, faults, close } = await openPage(browser, server, options);
+    try {
+      await run(page);
+      assert.deepEqual(faults, []);
+    } finally {
+      await close();
+    }
+  });
+}
+
+pageTest('a collection is a wall of pictures, and strangers\' words stay words', async (page) => {
+  await visit(page, server, '#/');
+  assert.equal(await page.locator('.card').count(), 10);
+  assert.equal(await page.locator('.total').innerText(), '10 shapes');
+  await page.locator('.picture canvas[data-drawn]').first().waitFor();
+  const drawn = boxOf(await pixelsOf(page, '.picture'), isBlue);
+  assert.ok(drawn.count > 500, `${drawn.count} pixels`);
+  assert.ok(await page.getByText(kNasty.split('/').pop(), { exact: true }).count() > 0);
+  assert.equal(await page.locator('main img').count(), 0);
+  assert.ok(!(await page.title()).includes('taken'));
+});
+
+pageTest('a search by key ranks, says what it found, and lays a hit on the query', async (page) => {
+  await visit(page, server, '#/like/parts/human%2Fhuman_01');
+  const first = page.locator('.hit').first();
+  assert.match(await first.locator('.verdict').innerText(), /^same object/);
+  assert.ok(Number(await first.locator('.score-value').innerText()) > 0.6);
+  assert.equal(await first.locator('.reason').count(), 4);
+  await first.click();
+  await page.locator('.overlay-controls').waitFor();
+  await settled(page);
+  const aligned = await pixelsOf(page, '.viewer');
+  const [query, hit] = [boxOf(aligned, isBlue), boxOf(aligned, isOrange)];
+  assert.ok(query.count > 1_000 && hit.count > 1_000, `${query.count} and ${hit.count} pixels`);
+  for (const side of ['left', 'right', 'top', 'bottom']) {
+    assert.ok(Math.abs(query[side] - hit[side]) < 0.1 * aligned.height, `${side}: ${query[side]} and ${hit[side]}`);
+  }
+
+  const slider = page.locator('.between');
+  await slider.fill('0');
+  await slider.dispatchEvent('change');
+  await settled(page);
+  const apart = await pixelsOf(page, '.viewer');
+  assert.ok(boxOf(apart, isBlue).right < boxOf(apart, isOrange).left, 'side by side before they are aligned');
+
+  await slider.fill('100');
+  await page.getByLabel('distance').check();
+  await page.getByText('of the query is nearer than').waitFor();
+  await settled(page);
+  const near = boxOf(await pixelsOf(page, '.viewer'), ([r, g, b]) => b > r && b > 90);
+  assert.ok(near.count > 1_000, `${near.count} pixels are near: scans of one object touch`);
+});
+
+pageTest('a dropped scan is shown in segments, searched with and stored', async (page) => {
+  await visit(page, server, '#/shapes/parts');
+  await page.setInputFiles('#file', scan);
+  await page.locator('.hit').first().waitFor();
+  await page.getByText('segment 2', { exact: false }).waitFor();
+  await settled(page);
+  assert.equal(await page.locator('.hit').first().locator('.score-value').innerText(), '1.000');
+  const shown = await pixelsOf(page, '.viewer');
+  const hues = [isBlue, isOrange, ([r, g, b]) => g > r + 25 && g > b + 15].map((is) => boxOf(shown, is).count);
+  assert.ok(hues.filter((count) => count > 150).length >= 2, `pixels of the colours of segments: ${hues}`);
+
+  await page.locator('.hit').nth(1).click();
+  await page.locator('.overlay-controls').waitFor();
+  await page.goBack();
+  await page.locator('.hit').first().waitFor();
+
+  await page.getByText('Store it in parts').click();
+  await page.locator('#store-key').fill('stored here');
+  await page.getByRole('button', { name: 'Store', exact: true }).click();
+  await page.getByRole('link', { name: 'stored here is stored' }).click();
+  await settled(page);
+  assert.equal(await page.locator('h1').innerText(), 'stored here');
+  server.command('delete', 'stored here', '--collection', 'parts');
+});
+
+pageTest('a file that is no scan is refused in words', async (page) => {
+  const bad = join(temporary.folder, 'bad.off');
+  writeFileSync(bad, 'OFF\n4 1 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 9\n');
+  await visit(page, server, '#/shapes/parts');
+  await page.setInputFiles('#file', bad);
+  const alert = page.getByRole('alert');
+  await alert.waitFor();
+  assert.match(await alert.innerText(), /bad\.off cannot be read as OFF: face 1 names a corner that is not there/);
+});
+
+pageTest('facets filter, and the address is a link to what is seen', async (page) => {
+  await visit(page, server, '#/shapes/parts');
+  await page.locator('.facet-value', { hasText: 'mug' }).click();
+  await settled(page);
+  await page.getByText('3 shapes').waitFor();
+  assert.match(page.url(), /filter=label%3Dmug/);
+  await page.reload();
+  await settled(page);
+  assert.equal(await page.locator('.card').count(), 3);
+  await page.locator('#filter').fill('label==');
+  await page.getByRole('button', { name: 'Apply' }).click();
+  await page.getByRole('alert').waitFor();
+  assert.match(await page.getByRole('alert').innerText(), /column 7/);
+  await page.locator('#filter').fill('label=nothing');
+  await page.getByRole('button', { name: 'Apply' }).click();
+  await page.getByText('No shape is like that').waitFor();
+});
+
+pageTest('the keyboard is enough', async (page) => {
+  await visit(page, server, '#/shapes/parts');
+  await page.keyboard.press('/');
+  await page.keyboard.type('mug');
+  await page.keyboard.press('Enter');
+  await page.getByText('3 shapes').waitFor();
+  await page.keyboard.press('Escape');
+  await page.keyboard.press('ArrowDown');
+  await page.keyboard.press('ArrowRight');
+  await page.keyboard.press('Enter');
+  await page.getByRole('heading', { name: 'mug/mug_02' }).waitFor();
+  await page.keyboard.press('?');
+  await page.getByRole('dialog').waitFor();
+});
+
+const kViews = ['#/shapes/parts', '#/like/parts/mug%2Fmug_01', '#/compare/parts/mug%2Fmug_01/mug%2Fmug_02',
+  '#/shape/parts/mug%2Fmug_01', '#/families/parts', '#/admin/parts', '#/scan/parts', '#/compare/parts', '#/shape/parts/none'];
+for (const colorScheme of ['light', 'dark']) {
+  pageTest(`everybody can use it: ${colorScheme}`, async (page) => {
+    for (const view of kViews) {
+      await visit(page, server, view);
+      assert.deepEqual(await complaints(page), [], view);
+    }
+  }, { colorScheme });
+}
+
+pageTest('it fits a phone', async (page) => {
+  for (const view of kViews) {
+    await visit(page, server, view);
+    const [wide, seen] = await page.evaluate(() => [document.documentElement.scrollWidth, innerWidth]);
+    assert.ok(wide <= seen, `${view} is ${wide} wide, ${seen} are seen`);
+  }
+}, { viewport: { width: 390, height: 800 } });
+
+test('a server with keys asks for one, and keeps it for the tab alone', async () => {
+  const locked = temporaryFolder();
+  const secret = createKey(locked.folder, 'reader');
+  const guarded = await startServer(locked.folder, '--security-keys', 'always');
+  const { page, faults, close } = await openPage(browser, guarded);
+  try {
+    await page.goto(guarded.url);
+    await page.locator('#api-key').fill(secret.slice(0, -1));
+    await page.getByRole('button', { name: 'Use' }).click();
+    await page.locator('#api-key').fill(secret);
+    await page.getByRole('button', { name: 'Use' }).click();
+    await page.getByText('This collection is empty').waitFor();
+    assert.equal(await page.evaluate(() => JSON.stringify(localStorage) + document.cookie + location.href).then((kept) => kept.includes('shapedb_')), false);
+    await guarded.stop();
+    await page.reload().catch(() => undefined);
+    assert.deepEqual(faults, []);
+  } finally {
+    await close();
+    await guarded.stop();
+    locked.remove();
+  }
+});
+
+test('a server that has gone is told', async () => {
+  const { folder, remove } = temporaryFolder();
+  const short = await startServer(folder);
+  const { page, close } = await openPage(browser, short);
+  try {
+    await visit(page, short, '#/');
+    await short.stop();
+    await page.getByRole('link', { name: 'Families' }).click();
+    await page.getByText('The server does not answer').waitFor();
+  } finally {
+    await close();
+    remove();
+  }
+});
