@@ -52,7 +52,8 @@ install_npm_packages() {
   case "${1:-}" in --runtime | --open3d) return 0 ;; esac
   [ -f "$web/package-lock.json" ] || return 0
   [ "$web/node_modules/.package-lock.json" -nt "$web/package-lock.json" ] && return 0
-  (cd "$web" && npm ci --ignore-scripts --no-audit --no-fund) >&2
+  (cd "$web" && npm ci --ignore-scripts --no-audit --no-fund) >&2 ||
+    echo "install-deps: npm's registry cannot be reached: the web page will not be built, nor tested" >&2
 }
 
 missing=()
