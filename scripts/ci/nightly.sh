@@ -11,9 +11,11 @@ reliability() {
   local tests=${BUILD_DIR:-build}/tests
   scripts/install-deps.sh && scripts/build.sh dev || return 1
   SHAPEDB_TEST_SCALE=40 "$tests/shapedb_reliability_test" --gtest_filter='*PowerLoss*:*IoError*' || return 1
-  SHAPEDB_TEST_SCALE=20 "$tests/shapedb_reliability_test" --gtest_filter='*OutOfMemory*:*Failpoint*' || return 1
+  SHAPEDB_TEST_SCALE=40 "$tests/shapedb_reliability_test" --gtest_filter='*OutOfMemory*' || return 1
+  SHAPEDB_TEST_SCALE=20 "$tests/shapedb_reliability_test" --gtest_filter='*Failpoint*' || return 1
   SHAPEDB_TEST_SCALE=20 "$tests/shapedb_server_test" --gtest_filter='*ModelTest*' || return 1
-  SHAPEDB_TEST_SCALE=10 ctest --test-dir "${BUILD_DIR:-build}" --output-on-failure -R '^attack\.kill$'
+  SHAPEDB_TEST_SCALE=10 ctest --test-dir "${BUILD_DIR:-build}" --output-on-failure -R '^attack\.kill$' || return 1
+  SHAPEDB_TEST_SCALE=240 ctest --test-dir "${BUILD_DIR:-build}" --output-on-failure -R '^attack\.soak$'
 }
 
 failed=()

@@ -57,6 +57,8 @@ constexpr std::size_t kMaxAnswerBytes = std::size_t{64} << 20;
 /// The answers being made of all calls together; more are refused. In memory they take about four times as
 /// much.
 constexpr std::size_t kMaxAnswersBytes = std::size_t{192} << 20;
+/// Of memory that large messages of all calls may become when they are decoded.
+constexpr std::uint64_t kMaxRequestsBytes = std::uint64_t{512} << 20;
 
 // Calls at a time. A transport needs a thread for each, and some to refuse the rest.
 constexpr int kMaxOrdinaryCalls = 208;

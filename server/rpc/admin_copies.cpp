@@ -27,7 +27,7 @@ constexpr std::uint64_t kCopiesOfReceived = 3;
 /// Has `make(path)` write a file of about `bytes`, and sends it, or only what has changed since `since`.
 /// `what` begins messages, as "the backup".
 template <typename Make>
-Result<void> sendCopy(const Services& services, Call& call, grpc::ServerWriter<v1::BackupChunk>& writer,
+Result<void> sendCopy(const Services& services, Call& call, Replies<v1::BackupChunk>& writer,
                       const char* what, const Result<std::uint64_t>& bytes, Make&& make,
                       std::optional<BackupManifest> since = std::nullopt) {
     RETURN_IF_ERROR(bytes);
@@ -109,9 +109,9 @@ Result<std::string> receiveExport(const Services& services, Call& call, catalog:
 
 }  // namespace
 
-grpc::Status AdminServiceHandler::Backup(grpc::ServerContext* context, const v1::BackupRequest* request,
-                                         grpc::ServerWriter<v1::BackupChunk>* writer) {
-    return handle(services_, context, operations::kBackup, [&](Call& call) -> Result<void> {
+grpc::Status AdminServiceHandler::backup(grpc::ServerContext* context, Request<v1::BackupRequest>& request,
+                                         Replies<v1::BackupChunk>* writer) {
+    return handle(services_, context, operations::kBackup, request, [&](Call& call) -> Result<void> {
         std::optional<BackupManifest> since;
         if (request->has_since()) {
             auto manifest = checkedManifest(request->since());
@@ -160,19 +160,20 @@ grpc::Status AdminServiceHandler::Restore(grpc::ServerContext* context,
     });
 }
 
-grpc::Status AdminServiceHandler::ExportCollection(grpc::ServerContext* context,
-                                                   const v1::ExportCollectionRequest* request,
-                                                   grpc::ServerWriter<v1::BackupChunk>* writer) {
-    return handle(services_, context, operations::kExportCollection, [&](Call& call) -> Result<void> {
-        const auto name = call.useCollection(request->collection());
-        RETURN_IF_ERROR(name);
-        catalog::Budget::Share copy(services_.admission.copies);
-        RETURN_IF_ERROR(copy.take(1));
-        return sendCopy(services_, call, *writer, "the export", services_.catalog.exportBytes(*name),
-                        [&](const std::string& path) {
-                            return services_.catalog.exportCollection(*name, path, call.run());
-                        });
-    });
+grpc::Status AdminServiceHandler::exportCollection(grpc::ServerContext* context,
+                                                   Request<v1::ExportCollectionRequest>& request,
+                                                   Replies<v1::BackupChunk>* writer) {
+    return handle(services_, context, operations::kExportCollection, request,
+                  [&](Call& call) -> Result<void> {
+                      const auto name = call.useCollection(request->collection());
+                      RETURN_IF_ERROR(name);
+                      catalog::Budget::Share copy(services_.admission.copies);
+                      RETURN_IF_ERROR(copy.take(1));
+                      return sendCopy(services_, call, *writer, "the export",
+                                      services_.catalog.exportBytes(*name), [&](const std::string& path) {
+                                          return services_.catalog.exportCollection(*name, path, call.run());
+                                      });
+                  });
 }
 
 grpc::Status AdminServiceHandler::ImportCollection(grpc::ServerContext* context,

@@ -65,9 +65,10 @@ void noteKeyOfCall(Call& call, const security::Key& key) {
 
 }  // namespace
 
-grpc::Status AdminServiceHandler::CreateKey(grpc::ServerContext* context, const v1::CreateKeyRequest* request,
+grpc::Status AdminServiceHandler::createKey(grpc::ServerContext* context,
+                                            Request<v1::CreateKeyRequest>& request,
                                             v1::CreateKeyResponse* response) {
-    return handle(services_, context, operations::kCreateKey, [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kCreateKey, request, [&](Call& call) -> Result<void> {
         const auto spec = specFrom(*request);
         RETURN_IF_ERROR(spec);
         const auto created = services_.access.keyring.create(*spec);
@@ -79,9 +80,10 @@ grpc::Status AdminServiceHandler::CreateKey(grpc::ServerContext* context, const 
     });
 }
 
-grpc::Status AdminServiceHandler::ListKeys(grpc::ServerContext* context, const v1::ListKeysRequest*,
+grpc::Status AdminServiceHandler::listKeys(grpc::ServerContext* context,
+                                           Request<v1::ListKeysRequest>& request,
                                            v1::ListKeysResponse* response) {
-    return handle(services_, context, operations::kListKeys, [&](Call&) -> Result<void> {
+    return handle(services_, context, operations::kListKeys, request, [&](Call&) -> Result<void> {
         const auto keys = services_.access.keyring.list();
         RETURN_IF_ERROR(keys);
         for (const security::KeyStatus& status : *keys)
@@ -90,9 +92,10 @@ grpc::Status AdminServiceHandler::ListKeys(grpc::ServerContext* context, const v
     });
 }
 
-grpc::Status AdminServiceHandler::RevokeKey(grpc::ServerContext* context, const v1::RevokeKeyRequest* request,
+grpc::Status AdminServiceHandler::revokeKey(grpc::ServerContext* context,
+                                            Request<v1::RevokeKeyRequest>& request,
                                             v1::RevokeKeyResponse* response) {
-    return handle(services_, context, operations::kRevokeKey, [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kRevokeKey, request, [&](Call& call) -> Result<void> {
         const auto key = services_.access.keyring.revoke(request->id());
         RETURN_IF_ERROR(key);
         noteKeyOfCall(call, *key);

@@ -40,9 +40,26 @@ v1::RebuildProgress progressFrom(const catalog::RebuildProgress& progress) {
 
 }  // namespace
 
-grpc::Status AdminServiceHandler::Rebuild(grpc::ServerContext* context, const v1::RebuildRequest* request,
-                                          grpc::ServerWriter<v1::RebuildProgress>* writer) {
-    return handle(services_, context, operations::kRebuild, [&](Call& call) -> Result<void> {
+AdminServiceHandler::AdminServiceHandler(const Services& services) : services_(services) {
+    const auto mark = [this](int index, auto method) {
+        MarkMethodStreamed(index, methodHandler(this, method));
+    };
+    mark(methodIndex<v1::RebuildRequest>("Rebuild"), &AdminServiceHandler::rebuild);
+    mark(methodIndex<v1::CancelRebuildRequest>("CancelRebuild"), &AdminServiceHandler::cancelRebuild);
+    mark(methodIndex<v1::BackupRequest>("Backup"), &AdminServiceHandler::backup);
+    mark(methodIndex<v1::ExportCollectionRequest>("ExportCollection"),
+         &AdminServiceHandler::exportCollection);
+    mark(methodIndex<v1::CheckRequest>("Check"), &AdminServiceHandler::check);
+    mark(methodIndex<v1::StatsRequest>("Stats"), &AdminServiceHandler::stats);
+    mark(methodIndex<v1::ServerInfoRequest>("ServerInfo"), &AdminServiceHandler::serverInfo);
+    mark(methodIndex<v1::CreateKeyRequest>("CreateKey"), &AdminServiceHandler::createKey);
+    mark(methodIndex<v1::ListKeysRequest>("ListKeys"), &AdminServiceHandler::listKeys);
+    mark(methodIndex<v1::RevokeKeyRequest>("RevokeKey"), &AdminServiceHandler::revokeKey);
+}
+
+grpc::Status AdminServiceHandler::rebuild(grpc::ServerContext* context, Request<v1::RebuildRequest>& request,
+                                          Replies<v1::RebuildProgress>* writer) {
+    return handle(services_, context, operations::kRebuild, request, [&](Call& call) -> Result<void> {
         auto wanted = rebuildRequestFrom(*request);
         RETURN_IF_ERROR(wanted);
         if (wanted->collection.empty()) {
@@ -59,19 +76,19 @@ grpc::Status AdminServiceHandler::Rebuild(grpc::ServerContext* context, const v1
     });
 }
 
-grpc::Status AdminServiceHandler::CancelRebuild(grpc::ServerContext* context,
-                                                const v1::CancelRebuildRequest* request,
+grpc::Status AdminServiceHandler::cancelRebuild(grpc::ServerContext* context,
+                                                Request<v1::CancelRebuildRequest>& request,
                                                 v1::CancelRebuildResponse*) {
-    return handle(services_, context, operations::kCancelRebuild, [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kCancelRebuild, request, [&](Call& call) -> Result<void> {
         const auto collection = call.useCollection(request->collection());
         RETURN_IF_ERROR(collection);
         return services_.catalog.cancelRebuild(*collection);
     });
 }
 
-grpc::Status AdminServiceHandler::Check(grpc::ServerContext* context, const v1::CheckRequest*,
-                                        grpc::ServerWriter<v1::CheckProgress>* writer) {
-    return handle(services_, context, operations::kCheck, [&](Call& call) -> Result<void> {
+grpc::Status AdminServiceHandler::check(grpc::ServerContext* context, Request<v1::CheckRequest>& request,
+                                        Replies<v1::CheckProgress>* writer) {
+    return handle(services_, context, operations::kCheck, request, [&](Call& call) -> Result<void> {
         RunContext run = call.run();
         auto lastSent = RunContext::Clock::time_point();
         v1::CheckProgress progress;
@@ -97,9 +114,9 @@ grpc::Status AdminServiceHandler::Check(grpc::ServerContext* context, const v1::
     });
 }
 
-grpc::Status AdminServiceHandler::Stats(grpc::ServerContext* context, const v1::StatsRequest*,
+grpc::Status AdminServiceHandler::stats(grpc::ServerContext* context, Request<v1::StatsRequest>& request,
                                         v1::StatsResponse* response) {
-    return handle(services_, context, operations::kStats, [&](Call&) -> Result<void> {
+    return handle(services_, context, operations::kStats, request, [&](Call&) -> Result<void> {
         const auto stats = services_.catalog.stats();
         RETURN_IF_ERROR(stats);
         const store::StoreStats& stored = stats->store;
@@ -125,9 +142,10 @@ grpc::Status AdminServiceHandler::Stats(grpc::ServerContext* context, const v1::
     });
 }
 
-grpc::Status AdminServiceHandler::ServerInfo(grpc::ServerContext* context, const v1::ServerInfoRequest*,
+grpc::Status AdminServiceHandler::serverInfo(grpc::ServerContext* context,
+                                             Request<v1::ServerInfoRequest>& request,
                                              v1::ServerInfoResponse* response) {
-    return handle(services_, context, operations::kServerInfo, [&](Call&) -> Result<void> {
+    return handle(services_, context, operations::kServerInfo, request, [&](Call&) -> Result<void> {
         const auto stats = services_.catalog.stats();
         // What a client must know to send anything does not depend on the database.
         if (!stats && stats.error().code != ErrorCode::kDataLoss) return fail(stats.error());

@@ -1,6 +1,7 @@
 // shapedb.v1.AdminService over gRPC: validate, convert, call the catalog, convert back.
 #pragma once
 
+#include "server/rpc/request.h"
 #include "server/rpc/services.h"
 #include "shapedb/v1/admin_service.grpc.pb.h"
 
@@ -11,33 +12,33 @@ class Call;
 /// Thread-safe. `services` must outlive it.
 class AdminServiceHandler final : public shapedb::v1::AdminService::Service {
   public:
-    explicit AdminServiceHandler(const Services& services) : services_(services) {}
+    explicit AdminServiceHandler(const Services& services);
 
-    grpc::Status Rebuild(grpc::ServerContext* context, const v1::RebuildRequest* request,
-                         grpc::ServerWriter<v1::RebuildProgress>* writer) override;
-    grpc::Status CancelRebuild(grpc::ServerContext* context, const v1::CancelRebuildRequest* request,
-                               v1::CancelRebuildResponse* response) override;
-    grpc::Status Backup(grpc::ServerContext* context, const v1::BackupRequest* request,
-                        grpc::ServerWriter<v1::BackupChunk>* writer) override;
+    grpc::Status rebuild(grpc::ServerContext* context, Request<v1::RebuildRequest>& request,
+                         Replies<v1::RebuildProgress>* writer);
+    grpc::Status cancelRebuild(grpc::ServerContext* context, Request<v1::CancelRebuildRequest>& request,
+                               v1::CancelRebuildResponse* response);
+    grpc::Status backup(grpc::ServerContext* context, Request<v1::BackupRequest>& request,
+                        Replies<v1::BackupChunk>* writer);
     grpc::Status Restore(grpc::ServerContext* context, grpc::ServerReader<v1::BackupChunk>* reader,
                          v1::RestoreResponse* response) override;
-    grpc::Status ExportCollection(grpc::ServerContext* context, const v1::ExportCollectionRequest* request,
-                                  grpc::ServerWriter<v1::BackupChunk>* writer) override;
+    grpc::Status exportCollection(grpc::ServerContext* context, Request<v1::ExportCollectionRequest>& request,
+                                  Replies<v1::BackupChunk>* writer);
     grpc::Status ImportCollection(grpc::ServerContext* context,
                                   grpc::ServerReader<v1::ImportCollectionRequest>* reader,
                                   v1::ImportCollectionResponse* response) override;
-    grpc::Status Check(grpc::ServerContext* context, const v1::CheckRequest* request,
-                       grpc::ServerWriter<v1::CheckProgress>* writer) override;
-    grpc::Status Stats(grpc::ServerContext* context, const v1::StatsRequest* request,
-                       v1::StatsResponse* response) override;
-    grpc::Status ServerInfo(grpc::ServerContext* context, const v1::ServerInfoRequest* request,
-                            v1::ServerInfoResponse* response) override;
-    grpc::Status CreateKey(grpc::ServerContext* context, const v1::CreateKeyRequest* request,
-                           v1::CreateKeyResponse* response) override;
-    grpc::Status ListKeys(grpc::ServerContext* context, const v1::ListKeysRequest* request,
-                          v1::ListKeysResponse* response) override;
-    grpc::Status RevokeKey(grpc::ServerContext* context, const v1::RevokeKeyRequest* request,
-                           v1::RevokeKeyResponse* response) override;
+    grpc::Status check(grpc::ServerContext* context, Request<v1::CheckRequest>& request,
+                       Replies<v1::CheckProgress>* writer);
+    grpc::Status stats(grpc::ServerContext* context, Request<v1::StatsRequest>& request,
+                       v1::StatsResponse* response);
+    grpc::Status serverInfo(grpc::ServerContext* context, Request<v1::ServerInfoRequest>& request,
+                            v1::ServerInfoResponse* response);
+    grpc::Status createKey(grpc::ServerContext* context, Request<v1::CreateKeyRequest>& request,
+                           v1::CreateKeyResponse* response);
+    grpc::Status listKeys(grpc::ServerContext* context, Request<v1::ListKeysRequest>& request,
+                          v1::ListKeysResponse* response);
+    grpc::Status revokeKey(grpc::ServerContext* context, Request<v1::RevokeKeyRequest>& request,
+                           v1::RevokeKeyResponse* response);
 
   private:
     const Services& services_;

@@ -47,7 +47,7 @@ class Call {
     bool read(Reader& reader, Message* message) {
         cancellation_.beginTransfer();
         const bool good = reader.Read(message);
-        cancellation_.endTransfer(good ? message->ByteSizeLong() : 0);
+        cancellation_.endTransfer(good ? sizeOf(*message) : 0);
         return good;
     }
     /// Errors: kCancelled (the client has gone or was cut off as above).

@@ -30,36 +30,55 @@ Result<void> fill(const Services& services, const index::Snapshot& snapshot, v1:
 
 }  // namespace
 
-grpc::Status CollectionServiceHandler::CreateCollection(grpc::ServerContext* context,
-                                                        const v1::CreateCollectionRequest* request,
-                                                        v1::Collection* response) {
-    return handle(services_, context, operations::kCreateCollection, [&](Call& call) -> Result<void> {
-        RETURN_IF_ERROR(call.useCollection(request->name()));
-        const auto wanted = overridesFrom(request->profile(), request->segmentation(), request->signature());
-        RETURN_IF_ERROR(wanted);
-        const auto parameters = wanted->ofNew();
-        RETURN_IF_ERROR(parameters);
-        const auto created =
-            services_.catalog.createCollection(request->name(), request->description(), *parameters);
-        RETURN_IF_ERROR(created);
-        return fill(services_, **created, response);
-    });
+CollectionServiceHandler::CollectionServiceHandler(const Services& services) : services_(services) {
+    const auto mark = [this](int index, auto method) {
+        MarkMethodStreamed(index, methodHandler(this, method));
+    };
+    mark(methodIndex<v1::CreateCollectionRequest>("CreateCollection"),
+         &CollectionServiceHandler::createCollection);
+    mark(methodIndex<v1::GetCollectionRequest>("GetCollection"), &CollectionServiceHandler::getCollection);
+    mark(methodIndex<v1::ListCollectionsRequest>("ListCollections"),
+         &CollectionServiceHandler::listCollections);
+    mark(methodIndex<v1::RenameCollectionRequest>("RenameCollection"),
+         &CollectionServiceHandler::renameCollection);
+    mark(methodIndex<v1::SetAliasRequest>("SetAlias"), &CollectionServiceHandler::setAlias);
+    mark(methodIndex<v1::DeleteAliasRequest>("DeleteAlias"), &CollectionServiceHandler::deleteAlias);
+    mark(methodIndex<v1::DeleteCollectionRequest>("DeleteCollection"),
+         &CollectionServiceHandler::deleteCollection);
 }
 
-grpc::Status CollectionServiceHandler::GetCollection(grpc::ServerContext* context,
-                                                     const v1::GetCollectionRequest* request,
+grpc::Status CollectionServiceHandler::createCollection(grpc::ServerContext* context,
+                                                        Request<v1::CreateCollectionRequest>& request,
+                                                        v1::Collection* response) {
+    return handle(
+        services_, context, operations::kCreateCollection, request, [&](Call& call) -> Result<void> {
+            RETURN_IF_ERROR(call.useCollection(request->name()));
+            const auto wanted =
+                overridesFrom(request->profile(), request->segmentation(), request->signature());
+            RETURN_IF_ERROR(wanted);
+            const auto parameters = wanted->ofNew();
+            RETURN_IF_ERROR(parameters);
+            const auto created =
+                services_.catalog.createCollection(request->name(), request->description(), *parameters);
+            RETURN_IF_ERROR(created);
+            return fill(services_, **created, response);
+        });
+}
+
+grpc::Status CollectionServiceHandler::getCollection(grpc::ServerContext* context,
+                                                     Request<v1::GetCollectionRequest>& request,
                                                      v1::Collection* response) {
-    return handle(services_, context, operations::kGetCollection, [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kGetCollection, request, [&](Call& call) -> Result<void> {
         const auto found = call.collection(request->name());
         RETURN_IF_ERROR(found);
         return fill(services_, **found, response);
     });
 }
 
-grpc::Status CollectionServiceHandler::ListCollections(grpc::ServerContext* context,
-                                                       const v1::ListCollectionsRequest*,
+grpc::Status CollectionServiceHandler::listCollections(grpc::ServerContext* context,
+                                                       Request<v1::ListCollectionsRequest>& request,
                                                        v1::ListCollectionsResponse* response) {
-    return handle(services_, context, operations::kListCollections, [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kListCollections, request, [&](Call& call) -> Result<void> {
         const auto collections = services_.catalog.collections();
         RETURN_IF_ERROR(collections);
         for (const index::SnapshotPtr& snapshot : *collections) {
@@ -70,24 +89,25 @@ grpc::Status CollectionServiceHandler::ListCollections(grpc::ServerContext* cont
     });
 }
 
-grpc::Status CollectionServiceHandler::RenameCollection(grpc::ServerContext* context,
-                                                        const v1::RenameCollectionRequest* request,
+grpc::Status CollectionServiceHandler::renameCollection(grpc::ServerContext* context,
+                                                        Request<v1::RenameCollectionRequest>& request,
                                                         v1::Collection* response) {
-    return handle(services_, context, operations::kRenameCollection, [&](Call& call) -> Result<void> {
-        // The new name is asked for as if a collection were created.
-        RETURN_IF_ERROR(call.useCollection(request->new_name()));
-        RETURN_IF_ERROR(call.useCollection(request->name()));
-        call.note({"new_name", request->new_name()});
-        const auto renamed = services_.catalog.renameCollection(request->name(), request->new_name());
-        RETURN_IF_ERROR(renamed);
-        return fill(services_, **renamed, response);
-    });
+    return handle(
+        services_, context, operations::kRenameCollection, request, [&](Call& call) -> Result<void> {
+            // The new name is asked for as if a collection were created.
+            RETURN_IF_ERROR(call.useCollection(request->new_name()));
+            RETURN_IF_ERROR(call.useCollection(request->name()));
+            call.note({"new_name", request->new_name()});
+            const auto renamed = services_.catalog.renameCollection(request->name(), request->new_name());
+            RETURN_IF_ERROR(renamed);
+            return fill(services_, **renamed, response);
+        });
 }
 
-grpc::Status CollectionServiceHandler::SetAlias(grpc::ServerContext* context,
-                                                const v1::SetAliasRequest* request,
+grpc::Status CollectionServiceHandler::setAlias(grpc::ServerContext* context,
+                                                Request<v1::SetAliasRequest>& request,
                                                 v1::Collection* response) {
-    return handle(services_, context, operations::kSetAlias, [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kSetAlias, request, [&](Call& call) -> Result<void> {
         // The alias too: the name of a collection that could be created, or what it stands for now.
         RETURN_IF_ERROR(call.useCollection(request->alias()));
         const auto collection = call.useCollection(request->collection());
@@ -99,22 +119,23 @@ grpc::Status CollectionServiceHandler::SetAlias(grpc::ServerContext* context,
     });
 }
 
-grpc::Status CollectionServiceHandler::DeleteAlias(grpc::ServerContext* context,
-                                                   const v1::DeleteAliasRequest* request,
+grpc::Status CollectionServiceHandler::deleteAlias(grpc::ServerContext* context,
+                                                   Request<v1::DeleteAliasRequest>& request,
                                                    v1::DeleteAliasResponse*) {
-    return handle(services_, context, operations::kDeleteAlias, [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kDeleteAlias, request, [&](Call& call) -> Result<void> {
         RETURN_IF_ERROR(call.useCollection(request->alias()));
         return services_.catalog.deleteAlias(request->alias());
     });
 }
 
-grpc::Status CollectionServiceHandler::DeleteCollection(grpc::ServerContext* context,
-                                                        const v1::DeleteCollectionRequest* request,
+grpc::Status CollectionServiceHandler::deleteCollection(grpc::ServerContext* context,
+                                                        Request<v1::DeleteCollectionRequest>& request,
                                                         v1::DeleteCollectionResponse*) {
-    return handle(services_, context, operations::kDeleteCollection, [&](Call& call) -> Result<void> {
-        RETURN_IF_ERROR(call.useCollection(request->name()));
-        return services_.catalog.deleteCollection(request->name(), request->force());
-    });
+    return handle(services_, context, operations::kDeleteCollection, request,
+                  [&](Call& call) -> Result<void> {
+                      RETURN_IF_ERROR(call.useCollection(request->name()));
+                      return services_.catalog.deleteCollection(request->name(), request->force());
+                  });
 }
 
 }  // namespace shapedb::rpc

@@ -1,6 +1,7 @@
 // shapedb.v1.CollectionService over gRPC: validate, convert, call the catalog, convert back.
 #pragma once
 
+#include "server/rpc/request.h"
 #include "server/rpc/services.h"
 #include "shapedb/v1/collection_service.grpc.pb.h"
 
@@ -9,22 +10,22 @@ namespace shapedb::rpc {
 /// Thread-safe. `services` must outlive it.
 class CollectionServiceHandler final : public shapedb::v1::CollectionService::Service {
   public:
-    explicit CollectionServiceHandler(const Services& services) : services_(services) {}
+    explicit CollectionServiceHandler(const Services& services);
 
-    grpc::Status CreateCollection(grpc::ServerContext* context, const v1::CreateCollectionRequest* request,
-                                  v1::Collection* response) override;
-    grpc::Status GetCollection(grpc::ServerContext* context, const v1::GetCollectionRequest* request,
-                               v1::Collection* response) override;
-    grpc::Status ListCollections(grpc::ServerContext* context, const v1::ListCollectionsRequest* request,
-                                 v1::ListCollectionsResponse* response) override;
-    grpc::Status RenameCollection(grpc::ServerContext* context, const v1::RenameCollectionRequest* request,
-                                  v1::Collection* response) override;
-    grpc::Status SetAlias(grpc::ServerContext* context, const v1::SetAliasRequest* request,
-                          v1::Collection* response) override;
-    grpc::Status DeleteAlias(grpc::ServerContext* context, const v1::DeleteAliasRequest* request,
-                             v1::DeleteAliasResponse* response) override;
-    grpc::Status DeleteCollection(grpc::ServerContext* context, const v1::DeleteCollectionRequest* request,
-                                  v1::DeleteCollectionResponse* response) override;
+    grpc::Status createCollection(grpc::ServerContext* context, Request<v1::CreateCollectionRequest>& request,
+                                  v1::Collection* response);
+    grpc::Status getCollection(grpc::ServerContext* context, Request<v1::GetCollectionRequest>& request,
+                               v1::Collection* response);
+    grpc::Status listCollections(grpc::ServerContext* context, Request<v1::ListCollectionsRequest>& request,
+                                 v1::ListCollectionsResponse* response);
+    grpc::Status renameCollection(grpc::ServerContext* context, Request<v1::RenameCollectionRequest>& request,
+                                  v1::Collection* response);
+    grpc::Status setAlias(grpc::ServerContext* context, Request<v1::SetAliasRequest>& request,
+                          v1::Collection* response);
+    grpc::Status deleteAlias(grpc::ServerContext* context, Request<v1::DeleteAliasRequest>& request,
+                             v1::DeleteAliasResponse* response);
+    grpc::Status deleteCollection(grpc::ServerContext* context, Request<v1::DeleteCollectionRequest>& request,
+                                  v1::DeleteCollectionResponse* response);
 
   private:
     const Services& services_;

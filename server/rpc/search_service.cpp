@@ -117,36 +117,23 @@ Result<void> searchBatch(const Services& services, const Call& call, catalog::Pr
         });
 }
 
-/// The one message of a call that a handler reads itself.
-template <typename Stream, typename Message>
-Result<void> readOnly(Call& call, Stream& stream, Message* message) {
-    if (call.read(stream, message)) return {};
-    if (call.clientGone()) return fail(ErrorCode::kCancelled, "the client has gone");
-    return fail(ErrorCode::kInvalidArgument, "the message is not a " + Message::descriptor()->full_name());
-}
-
-int batchMethod() {
-    return v1::SearchBatchRequest::descriptor()
-        ->file()
-        ->FindServiceByName("SearchService")
-        ->FindMethodByName("SearchBatch")
-        ->index();
-}
-
 }  // namespace
 
 SearchServiceHandler::SearchServiceHandler(const Services& services) : services_(services) {
-    MarkMethodStreamed(batchMethod(),
-                       new grpc::internal::StreamedUnaryHandler<v1::SearchBatchRequest, grpc::ByteBuffer>(
-                           [this](grpc::ServerContext* context, BatchStream* stream) {
-                               return searchBatch(context, *stream);
-                           }));
+    const auto mark = [this](int index, auto method) {
+        MarkMethodStreamed(index, methodHandler(this, method));
+    };
+    mark(methodIndex<v1::SearchByKeyRequest>("SearchByKey"), &SearchServiceHandler::searchByKey);
+    mark(methodIndex<v1::SearchBySignatureRequest>("SearchBySignature"),
+         &SearchServiceHandler::searchBySignature);
+    mark(methodIndex<v1::SearchBatchRequest>("SearchBatch"), &SearchServiceHandler::searchBatch);
+    mark(methodIndex<v1::CompareRequest>("Compare"), &SearchServiceHandler::compare);
 }
 
-grpc::Status SearchServiceHandler::SearchByKey(grpc::ServerContext* context,
-                                               const v1::SearchByKeyRequest* request,
+grpc::Status SearchServiceHandler::searchByKey(grpc::ServerContext* context,
+                                               Request<v1::SearchByKeyRequest>& request,
                                                v1::SearchResponse* response) {
-    return handle(services_, context, operations::kSearchByKey, [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kSearchByKey, request, [&](Call& call) -> Result<void> {
         call.noteKey(request->key());
         auto prepared = prepare(services_, call, request->options());
         RETURN_IF_ERROR(prepared);
@@ -181,38 +168,41 @@ grpc::Status SearchServiceHandler::SearchByScan(grpc::ServerContext* context,
     });
 }
 
-grpc::Status SearchServiceHandler::SearchBySignature(grpc::ServerContext* context,
-                                                     const v1::SearchBySignatureRequest* request,
+grpc::Status SearchServiceHandler::searchBySignature(grpc::ServerContext* context,
+                                                     Request<v1::SearchBySignatureRequest>& request,
                                                      v1::SearchResponse* response) {
-    return handle(services_, context, operations::kSearchBySignature, [&](Call& call) -> Result<void> {
-        const auto prepared = prepare(services_, call, request->options());
-        RETURN_IF_ERROR(prepared);
-        auto signature = decodeSignature(request->signature());
-        RETURN_IF_ERROR(signature);
-        return search(services_, call, *prepared, {{std::move(*signature), std::nullopt}, nullptr}, response);
-    });
+    return handle(services_, context, operations::kSearchBySignature, request,
+                  [&](Call& call) -> Result<void> {
+                      const auto prepared = prepare(services_, call, request->options());
+                      RETURN_IF_ERROR(prepared);
+                      auto signature = decodeSignature(request->signature());
+                      RETURN_IF_ERROR(signature);
+                      return search(services_, call, *prepared,
+                                    {{std::move(*signature), std::nullopt}, nullptr}, response);
+                  });
 }
 
-grpc::Status SearchServiceHandler::searchBatch(grpc::ServerContext* context, BatchStream& stream) {
-    return handle(services_, context, operations::kSearchBatch, [&](Call& call) -> Result<void> {
-        v1::SearchBatchRequest request;
-        RETURN_IF_ERROR(readOnly(call, stream, &request));
-        const int count = request.queries_size();
+grpc::Status SearchServiceHandler::searchBatch(grpc::ServerContext* context,
+                                               Request<v1::SearchBatchRequest>& request,
+                                               grpc::ByteBuffer* response) {
+    return handle(services_, context, operations::kSearchBatch, request, [&](Call& call) -> Result<void> {
+        const int count = request->queries_size();
         call.note({"queries", std::int64_t{count}});
-        RETURN_IF_ERROR(call.useCollection(request.options().collection()));
+        RETURN_IF_ERROR(call.useCollection(request->options().collection()));
         RETURN_IF_ERROR(
             catalog::checkBatchSize(static_cast<std::uint64_t>(count), services_.config.limits.maxBatch));
-        auto prepared = prepare(services_, call, request.options());
+        auto prepared = prepare(services_, call, request->options());
         RETURN_IF_ERROR(prepared);
         BatchAnswer batch(static_cast<std::size_t>(count));
-        RETURN_IF_ERROR(rpc::searchBatch(services_, call, *prepared, request, batch));
-        return call.write(stream, batch.message());
+        RETURN_IF_ERROR(rpc::searchBatch(services_, call, *prepared, *request, batch));
+        *response = batch.message();
+        return {};
     });
 }
 
-grpc::Status SearchServiceHandler::Compare(grpc::ServerContext* context, const v1::CompareRequest* request,
+grpc::Status SearchServiceHandler::compare(grpc::ServerContext* context, Request<v1::CompareRequest>& request,
                                            v1::CompareResponse* response) {
-    return handle(services_, context, operations::kCompare, [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kCompare, request, [&](Call& call) -> Result<void> {
         std::vector<catalog::ShapeName> names;
         for (const pb::ShapeRef* ref : {&request->query(), &request->other()}) {
             call.noteKey(ref->key());

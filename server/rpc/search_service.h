@@ -2,8 +2,8 @@
 #pragma once
 
 #include <grpcpp/support/byte_buffer.h>
-#include <grpcpp/support/sync_stream.h>
 
+#include "server/rpc/request.h"
 #include "server/rpc/services.h"
 #include "shapedb/v1/search_service.grpc.pb.h"
 
@@ -14,21 +14,21 @@ class SearchServiceHandler final : public shapedb::v1::SearchService::Service {
   public:
     explicit SearchServiceHandler(const Services& services);
 
-    grpc::Status SearchByKey(grpc::ServerContext* context, const v1::SearchByKeyRequest* request,
-                             v1::SearchResponse* response) override;
+    grpc::Status searchByKey(grpc::ServerContext* context, Request<v1::SearchByKeyRequest>& request,
+                             v1::SearchResponse* response);
     grpc::Status SearchByScan(grpc::ServerContext* context,
                               grpc::ServerReader<v1::SearchByScanRequest>* reader,
                               v1::SearchResponse* response) override;
-    grpc::Status SearchBySignature(grpc::ServerContext* context, const v1::SearchBySignatureRequest* request,
-                                   v1::SearchResponse* response) override;
-    grpc::Status Compare(grpc::ServerContext* context, const v1::CompareRequest* request,
-                         v1::CompareResponse* response) override;
+    grpc::Status searchBySignature(grpc::ServerContext* context,
+                                   Request<v1::SearchBySignatureRequest>& request,
+                                   v1::SearchResponse* response);
+    grpc::Status compare(grpc::ServerContext* context, Request<v1::CompareRequest>& request,
+                         v1::CompareResponse* response);
 
   private:
-    using BatchStream = grpc::ServerUnaryStreamer<v1::SearchBatchRequest, grpc::ByteBuffer>;
-
-    /// SearchBatch, with an answer that is encoded already.
-    grpc::Status searchBatch(grpc::ServerContext* context, BatchStream& stream);
+    /// The answer is encoded already.
+    grpc::Status searchBatch(grpc::ServerContext* context, Request<v1::SearchBatchRequest>& request,
+                             grpc::ByteBuffer* response);
 
     const Services& services_;
 };

@@ -121,6 +121,26 @@ Result<void> sendPoints(Call& call, Writer& writer, const std::vector<float>& xy
 
 }  // namespace
 
+ShapeServiceHandler::ShapeServiceHandler(const Services& services) : services_(services) {
+    const auto mark = [this](int index, auto method) {
+        MarkMethodStreamed(index, methodHandler(this, method));
+    };
+    mark(methodIndex<v1::GetShapeRequest>("GetShape"), &ShapeServiceHandler::getShape);
+    mark(methodIndex<v1::GetShapesRequest>("GetShapes"), &ShapeServiceHandler::getShapes);
+    mark(methodIndex<v1::GetPointsRequest>("GetPoints"), &ShapeServiceHandler::getPoints);
+    mark(methodIndex<v1::GetPreviewsRequest>("GetPreviews"), &ShapeServiceHandler::getPreviews);
+    mark(methodIndex<v1::ListShapesRequest>("ListShapes"), &ShapeServiceHandler::listShapes);
+    mark(methodIndex<v1::CountShapesRequest>("CountShapes"), &ShapeServiceHandler::countShapes);
+    mark(methodIndex<v1::CountByValueRequest>("CountByValue"), &ShapeServiceHandler::countByValue);
+    mark(methodIndex<v1::DeleteShapeRequest>("DeleteShape"), &ShapeServiceHandler::deleteShape);
+    mark(methodIndex<v1::DeleteShapesRequest>("DeleteShapes"), &ShapeServiceHandler::deleteShapes);
+    mark(methodIndex<v1::UpdateMetadataRequest>("UpdateMetadata"), &ShapeServiceHandler::updateMetadata);
+    mark(methodIndex<v1::RetryShapesRequest>("RetryShapes"), &ShapeServiceHandler::retryShapes);
+    mark(methodIndex<v1::WatchIngestRequest>("WatchIngest"), &ShapeServiceHandler::watchIngest);
+    mark(methodIndex<v1::GetSignatureRequest>("GetSignature"), &ShapeServiceHandler::getSignature);
+    mark(methodIndex<v1::GetSegmentsRequest>("GetSegments"), &ShapeServiceHandler::getSegments);
+}
+
 grpc::Status ShapeServiceHandler::AddShape(grpc::ServerContext* context,
                                            grpc::ServerReader<v1::AddShapeRequest>* reader,
                                            v1::AddShapeResponse* response) {
@@ -151,9 +171,10 @@ Result<void> ShapeServiceHandler::addShape(Call& call, grpc::ServerReader<v1::Ad
     return {};
 }
 
-grpc::Status ShapeServiceHandler::GetShape(grpc::ServerContext* context, const v1::GetShapeRequest* request,
+grpc::Status ShapeServiceHandler::getShape(grpc::ServerContext* context,
+                                           Request<v1::GetShapeRequest>& request,
                                            v1::GetShapeResponse* response) {
-    return handle(services_, context, operations::kGetShape, [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kGetShape, request, [&](Call& call) -> Result<void> {
         const auto found = call.shape(request->shape());
         RETURN_IF_ERROR(found);
         toProto(found->shape, found->collection->collection.name, found->quality(),
@@ -162,9 +183,10 @@ grpc::Status ShapeServiceHandler::GetShape(grpc::ServerContext* context, const v
     });
 }
 
-grpc::Status ShapeServiceHandler::GetShapes(grpc::ServerContext* context, const v1::GetShapesRequest* request,
+grpc::Status ShapeServiceHandler::getShapes(grpc::ServerContext* context,
+                                            Request<v1::GetShapesRequest>& request,
                                             v1::GetShapesResponse* response) {
-    return handle(services_, context, operations::kGetShapes, [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kGetShapes, request, [&](Call& call) -> Result<void> {
         const auto collection = call.collection(request->collection());
         RETURN_IF_ERROR(collection);
         call.note({"keys", std::int64_t{request->keys_size()}});
@@ -181,9 +203,10 @@ grpc::Status ShapeServiceHandler::GetShapes(grpc::ServerContext* context, const 
     });
 }
 
-grpc::Status ShapeServiceHandler::GetPoints(grpc::ServerContext* context, const v1::GetPointsRequest* request,
-                                            grpc::ServerWriter<v1::StoredPoints>* writer) {
-    return handle(services_, context, operations::kGetPoints, [&](Call& call) -> Result<void> {
+grpc::Status ShapeServiceHandler::getPoints(grpc::ServerContext* context,
+                                            Request<v1::GetPointsRequest>& request,
+                                            Replies<v1::StoredPoints>* writer) {
+    return handle(services_, context, operations::kGetPoints, request, [&](Call& call) -> Result<void> {
         const auto found = call.shape(request->shape());
         RETURN_IF_ERROR(found);
         catalog::Budget::Share share(services_.admission.uploads);
@@ -199,10 +222,10 @@ grpc::Status ShapeServiceHandler::GetPoints(grpc::ServerContext* context, const 
     });
 }
 
-grpc::Status ShapeServiceHandler::GetPreviews(grpc::ServerContext* context,
-                                              const v1::GetPreviewsRequest* request,
+grpc::Status ShapeServiceHandler::getPreviews(grpc::ServerContext* context,
+                                              Request<v1::GetPreviewsRequest>& request,
                                               v1::GetPreviewsResponse* response) {
-    return handle(services_, context, operations::kGetPreviews, [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kGetPreviews, request, [&](Call& call) -> Result<void> {
         const auto collection = call.collection(request->collection());
         RETURN_IF_ERROR(collection);
         call.note({"keys", std::int64_t{request->keys_size()}});
@@ -226,10 +249,10 @@ grpc::Status ShapeServiceHandler::GetPreviews(grpc::ServerContext* context,
     });
 }
 
-grpc::Status ShapeServiceHandler::ListShapes(grpc::ServerContext* context,
-                                             const v1::ListShapesRequest* request,
+grpc::Status ShapeServiceHandler::listShapes(grpc::ServerContext* context,
+                                             Request<v1::ListShapesRequest>& request,
                                              v1::ListShapesResponse* response) {
-    return handle(services_, context, operations::kListShapes, [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kListShapes, request, [&](Call& call) -> Result<void> {
         const auto collection = call.collection(request->collection());
         RETURN_IF_ERROR(collection);
         const auto state = fromProto(request->state());
@@ -253,10 +276,10 @@ grpc::Status ShapeServiceHandler::ListShapes(grpc::ServerContext* context,
     });
 }
 
-grpc::Status ShapeServiceHandler::CountShapes(grpc::ServerContext* context,
-                                              const v1::CountShapesRequest* request,
+grpc::Status ShapeServiceHandler::countShapes(grpc::ServerContext* context,
+                                              Request<v1::CountShapesRequest>& request,
                                               v1::CountShapesResponse* response) {
-    return handle(services_, context, operations::kCountShapes, [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kCountShapes, request, [&](Call& call) -> Result<void> {
         const auto collection = call.collection(request->collection());
         RETURN_IF_ERROR(collection);
         const auto state = fromProto(request->state());
@@ -269,10 +292,10 @@ grpc::Status ShapeServiceHandler::CountShapes(grpc::ServerContext* context,
     });
 }
 
-grpc::Status ShapeServiceHandler::CountByValue(grpc::ServerContext* context,
-                                               const v1::CountByValueRequest* request,
+grpc::Status ShapeServiceHandler::countByValue(grpc::ServerContext* context,
+                                               Request<v1::CountByValueRequest>& request,
                                                v1::CountByValueResponse* response) {
-    return handle(services_, context, operations::kCountByValue, [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kCountByValue, request, [&](Call& call) -> Result<void> {
         const auto collection = call.collection(request->collection());
         RETURN_IF_ERROR(collection);
         const auto state = fromProto(request->state());
@@ -293,10 +316,10 @@ grpc::Status ShapeServiceHandler::CountByValue(grpc::ServerContext* context,
     });
 }
 
-grpc::Status ShapeServiceHandler::DeleteShape(grpc::ServerContext* context,
-                                              const v1::DeleteShapeRequest* request,
+grpc::Status ShapeServiceHandler::deleteShape(grpc::ServerContext* context,
+                                              Request<v1::DeleteShapeRequest>& request,
                                               v1::DeleteShapeResponse* response) {
-    return handle(services_, context, operations::kDeleteShape, [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kDeleteShape, request, [&](Call& call) -> Result<void> {
         const pb::ShapeRef& ref = request->shape();
         call.noteKey(ref.key());
         const auto collection = call.useCollection(ref.collection());
@@ -311,10 +334,10 @@ grpc::Status ShapeServiceHandler::DeleteShape(grpc::ServerContext* context,
     });
 }
 
-grpc::Status ShapeServiceHandler::DeleteShapes(grpc::ServerContext* context,
-                                               const v1::DeleteShapesRequest* request,
+grpc::Status ShapeServiceHandler::deleteShapes(grpc::ServerContext* context,
+                                               Request<v1::DeleteShapesRequest>& request,
                                                v1::DeleteShapesResponse* response) {
-    return handle(services_, context, operations::kDeleteShapes, [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kDeleteShapes, request, [&](Call& call) -> Result<void> {
         const auto collection = call.collection(request->collection());
         RETURN_IF_ERROR(collection);
         const auto result = catalog::deleteShapes(services_.catalog, **collection,
@@ -327,17 +350,17 @@ grpc::Status ShapeServiceHandler::DeleteShapes(grpc::ServerContext* context,
     });
 }
 
-grpc::Status ShapeServiceHandler::UpdateMetadata(grpc::ServerContext* context,
-                                                 const v1::UpdateMetadataRequest* request,
+grpc::Status ShapeServiceHandler::updateMetadata(grpc::ServerContext* context,
+                                                 Request<v1::UpdateMetadataRequest>& request,
                                                  v1::UpdateMetadataResponse* response) {
-    return handle(services_, context, operations::kUpdateMetadata, [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kUpdateMetadata, request, [&](Call& call) -> Result<void> {
         const auto collection = call.collection(request->collection());
         RETURN_IF_ERROR(collection);
-        return updateMetadata(call, *collection, *request, *response);
+        return changeMetadata(call, *collection, *request, *response);
     });
 }
 
-Result<void> ShapeServiceHandler::updateMetadata(Call& call, const index::SnapshotPtr& collection,
+Result<void> ShapeServiceHandler::changeMetadata(Call& call, const index::SnapshotPtr& collection,
                                                  const v1::UpdateMetadataRequest& request,
                                                  v1::UpdateMetadataResponse& response) {
     const store::MetadataChange change = fromProto(request.change());
@@ -370,10 +393,10 @@ Result<void> ShapeServiceHandler::updateMetadata(Call& call, const index::Snapsh
     return {};
 }
 
-grpc::Status ShapeServiceHandler::RetryShapes(grpc::ServerContext* context,
-                                              const v1::RetryShapesRequest* request,
+grpc::Status ShapeServiceHandler::retryShapes(grpc::ServerContext* context,
+                                              Request<v1::RetryShapesRequest>& request,
                                               v1::RetryShapesResponse* response) {
-    return handle(services_, context, operations::kRetryShapes, [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kRetryShapes, request, [&](Call& call) -> Result<void> {
         const auto collection = call.collection(request->collection());
         RETURN_IF_ERROR(collection);
         const auto result = catalog::retryShapes(services_.catalog, **collection,
@@ -391,10 +414,10 @@ grpc::Status ShapeServiceHandler::RetryShapes(grpc::ServerContext* context,
     });
 }
 
-grpc::Status ShapeServiceHandler::WatchIngest(grpc::ServerContext* context,
-                                              const v1::WatchIngestRequest* request,
-                                              grpc::ServerWriter<v1::IngestEvent>* writer) {
-    return handle(services_, context, operations::kWatchIngest, [&](Call& call) -> Result<void> {
+grpc::Status ShapeServiceHandler::watchIngest(grpc::ServerContext* context,
+                                              Request<v1::WatchIngestRequest>& request,
+                                              Replies<v1::IngestEvent>* writer) {
+    return handle(services_, context, operations::kWatchIngest, request, [&](Call& call) -> Result<void> {
         const auto found = call.shape(request->shape());
         RETURN_IF_ERROR(found);
         RETURN_IF_ERROR(call.frame().becomeFollower());
@@ -413,10 +436,10 @@ grpc::Status ShapeServiceHandler::WatchIngest(grpc::ServerContext* context,
     });
 }
 
-grpc::Status ShapeServiceHandler::GetSignature(grpc::ServerContext* context,
-                                               const v1::GetSignatureRequest* request,
+grpc::Status ShapeServiceHandler::getSignature(grpc::ServerContext* context,
+                                               Request<v1::GetSignatureRequest>& request,
                                                v1::GetSignatureResponse* response) {
-    return handle(services_, context, operations::kGetSignature, [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kGetSignature, request, [&](Call& call) -> Result<void> {
         auto found = call.shape(request->shape());
         RETURN_IF_ERROR(found);
         const auto signature = services_.catalog.signature(*found);
@@ -426,10 +449,10 @@ grpc::Status ShapeServiceHandler::GetSignature(grpc::ServerContext* context,
     });
 }
 
-grpc::Status ShapeServiceHandler::GetSegments(grpc::ServerContext* context,
-                                              const v1::GetSegmentsRequest* request,
-                                              grpc::ServerWriter<v1::SegmentedPoints>* writer) {
-    return handle(services_, context, operations::kGetSegments, [&](Call& call) -> Result<void> {
+grpc::Status ShapeServiceHandler::getSegments(grpc::ServerContext* context,
+                                              Request<v1::GetSegmentsRequest>& request,
+                                              Replies<v1::SegmentedPoints>* writer) {
+    return handle(services_, context, operations::kGetSegments, request, [&](Call& call) -> Result<void> {
         const auto found = call.shape(request->shape());
         RETURN_IF_ERROR(found);
         catalog::SegmentationSlots::Slot slot(services_.catalog.segmentationSlots());

@@ -25,6 +25,7 @@ ELSEWHERE = {
     "calls": ("tests/server/catalog/gates_test.cpp", "NoKindOfCallShutsTheOthersOut"),
     "admin_calls": ("tests/server/catalog/gates_test.cpp", "NoKindOfCallShutsTheOthersOut"),
     "followers": ("tests/server/catalog/call_frame_test.cpp", "FollowersGiveTheirPlacesBack"),
+    "requests_bytes": ("tests/attack/resources_test.py", "test_that_become_large_are_bounded"),
     "answers_bytes": ("tests/server/catalog/searches_test.cpp", "IsSharedByAllAnswersUntilTheyAreGone"),
     "transport_bytes": ("tests/attack/resources_test.py", "test_many_at_once_do_not_end_the_process"),
     "handshake_milliseconds": ("tests/attack/resources_test.py", "test_that_say_nothing_are_closed"),

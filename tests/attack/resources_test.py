@@ -6,8 +6,8 @@ import threading
 import time
 import unittest
 
-from attacker import (MIB, Server, admin, align, ball, collections, eventually, grpc, main, reason, search, shapes,
-                      types)
+from attacker import (MIB, SecuredServer, Server, admin, align, ball, collections, eventually, grpc, main, reason, search,
+                      shapes, types)
 
 
 class CompressedMessages(unittest.TestCase):
@@ -154,16 +154,67 @@ class SlowUploads(unittest.TestCase):
             self.assertTrue(eventually(lambda: "less than 1000 bytes per second" in server.log()), server.log())
 
 
+# 4 MiB less a little: two bytes each for texts that take 32 and more when they are decoded.
+MANY_EMPTY_TEXTS = b"\x12\x00" * ((4 * MIB - 1024) // 2)
+
+
+def methods(client_streams):
+    """The rpcs whose client sends one message, or a stream: their full names."""
+    for file in (admin, align, collections, search, shapes):
+        for service in file.DESCRIPTOR.services_by_name.values():
+            for method in service.methods:
+                if method.client_streaming == client_streams:
+                    yield f"/{service.full_name}/{method.name}"
+
+
+def send(client, method, message, timeout=30):
+    """The one message of a call, as it is; the error that comes of it."""
+    try:
+        list(client.channel.unary_stream(method)(message, timeout=timeout))
+    except grpc.RpcError as error:
+        return error
+    return None
+
+
 class Messages(unittest.TestCase):
     def test_that_are_none_are_refused(self):
-        """By the handlers that gRPC gives its message, and by the one that reads it itself."""
-        with Server() as server, server.connect() as client:
-            for method in ("SearchByKey", "SearchBatch"):
-                call = client.channel.unary_unary(f"/shapedb.v1.SearchService/{method}")
-                with self.assertRaises(grpc.RpcError) as failure:
-                    call(b"\xff" * 100, timeout=10)
-                self.assertIn(failure.exception.code(), (grpc.StatusCode.INVALID_ARGUMENT, grpc.StatusCode.INTERNAL))
+        with SecuredServer() as server, server.local() as client:
+            for method in methods(client_streams=False):
+                error = send(client, method, b"\xff" * 100)
+                self.assertEqual((error.code(), reason(error)),
+                                 (grpc.StatusCode.INVALID_ARGUMENT, "invalid_argument"), method)
             self.assertEqual(client.count(), 0)
+
+    def test_of_strangers_are_not_decoded(self):
+        with SecuredServer() as server, server.connect() as stranger:
+            for method in methods(client_streams=False):
+                before = server.peak()
+                error = send(stranger, method, MANY_EMPTY_TEXTS)
+                self.assertEqual(error.code(), grpc.StatusCode.UNAUTHENTICATED, method)
+                self.assertLess(server.peak() - before, 24 * MIB, method)
+
+    def test_that_become_large_are_bounded(self):
+        with Server() as server:
+            clients = [server.connect() for _ in range(40)]
+            refused = []
+
+            def work(client):
+                for _ in range(3):
+                    error = send(client, "/shapedb.v1.ShapeService/GetShapes", MANY_EMPTY_TEXTS, timeout=120)
+                    refused.append((error.code(), reason(error)))
+
+            threads = [threading.Thread(target=work, args=(client,)) for client in clients]
+            for thread in threads:
+                thread.start()
+            for thread in threads:
+                thread.join()
+            for client in clients:
+                client.channel.close()
+            self.assertEqual(set(refused) - {(grpc.StatusCode.INVALID_ARGUMENT, "invalid_argument"),
+                                             (grpc.StatusCode.RESOURCE_EXHAUSTED, "queue_full")}, set())
+            # Those being decoded, and the messages themselves.
+            self.assertLess(server.peak(), 1280 * MIB)
+            self.assertTrue(server.running())
 
 
 def stalled_uploads(client, stop):

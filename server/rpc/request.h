@@ -1,0 +1,114 @@
+// The one message of a unary call, or of one that is answered by a stream. gRPC would decode it before the
+// handler runs, whoever sent it, and a few megabytes can become a hundred in memory. So the handler reads it,
+// once it is known that the caller may make the call.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include <grpcpp/impl/codegen/proto_utils.h>
+#include <grpcpp/support/byte_buffer.h>
+#include <grpcpp/support/method_handler.h>
+#include <grpcpp/support/sync_stream.h>
+
+#include "core/base/return_if_error.h"
+#include "server/catalog/gates.h"
+#include "server/rpc/call.h"
+
+namespace shapedb::rpc {
+
+/// At most so many bytes of memory become of a byte of a message: many empty texts of two bytes each.
+constexpr std::uint64_t kMostDecodedPerByte = 32;
+/// Messages up to this size need no room: that many calls are not made at a time.
+constexpr std::uint64_t kSmallMessageBytes = std::uint64_t{16} << 10;
+
+/// Used by the thread of its call. `stream`, given at construction, must outlive it.
+template <typename Message>
+class Request {
+  public:
+    template <typename Stream>
+    explicit Request(Stream& stream)
+        : read_([&stream](Call& call, grpc::ByteBuffer* bytes) { return call.read(stream, bytes); }) {}
+
+    /// Reads and decodes it, holding room for what may become of it until it is destroyed. Errors: kCancelled
+    /// (the client has gone), kQueueFull (no room), kInvalidArgument (not such a message).
+    [[nodiscard]] Result<void> receive(Call& call, catalog::Budget& room) {
+        grpc::ByteBuffer bytes;
+        if (!read_(call, &bytes)) return fail(ErrorCode::kCancelled, "the client has gone");
+        if (bytes.Length() > kSmallMessageBytes) {
+            share_ = std::make_unique<catalog::Budget::Share>(room);
+            RETURN_IF_ERROR(share_->take(kMostDecodedPerByte * bytes.Length()));
+        }
+        if (grpc::SerializationTraits<Message>::Deserialize(&bytes, &message_).ok()) return {};
+        return fail(ErrorCode::kInvalidArgument,
+                    "the message is not a " + Message::descriptor()->full_name());
+    }
+
+    /// After `receive`.
+    const Message& operator*() const { return message_; }
+    const Message* operator->() const { return &message_; }
+
+  private:
+    std::function<bool(Call&, grpc::ByteBuffer*)> read_;
+    std::unique_ptr<catalog::Budget::Share> share_;
+    Message message_;
+};
+
+/// What a handler writes its stream of answers to.
+template <typename Response>
+using Replies = grpc::ServerSplitStreamer<grpc::ByteBuffer, Response>;
+
+/// As `handle` (call.h) of a call with one message, which is received before `body` runs.
+template <typename Message, typename Body>
+grpc::Status handle(const Services& services, grpc::ServerContext* context,
+                    const security::Operation& operation, Request<Message>& request, Body&& body) {
+    return handle(services, context, operation, [&](Call& call) -> Result<void> {
+        RETURN_IF_ERROR(request.receive(call, services.admission.requests));
+        return body(call);
+    });
+}
+
+/// For grpc::Service::MarkMethodStreamed: the index of a method in `Service`.
+template <typename Message>
+int methodIndex(const std::string& method) {
+    const auto* file = Message::descriptor()->file();
+    for (int i = 0; i < file->service_count(); ++i) {
+        if (const auto* found = file->service(i)->FindMethodByName(method)) return found->index();
+    }
+    return -1;
+}
+
+/// For the same: runs `method` of `handler`, which answers with one message.
+template <typename Handler, typename Message, typename Response>
+grpc::internal::MethodHandler* methodHandler(Handler* handler,
+                                             grpc::Status (Handler::*method)(grpc::ServerContext*,
+                                                                             Request<Message>&, Response*)) {
+    using Stream = grpc::ServerUnaryStreamer<grpc::ByteBuffer, Response>;
+    return new grpc::internal::StreamedUnaryHandler<grpc::ByteBuffer, Response>(
+        [handler, method](grpc::ServerContext* context, Stream* stream) {
+            Request<Message> request(*stream);
+            Response response;
+            const grpc::Status status = (handler->*method)(context, request, &response);
+            // A client that has gone needs no answer.
+            if (status.ok()) static_cast<void>(stream->Write(response));
+            return status;
+        });
+}
+
+/// For the same: with a stream of messages.
+template <typename Handler, typename Message, typename Response>
+grpc::internal::MethodHandler* methodHandler(Handler* handler,
+                                             grpc::Status (Handler::*method)(grpc::ServerContext*,
+                                                                             Request<Message>&,
+                                                                             Replies<Response>*)) {
+    return new grpc::internal::SplitServerStreamingHandler<grpc::ByteBuffer, Response>(
+        [handler, method](grpc::ServerContext* context, Replies<Response>* stream) {
+            Request<Message> request(*stream);
+            return (handler->*method)(context, request, stream);
+        });
+}
+
+}  // namespace shapedb::rpc
