@@ -10,9 +10,7 @@ import threading
 import time
 import unittest
 
-import grpc
-
-from attacker import Server, admin, ball, collections, eventually, main, pack, shapes, types
+from attacker import Server, admin, ball, collections, eventually, grpc, main, pack, shapes, types
 
 # Taken away, since the server refuses variables of this kind that it does not know.
 KILLS = 20 * max(1, int(os.environ.pop("SHAPEDB_TEST_SCALE", "1")))

@@ -86,7 +86,7 @@ std::optional<std::string> damageOf(Connection& connection, const SmallTable& ta
 
 void raiseUnreadable(const std::string& line) {
     // A page of the list of free ones comes without a code; a wrong number would have been noticed before.
-    if (line.find("failed to get page") != std::string::npos)
+    if (line.find(kMissingPage) != std::string::npos)
         raise(ErrorCode::kStorage, "the database cannot be read: " + line);
     static constexpr std::string_view kReason = "error code=";
     const std::size_t at = line.find(kReason);

@@ -13,6 +13,9 @@
 
 namespace shapedb::store {
 
+/// In a line of SQLite's integrity check: a page that it could not read, whatever the reason.
+inline constexpr char kMissingPage[] = "failed to get page";
+
 /// A line of SQLite's integrity check that tells of a page the device did not give, which is no damage: the
 /// next time it may be there. Throws Failure kStorage (or std::bad_alloc) for such a line.
 void raiseUnreadable(const std::string& line);
