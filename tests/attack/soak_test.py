@@ -118,7 +118,7 @@ class Load:
 
     def batch(self, client, dice):
         queries = [search.SearchBatchRequest.Query(key=self.key(dice)) for _ in range(5)]
-        client.search.SearchBatch(search.SearchBatchRequest(options=options(), queries=queries), timeout=30)
+        client.search.SearchBatch(search.SearchBatchRequest(options=options(), queries=queries), timeout=120)
 
     def by_scan(self, client, dice):
         chunk = dice.choice(CHUNKS)
