@@ -6,6 +6,13 @@
 #include "server/catalog/limits.h"
 
 namespace shapedb::catalog {
+namespace {
+
+bool isAdmin(security::CallClass kind) {
+    return kind == security::CallClass::kAdmin || kind == security::CallClass::kAdminLong;
+}
+
+}  // namespace
 
 Result<void> CallGate::enter(security::CallClass kind) {
     const auto full = [](const char* what, int limit) {
@@ -14,9 +21,14 @@ Result<void> CallGate::enter(security::CallClass kind) {
     };
     const std::lock_guard<std::mutex> lock(mutex_);
     if (draining_) return fail(ErrorCode::kUnavailable, "the server is shutting down: try again later");
-    if (kind == security::CallClass::kAdmin) {
+    if (isAdmin(kind)) {
+        const bool lasts = kind == security::CallClass::kAdminLong;
         if (running_.admin >= limits_.admin) return full("calls of administrators", limits_.admin);
+        if (lasts && running_.longAdmin >= limits_.longAdmin) {
+            return full("rebuilds, checks and copies", limits_.longAdmin);
+        }
         ++running_.admin;
+        if (lasts) ++running_.longAdmin;
         return {};
     }
     if (running_.ordinary >= limits_.ordinary) return full("calls", limits_.ordinary);
@@ -31,7 +43,8 @@ Result<void> CallGate::enter(security::CallClass kind) {
 void CallGate::leave(security::CallClass kind) {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (kind == security::CallClass::kUpload) --running_.uploads;
-    --(kind == security::CallClass::kAdmin ? running_.admin : running_.ordinary);
+    if (kind == security::CallClass::kAdminLong) --running_.longAdmin;
+    --(isAdmin(kind) ? running_.admin : running_.ordinary);
     if (running_.ordinary + running_.admin == 0) changed_.notify_all();
 }
 
@@ -100,7 +113,7 @@ Result<void> Budget::Share::take(std::uint64_t amount) {
 }
 
 Admission::Admission(std::uint64_t uploadBytes, int uploadCalls)
-    : calls({kMaxOrdinaryCalls, uploadCalls, kMaxAdminCalls}),
+    : calls({kMaxOrdinaryCalls, uploadCalls, kMaxAdminCalls, kMaxLongAdminCalls}),
       uploads(uploadBytes, "bytes of points that uploads in progress may hold (limits.max_upload_bytes)"),
       followers(kMaxFollowers, "calls that may wait for shapes and rebuilds"),
       requests(kMaxRequestsBytes, "bytes that large requests may become in memory"),

@@ -19,6 +19,7 @@ struct CallCounts {
     int ordinary = 0;  ///< all but those of administrators; uploads among them
     int uploads = 0;
     int admin = 0;
+    int longAdmin = 0;  ///< among them
 };
 
 /// Counts running calls, and admits none beyond the limits of its kind, so that whoever fills one kind leaves

@@ -70,6 +70,8 @@ std::vector<LimitRow> limitTable(const config::ServerConfig& config) {
         {"calls", number(kMaxOrdinaryCalls), "calls", "calls at a time, but for those of administrators",
          full},
         {"admin_calls", number(kMaxAdminCalls), "calls", "calls of AdminService at a time", full},
+        {"long_admin_calls", number(kMaxLongAdminCalls), "calls",
+         "of them, rebuilds, checks, backups, restores, exports and imports", full},
         {"followers", number(kMaxFollowers), "calls", "calls at a time that wait for a shape or a rebuild",
          full},
         {"copies", number(kMaxCopies), "calls", "backups, restores, exports and imports in transit", full},

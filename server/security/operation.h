@@ -19,6 +19,7 @@ enum class CallClass : std::uint8_t {
     kOrdinary,  ///< one request, and an answer as soon as it is computed
     kUpload,    ///< lasts as long as the client sends
     kAdmin,     ///< has places of its own
+    kAdminLong,  ///< so too, but lasts as long as its work or its client: some places are not for it
 };
 
 /// What of the server a call touches: a key may be for some collections only.
@@ -105,18 +106,18 @@ inline constexpr Operation kDeleteAlias{"CollectionService", "DeleteAlias", Role
                                         CallClass::kOrdinary, Scope::kCollections};
 
 // AdminService
-inline constexpr Operation kRebuild{"AdminService", "Rebuild", Role::kAdmin, CallClass::kAdmin,
+inline constexpr Operation kRebuild{"AdminService", "Rebuild", Role::kAdmin, CallClass::kAdminLong,
                                     Scope::kCollections};
 inline constexpr Operation kCancelRebuild{"AdminService", "CancelRebuild", Role::kAdmin, CallClass::kAdmin,
                                           Scope::kCollections};
-inline constexpr Operation kBackup{"AdminService", "Backup", Role::kAdmin, CallClass::kAdmin, Scope::kServer};
-inline constexpr Operation kRestore{"AdminService", "Restore", Role::kAdmin, CallClass::kAdmin,
+inline constexpr Operation kBackup{"AdminService", "Backup", Role::kAdmin, CallClass::kAdminLong, Scope::kServer};
+inline constexpr Operation kRestore{"AdminService", "Restore", Role::kAdmin, CallClass::kAdminLong,
                                     Scope::kServer};
 inline constexpr Operation kExportCollection{"AdminService", "ExportCollection", Role::kAdmin,
-                                             CallClass::kAdmin, Scope::kCollections};
+                                             CallClass::kAdminLong, Scope::kCollections};
 inline constexpr Operation kImportCollection{"AdminService", "ImportCollection", Role::kAdmin,
-                                             CallClass::kAdmin, Scope::kCollections};
-inline constexpr Operation kCheck{"AdminService", "Check", Role::kAdmin, CallClass::kAdmin, Scope::kServer};
+                                             CallClass::kAdminLong, Scope::kCollections};
+inline constexpr Operation kCheck{"AdminService", "Check", Role::kAdmin, CallClass::kAdminLong, Scope::kServer};
 inline constexpr Operation kStats{"AdminService", "Stats", Role::kAdmin, CallClass::kAdmin, Scope::kServer};
 inline constexpr Operation kServerInfo{"AdminService", "ServerInfo", Role::kReader, CallClass::kAdmin,
                                        Scope::kNone};

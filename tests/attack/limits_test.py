@@ -24,6 +24,7 @@ WAITING_POINTS = 85_000  # so many that their segmentation takes longer than wha
 ELSEWHERE = {
     "calls": ("tests/server/catalog/gates_test.cpp", "NoKindOfCallShutsTheOthersOut"),
     "admin_calls": ("tests/server/catalog/gates_test.cpp", "NoKindOfCallShutsTheOthersOut"),
+    "long_admin_calls": ("tests/server/catalog/gates_test.cpp", "WhatLastsLeavesPlacesForAdministrators"),
     "followers": ("tests/server/catalog/call_frame_test.cpp", "FollowersGiveTheirPlacesBack"),
     "requests_bytes": ("tests/attack/resources_test.py", "test_that_become_large_are_bounded"),
     "answers_bytes": ("tests/server/catalog/searches_test.cpp", "IsSharedByAllAnswersUntilTheyAreGone"),

@@ -32,7 +32,7 @@ TEST(CallGate, RefusesOnceDraining) {
 }
 
 TEST(CallGate, NoKindOfCallShutsTheOthersOut) {
-    CallGate gate({4, 2, 1});
+    CallGate gate({4, 2, 1, 1});
     ASSERT_TRUE(gate.enter(CallClass::kUpload));
     ASSERT_TRUE(gate.enter(CallClass::kUpload));
     const auto third = gate.enter(CallClass::kUpload);
@@ -51,6 +51,30 @@ TEST(CallGate, NoKindOfCallShutsTheOthersOut) {
     EXPECT_TRUE(gate.enter(CallClass::kUpload));
     gate.leave(CallClass::kAdmin);
     EXPECT_TRUE(gate.enter(CallClass::kAdmin));
+}
+
+TEST(CallGate, WhatLastsLeavesPlacesForAdministrators) {
+    CallGate gate({4, 2, 3, 2});
+    ASSERT_TRUE(gate.enter(CallClass::kAdminLong));
+    ASSERT_TRUE(gate.enter(CallClass::kAdminLong));
+    const auto third = gate.enter(CallClass::kAdminLong);
+    ASSERT_FALSE(third);
+    EXPECT_EQ(third.error().code, ErrorCode::kQueueFull);
+    EXPECT_EQ(third.error().message,
+              "all of the 2 places for rebuilds, checks and copies are taken: try again later");
+    ASSERT_TRUE(gate.enter(CallClass::kAdmin)) << "such as one that revokes a key";
+    EXPECT_FALSE(gate.enter(CallClass::kAdmin));
+
+    gate.leave(CallClass::kAdminLong);
+    EXPECT_TRUE(gate.enter(CallClass::kAdmin)) << "of all places";
+    EXPECT_FALSE(gate.enter(CallClass::kAdminLong));
+    gate.leave(CallClass::kAdmin);
+    EXPECT_TRUE(gate.enter(CallClass::kAdminLong));
+    for (const CallClass kind : {CallClass::kAdminLong, CallClass::kAdminLong, CallClass::kAdmin}) {
+        gate.leave(kind);
+    }
+    EXPECT_EQ(gate.running().admin, 0);
+    EXPECT_EQ(gate.running().longAdmin, 0);
 }
 
 TEST(SegmentationSlots, LimitsConcurrentHolders) {

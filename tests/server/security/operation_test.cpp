@@ -61,6 +61,19 @@ TEST(Operations, WhatLastsAsLongAsTheClientSendsIsAnUpload) {
     }
 }
 
+TEST(Operations, StreamsOfAdministratorsLeavePlacesForTheirOtherCalls) {
+    const auto* service = files().front()->pool()->FindServiceByName("shapedb.v1.AdminService");
+    ASSERT_NE(service, nullptr);
+    for (const Operation* operation : operations::kAll) {
+        if (operation->service != std::string("AdminService")) continue;
+        const auto* method = service->FindMethodByName(operation->name);
+        ASSERT_NE(method, nullptr) << operation->name;
+        const bool streams = method->client_streaming() || method->server_streaming();
+        EXPECT_EQ(operation->callClass, streams ? CallClass::kAdminLong : CallClass::kAdmin)
+            << operation->name;
+    }
+}
+
 TEST(Operations, DestructiveOnesAreForAdministrators) {
     for (const Operation* operation :
          {&operations::kRestore, &operations::kDeleteCollection, &operations::kCreateCollection,
