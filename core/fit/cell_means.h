@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/base/error.h"
+#include "core/base/run_context.h"
 #include "core/geometry/point.h"
 
 namespace shapedb {
@@ -22,7 +24,8 @@ struct CellMeans {
 /// The means of the finest grid that gives at most `most` (at least 1); of points that have no more distinct
 /// places, the points themselves. Points must be finite, with coordinates in [-1, 1], and at least one.
 /// Sums are exact, so the means do not depend on the order of the points, but the order of `cells` is by
-/// place. Time: that of a few sorts.
-[[nodiscard]] CellMeans cellMeans(const PointCloud& points, std::size_t most);
+/// place. Time: that of a few sorts. Errors: kCancelled, kDeadlineExceeded.
+[[nodiscard]] Result<CellMeans> cellMeans(const PointCloud& points, std::size_t most,
+                                          const RunContext& context);
 
 }  // namespace shapedb

@@ -138,19 +138,21 @@ Result<SurfacePoints> makeOrThrow(const PointCloud& scan, const RunContext& cont
     scaled.reserve(scan.size());
     for (const Point3& p : scan) scaled.push_back((1.0 / frame->unit) * (p - frame->centre));
     RETURN_IF_ERROR(context.checkpoint());
-    CellMeans means = cellMeans(scaled, kMostSurfacePoints);
-    const std::vector<std::uint8_t> kept = keptCells(means.cells);
+    auto means = cellMeans(scaled, kMostSurfacePoints, context);
+    RETURN_IF_ERROR(means);
+    const std::vector<std::uint8_t> kept = keptCells(means->cells);
+    RETURN_IF_ERROR(context.checkpoint());
     if (std::find(kept.begin(), kept.end(), std::uint8_t{0}) != kept.end()) {
         PointCloud left;
         for (std::size_t i = 0; i < scaled.size(); ++i) {
-            if (kept[means.cellOfPoint[i]] != 0) left.push_back(scaled[i]);
+            if (kept[means->cellOfPoint[i]] != 0) left.push_back(scaled[i]);
         }
         scaled = std::move(left);
-        means = cellMeans(scaled, kMostSurfacePoints);
+        means = cellMeans(scaled, kMostSurfacePoints, context);
+        RETURN_IF_ERROR(means);
     }
-    RETURN_IF_ERROR(context.checkpoint());
     PointCloud points;
-    for (const CellMean& cell : means.cells) points.push_back(cell.mean);
+    for (const CellMean& cell : means->cells) points.push_back(cell.mean);
     points = inFarthestPointOrder(std::move(points));
     if (points.size() < 4) {
         return fail(ErrorCode::kTooFewPoints, "only " + std::to_string(points.size()) + " of " +

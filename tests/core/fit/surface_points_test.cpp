@@ -1,10 +1,13 @@
 #include "core/fit/surface_points.h"
 
+#include <chrono>
 #include <cmath>
+#include <ctime>
 #include <limits>
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <tbb/task_arena.h>
 
 #include "core/base/random.h"
 #include "core/geometry/motion.h"
@@ -151,6 +154,39 @@ TEST(SurfacePoints, PackNormalsToHalfADegree) {
     for (const Point3& n : {Point3{1, 0, 0}, Point3{0, 1, 0}, Point3{0, 0, 1}, Point3{0, 0, -1}}) {
         EXPECT_NEAR(std::abs(dot(n, unpackNormal(packNormal(n)))), 1.0, 1e-12);
     }
+}
+
+// Time of this thread, in which a machine under load does not count.
+double processorSeconds() {
+    timespec now{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+TEST(SurfacePoints, OfALargeScanEndSoonAfterTheDeadline) {
+    Random random(5);
+    PointCloud scan;
+    for (int i = 0; i < 2'000'000; ++i) {
+        scan.push_back({random.uniform(-1.0, 1.0), random.uniform(-1.0, 1.0), random.uniform(-1.0, 1.0)});
+    }
+    const auto timed = [&](const RunContext& context, ErrorCode expected) {
+        const double began = processorSeconds();
+        const auto surface = makeSurfacePoints(scan, context);
+        EXPECT_EQ(surface ? ErrorCode::kInternal : surface.error().code, expected);
+        return processorSeconds() - began;
+    };
+    // All of the work in this thread.
+    tbb::task_arena(1).execute([&] {
+        const double whole = timed({}, ErrorCode::kInternal);
+        for (const double share : {0.1, 0.3, 0.5, 0.7}) {
+            RunContext context;
+            const std::chrono::duration<double> allowed(share * whole);
+            context.deadline =
+                RunContext::Clock::now() + std::chrono::duration_cast<RunContext::Clock::duration>(allowed);
+            const double late = timed(context, ErrorCode::kDeadlineExceeded) - allowed.count();
+            EXPECT_LT(late, 0.1 * whole) << share << " of " << whole << " s";
+        }
+    });
 }
 
 }  // namespace
