@@ -56,6 +56,10 @@ Result<void> checkMetadataChange(const store::MetadataChange& change) {
     if (change.replaceAll && !change.remove.empty()) {
         return bad("remove: replace_all removes all keys that are not set; leave one out");
     }
+    if (change.remove.size() > kMaxMetadataEntries) {
+        return bad("remove: " + std::to_string(change.remove.size()) + " keys, at most " +
+                   std::to_string(kMaxMetadataEntries) + " are allowed");
+    }
     for (const std::string& key : change.remove) {
         RETURN_IF_ERROR(checkMetadataKey("remove: key", key));
         if (change.set.count(key) > 0) return bad("remove: key '" + key + "' is also set");

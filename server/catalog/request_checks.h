@@ -28,7 +28,8 @@ constexpr const char* kDefaultCollection = "default";
 [[nodiscard]] Result<void> checkKey(const std::string& key);
 /// At most kMaxMetadataEntries, each key and value within its limits.
 [[nodiscard]] Result<void> checkMetadata(const Metadata& metadata);
-/// As `checkMetadata` of what it sets; nothing is both set and removed, or removed where all is replaced.
+/// As `checkMetadata` of what it sets; removes at most kMaxMetadataEntries keys; nothing is both set and
+/// removed, or removed where all is replaced.
 [[nodiscard]] Result<void> checkMetadataChange(const store::MetadataChange& change);
 /// 1 to kMaxMetadataKeyBytes of [A-Za-z0-9_.-]. `field` names it in the error.
 [[nodiscard]] Result<void> checkMetadataKey(const char* field, const std::string& key);

@@ -21,7 +21,7 @@ std::vector<LimitRow> limitTable(const config::ServerConfig& config) {
     const char* const invalid = errorCodeName(ErrorCode::kInvalidArgument);
     const char* const malformed = errorCodeName(ErrorCode::kMalformedStream);
     const char* const full = errorCodeName(ErrorCode::kQueueFull);
-    const char* const cut = errorCodeName(ErrorCode::kCancelled);
+    const char* const cut = errorCodeName(ErrorCode::kDeadlineExceeded);
     return {
         // Names and text.
         {"collection_name_bytes", kMaxCollectionNameBytes, "bytes", "name of a collection or alias", invalid},
@@ -29,6 +29,8 @@ std::vector<LimitRow> limitTable(const config::ServerConfig& config) {
         {"key_bytes", kMaxKeyBytes, "bytes", "key of a shape", invalid},
         {"key_prefix_bytes", kMaxKeyBytes, "bytes", "key_prefix of a listing, a count or a change", invalid},
         {"metadata_entries", kMaxMetadataEntries, "entries", "metadata of a shape", invalid},
+        {"metadata_removed_keys", kMaxMetadataEntries, "keys", "keys that one change of metadata removes",
+         invalid},
         {"metadata_key_bytes", kMaxMetadataKeyBytes, "bytes",
          "key of a metadata entry, also where one is asked for", invalid},
         {"metadata_value_bytes", kMaxMetadataValueBytes, "bytes", "value of a metadata entry", invalid},

@@ -156,6 +156,11 @@ class Limits(unittest.TestCase):
     def case_metadata_entries(self, limit):
         self.three(limit, lambda n: self.change({f"k{i}": "v" for i in range(n)}), "metadata", "entries")
 
+    def case_metadata_removed_keys(self, limit):
+        remove = lambda n: self.client.shapes.UpdateMetadata(shapes.UpdateMetadataRequest(
+            key="ball", change=shapes.MetadataChange(remove=[f"none{i}" for i in range(n)])), timeout=30)
+        self.three(limit, remove, "remove")
+
     def case_metadata_key_bytes(self, limit):
         self.three(limit, lambda n: self.change({"k" * n: "v"}), "metadata: key")
 
@@ -377,6 +382,26 @@ class Limits(unittest.TestCase):
         stats = client.admin.Stats(admin.StatsRequest(), timeout=10)
         held = stats.queued_bytes if unit == "bytes" else stats.queued_jobs + stats.running_jobs
         self.assertLessEqual(held, limit.value)
+
+
+class Pace(unittest.TestCase):
+    def test_is_refused_as_listed(self):
+        """A call that is cut off has no `shapedb-error`: what is listed is its status."""
+        def send(pause, stop):
+            yield shapes.AddShapeRequest(header=shapes.AddShapeHeader(key="slow", point_count=100_000))
+            while not stop.wait(pause):
+                yield shapes.AddShapeRequest(chunk=types.PointChunk(xyz=b"\0" * 12))
+
+        with Server("--limits-stall-seconds", "2", "--limits-min-bytes-per-second", "1000") as server, \
+                server.connect() as client:
+            limits = limits_of(client)
+            for name, pause in (("limits.stall_seconds", 30), ("limits.min_bytes_per_second", 0.1)):
+                stop = threading.Event()
+                with self.assertRaises(grpc.RpcError) as failure:
+                    client.shapes.AddShape(send(pause, stop), timeout=60)
+                stop.set()
+                self.assertIn(name, failure.exception.details())
+                self.assertEqual(failure.exception.code().name.lower(), limits[name].refusal)
 
 
 class Stored(unittest.TestCase):

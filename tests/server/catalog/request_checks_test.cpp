@@ -52,6 +52,22 @@ TEST(RequestChecks, LimitsMetadata) {
     EXPECT_FALSE(checkMetadata({{"k", "\xed\xa0\x80"}})) << "a surrogate";
 }
 
+TEST(RequestChecks, LimitsWhatAChangeOfMetadataRemoves) {
+    store::MetadataChange change;
+    for (std::size_t i = 0; i < kMaxMetadataEntries; ++i) change.remove.push_back("k" + std::to_string(i));
+    EXPECT_TRUE(checkMetadataChange(change));
+    change.remove.emplace_back("one-more");
+    const auto many = checkMetadataChange(change);
+    ASSERT_FALSE(many);
+    EXPECT_EQ(many.error().code, ErrorCode::kInvalidArgument);
+    EXPECT_EQ(many.error().message, "remove: 65 keys, at most 64 are allowed");
+
+    change.remove = {std::string(kMaxMetadataKeyBytes, 'k')};
+    EXPECT_TRUE(checkMetadataChange(change));
+    change.remove = {std::string(kMaxMetadataKeyBytes + 1, 'k')};
+    EXPECT_EQ(checkMetadataChange(change).error().code, ErrorCode::kInvalidArgument);
+}
+
 TEST(RequestChecks, LimitsGroups) {
     EXPECT_TRUE(checkGrouping("", 0, 10, 10));
     EXPECT_FALSE(checkGrouping("", 1, 10, 10)) << "hits of no group";
