@@ -275,11 +275,10 @@ class Catalog {
     [[nodiscard]] Result<std::shared_ptr<const SurfacePoints>> surface(std::int64_t shapeId) {
         return index_.surface(shapeId);
     }
-    /// Shapes of the collection that wait for their signature.
-    [[nodiscard]] Result<std::uint64_t> pendingShapes(std::int64_t collectionId) {
-        store::ShapeFilter filter;
-        filter.state = store::ShapeState::kPending;
-        return store_->countShapes(collectionId, filter);
+    /// Shapes that wait for their first signature: those whose older points are searched do not count.
+    [[nodiscard]] Result<std::uint64_t> unsearchedShapes(const index::Snapshot& collection) {
+        return store_->countPending(collection.collection.id,
+                                    [&](std::int64_t id) { return !collection.signatures.find(id); });
     }
     /// `qualityIn` the shape's collection as it is searched now.
     [[nodiscard]] std::optional<double> servingQuality(const store::Shape& shape) const;

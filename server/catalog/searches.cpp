@@ -47,7 +47,7 @@ Result<PreparedSearch> Searches::prepare(index::SnapshotPtr collection, const Se
     RETURN_IF_ERROR(keepScale);
     Result<Filter> filter = Filter::parse(request.filter);
     RETURN_IF_ERROR(filter);
-    const auto pending = catalog_.pendingShapes(collection->collection.id);
+    const auto pending = catalog_.unsearchedShapes(*collection);
     RETURN_IF_ERROR(pending);
     PreparedSearch prepared;
     prepared.pending = *pending;

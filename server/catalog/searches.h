@@ -39,7 +39,7 @@ struct PreparedSearch {
     SearchOptions options;
     bool explain = true;
     std::optional<VerifyOptions> verify;
-    std::uint64_t pending = 0;  ///< shapes of the collection that have no signature yet
+    std::uint64_t pending = 0;  ///< shapes of the collection without a signature to search, yet
 };
 
 /// What a request names as a query: one of the two. Not owned.

@@ -281,6 +281,9 @@ class Store {
     /// Errors: kCancelled, kDeadlineExceeded (filter.context).
     [[nodiscard]] virtual Result<std::uint64_t> countShapes(std::int64_t collectionId,
                                                             const ShapeFilter& filter) = 0;
+    /// Pending shapes of which `counts(id)` says so; it must not call the store.
+    [[nodiscard]] virtual Result<std::uint64_t> countPending(
+        std::int64_t collectionId, const std::function<bool(std::int64_t)>& counts) = 0;
     /// Removes the shape with its points, signatures and jobs; returns it as it was.
     /// Errors: kNotFound, kVersionConflict.
     [[nodiscard]] virtual Result<Shape> deleteShape(std::int64_t collectionId, const std::string& key,

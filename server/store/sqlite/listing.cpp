@@ -103,10 +103,12 @@ void inOrder(Connection& connection, std::int64_t collectionId, const ShapeListi
     }
 }
 
-/// Slow, and right while the table can be read: searches tell how many shapes are pending, and a damaged
-/// index must not stop them.
+// Slow, and right while the table can be read: searches tell how many shapes are pending, and a damaged index
+// must not stop them.
 constexpr char kCountWithoutIndex[] =
     "SELECT count(*) FROM shape NOT INDEXED WHERE collection_id = ?1 AND (?2 < 0 OR state = ?2)";
+constexpr char kIdsWithoutIndex[] =
+    "SELECT id FROM shape NOT INDEXED WHERE collection_id = ?1 AND state = ?2";
 
 std::uint64_t countWithoutIndex(Connection& connection, std::int64_t collectionId,
                                 std::optional<ShapeState> state) {
@@ -152,6 +154,27 @@ Result<std::uint64_t> SqliteStore::countShapes(std::int64_t collectionId, const 
             if (query.step()) count = static_cast<std::uint64_t>(query.integer(0));
         });
         return whole ? count : countWithoutIndex(connection, collectionId, filter.state);
+    });
+}
+
+Result<std::uint64_t> SqliteStore::countPending(std::int64_t collectionId,
+                                                const std::function<bool(std::int64_t)>& counts) {
+    return read("count the pending shapes", [&](Connection& connection) {
+        std::uint64_t count = 0;
+        const auto look = [&](Query& query) {
+            count = 0;
+            while (query.step()) count += counts(query.integer(0)) ? 1 : 0;
+        };
+        const int pending = static_cast<int>(ShapeState::kPending);
+        const bool whole = unlessDamaged([&] {
+            Query query(connection, sql::kListIdsInState, collectionId, pending);
+            look(query);
+        });
+        if (!whole) {
+            Query query(connection, kIdsWithoutIndex, collectionId, pending);
+            look(query);
+        }
+        return count;
     });
 }
 

@@ -58,6 +58,8 @@ class SqliteStore final : public Store {
     Result<std::vector<Shape>> listShapes(std::int64_t collectionId, const ShapeListing& listing,
                                           std::size_t limit, const ShapeFilter& filter) override;
     Result<std::uint64_t> countShapes(std::int64_t collectionId, const ShapeFilter& filter) override;
+    Result<std::uint64_t> countPending(std::int64_t collectionId,
+                                       const std::function<bool(std::int64_t)>& counts) override;
     Result<Shape> deleteShape(std::int64_t collectionId, const std::string& key,
                               std::optional<std::int64_t> expectedVersion) override;
     Result<std::vector<Shape>> deleteShapes(const std::vector<std::int64_t>& shapeIds,

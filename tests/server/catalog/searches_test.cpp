@@ -1,9 +1,12 @@
 #include "server/catalog/searches.h"
 
 #include <atomic>
+#include <chrono>
+#include <thread>
 
 #include <gtest/gtest.h>
 
+#include "core/base/return_if_error.h"
 #include "core/matching/score.h"
 #include "core/signature/signature_codec.h"
 #include "server/catalog/listing.h"
@@ -15,23 +18,37 @@ namespace {
 
 using namespace shapedb::testing;
 
+constexpr float kNeverDone = 1'000.0f;
+
+// A tag of kNeverDone or more is segmented until it is cancelled.
+Result<Description> describeOrWait(const PointCloud& points, const ShapeParameters& parameters,
+                                   const RunContext& context) {
+    while (points.at(0).x >= kNeverDone) {
+        RETURN_IF_ERROR(context.checkpoint());
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    return quickDescribe(points, parameters, context);
+}
+
 class SearchesTest : public ::testing::Test {
   protected:
     SearchesTest() {
         CatalogOptions options;
         options.maxQueuedJobs = 100;
-        catalog = std::make_unique<Catalog>(std::make_unique<MemoryStore>(), quickDescribe,
+        catalog = std::make_unique<Catalog>(std::make_unique<MemoryStore>(), describeOrWait,
                                             std::make_shared<RecordingLogger>(), options);
         EXPECT_TRUE(catalog->start());
     }
     ~SearchesTest() override { EXPECT_TRUE(catalog->stop()); }
 
-    store::Shape putAndWait(const std::string& key, float tag, const std::string& collection = "") {
+    store::Shape putOnly(const std::string& key, float tag, const std::string& collection = "") {
         ShapeHeader header;
         header.collection = collection;
         header.key = key;
-        const auto added = catalog->put(header, store::VerifiedScan::verify(taggedPoints(tag)).value());
-        return catalog->awaitIngest(added.value().shape, [] { return Result<void>(); }).value();
+        return catalog->put(header, store::VerifiedScan::verify(taggedPoints(tag)).value()).value().shape;
+    }
+    store::Shape putAndWait(const std::string& key, float tag, const std::string& collection = "") {
+        return catalog->awaitIngest(putOnly(key, tag, collection), [] { return Result<void>(); }).value();
     }
     Searches searches() { return {*catalog, runner, 50}; }
     Result<PreparedSearch> prepare(const SearchRequest& request) {
@@ -78,6 +95,23 @@ TEST_F(SearchesTest, AStoredShapeFindsOthersButNotItself) {
     const auto withSelf = searches().storedQuery(*prepared, "cup", true);
     EXPECT_EQ(searches().run(*prepared, withSelf.value(), {}).value().hits.size(), 2u);
     EXPECT_EQ(searches().count(), 2u);
+}
+
+TEST_F(SearchesTest, OnlyShapesThatCouldNotBeSearchedCountAsPending) {
+    SearchRequest request;
+    request.k = 10;
+    putAndWait("cup", 5.0f);
+    putAndWait("jug", 6.0f);
+    EXPECT_EQ(prepare(request)->pending, 0u);
+    EXPECT_EQ(putOnly("jug", kNeverDone).state, store::ShapeState::kPending);
+    EXPECT_EQ(prepare(request)->pending, 0u) << "its older points are searched";
+    putOnly("mug", kNeverDone + 1.0f);
+    auto prepared = prepare(request);
+    ASSERT_TRUE(prepared);
+    EXPECT_EQ(prepared->pending, 1u);
+    const auto query = searches().storedQuery(*prepared, "cup");
+    ASSERT_TRUE(query);
+    EXPECT_EQ(searches().run(*prepared, *query, {}).value().hits.size(), 1u) << "the jug of before";
 }
 
 TEST_F(SearchesTest, AScanIsSegmentedAndSearched) {

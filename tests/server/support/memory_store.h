@@ -40,6 +40,8 @@ class MemoryStore : public store::Store {
                                                  const store::ShapeListing& listing, std::size_t limit,
                                                  const store::ShapeFilter& filter) override;
     Result<std::uint64_t> countShapes(std::int64_t collectionId, const store::ShapeFilter& filter) override;
+    Result<std::uint64_t> countPending(std::int64_t collectionId,
+                                       const std::function<bool(std::int64_t)>& counts) override;
     Result<store::Shape> deleteShape(std::int64_t collectionId, const std::string& key,
                                      std::optional<std::int64_t> expectedVersion) override;
     Result<std::vector<store::Shape>> deleteShapes(

@@ -79,6 +79,14 @@ Result<std::uint64_t> MemoryStore::countShapes(std::int64_t collectionId, const 
     });
 }
 
+Result<std::uint64_t> MemoryStore::countPending(std::int64_t collectionId,
+                                                const std::function<bool(std::int64_t)>& counts) {
+    ShapeFilter filter;
+    filter.state = ShapeState::kPending;
+    filter.accept = [&](const Shape& shape) { return counts(shape.id); };
+    return countShapes(collectionId, filter);
+}
+
 Result<Shape> MemoryStore::deleteShape(std::int64_t collectionId, const std::string& key,
                                        std::optional<std::int64_t> expectedVersion) {
     return guarded("deleteShape", [&]() -> Result<Shape> {
