@@ -61,7 +61,11 @@ Result<store::VerifiedScan> receiveScan(Reader& reader, catalog::ScanUpload& upl
     RETURN_IF_ERROR(receiveMessages<Request>(reader, call, take));
     auto scan = upload.finish();
     RETURN_IF_ERROR(scan);
-    return catalog::isolated(std::move(*scan), isolation, call.run());
+    auto isolated = catalog::isolated(std::move(*scan), isolation, call.run());
+    RETURN_IF_ERROR(isolated);
+    // Isolating takes a while, and then the scan may be stored.
+    RETURN_IF_ERROR(call.authorization().requireStill());
+    return isolated;
 }
 
 }  // namespace shapedb::rpc

@@ -417,6 +417,21 @@ class Secrets(unittest.TestCase):
                     self.assertIn("was revoked", error.details())
                 self.assertEqual(local.count(), 2, "what is there is as it was")
 
+    def test_a_download_that_has_begun_runs_to_its_end_without_its_key(self):
+        count = 1_000_000
+        with SecuredServer() as server, server.local() as local:
+            local.add("large", [(i % 1000, i // 1000, (i * i) % 999) for i in range(count)], timeout=120)
+            key = server.make(READER)
+            with server.connect(key=key.secret) as client:
+                request = shapes.GetPointsRequest(shape=shapes.ShapeRef(key="large"))
+                download = client.shapes.GetPoints(request, timeout=60)
+                self.assertEqual(next(download).shape.key, "large")
+                local.admin.RevokeKey(admin.RevokeKeyRequest(id=key.key.id), timeout=10)
+                self.assertEqual(sum(len(message.chunk.xyz) for message in download), 12 * count)
+                with self.assertRaises(grpc.RpcError) as failure:
+                    next(client.shapes.GetPoints(request, timeout=60))
+                self.assertEqual(reason(failure.exception), "unauthenticated")
+
     def test_a_long_upload_ends_soon_after_its_key(self):
         with SecuredServer() as server:
             key = server.make(WRITER)
