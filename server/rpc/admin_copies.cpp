@@ -155,7 +155,7 @@ grpc::Status AdminServiceHandler::Restore(grpc::ServerContext* context,
         const store::StoreStats& stored = stats->store;
         response->set_collections(stored.collections);
         response->set_shapes(stored.shapesPending + stored.shapesReady + stored.shapesFailed);
-        services_.log->info("database replaced by a backup", {{"shapes", response->shapes()}});
+        call.info("database replaced by a backup", {{"shapes", response->shapes()}});
         return {};
     });
 }
@@ -196,8 +196,8 @@ grpc::Status AdminServiceHandler::ImportCollection(grpc::ServerContext* context,
         response->set_collection((*imported)->collection.name);
         response->set_shapes(counts->all);
         response->set_shapes_pending(counts->all - counts->ready - counts->failed);
-        services_.log->info("collection imported",
-                            {{"collection", response->collection()}, {"shapes", response->shapes()}});
+        call.info("collection imported",
+                  {{"collection", response->collection()}, {"shapes", response->shapes()}});
         return {};
     });
 }

@@ -176,6 +176,11 @@ grpc::Status Call::finish(Result<void> result) {
     return status;
 }
 
+void Call::info(const std::string& message, std::vector<telemetry::Field> fields) const {
+    if (const auto trace = traceOf(context_)) fields.push_back({"trace", *trace});
+    services_.log->info(message, fields);
+}
+
 void Call::logLine(const grpc::Status& status, const Error* error) {
     const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - began_;
     services_.metrics.recordCall(operation_.name, statusName(status.error_code()), took.count() / 1e3,

@@ -78,6 +78,8 @@ class Call {
     [[nodiscard]] Result<catalog::FoundShape> shape(const v1::ShapeRef& ref);
     /// Adds a field to the log line.
     void note(telemetry::Field field) { notes_.push_back(std::move(field)); }
+    /// A log line of its own, with the call's trace.
+    void info(const std::string& message, std::vector<telemetry::Field> fields) const;
     void noteKey(const std::string& key) { note({"key", key}); }
     void addPoints(std::uint64_t points, std::uint64_t bytes) {
         points_ += points;

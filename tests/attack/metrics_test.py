@@ -207,6 +207,20 @@ class Traces(unittest.TestCase):
             self.assertTrue(eventually(lambda: len(lines()) == 1 + len(bad), 10))
             self.assertEqual([line.get("trace") for line in lines()], [self.TRACE] + [None] * len(bad))
 
+    def test_are_written_to_each_line_of_the_call(self):
+        from attacker import admin
+        trace = (("traceparent", f"00-{self.TRACE}-00f067aa0ba902b7-01"),)
+        with Server("--log-format", "json") as server, server.connect() as client:
+            backup = list(client.admin.Backup(admin.BackupRequest(), timeout=30))
+            client.admin.Restore(iter(backup), timeout=30, metadata=trace)
+            header = admin.ImportCollectionRequest(header=admin.ImportCollectionHeader(collection="copy"))
+            export = client.admin.ExportCollection(admin.ExportCollectionRequest(), timeout=30)
+            client.admin.ImportCollection(iter([header] + [admin.ImportCollectionRequest(chunk=chunk)
+                                                           for chunk in export]), timeout=30, metadata=trace)
+            for words in ("database replaced by a backup", "collection imported"):
+                lines = [json.loads(line) for line in server.log().splitlines() if words in line]
+                self.assertEqual([line.get("trace") for line in lines], [self.TRACE], words)
+
 
 if __name__ == "__main__":
     main()
