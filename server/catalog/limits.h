@@ -63,8 +63,8 @@ constexpr std::uint64_t kMaxRequestsBytes = std::uint64_t{512} << 20;
 // Calls at a time. A transport needs a thread for each, and some to refuse the rest.
 constexpr int kMaxOrdinaryCalls = 208;
 constexpr int kMaxAdminCalls = 16;
-/// Of them, those that last: rebuilds, checks and copies. The others always find a place, so that a key can be
-/// revoked and a rebuild cancelled.
+/// Of them, those that last: rebuilds, checks and copies. The others always find a place, so that a key can
+/// be revoked and a rebuild cancelled.
 constexpr int kMaxLongAdminCalls = 12;
 /// Calls that only wait for a shape or a rebuild. With all uploads (limits.max_uploads) they leave places for
 /// searches.

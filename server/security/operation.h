@@ -16,9 +16,9 @@ enum class Role : std::uint8_t {
 
 /// Which share of the threads a call may take, so that no kind of call can shut the others out.
 enum class CallClass : std::uint8_t {
-    kOrdinary,  ///< one request, and an answer as soon as it is computed
-    kUpload,    ///< lasts as long as the client sends
-    kAdmin,     ///< has places of its own
+    kOrdinary,   ///< one request, and an answer as soon as it is computed
+    kUpload,     ///< lasts as long as the client sends
+    kAdmin,      ///< has places of its own
     kAdminLong,  ///< so too, but lasts as long as its work or its client: some places are not for it
 };
 
@@ -110,14 +110,16 @@ inline constexpr Operation kRebuild{"AdminService", "Rebuild", Role::kAdmin, Cal
                                     Scope::kCollections};
 inline constexpr Operation kCancelRebuild{"AdminService", "CancelRebuild", Role::kAdmin, CallClass::kAdmin,
                                           Scope::kCollections};
-inline constexpr Operation kBackup{"AdminService", "Backup", Role::kAdmin, CallClass::kAdminLong, Scope::kServer};
+inline constexpr Operation kBackup{"AdminService", "Backup", Role::kAdmin, CallClass::kAdminLong,
+                                   Scope::kServer};
 inline constexpr Operation kRestore{"AdminService", "Restore", Role::kAdmin, CallClass::kAdminLong,
                                     Scope::kServer};
 inline constexpr Operation kExportCollection{"AdminService", "ExportCollection", Role::kAdmin,
                                              CallClass::kAdminLong, Scope::kCollections};
 inline constexpr Operation kImportCollection{"AdminService", "ImportCollection", Role::kAdmin,
                                              CallClass::kAdminLong, Scope::kCollections};
-inline constexpr Operation kCheck{"AdminService", "Check", Role::kAdmin, CallClass::kAdminLong, Scope::kServer};
+inline constexpr Operation kCheck{"AdminService", "Check", Role::kAdmin, CallClass::kAdminLong,
+                                  Scope::kServer};
 inline constexpr Operation kStats{"AdminService", "Stats", Role::kAdmin, CallClass::kAdmin, Scope::kServer};
 inline constexpr Operation kServerInfo{"AdminService", "ServerInfo", Role::kReader, CallClass::kAdmin,
                                        Scope::kNone};
