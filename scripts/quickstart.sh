@@ -62,5 +62,5 @@ if [ "${1:-}" = "--keep" ]; then
   printf '\nThe server is still running at %s and %s (process %s). Try:\n  build/bin/shapedb --server %s list\n' \
     "$SHAPEDB_SERVER" "$http" "$server" "$SHAPEDB_SERVER"
 else
-  printf '\nTo start the server again with the same data:\n  build/bin/shapedbd --listen 127.0.0.1:7878 --http-listen 127.0.0.1:7879 --data %s/data\n' "$demo"
+  printf '\nTo start the server again with the same data, and look at the shapes at http://127.0.0.1:7879 in a browser:\n  build/bin/shapedbd --listen 127.0.0.1:7878 --http-listen 127.0.0.1:7879 --data %s/data\n' "$demo"
 fi
