@@ -33,18 +33,20 @@ class Request {
     explicit Request(Stream& stream)
         : read_([&stream](Call& call, grpc::ByteBuffer* bytes) { return call.read(stream, bytes); }) {}
 
-    /// Reads and decodes it, holding room for what may become of it until it is destroyed. Errors: kCancelled
-    /// (the client has gone), kQueueFull (no room), kInvalidArgument (not such a message).
+    /// Reads and decodes it, holding room for the most that may become of it meanwhile, and for what became
+    /// of it until it is destroyed. Errors: kCancelled (the client has gone), kQueueFull (no room),
+    /// kInvalidArgument (not such a message).
     [[nodiscard]] Result<void> receive(Call& call, catalog::Budget& room) {
         grpc::ByteBuffer bytes;
         if (!read_(call, &bytes)) return fail(ErrorCode::kCancelled, "the client has gone");
-        if (bytes.Length() > kSmallMessageBytes) {
-            share_ = std::make_unique<catalog::Budget::Share>(room);
-            RETURN_IF_ERROR(share_->take(kMostDecodedPerByte * bytes.Length()));
+        if (bytes.Length() <= kSmallMessageBytes) return decode(bytes);
+        {
+            catalog::Budget::Share decoding(room);
+            RETURN_IF_ERROR(decoding.take(kMostDecodedPerByte * bytes.Length()));
+            RETURN_IF_ERROR(decode(bytes));
         }
-        if (grpc::SerializationTraits<Message>::Deserialize(&bytes, &message_).ok()) return {};
-        return fail(ErrorCode::kInvalidArgument,
-                    "the message is not a " + Message::descriptor()->full_name());
+        share_ = std::make_unique<catalog::Budget::Share>(room);
+        return share_->take(message_.SpaceUsedLong());
     }
 
     /// After `receive`.
@@ -52,6 +54,12 @@ class Request {
     const Message* operator->() const { return &message_; }
 
   private:
+    Result<void> decode(grpc::ByteBuffer& bytes) {
+        if (grpc::SerializationTraits<Message>::Deserialize(&bytes, &message_).ok()) return {};
+        return fail(ErrorCode::kInvalidArgument,
+                    "the message is not a " + Message::descriptor()->full_name());
+    }
+
     std::function<bool(Call&, grpc::ByteBuffer*)> read_;
     std::unique_ptr<catalog::Budget::Share> share_;
     Message message_;
