@@ -112,6 +112,8 @@ TEST_F(Lifecycle, NewCallsAreRefusedWhileDraining) {
     *message.mutable_header() = headerFor("", "k", dumbbell());
     ASSERT_TRUE(upload->Write(message));
     ASSERT_TRUE(eventually([&] { return statsOf(*client).collections() == 1; }));
+    // Nothing tells when the handler of the upload has begun; before that it counts as a new call.
+    std::this_thread::sleep_for(std::chrono::milliseconds(500));
     server->signal(SIGTERM);
     EXPECT_TRUE(eventually([&] { return getShape(*client, "", "k").error == "unavailable"; }));
     for (const std::string& chunk : chunksOf(dumbbell())) {
