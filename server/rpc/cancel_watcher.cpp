@@ -64,8 +64,9 @@ void CancelWatcher::cutOffAll(const Error& why) {
     for (Registration* call : calls_) cutOff(*call, why);
 }
 
-std::optional<Error> CancelWatcher::Registration::cutOff() const {
+std::optional<Error> CancelWatcher::Registration::end() {
     const std::lock_guard<std::mutex> lock(watcher_.mutex_);
+    watcher_.calls_.erase(this);
     return cutOff_;
 }
 

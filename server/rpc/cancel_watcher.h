@@ -54,8 +54,9 @@ class CancelWatcher {
             blocked_ += Clock::now().time_since_epoch().count() - blockedSince_.exchange(0);
             bytes_ += bytes;
         }
-        /// Why the call was cut off here, if it was: what its client has been told.
-        [[nodiscard]] std::optional<Error> cutOff() const;
+        /// Once the outcome of the call is known: it is not cut off any more, or a client would be told so of
+        /// what was done. Why it was cut off before, if it was: what its client has been told.
+        [[nodiscard]] std::optional<Error> end();
 
       private:
         friend class CancelWatcher;
