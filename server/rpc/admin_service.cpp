@@ -41,20 +41,16 @@ v1::RebuildProgress progressFrom(const catalog::RebuildProgress& progress) {
 }  // namespace
 
 AdminServiceHandler::AdminServiceHandler(const Services& services) : services_(services) {
-    const auto mark = [this](int index, auto method) {
-        MarkMethodStreamed(index, methodHandler(this, method));
-    };
-    mark(methodIndex<v1::RebuildRequest>("Rebuild"), &AdminServiceHandler::rebuild);
-    mark(methodIndex<v1::CancelRebuildRequest>("CancelRebuild"), &AdminServiceHandler::cancelRebuild);
-    mark(methodIndex<v1::BackupRequest>("Backup"), &AdminServiceHandler::backup);
-    mark(methodIndex<v1::ExportCollectionRequest>("ExportCollection"),
-         &AdminServiceHandler::exportCollection);
-    mark(methodIndex<v1::CheckRequest>("Check"), &AdminServiceHandler::check);
-    mark(methodIndex<v1::StatsRequest>("Stats"), &AdminServiceHandler::stats);
-    mark(methodIndex<v1::ServerInfoRequest>("ServerInfo"), &AdminServiceHandler::serverInfo);
-    mark(methodIndex<v1::CreateKeyRequest>("CreateKey"), &AdminServiceHandler::createKey);
-    mark(methodIndex<v1::ListKeysRequest>("ListKeys"), &AdminServiceHandler::listKeys);
-    mark(methodIndex<v1::RevokeKeyRequest>("RevokeKey"), &AdminServiceHandler::revokeKey);
+    serve("Rebuild", this, &AdminServiceHandler::rebuild);
+    serve("CancelRebuild", this, &AdminServiceHandler::cancelRebuild);
+    serve("Backup", this, &AdminServiceHandler::backup);
+    serve("ExportCollection", this, &AdminServiceHandler::exportCollection);
+    serve("Check", this, &AdminServiceHandler::check);
+    serve("Stats", this, &AdminServiceHandler::stats);
+    serve("ServerInfo", this, &AdminServiceHandler::serverInfo);
+    serve("CreateKey", this, &AdminServiceHandler::createKey);
+    serve("ListKeys", this, &AdminServiceHandler::listKeys);
+    serve("RevokeKey", this, &AdminServiceHandler::revokeKey);
 }
 
 grpc::Status AdminServiceHandler::rebuild(grpc::ServerContext* context, Request<v1::RebuildRequest>& request,

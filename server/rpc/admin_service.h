@@ -10,7 +10,7 @@ namespace shapedb::rpc {
 class Call;
 
 /// Thread-safe. `services` must outlive it.
-class AdminServiceHandler final : public shapedb::v1::AdminService::Service {
+class AdminServiceHandler final : public ReadsRequests<v1::AdminService> {
   public:
     explicit AdminServiceHandler(const Services& services);
 

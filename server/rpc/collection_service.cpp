@@ -31,20 +31,13 @@ Result<void> fill(const Services& services, const index::Snapshot& snapshot, v1:
 }  // namespace
 
 CollectionServiceHandler::CollectionServiceHandler(const Services& services) : services_(services) {
-    const auto mark = [this](int index, auto method) {
-        MarkMethodStreamed(index, methodHandler(this, method));
-    };
-    mark(methodIndex<v1::CreateCollectionRequest>("CreateCollection"),
-         &CollectionServiceHandler::createCollection);
-    mark(methodIndex<v1::GetCollectionRequest>("GetCollection"), &CollectionServiceHandler::getCollection);
-    mark(methodIndex<v1::ListCollectionsRequest>("ListCollections"),
-         &CollectionServiceHandler::listCollections);
-    mark(methodIndex<v1::RenameCollectionRequest>("RenameCollection"),
-         &CollectionServiceHandler::renameCollection);
-    mark(methodIndex<v1::SetAliasRequest>("SetAlias"), &CollectionServiceHandler::setAlias);
-    mark(methodIndex<v1::DeleteAliasRequest>("DeleteAlias"), &CollectionServiceHandler::deleteAlias);
-    mark(methodIndex<v1::DeleteCollectionRequest>("DeleteCollection"),
-         &CollectionServiceHandler::deleteCollection);
+    serve("CreateCollection", this, &CollectionServiceHandler::createCollection);
+    serve("GetCollection", this, &CollectionServiceHandler::getCollection);
+    serve("ListCollections", this, &CollectionServiceHandler::listCollections);
+    serve("RenameCollection", this, &CollectionServiceHandler::renameCollection);
+    serve("SetAlias", this, &CollectionServiceHandler::setAlias);
+    serve("DeleteAlias", this, &CollectionServiceHandler::deleteAlias);
+    serve("DeleteCollection", this, &CollectionServiceHandler::deleteCollection);
 }
 
 grpc::Status CollectionServiceHandler::createCollection(grpc::ServerContext* context,

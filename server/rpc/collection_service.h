@@ -8,7 +8,7 @@
 namespace shapedb::rpc {
 
 /// Thread-safe. `services` must outlive it.
-class CollectionServiceHandler final : public shapedb::v1::CollectionService::Service {
+class CollectionServiceHandler final : public ReadsRequests<v1::CollectionService> {
   public:
     explicit CollectionServiceHandler(const Services& services);
 

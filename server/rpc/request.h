@@ -79,17 +79,7 @@ grpc::Status handle(const Services& services, grpc::ServerContext* context,
     });
 }
 
-/// For grpc::Service::MarkMethodStreamed: the index of a method in `Service`.
-template <typename Message>
-int methodIndex(const std::string& method) {
-    const auto* file = Message::descriptor()->file();
-    for (int i = 0; i < file->service_count(); ++i) {
-        if (const auto* found = file->service(i)->FindMethodByName(method)) return found->index();
-    }
-    return -1;
-}
-
-/// For the same: runs `method` of `handler`, which answers with one message.
+/// For grpc::Service::MarkMethodStreamed: runs `method` of `handler`, which answers with one message.
 template <typename Handler, typename Message, typename Response>
 grpc::internal::MethodHandler* methodHandler(Handler* handler,
                                              grpc::Status (Handler::*method)(grpc::ServerContext*,
@@ -118,5 +108,19 @@ grpc::internal::MethodHandler* methodHandler(Handler* handler,
             return (handler->*method)(context, request, stream);
         });
 }
+
+/// `Service` of the API, generated, whose methods with one message read it themselves.
+template <typename Service>
+class ReadsRequests : public Service::Service {
+  protected:
+    /// In the constructor, for each of them: `rpc` is its name in the API, `method` one of `handler`, this.
+    template <typename Handler, typename Message, typename Reply>
+    void serve(const char* rpc, Handler* handler,
+               grpc::Status (Handler::*method)(grpc::ServerContext*, Request<Message>&, Reply*)) {
+        const auto* service =
+            Message::descriptor()->file()->pool()->FindServiceByName(Service::service_full_name());
+        this->MarkMethodStreamed(service->FindMethodByName(rpc)->index(), methodHandler(handler, method));
+    }
+};
 
 }  // namespace shapedb::rpc

@@ -120,14 +120,10 @@ Result<void> searchBatch(const Services& services, const Call& call, catalog::Pr
 }  // namespace
 
 SearchServiceHandler::SearchServiceHandler(const Services& services) : services_(services) {
-    const auto mark = [this](int index, auto method) {
-        MarkMethodStreamed(index, methodHandler(this, method));
-    };
-    mark(methodIndex<v1::SearchByKeyRequest>("SearchByKey"), &SearchServiceHandler::searchByKey);
-    mark(methodIndex<v1::SearchBySignatureRequest>("SearchBySignature"),
-         &SearchServiceHandler::searchBySignature);
-    mark(methodIndex<v1::SearchBatchRequest>("SearchBatch"), &SearchServiceHandler::searchBatch);
-    mark(methodIndex<v1::CompareRequest>("Compare"), &SearchServiceHandler::compare);
+    serve("SearchByKey", this, &SearchServiceHandler::searchByKey);
+    serve("SearchBySignature", this, &SearchServiceHandler::searchBySignature);
+    serve("SearchBatch", this, &SearchServiceHandler::searchBatch);
+    serve("Compare", this, &SearchServiceHandler::compare);
 }
 
 grpc::Status SearchServiceHandler::searchByKey(grpc::ServerContext* context,

@@ -10,7 +10,7 @@
 namespace shapedb::rpc {
 
 /// Thread-safe. `services` must outlive it.
-class SearchServiceHandler final : public shapedb::v1::SearchService::Service {
+class SearchServiceHandler final : public ReadsRequests<v1::SearchService> {
   public:
     explicit SearchServiceHandler(const Services& services);
 

@@ -122,23 +122,20 @@ Result<void> sendPoints(Call& call, Writer& writer, const std::vector<float>& xy
 }  // namespace
 
 ShapeServiceHandler::ShapeServiceHandler(const Services& services) : services_(services) {
-    const auto mark = [this](int index, auto method) {
-        MarkMethodStreamed(index, methodHandler(this, method));
-    };
-    mark(methodIndex<v1::GetShapeRequest>("GetShape"), &ShapeServiceHandler::getShape);
-    mark(methodIndex<v1::GetShapesRequest>("GetShapes"), &ShapeServiceHandler::getShapes);
-    mark(methodIndex<v1::GetPointsRequest>("GetPoints"), &ShapeServiceHandler::getPoints);
-    mark(methodIndex<v1::GetPreviewsRequest>("GetPreviews"), &ShapeServiceHandler::getPreviews);
-    mark(methodIndex<v1::ListShapesRequest>("ListShapes"), &ShapeServiceHandler::listShapes);
-    mark(methodIndex<v1::CountShapesRequest>("CountShapes"), &ShapeServiceHandler::countShapes);
-    mark(methodIndex<v1::CountByValueRequest>("CountByValue"), &ShapeServiceHandler::countByValue);
-    mark(methodIndex<v1::DeleteShapeRequest>("DeleteShape"), &ShapeServiceHandler::deleteShape);
-    mark(methodIndex<v1::DeleteShapesRequest>("DeleteShapes"), &ShapeServiceHandler::deleteShapes);
-    mark(methodIndex<v1::UpdateMetadataRequest>("UpdateMetadata"), &ShapeServiceHandler::updateMetadata);
-    mark(methodIndex<v1::RetryShapesRequest>("RetryShapes"), &ShapeServiceHandler::retryShapes);
-    mark(methodIndex<v1::WatchIngestRequest>("WatchIngest"), &ShapeServiceHandler::watchIngest);
-    mark(methodIndex<v1::GetSignatureRequest>("GetSignature"), &ShapeServiceHandler::getSignature);
-    mark(methodIndex<v1::GetSegmentsRequest>("GetSegments"), &ShapeServiceHandler::getSegments);
+    serve("GetShape", this, &ShapeServiceHandler::getShape);
+    serve("GetShapes", this, &ShapeServiceHandler::getShapes);
+    serve("GetPoints", this, &ShapeServiceHandler::getPoints);
+    serve("GetPreviews", this, &ShapeServiceHandler::getPreviews);
+    serve("ListShapes", this, &ShapeServiceHandler::listShapes);
+    serve("CountShapes", this, &ShapeServiceHandler::countShapes);
+    serve("CountByValue", this, &ShapeServiceHandler::countByValue);
+    serve("DeleteShape", this, &ShapeServiceHandler::deleteShape);
+    serve("DeleteShapes", this, &ShapeServiceHandler::deleteShapes);
+    serve("UpdateMetadata", this, &ShapeServiceHandler::updateMetadata);
+    serve("RetryShapes", this, &ShapeServiceHandler::retryShapes);
+    serve("WatchIngest", this, &ShapeServiceHandler::watchIngest);
+    serve("GetSignature", this, &ShapeServiceHandler::getSignature);
+    serve("GetSegments", this, &ShapeServiceHandler::getSegments);
 }
 
 grpc::Status ShapeServiceHandler::AddShape(grpc::ServerContext* context,

@@ -10,7 +10,7 @@ namespace shapedb::rpc {
 class Call;
 
 /// Thread-safe. `services` must outlive it.
-class ShapeServiceHandler final : public shapedb::v1::ShapeService::Service {
+class ShapeServiceHandler final : public ReadsRequests<v1::ShapeService> {
   public:
     explicit ShapeServiceHandler(const Services& services);
 
