@@ -3,19 +3,19 @@
 #include <string>
 #include <utility>
 
+#include "server/store/failure.h"
+
 namespace shapedb::index {
 namespace {
-
-constexpr const char* kRestore =
-    "run 'shapedb admin check', then restore a backup with 'shapedb admin restore'";
 
 std::shared_ptr<Snapshot> marked(Snapshot snapshot, const char* what, const Error& why,
                                  const std::string& remedy) {
     const store::Collection& collection = snapshot.collection;
     const std::string name =
         collection.name.empty() ? "with id " + std::to_string(collection.id) : "'" + collection.name + "'";
-    snapshot.damage = Error{ErrorCode::kDataLoss, "collection " + name + " cannot be searched, " + what +
-                                                      " (" + why.message + "): " + kRestore + remedy};
+    snapshot.damage =
+        Error{ErrorCode::kDataLoss, "collection " + name + " cannot be searched, " + what + " (" +
+                                        why.message + "): " + store::kDamageRemedy + remedy};
     return std::make_shared<Snapshot>(std::move(snapshot));
 }
 

@@ -24,6 +24,10 @@ struct Failure : std::exception {
     bool fromDatabase;  ///< the message is the library's and needs the operation in front of it
 };
 
+/// What helps against damage, for the end of a message.
+inline constexpr char kDamageRemedy[] =
+    "run 'shapedb admin check', then restore a backup with 'shapedb admin restore'";
+
 [[noreturn]] inline void raise(ErrorCode code, std::string message) {
     throw Failure(code, std::move(message));
 }

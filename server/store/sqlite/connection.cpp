@@ -158,7 +158,7 @@ void Connection::raiseLast(int code, const char* sql) const {
     if (mapped == ErrorCode::kStorageFull) message += "; free some space on the device";
     if (mapped == ErrorCode::kDataLoss) {
         if (sql != nullptr) message += tablesOf(sql);
-        message += "; run 'shapedb admin check', then restore a backup with 'shapedb admin restore'";
+        message += std::string("; ") + kDamageRemedy;
     }
     throw Failure(mapped, std::move(message), true);
 }

@@ -20,12 +20,13 @@ struct SmallTable {
     const char* name;
     const char* consequence;
 };
+constexpr SmallTable kJobs = {"job", "no scan is taken in, searches are answered"};
 constexpr SmallTable kSmallTables[] = {
     {"sqlite_sequence", "nothing can be added"},
     {"tally", "nothing can be changed"},
     {"collection", "collections whose row cannot be read are out of service, the others are served"},
     {"collection_alias", "aliases that cannot be read are unknown"},
-    {"job", "no scan is taken in, searches are answered"},
+    kJobs,
     {"rebuild", "rebuilds do not run"},
     {"rebuild_failure", "rebuilds do not run"},
 };
@@ -39,8 +40,6 @@ constexpr char kNextCollectionOfShapes[] =
 constexpr char kCollectionsOfAliases[] = "SELECT collection_id FROM collection_alias";
 constexpr char kAliasesByIndex[] =
     "SELECT name, collection_id FROM collection_alias INDEXED BY collection_alias_by_collection";
-
-constexpr char kImportingName[] = ".import";
 
 /// Ids of collections, wherever one is mentioned, with the name if the index over the names tells it.
 std::map<std::int64_t, std::string> mentioned(Connection& connection) {
@@ -78,8 +77,8 @@ std::optional<std::string> damageOf(Connection& connection, const SmallTable& ta
     raiseUnreadable(line);
     if (line == "ok" || line.empty()) return std::nullopt;
     std::replace(line.begin(), line.end(), '\n', ' ');
-    return "table " + std::string(table.name) + " is damaged (" + line + "): " + table.consequence +
-           "; run 'shapedb admin check', then restore a backup with 'shapedb admin restore'";
+    return "table " + std::string(table.name) + " is damaged (" + line + "): " + table.consequence + "; " +
+           kDamageRemedy;
 }
 
 }  // namespace
@@ -107,10 +106,7 @@ std::vector<std::string> damagedTables(Connection& connection) {
 }
 
 void requireSoundQueue(Connection& connection) {
-    for (const SmallTable& table : kSmallTables) {
-        if (table.name != std::string_view("job")) continue;
-        if (auto line = damageOf(connection, table)) raise(ErrorCode::kDataLoss, std::move(*line));
-    }
+    if (auto line = damageOf(connection, kJobs)) raise(ErrorCode::kDataLoss, std::move(*line));
 }
 
 std::vector<Collection> salvageCollections(Connection& connection, const Error& listing) {
@@ -127,7 +123,7 @@ std::vector<Collection> salvageCollections(Connection& connection, const Error& 
             row->name = name;
             row->damage = listing;
         }
-        if (row && row->name != kImportingName) all.push_back(std::move(*row));
+        if (row && row->name != sql::kImporting) all.push_back(std::move(*row));
     }
     std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
     return all;

@@ -16,6 +16,8 @@ namespace shapedb::store::sql {
 
 /// The name, as an SQL text, of a collection that is being imported. No client can give it or ask for it.
 #define SHAPEDB_IMPORTING "'.import'"
+/// The same outside SQL.
+inline constexpr char kImporting[] = ".import";
 
 #define STATEMENT(name, text) inline constexpr char name[] = text;
 #include "server/store/sqlite/sql_statements.inc"

@@ -9,8 +9,6 @@ namespace shapedb::store {
 
 namespace {
 
-constexpr char kImporting[] = ".import";
-
 /// Beside blobs: rows, metadata, indices, and half a page of each blob that stays empty.
 constexpr std::uint64_t kBytesBesideBlobs = 8192;
 
@@ -58,7 +56,7 @@ Collection onlyCollection(Connection& file, const std::string& path) {
 
 /// The content may have been replaced by a restore, and another collection have the id.
 void requireHidden(Connection& connection, const Collection& hidden) {
-    const auto found = findCollection(connection, kImporting);
+    const auto found = findCollection(connection, sql::kImporting);
     if (found && found->id == hidden.id) return;
     raise(ErrorCode::kUnavailable, "the content was replaced during the import: import again");
 }
@@ -127,7 +125,7 @@ Collection SqliteStore::beginImport(const Collection& wanted) {
         // Asked again at the end; to be refused here saves the time.
         requireFreeName(connection, wanted.name);
         Collection hidden = wanted;
-        hidden.id = insertCollection(connection, wanted, kImporting);
+        hidden.id = insertCollection(connection, wanted, sql::kImporting);
         return hidden;
     }));
 }
@@ -168,13 +166,13 @@ Collection SqliteStore::finishImport(const Collection& imported) {
 
 Result<void> SqliteStore::dropImport() noexcept {
     const auto there = read("look for an unfinished import", [](Connection& connection) {
-        return findCollection(connection, kImporting).has_value();
+        return findCollection(connection, sql::kImporting).has_value();
     });
     RETURN_IF_ERROR(there);
     if (!*there) return {};
     while (true) {
         const auto more = remove("remove an unfinished import", [](Connection& connection) {
-            const auto found = findCollection(connection, kImporting);
+            const auto found = findCollection(connection, sql::kImporting);
             if (!found) return false;
             const std::vector<std::int64_t> ids = someShapes(connection, found->id);
             for (const std::int64_t id : ids) Query(connection, sql::kDeleteShape, id).run();
