@@ -6,8 +6,11 @@ import socket
 import ssl
 import struct
 
-from attacker import grpc
+from attacker import SecuredServer, Server, grpc
 
+HTTP = ("--http-listen", "127.0.0.1:0")
+JSON = "Content-Type: application/json"
+COUNT = "/shapedb.v1.ShapeService/CountShapes"
 CODES = {code.name.lower(): code for code in grpc.StatusCode}
 CODES["canceled"] = CODES["cancelled"]  # as the protocol spells it
 
@@ -143,3 +146,20 @@ class Raw:
 def head(path, *fields, method="POST", host="localhost"):
     lines = [f"{method} {path} HTTP/1.1", f"Host: {host}", *fields, "", ""]
     return "\r\n".join(lines)
+
+
+def serve(*flags, **options):
+    return Server(*HTTP, *flags, **options)
+
+
+def secured(*flags, **options):
+    return SecuredServer(*HTTP, *flags, **options)
+
+
+def count_request(*fields, body="{}", host="localhost"):
+    return head(COUNT, JSON, f"Content-Length: {len(body)}", *fields, host=host) + body
+
+
+def answers(server):
+    with Http(server) as client:
+        return client.json("ShapeService/CountShapes").status == 200

@@ -6,8 +6,9 @@ import threading
 import time
 import unittest
 
-from attacker import (MIB, SecuredServer, Server, admin, align, ball, collections, eventually, grpc, main, reason, search,
-                      shapes, types)
+from attacker import (MIB, SecuredServer, Server, admin, align, ball, collections, eventually, grpc, main, reason,
+                      search, shapes, types)
+from rpcs import methods
 
 
 class CompressedMessages(unittest.TestCase):
@@ -158,13 +159,9 @@ class SlowUploads(unittest.TestCase):
 MANY_EMPTY_TEXTS = b"\x12\x00" * ((4 * MIB - 1024) // 2)
 
 
-def methods(client_streams):
-    """The rpcs whose client sends one message, or a stream: their full names."""
-    for file in (admin, align, collections, search, shapes):
-        for service in file.DESCRIPTOR.services_by_name.values():
-            for method in service.methods:
-                if method.client_streaming == client_streams:
-                    yield f"/{service.full_name}/{method.name}"
+def of_one_message():
+    """The full names of the rpcs whose client sends one message."""
+    return [f"/{service.full_name}/{method.name}" for service, method in methods() if not method.client_streaming]
 
 
 def send(client, method, message, timeout=30):
@@ -179,7 +176,7 @@ def send(client, method, message, timeout=30):
 class Messages(unittest.TestCase):
     def test_that_are_none_are_refused(self):
         with SecuredServer() as server, server.local() as client:
-            for method in methods(client_streams=False):
+            for method in of_one_message():
                 error = send(client, method, b"\xff" * 100)
                 self.assertEqual((error.code(), reason(error)),
                                  (grpc.StatusCode.INVALID_ARGUMENT, "invalid_argument"), method)
@@ -187,7 +184,7 @@ class Messages(unittest.TestCase):
 
     def test_of_strangers_are_not_decoded(self):
         with SecuredServer() as server, server.connect() as stranger:
-            for method in methods(client_streams=False):
+            for method in of_one_message():
                 before = server.peak()
                 error = send(stranger, method, MANY_EMPTY_TEXTS)
                 self.assertEqual(error.code(), grpc.StatusCode.UNAUTHENTICATED, method)

@@ -9,7 +9,7 @@ import threading
 import time
 import unittest
 
-from attacker import MIB, Server, admin, ball, collections, eventually, grpc, main, pack, search, shapes, types
+from attacker import MIB, Server, admin, ball, eventually, grpc, main, pack, search, shapes, types
 
 # Taken away, since the server refuses variables of this kind that it does not know.
 SCALE = max(1, int(os.environ.pop("SHAPEDB_TEST_SCALE", "1")))

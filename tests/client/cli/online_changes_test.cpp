@@ -6,64 +6,30 @@
 
 #include "client/cli/exit_code.h"
 #include "client/io/scan_reader.h"
-#include "tests/client/cli/run_command.h"
-#include "tests/integration/support/server_process.h"
+#include "tests/client/cli/online_fixture.h"
 
 namespace shapedb::cli {
 namespace {
 
 using nlohmann::json;
-using testing::ServerProcess;
-using testing::TemporaryDirectory;
 
-/// A server for all tests, a collection with six samples for each.
-class OnlineChanges : public CommandTest {
+/// A collection with six samples for each test.
+class OnlineChanges : public Online {
   protected:
-    static void SetUpTestSuite() {
-        data() = std::make_unique<TemporaryDirectory>();
-        server() = std::make_unique<ServerProcess>(data()->path());
-        const CommandRun run = runCommand(
-            {"sample", scans(), "--count", "2", "--points", "1500", "--families", "human,mug,fish"});
-        ASSERT_EQ(run.exitCode, 0) << run.err;
-    }
-    static void TearDownTestSuite() {
-        server().reset();
-        data().reset();
-    }
-    static std::unique_ptr<TemporaryDirectory>& data() {
-        static std::unique_ptr<TemporaryDirectory> directory;
-        return directory;
-    }
-    static std::unique_ptr<ServerProcess>& server() {
-        static std::unique_ptr<ServerProcess> process;
-        return process;
-    }
-    static std::string scans() { return data()->path() + "/scans"; }
-
     OnlineChanges() {
         collection = ::testing::UnitTest::GetInstance()->current_test_info()->name();
-        ask({"collection", "create", collection, "--profile", "paper"});
+        onlineJson({"collection", "create", collection, "--profile", "paper"});
         const json added = in({"add", scans(), "--base", scans(), "--label-from-folder", "--wait"});
         EXPECT_EQ(added["added"].size(), 6u);
     }
 
-    static CommandRun run(std::vector<std::string> arguments) {
-        arguments.insert(arguments.end(), {"--server", server()->address(), "--timeout", "60"});
-        return runCommand(arguments);
-    }
-    static json ask(std::vector<std::string> arguments, int exitCode = 0) {
-        arguments.emplace_back("--json");
-        const CommandRun done = run(arguments);
-        EXPECT_EQ(done.exitCode, exitCode) << arguments[0] << ": " << done.err;
-        return done.json();
-    }
     CommandRun textIn(std::vector<std::string> arguments) const {
         arguments.insert(arguments.end(), {"--collection", collection});
-        return run(arguments);
+        return online(arguments);
     }
     json in(std::vector<std::string> arguments, int exitCode = 0) const {
         arguments.insert(arguments.end(), {"--collection", collection});
-        return ask(arguments, exitCode);
+        return onlineJson(arguments, exitCode);
     }
     std::vector<std::string> listed(std::vector<std::string> flags) const {
         flags.insert(flags.begin(), "list");
@@ -292,20 +258,20 @@ TEST_F(OnlineChanges, KeysTellFoldersApart) {
 }
 
 TEST_F(OnlineChanges, CollectionsAreRenamedAndHaveAliases) {
-    EXPECT_EQ(ask({"collection", "alias", "live", collection})["collection"], collection);
-    EXPECT_EQ(ask({"count", "--collection", "live"})["count"], 6);
-    EXPECT_EQ(ask({"query", "--key", "mug/mug_01", "--collection", "live"})["hits"].size(), 5u);
-    ask({"collection", "create", "next"});
-    EXPECT_EQ(ask({"collection", "alias", "live", "next"})["collection"], "next");
-    EXPECT_EQ(ask({"count", "--collection", "live"})["count"], 0);
-    EXPECT_EQ(ask({"collection", "get", "next"})["aliases"], json({"live"}));
-    EXPECT_EQ(ask({"collection", "rename", "next", "later"})["name"], "later");
-    EXPECT_EQ(ask({"count", "--collection", "live"})["count"], 0);
-    EXPECT_EQ(ask({"collection", "get", "next"}, 4)["error"]["name"], "not_found");
-    EXPECT_EQ(ask({"collection", "delete", "live", "--force"}, 4)["error"]["name"], "not_found");
-    EXPECT_EQ(ask({"collection", "alias", collection, "later"}, 4)["error"]["name"], "already_exists");
-    EXPECT_EQ(ask({"collection", "unalias", "live"})["deleted"], "live");
-    EXPECT_EQ(ask({"count", "--collection", "live"}, 4)["error"]["name"], "not_found");
+    EXPECT_EQ(onlineJson({"collection", "alias", "live", collection})["collection"], collection);
+    EXPECT_EQ(onlineJson({"count", "--collection", "live"})["count"], 6);
+    EXPECT_EQ(onlineJson({"query", "--key", "mug/mug_01", "--collection", "live"})["hits"].size(), 5u);
+    onlineJson({"collection", "create", "next"});
+    EXPECT_EQ(onlineJson({"collection", "alias", "live", "next"})["collection"], "next");
+    EXPECT_EQ(onlineJson({"count", "--collection", "live"})["count"], 0);
+    EXPECT_EQ(onlineJson({"collection", "get", "next"})["aliases"], json({"live"}));
+    EXPECT_EQ(onlineJson({"collection", "rename", "next", "later"})["name"], "later");
+    EXPECT_EQ(onlineJson({"count", "--collection", "live"})["count"], 0);
+    EXPECT_EQ(onlineJson({"collection", "get", "next"}, 4)["error"]["name"], "not_found");
+    EXPECT_EQ(onlineJson({"collection", "delete", "live", "--force"}, 4)["error"]["name"], "not_found");
+    EXPECT_EQ(onlineJson({"collection", "alias", collection, "later"}, 4)["error"]["name"], "already_exists");
+    EXPECT_EQ(onlineJson({"collection", "unalias", "live"})["deleted"], "live");
+    EXPECT_EQ(onlineJson({"count", "--collection", "live"}, 4)["error"]["name"], "not_found");
 }
 
 }  // namespace

@@ -11,52 +11,15 @@
 #include "client/io/scan_reader.h"
 #include "core/base/random.h"
 #include "core/geometry/motion.h"
-#include "tests/client/cli/run_command.h"
-#include "tests/integration/support/server_process.h"
+#include "tests/client/cli/online_fixture.h"
 
 namespace shapedb::cli {
 namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
-using testing::ServerProcess;
-using testing::TemporaryDirectory;
 
-/// One server and six samples for all tests, one collection per test.
-class OnlineLengths : public CommandTest {
-  protected:
-    static void SetUpTestSuite() {
-        data() = std::make_unique<TemporaryDirectory>();
-        server() = std::make_unique<ServerProcess>(data()->path());
-        const CommandRun run = runCommand(
-            {"sample", scans(), "--count", "2", "--points", "2000", "--families", "human,mug,fish"});
-        ASSERT_EQ(run.exitCode, 0) << run.err;
-    }
-    static void TearDownTestSuite() {
-        server().reset();
-        data().reset();
-    }
-    static std::unique_ptr<TemporaryDirectory>& data() {
-        static std::unique_ptr<TemporaryDirectory> directory;
-        return directory;
-    }
-    static std::unique_ptr<ServerProcess>& server() {
-        static std::unique_ptr<ServerProcess> process;
-        return process;
-    }
-    static std::string scans() { return data()->path() + "/scans"; }
-
-    static CommandRun online(std::vector<std::string> arguments) {
-        arguments.insert(arguments.end(), {"--server", server()->address(), "--timeout", "60"});
-        return runCommand(arguments);
-    }
-    static json onlineJson(std::vector<std::string> arguments, int exitCode = 0) {
-        arguments.emplace_back("--json");
-        const CommandRun run = online(arguments);
-        EXPECT_EQ(run.exitCode, exitCode) << arguments[0] << ": " << run.err;
-        return run.json();
-    }
-};
+using OnlineLengths = Online;
 
 /// Two balls of different sizes on a table.
 std::string twoBallsOnATable() {
