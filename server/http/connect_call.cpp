@@ -23,8 +23,8 @@ ConnectCall::ConnectCall(const CallServices& services, CallClient& client, const
       envelopes_(kMostMessageBytes) {}
 
 void ConnectCall::start() {
-    // Whether the caller may call is found out before an upload arrives. A single message comes first: gRPC's
-    // handlers begin when they have it.
+    // Whether the caller may call is found out before an upload arrives. A single message comes first: a
+    // handler would hold a place of its kind while it waits for it.
     if (method_.clientStreams) startInner();
 }
 

@@ -213,6 +213,11 @@ def reason(error):
     return None
 
 
+def limits_of(client):
+    reply = client.admin.ServerInfo(admin.ServerInfoRequest(), timeout=10)
+    return {limit.name: limit for limit in reply.limit_table}
+
+
 def eventually(condition, seconds=60):
     until = time.monotonic() + seconds
     while not condition():

@@ -14,8 +14,8 @@ import unittest
 import health_pb2
 from shapedb.v1 import shape_service_pb2_grpc as shapes_grpc
 
-from attacker import (CHUNK_POINTS, MIB, SecuredServer, Server, admin, ball, collections, eventually, grpc, main,
-                      reason, search, shapes, types)
+from attacker import (CHUNK_POINTS, MIB, SecuredServer, Server, admin, ball, collections, eventually, grpc,
+                      limits_of, main, reason, search, shapes, types)
 
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
 WAITING_POINTS = 85_000  # so many that their segmentation takes longer than what is tried beside it
@@ -34,11 +34,6 @@ ELSEWHERE = {
     "limits.min_bytes_per_second": ("tests/attack/resources_test.py", "test_are_cut_off"),
     "ingest.max_attempts": ("tests/server/ingest/worker_pool_test.cpp", "JobOfADeadProcessIsDoneAgainButNotForEver"),
 }
-
-
-def limits_of(client):
-    reply = client.admin.ServerInfo(admin.ServerInfoRequest(), timeout=10)
-    return {limit.name: limit for limit in reply.limit_table}
 
 
 class Limits(unittest.TestCase):
@@ -382,26 +377,6 @@ class Limits(unittest.TestCase):
         stats = client.admin.Stats(admin.StatsRequest(), timeout=10)
         held = stats.queued_bytes if unit == "bytes" else stats.queued_jobs + stats.running_jobs
         self.assertLessEqual(held, limit.value)
-
-
-class Pace(unittest.TestCase):
-    def test_is_refused_as_listed(self):
-        """A call that is cut off has no `shapedb-error`: what is listed is its status."""
-        def send(pause, stop):
-            yield shapes.AddShapeRequest(header=shapes.AddShapeHeader(key="slow", point_count=100_000))
-            while not stop.wait(pause):
-                yield shapes.AddShapeRequest(chunk=types.PointChunk(xyz=b"\0" * 12))
-
-        with Server("--limits-stall-seconds", "2", "--limits-min-bytes-per-second", "1000") as server, \
-                server.connect() as client:
-            limits = limits_of(client)
-            for name, pause in (("limits.stall_seconds", 30), ("limits.min_bytes_per_second", 0.1)):
-                stop = threading.Event()
-                with self.assertRaises(grpc.RpcError) as failure:
-                    client.shapes.AddShape(send(pause, stop), timeout=60)
-                stop.set()
-                self.assertIn(name, failure.exception.details())
-                self.assertEqual(failure.exception.code().name.lower(), limits[name].refusal)
 
 
 class Stored(unittest.TestCase):

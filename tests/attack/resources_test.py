@@ -6,8 +6,8 @@ import threading
 import time
 import unittest
 
-from attacker import (MIB, SecuredServer, Server, admin, align, ball, collections, eventually, grpc, main, reason,
-                      search, shapes, types)
+from attacker import (MIB, SecuredServer, Server, admin, align, ball, collections, eventually, grpc, limits_of,
+                      main, reason, search, shapes, types)
 from rpcs import methods
 
 
@@ -291,6 +291,26 @@ class CutOffCalls(unittest.TestCase):
                 self.assert_cut_off(name, call, grpc.StatusCode.UNAVAILABLE,
                                     "the server is shutting down: send it again after its restart")
             stop.set()
+
+
+class Pace(unittest.TestCase):
+    def test_is_refused_as_listed(self):
+        """A call that is cut off has no `shapedb-error`: what is listed is its status."""
+        def send(pause, stop):
+            yield shapes.AddShapeRequest(header=shapes.AddShapeHeader(key="slow", point_count=100_000))
+            while not stop.wait(pause):
+                yield shapes.AddShapeRequest(chunk=types.PointChunk(xyz=b"\0" * 12))
+
+        with Server("--limits-stall-seconds", "2", "--limits-min-bytes-per-second", "1000") as server, \
+                server.connect() as client:
+            limits = limits_of(client)
+            for name, pause in (("limits.stall_seconds", 30), ("limits.min_bytes_per_second", 0.1)):
+                stop = threading.Event()
+                with self.assertRaises(grpc.RpcError) as failure:
+                    client.shapes.AddShape(send(pause, stop), timeout=60)
+                stop.set()
+                self.assertIn(name, failure.exception.details())
+                self.assertEqual(failure.exception.code().name.lower(), limits[name].refusal)
 
 
 class Floods(unittest.TestCase):
