@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/base/count_text.h"
 #include "core/base/return_if_error.h"
 #include "server/catalog/limits.h"
 #include "server/catalog/request_checks.h"
@@ -12,9 +13,8 @@ Result<void> ScanUpload::begin(std::uint64_t announced, const std::string& sha25
     if (announced_)
         return fail(ErrorCode::kMalformedStream, "a second header arrived; send one, before the chunks");
     if (announced < kMinPoints) {
-        return fail(ErrorCode::kTooFewPoints, "point_count: " + std::to_string(announced) +
-                                                  " points, a scan needs at least " +
-                                                  std::to_string(kMinPoints));
+        return fail(ErrorCode::kTooFewPoints, "point_count: " + countText(announced, "point") +
+                                                  ", a scan needs at least " + std::to_string(kMinPoints));
     }
     if (announced > maxPoints_) {
         return fail(ErrorCode::kPointLimitExceeded,

@@ -77,7 +77,8 @@ struct ServerConfig {
     } log;
 
     struct Metrics {
-        std::string listen;  ///< HOST:PORT; empty: none
+        std::string listen;                ///< HOST:PORT; empty: none
+        std::string anyoneMayRead = "no";  ///< "yes": beyond loopback too
     } metrics;
 
     struct Shutdown {

@@ -214,16 +214,33 @@ Setting optionalPath(const std::string& key, Field field, std::string help) {
 constexpr const char* kAnyoneMayDoAll =
     "security.anyone_on_the_network_may_read_change_and_delete_everything";
 
-/// The setting of an address that others than this machine reach, with its value; empty: there is none.
+constexpr const char* kMetricsForAnyone = "metrics.anyone_on_the_network_may_read";
+
+/// Whether others than this machine reach it.
+bool isBeyond(const std::string& address) {
+    if (address.empty()) return false;
+    const auto endpoint = parseEndpoint(address);
+    return !endpoint || !endpoint->isLoopback();
+}
+
+/// The setting of an address of the API that is beyond this machine, with its value; empty: there is none.
 std::string addressBeyond(const ServerConfig& config) {
     const std::pair<const char*, const std::string&> addresses[] = {{"listen", config.listen},
                                                                     {"http.listen", config.http.listen}};
-    for (const auto& [key, address] : addresses) {
-        const auto endpoint = parseEndpoint(address);
-        const bool local = address.empty() || (endpoint && endpoint->isLoopback());
-        if (!local) return std::string(key) + " = " + address;
-    }
+    for (const auto& [key, address] : addresses)
+        if (isBeyond(address)) return std::string(key) + " = " + address;
     return {};
+}
+
+/// Prometheus reads without TLS and without a key.
+Result<void> validateMetrics(const ServerConfig& config) {
+    const bool open = config.metrics.anyoneMayRead == "yes" || config.security.anyoneMayDoAll == "yes";
+    if (open || !isBeyond(config.metrics.listen)) return {};
+    return fail(ErrorCode::kInvalidArgument,
+                "metrics.listen = " + config.metrics.listen +
+                    " is beyond this machine, and metrics are served without TLS and without a key; let a "
+                    "proxy with both stand before it, or, for a network where anybody may read them, set " +
+                    kMetricsForAnyone + " = yes");
 }
 
 /// What must not be reachable beyond this machine without TLS.
@@ -236,6 +253,7 @@ Result<void> validateSecurity(const ServerConfig& config) {
     if (!tls && !config.tls.clientCa.empty()) {
         return fail(ErrorCode::kInvalidArgument, "tls.client_ca takes tls.certificate and tls.key");
     }
+    RETURN_IF_ERROR(validateMetrics(config));
     if (tls || config.security.anyoneMayDoAll == "yes") return {};
     const std::string beyond = addressBeyond(config);
     if (beyond.empty()) return {};
@@ -351,6 +369,9 @@ std::vector<Setting> makeSettings() {
         optionalAddress(
             "metrics.listen", [](C& c) -> std::string& { return c.metrics.listen; },
             "Address to serve numbers for Prometheus on (http, /metrics). Empty: none."),
+        choice(
+            kMetricsForAnyone, {"no", "yes"}, [](C& c) -> std::string& { return c.metrics.anyoneMayRead; },
+            "yes: serve the numbers beyond loopback, without TLS and without API keys."),
         number(
             "shutdown.drain_seconds", kInteger, 0, 3'600,
             [](C& c) -> int& { return c.shutdown.drainSeconds; },

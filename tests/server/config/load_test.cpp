@@ -253,6 +253,23 @@ TEST_F(Load, BeyondThisMachineTlsIsNeeded) {
     }
 }
 
+TEST_F(Load, MetricsLeaveThisMachineOnlyWhenTold) {
+    const char* flag = "--metrics-listen";
+    for (const char* address : {"0.0.0.0:1", "[::]:1", "192.168.1.2:1", "shapes.example:1"}) {
+        // TLS is of the API: metrics have none.
+        for (const bool tls : {false, true}) {
+            std::vector<const char*> flags{flag, address};
+            if (tls) flags.insert(flags.end(), {"--tls-certificate", "c", "--tls-key", "k"});
+            expectRefused(loadWith(flags), ErrorCode::kInvalidArgument,
+                          {"metrics.listen", address, "metrics.anyone_on_the_network_may_read"});
+            flags.insert(flags.end(), {"--metrics-anyone-on-the-network-may-read", "yes"});
+            EXPECT_TRUE(loadWith(flags)) << address;
+        }
+    }
+    for (const char* address : {"127.0.0.1:1", "[::1]:1", "localhost:1", ""})
+        EXPECT_TRUE(loadWith({flag, address})) << address;
+}
+
 TEST_F(Load, HttpIsOffAndKnowsItsNames) {
     EXPECT_EQ(loadWith({})->config.http.listen, "");
     EXPECT_EQ(transports(loadWith({})->config), 1);
