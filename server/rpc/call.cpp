@@ -140,6 +140,7 @@ security::Credentials Call::credentials() const {
 
 Result<void> Call::begin() {
     RETURN_IF_ERROR(authorization_.begin(credentials()));
+    cancellation_.guard(authorization_.stillAllowed());
     return frame_.admit(operation_.callClass);
 }
 

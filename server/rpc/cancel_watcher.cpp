@@ -1,6 +1,7 @@
 #include "server/rpc/cancel_watcher.h"
 
 #include <string>
+#include <utility>
 
 #include <grpc/grpc.h>
 
@@ -9,6 +10,11 @@
 #include "server/rpc/status.h"
 
 namespace shapedb::rpc {
+namespace {
+
+constexpr std::chrono::seconds kToSayItBetter{1};
+
+}  // namespace
 
 CancelWatcher::CancelWatcher(std::chrono::milliseconds stall, std::uint64_t leastRate)
     : limits_{stall, leastRate}, thread_([this] { run(); }) {}
@@ -40,6 +46,10 @@ void CancelWatcher::look(Registration& call) const {
         call.flag_ = true;
         return;
     }
+    if (const auto still = call.stillAllowed_ ? call.stillAllowed_() : Result<void>(); !still) {
+        if (!call.refusedSince_) call.refusedSince_ = Clock::now();
+        if (Clock::now() - *call.refusedSince_ >= kToSayItBetter) cutOff(call, still.error());
+    }
     const Clock::rep since = call.blockedSince_;
     if (since == 0) return;
     const auto now = Clock::now() - Clock::time_point(Clock::duration(since));
@@ -62,6 +72,11 @@ void CancelWatcher::cutOff(Registration& call, const Error& why) {
 void CancelWatcher::cutOffAll(const Error& why) {
     const std::lock_guard<std::mutex> lock(mutex_);
     for (Registration* call : calls_) cutOff(*call, why);
+}
+
+void CancelWatcher::Registration::guard(std::function<Result<void>()> stillAllowed) {
+    const std::lock_guard<std::mutex> lock(watcher_.mutex_);
+    stillAllowed_ = std::move(stillAllowed);
 }
 
 std::optional<Error> CancelWatcher::Registration::end() {

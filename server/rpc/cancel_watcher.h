@@ -7,6 +7,7 @@
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <set>
@@ -45,6 +46,10 @@ class CancelWatcher {
         Registration(const Registration&) = delete;
         Registration& operator=(const Registration&) = delete;
 
+        /// The call is cut off, with the status of the error, a second after `stillAllowed` fails: calls that
+        /// ask for themselves can say it better. It is called often, by another thread.
+        void guard(std::function<Result<void>()> stillAllowed);
+
         /// True once the client has gone or cancelled, or the deadline has passed.
         [[nodiscard]] const std::atomic<bool>& flag() const { return flag_; }
 
@@ -64,7 +69,9 @@ class CancelWatcher {
         CancelWatcher& watcher_;
         grpc::ServerContext& context_;
         std::atomic<bool> flag_{false};
-        std::optional<Error> cutOff_;              ///< guarded by the watcher's mutex
+        std::optional<Error> cutOff_;                 ///< guarded by the watcher's mutex, as is the next
+        std::function<Result<void>()> stillAllowed_;  ///< may be empty
+        std::optional<Clock::time_point> refusedSince_;
         std::atomic<Clock::rep> blockedSince_{0};  ///< 0: not blocked
         std::atomic<Clock::rep> blocked_{0};       ///< in earlier transfers
         std::atomic<std::uint64_t> bytes_{0};      ///< moved so far

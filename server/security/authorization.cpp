@@ -80,8 +80,12 @@ Result<void> Authorization::useScan(std::uint64_t bytes) {
     return spend(holder_->takeScan(bytes, policy_.keyring.clock().wall()));
 }
 
-Result<void> Authorization::requireStill() const {
-    return holder_ ? policy_.keyring.requireUsable(*holder_) : Result<void>();
+Result<void> Authorization::requireStill() const { return stillAllowed()(); }
+
+std::function<Result<void>()> Authorization::stillAllowed() const {
+    return [&keyring = policy_.keyring, holder = holder_] {
+        return holder ? keyring.requireUsable(*holder) : Result<void>();
+    };
 }
 
 Result<void> Authorization::spend(tl::expected<void, Refusal> taken) {

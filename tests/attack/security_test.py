@@ -316,20 +316,29 @@ class Secrets(unittest.TestCase):
                     self.assertIn("was revoked", error.details())
                 self.assertEqual(local.count(), 2, "what is there is as it was")
 
-    def test_a_download_that_has_begun_runs_to_its_end_without_its_key(self):
-        count = 1_000_000
+    def test_a_download_ends_soon_after_its_key(self):
+        def in_two_seconds():
+            soon = timestamp_pb2.Timestamp()
+            soon.FromDatetime(datetime.datetime.utcnow() + datetime.timedelta(seconds=2))
+            return soon
+
         with SecuredServer() as server, server.local() as local:
-            local.add("large", [(i % 1000, i // 1000, (i * i) % 999) for i in range(count)], timeout=120)
-            key = server.make(READER)
-            with server.connect(key=key.secret) as client:
-                request = shapes.GetPointsRequest(shape=shapes.ShapeRef(key="large"))
-                download = client.shapes.GetPoints(request, timeout=60)
-                self.assertEqual(next(download).shape.key, "large")
-                local.admin.RevokeKey(admin.RevokeKeyRequest(id=key.key.id), timeout=10)
-                self.assertEqual(sum(len(message.chunk.xyz) for message in download), 12 * count)
-                with self.assertRaises(grpc.RpcError) as failure:
-                    next(client.shapes.GetPoints(request, timeout=60))
-                self.assertEqual(reason(failure.exception), "unauthenticated")
+            local.add("large", [(i % 1000, i // 1000, (i * i) % 999) for i in range(1_000_000)], timeout=120)
+            for ended in ("was revoked", "has expired"):
+                expires = {"expires": in_two_seconds()} if ended == "has expired" else {}
+                key = server.make(READER, **expires)
+                with self.subTest(ended), server.connect(key=key.secret) as client:
+                    request = shapes.GetPointsRequest(shape=shapes.ShapeRef(key="large"))
+                    download = client.shapes.GetPoints(request, timeout=60)
+                    self.assertEqual(next(download).shape.key, "large")
+                    if ended == "was revoked":
+                        local.admin.RevokeKey(admin.RevokeKeyRequest(id=key.key.id), timeout=10)
+                    time.sleep(3)  # what is not read stops the server from sending more
+                    with self.assertRaises(grpc.RpcError) as failure:
+                        for _ in download:
+                            pass
+                    self.assertEqual(failure.exception.code(), grpc.StatusCode.UNAUTHENTICATED)
+                    self.assertIn(ended, failure.exception.details())
 
     def test_a_long_upload_ends_soon_after_its_key(self):
         with SecuredServer() as server:
