@@ -7,6 +7,7 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
+#include "bench/batch_clients.h"
 #include "bench/load_parts.h"
 #include "bench/quantiles.h"
 #include "bench/stored_shapes.h"
@@ -48,13 +49,10 @@ struct Subject {
 };
 
 /// As measureLatencyOf, beside clients that send large batches.
-Result<BatchFigures> measureBatchesOf(const LoadSettings& settings, const ServerProcess& server,
-                                      const client::Client& client, const std::vector<std::string>& queries,
-                                      const LoadProgress& progress, const RunContext& context) {
-    std::vector<client::BatchQuery> batch(settings.batchQueries);
-    for (std::size_t i = 0; i < batch.size(); ++i) batch[i].signature = queries[i % queries.size()];
-    client::SearchOptions options;
-    options.k = settings.k;
+Result<BatchFigures> measureBatchesOf(const LoadSettings& settings, const Subject& subject,
+                                      const client::Client& client, const LoadProgress& progress,
+                                      const RunContext& context) {
+    const std::vector<std::string>& queries = subject.queries;
     std::vector<double> idle, busy, warmUp;
     const std::size_t share = (settings.queries + settings.rounds - 1) / settings.rounds;
     const double seconds = settings.querySeconds / static_cast<double>(settings.rounds);
@@ -64,16 +62,8 @@ Result<BatchFigures> measureBatchesOf(const LoadSettings& settings, const Server
     for (std::size_t round = 0; round < settings.rounds; ++round) {
         progress("queries beside batches", round, settings.rounds);
         RETURN_IF_ERROR(ask(client, queries, settings.k, share, seconds, idle, context));
-        std::atomic<bool> stop{false};
-        RunContext stopped;
-        stopped.cancel = &stop;
-        WorkLoop loop(settings.batchClients, stop, [&](std::size_t) -> Result<bool> {
-            yieldToServer();
-            const auto own = connect(server);
-            RETURN_IF_ERROR(own);
-            RETURN_IF_ERROR(own->searchBatch(options, batch, stopped));
-            return true;
-        });
+        auto clients = BatchClients::start(settings, subject.server, queries, subject.directory.path());
+        RETURN_IF_ERROR(clients);
         std::this_thread::sleep_for(kWarmUp);
         const auto before = client.stats();
         const std::size_t asked = busy.size();
@@ -81,15 +71,17 @@ Result<BatchFigures> measureBatchesOf(const LoadSettings& settings, const Server
         RETURN_IF_ERROR(ask(client, queries, settings.k, share, seconds, busy, context));
         busySeconds += since(began);
         const auto after = client.stats();
-        stop = true;
-        RETURN_IF_ERROR(loop.finish());
+        RETURN_IF_ERROR(clients->requireRunning());
         if (!before || !after) return fail((before ? after : before).error());
         figures.searchesPerSecond +=
             static_cast<double>(after->searches - before->searches - (busy.size() - asked));
-        // What was interrupted ends before the next round.
+        {
+            // What is interrupted ends before the next round.
+            const BatchClients killed = std::move(*clients);
+        }
         std::this_thread::sleep_for(kWarmUp);
     }
-    const auto memory = server.memory();
+    const auto memory = subject.server.memory();
     RETURN_IF_ERROR(memory);
     figures.peak = memory->peak;
     figures.idle = latenciesOf(idle);
@@ -156,7 +148,7 @@ Result<BatchFigures> measureBatches(const LoadSettings& settings, const LoadProg
     RETURN_IF_ERROR(subject);
     const auto client = connect(subject->server);
     RETURN_IF_ERROR(client);
-    return measureBatchesOf(settings, subject->server, *client, subject->queries, progress, context);
+    return measureBatchesOf(settings, *subject, *client, progress, context);
 }
 
 Result<OverloadFigures> measureOverload(const LoadSettings& settings, const LoadProgress& progress,

@@ -40,6 +40,7 @@ void addRetrievalOperation(CLI::App& app, Bench& bench);
 void addInteriorOperation(CLI::App& app, Bench& bench);
 void addTopKOperation(CLI::App& app, Bench& bench);
 void addLoadOperation(CLI::App& app, Bench& bench);
+void addBatchClientsOperation(CLI::App& app, Bench& bench);
 void addInstructionsOperation(CLI::App& app, Bench& bench);
 void addJobOperation(CLI::App& app, Bench& bench);
 void addSegmentOperation(CLI::App& app, Bench& bench);

@@ -49,6 +49,7 @@ int run(int argc, const char* const* argv, cli::Console& console, const std::ato
         addInteriorOperation(app, bench);
         addTopKOperation(app, bench);
         addLoadOperation(app, bench);
+        addBatchClientsOperation(app, bench);
         addInstructionsOperation(app, bench);
         addJobOperation(app, bench);
         addSegmentOperation(app, bench);

@@ -18,6 +18,7 @@
 #include "server/config/settings.h"
 #include "server/daemon.h"
 #include "server/key_command.h"
+#include "server/store/sqlite/sqlite_store.h"
 #include "server/telemetry/logger.h"
 
 namespace {
@@ -112,6 +113,7 @@ int main(int argc, char** argv) {
     std::signal(SIGXFSZ, SIG_IGN);
     // What gRPC would write to standard error is about strangers who break the protocol, and without end.
     setenv("GRPC_VERBOSITY", "NONE", 0);
+    shapedb::store::stopCountingSqliteMemory();
     try {
         return run(argc, argv);
     } catch (const std::exception& error) {

@@ -260,9 +260,13 @@ class Catalog {
     /// collection was looked up, `found.collection` becomes the collection after it, and so does the
     /// signature. Errors: kNotReady, saying whether it is pending or why it failed; kDataLoss.
     [[nodiscard]] Result<Signature> signature(FoundShape& found);
-    /// The signature behind a hit, with what the index leaves out. Errors: kNotFound, kNotReady (also:
-    /// of another generation than `searched`), kDataLoss.
-    [[nodiscard]] Result<Signature> storedSignature(const index::Snapshot& searched, std::int64_t shapeId);
+    /// As store::Store.
+    [[nodiscard]] Result<std::vector<std::optional<store::StoredHit>>> getHits(
+        const std::vector<std::int64_t>& shapeIds, bool withSignatures);
+    /// What is stored, with what the index leaves out. Errors: that of `row`; kNotReady (of another
+    /// generation than `searched`), kDataLoss.
+    [[nodiscard]] static Result<Signature> decoded(const index::Snapshot& searched,
+                                                   const Result<store::SignatureRow>& row);
     /// The points of a shape in the order of the upload, and the shape that they are of, which may
     /// have changed since it was looked up. Takes their bytes from `share`. Errors: kNotFound (deleted
     /// meanwhile), kQueueFull, kDataLoss.

@@ -13,6 +13,10 @@ namespace shapedb::catalog {
 
 namespace {
 
+// Rows read together. Each read takes locks of SQLite that all connections share, and a thread of low
+// priority that is held up inside one holds up all the others: so few reads, each of little memory.
+constexpr std::size_t kHitsAtOnce = 64;
+
 // Whether sizes are compared, of shapes in collections with this unit.
 Result<bool> sizesCount(bool keepScale, bool freeScale, LengthUnit unit) {
     if (keepScale && freeScale) {
@@ -271,9 +275,9 @@ SurfaceOf Searches::surfaces() const {
 }
 
 Result<std::optional<Explanation>> Searches::explain(const PreparedSearch& search, const Signature& query,
-                                                     const VerifiedResult& found,
-                                                     const VerifiedHit& hit) const {
-    const auto signature = catalog_.storedSignature(*search.collection, hit.id);
+                                                     const VerifiedResult& found, const VerifiedHit& hit,
+                                                     const Result<store::SignatureRow>& stored) {
+    const auto signature = Catalog::decoded(*search.collection, stored);
     if (!signature && signature.error().code == ErrorCode::kDataLoss) return fail(signature.error());
     // Deleted or replaced since the search, or not readable now: a hit without reasons.
     if (!signature) return std::optional<Explanation>();
@@ -287,31 +291,44 @@ Result<std::optional<Explanation>> Searches::explain(const PreparedSearch& searc
     return std::optional<Explanation>(std::move(explanation));
 }
 
+Result<FoundHit> Searches::show(const PreparedSearch& search, const Signature& query,
+                                const VerifiedResult& found, const VerifiedHit& hit,
+                                store::StoredHit stored) {
+    FoundHit out;
+    out.shape = std::move(stored.shape);
+    out.quality = qualityIn(search.collection->signatures, hit.id);
+    out.score = hit.score;
+    out.signatureScore = hit.signatureScore;
+    out.fit = hit.fit;
+    out.verdict = hit.verdict;
+    if (search.options.grouping) {
+        // As it was searched: the shape may have other metadata by now.
+        const GroupValue group = groupOf(search.collection->signatures, hit.id, search.options.grouping->key);
+        if (group != nullptr) out.group = *group;
+    }
+    if (search.explain) {
+        auto explanation = explain(search, query, found, hit, stored.signature);
+        RETURN_IF_ERROR(explanation);
+        out.explanation = std::move(*explanation);
+    }
+    return out;
+}
+
 Result<void> Searches::visitHits(const PreparedSearch& search, const Signature& query,
                                  const VerifiedResult& found, const Visit& visit) const {
-    for (const VerifiedHit& hit : found.hits) {
-        auto shape = catalog_.shapeById(hit.id);
-        if (!shape && shape.error().code == ErrorCode::kNotFound) continue;  // deleted meanwhile
-        RETURN_IF_ERROR(shape);
-        FoundHit out;
-        out.shape = std::move(*shape);
-        out.quality = qualityIn(search.collection->signatures, hit.id);
-        out.score = hit.score;
-        out.signatureScore = hit.signatureScore;
-        out.fit = hit.fit;
-        out.verdict = hit.verdict;
-        if (search.options.grouping) {
-            // As it was searched: the shape may have other metadata by now.
-            const GroupValue group =
-                groupOf(search.collection->signatures, hit.id, search.options.grouping->key);
-            if (group != nullptr) out.group = *group;
+    for (std::size_t begin = 0; begin < found.hits.size(); begin += kHitsAtOnce) {
+        const std::size_t end = std::min(found.hits.size(), begin + kHitsAtOnce);
+        std::vector<std::int64_t> ids;
+        for (std::size_t i = begin; i < end; ++i) ids.push_back(found.hits[i].id);
+        auto stored = catalog_.getHits(ids, search.explain);
+        RETURN_IF_ERROR(stored);
+        for (std::size_t i = begin; i < end; ++i) {
+            auto& one = (*stored)[i - begin];
+            if (!one) continue;  // deleted meanwhile
+            const auto hit = show(search, query, found, found.hits[i], std::move(*one));
+            RETURN_IF_ERROR(hit);
+            RETURN_IF_ERROR(visit(*hit));
         }
-        if (search.explain) {
-            auto explanation = explain(search, query, found, hit);
-            RETURN_IF_ERROR(explanation);
-            out.explanation = std::move(*explanation);
-        }
-        RETURN_IF_ERROR(visit(out));
     }
     return {};
 }

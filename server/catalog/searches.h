@@ -174,8 +174,12 @@ class Searches {
     Result<FoundShape> shapeNamed(const ShapeName& name) const;
     Result<LengthUnit> unitOf(const ShapeName& name) const;
     Result<Compared> compared(const char* which, const ShapeName& name) const;
-    Result<std::optional<Explanation>> explain(const PreparedSearch& search, const Signature& query,
-                                               const VerifiedResult& found, const VerifiedHit& hit) const;
+    static Result<std::optional<Explanation>> explain(const PreparedSearch& search, const Signature& query,
+                                                      const VerifiedResult& found, const VerifiedHit& hit,
+                                                      const Result<store::SignatureRow>& stored);
+    static Result<FoundHit> show(const PreparedSearch& search, const Signature& query,
+                                 const VerifiedResult& found, const VerifiedHit& hit,
+                                 store::StoredHit stored);
     SurfaceOf surfaces() const;
     static Result<SurfacePoints> surfaceOfScan(const store::VerifiedScan& scan, const RunContext& context);
     Result<std::shared_ptr<const SurfacePoints>> surfaceOf(const ShapeName& name) const;

@@ -41,7 +41,7 @@ Result<std::uint64_t> Catalog::countShapes(std::int64_t collectionId, const stor
 
 Result<Signature> Catalog::signature(FoundShape& found) {
     while (found.collection->signatures.find(found.shape.id)) {
-        auto signature = storedSignature(*found.collection, found.shape.id);
+        auto signature = decoded(*found.collection, store_->getSignature(found.shape.id));
         if (signature || signature.error().code != ErrorCode::kNotReady) return signature;
         // The store may have switched to the results of a rebuild: once the index has followed, again with
         // them.
@@ -59,8 +59,12 @@ Result<Signature> Catalog::signature(FoundShape& found) {
     return fail(ErrorCode::kNotReady, name + " yet: wait until it is READY (WatchIngest)");
 }
 
-Result<Signature> Catalog::storedSignature(const index::Snapshot& searched, std::int64_t shapeId) {
-    const auto row = store_->getSignature(shapeId);
+Result<std::vector<std::optional<store::StoredHit>>> Catalog::getHits(
+    const std::vector<std::int64_t>& shapeIds, bool withSignatures) {
+    return store_->getHits(shapeIds, withSignatures);
+}
+
+Result<Signature> Catalog::decoded(const index::Snapshot& searched, const Result<store::SignatureRow>& row) {
     RETURN_IF_ERROR(row);
     if (row->generation != searched.collection.generation) {
         return fail(ErrorCode::kNotReady, "a rebuild of collection '" + searched.collection.name +
@@ -68,7 +72,7 @@ Result<Signature> Catalog::storedSignature(const index::Snapshot& searched, std:
     }
     auto signature = decodeSignature(row->bytes);
     if (!signature) {
-        return fail(ErrorCode::kDataLoss, "the signature of shape " + std::to_string(shapeId) +
+        return fail(ErrorCode::kDataLoss, "the signature of shape " + std::to_string(row->shapeId) +
                                               " is damaged: " + signature.error().message);
     }
     return signature;

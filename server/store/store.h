@@ -182,6 +182,12 @@ struct SurfaceRow {
     std::string bytes;  ///< core/fit/surface_points_codec.h
 };
 
+/// What a search shows of a shape that it found.
+struct StoredHit {
+    Shape shape;
+    Result<SignatureRow> signature;  ///< as getSignature, or kNotReady if it was not asked for
+};
+
 /// What the index needs of one shape.
 struct IndexRow {
     std::int64_t shapeId = 0;
@@ -302,6 +308,9 @@ class Store {
     [[nodiscard]] virtual Result<StoredPoints> loadPoints(std::int64_t shapeId) = 0;
     /// The signature that serves now. Errors: kNotFound (shape), kNotReady.
     [[nodiscard]] virtual Result<SignatureRow> getSignature(std::int64_t shapeId) = 0;
+    /// One for each id, empty where the shape is gone; all as of one moment and in one read of the database.
+    [[nodiscard]] virtual Result<std::vector<std::optional<StoredHit>>> getHits(
+        const std::vector<std::int64_t>& shapeIds, bool withSignatures) = 0;
     /// The surface points of the shape; empty if none were stored yet. Errors: kNotFound (shape).
     [[nodiscard]] virtual Result<std::optional<SurfaceRow>> getSurface(std::int64_t shapeId) = 0;
 

@@ -19,6 +19,18 @@ constexpr std::size_t kMostReserved = 4096;
     raise(ErrorCode::kNotFound, "there is no shape with id " + std::to_string(shapeId));
 }
 
+SignatureRow servingSignature(Connection& connection, std::int64_t shapeId) {
+    Query query(connection, sql::kServingSignature, shapeId);
+    if (!query.step()) raiseNoShape(shapeId);
+    if (query.isNull(3)) {
+        const bool failed = query.integer(1) == static_cast<int>(ShapeState::kFailed);
+        raise(ErrorCode::kNotReady, "shape " + quoted(query.text(0)) +
+                                        (failed ? " could not be segmented: " + query.text(2)
+                                                : " has no signature yet; its job is queued"));
+    }
+    return readSignature(connection, query, 3, shapeId);
+}
+
 void writeMetadata(Connection& connection, std::int64_t shapeId, const Metadata& metadata) {
     for (const auto& [name, value] : metadata) {
         Query(connection, sql::kInsertMetadata, shapeId, name, value).run();
@@ -212,16 +224,25 @@ Result<StoredPoints> SqliteStore::loadPoints(std::int64_t shapeId) {
 }
 
 Result<SignatureRow> SqliteStore::getSignature(std::int64_t shapeId) {
-    return read("read the signature", [&](Connection& connection) {
-        Query query(connection, sql::kServingSignature, shapeId);
-        if (!query.step()) raiseNoShape(shapeId);
-        if (query.isNull(3)) {
-            const bool failed = query.integer(1) == static_cast<int>(ShapeState::kFailed);
-            raise(ErrorCode::kNotReady, "shape " + quoted(query.text(0)) +
-                                            (failed ? " could not be segmented: " + query.text(2)
-                                                    : " has no signature yet; its job is queued"));
+    return read("read the signature",
+                [&](Connection& connection) { return servingSignature(connection, shapeId); });
+}
+
+Result<std::vector<std::optional<StoredHit>>> SqliteStore::getHits(const std::vector<std::int64_t>& shapeIds,
+                                                                   bool withSignatures) {
+    return read("read the hits", [&](Connection& connection) {
+        std::vector<std::optional<StoredHit>> hits(shapeIds.size());
+        for (std::size_t i = 0; i < hits.size(); ++i) {
+            auto shape = findShapeById(connection, shapeIds[i]);
+            if (!shape) continue;
+            Result<SignatureRow> signature = fail(ErrorCode::kNotReady, "not asked for");
+            if (withSignatures) {
+                signature =
+                    guarded("read the signature", [&] { return servingSignature(connection, shapeIds[i]); });
+            }
+            hits[i] = StoredHit{std::move(*shape), std::move(signature)};
         }
-        return readSignature(connection, query, 3, shapeId);
+        return hits;
     });
 }
 

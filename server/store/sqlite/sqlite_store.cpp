@@ -8,6 +8,7 @@
 #include <filesystem>
 
 #include <fcntl.h>
+#include <sqlite3.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -271,6 +272,8 @@ Result<void> SqliteStore::checkpoint() {
         walAttemptAt_ = kWalBoundBytes;
     });
 }
+
+bool stopCountingSqliteMemory() noexcept { return sqlite3_config(SQLITE_CONFIG_MEMSTATUS, 0) == SQLITE_OK; }
 
 Result<std::unique_ptr<Store>> openSqliteStore(const SqliteOptions& options) {
     return guarded("open the database", [&]() -> std::unique_ptr<Store> {

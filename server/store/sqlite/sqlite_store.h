@@ -18,6 +18,10 @@ struct SqliteOptions {
     std::function<TimestampMs()> now;
 };
 
+/// For a process with threads of different priority: SQLite keeps no count of its memory, for which every
+/// allocation takes one lock. Call once, before any database is opened. False: it was too late.
+bool stopCountingSqliteMemory() noexcept;
+
 /// Opens the database and applies missing migrations, each in its own transaction. Only one store at
 /// a time may have it open: an flock on `path`.lock is held until the store is destroyed, which no
 /// call may outlive.

@@ -69,6 +69,8 @@ class SqliteStore final : public Store {
         const std::function<std::optional<Metadata>(const Shape&)>& change) override;
     Result<StoredPoints> loadPoints(std::int64_t shapeId) override;
     Result<SignatureRow> getSignature(std::int64_t shapeId) override;
+    Result<std::vector<std::optional<StoredHit>>> getHits(const std::vector<std::int64_t>& shapeIds,
+                                                          bool withSignatures) override;
     Result<std::optional<SurfaceRow>> getSurface(std::int64_t shapeId) override;
 
     Result<std::optional<Job>> claimJob() override;

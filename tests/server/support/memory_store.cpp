@@ -153,6 +153,23 @@ Result<SignatureRow> MemoryStore::getSignature(std::int64_t shapeId) {
     });
 }
 
+Result<std::vector<std::optional<store::StoredHit>>> MemoryStore::getHits(
+    const std::vector<std::int64_t>& shapeIds, bool withSignatures) {
+    std::vector<std::optional<store::StoredHit>> hits;
+    for (const std::int64_t id : shapeIds) {
+        auto shape = getShapeById(id);
+        if (!shape && shape.error().code != ErrorCode::kNotFound) return fail(shape.error());
+        if (!shape) {
+            hits.emplace_back();
+            continue;
+        }
+        Result<SignatureRow> signature = fail(ErrorCode::kNotReady, "not asked for");
+        if (withSignatures) signature = getSignature(id);
+        hits.push_back(store::StoredHit{std::move(*shape), std::move(signature)});
+    }
+    return hits;
+}
+
 Result<std::optional<SurfaceRow>> MemoryStore::getSurface(std::int64_t shapeId) {
     return guarded("getSurface", [&]() -> Result<std::optional<SurfaceRow>> {
         if (content_.shapes.count(shapeId) == 0) return notFound("shape");

@@ -52,6 +52,8 @@ class MemoryStore : public store::Store {
         const std::function<std::optional<Metadata>(const store::Shape&)>& change) override;
     Result<store::StoredPoints> loadPoints(std::int64_t shapeId) override;
     Result<store::SignatureRow> getSignature(std::int64_t shapeId) override;
+    Result<std::vector<std::optional<store::StoredHit>>> getHits(const std::vector<std::int64_t>& shapeIds,
+                                                                 bool withSignatures) override;
     Result<std::optional<store::SurfaceRow>> getSurface(std::int64_t shapeId) override;
 
     Result<std::optional<store::Job>> claimJob() override;

@@ -215,6 +215,11 @@ std::string stateOf(Side& side) {
     for (const std::string key : {"k0", "k1", "k2", "k3"}) {
         text += textOf(side.store.getSignature(side.idOf(key))) + "\n";
     }
+    for (const bool withSignatures : {false, true}) {
+        const auto hits = side.store.getHits({side.idOf("k1"), 1'000'000, side.idOf("k0")}, withSignatures);
+        for (const auto& hit : hits.value())
+            text += hit ? textOf(hit->shape) + textOf(hit->signature) + "\n" : "gone\n";
+    }
     ShapeFilter k;
     k.keyPrefix = "k";
     text += textOf(side.store.listShapes(side.collection, {ShapeOrder::kKey, true}, 3, k));
