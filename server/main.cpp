@@ -11,6 +11,7 @@
 #include <exception>
 #include <string>
 
+#include "common/build_info.h"
 #include "common/stop_signals.h"
 #include "core/base/return_if_error.h"
 #include "core/pipeline.h"
@@ -56,7 +57,9 @@ int serve(const config::ServerConfig& config) {
     const StopSignals signals;
     const auto log = openLog(config.log);
     if (!log) return report(log.error(), kWrongConfiguration);
-    (*log)->info("starting", {{"version", std::string(config::version())}, {"data", config.data}});
+    (*log)->info("starting", {{"version", std::string(config::version())},
+                              {"build", std::string(buildInfo())},
+                              {"data", config.data}});
     const auto describeScan = [](const PointCloud& points, const ShapeParameters& parameters,
                                  const RunContext& context) { return describe(points, parameters, context); };
     auto daemon = Daemon::start(config, *log, describeScan);
@@ -94,6 +97,10 @@ int run(int argc, char** argv) {
     if (!commandLine) return report(commandLine.error(), mistake);
     if (commandLine->action == config::Action::kPrint) {
         std::fputs(commandLine->text.c_str(), stdout);
+        return 0;
+    }
+    if (commandLine->action == config::Action::kPrintVersion) {
+        std::printf("%s%s\n", commandLine->text.c_str(), buildInfo());
         return 0;
     }
     const auto loaded = config::load(*commandLine, config::processEnvironment());

@@ -6,6 +6,7 @@
 
 #include "client/cli/console.h"
 #include "client/cli/session.h"
+#include "common/build_info.h"
 #include "common/stop_signals.h"
 
 int main(int argc, char** argv) {
@@ -15,5 +16,5 @@ int main(int argc, char** argv) {
     setenv("GRPC_VERBOSITY", "NONE", 0);
 
     shapedb::cli::Console console(std::cout, std::cerr, isatty(STDERR_FILENO) != 0);
-    return shapedb::cli::run(argc, argv, console, interrupted);
+    return shapedb::cli::run(argc, argv, console, interrupted, shapedb::buildInfo());
 }

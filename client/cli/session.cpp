@@ -102,7 +102,8 @@ RunContext Session::context(const std::string& what) {
     return context;
 }
 
-int run(int argc, const char* const* argv, Console& console, const std::atomic<bool>& cancel) {
+int run(int argc, const char* const* argv, Console& console, const std::atomic<bool>& cancel,
+        const std::string& build) {
     // Before parsing, so that a parse error is reported as JSON too.
     console.setJson(
         std::any_of(argv, argv + argc, [](const char* a) { return std::strcmp(a, "--json") == 0; }));
@@ -137,7 +138,7 @@ int run(int argc, const char* const* argv, Console& console, const std::atomic<b
             return finish(console, kOk);
         } catch (const CLI::CallForVersion&) {
             console.setJson(false);
-            console.text(app.version() + "\n");
+            console.text(app.version() + "\n" + (build.empty() ? "" : build + "\n"));
             return finish(console, kOk);
         } catch (const CLI::ParseError& error) {
             return usageError(console, app, error);

@@ -70,7 +70,8 @@ void addBackupCommands(CLI::App& admin, Session& session);
 void addKeyCommands(CLI::App& admin, Session& session);
 
 /// The whole program without its signal handler: reads the command line, runs the command, prints the result
-/// or the error. Never throws.
-[[nodiscard]] int run(int argc, const char* const* argv, Console& console, const std::atomic<bool>& cancel);
+/// or the error. Never throws. `build` is what `--version` adds in a line of its own.
+[[nodiscard]] int run(int argc, const char* const* argv, Console& console, const std::atomic<bool>& cancel,
+                      const std::string& build = {});
 
 }  // namespace shapedb::cli

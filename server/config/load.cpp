@@ -185,7 +185,7 @@ Result<CommandLine> parseCommandLine(int argc, const char* const* argv) {
         commandLine.text = app.help();
         return commandLine;
     } catch (const CLI::CallForVersion&) {
-        commandLine.action = Action::kPrint;
+        commandLine.action = Action::kPrintVersion;
         commandLine.text = std::string("shapedbd ") + version() + "\n";
         return commandLine;
     } catch (const CLI::ParseError& error) {

@@ -12,8 +12,9 @@ namespace shapedb::config {
 
 enum class Action {
     kServe,
-    kCheckConfig,  ///< print the effective configuration and exit
-    kPrint,        ///< print `text` (help, version) and exit
+    kCheckConfig,   ///< print the effective configuration and exit
+    kPrint,         ///< print `text` (help) and exit
+    kPrintVersion,  ///< print `text` (name and version) and what the program knows of its build, and exit
 };
 
 struct CommandLine {
