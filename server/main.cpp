@@ -1,7 +1,8 @@
 // shapedbd: reads the configuration, serves until SIGTERM or SIGINT, shuts down cleanly.
 //
 // Prints one line to standard output, `listening on HOST:PORT`, and if it serves HTTP a second one;
-// everything else is logged. `shapedbd key` makes, lists and revokes API keys instead. Exit codes: 0 success,
+// everything else is logged. `shapedbd key` makes, lists and revokes API keys
+// instead, `shapedbd man` prints the manual page. Exit codes: 0 success,
 // 1 could not start or not shut down cleanly, 2 wrong configuration, 130 stopped at once by a second signal.
 
 #include <algorithm>
@@ -16,6 +17,7 @@
 #include "core/base/return_if_error.h"
 #include "core/pipeline.h"
 #include "server/config/load.h"
+#include "server/config/man_page.h"
 #include "server/config/settings.h"
 #include "server/daemon.h"
 #include "server/key_command.h"
@@ -89,6 +91,10 @@ int serve(const config::ServerConfig& config) {
 
 int run(int argc, char** argv) {
     if (argc > 1 && std::string(argv[1]) == "key") return runKeyCommand(argc - 1, argv + 1);
+    if (argc == 2 && std::string(argv[1]) == "man") {
+        std::fputs(config::manPage().c_str(), stdout);
+        return 0;
+    }
     // The exit code is the answer of a check: 0, or 1 also for a mistake in the flags.
     const bool checking = std::any_of(argv, argv + argc,
                                       [](const char* flag) { return std::string(flag) == "--check-config"; });

@@ -177,7 +177,9 @@ Result<CommandLine> parseCommandLine(int argc, const char* const* argv) {
                                  (shown.empty() ? "empty" : shown) + " [" + setting.environment + "]";
         options.emplace_back(setting.key, app.add_option(setting.flag, values[setting.key], help));
     }
-    app.footer("Flags override environment variables, which override the file.");
+    app.footer(
+        "Flags override environment variables, which override the file. `shapedbd key --help`: API keys. "
+        "`shapedbd man`: this as a page for man(1).");
     try {
         app.parse(argc, argv);
     } catch (const CLI::CallForHelp&) {

@@ -1,0 +1,112 @@
+#include "server/config/man_page.h"
+
+#include "server/config/load.h"
+#include "server/config/settings.h"
+
+namespace shapedb::config {
+namespace {
+
+constexpr char kBeforeSettings[] = R"(.SH NAME
+shapedbd \- server of ShapeDB, a database of 3D shapes
+.SH SYNOPSIS
+.B shapedbd
+.RB [ \-\-config
+.IR FILE ]
+.RB [ \-\-\fISETTING\fP
+.IR VALUE ]...
+.br
+.B shapedbd key
+.RB { create | list | revoke }
+.I OPTION\fR...
+.SH DESCRIPTION
+Stores scans of 3D objects and finds those that look like another scan.
+.BR shapedb (1)
+is its client.
+It serves until SIGTERM or SIGINT, shuts down cleanly then, and stops at once when it gets a second one.
+Beyond this machine it does not start without TLS and API keys.
+.PP
+Once it serves, it prints
+.B listening on
+.I HOST:PORT
+and, if it speaks HTTP too, a second line of that kind.
+Everything else is logged.
+.PP
+.B shapedbd key
+makes, lists and revokes API keys;
+.B shapedbd key \-\-help
+describes it.
+.SH OPTIONS
+.TP
+.BI \-\-config " FILE"
+Configuration file (TOML). Environment: SHAPEDB_CONFIG.
+.TP
+.B \-\-check\-config
+Print every setting in force and where its value came from, and exit.
+.TP
+.B \-\-version
+Print version, commit and build, and exit.
+.TP
+.B \-\-help
+Print the flags, and exit.
+.SH SETTINGS
+Each is a flag, a variable of the environment, and a key of the configuration file.
+Flags override the environment, which overrides the file.
+)";
+
+constexpr char kAfterSettings[] = R"(.SH EXIT STATUS
+.TP
+.B 0
+It has shut down cleanly.
+.TP
+.B 1
+It could not start, or not shut down cleanly.
+.TP
+.B 2
+The configuration is wrong.
+.TP
+.B 130
+A second signal has stopped it at once.
+.SH FILES
+.TP
+.I /etc/shapedb/shapedbd.toml
+Configuration of the system's service.
+.TP
+.I /var/lib/shapedb
+Its data. Never copy the database while the server runs:
+.B shapedb admin backup
+does that.
+.SH SEE ALSO
+.BR shapedb (1),
+.BR systemctl (1)
+)";
+
+/// Text of ours in a line of roff.
+std::string roff(const std::string& text) {
+    std::string line;
+    for (const char c : text) {
+        if (c == '\\') {
+            line += "\\e";
+        } else {
+            if (c == '-' || (line.empty() && (c == '.' || c == '\''))) line += c == '-' ? "\\" : "\\&";
+            line += c;
+        }
+    }
+    return line;
+}
+
+}  // namespace
+
+std::string manPage() {
+    std::string page =
+        std::string(".TH SHAPEDBD 8 \"\" \"ShapeDB ") + version() + "\" \"ShapeDB\"\n" + kBeforeSettings;
+    const ServerConfig defaults;
+    for (const Setting& setting : settings()) {
+        const std::string shown = setting.show(defaults);
+        page += ".TP\n.BI " + roff(setting.flag) + " \" VALUE\"\n" + roff(setting.help) + "\n.br\n" +
+                roff(setting.range + "; default: " + (shown.empty() ? "empty" : shown)) + "\n.br\n" +
+                roff("File: " + setting.key + ". Environment: " + setting.environment + ".") + "\n";
+    }
+    return page + kAfterSettings;
+}
+
+}  // namespace shapedb::config
