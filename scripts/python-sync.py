@@ -24,9 +24,9 @@ RULES = (
     (r"\bAsync(Client|Collection|Transport)\b", r"\1"),
     (r"\b_async_(client|collection)\b", r"_\1"),
     (r"\brun_async_workers\b", "run_workers"),
-    (r'\A"""A connection for asyncio\..*?"""\n', '"""A connection that blocks. Made of `_async_client.py` by '
+    (r'(?m:^)"""A connection for asyncio\..*?"""\n', '"""A connection that blocks. Made of `_async_client.py` by '
      'scripts/python-sync.py: change that, not this."""\n'),
-    (r'\A"""One collection, as `Client` sees it\..*?"""\n', '"""One collection, for `Client`. Made of '
+    (r'(?m:^)"""One collection, as `Client` sees it\..*?"""\n', '"""One collection, for `Client`. Made of '
      '`_async_collection.py` by scripts/python-sync.py: change that, not this."""\n'),
 )
 
