@@ -2,7 +2,7 @@
 //
 // protoc writes gen/: the messages and services of ../proto as TypeScript, so that the page cannot drift from the API.
 import { execFileSync } from 'node:child_process';
-import { cpSync, mkdirSync, mkdtempSync, readdirSync, renameSync, rmSync } from 'node:fs';
+import { cpSync, mkdirSync, mkdtempSync, readdirSync, renameSync, rmSync, writeFileSync } from 'node:fs';
 import { dirname, join, resolve } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { build } from 'esbuild';
@@ -25,7 +25,7 @@ rmSync(fresh, { recursive: true });
 run(join(web, 'node_modules/.bin/tsc'), '--noEmit');
 
 rmSync(out, { recursive: true, force: true });
-await build({
+const { metafile } = await build({
   entryPoints: [join(web, 'src/main.ts'), join(web, 'src/worker.ts'), join(web, 'style.css')],
   outdir: out,
   bundle: true,
@@ -37,5 +37,11 @@ await build({
   chunkNames: 'part-[hash]',
   entryNames: '[name]',
   logLevel: 'warning',
+  metafile: true,
 });
 for (const name of ['index.html', 'icon.svg', 'licences.txt']) cpSync(join(web, name), join(out, name));
+
+// Beside the folder, which is served whole: the npm packages that are in it.
+const bundled = Object.values(metafile.outputs).flatMap((output) => Object.keys(output.inputs))
+  .map((path) => /(?:^|\/)node_modules\/((?:@[^/]+\/)?[^/]+)\//.exec(path)?.[1]).filter(Boolean);
+writeFileSync(`${out}.packages.txt`, [...new Set(bundled)].sort().map((name) => `${name}\n`).join(''));
