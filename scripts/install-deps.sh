@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # Installs the Debian 12 packages that ShapeDB needs, and only those that are missing.
 #   scripts/install-deps.sh             everything to build, test and check, the Python package too, and the npm
-#                                       packages of web/, as do all but --runtime and --open3d
+#                                       packages of web/, as do all but --open3d
 #   scripts/install-deps.sh --analysis  that, and clang for scripts/ci/tidy.sh and scripts/ci/fuzz.sh
 #   scripts/install-deps.sh --build     only what is needed to build
-#   scripts/install-deps.sh --runtime   only what the programs need to run
+#   scripts/install-deps.sh --packages  everything to build, and what scripts/ci/packages.sh needs
 #   scripts/install-deps.sh --open3d    Open3D, for client/python/examples/open3d_interop.py and its test
 #   scripts/install-deps.sh --bench     everything to build, and the Point Cloud Library and FAISS, which
 #                                       shapedb-bench measures too (preset peers)
@@ -23,33 +23,30 @@ python_packages=(
   python3-numpy python3-matplotlib python3-pandas
   python3-pytest python3-hypothesis python3-mypy python3-build python3-pip python3-setuptools python3-wheel
 )
-runtime_packages=(
-  ca-certificates libgmpxx4ldbl libmpfr6 libtbb12 libgrpc++1.51 libprotobuf32 libsqlite3-0
-  libzstd1 libssl3 libspdlog1.10 libprometheus-cpp-pull1.0 libpng16-16 liblzf1 zlib1g libzip4 libexpat1
-)
 open3d_packages=(python3-open3d)
 browser_packages=(chromium)
 # Node may come from elsewhere than Debian, and then brings its own npm.
 command -v node >/dev/null || build_packages+=(nodejs)
 command -v npm >/dev/null || build_packages+=(npm)
 analysis_packages=(clang-14 clang-tidy-14 libclang-rt-14-dev)
+packages_packages=(buildah groff lintian mmdebstrap)
 bench_packages=(libpcl-dev libfaiss-dev libopenblas-dev)
 
 case "${1:-}" in
   "") packages=("${build_packages[@]}" "${python_packages[@]}" "${browser_packages[@]}") ;;
   --analysis) packages=("${build_packages[@]}" "${python_packages[@]}" "${browser_packages[@]}" "${analysis_packages[@]}") ;;
   --build) packages=("${build_packages[@]}") ;;
-  --runtime) packages=("${runtime_packages[@]}") ;;
+  --packages) packages=("${build_packages[@]}" "${packages_packages[@]}") ;;
   --open3d) packages=("${open3d_packages[@]}") ;;
   --bench) packages=("${build_packages[@]}" "${bench_packages[@]}") ;;
-  *) echo "install-deps: unknown option $1; there are --build, --analysis, --runtime, --bench and --open3d" >&2; exit 2 ;;
+  *) echo "install-deps: unknown option $1; there are --build, --analysis, --bench, --packages and --open3d" >&2; exit 2 ;;
 esac
 
 # Exactly what web/package-lock.json names, and no script of any package is run.
 install_npm_packages() {
   local web
   web=$(dirname "$0")/../web
-  case "${1:-}" in --runtime | --open3d) return 0 ;; esac
+  case "${1:-}" in --open3d) return 0 ;; esac
   [ -f "$web/package-lock.json" ] || return 0
   [ "$web/node_modules/.package-lock.json" -nt "$web/package-lock.json" ] && return 0
   (cd "$web" && npm ci --ignore-scripts --no-audit --no-fund) >&2 ||

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # Everything that is too slow for every change. Runs all lanes, even after one has failed, and says which failed.
-#   scripts/ci/nightly.sh [LANE]...    sanitize, threads, bench, tidy, fuzz, mutate, reliability, docs; all by default
+#   scripts/ci/nightly.sh [LANE]...    sanitize, threads, bench, tidy, fuzz, mutate, reliability, docs, packages; all by default
 set -uo pipefail
 cd "$(dirname "$0")/../.."
 lanes=("$@")
-[ ${#lanes[@]} -gt 0 ] || lanes=(sanitize threads bench tidy fuzz mutate reliability docs)
+[ ${#lanes[@]} -gt 0 ] || lanes=(sanitize threads bench tidy fuzz mutate reliability docs packages)
 
 # The long counts of docs/reliability.md. Not by ctest, whose limits of time are those of the short ones.
 reliability() {
@@ -31,6 +31,7 @@ for lane in "${lanes[@]}"; do
     mutate) scripts/mutate.sh --seed "$(date +%j)" ;;
     reliability) reliability ;;
     docs) scripts/install-deps.sh && scripts/build.sh dev && scripts/documented-commands.py ;;
+    packages) scripts/ci/packages.sh ;;
     *) echo "nightly: unknown lane $lane" >&2; exit 2 ;;
   esac || failed+=("$lane")
 done
