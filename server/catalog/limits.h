@@ -13,11 +13,11 @@ namespace shapedb::catalog {
 
 // Names and text (repeated in the comments of proto/).
 using store::kMaxCollectionNameBytes;
-constexpr std::size_t kMaxDescriptionBytes = 1'024;
+using store::kMaxDescriptionBytes;
 using store::kMaxKeyBytes;
-constexpr std::size_t kMaxMetadataEntries = 64;
-constexpr std::size_t kMaxMetadataKeyBytes = 128;
-constexpr std::size_t kMaxMetadataValueBytes = 1'024;
+using store::kMaxMetadataEntries;
+using store::kMaxMetadataKeyBytes;
+using store::kMaxMetadataValueBytes;
 constexpr std::size_t kMaxFilterBytes = 16'384;
 
 /// Metadata keys that begin so describe the points (earlier client libraries kept an offset under one):

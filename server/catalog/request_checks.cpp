@@ -1,6 +1,5 @@
 #include "server/catalog/request_checks.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "common/safe_text.h"
@@ -16,11 +15,6 @@ tl::unexpected<Error> bad(std::string message) {
     return fail(ErrorCode::kInvalidArgument, std::move(message));
 }
 
-bool isMetadataKey(const std::string& key) {
-    return !key.empty() && key.size() <= kMaxMetadataKeyBytes &&
-           std::all_of(key.begin(), key.end(), store::isNameByte);
-}
-
 }  // namespace
 
 std::string collectionNameOrDefault(const std::string& name) {
@@ -33,10 +27,7 @@ Result<void> checkCollectionName(const std::string& name) {
 }
 
 Result<void> checkDescription(const std::string& description) {
-    if (description.size() > kMaxDescriptionBytes) {
-        return bad("description: " + std::to_string(description.size()) + " bytes, at most " +
-                   std::to_string(kMaxDescriptionBytes) + " are allowed");
-    }
+    if (const auto problem = store::problemOfDescription(description)) return bad("description: " + *problem);
     return {};
 }
 
@@ -46,9 +37,9 @@ Result<void> checkKey(const std::string& key) {
 }
 
 Result<void> checkMetadataKey(const char* field, const std::string& key) {
-    if (isMetadataKey(key)) return {};
-    return bad(std::string(field) + " '" + key.substr(0, kMaxMetadataKeyBytes) + "' is not 1 to " +
-               std::to_string(kMaxMetadataKeyBytes) + " letters, digits, '_', '.' and '-'");
+    const auto problem = store::problemOfMetadataKey(key);
+    if (!problem) return {};
+    return bad(std::string(field) + " '" + key.substr(0, kMaxMetadataKeyBytes) + "' is " + *problem);
 }
 
 Result<void> checkMetadataChange(const store::MetadataChange& change) {
@@ -106,11 +97,9 @@ Result<void> checkMetadata(const Metadata& metadata) {
     }
     for (const auto& [key, value] : metadata) {
         RETURN_IF_ERROR(checkMetadataKey("metadata: key", key));
-        if (value.size() > kMaxMetadataValueBytes) {
-            return bad("metadata: the value of '" + key + "' has " + std::to_string(value.size()) +
-                       " bytes, at most " + std::to_string(kMaxMetadataValueBytes) + " are allowed");
+        if (const auto problem = store::problemOfMetadataValue(value)) {
+            return bad("metadata: the value of '" + key + "': " + *problem);
         }
-        if (!isUtf8(value)) return bad("metadata: the value of '" + key + "' is not valid UTF-8");
     }
     return {};
 }

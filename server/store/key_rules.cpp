@@ -15,12 +15,17 @@ std::string tooLong(std::size_t bytes, std::size_t most) {
     return std::to_string(bytes) + " bytes, at most " + std::to_string(most) + " are allowed";
 }
 
+std::optional<std::string> problemOfText(const std::string& text, std::size_t most) {
+    if (text.size() > most) return tooLong(text.size(), most);
+    if (!isUtf8(text)) return "not valid UTF-8";
+    return std::nullopt;
+}
+
 }  // namespace
 
 std::optional<std::string> problemOfKey(const std::string& key) {
     if (key.empty()) return "a shape needs a key of 1 to " + std::to_string(kMaxKeyBytes) + " bytes";
-    if (key.size() > kMaxKeyBytes) return tooLong(key.size(), kMaxKeyBytes);
-    if (!isUtf8(key)) return "not valid UTF-8";
+    if (auto problem = problemOfText(key, kMaxKeyBytes)) return problem;
     const std::size_t at = findUnsafe(key);
     if (at == std::string::npos) return std::nullopt;
     return "control character at byte " + std::to_string(at);
@@ -34,6 +39,21 @@ std::optional<std::string> problemOfCollectionName(const std::string& name) {
     if (std::all_of(name.begin(), name.end(), isNameByte) && isAlphanumeric(name.front()))
         return std::nullopt;
     return "only letters, digits, '_', '.' and '-' are allowed, the first a letter or digit";
+}
+
+std::optional<std::string> problemOfDescription(const std::string& description) {
+    return problemOfText(description, kMaxDescriptionBytes);
+}
+
+std::optional<std::string> problemOfMetadataKey(const std::string& key) {
+    const bool isKey =
+        !key.empty() && key.size() <= kMaxMetadataKeyBytes && std::all_of(key.begin(), key.end(), isNameByte);
+    if (isKey) return std::nullopt;
+    return "not 1 to " + std::to_string(kMaxMetadataKeyBytes) + " letters, digits, '_', '.' and '-'";
+}
+
+std::optional<std::string> problemOfMetadataValue(const std::string& value) {
+    return problemOfText(value, kMaxMetadataValueBytes);
 }
 
 }  // namespace shapedb::store
