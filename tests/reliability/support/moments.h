@@ -24,6 +24,8 @@ struct Moment {
 
 /// Runs the steps one after another on the files given; the store is closed at first.
 [[nodiscard]] std::vector<Moment> record(const std::vector<Step>& steps, const Image& files);
+/// The files of a store that has run the steps and was closed.
+[[nodiscard]] Image filesAfter(const std::vector<Step>& steps);
 
 /// The script of all calls, from no file at all; ends with the store closed and opened again.
 [[nodiscard]] std::vector<Moment> recordWholeScript();

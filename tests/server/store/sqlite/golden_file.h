@@ -1,0 +1,28 @@
+// The packed files of tests/golden/.
+#pragma once
+
+#include <string>
+
+#include <gtest/gtest.h>
+#include <zstd.h>
+
+#include "tests/server/store/sqlite/store_fixture.h"
+
+namespace shapedb::store {
+
+/// The content of tests/golden/NAME.db.zst; empty if it is missing.
+inline std::string unpackedGolden(const std::string& name) {
+    const std::string packed = slurp(std::string(SHAPEDB_GOLDEN_DIR) + "/" + name + ".db.zst");
+    if (packed.empty()) return {};
+    std::string bytes(ZSTD_getFrameContentSize(packed.data(), packed.size()), ' ');
+    EXPECT_EQ(ZSTD_decompress(bytes.data(), bytes.size(), packed.data(), packed.size()), bytes.size());
+    return bytes;
+}
+
+inline void writeGolden(const std::string& path, const std::string& bytes) {
+    std::string packed(ZSTD_compressBound(bytes.size()), ' ');
+    packed.resize(ZSTD_compress(packed.data(), packed.size(), bytes.data(), bytes.size(), 19));
+    spill(path, packed);
+}
+
+}  // namespace shapedb::store
