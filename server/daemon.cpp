@@ -16,6 +16,7 @@
 #include "server/security/authorization.h"
 #include "server/security/usage_saver.h"
 #include "server/server_samples.h"
+#include "server/store/parameters_codec.h"
 #include "server/store/sqlite/sqlite_key_store.h"
 #include "server/store/sqlite/sqlite_store.h"
 #include "server/telemetry/audit_log.h"
@@ -34,6 +35,11 @@ Result<std::unique_ptr<store::Store>> openStore(const config::ServerConfig& conf
     options.path = config.data + "/" + files::kDatabaseName;
     options.readers = config.store.readers;
     options.pointCompressionLevel = config.store.compressionLevel;
+    options.acceptParameters = [](const std::string& text) -> Result<void> {
+        const auto parameters = store::decodeParameters(text);
+        RETURN_IF_ERROR(parameters);
+        return {};
+    };
     return store::openSqliteStore(options);
 }
 

@@ -42,6 +42,8 @@ std::vector<Sample> sampleContent(catalog::Catalog& catalog) {
          number(stored.storedPointBytes)},
         {"shapedb_missing_commits", "Acknowledged changes that were gone when the server started.", kGauge,
          number(stored.missingCommits)},
+        {"shapedb_unacknowledged_notices", "Notices that changes are or may be missing, not acknowledged.",
+         kGauge, number(stored.notices)},
         {"shapedb_build_info",
          "Always 1; the labels tell the version and the database's schema.",
          kGauge,

@@ -47,7 +47,11 @@ Result<void> Catalog::start() {
                     telemetry::fieldsOf(ensured.error()));
     }
     const auto began = std::chrono::steady_clock::now();
+    const std::vector<std::string> known = store_->findings();
     RETURN_IF_ERROR(index_.loadAll());
+    for (const std::string& finding : store_->findings()) {
+        if (std::find(known.begin(), known.end(), finding) == known.end()) log_->error(finding);
+    }
     const auto totals = index_.totals();
     log_->info(
         "index loaded",
@@ -129,11 +133,23 @@ Result<void> Catalog::deleteCollection(const std::string& name, bool force) {
         }
     }
     const auto cancelled = rebuilds_.cancel(collection);
-    if (!cancelled && cancelled.error().code != ErrorCode::kNotFound) return cancelled;
+    // On a full disk its results go with the collection.
+    const auto mayGoOn = [](ErrorCode code) {
+        return code == ErrorCode::kNotFound || code == ErrorCode::kStorageFull;
+    };
+    if (!cancelled && !mayGoOn(cancelled.error().code)) return cancelled;
     // The store first, which may refuse; the index and the workers follow.
-    RETURN_IF_ERROR(store_->deleteCollection(collection.id));
-    index_.remove(collection.id);
-    workers_.supersedeCollection(collection.id);
+    bool gone = false;
+    const auto deleted = store_->deleteCollection(collection.id, [&] {
+        gone = true;
+        index_.remove(collection.id);
+        workers_.supersedeCollection(collection.id);
+    });
+    if (deleted || !gone) return deleted;
+    log_->error(
+        "the space of a deleted collection is not free yet: the next deletion of one goes on, or the next "
+        "start",
+        telemetry::fieldsOf(deleted.error()));
     return {};
 }
 
@@ -215,6 +231,13 @@ Result<std::vector<std::string>> Catalog::check(const RunContext& context) {
     return problems;
 }
 
+Result<void> Catalog::acknowledge() {
+    const auto told = store_->acknowledge();
+    RETURN_IF_ERROR(told);
+    for (const std::string& line : *told) log_->info("acknowledged", {{"notice", line}});
+    return {};
+}
+
 Result<void> Catalog::restore(const std::string& path, const RunContext& context,
                               const MayReplace& mayReplace) {
     RETURN_IF_ERROR(restores_.beginRestore());
@@ -268,7 +291,9 @@ Result<void> Catalog::replaceContent(const std::string& path, const RunContext& 
                                          loaded.error().message + "; restart the server or restore again");
 }
 
-Condition Catalog::condition() const { return {!restores_.apart(), !workers_.trouble(), index_.damaged()}; }
+Condition Catalog::condition() const {
+    return {!restores_.apart(), !workers_.trouble(), index_.damaged(), store_->notices() == 0};
+}
 
 Result<CatalogStats> Catalog::stats() {
     const auto stored = store_->stats();

@@ -91,6 +91,7 @@ struct Condition {
     bool content = true;  ///< collections can be looked up: no restore is replacing them, and none failed
     bool segmentation = true;            ///< scans are taken in and segmented
     std::size_t damagedCollections = 0;  ///< as CollectionIndex::damaged
+    bool complete = true;                ///< no change is missing that was not acknowledged as such
 };
 
 /// How well the interior of a shape was determined, in [0, 1]; empty when searches do not find the
@@ -281,8 +282,7 @@ class Catalog {
     }
     /// Shapes that wait for their first signature: those whose older points are searched do not count.
     [[nodiscard]] Result<std::uint64_t> unsearchedShapes(const index::Snapshot& collection) {
-        return store_->countPending(collection.collection.id,
-                                    [&](std::int64_t id) { return !collection.signatures.find(id); });
+        return store_->countWaiting(collection.collection.id);
     }
     /// `qualityIn` the shape's collection as it is searched now.
     [[nodiscard]] std::optional<double> servingQuality(const store::Shape& shape) const;
@@ -326,6 +326,8 @@ class Catalog {
     /// As store::Store.
     [[nodiscard]] Result<void> backup(const std::string& path, const RunContext& context);
     [[nodiscard]] Result<std::vector<std::string>> check(const RunContext& context);
+    /// As store::Store; logs what was told.
+    [[nodiscard]] Result<void> acknowledge();
     /// Replaces everything by the backup `path` while workers and rebuilds pause, and loads the index.
     /// Errors, which call the file "the backup": kRejected (another restore is running), those of
     /// store::Store::restore and of `mayReplace`; those of CollectionIndex::loadAll, after which the content

@@ -14,6 +14,7 @@ enum class Need {
     kNothing,
     kContent,       ///< collections can be looked up
     kSegmentation,  ///< and scans are taken in
+    kComplete,      ///< no acknowledged change is missing
 };
 
 struct Name {
@@ -30,6 +31,7 @@ constexpr Name kNames[] = {
     {"shapedb.v1.AlignService", Need::kContent},
     {"shapedb.v1.AdminService", Need::kNothing},  // a restore is the way out of lost content
     {"shapedb.segmentation", Need::kSegmentation},
+    {"shapedb.storage", Need::kComplete},
 };
 
 bool has(const catalog::Condition& condition, Need need) {
@@ -37,6 +39,7 @@ bool has(const catalog::Condition& condition, Need need) {
         case Need::kNothing: return true;
         case Need::kContent: return condition.content;
         case Need::kSegmentation: return condition.content && condition.segmentation;
+        case Need::kComplete: return condition.complete;
     }
     return false;
 }

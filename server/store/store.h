@@ -221,10 +221,15 @@ struct StoreStats {
     std::uint64_t storedPointBytes = 0;  ///< as compressed
     std::uint64_t databaseBytes = 0;
     std::uint64_t walBytes = 0;
-    /// Acknowledged changes that the database did not have when it was opened; 0 after a restore.
+    /// Acknowledged changes that the database did not have when it was opened, now or earlier; 0 after
+    /// `acknowledge` and after a restore.
     std::uint64_t missingCommits = 0;
+    std::uint64_t notices = 0;  ///< what waits for `acknowledge`
     int schemaVersion = 0;
 };
+
+/// Deletions with an expected version that a store remembers, of all collections.
+constexpr std::int64_t kDeletionsRemembered = 1'000;
 
 class Store {
   public:
@@ -240,8 +245,15 @@ class Store {
     [[nodiscard]] virtual Result<Collection> getCollection(const std::string& name) = 0;
     /// By name. A damaged page takes out the collections on it (Collection::damage), not the others.
     [[nodiscard]] virtual Result<std::vector<Collection>> listCollections() = 0;
-    /// Deletes the collection with its shapes, jobs and aliases. Errors: kNotFound.
-    [[nodiscard]] virtual Result<void> deleteCollection(std::int64_t collectionId) = 0;
+    /// Deletes the collection with its shapes, jobs and aliases. At one moment nobody can find it or its
+    /// aliases any more, whatever happens from then on: `gone` is called, unless it is null, which must not
+    /// call the store. Then its rows are removed, some at a time. An error after that moment says that rows
+    /// are left: the next deletion of a collection removes them, or the next start. Errors: kNotFound.
+    [[nodiscard]] virtual Result<void> deleteCollection(std::int64_t collectionId,
+                                                        const std::function<void()>& gone) = 0;
+    [[nodiscard]] Result<void> deleteCollection(std::int64_t collectionId) {
+        return deleteCollection(collectionId, nullptr);
+    }
     /// Errors: kNotFound, kAlreadyExists (as above; its own name is no error).
     [[nodiscard]] virtual Result<Collection> renameCollection(std::int64_t collectionId,
                                                               const std::string& name) = 0;
@@ -287,11 +299,11 @@ class Store {
     /// Errors: kCancelled, kDeadlineExceeded (filter.context).
     [[nodiscard]] virtual Result<std::uint64_t> countShapes(std::int64_t collectionId,
                                                             const ShapeFilter& filter) = 0;
-    /// Pending shapes of which `counts(id)` says so; it must not call the store.
-    [[nodiscard]] virtual Result<std::uint64_t> countPending(
-        std::int64_t collectionId, const std::function<bool(std::int64_t)>& counts) = 0;
-    /// Removes the shape with its points, signatures and jobs; returns it as it was.
-    /// Errors: kNotFound, kVersionConflict.
+    /// Pending shapes without a signature that serves. Reads one row.
+    [[nodiscard]] virtual Result<std::uint64_t> countWaiting(std::int64_t collectionId) = 0;
+    /// Removes the shape with its points, signatures and jobs; returns it as it was. A repeated request with
+    /// an expected version is recognised, for the last kDeletionsRemembered of them: the key is free, and the
+    /// shape that it had was deleted so. Errors: kNotFound, kVersionConflict.
     [[nodiscard]] virtual Result<Shape> deleteShape(std::int64_t collectionId, const std::string& key,
                                                     std::optional<std::int64_t> expectedVersion) = 0;
     /// In one transaction, removes each of these shapes that is still there and of which `still` says so, and
@@ -443,8 +455,13 @@ class Store {
     /// read outlasts the busy timeout.
     [[nodiscard]] virtual Result<void> checkpoint() = 0;
     /// What an operator must know of how the database was found when it was opened: acknowledged changes that
-    /// are missing, what was mended. One line each; `check` lists them too. Empty after a restore.
+    /// are missing, what was mended. One line each; `check` lists them too. Empty after a restore. That
+    /// changes are missing, or may be, is told at every start until `acknowledge`.
     [[nodiscard]] virtual std::vector<std::string> findings() const = 0;
+    /// How many of them wait for `acknowledge`. Reads no disk.
+    [[nodiscard]] virtual std::size_t notices() const = 0;
+    /// Missing changes are told no more. Returns what was told of them, one line each.
+    [[nodiscard]] virtual Result<std::vector<std::string>> acknowledge() = 0;
 };
 
 }  // namespace shapedb::store

@@ -1,5 +1,6 @@
 """Attacks on the disk and on what is kept there."""
 
+import contextlib
 import os
 import random
 import subprocess
@@ -189,28 +190,62 @@ class FullDisk(unittest.TestCase):
 
     NAMESPACE = ["unshare", "--user", "--map-root-user", "--mount"]
 
-    def test_deletions_are_possible_and_make_room(self):
+    @contextlib.contextmanager
+    def server(self):
         if subprocess.run([*self.NAMESPACE, "mount", "-t", "tmpfs", "tmpfs", "/mnt"], capture_output=True).returncode:
             self.skipTest("this machine allows no mount namespace")
         with tempfile.TemporaryDirectory(prefix="shapedb-full-") as folder:
             inside = ("mount -t tmpfs -o size=60m tmpfs " + folder + " && exec \"$0\" \"$@\"")
             prefix = [*self.NAMESPACE, "sh", "-c", inside]
             with Server(directory=folder + "/data", prefix=prefix) as server, server.connect() as client:
-                stored, error = [], None
-                points = noise(60_000)
-                while error is None and len(stored) < 200:
-                    try:
-                        client.add(f"scan {len(stored)}", points, wait=False)
-                        stored.append(f"scan {len(stored)}")
-                    except grpc.RpcError as failure:
-                        error = failure
-                self.assertEqual(reason(error), "storage_full")
-                self.assertGreater(len(stored), 5)
-                for key in stored:
-                    client.shapes.DeleteShape(shapes.DeleteShapeRequest(shape=shapes.ShapeRef(key=key)), timeout=30)
-                self.assertEqual(client.count(), 0)
-                self.assertTrue(server.running())
-                self.assertEqual(list(client.admin.Check(admin.CheckRequest(), timeout=60))[-1].finished, True)
+                yield server, client
+
+    def fill(self, client, collection="default", points=60_000, most=200):
+        """Until nothing more goes in; the keys of what did."""
+        stored, cloud = [], noise(points)
+        while len(stored) < most:
+            try:
+                client.add(f"scan {len(stored)}", cloud, collection=collection, wait=False)
+                stored.append(f"scan {len(stored)}")
+            except grpc.RpcError as failure:
+                self.assertEqual(reason(failure), "storage_full")
+                return stored
+        self.fail("the disk does not become full")
+
+    def test_deletions_are_possible_and_make_room(self):
+        with self.server() as (server, client):
+            stored = self.fill(client)
+            self.assertGreater(len(stored), 5)
+            for key in stored:
+                client.shapes.DeleteShape(shapes.DeleteShapeRequest(shape=shapes.ShapeRef(key=key)), timeout=30)
+            self.assertEqual(client.count(), 0)
+            self.assertTrue(server.running())
+            self.assertEqual(list(client.admin.Check(admin.CheckRequest(), timeout=60))[-1].finished, True)
+            # The space of what was deleted is used again.
+            again = self.fill(client)
+            self.assertGreater(len(again), len(stored) // 2)
+
+    def test_a_large_collection_can_be_deleted_and_its_space_used_again(self):
+        with self.server() as (server, client):
+            client.collections.CreateCollection(collections.CreateCollectionRequest(name="many"), timeout=30)
+            # On pages with those of another collection, which have to be written: more than the reserve.
+            small = noise(170)
+            for i in range(4_500):
+                for collection in ("many", "default"):
+                    client.add(f"small {i}", small, collection=collection, wait=False)
+            stored = self.fill(client, "many")
+            self.assertGreater(len(stored), 5)
+            for _ in range(3):
+                client.collections.DeleteCollection(
+                    collections.DeleteCollectionRequest(name="many", force=True), timeout=120)
+                names = [one.name for one in client.collections.ListCollections(
+                    collections.ListCollectionsRequest(), timeout=10).collections]
+                self.assertEqual(names, ["default"])
+                client.collections.CreateCollection(collections.CreateCollectionRequest(name="many"), timeout=30)
+                # Less than before: the others have been segmented meanwhile.
+                self.assertGreater(len(self.fill(client, "many")), 5)
+            self.assertEqual(client.count(), 4_500)
+            self.assertEqual([p for m in client.admin.Check(admin.CheckRequest(), timeout=60) for p in m.problems], [])
 
 
 def noise(points):

@@ -2,6 +2,7 @@
 
 import contextlib
 import hashlib
+import os
 import resource
 import socket
 import sqlite3
@@ -16,7 +17,8 @@ SERVER = ["", "shapedb.v1.ShapeService", "shapedb.v1.SearchService", "shapedb.v1
           "shapedb.v1.AlignService"]
 ADMIN = "shapedb.v1.AdminService"
 SEGMENTATION = "shapedb.segmentation"
-ALL = [*SERVER, ADMIN, SEGMENTATION]
+STORAGE = "shapedb.storage"
+ALL = [*SERVER, ADMIN, SEGMENTATION, STORAGE]
 
 
 def serving(client):
@@ -64,13 +66,47 @@ class Health(unittest.TestCase):
             server.start()
             with server.connect() as client:
                 self.assertTrue(eventually(lambda: not client.serving(SEGMENTATION), 10))
-                self.assertEqual(serving(client), [*SERVER, ADMIN])
+                self.assertEqual(serving(client), [*SERVER, ADMIN, STORAGE])
                 with self.assertRaises(grpc.RpcError) as error:
                     client.add("more", ball(300))
                 self.assertEqual(reason(error.exception), "data_loss")
                 self.restore(client, backup)
                 self.assertTrue(eventually(lambda: serving(client) == ALL, 10))
                 client.add("more", ball(300))
+
+    def test_of_lost_changes_is_told_until_they_are_acknowledged(self):
+        with Server() as server:
+            with server.connect() as client:
+                client.add("ball", ball(300))
+            for how in ("log", "log and mark"):
+                server.process.kill()  # what was acknowledged is in the log alone
+                server.process.wait()
+                server.process.stdout.close()
+                os.truncate(server.data + "/shapedb.sqlite-wal", 0)
+                if how == "log and mark":
+                    os.truncate(server.data + "/shapedb.sqlite.commits", 0)
+                for start in range(3):
+                    if start > 0:
+                        server.start()
+                        self.assertIn("shapedb admin check --acknowledge", server.log())
+                        with server.connect() as client:
+                            self.assertEqual(serving(client), [*SERVER, ADMIN, SEGMENTATION], how)
+                            self.assertEqual(len(self.check(client)), 1)
+                            missing = client.admin.Stats(admin.StatsRequest(), timeout=10).missing_commits
+                            self.assertEqual(missing > 0, how == "log")
+                        self.assertEqual(server.stop(), 0)
+                server.start()
+                with server.connect() as client:
+                    self.assertEqual(len(self.check(client, acknowledge=True)), 1)
+                    self.assertTrue(eventually(lambda: serving(client) == ALL, 10))
+                    self.assertEqual(self.check(client), [])
+                self.assertEqual(server.stop(), 0)  # the acknowledgement is not in the log that is lost next
+                server.start()
+                with server.connect() as client:
+                    client.add("ball", ball(300, 2.0))
+
+    def check(self, client, **options):
+        return [p for m in client.admin.Check(admin.CheckRequest(**options), timeout=60) for p in m.problems]
 
     def restore(self, client, backup):
         client.admin.Restore(iter([

@@ -24,7 +24,7 @@ constexpr const char* kServices[] = {"shapedb.v1.ShapeService", "shapedb.v1.Sear
 TEST_F(StandardServices, HealthCheckKnowsEachService) {
     HealthCheckRequest request;
     std::vector<const char*> names(std::begin(kServices), std::end(kServices));
-    names.insert(names.end(), {"", "shapedb.segmentation"});
+    names.insert(names.end(), {"", "shapedb.segmentation", "shapedb.storage"});
     for (const char* service : names) {
         request.set_service(service);
         const auto reply = unary(*client.health, &Health::Stub::Check, request);

@@ -206,6 +206,48 @@ void dieWorking(const std::string& name, int time) {
     EXPECT_EQ(next, 0) << "the next process";
 }
 
+const Step kOpen{"open", [](World& world) { return world.open(); }};
+
+/// Of a collection that takes several transactions to delete.
+std::vector<Step> largeCollection() {
+    return {kOpen, {"fill", [](World& world) -> Result<void> {
+                        const auto made = world.store->createCollection("large", "", "");
+                        for (int i = 0; made && i < 600; ++i) {
+                            EXPECT_TRUE(world.store->putShape(testing::putRequest(
+                                made->id, std::to_string(i), testing::taggedPoints(1.0f))));
+                        }
+                        return {};
+                    }}};
+}
+const Step kDeleteIt{"delete a large collection", [](World& world) -> Result<void> {
+                         return world.store->deleteCollection(world.store->getCollection("large")->id);
+                     }};
+
+const char* const kNoticed = "failpoint:open.noticed";
+
+/// Changes are missing: dies where that is noted, and the next start tells it.
+void dieNoticing() {
+    Image files = filesAfter({kOpen, {"create", [](World& world) -> Result<void> {
+                                          const auto made = world.store->createCollection("a", "", "");
+                                          return made ? Result<void>() : fail(made.error());
+                                      }}});
+    files["shapes.db.commits"] = "shapedb commits 00000000000000000009\n";
+    const testing::TemporaryDirectory folder;
+    for (const auto& [file, bytes] : files) writeFile(folder.file(file), bytes);
+    const int exit = inChild([&] {
+        Failpoints::dieAt(kNoticed, 1);
+        static_cast<void>(World(folder.path()).open());
+    });
+    ASSERT_EQ(exit, kDiedThere);
+    ++deathCount;
+    for (int start = 0; start < 2; ++start) {
+        World after(folder.path());
+        ASSERT_TRUE(after.open());
+        EXPECT_EQ(after.store->stats()->missingCommits, 8u);
+        EXPECT_EQ(after.store->findings().size(), 1u);
+    }
+}
+
 // One test, so that it knows of all failpoints whether the process died there.
 TEST(FailpointTest, EachIsSurvived) {
     const auto whole = dieEverywhere(recordWholeScript, {});
@@ -214,9 +256,15 @@ TEST(FailpointTest, EachIsSurvived) {
         const auto names = dieEverywhere([&] { return std::vector<Moment>{moment}; }, moment.files);
         died.insert(names.begin(), names.end());
     }
+    const Image large = filesAfter(largeCollection());
+    const auto deleting = dieEverywhere([&] { return record({kOpen, kDeleteIt}, large); }, large);
+    EXPECT_EQ(deleting.count("failpoint:delete.some"), 1u);
+    died.insert(deleting.begin(), deleting.end());
+    dieNoticing();
+    died.insert(kNoticed);
     const std::set<std::string> all = Failpoints::inSources();
     for (const std::string& name : all) {
-        if (whole.count(name) != 0) continue;
+        if (whole.count(name) != 0 || deleting.count(name) != 0 || name == kNoticed) continue;
         dieWorking(name, 1);
         dieWorking(name, 2);
         if (HasFailure()) return;  // a child would inherit it

@@ -31,7 +31,6 @@ constexpr char kAllSignatures[] =
 constexpr char kAllSurfaces[] =
     "SELECT s.key, f.points_version, f.digest, f.bytes FROM shape_surface f JOIN shape s ON s.id = "
     "f.shape_id";
-constexpr char kAllKeys[] = "SELECT key FROM shape";
 constexpr char kShapesTotal[] = "SELECT count(*) FROM shape";
 
 /// A rule between tables; the statement lists the keys of shapes that break it.
@@ -41,14 +40,23 @@ struct Rule {
 };
 constexpr char kSequenceProblems[] =
     "SELECT name, seq FROM sqlite_sequence WHERE typeof(seq) <> 'integer' OR seq < 0 OR seq > ?1";
-constexpr char kCounterProblems[] =
-    "SELECT 'collection ' || name FROM collection WHERE max(id, generation) > ?1 UNION ALL "
-    "SELECT 'shape ' || key FROM shape WHERE max(id, version) > ?1 UNION ALL "
-    "SELECT 'job ' || id FROM job WHERE max(id, attempts, stops) > ?1 UNION ALL "
-    "SELECT 'rebuild ' || id FROM rebuild WHERE max(id, target_generation) > ?1 UNION ALL "
-    "SELECT 'table tally' FROM tally WHERE commits < 0 OR commits > ?1";
-constexpr char kAliasProblems[] =
-    "SELECT a.name FROM collection_alias a JOIN collection c ON c.name = a.name";
+/// The same for other tables; the statement names the row.
+constexpr Rule kRulesOfOthers[] = {
+    {"SELECT 'alias ''' || a.name || '''' FROM collection_alias a JOIN collection c ON c.name = a.name",
+     "is also the name of a collection"},
+    {"SELECT 'table collection, row ' || c.id FROM collection c WHERE c.waiting <> (SELECT count(*) FROM "
+     "shape "
+     "s WHERE s.collection_id = c.id AND s.state = 0 AND NOT EXISTS (SELECT 1 FROM signature g WHERE "
+     "g.shape_id "
+     "= s.id AND g.generation = c.generation))",
+     "counts other shapes as waiting than those that are"},
+    {"SELECT 'table rebuild, row ' || r.id FROM rebuild r JOIN collection c ON c.id = r.collection_id WHERE "
+     "r.state = 0 AND r.target_generation <> c.generation + 1",
+     "runs into a generation that is not the next one of its collection"},
+    {"SELECT 'table job, row ' || id FROM job WHERE state = 1 AND attempts < 1",
+     "is running and was never tried"},
+};
+static_assert(kMaxMetadataEntries == 64, "as in the rule below");
 constexpr Rule kRules[] = {
     {"SELECT s.key FROM shape s JOIN job j ON j.shape_id = s.id JOIN shape_points p ON p.shape_id = s.id "
      "WHERE "
@@ -58,9 +66,9 @@ constexpr Rule kRules[] = {
      "(SELECT 1 FROM signature g WHERE g.shape_id = s.id AND g.generation = c.generation "
      "AND g.points_version = s.points_version)",
      "is ready but has no signature of its current points"},
-    // An import queues its jobs when it is complete.
-    {"SELECT s.key FROM shape s JOIN collection c ON c.id = s.collection_id WHERE s.state = 0 AND c.name "
-     "<> " SHAPEDB_IMPORTING " AND NOT EXISTS (SELECT 1 FROM job j WHERE j.shape_id = s.id)",
+    // An import queues its jobs when it is complete, and a deletion ends with what is left.
+    {"SELECT s.key FROM shape s JOIN collection c ON c.id = s.collection_id WHERE s.state = 0 AND "
+     "NOT " SHAPEDB_HIDDEN("c.name") " AND NOT EXISTS (SELECT 1 FROM job j WHERE j.shape_id = s.id)",
      "is pending but has no job"},
     {"SELECT s.key FROM shape s JOIN job j ON j.shape_id = s.id WHERE s.state <> 0",
      "has a job but is not pending"},
@@ -80,13 +88,22 @@ constexpr Rule kRules[] = {
      "s.points_version",
      "has surface points of points that it never had"},
     // A read-only connection knows no CHECK constraints.
+    {"SELECT key FROM shape WHERE points_version > version", "has points of a version that it never had"},
+    {"SELECT key FROM shape WHERE (state = 2) <> (failure_code IS NOT NULL) OR (state = 2) <> "
+     "(failure_message IS NOT NULL)",
+     "has a failure that does not fit its state"},
+    {"SELECT s.key FROM shape s JOIN (SELECT shape_id FROM shape_metadata GROUP BY shape_id HAVING count(*) "
+     "> "
+     "64) m ON m.shape_id = s.id",
+     "has more than 64 entries of metadata"},
     {"SELECT s.key FROM shape s WHERE max(abs(s.origin_x), abs(s.origin_y), abs(s.origin_z)) > 3.4e38",
      "has points relative to an origin that is out of range"},
 };
 
 class Checker {
   public:
-    Checker(Connection& connection, const RunContext& context) : connection_(connection), context_(context) {}
+    Checker(Connection& connection, const ValueRules& values, const RunContext& context)
+        : connection_(connection), values_(values), context_(context) {}
 
     std::vector<std::string> run() {
         const Interruptible interruptible(connection_, context_);
@@ -100,15 +117,22 @@ class Checker {
         for (const Rule& rule : kRules) {
             section([&] {
                 Query query(connection_, rule.sql);
-                while (query.step()) add("shape " + quoted(query.text(0)) + " " + rule.problem);
+                while (query.step()) add("shape " + named(query) + " " + rule.problem);
             });
         }
-        section([&] {
-            Query query(connection_, kAliasProblems);
-            while (query.step()) add(quoted(query.text(0)) + " is both a collection and an alias");
-        });
-        section([&] { counters(); });
-        section([&] { keys(); });
+        for (const Rule& rule : kRulesOfOthers) {
+            section([&] {
+                Query query(connection_, rule.sql);
+                while (query.step()) add(escapeUnsafe(query.text(0)) + " " + rule.problem);
+            });
+        }
+        section([&] { sequences(); });
+        for (std::size_t table = 0; table < kValueTables; ++table) {
+            section([&] {
+                checkValues(connection_, table, values_, context_,
+                            [&](std::string problem) { add(std::move(problem)); });
+            });
+        }
         section([&] {
             if (Query(connection_, kTallyProblems).step()) add("the sums in table tally are wrong");
         });
@@ -170,24 +194,15 @@ class Checker {
         return lines;
     }
 
-    /// What counts up must never come to its end.
-    void counters() {
-        Query sequences(connection_, kSequenceProblems, kMostCounted);
-        while (sequences.step()) {
-            add("the id sequence of table " + sequences.text(0) + " stands at " + sequences.text(1) +
-                ": no rows could be added any more");
-        }
-        Query counted(connection_, kCounterProblems, kMostCounted);
-        while (counted.step()) add(counted.text(0) + " has an id, a version or a count beyond 2^62");
-    }
+    static std::string named(const Query& query) { return quoted(escapeUnsafe(query.text(0))); }
 
-    void keys() {
-        Query all(connection_, kAllKeys);
-        while (all.step()) {
-            orRaise(context_.checkpoint());
-            if (const auto problem = problemOfKey(all.text(0))) {
-                add("shape " + quoted(escapeUnsafe(all.text(0))) + " has a key that is none: " + *problem);
-            }
+    /// What counts up must never come to its end.
+    void sequences() {
+        Query query(connection_, kSequenceProblems, values_.mostCounted);
+        while (query.step()) {
+            add("table sqlite_sequence, row " + quoted(escapeUnsafe(query.text(0))) +
+                ": the id sequence of table " + escapeUnsafe(query.text(0)) + " stands at " + query.text(1) +
+                ", outside 0 to " + asPower(values_.mostCounted) + ": no room for more rows");
         }
     }
 
@@ -237,14 +252,16 @@ class Checker {
     }
 
     Connection& connection_;
+    const ValueRules& values_;
     const RunContext& context_;
     std::vector<std::string> problems_;
 };
 
 }  // namespace
 
-std::vector<std::string> checkDatabase(Connection& connection, const RunContext& context) {
-    return Checker(connection, context).run();
+std::vector<std::string> checkDatabase(Connection& connection, const ValueRules& values,
+                                       const RunContext& context) {
+    return Checker(connection, values, context).run();
 }
 
 }  // namespace shapedb::store

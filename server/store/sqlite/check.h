@@ -6,6 +6,7 @@
 
 #include "core/base/run_context.h"
 #include "server/store/sqlite/connection.h"
+#include "server/store/sqlite/value_rules.h"
 
 namespace shapedb::store {
 
@@ -13,6 +14,7 @@ namespace shapedb::store {
 /// in one snapshot.
 /// Reports the stages "integrity" and "points" (in shapes). Damage is a line, not a Failure; throws
 /// Failure kCancelled, kDeadlineExceeded, or when it cannot read.
-std::vector<std::string> checkDatabase(Connection& connection, const RunContext& context);
+std::vector<std::string> checkDatabase(Connection& connection, const ValueRules& values,
+                                       const RunContext& context);
 
 }  // namespace shapedb::store

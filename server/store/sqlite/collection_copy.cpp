@@ -7,9 +7,13 @@ namespace shapedb::store {
 
 namespace {
 
-/// What one transaction copies or deletes: a few milliseconds of the write lock, and of memory.
+/// What one transaction copies: a few milliseconds of the write lock, and of memory.
 constexpr std::size_t kShapesAtATime = 64;
 constexpr std::size_t kBytesAtATime = std::size_t{4} << 20;
+/// What one transaction deletes. Of a shape up to a dozen pages are written to the log, of its points one in
+/// a thousand of their pages: in all less than SpaceReserve::kBytes.
+constexpr std::size_t kShapesPerDeletion = 256;
+constexpr std::size_t kBytesPerDeletion = std::size_t{64} << 20;
 
 std::size_t bytesOf(const CopiedShape& copied) {
     return copied.points.size() +
@@ -107,15 +111,21 @@ void queuePending(Connection& connection, std::int64_t collectionId, TimestampMs
     Query(connection, sql::kQueuePending, collectionId, now).run();
 }
 
-std::vector<std::int64_t> someShapes(Connection& connection, std::int64_t collectionId) {
+bool deleteSome(Connection& connection, std::int64_t collectionId) {
     std::vector<std::int64_t> ids;
-    std::size_t bytes = 0;
-    Query query(connection, sql::kStoredSizes, collectionId);
-    while (ids.size() < kShapesAtATime && bytes < kBytesAtATime && query.step()) {
-        ids.push_back(query.integer(0));
-        bytes += static_cast<std::size_t>(query.integer(1));
+    bool all = true;
+    {
+        std::size_t bytes = 0;
+        Query query(connection, sql::kStoredSizes, collectionId);
+        while (all && query.step()) {
+            bytes += static_cast<std::size_t>(query.integer(1));
+            all = ids.empty() || (ids.size() < kShapesPerDeletion && bytes <= kBytesPerDeletion);
+            if (all) ids.push_back(query.integer(0));
+        }
     }
-    return ids;
+    for (const std::int64_t id : ids) Query(connection, sql::kDeleteShape, id).run();
+    if (all) Query(connection, sql::kDeleteCollection, collectionId).run();
+    return all;
 }
 
 }  // namespace shapedb::store

@@ -33,7 +33,8 @@ void insertCopy(Connection& target, std::int64_t collectionId, const CopiedShape
 /// Queues a job for each pending shape of the collection, which must have none; in the caller's transaction.
 void queuePending(Connection& connection, std::int64_t collectionId, TimestampMs now);
 
-/// The first shapes of the collection: as many as one transaction should delete.
-[[nodiscard]] std::vector<std::int64_t> someShapes(Connection& connection, std::int64_t collectionId);
+/// Deletes the first shapes of the collection, as many as one transaction should, and the collection if these
+/// were all. Returns whether they were; in the caller's transaction.
+bool deleteSome(Connection& connection, std::int64_t collectionId);
 
 }  // namespace shapedb::store

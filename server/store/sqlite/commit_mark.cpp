@@ -3,6 +3,7 @@
 #include <array>
 #include <charconv>
 #include <cstdio>
+#include <filesystem>
 #include <string_view>
 #include <system_error>
 
@@ -22,7 +23,8 @@ constexpr std::size_t kBytes = kHead.size() + kDigits + 1;
 }  // namespace
 
 CommitMark::CommitMark(const std::string& path)
-    : file_(::open(path.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, S_IRUSR | S_IWUSR)) {}
+    : folder_(std::filesystem::path(path).parent_path().string()),
+      file_(::open(path.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, S_IRUSR | S_IWUSR)) {}
 
 CommitMark::~CommitMark() {
     if (file_ >= 0) ::close(file_);
@@ -44,6 +46,15 @@ void CommitMark::write(std::int64_t commits) const noexcept {
     std::snprintf(line.data(), line.size(), "%s%020lld\n", kHead.data(), static_cast<long long>(commits));
     // A mark that cannot be written is behind, and proves less.
     if (file_ >= 0) static_cast<void>(::pwrite(file_, line.data(), kBytes, 0) == 0);
+}
+
+bool CommitMark::sync() const noexcept {
+    if (file_ < 0 || ::fsync(file_) != 0) return false;
+    const int folder = ::open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (folder < 0) return false;
+    const bool done = ::fsync(folder) == 0;
+    ::close(folder);
+    return done;
 }
 
 }  // namespace shapedb::store

@@ -24,8 +24,12 @@ class CommitMark {
     /// Nothing if there is no mark, or a damaged one.
     [[nodiscard]] std::optional<std::int64_t> read() const noexcept;
     void write(std::int64_t commits) const noexcept;
+    /// Whether what was written, and the file's name, survive a power failure: then a mark that is missing
+    /// later was not lost so.
+    bool sync() const noexcept;
 
   private:
+    const std::string folder_;
     int file_;
 };
 

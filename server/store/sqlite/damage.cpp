@@ -20,13 +20,13 @@ struct SmallTable {
     const char* name;
     const char* consequence;
 };
-constexpr SmallTable kJobs = {"job", "no scan is taken in, searches are answered"};
+constexpr char kJobs[] = "job";
 constexpr SmallTable kSmallTables[] = {
     {"sqlite_sequence", "nothing can be added"},
     {"tally", "nothing can be changed"},
     {"collection", "collections whose row cannot be read are out of service, the others are served"},
     {"collection_alias", "aliases that cannot be read are unknown"},
-    kJobs,
+    {kJobs, "no scan is taken in, searches are answered"},
     {"rebuild", "rebuilds do not run"},
     {"rebuild_failure", "rebuilds do not run"},
 };
@@ -97,16 +97,15 @@ void raiseUnreadable(const std::string& line) {
     }
 }
 
-std::vector<std::string> damagedTables(Connection& connection) {
+std::vector<std::string> damagedTables(Connection& connection, std::optional<std::string>& queue) {
     std::vector<std::string> damaged;
     for (const SmallTable& table : kSmallTables) {
-        if (auto line = damageOf(connection, table)) damaged.push_back(std::move(*line));
+        auto line = damageOf(connection, table);
+        if (!line) continue;
+        if (table.name == kJobs) queue = *line;
+        damaged.push_back(std::move(*line));
     }
     return damaged;
-}
-
-void requireSoundQueue(Connection& connection) {
-    if (auto line = damageOf(connection, kJobs)) raise(ErrorCode::kDataLoss, std::move(*line));
 }
 
 std::vector<Collection> salvageCollections(Connection& connection, const Error& listing) {
@@ -123,7 +122,7 @@ std::vector<Collection> salvageCollections(Connection& connection, const Error& 
             row->name = name;
             row->damage = listing;
         }
-        if (row && row->name != sql::kImporting) all.push_back(std::move(*row));
+        if (row && !sql::isHidden(row->name)) all.push_back(std::move(*row));
     }
     std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
     return all;

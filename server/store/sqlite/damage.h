@@ -5,6 +5,7 @@
 // which marks the collections it cannot read.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,12 +22,9 @@ inline constexpr char kMissingPage[] = "failed to get page";
 void raiseUnreadable(const std::string& line);
 
 /// Reads the small tables. One line for each that is damaged: its name, what does not work without it, and
-/// what to do. Throws Failure if they cannot be read for another reason.
-std::vector<std::string> damagedTables(Connection& connection);
-
-/// Throws Failure kDataLoss, as a line of the above, if the table of jobs is damaged: it may go unnoticed
-/// until the first is queued.
-void requireSoundQueue(Connection& connection);
+/// what to do. `queue` becomes that of the table of jobs. Throws Failure if they cannot be read for another
+/// reason.
+std::vector<std::string> damagedTables(Connection& connection, std::optional<std::string>& queue);
 
 /// The collections, by name, when `listing` them has failed: those that can be read, and with
 /// Collection::damage those of which only the id is known, and the name if an index still tells it. Throws
@@ -36,14 +34,16 @@ std::vector<Collection> salvageCollections(Connection& connection, const Error& 
 /// The aliases, by name, from the index over them: when their table cannot be read. Throws Failure.
 std::vector<Alias> salvageAliases(Connection& connection);
 
-/// Runs `body`; damage that it meets is left to others to tell of. Returns whether there was none.
+/// Runs `body`; damage that it meets is left to others to tell of. Returns whether there was none; `damage`,
+/// unless null, becomes what it was.
 template <typename Body>
-bool unlessDamaged(Body body) {
+bool unlessDamaged(Body body, std::string* damage = nullptr) {
     try {
         body();
         return true;
     } catch (const Failure& failure) {
         if (failure.error.code != ErrorCode::kDataLoss) throw;
+        if (damage != nullptr) *damage = failure.error.message;
         return false;
     }
 }

@@ -13,6 +13,7 @@
 #include "server/store/failpoints.h"
 #include "server/store/sqlite/check.h"
 #include "server/store/sqlite/migrator.h"
+#include "server/store/sqlite/sequences.h"
 #include "server/store/sqlite/sql.h"
 
 namespace shapedb::store {
@@ -99,7 +100,7 @@ void requireBackupFile(const std::string& path, const std::string& livePath) {
 }
 
 /// Migrates the private copy of a backup and checks it.
-void prepareCopy(Connection& copy, const RunContext& context, std::int64_t nowMs) {
+void prepareCopy(Connection& copy, const SqliteOptions& options, const RunContext& context) {
     if (identify(copy) != FileKind::kOurs) raise(ErrorCode::kDataLoss, "it is not a ShapeDB database");
     if (copy.integer("PRAGMA page_size") != kPageSize) {
         raise(ErrorCode::kDataLoss, "its page size is not " + std::to_string(kPageSize));
@@ -110,11 +111,11 @@ void prepareCopy(Connection& copy, const RunContext& context, std::int64_t nowMs
     {
         // A file can be made so that its triggers keep a migration busy for ever.
         const Interruptible interruptible(copy, context);
-        migrate(copy, embeddedMigrations(), nowMs);
-        // What was being imported when the backup was made would never be completed.
-        copy.execute("DELETE FROM collection WHERE name = " SHAPEDB_IMPORTING);
+        migrate(copy, embeddedMigrations(), options.now());
+        // What was being imported or deleted when the backup was made would never be completed.
+        copy.execute("DELETE FROM collection WHERE " SHAPEDB_HIDDEN("name"));
     }
-    requireSound(copy, context);
+    requireSound(copy, options, context);
 }
 
 /// What is wrong with the copy of `path`, as an error of the file that was named.
@@ -183,7 +184,7 @@ std::unique_ptr<Connection> checkedCopy(const std::string& path, const char* use
     SHAPEDB_FAILPOINT("restore.copied");
     try {
         auto copy = std::make_unique<Connection>(copyPath, OpenMode::kReadWrite, options.busyTimeoutMs);
-        prepareCopy(*copy, context, options.now());
+        prepareCopy(*copy, options, context);
         return copy;
     } catch (const Failure& failure) {
         orRaise(context.checkpoint());  // reports the caller's reason instead of SQLite's "interrupted"
@@ -191,8 +192,9 @@ std::unique_ptr<Connection> checkedCopy(const std::string& path, const char* use
     }
 }
 
-void requireSound(Connection& connection, const RunContext& context) {
-    const std::vector<std::string> problems = checkDatabase(connection, context);
+void requireSound(Connection& connection, const SqliteOptions& options, const RunContext& context) {
+    const std::vector<std::string> problems =
+        checkDatabase(connection, {kMostCountedInFiles, options.acceptParameters}, context);
     if (problems.empty()) return;
     raise(ErrorCode::kDataLoss,
           problems.front() +

@@ -57,7 +57,7 @@ void makeEmptyDatabase(Connection& connection, std::int64_t nowMs);
                                                       const SqliteOptions& options,
                                                       const RunContext& context);
 
-/// Throws Failure kDataLoss, with the first problem that `check` finds.
-void requireSound(Connection& connection, const RunContext& context);
+/// Throws Failure kDataLoss, with the first problem that `check` finds in a file.
+void requireSound(Connection& connection, const SqliteOptions& options, const RunContext& context);
 
 }  // namespace shapedb::store

@@ -2,7 +2,6 @@
 #include "server/store/failpoints.h"
 #include "server/store/put_rules.h"
 #include "server/store/quarantine.h"
-#include "server/store/sqlite/damage.h"
 #include "server/store/sqlite/rows.h"
 #include "server/store/sqlite/sqlite_store_impl.h"
 
@@ -87,7 +86,11 @@ Result<void> SqliteStore::releaseJob(const Job& job) {
 
 Result<std::vector<Shape>> SqliteStore::recoverJobs(int maxAttempts, const std::vector<Crash>& crashes) {
     return write("recover the jobs", [&](Connection& connection) {
-        requireSoundQueue(connection);
+        {
+            // It may go unnoticed until the first job is queued.
+            const std::lock_guard<std::mutex> lock(findingsMutex_);
+            if (queueDamage_) raise(ErrorCode::kDataLoss, *queueDamage_);
+        }
         struct Lost {
             std::int64_t shapeId;
             Deaths deaths;

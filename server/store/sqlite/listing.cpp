@@ -107,8 +107,10 @@ void inOrder(Connection& connection, std::int64_t collectionId, const ShapeListi
 // must not stop them.
 constexpr char kCountWithoutIndex[] =
     "SELECT count(*) FROM shape NOT INDEXED WHERE collection_id = ?1 AND (?2 < 0 OR state = ?2)";
-constexpr char kIdsWithoutIndex[] =
-    "SELECT id FROM shape NOT INDEXED WHERE collection_id = ?1 AND state = ?2";
+constexpr char kCountWaitingOneByOne[] =
+    "SELECT count(*) FROM shape s NOT INDEXED WHERE s.collection_id = ?1 AND s.state = 0 AND NOT EXISTS "
+    "(SELECT 1 "
+    "FROM signature g WHERE g.shape_id = s.id)";
 
 std::uint64_t countWithoutIndex(Connection& connection, std::int64_t collectionId,
                                 std::optional<ShapeState> state) {
@@ -157,23 +159,14 @@ Result<std::uint64_t> SqliteStore::countShapes(std::int64_t collectionId, const 
     });
 }
 
-Result<std::uint64_t> SqliteStore::countPending(std::int64_t collectionId,
-                                                const std::function<bool(std::int64_t)>& counts) {
-    return read("count the pending shapes", [&](Connection& connection) {
+Result<std::uint64_t> SqliteStore::countWaiting(std::int64_t collectionId) {
+    return read("count the waiting shapes", [&](Connection& connection) {
         std::uint64_t count = 0;
-        const auto look = [&](Query& query) {
-            count = 0;
-            while (query.step()) count += counts(query.integer(0)) ? 1 : 0;
+        const auto look = [&](const char* statement) {
+            Query query(connection, statement, collectionId);
+            if (query.step()) count = static_cast<std::uint64_t>(query.integer(0));
         };
-        const int pending = static_cast<int>(ShapeState::kPending);
-        const bool whole = unlessDamaged([&] {
-            Query query(connection, sql::kListIdsInState, collectionId, pending);
-            look(query);
-        });
-        if (!whole) {
-            Query query(connection, kIdsWithoutIndex, collectionId, pending);
-            look(query);
-        }
+        if (!unlessDamaged([&] { look(sql::kCountWaiting); })) look(kCountWaitingOneByOne);
         return count;
     });
 }

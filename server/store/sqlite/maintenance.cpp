@@ -17,6 +17,10 @@ namespace {
 /// 1 MiB between two checks for cancellation.
 constexpr int kStepPages = 256;
 
+bool contains(const std::vector<std::string>& lines, const std::string& line) {
+    return std::find(lines.begin(), lines.end(), line) != lines.end();
+}
+
 /// No server gave out so many ids since the backup was made, for want of the last one.
 constexpr std::int64_t kBeyondUnknownIds = std::int64_t{1} << 40;
 
@@ -28,8 +32,11 @@ constexpr std::int64_t kBeyondUnknownIds = std::int64_t{1} << 40;
 /// A restore is the way out of damage: what cannot be read of the live database must not stop it.
 std::int64_t separateIds(Connection& copy, Connection& live, std::int64_t marked) {
     std::int64_t commits = countCommits(copy);
-    const bool counted = unlessDamaged([&] { commits = std::max(commits, countCommits(live)); });
-    if (!counted && marked <= kMostCounted) commits = std::max(commits, marked);
+    const auto believe = [&](std::int64_t count) {
+        if (count <= kMostCounted) commits = std::max(commits, count);
+    };
+    const bool counted = unlessDamaged([&] { believe(countCommits(live)); });
+    if (!counted) believe(marked);
     ++commits;
     const auto lastOfBoth = [&](const std::string& table) {
         std::int64_t last = lastId(copy, table);
@@ -38,14 +45,12 @@ std::int64_t separateIds(Connection& copy, Connection& live, std::int64_t marked
     };
     Transaction transaction(copy, Transaction::Kind::kWrite);
     for (const char* table : {"collection", "shape"}) setLastId(copy, table, lastOfBoth(table));
-    for (const std::string table : {"job", "rebuild"}) {
-        const std::int64_t offset = lastOfBoth(table);
-        // The offset is no less than any id, so that no row moves to an id that another still has.
-        copy.execute("UPDATE " + table + " SET id = id + " + std::to_string(offset));
-        setLastId(copy, table, offset + lastId(copy, table));
-    }
+    // Not moved by an offset: ids would double with every restore of what was restored before.
+    for (const std::string table : {"job", "rebuild"}) renumber(copy, table, lastOfBoth(table));
     // No mark of an acknowledged change is ahead of the database that replaces this one.
     copy.execute("UPDATE tally SET commits = " + std::to_string(commits));
+    // Of the history of another database.
+    copy.execute("DELETE FROM notice");
     // The server that made the backup did not die of the jobs it was running.
     copy.execute("UPDATE job SET state = 0, attempts = attempts - 1 WHERE state = 1");
     transaction.commit();
@@ -105,6 +110,8 @@ Result<void> SqliteStore::restore(const std::string& path, const RunContext& con
             const std::lock_guard<std::mutex> known(findingsMutex_);
             missingCommits_ = 0;
             findings_.clear();
+            notices_.clear();
+            queueDamage_.reset();
         }
         boundWal();
     });
@@ -115,8 +122,9 @@ Result<std::vector<std::string>> SqliteStore::check(const RunContext& context) {
         const Counted longRead(longReads_);
         Connection connection(options_.path, OpenMode::kReadOnly, options_.busyTimeoutMs);
         std::vector<std::string> problems = findings();
-        for (std::string& problem : checkDatabase(connection, context))
-            problems.push_back(std::move(problem));
+        for (std::string& problem :
+             checkDatabase(connection, {kMostCounted, options_.acceptParameters}, context))
+            if (!contains(problems, problem)) problems.push_back(std::move(problem));
         return problems;
     });
 }

@@ -13,12 +13,25 @@ namespace shapedb::store {
 
 namespace {
 
-std::string readOwner(int descriptor) {
-    char text[32] = {};
+constexpr char kComplete[] = "complete\n";
+
+std::string readLock(int descriptor) {
+    char text[64] = {};
     const ssize_t got = pread(descriptor, text, sizeof text - 1, 0);
-    std::string owner(text, got > 0 ? static_cast<std::size_t>(got) : 0);
-    while (!owner.empty() && (owner.back() == '\n' || owner.back() == '\0')) owner.pop_back();
+    return {text, got > 0 ? static_cast<std::size_t>(got) : 0};
+}
+
+std::string readOwner(int descriptor) {
+    const std::string text = readLock(descriptor);
+    const std::string owner = text.substr(0, text.find_first_of(std::string("\n\0", 2)));
     return owner.empty() ? "(not yet written)" : owner;
+}
+
+/// False if it cannot be written, as on a full device: the lock holds without it.
+bool writeLock(int descriptor, bool complete) {
+    const std::string text = std::to_string(getpid()) + "\n" + (complete ? kComplete : "");
+    return pwrite(descriptor, text.data(), text.size(), 0) == static_cast<ssize_t>(text.size()) &&
+           ftruncate(descriptor, static_cast<off_t>(text.size())) == 0;
 }
 
 }  // namespace
@@ -40,11 +53,12 @@ ProcessLock::ProcessLock(const std::string& databasePath) {
         raise(ErrorCode::kStorage, "database '" + databasePath + "' is in use by process " + owner +
                                        "; stop that server or choose another data folder");
     }
-    // Only for the message above: the lock holds without it, for example on a full device.
-    const std::string pid = std::to_string(getpid()) + "\n";
-    if (ftruncate(descriptor_, 0) == 0 && pwrite(descriptor_, pid.data(), pid.size(), 0) < 0) {
-        static_cast<void>(ftruncate(descriptor_, 0));
-    }
+    wasComplete_ = readLock(descriptor_).find(kComplete) != std::string::npos;
+    static_cast<void>(writeLock(descriptor_, wasComplete_));
+}
+
+void ProcessLock::setComplete() noexcept {
+    if (!wasComplete_) wasComplete_ = writeLock(descriptor_, true);
 }
 
 ProcessLock::~ProcessLock() { close(descriptor_); }

@@ -6,7 +6,7 @@
 namespace shapedb::store {
 
 /// Holds an exclusive flock on the database path + ".lock". The kernel releases it however the process
-/// ends; the file stays and contains the owner's process id.
+/// ends; the file stays and contains the owner's process id, and a second line once `setComplete` was called.
 class ProcessLock {
   public:
     /// Throws Failure kStorage: another process has it (names its id), or the file cannot be created.
@@ -14,8 +14,12 @@ class ProcessLock {
     ~ProcessLock();
     ProcessLock(const ProcessLock&) = delete;
     ProcessLock& operator=(const ProcessLock&) = delete;
+    /// Remembers, from one owner to the next, that the files beside the database are complete.
+    void setComplete() noexcept;
+    [[nodiscard]] bool wasComplete() const noexcept { return wasComplete_; }
 
   private:
+    bool wasComplete_ = false;
     int descriptor_ = -1;
 };
 

@@ -73,7 +73,7 @@ bool pointsAreCurrent(Connection& connection, const Rebuild& rebuild, std::int64
 }  // namespace
 
 Result<Rebuild> SqliteStore::startRebuild(std::int64_t collectionId, const std::string& parameters) {
-    RETURN_IF_ERROR(reserve_.hold());
+    RETURN_IF_ERROR(requireSpace());
     return write("start the rebuild", [&](Connection& connection) {
         const Collection collection = requireCollection(connection, collectionId);
         {
@@ -176,7 +176,7 @@ Result<bool> SqliteStore::finishRebuild(std::int64_t rebuildId) {
 }
 
 Result<void> SqliteStore::abandonRebuild(std::int64_t rebuildId, RebuildState state) {
-    return write("abandon the rebuild", [&](Connection& connection) {
+    return remove("abandon the rebuild", [&](Connection& connection) {
         if (state != RebuildState::kCancelled && state != RebuildState::kFailed) {
             raise(ErrorCode::kInvalidArgument, "a rebuild is abandoned as cancelled or as failed");
         }

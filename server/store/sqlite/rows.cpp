@@ -5,6 +5,7 @@
 
 #include "common/sha256.h"
 #include "server/store/point_blob.h"
+#include "server/store/sqlite/damage.h"
 
 namespace shapedb::store {
 
@@ -56,6 +57,11 @@ Shape readShape(const Query& query) {
 
 namespace {
 
+/// Slow, and right while the table can be read.
+constexpr char kShapeWithoutIndex[] = "SELECT " SHAPEDB_SHAPE_COLUMNS
+                                      " FROM shape s NOT INDEXED LEFT JOIN shape_metadata m ON m.shape_id = "
+                                      "s.id WHERE s.collection_id = ?1 AND s.key = ?2";
+
 std::optional<Shape> onlyShape(Query& query) {
     std::optional<Shape> found;
     forEachShape(query, [&](Shape&& shape) {
@@ -68,7 +74,18 @@ std::optional<Shape> onlyShape(Query& query) {
 }  // namespace
 
 std::optional<Shape> findShape(Connection& connection, std::int64_t collectionId, const std::string& key) {
-    Query query(connection, sql::kShapeByKey, collectionId, key);
+    std::optional<Shape> found;
+    const auto look = [&](const char* statement) {
+        Query query(connection, statement, collectionId, key);
+        found = onlyShape(query);
+    };
+    if (!unlessDamaged([&] { look(sql::kShapeByKey); })) look(kShapeWithoutIndex);
+    return found;
+}
+
+std::optional<Shape> findDeletion(Connection& connection, std::int64_t collectionId, const std::string& key,
+                                  std::int64_t version) {
+    Query query(connection, sql::kRememberedDeletion, collectionId, key, version);
     return onlyShape(query);
 }
 
@@ -90,9 +107,13 @@ Collection readCollection(const Query& query) {
 
 Collection requireCollection(Connection& connection, std::int64_t collectionId) {
     Query query(connection, sql::kCollectionById, collectionId);
-    if (!query.step())
+    const auto none = [&] {
         raise(ErrorCode::kNotFound, "there is no collection with id " + std::to_string(collectionId));
-    return readCollection(query);
+    };
+    if (!query.step()) none();
+    Collection found = readCollection(query);
+    if (sql::isDeleted(found.name)) none();
+    return found;
 }
 
 std::optional<Collection> findCollection(Connection& connection, const std::string& name) {

@@ -37,6 +37,9 @@ void forEachShape(Query& query, Visit visit) {
 
 std::optional<Shape> findShape(Connection& connection, std::int64_t collectionId, const std::string& key);
 std::optional<Shape> findShapeById(Connection& connection, std::int64_t shapeId);
+/// A shape that was deleted with this expected version, as it was.
+std::optional<Shape> findDeletion(Connection& connection, std::int64_t collectionId, const std::string& key,
+                                  std::int64_t version);
 /// Throws Failure kNotFound.
 Collection requireCollection(Connection& connection, std::int64_t collectionId);
 std::optional<Collection> findCollection(Connection& connection, const std::string& name);

@@ -1,5 +1,7 @@
 #include "server/store/sqlite/sequences.h"
 
+#include <algorithm>
+
 namespace shapedb::store {
 
 namespace {
@@ -24,6 +26,13 @@ void setLastId(Connection& connection, const std::string& table, std::int64_t id
     connection.execute("DELETE FROM sqlite_sequence WHERE name = '" + table +
                        "'; INSERT INTO sqlite_sequence (name, seq) VALUES ('" + table + "', " +
                        std::to_string(id) + ")");
+}
+
+void renumber(Connection& connection, const std::string& table, std::int64_t last) {
+    connection.execute("UPDATE " + table + " SET id = " + std::to_string(last) +
+                       " + n.place FROM (SELECT id AS old, row_number() OVER (ORDER BY id) AS place FROM " +
+                       table + ") n WHERE n.old = " + table + ".id");
+    setLastId(connection, table, std::max(last, largestId(connection, table)));
 }
 
 std::vector<std::string> mendSequences(Connection& connection) {

@@ -5,6 +5,7 @@
 #include "server/store/failpoints.h"
 #include "server/store/point_blob.h"
 #include "server/store/put_rules.h"
+#include "server/store/sqlite/damage.h"
 #include "server/store/sqlite/rows.h"
 #include "server/store/sqlite/sqlite_store_impl.h"
 
@@ -17,18 +18,6 @@ constexpr std::size_t kMostReserved = 4096;
 
 [[noreturn]] void raiseNoShape(std::int64_t shapeId) {
     raise(ErrorCode::kNotFound, "there is no shape with id " + std::to_string(shapeId));
-}
-
-SignatureRow servingSignature(Connection& connection, std::int64_t shapeId) {
-    Query query(connection, sql::kServingSignature, shapeId);
-    if (!query.step()) raiseNoShape(shapeId);
-    if (query.isNull(3)) {
-        const bool failed = query.integer(1) == static_cast<int>(ShapeState::kFailed);
-        raise(ErrorCode::kNotReady, "shape " + quoted(query.text(0)) +
-                                        (failed ? " could not be segmented: " + query.text(2)
-                                                : " has no signature yet; its job is queued"));
-    }
-    return readSignature(connection, query, 3, shapeId);
 }
 
 void writeMetadata(Connection& connection, std::int64_t shapeId, const Metadata& metadata) {
@@ -58,6 +47,67 @@ void writePoints(Connection& connection, std::int64_t shapeId, const PutRequest&
 }
 
 BlobView view(const Checksum& checksum) { return {checksum.data(), checksum.size()}; }
+
+// Slow, and right while the tables can be read: what a damaged index holds is in its table, too.
+constexpr char kSignatureWithoutIndex[] =
+    "SELECT s.key, s.state, s.failure_message, g.points_version, g.generation, g.digest, g.bytes, g.views "
+    "FROM "
+    "shape s NOT INDEXED JOIN collection c ON c.id = s.collection_id LEFT JOIN signature g NOT INDEXED ON "
+    "g.shape_id = s.id AND g.generation = c.generation WHERE s.id = ?1";
+constexpr char kRowsWithoutIndices[] =
+    "SELECT g.rowid FROM signature g NOT INDEXED CROSS JOIN shape s NOT INDEXED ON s.id = g.shape_id WHERE "
+    "s.collection_id = ?1 AND g.shape_id > ?2 AND g.generation = ?3 ORDER BY g.shape_id LIMIT ?4";
+constexpr char kIndexRow[] =
+    "SELECT g.shape_id, m.name, m.value, g.points_version, g.generation, g.digest, g.bytes, g.views FROM "
+    "signature g NOT INDEXED LEFT JOIN shape_metadata m ON m.shape_id = g.shape_id WHERE g.rowid = ?1";
+
+SignatureRow signatureBy(const char* statement, Connection& connection, std::int64_t shapeId) {
+    Query query(connection, statement, shapeId);
+    if (!query.step()) raiseNoShape(shapeId);
+    if (query.isNull(3)) {
+        const bool failed = query.integer(1) == static_cast<int>(ShapeState::kFailed);
+        raise(ErrorCode::kNotReady, "shape " + quoted(query.text(0)) +
+                                        (failed ? " could not be segmented: " + query.text(2)
+                                                : " has no signature yet; its job is queued"));
+    }
+    return readSignature(connection, query, 3, shapeId);
+}
+
+/// Throws Failure kNotFound, kNotReady.
+SignatureRow servingSignature(Connection& connection, std::int64_t shapeId) {
+    SignatureRow row;
+    const auto look = [&](const char* statement) { row = signatureBy(statement, connection, shapeId); };
+    if (!unlessDamaged([&] { look(sql::kServingSignature); })) look(kSignatureWithoutIndex);
+    return row;
+}
+
+/// Appends shapes of the statement until there are `limit`.
+void readIndexRows(Connection& connection, Query& query, std::size_t limit, std::vector<IndexRow>& rows) {
+    for (bool more = query.step(); more && rows.size() < limit;) {
+        IndexRow& row = rows.emplace_back();
+        row.shapeId = query.integer(0);
+        row.signature = readSignature(connection, query, 3, row.shapeId);
+        do {
+            if (!query.isNull(1)) row.metadata.emplace(query.text(1), query.text(2));
+            more = query.step();
+        } while (more && query.integer(0) == row.shapeId);
+    }
+}
+
+std::vector<IndexRow> indexRowsWithoutIndices(Connection& connection, const Collection& collection,
+                                              std::int64_t afterId, std::size_t limit) {
+    std::vector<std::int64_t> places;
+    {
+        Query query(connection, kRowsWithoutIndices, collection.id, afterId, collection.generation, limit);
+        while (query.step()) places.push_back(query.integer(0));
+    }
+    std::vector<IndexRow> rows;
+    for (const std::int64_t place : places) {
+        Query query(connection, kIndexRow, place);
+        readIndexRows(connection, query, rows.size() + 1, rows);
+    }
+    return rows;
+}
 
 }  // namespace
 
@@ -124,7 +174,7 @@ PutResult SqliteStore::replacePoints(Connection& connection, const PutRequest& r
 }
 
 Result<PutResult> SqliteStore::putShape(const PutRequest& request) {
-    RETURN_IF_ERROR(reserve_.hold());
+    RETURN_IF_ERROR(requireSpace());
     // Compressing takes longest and needs no write lock.
     std::unique_lock<std::mutex> largeScan(largeScanMutex_, std::defer_lock);
     if (request.scan.bytes() > PointEncoding::kWholeBytes) largeScan.lock();
@@ -178,8 +228,17 @@ Result<Shape> SqliteStore::deleteShape(std::int64_t collectionId, const std::str
                                        std::optional<std::int64_t> expectedVersion) {
     return remove("delete the shape", [&](Connection& connection) {
         auto found = findShape(connection, collectionId, key);
+        if (!found && expectedVersion) {
+            // Done before, and the client did not hear of it.
+            auto deleted = findDeletion(connection, collectionId, key, *expectedVersion);
+            if (deleted) return std::move(*deleted);
+        }
         if (!found) throw Failure(noSuchShape(requireCollection(connection, collectionId).name, key));
         orRaise(requireVersion(key, found->version, expectedVersion));
+        if (expectedVersion) {
+            Query(connection, sql::kRememberDeletion, found->id).run();
+            Query(connection, sql::kForgetDeletions, connection.lastInsertId() - kDeletionsRemembered).run();
+        }
         Query(connection, sql::kDeleteShape, found->id).run();
         return std::move(*found);
     });
@@ -202,8 +261,9 @@ Result<std::vector<Shape>> SqliteStore::deleteShapes(const std::vector<std::int6
 Result<std::vector<Shape>> SqliteStore::changeMetadata(
     const std::vector<std::int64_t>& shapeIds,
     const std::function<std::optional<Metadata>(const Shape&)>& change) {
-    RETURN_IF_ERROR(reserve_.hold());
-    return write("change the metadata", [&](Connection& connection) {
+    RETURN_IF_ERROR(requireSpace());
+    // Once: `change` may count.
+    return writeOnce("change the metadata", [&](Connection& connection) {
         std::vector<Shape> changed;
         for (const std::int64_t shapeId : shapeIds) {
             const auto found = findShapeById(connection, shapeId);
@@ -260,19 +320,26 @@ Result<std::vector<IndexRow>> SqliteStore::loadIndex(std::int64_t collectionId, 
         std::vector<IndexRow> rows;
         if (limit == 0) return rows;
         const Collection collection = requireCollection(connection, collectionId);
-        Query query(connection, sql::kLoadIndex, collectionId, afterId, collection.generation);
-        rows.reserve(std::min(limit, kMostReserved));
-        for (bool more = query.step(); more && rows.size() < limit;) {
-            IndexRow& row = rows.emplace_back();
-            row.shapeId = query.integer(0);
-            row.signature = readSignature(connection, query, 3, row.shapeId);
-            do {
-                if (!query.isNull(1)) row.metadata.emplace(query.text(1), query.text(2));
-                more = query.step();
-            } while (more && query.integer(0) == row.shapeId);
-        }
+        std::string damage;
+        const bool whole = unlessDamaged(
+            [&] {
+                Query query(connection, sql::kLoadIndex, collectionId, afterId, collection.generation);
+                rows.reserve(std::min(limit, kMostReserved));
+                readIndexRows(connection, query, limit, rows);
+            },
+            &damage);
+        if (whole) return rows;
+        rows = indexRowsWithoutIndices(connection, collection, afterId, limit);
+        noteDamagedIndex(damage);
         return rows;
     });
+}
+
+void SqliteStore::noteDamagedIndex(const std::string& damage) {
+    const std::string line =
+        "an index of the database is damaged; searches are answered from the tables alone (" + damage + ")";
+    const std::lock_guard<std::mutex> lock(findingsMutex_);
+    if (std::find(findings_.begin(), findings_.end(), line) == findings_.end()) findings_.push_back(line);
 }
 
 }  // namespace shapedb::store

@@ -19,6 +19,10 @@ SpaceReserve::~SpaceReserve() {
 
 Result<void> SpaceReserve::hold() {
     const std::lock_guard<std::mutex> lock(mutex_);
+    return take();
+}
+
+Result<void> SpaceReserve::take() {
     if (held_ || file_ < 0) return {};
     const int failed = ::posix_fallocate(file_, 0, static_cast<off_t>(bytes_));
     held_ = failed == 0;
@@ -31,9 +35,19 @@ Result<void> SpaceReserve::hold() {
 
 bool SpaceReserve::release() {
     const std::lock_guard<std::mutex> lock(mutex_);
+    return give();
+}
+
+bool SpaceReserve::give() {
     if (!held_) return false;
     held_ = false;
     return ::ftruncate(file_, 0) == 0;
 }
+
+SpaceReserve::Loan::Loan(SpaceReserve& reserve) : reserve_(reserve), lock_(reserve.mutex_) {
+    static_cast<void>(reserve_.give());
+}
+
+SpaceReserve::Loan::~Loan() { static_cast<void>(reserve_.take()); }
 
 }  // namespace shapedb::store

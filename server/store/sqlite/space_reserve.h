@@ -27,7 +27,24 @@ class SpaceReserve {
     /// Gives the space to whoever writes next. False if there was none to give.
     bool release();
 
+    /// While it lives, the space is given to its owner, and `hold` waits. At its end the space is taken back,
+    /// if it is there.
+    class Loan {
+      public:
+        explicit Loan(SpaceReserve& reserve);
+        ~Loan();
+        Loan(const Loan&) = delete;
+        Loan& operator=(const Loan&) = delete;
+
+      private:
+        SpaceReserve& reserve_;
+        const std::lock_guard<std::mutex> lock_;
+    };
+
   private:
+    Result<void> take();
+    bool give();
+
     const std::string path_;
     const std::uint64_t bytes_;
     std::mutex mutex_;

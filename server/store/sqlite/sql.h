@@ -4,6 +4,8 @@
 // each and allows only the statements it names to read a whole table.
 #pragma once
 
+#include <string>
+
 namespace shapedb::store::sql {
 
 // Columns 0 to 16 in the order `readShape` and `forEachShape` (rows.h) expect: one row per metadata entry, so
@@ -18,6 +20,12 @@ namespace shapedb::store::sql {
 #define SHAPEDB_IMPORTING "'.import'"
 /// The same outside SQL.
 inline constexpr char kImporting[] = ".import";
+/// The names of collections that were deleted and of which rows are left begin so; the id follows.
+inline constexpr char kDeletedPrefix[] = ".deleted-";
+/// Whether a collection with the name in `column` is one of these, which are not there for clients.
+#define SHAPEDB_HIDDEN(column) "(" column " = '.import' OR " column " GLOB '.deleted-*')"
+inline bool isDeleted(const std::string& name) { return name.rfind(kDeletedPrefix, 0) == 0; }
+inline bool isHidden(const std::string& name) { return name == kImporting || isDeleted(name); }
 
 #define STATEMENT(name, text) inline constexpr char name[] = text;
 #include "server/store/sqlite/sql_statements.inc"

@@ -167,30 +167,18 @@ SqliteStore::SqliteStore(const SqliteOptions& options)
       walAttemptAt_(kWalBoundBytes) {
     // Without it deletions may be refused on a full disk; uploads ask again.
     static_cast<void>(reserve_.hold());
-    findings_ = damagedTables(*writer_);
+    findings_ = damagedTables(*writer_, queueDamage_);
     unlessDamaged([&] {
         for (std::string& mended : mendSequences(*writer_)) findings_.push_back(std::move(mended));
     });
+    unlessDamaged([&] { checkSmallValues(); });
     unlessDamaged([&] { compareCommits(); });
     // What a dead process had in hand: its copies of files, which may be as large as the database,
     for (const char* copy : {".restore", ".import"})
         static_cast<void>(TemporaryDatabase(options_.path + copy));
     // and shapes, which are left where they are if the disk fails: no client sees them.
     static_cast<void>(dropImport());
-}
-
-void SqliteStore::compareCommits() {
-    const std::int64_t commits = countCommits(*writer_);
-    missingCommits_ = std::max<std::int64_t>(0, mark_.read().value_or(0) - commits);
-    if (missingCommits_ > 0) {
-        findings_.push_back(
-            "the last " + std::to_string(missingCommits_) +
-            " acknowledged changes are missing: the write-ahead log was damaged or removed, or "
-            "an older copy of the database was put in its place; restore a backup, or send the "
-            "scans again");
-    }
-    SHAPEDB_FAILPOINT("open.counted");
-    mark_.write(commits);
+    static_cast<void>(dropDeleted());
 }
 
 void SqliteStore::commit(Transaction& transaction, std::int64_t changesBefore) {
@@ -206,11 +194,6 @@ void SqliteStore::commit(Transaction& transaction, std::int64_t changesBefore) {
     mark_.write(commits);
     SHAPEDB_FAILPOINT("commit.marked");
     boundWal();
-}
-
-std::vector<std::string> SqliteStore::findings() const {
-    const std::lock_guard<std::mutex> lock(findingsMutex_);
-    return findings_;
 }
 
 // SQLite writes the log back every thousand pages, but cannot start it from the beginning while reads overlap
@@ -258,6 +241,7 @@ Result<StoreStats> SqliteStore::stats() {
         stats.schemaVersion = schemaVersion(connection);
         const std::lock_guard<std::mutex> lock(findingsMutex_);
         stats.missingCommits = static_cast<std::uint64_t>(missingCommits_);
+        stats.notices = notices_.size();
         return stats;
     });
 }

@@ -16,6 +16,9 @@ struct SqliteOptions {
     int pointCompressionLevel = 1;  ///< zstd level of stored points, 1 to 19
     /// Source of timestamps; the system clock when empty (tests set it).
     std::function<TimestampMs()> now;
+    /// What the parameters of a collection may be, which the store does not read: asked by `check`, and about
+    /// files that are to be restored or imported. Empty accepts all.
+    std::function<Result<void>(const std::string& parameters)> acceptParameters;
 };
 
 /// For a process with threads of different priority: SQLite keeps no count of its memory, for which every

@@ -1,11 +1,12 @@
 // The class behind openSqliteStore; its functions are in collections.cpp, shapes.cpp, listing.cpp, jobs.cpp,
-// rebuild.cpp, maintenance.cpp, transfer.cpp and sqlite_store.cpp.
+// rebuild.cpp, maintenance.cpp, notices.cpp, space.cpp, transfer.cpp and sqlite_store.cpp.
 //
-// Lock order: importMutex_, largeScanMutex_, writerMutex_, the pool's mutex. Nobody holds a reader while
-// waiting for the writer, so that neither waits for the other.
+// Lock order: importMutex_, largeScanMutex_, the reserve's mutex, writerMutex_, the pool's mutex. Nobody
+// holds a reader while waiting for the writer, so that neither waits for the other.
 #pragma once
 
 #include <atomic>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -44,7 +45,8 @@ class SqliteStore final : public Store {
                                         const std::string& parameters) override;
     Result<Collection> getCollection(const std::string& name) override;
     Result<std::vector<Collection>> listCollections() override;
-    Result<void> deleteCollection(std::int64_t collectionId) override;
+    using Store::deleteCollection;
+    Result<void> deleteCollection(std::int64_t collectionId, const std::function<void()>& gone) override;
     Result<Collection> renameCollection(std::int64_t collectionId, const std::string& name) override;
     Result<void> setAlias(const std::string& name, std::int64_t collectionId) override;
     Result<void> deleteAlias(const std::string& name) override;
@@ -58,8 +60,7 @@ class SqliteStore final : public Store {
     Result<std::vector<Shape>> listShapes(std::int64_t collectionId, const ShapeListing& listing,
                                           std::size_t limit, const ShapeFilter& filter) override;
     Result<std::uint64_t> countShapes(std::int64_t collectionId, const ShapeFilter& filter) override;
-    Result<std::uint64_t> countPending(std::int64_t collectionId,
-                                       const std::function<bool(std::int64_t)>& counts) override;
+    Result<std::uint64_t> countWaiting(std::int64_t collectionId) override;
     Result<Shape> deleteShape(std::int64_t collectionId, const std::string& key,
                               std::optional<std::int64_t> expectedVersion) override;
     Result<std::vector<Shape>> deleteShapes(const std::vector<std::int64_t>& shapeIds,
@@ -108,11 +109,13 @@ class SqliteStore final : public Store {
     Result<StoreStats> stats() override;
     Result<void> checkpoint() override;
     std::vector<std::string> findings() const override;
+    std::size_t notices() const override;
+    Result<std::vector<std::string>> acknowledge() override;
 
   private:
     /// Runs `body(connection)` in a write transaction and commits it, unless it throws.
     template <typename Body>
-    auto write(const char* operation, Body&& body) noexcept
+    auto writeOnce(const char* operation, Body&& body) noexcept
         -> Result<std::invoke_result_t<Body, Connection&>> {
         using Value = std::invoke_result_t<Body, Connection&>;
         return guarded(operation, [&]() -> Value {
@@ -130,13 +133,33 @@ class SqliteStore final : public Store {
         });
     }
 
-    /// As `write`, for what frees space: on a full disk it gets what the reserve holds.
+    /// As `writeOnce`; on a full disk a second time, if what it writes fits into free pages of the database.
+    template <typename Body>
+    auto write(const char* operation, Body&& body) noexcept
+        -> Result<std::invoke_result_t<Body, Connection&>> {
+        auto done = writeOnce(operation, body);
+        if (done || done.error().code != ErrorCode::kStorageFull || !hasFreePages()) return done;
+        return onReserve(operation, body);
+    }
+
+    /// As `write`, for what frees space.
     template <typename Body>
     auto remove(const char* operation, Body&& body) noexcept
         -> Result<std::invoke_result_t<Body, Connection&>> {
-        auto done = write(operation, body);
-        if (done || done.error().code != ErrorCode::kStorageFull || !reserve_.release()) return done;
-        return write(operation, body);
+        auto done = writeOnce(operation, body);
+        if (done || done.error().code != ErrorCode::kStorageFull) return done;
+        return onReserve(operation, body);
+    }
+
+    /// The log gets the space of the reserve, and gives it back when it has been written back: what is
+    /// written must not let the database grow.
+    template <typename Body>
+    auto onReserve(const char* operation, Body&& body) noexcept
+        -> Result<std::invoke_result_t<Body, Connection&>> {
+        const SpaceReserve::Loan loan(reserve_);
+        auto done = writeOnce(operation, body);
+        emptyLog();
+        return done;
     }
 
     /// Runs `body(connection)` in a read transaction on a pooled connection.
@@ -153,13 +176,28 @@ class SqliteStore final : public Store {
 
     /// At start: tells of commits that are gone, and brings the mark up to date. Throws Failure.
     void compareCommits();
+    /// Throws Failure.
+    void addNotice(std::int64_t missing, const std::string& message);
+    void readNotices();
+    /// At start, of the small tables. Throws Failure.
+    void checkSmallValues();
     /// Commits, counts the commit if anything changed since `changesBefore`, and leaves the mark.
     void commit(Transaction& transaction, std::int64_t changesBefore);
 
     TimestampMs now() const { return options_.now(); }
 
+    /// Adds it to the findings, once.
+    void noteDamagedIndex(const std::string& damage);
+
     /// After a commit: keeps the write-ahead log from growing without bound. Under writerMutex_.
     void boundWal() noexcept;
+    /// Writes the log back and cuts it to nothing, if no read needs it.
+    void emptyLog() noexcept;
+    /// Before what lets the database grow: the reserve is held, or there are free pages. Errors:
+    /// kStorageFull.
+    Result<void> requireSpace() noexcept;
+    /// Whether the database can take as much as the reserve without growing.
+    bool hasFreePages() noexcept;
 
     PutResult insertShape(Connection& connection, const PutRequest& request, const PointEncoding& encoding);
     Shape replaceMetadata(Connection& connection, const Shape& existing, const Metadata& metadata);
@@ -182,19 +220,25 @@ class SqliteStore final : public Store {
                       const ImportRequest& request, const RunContext& context);
     /// Removes what an import has stored, some shapes at a time, if it was not completed.
     Result<void> dropImport() noexcept;
+    /// The same for collections that were deleted.
+    Result<void> dropDeleted() noexcept;
+    /// Removes the collections that `statement` finds, which are hidden.
+    Result<void> dropHidden(const char* operation, const char* statement) noexcept;
 
     SqliteOptions options_;
     std::string walPath_;
     ProcessLock lock_;
-    SpaceReserve reserve_;       ///< under writerMutex_
+    SpaceReserve reserve_;
     std::mutex importMutex_;     ///< one import at a time
     std::mutex largeScanMutex_;  ///< one compressed copy of a large scan at a time, to bound memory
     std::mutex writerMutex_;
     std::unique_ptr<Connection> writer_;
     std::unique_ptr<ReaderPool> readers_;
     CommitMark mark_;
-    std::int64_t missingCommits_ = 0;    ///< under findingsMutex_, as the next
-    std::vector<std::string> findings_;  ///< what was noticed when the database was opened
+    std::int64_t missingCommits_ = 0;         ///< under findingsMutex_, as the next three
+    std::vector<std::string> findings_;       ///< what was noticed when the database was opened
+    std::vector<std::string> notices_;        ///< what waits for `acknowledge`
+    std::optional<std::string> queueDamage_;  ///< of the table of jobs, found when the database was opened
     mutable std::mutex findingsMutex_;
     std::uint64_t walAttemptAt_;  ///< log size at which to wait for readers; under writerMutex_
     /// Backups, exports and checks, which hold a snapshot too long to wait for.

@@ -88,7 +88,7 @@ Result<void> SqliteStore::exportCollection(std::int64_t collectionId, const std:
                 exportShapes(source, requireCollection(source, collectionId), target, now(), context);
             }
             // It is too late to learn of damage when the file is needed.
-            requireSound(target, context);
+            requireSound(target, options_, context);
         }
         file.publish();
     });
@@ -120,7 +120,7 @@ Result<Collection> SqliteStore::importCollection(const std::string& path, const 
 }
 
 Collection SqliteStore::beginImport(const Collection& wanted) {
-    orRaise(reserve_.hold());
+    orRaise(requireSpace());
     return orRaise(write("import the collection", [&](Connection& connection) {
         // Asked again at the end; to be refused here saves the time.
         requireFreeName(connection, wanted.name);
@@ -143,7 +143,7 @@ void SqliteStore::importShapes(Connection& file, const Collection& from, const C
         for (const CopiedShape& copied : batch) {
             if (request.acceptShape) orRaise(request.acceptShape(copied.shape));
         }
-        orRaise(reserve_.hold());
+        orRaise(requireSpace());
         orRaise(write("import the collection", [&](Connection& connection) {
             requireHidden(connection, to);
             for (const CopiedShape& copied : batch) insertCopy(connection, to.id, copied);
@@ -165,23 +165,7 @@ Collection SqliteStore::finishImport(const Collection& imported) {
 }
 
 Result<void> SqliteStore::dropImport() noexcept {
-    const auto there = read("look for an unfinished import", [](Connection& connection) {
-        return findCollection(connection, sql::kImporting).has_value();
-    });
-    RETURN_IF_ERROR(there);
-    if (!*there) return {};
-    while (true) {
-        const auto more = remove("remove an unfinished import", [](Connection& connection) {
-            const auto found = findCollection(connection, sql::kImporting);
-            if (!found) return false;
-            const std::vector<std::int64_t> ids = someShapes(connection, found->id);
-            for (const std::int64_t id : ids) Query(connection, sql::kDeleteShape, id).run();
-            if (ids.empty()) Query(connection, sql::kDeleteCollection, found->id).run();
-            return !ids.empty();
-        });
-        RETURN_IF_ERROR(more);
-        if (!*more) return {};
-    }
+    return dropHidden("remove an unfinished import", sql::kImportingCollection);
 }
 
 }  // namespace shapedb::store

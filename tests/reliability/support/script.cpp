@@ -264,7 +264,7 @@ Result<void> World::open() {
 }
 
 std::vector<Step> storeScript(int round) {
-    const std::string suffix = " " + std::to_string(round);
+    const std::string suffix = "-" + std::to_string(round);
     const auto seed = [round](int i) { return static_cast<std::uint64_t>(100 * round + i); };
     std::vector<Step> steps = {
         createCollection("parts" + suffix, true),
@@ -317,7 +317,7 @@ std::vector<Step> storeScript(int round) {
         deleteCollection("gone" + suffix),
     };
     for (Step& read : reads("e")) steps.push_back(std::move(read));
-    if (round > 0) steps.push_back(deleteCollection("parts " + std::to_string(round - 1)));
+    if (round > 0) steps.push_back(deleteCollection("parts-" + std::to_string(round - 1)));
     return steps;
 }
 

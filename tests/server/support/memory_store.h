@@ -24,7 +24,8 @@ class MemoryStore : public store::Store {
                                                const std::string& parameters) override;
     Result<store::Collection> getCollection(const std::string& name) override;
     Result<std::vector<store::Collection>> listCollections() override;
-    Result<void> deleteCollection(std::int64_t collectionId) override;
+    using Store::deleteCollection;
+    Result<void> deleteCollection(std::int64_t collectionId, const std::function<void()>& gone) override;
     Result<store::Collection> renameCollection(std::int64_t collectionId, const std::string& name) override;
     Result<void> setAlias(const std::string& name, std::int64_t collectionId) override;
     Result<void> deleteAlias(const std::string& name) override;
@@ -40,8 +41,7 @@ class MemoryStore : public store::Store {
                                                  const store::ShapeListing& listing, std::size_t limit,
                                                  const store::ShapeFilter& filter) override;
     Result<std::uint64_t> countShapes(std::int64_t collectionId, const store::ShapeFilter& filter) override;
-    Result<std::uint64_t> countPending(std::int64_t collectionId,
-                                       const std::function<bool(std::int64_t)>& counts) override;
+    Result<std::uint64_t> countWaiting(std::int64_t collectionId) override;
     Result<store::Shape> deleteShape(std::int64_t collectionId, const std::string& key,
                                      std::optional<std::int64_t> expectedVersion) override;
     Result<std::vector<store::Shape>> deleteShapes(
@@ -93,6 +93,8 @@ class MemoryStore : public store::Store {
     Result<store::StoreStats> stats() override;
     Result<void> checkpoint() override;
     std::vector<std::string> findings() const override { return {}; }
+    std::size_t notices() const override { return 0; }
+    Result<std::vector<std::string>> acknowledge() override { return std::vector<std::string>(); }
 
   private:
     struct QueuedJob {
@@ -115,6 +117,7 @@ class MemoryStore : public store::Store {
         std::map<std::int64_t, QueuedJob> jobs;
         std::map<std::int64_t, store::Rebuild> rebuilds;
         std::map<std::int64_t, std::map<std::int64_t, Rebuilt>> rebuilt;
+        std::vector<store::Shape> deleted;  ///< with an expected version
         std::int64_t nextId = 1;
     };
 

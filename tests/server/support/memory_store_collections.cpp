@@ -39,8 +39,8 @@ Result<std::vector<Collection>> MemoryStore::listCollections() {
     });
 }
 
-Result<void> MemoryStore::deleteCollection(std::int64_t collectionId) {
-    return guarded("deleteCollection", [&]() -> Result<void> {
+Result<void> MemoryStore::deleteCollection(std::int64_t collectionId, const std::function<void()>& gone) {
+    auto deleted = guarded("deleteCollection", [&]() -> Result<void> {
         if (content_.collections.erase(collectionId) == 0)
             return fail(ErrorCode::kNotFound, "no such collection");
         for (auto alias = content_.aliases.begin(); alias != content_.aliases.end();) {
@@ -58,6 +58,8 @@ Result<void> MemoryStore::deleteCollection(std::int64_t collectionId) {
         }
         return {};
     });
+    if (deleted && gone) gone();
+    return deleted;
 }
 
 bool MemoryStore::isTaken(const std::string& name) const {

@@ -79,11 +79,14 @@ Result<std::uint64_t> MemoryStore::countShapes(std::int64_t collectionId, const 
     });
 }
 
-Result<std::uint64_t> MemoryStore::countPending(std::int64_t collectionId,
-                                                const std::function<bool(std::int64_t)>& counts) {
+Result<std::uint64_t> MemoryStore::countWaiting(std::int64_t collectionId) {
     ShapeFilter filter;
     filter.state = ShapeState::kPending;
-    filter.accept = [&](const Shape& shape) { return counts(shape.id); };
+    filter.accept = [&](const Shape& shape) {
+        const auto found = content_.signatures.find(shape.id);
+        return found == content_.signatures.end() ||
+               found->second.generation != content_.collections.at(collectionId).generation;
+    };
     return countShapes(collectionId, filter);
 }
 
@@ -91,11 +94,17 @@ Result<Shape> MemoryStore::deleteShape(std::int64_t collectionId, const std::str
                                        std::optional<std::int64_t> expectedVersion) {
     return guarded("deleteShape", [&]() -> Result<Shape> {
         const Shape* found = find(collectionId, key);
+        for (auto past = content_.deleted.rbegin(); found == nullptr && past != content_.deleted.rend();
+             ++past) {
+            if (past->collectionId == collectionId && past->key == key && past->version == expectedVersion)
+                return *past;
+        }
         if (found == nullptr) return noShape();
         const auto version = requireVersion(key, found->version, expectedVersion);
         if (!version) return fail(version.error());
         const Shape shape = *found;
         removeShape(shape.id);
+        if (expectedVersion) content_.deleted.push_back(shape);
         return shape;
     });
 }

@@ -3,10 +3,8 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include <zstd.h>
-
 #include "server/store/sqlite/migrator.h"
-#include "tests/server/store/sqlite/store_fixture.h"
+#include "tests/server/store/sqlite/golden_file.h"
 
 namespace shapedb::store {
 namespace {
@@ -39,20 +37,24 @@ void fill(Store& store) {
     const Rebuild rebuild = store.startRebuild(c.id, "theta=25").value();
     ASSERT_TRUE(store.putRebuilt(rebuild.id, signatureFor(1, 1, 2)));
     ASSERT_TRUE(store.claimJob().value());
+    ASSERT_TRUE(store.putShape(request(c.id, "gone", kTetrahedron, {{"label", "gone"}})));
+    ASSERT_TRUE(store.deleteShape(c.id, "gone", 1));
 }
 
 class EachGoldenTest : public GoldenTest, public ::testing::WithParamInterface<int> {};
 
-INSTANTIATE_TEST_SUITE_P(Versions, EachGoldenTest, ::testing::Values(1, 2, 3, 4, 5, 6));
+INSTANTIATE_TEST_SUITE_P(Versions, EachGoldenTest, ::testing::Values(1, 2, 3, 4, 5, 6, 7));
+
+/// As if no database had been in this folder.
+void forgetTheOneBefore(const std::string& path) {
+    for (const char* ending : {".commits", ".lock"}) std::filesystem::remove(path + ending);
+}
 
 /// The database of a schema version; empty if it is missing.
-std::string golden(int version) {
-    const std::string packed =
-        slurp(std::string(SHAPEDB_GOLDEN_DIR) + "/database_v" + std::to_string(version) + ".db.zst");
-    if (packed.empty()) return {};
-    std::string bytes(ZSTD_getFrameContentSize(packed.data(), packed.size()), ' ');
-    EXPECT_EQ(ZSTD_decompress(bytes.data(), bytes.size(), packed.data(), packed.size()), bytes.size());
-    return bytes;
+std::string golden(int version) { return unpackedGolden("database_v" + std::to_string(version)); }
+
+TEST_F(GoldenTest, ThereIsOneForEachVersion) {
+    EXPECT_FALSE(golden(static_cast<int>(embeddedMigrations().size())).empty());
 }
 
 TEST_F(GoldenTest, CanBeWritten) {
@@ -63,9 +65,7 @@ TEST_F(GoldenTest, CanBeWritten) {
     const std::string bytes = slurp(options().path);
     ASSERT_FALSE(bytes.empty());
     if (target == nullptr) return;
-    std::string packed(ZSTD_compressBound(bytes.size()), ' ');
-    packed.resize(ZSTD_compress(packed.data(), packed.size(), bytes.data(), bytes.size(), 19));
-    spill(target, packed);
+    writeGolden(target, bytes);
 }
 
 TEST_P(EachGoldenTest, IsMigratedWhenItsCollectionIsImported) {
@@ -89,7 +89,7 @@ TEST_P(EachGoldenTest, OpensAndAnswers) {
     ASSERT_FALSE(bytes.empty());
     store_.reset();
     spill(options().path, bytes);
-    std::filesystem::remove(options().path + ".commits");  // of the database that was here before
+    forgetTheOneBefore(options().path);
     open();
     EXPECT_EQ(store_->stats()->schemaVersion, static_cast<int>(embeddedMigrations().size()));
     expectSound();
@@ -128,6 +128,12 @@ TEST_P(EachGoldenTest, OpensAndAnswers) {
     EXPECT_EQ(failed.failure->code, ErrorCode::kNoInterior);
     EXPECT_EQ(failed.failure->message, "no closed interior");
     EXPECT_EQ(store_->loadIndex(c.id, 0, 10)->size(), 2u);
+    EXPECT_EQ(store_->countWaiting(c.id).value(), 0u) << "the old signature serves";
+    const auto gone = store_->deleteShape(c.id, "gone", 1);
+    ASSERT_EQ(gone.has_value(), GetParam() >= 7);
+    if (gone) {
+        EXPECT_EQ(gone->metadata.at("label"), "gone");
+    }
 
     // Work continues: the interrupted job and the rebuild finish.
     ASSERT_TRUE(store_->recoverJobs(2, {})->empty());
@@ -149,7 +155,7 @@ using OffsetMigration = GoldenTest;
 /// The last database of before shape.origin, with an offset in the metadata of each shape, opened.
 void openWithOffset(const std::string& path, const std::string& offset) {
     spill(path, golden(5));
-    std::filesystem::remove(path + ".commits");
+    forgetTheOneBefore(path);
     Connection connection(path, OpenMode::kReadWrite, 0);
     connection.execute("INSERT INTO shape_metadata SELECT id, 'shapedb.offset', '" + offset + "' FROM shape");
 }

@@ -45,20 +45,6 @@ class ListingTest : public StoreTest {
     Collection collection_;
 };
 
-TEST_F(ListingTest, PendingShapesAreCountedAsTheCallerSays) {
-    collection_ = collection();
-    const Collection other = collection("other");
-    put(collection_.id, "done", 1);
-    const Job job = claim();
-    ASSERT_TRUE(store_->finishJob(job, signatureFor(job)));
-    put(collection_.id, "a", 2);
-    put(collection_.id, "b", 3);
-    put(other.id, "c", 4);
-    const std::int64_t a = store_->getShape(collection_.id, "a").value().id;
-    EXPECT_EQ(store_->countPending(collection_.id, [](std::int64_t) { return true; }).value(), 2u);
-    EXPECT_EQ(store_->countPending(collection_.id, [a](std::int64_t id) { return id != a; }).value(), 1u);
-}
-
 TEST_F(ListingTest, EveryOrderIsThatOfAPlainSort) {
     collection_ = collection();
     const Collection other = collection("other");

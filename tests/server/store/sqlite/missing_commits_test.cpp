@@ -86,6 +86,86 @@ TEST_F(MissingCommitsTest, AreOverAfterARestore) {
     EXPECT_EQ(missing(), 0u) << "the backup's count is older than the mark";
 }
 
+TEST_F(MissingCommitsTest, AreToldAtEveryStartUntilTheyAreAcknowledged) {
+    const Collection c = collection();
+    ASSERT_TRUE(store_->checkpoint());
+    for (int i = 0; i < 3; ++i) put(c.id, std::to_string(i), static_cast<std::uint64_t>(i));
+    dieWith([&] { fs::remove(wal()); });
+    const auto told = store_->findings();
+    for (int start = 0; start < 3; ++start) {
+        EXPECT_EQ(missing(), 3u) << start;
+        EXPECT_EQ(store_->notices(), 1u);
+        EXPECT_EQ(store_->findings(), told);
+        put(c.id, "later " + std::to_string(start), 9);
+        open();
+    }
+    ASSERT_TRUE(store_->checkpoint());
+    put(c.id, "once more", 10);
+    dieWith([&] { fs::remove(wal()); });
+    EXPECT_EQ(missing(), 4u);
+    EXPECT_EQ(store_->notices(), 2u);
+    EXPECT_NE(store_->findings()[0].find("'shapedb admin check --acknowledge'"), std::string::npos);
+
+    EXPECT_EQ(store_->acknowledge()->size(), 2u);
+    EXPECT_EQ(missing(), 0u);
+    EXPECT_EQ(store_->notices(), 0u);
+    expectSound();
+    open();
+    EXPECT_EQ(missing(), 0u);
+    EXPECT_TRUE(store_->findings().empty());
+}
+
+TEST_F(MissingCommitsTest, AMarkThatIsGoneIsTold) {
+    const Collection c = collection();
+    ASSERT_TRUE(store_->checkpoint());
+    put(c.id, "a", 1);
+    const std::string mark = options().path + ".commits";
+    for (const bool emptied : {true, false}) {
+        dieWith([&] {
+            fs::remove(wal());
+            emptied ? spill(mark, "") : static_cast<void>(fs::remove(mark));
+        });
+        EXPECT_EQ(missing(), 0u) << "nobody can tell";
+        ASSERT_EQ(store_->findings().size(), 1u);
+        EXPECT_NE(store_->findings()[0].find(mark), std::string::npos) << store_->findings()[0];
+        open();
+        EXPECT_EQ(store_->notices(), 1u) << "still";
+        EXPECT_EQ(store_->check({})->size(), 1u);
+        ASSERT_TRUE(store_->acknowledge());
+        expectSound();
+        ASSERT_TRUE(store_->checkpoint()) << "not in the log that is lost next";
+    }
+}
+
+TEST_F(MissingCommitsTest, ABackupInANewFolderHasNoMarkAndLacksNothing) {
+    const Collection c = collection();
+    put(c.id, "a", 1);
+    const std::string backup = folder_.file("backup.db");
+    ASSERT_TRUE(store_->backup(backup, {}));
+    const Folder fresh;
+    SqliteOptions there = options();
+    there.path = fresh.file("shapes.db");
+    spill(there.path, slurp(backup));
+    for (int start = 0; start < 2; ++start) {
+        const auto opened = openSqliteStore(there);
+        ASSERT_TRUE(opened) << opened.error().message;
+        EXPECT_TRUE((*opened)->findings().empty());
+    }
+}
+
+TEST_F(MissingCommitsTest, NoticesAreNotRestored) {
+    const Collection c = collection();
+    ASSERT_TRUE(store_->checkpoint());
+    put(c.id, "a", 1);
+    dieWith([&] { fs::remove(wal()); });
+    const std::string backup = folder_.file("backup.db");
+    ASSERT_TRUE(store_->backup(backup, {}));
+    ASSERT_TRUE(store_->restore(backup, {}, {}));
+    EXPECT_EQ(store_->notices(), 0u);
+    open();
+    EXPECT_TRUE(store_->findings().empty());
+}
+
 TEST_F(MissingCommitsTest, RequestsThatChangeNothingAreNotCounted) {
     const Collection c = collection();
     put(c.id, "a", 1);

@@ -187,7 +187,9 @@ TEST_F(SqliteShapesTest, ObeysModesAndExpectedVersions) {
 
     EXPECT_FAILS(store_->deleteShape(c.id, "cup", 1), ErrorCode::kVersionConflict);
     EXPECT_EQ(store_->deleteShape(c.id, "cup", 2)->version, 2);
-    EXPECT_FAILS(store_->deleteShape(c.id, "cup", 2), ErrorCode::kNotFound);
+    EXPECT_EQ(store_->deleteShape(c.id, "cup", 2)->version, 2) << "as a call whose reply was lost";
+    EXPECT_FAILS(store_->deleteShape(c.id, "cup", 1), ErrorCode::kNotFound);
+    EXPECT_FAILS(store_->deleteShape(c.id, "cup", std::nullopt), ErrorCode::kNotFound);
 }
 
 TEST_F(SqliteShapesTest, ReportsWhatIsNotFound) {

@@ -29,8 +29,9 @@ class SqlitePlanTest : public ::testing::Test {
 
 /// Few rows, or a total that nobody asks for often.
 bool mayReadAWholeTable(const std::string& name) {
-    static const std::set<std::string> names = {"kListCollections", "kListAliases", "kCountCollections",
-                                                "kRunningRebuilds", "kCountStates", "kCountSignatures"};
+    static const std::set<std::string> names = {"kListCollections", "kListAliases",       "kCountCollections",
+                                                "kRunningRebuilds", "kCountStates",       "kCountSignatures",
+                                                "kListNotices",     "kRememberedDeletion"};
     return names.count(name) > 0;
 }
 

@@ -1,0 +1,153 @@
+// Deletions: in pieces when there is much to delete, and repeated when their reply was lost.
+#include <atomic>
+#include <thread>
+
+#include "server/store/sqlite/connection.h"
+#include "server/store/sqlite/migrator.h"
+#include "tests/server/store/sqlite/store_fixture.h"
+
+namespace shapedb::store {
+namespace {
+
+class DeletionTest : public StoreTest {
+  protected:
+    /// More than one transaction deletes; pending.
+    Collection large(const std::string& name, int shapes = 600) {
+        const Collection made = collection(name);
+        for (int i = 0; i < shapes; ++i) put(made.id, std::to_string(i), static_cast<std::uint64_t>(i));
+        return made;
+    }
+    std::int64_t rows(const std::string& table) {
+        return Connection(options().path, OpenMode::kReadOnly, 1'000)
+            .integer("SELECT count(*) FROM " + table);
+    }
+};
+
+TEST_F(DeletionTest, OfALargeCollectionLeavesNothing) {
+    const Collection gone = large("gone");
+    ASSERT_TRUE(store_->setAlias("other-name", gone.id));
+    const Collection kept = collection("kept");
+    put(kept.id, "a", 1);
+    const std::int64_t pages =
+        Connection(options().path, OpenMode::kReadOnly, 1'000).integer("PRAGMA page_count");
+    bool called = false;
+    ASSERT_TRUE(store_->deleteCollection(gone.id, [&] { called = true; }));
+    EXPECT_TRUE(called);
+    EXPECT_EQ(store_->listCollections()->size(), 1u);
+    EXPECT_TRUE(store_->listAliases()->empty());
+    for (const char* table : {"shape", "shape_points", "job", "collection"})
+        EXPECT_EQ(rows(table), 1) << table;
+    EXPECT_FAILS(store_->deleteCollection(gone.id), ErrorCode::kNotFound);
+    EXPECT_GT(pages, 0);
+    expectSound();
+}
+
+// Nobody meets a half of it.
+TEST_F(DeletionTest, IsSeenAtOnce) {
+    const Collection gone = large("gone");
+    ASSERT_TRUE(store_->startRebuild(gone.id, "others"));
+    ASSERT_TRUE(store_->deleteCollection(gone.id, [&] {
+        // Another connection, in the middle of it.
+        Connection others(options().path, OpenMode::kReadOnly, 1'000);
+        EXPECT_GT(others.integer("SELECT count(*) FROM shape"), 0) << "rows are left";
+        EXPECT_EQ(others.integer("SELECT count(*) FROM collection WHERE name = 'gone'"), 0);
+        EXPECT_EQ(others.integer("SELECT count(*) FROM rebuild WHERE state = 0"), 0);
+        EXPECT_TRUE(store_->listCollections()->empty());
+        EXPECT_EQ(store_->stats()->shapesPending, 0u);
+        EXPECT_FALSE(store_->claimJob().value()) << "nothing of it is segmented any more";
+        EXPECT_FAILS(store_->putShape(request(gone.id, "new", cloud(1))), ErrorCode::kNotFound);
+        EXPECT_FAILS(store_->loadIndex(gone.id, 0, 10), ErrorCode::kNotFound);
+        EXPECT_TRUE(store_->createCollection("gone", "", "")) << "the name is free";
+    }));
+    EXPECT_EQ(store_->listCollections()->size(), 1u);
+    expectSound();
+}
+
+TEST_F(DeletionTest, IsCompletedAtTheNextStartAndLeftOutOfRestores) {
+    const Collection gone = large("gone");
+    std::string database;
+    std::string log;
+    const std::string backup = folder_.file("backup");
+    ASSERT_TRUE(store_->deleteCollection(gone.id, [&] {
+        EXPECT_TRUE(store_->backup(backup, {}));
+        database = slurp(options().path);
+        log = slurp(options().path + "-wal");
+    }));
+    // As a process that was killed in between leaves it.
+    store_.reset();
+    spill(options().path, database);
+    spill(options().path + "-wal", log);
+    std::filesystem::remove(options().path + "-shm");
+    std::filesystem::remove(options().path + ".commits");
+    std::filesystem::remove(options().path + ".lock");
+    ASSERT_GT(rows("shape"), 0);
+    open();
+    EXPECT_EQ(rows("shape"), 0);
+    EXPECT_EQ(rows("collection"), 0);
+    expectSound();
+    ASSERT_TRUE(store_->restore(backup, {}, {}));
+    EXPECT_EQ(rows("shape"), 0);
+    expectSound();
+}
+
+TEST_F(DeletionTest, NoTransactionOfItOutgrowsTheReserve) {
+    const Collection gone = large("gone", 3'000);
+    ASSERT_TRUE(store_->checkpoint());
+    std::atomic<bool> done{false};
+    std::uintmax_t largest = 0;
+    std::thread watching([&] {
+        std::error_code error;
+        while (!done) largest = std::max(largest, std::filesystem::file_size(options().path + "-wal", error));
+    });
+    ASSERT_TRUE(store_->deleteCollection(gone.id));
+    done = true;
+    watching.join();
+    EXPECT_LT(largest, std::uintmax_t{16} << 20);
+}
+
+TEST_F(DeletionTest, OfAShapeCanBeRepeated) {
+    const Collection parts = collection();
+    const Shape before = put(parts.id, "a", 1, {{"label", "cup"}, {"n", "1"}});
+    const Shape deleted = store_->deleteShape(parts.id, "a", 1).value();
+    EXPECT_EQ(deleted, before);
+    for (int i = 0; i < 2; ++i) {
+        const auto again = store_->deleteShape(parts.id, "a", 1);
+        ASSERT_TRUE(again) << again.error().message;
+        EXPECT_EQ(*again, before);
+        open();  // the reply may have been lost with the server
+    }
+    EXPECT_FAILS(store_->deleteShape(parts.id, "a", 2), ErrorCode::kNotFound);
+    EXPECT_FAILS(store_->deleteShape(parts.id, "a", std::nullopt), ErrorCode::kNotFound);
+    EXPECT_FAILS(store_->deleteShape(parts.id, "b", 1), ErrorCode::kNotFound);
+    EXPECT_FAILS(store_->deleteShape(collection("other").id, "a", 1), ErrorCode::kNotFound);
+    // Another shape has the key now, and is not meant.
+    const Shape next = put(parts.id, "a", 2);
+    ASSERT_TRUE(store_->putShape(request(parts.id, "a", cloud(3))));
+    EXPECT_FAILS(store_->deleteShape(parts.id, "a", 1), ErrorCode::kVersionConflict);
+    EXPECT_TRUE(store_->getShapeById(next.id));
+    expectSound();
+}
+
+TEST_F(DeletionTest, OfAFailedShapeIsRepeatedWithItsReason) {
+    const Collection parts = collection();
+    put(parts.id, "a", 1);
+    ASSERT_TRUE(store_->failJob(claim(), {ErrorCode::kNoInterior, "no closed interior"}));
+    const Shape deleted = store_->deleteShape(parts.id, "a", 1).value();
+    EXPECT_EQ(store_->deleteShape(parts.id, "a", 1).value(), deleted);
+    ASSERT_TRUE(deleted.failure);
+}
+
+TEST_F(DeletionTest, OnlyTheLastAreRemembered) {
+    const Collection parts = collection();
+    for (std::int64_t i = 0; i < kDeletionsRemembered + 20; ++i) {
+        put(parts.id, std::to_string(i), 1);
+        ASSERT_TRUE(store_->deleteShape(parts.id, std::to_string(i), 1));
+    }
+    EXPECT_EQ(rows("deleted_shape"), kDeletionsRemembered);
+    EXPECT_FAILS(store_->deleteShape(parts.id, "19", 1), ErrorCode::kNotFound);
+    EXPECT_TRUE(store_->deleteShape(parts.id, "20", 1));
+    EXPECT_TRUE(store_->deleteShape(parts.id, std::to_string(kDeletionsRemembered + 19), 1));
+}
+
+}  // namespace
+}  // namespace shapedb::store
