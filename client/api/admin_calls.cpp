@@ -81,11 +81,24 @@ Result<void> Client::cancelRebuild(const std::string& collection, const RunConte
 
 Result<std::vector<std::string>> Client::check(const std::function<void(const CheckProgress&)>& onProgress,
                                                const RunContext& context) const {
+    return impl_->check({}, onProgress, context);
+}
+
+Result<std::vector<std::string>> Client::checkAndAcknowledge(
+    const std::function<void(const CheckProgress&)>& onProgress, const RunContext& context) const {
+    v1::CheckRequest request;
+    request.set_acknowledge(true);
+    return impl_->check(request, onProgress, context);
+}
+
+Result<std::vector<std::string>> Client::Impl::check(
+    const v1::CheckRequest& request, const std::function<void(const CheckProgress&)>& onProgress,
+    const RunContext& context) {
     std::vector<std::string> problems;
     const auto made =
-        makeCall(impl_->options, context, kIdempotentUnbounded, [&](grpc::ClientContext& rpc, Result<void>&) {
+        makeCall(options, context, kIdempotentUnbounded, [&](grpc::ClientContext& rpc, Result<void>&) {
             problems.clear();
-            const auto stream = impl_->admin->Check(&rpc, v1::CheckRequest());
+            const auto stream = admin->Check(&rpc, request);
             v1::CheckProgress message;
             while (stream->Read(&message)) {
                 problems.insert(problems.end(), message.problems().begin(), message.problems().end());

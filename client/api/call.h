@@ -28,6 +28,10 @@ struct Client::Impl {
     std::unique_ptr<v1::AlignService::Stub> align;
     std::unique_ptr<v1::CollectionService::Stub> collections;
     std::unique_ptr<v1::AdminService::Stub> admin;
+
+    [[nodiscard]] Result<std::vector<std::string>> check(
+        const v1::CheckRequest& request, const std::function<void(const CheckProgress&)>& onProgress,
+        const RunContext& context);
 };
 
 struct CallTraits {

@@ -67,20 +67,21 @@ CommandResult runRebuild(Session& session, const RebuildFlags& flags) {
     return kOk;
 }
 
-CommandResult runCheck(Session& session) {
+CommandResult runCheck(Session& session, bool acknowledge) {
     const auto client = connectToServer(session);
     RETURN_IF_ERROR(client);
-    const auto problems = client->check(
-        [&](const client::CheckProgress& progress) {
-            session.console().progress("check", progress.done, progress.total);
-        },
-        session.context());
+    const auto onProgress = [&](const client::CheckProgress& progress) {
+        session.console().progress("check", progress.done, progress.total);
+    };
+    const auto problems = acknowledge ? client->checkAndAcknowledge(onProgress, session.context())
+                                      : client->check(onProgress, session.context());
     RETURN_IF_ERROR(problems);
     session.console().document({{"sound", problems->empty()}, {"problems", *problems}});
     for (const std::string& problem : *problems) session.console().text(problem + "\n");
     session.console().text(problems->empty()
                                ? "the database is sound\n"
                                : formatCount(problems->size(), "problem", "problems") + " found\n");
+    if (acknowledge) session.console().text("changes that are missing are not told any more\n");
     return problems->empty() ? kOk : kDefect;
 }
 
@@ -191,6 +192,16 @@ void addPlainCommand(CLI::App& group, Session& session, const char* name, const 
     });
 }
 
+void addCheck(CLI::App& group, Session& session) {
+    CLI::App* command = group.add_subcommand("check", "Read the whole database and report damage");
+    const auto acknowledge = std::make_shared<bool>(false);
+    command->add_flag("--acknowledge", *acknowledge,
+                      "Do not report again that acknowledged changes are missing");
+    command->callback([&session, acknowledge] {
+        session.action = [&session, acknowledge] { return runCheck(session, *acknowledge); };
+    });
+}
+
 }  // namespace
 
 void addAdminCommands(CLI::App& app, Session& session) {
@@ -198,7 +209,7 @@ void addAdminCommands(CLI::App& app, Session& session) {
     group->require_subcommand(1);
     addRebuild(*group, session);
     addBackupCommands(*group, session);
-    addPlainCommand(*group, session, "check", "Read the whole database and report damage", &runCheck);
+    addCheck(*group, session);
     addPlainCommand(*group, session, "stats", "Show counts and sizes", &runStats);
     addPlainCommand(*group, session, "info", "Show version and limits", &runInfo);
     addKeyCommands(*group, session);

@@ -97,6 +97,7 @@ grpc::Status AdminServiceHandler::check(grpc::ServerContext* context, Request<v1
         };
         const auto problems = services_.catalog.check(run);
         RETURN_IF_ERROR(problems);
+        if (request->acknowledge()) RETURN_IF_ERROR(services_.catalog.acknowledge());
         call.note({"problems", static_cast<std::uint64_t>(problems->size())});
         progress.set_done(progress.total());
         for (const std::string& problem : *problems) {

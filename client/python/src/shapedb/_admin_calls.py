@@ -226,9 +226,10 @@ class _Check(Collector[Tuple[str, ...]]):
         return tuple(self._problems)
 
 
-def check(progress: Showing) -> Call[Tuple[str, ...]]:
+def check(progress: Showing, acknowledge: bool) -> Call[Tuple[str, ...]]:
     """Check."""
-    return Call("AdminService/Check", admin_pb.CheckRequest(), collect=lambda: _Check(progress), bounded=False)
+    return Call("AdminService/Check", admin_pb.CheckRequest(acknowledge=acknowledge), collect=lambda: _Check(progress),
+                bounded=False)
 
 
 def stats() -> Call[types.Stats]:

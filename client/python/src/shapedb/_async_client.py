@@ -180,10 +180,11 @@ class AsyncClient:
         """Replaces everything on the server with a backup. Not repeated by itself, without limit but `timeout`."""
         return await self._transport.run(calls.restore(path, progress), timeout)
 
-    async def check(self, *, progress: Showing = False,
+    async def check(self, *, acknowledge: bool = False, progress: Showing = False,
                     timeout: Optional[float] = None) -> Tuple[str, ...]:
-        """Reads the whole database and returns the problems found; none if it is sound. Without limit but `timeout`."""
-        return await self._transport.run(calls.check(progress), timeout)
+        """Reads the whole database and returns the problems found; none if it is sound. Without limit but `timeout`.
+        With `acknowledge`, acknowledged changes that are missing are not reported again."""
+        return await self._transport.run(calls.check(progress, acknowledge), timeout)
 
     async def create_key(self, name: str, role: admin.Role, *, collections: Sequence[str] = (),
                          expires: Optional[datetime] = None, limits: admin.KeyLimits = admin.KeyLimits(),
