@@ -44,6 +44,7 @@ def test_backup_restore_export_import(client, tmp_path):
     np.testing.assert_array_equal(client.collection("copy").points("box"), collection.points("box"))
     assert reason_of(client.import_collection, tmp_path / "kept.sqlite") == "already_exists"
     assert client.check() == ()
+    assert client.check(acknowledge=True) == ()
     restored = client.restore(tmp_path / "all.sqlite")
     assert restored.shapes >= 1 and reason_of(client.collection("copy").info) == "not_found"
     assert collection.get("box").metadata == {"a": "b"}

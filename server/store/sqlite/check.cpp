@@ -53,6 +53,11 @@ constexpr Rule kRulesOfOthers[] = {
     {"SELECT 'table rebuild, row ' || r.id FROM rebuild r JOIN collection c ON c.id = r.collection_id WHERE "
      "r.state = 0 AND r.target_generation <> c.generation + 1",
      "runs into a generation that is not the next one of its collection"},
+    {"SELECT 'table deleted_shape, row ' || id FROM deleted_shape WHERE NOT max(abs(origin_x), "
+     "abs(origin_y), "
+     "abs(origin_z)) <= 3.4e38 OR length(checksum) <> 32 OR CASE WHEN json_valid(metadata) THEN "
+     "json_type(metadata) <> 'object' ELSE 1 END",
+     "has an origin, a checksum or metadata that is none"},
     {"SELECT 'table job, row ' || id FROM job WHERE state = 1 AND attempts < 1",
      "is running and was never tried"},
 };

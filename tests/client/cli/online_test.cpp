@@ -329,6 +329,7 @@ TEST_F(Online, OneCollectionIsExportedAndImported) {
 TEST_F(Online, CheckStatsAndInfoReport) {
     fill("care");
     EXPECT_EQ(onlineJson({"admin", "check"})["sound"], true);
+    EXPECT_EQ(onlineJson({"admin", "check", "--acknowledge"})["sound"], true);
     const json stats = onlineJson({"admin", "stats"});
     EXPECT_GE(stats["shapes_ready"].get<int>(), 6);
     EXPECT_GT(stats["database_bytes"].get<std::uint64_t>(), 0u);
