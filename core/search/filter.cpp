@@ -13,8 +13,12 @@ namespace {
 
 bool isBlank(char c) { return c == ' ' || c == '\t'; }
 bool isOperator(char c) { return c == '=' || c == '!' || c == '<' || c == '>'; }
+bool endsTerm(char c) { return c == ',' || c == '|'; }
 
-bool parseNumber(const std::string& text, double& value) {
+/// Stands for the shape's own key. No key of metadata has an '@' (catalog/request_checks.h).
+constexpr std::string_view kShapeKey = "@key";
+
+bool parseNumber(std::string_view text, double& value) {
     // Unlike strtod, from_chars does not depend on the locale.
     const char* end = text.data() + text.size();
     const auto [stop, error] = std::from_chars(text.data(), end, value);
@@ -31,13 +35,16 @@ class FilterParser {
         Filter filter;
         skipBlanks();
         if (atEnd()) return filter;
+        filter.conditions_.emplace_back();
         while (true) {
             auto term = parseTerm();
             RETURN_IF_ERROR(term);
-            filter.terms_.push_back(std::move(*term));
+            filter.asksForKeys_ = filter.asksForKeys_ || term->ofShapeKey;
+            filter.conditions_.back().push_back(std::move(*term));
             skipBlanks();
             if (atEnd()) return filter;
-            if (text_[at_] != ',') return expected("',' or the end");
+            if (!endsTerm(text_[at_])) return expected("',', '|' or the end");
+            if (text_[at_] == ',') filter.conditions_.emplace_back();
             ++at_;
             skipBlanks();
         }
@@ -81,24 +88,25 @@ class FilterParser {
         skipBlanks();
         term.key = parseKey();
         if (term.key.empty()) return expected("a key");
+        term.ofShapeKey = term.key == kShapeKey;
         skipBlanks();
         if (absent) {
             term.op = Operator::kAbsent;
             return term;
         }
-        if (atEnd() || text_[at_] == ',') {
+        if (atEnd() || endsTerm(text_[at_])) {
             term.op = Operator::kPresent;
             return term;
         }
-        if (!parseOperator(term.op)) return expected("one of = != < <= > >=");
+        if (!parseOperator(term.op)) return expected("one of = != ^= < <= > >=");
         skipBlanks();
         return parseValueOf(std::move(term));
     }
 
     std::string parseKey() {
         const std::size_t begin = at_;
-        while (!atEnd() && !isBlank(text_[at_]) && !isOperator(text_[at_]) && text_[at_] != ',' &&
-               text_[at_] != '"') {
+        while (!atEnd() && !isBlank(text_[at_]) && !isOperator(text_[at_]) && !endsTerm(text_[at_]) &&
+               text_[at_] != '"' && text_.compare(at_, 2, "^=") != 0) {
             ++at_;
         }
         return text_.substr(begin, at_ - begin);
@@ -113,7 +121,8 @@ class FilterParser {
             return true;
         };
         // Longer ones first: < is also the beginning of <=.
-        return take("!=", Operator::kNotEqual) || take("<=", Operator::kLessEqual) ||
+        return take("!=", Operator::kNotEqual) || take("^=", Operator::kBegins) ||
+               take("<=", Operator::kLessEqual) ||
                take(">=", Operator::kGreaterEqual) || take("=", Operator::kEqual) ||
                take("<", Operator::kLess) || take(">", Operator::kGreater);
     }
@@ -123,7 +132,7 @@ class FilterParser {
         if (!atEnd() && text_[at_] == '"') {
             if (!parseQuoted(term.value)) return expected("a closing quote");
         } else {
-            while (!atEnd() && text_[at_] != ',') {
+            while (!atEnd() && !endsTerm(text_[at_])) {
                 if (isOperator(text_[at_]) || text_[at_] == '"')
                     return expected("a value without operators, or quotes around it");
                 ++at_;
@@ -133,7 +142,8 @@ class FilterParser {
             term.value = text_.substr(begin, end - begin);
             if (term.value.empty()) return expected("a value");
         }
-        const bool ordered = term.op != Operator::kEqual && term.op != Operator::kNotEqual;
+        const bool ordered = term.op != Operator::kEqual && term.op != Operator::kNotEqual &&
+                             term.op != Operator::kBegins;
         if (ordered && !parseNumber(term.value, term.number)) {
             at_ = begin;
             return expected("a number after an order comparison");
@@ -159,27 +169,32 @@ class FilterParser {
 
 Result<Filter> Filter::parse(const std::string& text) { return FilterParser(text).parse(); }
 
-bool Filter::matches(const std::map<std::string, std::string>& metadata) const {
-    for (const Term& term : terms_) {
-        if (!passes(term, metadata)) return false;
-    }
-    return true;
+bool Filter::matches(const std::map<std::string, std::string>& metadata, std::string_view shapeKey) const {
+    const auto holds = [&](const Term& term) {
+        if (term.ofShapeKey) return passes(term, &shapeKey);
+        const auto found = metadata.find(term.key);
+        if (found == metadata.end()) return passes(term, nullptr);
+        const std::string_view value = found->second;
+        return passes(term, &value);
+    };
+    return std::all_of(conditions_.begin(), conditions_.end(), [&](const Condition& condition) {
+        return std::any_of(condition.begin(), condition.end(), holds);
+    });
 }
 
-bool Filter::passes(const Term& term, const std::map<std::string, std::string>& metadata) {
-    const auto found = metadata.find(term.key);
-    const bool present = found != metadata.end();
+bool Filter::passes(const Term& term, const std::string_view* value) {
+    if (value == nullptr) return term.op == Operator::kAbsent || term.op == Operator::kNotEqual;
     double number = 0.0;
-    const auto compared = [&] { return present && parseNumber(found->second, number); };
     switch (term.op) {
-        case Operator::kPresent: return present;
-        case Operator::kAbsent: return !present;
-        case Operator::kEqual: return present && found->second == term.value;
-        case Operator::kNotEqual: return !present || found->second != term.value;
-        case Operator::kLess: return compared() && number < term.number;
-        case Operator::kLessEqual: return compared() && number <= term.number;
-        case Operator::kGreater: return compared() && number > term.number;
-        case Operator::kGreaterEqual: return compared() && number >= term.number;
+        case Operator::kPresent: return true;
+        case Operator::kAbsent: return false;
+        case Operator::kEqual: return *value == term.value;
+        case Operator::kNotEqual: return *value != term.value;
+        case Operator::kBegins: return value->substr(0, term.value.size()) == term.value;
+        case Operator::kLess: return parseNumber(*value, number) && number < term.number;
+        case Operator::kLessEqual: return parseNumber(*value, number) && number <= term.number;
+        case Operator::kGreater: return parseNumber(*value, number) && number > term.number;
+        case Operator::kGreaterEqual: return parseNumber(*value, number) && number >= term.number;
     }
     return false;
 }

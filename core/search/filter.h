@@ -3,17 +3,20 @@
 
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/base/error.h"
 
 namespace shapedb {
 
-/// Terms separated by commas, all of which must hold: `key=value`, `key!=value`, `key` (present), `!key`
-/// (absent), and `key<v`, `key<=v`, `key>v`, `key>=v` (numbers). Blanks around keys, operators and values
-/// are ignored. A value with commas, operators, or blanks at its ends is written in double quotes, with \"
-/// and \\ inside. A shape without the key passes no comparison except `!=`. An empty text accepts
-/// everything. Keys have no blanks, commas, quotes or operator characters. Grammar: docs/filters.md.
+/// Conditions separated by commas, all of which must hold; a condition is one term, or several separated by
+/// `|`, of which one must hold. Terms: `key=value`, `key!=value`, `key^=start` (begins with), `key` (present),
+/// `!key` (absent), and `key<v`, `key<=v`, `key>v`, `key>=v` (numbers). `@key` is the shape's own key. Blanks
+/// around keys, operators and values are ignored. A value with commas, bars, operators, or blanks at its ends
+/// is written in double quotes, with \" and \\ inside. A shape without the key passes no comparison except
+/// `!=`. An empty text accepts everything. Keys have no blanks, commas, bars, quotes or operator characters.
+/// Grammar: docs/filters.md.
 ///
 /// Immutable; safe to share between threads.
 class Filter {
@@ -24,21 +27,40 @@ class Filter {
     /// Errors: kMalformedFilter with the column (bytes, from 1) and what was expected there.
     [[nodiscard]] static Result<Filter> parse(const std::string& text);
 
-    [[nodiscard]] bool matches(const std::map<std::string, std::string>& metadata) const;
-    [[nodiscard]] bool acceptsAll() const { return terms_.empty(); }
+    /// `shapeKey`: the shape's own.
+    [[nodiscard]] bool matches(const std::map<std::string, std::string>& metadata,
+                               std::string_view shapeKey = {}) const;
+    [[nodiscard]] bool acceptsAll() const { return conditions_.empty(); }
+    /// False: shapes with equal metadata pass alike.
+    [[nodiscard]] bool asksForKeys() const { return asksForKeys_; }
 
   private:
-    enum class Operator { kEqual, kNotEqual, kPresent, kAbsent, kLess, kLessEqual, kGreater, kGreaterEqual };
+    enum class Operator {
+        kEqual,
+        kNotEqual,
+        kBegins,
+        kPresent,
+        kAbsent,
+        kLess,
+        kLessEqual,
+        kGreater,
+        kGreaterEqual
+    };
     struct Term {
         std::string key;
         Operator op = Operator::kEqual;
         std::string value;
         double number = 0.0;
+        bool ofShapeKey = false;
     };
+    /// Alternatives: at least one, any of which will do.
+    using Condition = std::vector<Term>;
 
-    static bool passes(const Term& term, const std::map<std::string, std::string>& metadata);
+    /// `value`: null if there is none.
+    static bool passes(const Term& term, const std::string_view* value);
 
-    std::vector<Term> terms_;
+    std::vector<Condition> conditions_;
+    bool asksForKeys_ = false;
 
     friend class FilterParser;
 };

@@ -16,6 +16,7 @@ void SignatureBlock::reserve(std::size_t count) {
     scales_.reserve(count);
     qualities_.reserve(count);
     earlier_.reserve(count);
+    keysEnd_.reserve(count);
     metadataOf_.reserve(count);
     segmentsEnd_.reserve(count);
     pointsEnd_.reserve(count);
@@ -24,12 +25,18 @@ void SignatureBlock::reserve(std::size_t count) {
 }
 
 void SignatureBlock::shrink() {
+    keys_.shrink_to_fit();
     segments_.shrink_to_fit();
     points_.shrink_to_fit();
     metadata_.shrink_to_fit();
     first_.shrink_to_fit();
     second_.shrink_to_fit();
     views_.shrink_to_fit();
+}
+
+void SignatureBlock::appendKey(std::string_view key) {
+    keys_ += key;
+    keysEnd_.push_back(static_cast<std::uint32_t>(keys_.size()));
 }
 
 void SignatureBlock::appendMetadata(const Metadata& metadata) {
@@ -66,6 +73,7 @@ void SignatureBlock::append(const IndexEntry& entry) {
     scales_.push_back(signature.scale);
     qualities_.push_back(signature.attributes ? signature.attributes->quality : 0);
     earlier_.push_back(signature.attributes && signature.attributes->earlier ? 1 : 0);
+    appendKey(entry.key);
     appendMetadata(entry.metadata);
     appendViews(entry.views);
     if (signature.attributes) {
@@ -89,6 +97,7 @@ void SignatureBlock::append(const SignatureBlock& from, std::size_t row) {
     scales_.push_back(from.scales_[row]);
     qualities_.push_back(from.qualities_[row]);
     earlier_.push_back(from.earlier_[row]);
+    appendKey(from.key(row));
     appendMetadata(from.metadata(row));
     appendViews(from.views_.empty() ? nullptr : from.views_[row]);
     if (from.attributed(row)) {
@@ -123,7 +132,7 @@ ShapeRows SignatureBlock::rows() const {
 
 std::size_t SignatureBlock::memoryBytes() const {
     std::size_t bytes = sizeof *this + bytesOf(ids_) + bytesOf(scales_) + bytesOf(qualities_) +
-                        bytesOf(earlier_) + bytesOf(metadataOf_) + bytesOf(segmentsEnd_) +
+                        bytesOf(earlier_) + keys_.capacity() + bytesOf(keysEnd_) + bytesOf(metadataOf_) + bytesOf(segmentsEnd_) +
                         bytesOf(pointsEnd_) + bytesOf(first_) + bytesOf(second_) + bytesOf(segments_) +
                         bytesOf(points_) + bytesOf(metadata_) + bytesOf(views_);
     for (const auto& views : views_) bytes += views ? sizeof *views : 0;

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/base/metadata.h"
@@ -20,6 +21,7 @@ struct IndexEntry {
     Metadata metadata;
     Signature signature;
     std::shared_ptr<const ShapeViews> views{};  ///< null: none, a scan of one side is compared otherwise
+    std::string key{};                          ///< for filters
 };
 
 /// Signatures in ascending order of id. Immutable once shared: const members from any thread.
@@ -39,6 +41,11 @@ class SignatureBlock {
 
     [[nodiscard]] std::size_t size() const { return ids_.size(); }
     [[nodiscard]] std::int64_t id(std::size_t row) const { return ids_[row]; }
+    /// Valid while the block lives unchanged.
+    [[nodiscard]] std::string_view key(std::size_t row) const {
+        const std::size_t begin = row == 0 ? 0 : keysEnd_[row - 1];
+        return std::string_view(keys_).substr(begin, keysEnd_[row] - begin);
+    }
     [[nodiscard]] const Metadata& metadata(std::size_t row) const { return metadata_[metadataOf_[row]]; }
     /// Rows with equal metadata usually share a number.
     [[nodiscard]] std::size_t metadataNumber(std::size_t row) const { return metadataOf_[row]; }
@@ -65,6 +72,7 @@ class SignatureBlock {
   private:
     std::size_t segmentsBegin(std::size_t row) const { return row == 0 ? 0 : segmentsEnd_[row - 1]; }
     std::size_t pointsBegin(std::size_t row) const { return row == 0 ? 0 : pointsEnd_[row - 1]; }
+    void appendKey(std::string_view key);
     void appendMetadata(const Metadata& metadata);
     // Those of the row that was begun last; null: none.
     void appendViews(const std::shared_ptr<const ShapeViews>& views);
@@ -75,6 +83,8 @@ class SignatureBlock {
     std::vector<double> scales_;
     std::vector<std::uint8_t> qualities_;
     std::vector<std::uint8_t> earlier_;  // 1: ShapeAttributes::earlier
+    std::string keys_;                    // one after the other
+    std::vector<std::uint32_t> keysEnd_;  // of each row, in keys_
     std::vector<std::uint16_t> metadataOf_;
     std::vector<std::uint16_t> segmentsEnd_;  // of each row, in segments_
     std::vector<std::uint16_t> pointsEnd_;    // of each row, in points_

@@ -23,7 +23,7 @@ Result<store::ShapeFilter> makeFilter(const ShapeSelection& selection, const Run
     // With no `accept` the store counts without reading rows.
     if (filter->acceptsAll()) return result;
     result.accept = [filter = std::move(*filter)](const store::Shape& shape) {
-        return filter.matches(shape.metadata);
+        return filter.matches(shape.metadata, shape.key);
     };
     return result;
 }

@@ -37,6 +37,7 @@ bool toEntry(store::IndexRow&& row, IndexEntry& entry, store::Store& store, tele
         return false;
     }
     entry.id = row.shapeId;
+    entry.key = std::move(row.key);
     entry.metadata = std::move(row.metadata);
     entry.views = nullptr;
     if (row.signature.views.empty()) return true;
@@ -415,7 +416,7 @@ Result<void> CollectionIndex::applyDirty(Slot& slot) {
         // Of another generation: a switch is in progress, and its reload brings this shape.
         if (row && row->generation != before->collection.generation) continue;
         IndexEntry entry;
-        if (row && toEntry({id, shape->metadata, std::move(*row)}, entry, store_, *log_)) {
+        if (row && toEntry({id, shape->key, shape->metadata, std::move(*row)}, entry, store_, *log_)) {
             updates.push_back(std::move(entry));
         } else {
             // Deleted, not segmented yet, failed or damaged: not searched.

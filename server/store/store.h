@@ -191,6 +191,7 @@ struct StoredHit {
 /// What the index needs of one shape.
 struct IndexRow {
     std::int64_t shapeId = 0;
+    std::string key;
     Metadata metadata;
     SignatureRow signature;
 };

@@ -20,6 +20,10 @@ void tryFilter(const std::string& text) {
     const std::map<std::string, std::string> some = {{"label", "cup"}, {"mass", "1.5"}, {"a", ""}};
     static_cast<void>(filter->matches({}));
     static_cast<void>(filter->matches(some));
+    static_cast<void>(filter->matches(some, "cup/cup_01"));
+    if (!filter->asksForKeys()) {
+        require(filter->matches(some, "a") == filter->matches(some, "b"), "no key asked for, none looked at");
+    }
     if (filter->acceptsAll()) require(filter->matches({}) && filter->matches(some), "no term, no condition");
 }
 

@@ -115,6 +115,10 @@ test('filters keep their other terms', () => {
   assert.equal(page.equalTerm('k', 'a, "b"\\'), 'k="a, \\"b\\"\\\\"');
   assert.equal(page.toggled('a=1, b=2', 'a', 'a=3'), 'b=2, a=3');
   assert.equal(page.toggled('a=1, b=2', 'a', 'a=1'), 'b=2');
+  assert.deepEqual(page.termsOf('a=1 | b=2, c'), ['a=1 | b=2', 'c']);
+  assert.equal(page.equalTerm('k', 'a|b'), 'k="a|b"');
+  assert.equal(page.toggled('a=1 | b=2, a=2', 'a', 'a=3'), 'a=1 | b=2, a=3', 'alternatives are kept');
+  assert.equal(page.toggled('a="1|2"', 'a', 'a=3'), 'a=3', 'one value, in quotes');
   assert.equal(page.toggled('year>=1990', 'year', 'year=1995'), 'year>=1990, year=1995');
 });
 

@@ -1,7 +1,12 @@
 // Filters (docs/filters.md) as lists of terms, so that a facet can change one of them.
 
-/** The terms of a filter, without the blanks around them. Never fails: the server says what is wrong with a filter. */
+/** The conditions of a filter, without the blanks around them. Never fails: the server says what is wrong with a filter. */
 export function termsOf(filter: string): string[] {
+  return splitAt(filter, ',');
+}
+
+/** What stands between `separator`s that are not in quotes. */
+function splitAt(filter: string, separator: string): string[] {
   const terms: string[] = [];
   let term = '';
   let quoted = false;
@@ -12,7 +17,7 @@ export function termsOf(filter: string): string[] {
       continue;
     }
     if (c === '"') quoted = !quoted;
-    if (c === ',' && !quoted) {
+    if (c === separator && !quoted) {
       terms.push(term.trim());
       term = '';
     } else {
@@ -25,7 +30,7 @@ export function termsOf(filter: string): string[] {
 
 /** `key=value`, with quotes where the grammar wants them. */
 export function equalTerm(key: string, value: string): string {
-  const plain = value !== '' && value.trim() === value && !/[,=!<>"\\]/.test(value);
+  const plain = value !== '' && value.trim() === value && !/[,|=!<>"\\]/.test(value);
   return `${key}=${plain ? value : `"${value.replace(/[\\"]/g, '\\$&')}"`}`;
 }
 
@@ -33,9 +38,12 @@ export function missingTerm(key: string): string {
   return `!${key}`;
 }
 
-/** The filter with this term, in place of another value of the same key; without it if it had it. */
+/**
+ * The filter with this term, in place of another value of the same key; without it if it had it. Conditions with
+ * alternatives (`a=1 | b=2`) stay.
+ */
 export function toggled(filter: string, key: string, term: string): string {
   const terms = termsOf(filter);
-  const others = terms.filter((one) => one !== term && !one.startsWith(`${key}=`) && one !== missingTerm(key));
+  const others = terms.filter((one) => one !== term && (!one.startsWith(`${key}=`) || splitAt(one, '|').length > 1) && one !== missingTerm(key));
   return (terms.includes(term) ? others : [...others, term]).join(', ');
 }

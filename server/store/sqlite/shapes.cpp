@@ -58,8 +58,10 @@ constexpr char kRowsWithoutIndices[] =
     "SELECT g.rowid FROM signature g NOT INDEXED CROSS JOIN shape s NOT INDEXED ON s.id = g.shape_id WHERE "
     "s.collection_id = ?1 AND g.shape_id > ?2 AND g.generation = ?3 ORDER BY g.shape_id LIMIT ?4";
 constexpr char kIndexRow[] =
-    "SELECT g.shape_id, m.name, m.value, g.points_version, g.generation, g.digest, g.bytes, g.views FROM "
-    "signature g NOT INDEXED LEFT JOIN shape_metadata m ON m.shape_id = g.shape_id WHERE g.rowid = ?1";
+    "SELECT g.shape_id, m.name, m.value, g.points_version, g.generation, g.digest, g.bytes, g.views, s.key "
+    "FROM "
+    "signature g NOT INDEXED CROSS JOIN shape s NOT INDEXED ON s.id = g.shape_id LEFT JOIN shape_metadata m "
+    "ON m.shape_id = g.shape_id WHERE g.rowid = ?1";
 
 SignatureRow signatureBy(const char* statement, Connection& connection, std::int64_t shapeId) {
     Query query(connection, statement, shapeId);
@@ -87,6 +89,7 @@ void readIndexRows(Connection& connection, Query& query, std::size_t limit, std:
         IndexRow& row = rows.emplace_back();
         row.shapeId = query.integer(0);
         row.signature = readSignature(connection, query, 3, row.shapeId);
+        row.key = query.text(8);
         do {
             if (!query.isNull(1)) row.metadata.emplace(query.text(1), query.text(2));
             more = query.step();

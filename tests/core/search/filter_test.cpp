@@ -83,8 +83,31 @@ TEST(Filter, PassesWhatItSays) {
         {"label , year , !none", true},
         {"label=cup,label=mug", false},
         {"year>=1980,year<2000", true},
+        {"label=mug|label=cup", true},
+        {"label=mug | label = cup , year=1990", true},
+        {"label=mug|label=bowl", false},
+        {"label=cup|none, year=1991", false},  // of each condition one
+        {"year=1991, label=cup|none", false},
+        {"none|!label|year<0|year>1989", true},
+        {"none|!label|year<0", false},
+        {"none=\"a|b\"|label", true},
+        {"label^=cu", true},
+        {"label ^= cup", true},
+        {"label^=\"\"", true},
+        {"label^=cups", false},
+        {"label^=up", false},
+        {"none^=x", false},
+        {"year^=19", true},
+        {"@key=mug/mug_01", true},
+        {"@key=mug/mug_02", false},
+        {"@key!=mug/mug_02", true},
+        {"@key^=mug/", true},
+        {"@key^=cup/|label=cup", true},
+        {"@key^=cup/, label=cup", false},
+        {"@key", true},
+        {"!@key", false},
     };
-    for (const Case& c : cases) EXPECT_EQ(parsed(c.text).matches(cup), c.passes) << c.text;
+    for (const Case& c : cases) EXPECT_EQ(parsed(c.text).matches(cup, "mug/mug_01"), c.passes) << c.text;
 }
 
 TEST(Filter, RefusesTheRestAndSaysWhere) {
@@ -131,6 +154,14 @@ TEST(Filter, RefusesTheRestAndSaysWhere) {
         {"a<\"\"", 3, "a number"},
         {"a<\" 1\"", 3, "a number"},
         {"a<1 2", 3, "a number"},
+        {"|a", 1, "a key"},
+        {"a|", 3, "a key"},
+        {"a||b", 3, "a key"},
+        {"a,|b", 3, "a key"},
+        {"a=1|b=", 7, "a value"},
+        {"a=|b", 3, "a value"},
+        {"a^=", 4, "a value"},
+        {"a=\"b\" c|d", 7, "',', '|' or the end"},
         {"label=cup, year>=, x", 18, "a value"},
         {"ü=ä, =", 8, "a key"},  // columns are bytes
     };
@@ -150,7 +181,7 @@ TEST(Filter, RefusesTheRestAndSaysWhere) {
 TEST(Filter, MessageIsAsDocumented) {
     EXPECT_EQ(
         Filter::parse("a b").error().message,
-        "filter 'a b', column 3: expected one of = != < <= > >=; write for example label=cup, year>=1990, "
+        "filter 'a b', column 3: expected one of = != ^= < <= > >=; write for example label=cup, year>=1990, "
         "!draft");
 }
 
@@ -187,6 +218,7 @@ struct PlainTerm {
         const std::string& text = metadata.at(key);
         if (op == "=") return text == value;
         if (op == "!=") return text != value;
+        if (op == "^=") return text.rfind(value, 0) == 0;
         if (text.empty() || text[0] == '+' ||
             text.find_first_not_of("0123456789.eE+-") != std::string::npos) {
             return false;
@@ -205,7 +237,7 @@ struct PlainTerm {
         const auto blanks = [&] { return std::string(random.below(3), random.below(2) == 0 ? ' ' : '\t'); };
         if (op == "present") return blanks() + key + blanks();
         if (op == "absent") return blanks() + "!" + blanks() + key + blanks();
-        const bool mustQuote = value.empty() || value.find_first_of(",\"=!<>") != std::string::npos ||
+        const bool mustQuote = value.empty() || value.find_first_of(",|\"=!<>") != std::string::npos ||
                                std::string(" \t").find(value.front()) != std::string::npos ||
                                std::string(" \t").find(value.back()) != std::string::npos;
         std::string shown = value;
@@ -231,7 +263,7 @@ TEST(Filter, AgreesWithAnIndependentEvaluator) {
     const std::vector<std::string> numbers = {"0",       "1",  "-1",   "1.5", "1e3",
                                               "-2.5E-1", ".5", "1000", "007", "2."};
     const std::vector<std::string> texts = {"",        "cup", "two words", "a,b",         "a=b", " lead",
-                                            "trail\t", "\"",  "\\",        "\\\"",        "!x",  "日本",
+                                            "trail\t", "\"",  "\\",        "\\\"",        "!x",  "日本",  "c|u", "cu",
                                             "12x",     "inf", "+1",        "line\nbreak", "1 "};
     int passed = 0;
     const int rounds = 20000;
@@ -240,18 +272,21 @@ TEST(Filter, AgreesWithAnIndependentEvaluator) {
         for (std::uint64_t i = random.below(6); i > 0; --i) {
             metadata[pick(random, keys)] = pick(random, random.below(2) == 0 ? numbers : texts);
         }
-        std::vector<PlainTerm> terms;
-        std::string text;
-        for (std::uint64_t i = 1 + random.below(3); i > 0; --i) {
-            PlainTerm term{pick(random, keys),
-                           pick(random, {"present", "absent", "=", "!=", "<", "<=", ">", ">="}), ""};
-            const bool ordered = term.op.front() == '<' || term.op.front() == '>';
-            term.value = pick(random, ordered || random.below(2) == 0 ? numbers : texts);
-            text += (text.empty() ? "" : ",") + term.written(random);
-            terms.push_back(term);
-        }
         bool expected = true;
-        for (const PlainTerm& term : terms) expected = expected && term.passes(metadata);
+        std::string text;
+        for (std::uint64_t conditions = 1 + random.below(3); conditions > 0; --conditions) {
+            bool holds = false;
+            if (!text.empty()) text += ",";
+            for (std::uint64_t i = 1 + random.below(2); i > 0; --i) {
+                PlainTerm term{pick(random, keys),
+                               pick(random, {"present", "absent", "=", "!=", "^=", "<", "<=", ">", ">="}), ""};
+                const bool ordered = term.op.front() == '<' || term.op.front() == '>';
+                term.value = pick(random, ordered || random.below(2) == 0 ? numbers : texts);
+                text += term.written(random) + (i > 1 ? "|" : "");
+                holds = term.passes(metadata) || holds;
+            }
+            expected = expected && holds;
+        }
         const auto filter = Filter::parse(text);
         ASSERT_TRUE(filter) << text << ": " << filter.error().message;
         ASSERT_EQ(filter->matches(metadata), expected) << text;
@@ -263,7 +298,7 @@ TEST(Filter, AgreesWithAnIndependentEvaluator) {
 
 TEST(Filter, SurvivesAnyBytes) {
     Random random(2);
-    const std::string likely = "ab=!<>,\"\\ \t1.5e-";
+    const std::string likely = "ab=!<>^|@key,\"\\ \t1.5e-";
     const Metadata metadata = {{"a", "1"}, {"b", "x"}, {"ab", ""}};
     int accepted = 0;
     for (int round = 0; round < 200000; ++round) {

@@ -22,6 +22,7 @@ using testing_support::sameBits;
 IndexEntry entryOf(std::int64_t id, Signature signature) {
     IndexEntry entry;
     entry.id = id;
+    entry.key = "k" + std::to_string(id);
     entry.metadata["third"] = std::to_string(id % 3);
     if (id % 5 == 0) entry.metadata["fifth"] = "yes";
     entry.signature = std::move(signature);
@@ -60,7 +61,7 @@ std::vector<SearchHit> bruteForce(const Signature& query, const Library& library
     std::vector<SearchHit> hits;
     for (const IndexEntry& entry : library.entries) {
         if (options.excludeId && *options.excludeId == entry.id) continue;
-        if (!options.filter.matches(entry.metadata)) continue;
+        if (!options.filter.matches(entry.metadata, entry.key)) continue;
         const double value = score(query, entry.signature, options.score);
         if (value >= options.threshold) hits.push_back({entry.id, value});
     }
@@ -86,7 +87,8 @@ SearchOptions randomOptions(Random& random, const Library& library) {
     options.k = std::max<std::size_t>(1, ks[random.below(ks.size())]);
     const std::vector<double> thresholds = {0.0, 0.0, 0.0, 0.3, 0.9, 1.0, random.uniform()};
     options.threshold = thresholds[random.below(thresholds.size())];
-    const std::vector<const char*> filters = {"", "", "third=1", "fifth", "!fifth, third!=0", "none"};
+    const std::vector<const char*> filters = {"", "", "third=1", "fifth", "!fifth, third!=0", "none",
+                                              "@key^=k1", "@key=k12 | fifth"};
     options.filter = Filter::parse(filters[random.below(filters.size())]).value();
     options.score.reflection = random.below(2) == 0;
     options.score.keepScale = random.below(4) == 0;
@@ -105,7 +107,7 @@ void expectExact(const Signature& query, const Library& library, const SearchOpt
     std::uint64_t passing = 0;
     for (const IndexEntry& entry : library.entries) {
         const bool excluded = options.excludeId && *options.excludeId == entry.id;
-        passing += !excluded && options.filter.matches(entry.metadata) ? 1u : 0u;
+        passing += !excluded && options.filter.matches(entry.metadata, entry.key) ? 1u : 0u;
     }
     const SearchCounts& counts = result->counts;
     EXPECT_EQ(counts.candidates, library.entries.size());

@@ -332,7 +332,7 @@ Result<std::vector<IndexRow>> MemoryStore::loadIndex(std::int64_t collectionId, 
             const Shape& shape = content_.shapes.at(at->first);
             if (shape.collectionId != collectionId || at->second.generation != collection->second.generation)
                 continue;
-            rows.push_back({shape.id, shape.metadata, at->second});
+            rows.push_back({shape.id, shape.key, shape.metadata, at->second});
         }
         return rows;
     });
