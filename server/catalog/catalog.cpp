@@ -129,7 +129,7 @@ Result<void> Catalog::deleteCollection(const std::string& name, bool force) {
         if (*shapes > 0) {
             return fail(ErrorCode::kRejected, "collection '" + collection.name + "' holds " +
                                                   std::to_string(*shapes) +
-                                                  " shapes: delete them first, or set force");
+                                                  " shapes, which would be deleted with it");
         }
     }
     const auto cancelled = rebuilds_.cancel(collection);

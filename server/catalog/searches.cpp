@@ -32,7 +32,7 @@ Result<void> AnswerRoom::take(std::size_t bytes) {
     if (bytes > left_) {
         return fail(ErrorCode::kInvalidArgument,
                     "the answer would exceed " + std::to_string(kMaxAnswerBytes) +
-                        " bytes; ask for a smaller k or fewer queries, or set no_explanation");
+                        " bytes; ask for fewer hits or queries, or for no explanations");
     }
     RETURN_IF_ERROR(share_.take(bytes));
     left_ -= bytes;

@@ -56,7 +56,7 @@ Result<Signature> Catalog::signature(FoundShape& found) {
     if (found.shape.failure) {
         return fail(ErrorCode::kNotReady, name + ": it cannot be segmented: " + found.shape.failure->message);
     }
-    return fail(ErrorCode::kNotReady, name + " yet: wait until it is READY (WatchIngest)");
+    return fail(ErrorCode::kNotReady, name + " yet: wait until it is ready");
 }
 
 Result<std::vector<std::optional<store::StoredHit>>> Catalog::getHits(
