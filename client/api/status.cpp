@@ -19,16 +19,35 @@ ErrorCode codeOf(grpc::StatusCode code) {
         case grpc::StatusCode::NOT_FOUND: return ErrorCode::kNotFound;
         case grpc::StatusCode::ALREADY_EXISTS: return ErrorCode::kAlreadyExists;
         case grpc::StatusCode::ABORTED: return ErrorCode::kVersionConflict;
-        case grpc::StatusCode::FAILED_PRECONDITION:
-        case grpc::StatusCode::UNIMPLEMENTED: return ErrorCode::kRejected;
+        case grpc::StatusCode::FAILED_PRECONDITION: return ErrorCode::kRejected;
         case grpc::StatusCode::PERMISSION_DENIED: return ErrorCode::kPermissionDenied;
         case grpc::StatusCode::UNAUTHENTICATED: return ErrorCode::kUnauthenticated;
-        case grpc::StatusCode::UNAVAILABLE: return ErrorCode::kUnavailable;
+        case grpc::StatusCode::UNAVAILABLE:
+        case grpc::StatusCode::UNIMPLEMENTED: return ErrorCode::kUnavailable;  // none of ours, or too old
         case grpc::StatusCode::CANCELLED: return ErrorCode::kCancelled;
         case grpc::StatusCode::DEADLINE_EXCEEDED: return ErrorCode::kDeadlineExceeded;
         case grpc::StatusCode::DATA_LOSS: return ErrorCode::kDataLoss;
         default: return ErrorCode::kInternal;  // RESOURCE_EXHAUSTED too: the server names its own
     }
+}
+
+/// Why there is no connection, in words of a user rather than of gRPC.
+std::string unreachable(const std::string& address, const std::string& details) {
+    const auto says = [&](const char* words) { return details.find(words) != std::string::npos; };
+    if (says("DNS resolution failed") || says("C-ares")) {
+        return "cannot reach a server at " + address + ": this machine knows no host of that name";
+    }
+    if (says("Failed parsing HTTP/2") || says("http1.x")) {
+        return "what answers at " + address +
+               " is not a ShapeDB server: is it the right port? (that of the web page is another)";
+    }
+    if (says("Connection refused")) {
+        return "cannot reach a server at " + address + ": nobody listens there; is shapedbd running?";
+    }
+    // What becomes of a call without TLS to a server that wants it.
+    const bool closed = says("Socket closed");
+    return "cannot reach a server at " + address + ": is shapedbd running there" +
+           (closed ? ", and does it want TLS" : "") + "? (" + details + ")";
 }
 
 }  // namespace
@@ -40,17 +59,13 @@ Error errorOf(const grpc::Status& status, const TrailingMetadata& trailing, cons
     const Error error{codeOf(status.error_code()), status.error_message()};
     if (error.message.rfind(kCutOffPrefix, 0) == 0) return error;
     switch (status.error_code()) {
-        case grpc::StatusCode::UNAVAILABLE: {
-            // What becomes of a call without TLS to a server that wants it.
-            const bool closed = error.message.find("Socket closed") != std::string::npos;
-            return {error.code, "cannot reach a server at " + address + ": is shapedbd running there" +
-                                    (closed ? ", and does it want TLS" : "") + "? (" + error.message + ")"};
-        }
+        case grpc::StatusCode::UNAVAILABLE: return {error.code, unreachable(address, error.message)};
         case grpc::StatusCode::DEADLINE_EXCEEDED:
             return {error.code, "the server at " + address + " did not answer before the deadline"};
         case grpc::StatusCode::UNIMPLEMENTED:
-            return {error.code, "the server at " + address + " does not support this call (" + error.message +
-                                    "): is it a ShapeDB server, and new enough?"};
+            return {error.code, "what answers at " + address +
+                                    " does not know this call: it is not a ShapeDB server, or an older one" +
+                                    (error.message.empty() ? "" : " (" + error.message + ")")};
         default: return error;
     }
 }
@@ -62,6 +77,8 @@ AttemptFailure failureOf(const grpc::Status& status, const TrailingMetadata& tra
     if (status.error_code() == grpc::StatusCode::RESOURCE_EXHAUSTED && failure.pushback) {
         failure.code = ErrorCode::kQueueFull;
     }
+    // It would not know the call next time either.
+    if (status.error_code() == grpc::StatusCode::UNIMPLEMENTED) failure.code = ErrorCode::kRejected;
     return failure;
 }
 

@@ -347,7 +347,8 @@ TEST(Client, HealthFailsWithoutTheHealthService) {
     FakeServer server;
     const auto health = server.client().health();
     ASSERT_FALSE(health);
-    EXPECT_EQ(health.error().code, ErrorCode::kRejected);
+    EXPECT_EQ(health.error().code, ErrorCode::kUnavailable);
+    EXPECT_NE(health.error().message.find("not a ShapeDB server"), std::string::npos);
 }
 
 TEST(Client, UnreachableServerIsUnavailable) {

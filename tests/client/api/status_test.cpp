@@ -28,7 +28,7 @@ TEST(Status, GrpcCodeDecidesWithoutAName) {
     EXPECT_EQ(translate(grpc::StatusCode::INVALID_ARGUMENT).code, ErrorCode::kInvalidArgument);
     EXPECT_EQ(translate(grpc::StatusCode::UNAVAILABLE).code, ErrorCode::kUnavailable);
     EXPECT_EQ(translate(grpc::StatusCode::DEADLINE_EXCEEDED).code, ErrorCode::kDeadlineExceeded);
-    EXPECT_EQ(translate(grpc::StatusCode::UNIMPLEMENTED).code, ErrorCode::kRejected);
+    EXPECT_EQ(translate(grpc::StatusCode::UNIMPLEMENTED).code, ErrorCode::kUnavailable);
     EXPECT_EQ(translate(grpc::StatusCode::RESOURCE_EXHAUSTED).code, ErrorCode::kInternal);
     EXPECT_EQ(translate(grpc::StatusCode::UNKNOWN).code, ErrorCode::kInternal);
 }
@@ -38,6 +38,29 @@ TEST(Status, MessageNamesAnUnreachableServer) {
                             grpc::StatusCode::UNIMPLEMENTED}) {
         EXPECT_NE(translate(code).message.find("host:1"), std::string::npos);
     }
+}
+
+TEST(Status, AStrangerIsNotTriedAgain) {
+    const grpc::Status status(grpc::StatusCode::UNIMPLEMENTED, "");
+    const Error error = errorOf(status, {}, "host:1");
+    EXPECT_EQ(failureOf(status, {}, error).code, ErrorCode::kRejected);
+    EXPECT_NE(error.message.find("not a ShapeDB server"), std::string::npos) << error.message;
+}
+
+TEST(Status, WordsOfGrpcStayInside) {
+    const auto message = [](const char* details) {
+        return errorOf(grpc::Status(grpc::StatusCode::UNAVAILABLE, details), {}, "host:1").message;
+    };
+    EXPECT_EQ(message("DNS resolution failed for host:1: C-ares status is not ARES_SUCCESS qtype=AAAA"),
+              "cannot reach a server at host:1: this machine knows no host of that name");
+    EXPECT_EQ(message("failed to connect to all addresses; last error: UNKNOWN: ipv4:127.0.0.1:1: Failed to "
+                      "connect to remote host: Connection refused"),
+              "cannot reach a server at host:1: nobody listens there; is shapedbd running?");
+    EXPECT_NE(message("failed to connect to all addresses; last error: UNAVAILABLE: Failed parsing HTTP/2")
+                  .find("is not a ShapeDB server"),
+              std::string::npos);
+    EXPECT_NE(message("Socket closed").find("does it want TLS"), std::string::npos);
+    EXPECT_NE(message("something new").find("(something new)"), std::string::npos) << "nothing is lost";
 }
 
 TEST(Status, ACallThatTheServerCutOffKeepsItsReason) {

@@ -25,7 +25,7 @@ _REASON_OF_CODE = {
     grpc.StatusCode.ALREADY_EXISTS: "already_exists",
     grpc.StatusCode.ABORTED: "version_conflict",
     grpc.StatusCode.FAILED_PRECONDITION: "rejected",
-    grpc.StatusCode.UNIMPLEMENTED: "rejected",
+    grpc.StatusCode.UNIMPLEMENTED: "unavailable",
     grpc.StatusCode.PERMISSION_DENIED: "permission_denied",
     grpc.StatusCode.UNAUTHENTICATED: "unauthenticated",
     grpc.StatusCode.UNAVAILABLE: "unavailable",
@@ -70,10 +70,26 @@ class Failure:
         self.retry_reason = self.error.reason
         if code == grpc.StatusCode.RESOURCE_EXHAUSTED and self.pushback is not None:
             self.retry_reason = "queue_full"  # rate_limited and the like: there will be room
+        if code == grpc.StatusCode.UNIMPLEMENTED:
+            self.retry_reason = "rejected"  # it would not know the call next time either
 
 
 def _texts(metadata: Iterable[Any]) -> dict[str, str]:
     return {key: value for key, value in metadata if isinstance(value, str)}
+
+
+def _unreachable(address: str, details: str) -> str:
+    """Why there is no connection, in words of a user rather than of gRPC."""
+    if "DNS resolution failed" in details or "C-ares" in details:
+        return f"cannot reach a server at {address}: this machine knows no host of that name"
+    if "Failed parsing HTTP/2" in details or "http1.x" in details:
+        return (f"what answers at {address} is not a ShapeDB server: is it the right port? "
+                "(that of the web page is another)")
+    if "Connection refused" in details:
+        return f"cannot reach a server at {address}: nobody listens there; is shapedbd running?"
+    # What becomes of a call without TLS to a server that wants it.
+    closed = ", and does it want TLS" if "Socket closed" in details else ""
+    return f"cannot reach a server at {address}: is shapedbd running there{closed}? ({details})"
 
 
 def _error_of(code: Any, details: str, name: Optional[str], address: str) -> ShapeDBError:
@@ -83,14 +99,11 @@ def _error_of(code: Any, details: str, name: Optional[str], address: str) -> Sha
     if details.startswith(_CUT_OFF):
         return ShapeDBError(reason, details)
     if code == grpc.StatusCode.UNAVAILABLE:
-        # What becomes of a call without TLS to a server that wants it.
-        closed = ", and does it want TLS" if "Socket closed" in details else ""
-        return ShapeDBError(
-            reason, f"cannot reach a server at {address}: is shapedbd running there{closed}? ({details})")
+        return ShapeDBError(reason, _unreachable(address, details))
     if code == grpc.StatusCode.DEADLINE_EXCEEDED:
         return ShapeDBError(reason, f"the server at {address} did not answer before the deadline")
     if code == grpc.StatusCode.UNIMPLEMENTED:
+        told = f" ({details})" if details else ""
         return ShapeDBError(
-            reason, f"the server at {address} does not support this call ({details}): is it a ShapeDB server, "
-            "and new enough?")
+            reason, f"what answers at {address} does not know this call: it is not a ShapeDB server, or an older one{told}")
     return ShapeDBError(reason, details)
