@@ -122,9 +122,8 @@ class FilterParser {
         };
         // Longer ones first: < is also the beginning of <=.
         return take("!=", Operator::kNotEqual) || take("^=", Operator::kBegins) ||
-               take("<=", Operator::kLessEqual) ||
-               take(">=", Operator::kGreaterEqual) || take("=", Operator::kEqual) ||
-               take("<", Operator::kLess) || take(">", Operator::kGreater);
+               take("<=", Operator::kLessEqual) || take(">=", Operator::kGreaterEqual) ||
+               take("=", Operator::kEqual) || take("<", Operator::kLess) || take(">", Operator::kGreater);
     }
 
     Result<Filter::Term> parseValueOf(Filter::Term term) {
@@ -142,8 +141,8 @@ class FilterParser {
             term.value = text_.substr(begin, end - begin);
             if (term.value.empty()) return expected("a value");
         }
-        const bool ordered = term.op != Operator::kEqual && term.op != Operator::kNotEqual &&
-                             term.op != Operator::kBegins;
+        const bool ordered =
+            term.op != Operator::kEqual && term.op != Operator::kNotEqual && term.op != Operator::kBegins;
         if (ordered && !parseNumber(term.value, term.number)) {
             at_ = begin;
             return expected("a number after an order comparison");

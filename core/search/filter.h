@@ -11,7 +11,8 @@
 namespace shapedb {
 
 /// Conditions separated by commas, all of which must hold; a condition is one term, or several separated by
-/// `|`, of which one must hold. Terms: `key=value`, `key!=value`, `key^=start` (begins with), `key` (present),
+/// `|`, of which one must hold. Terms: `key=value`, `key!=value`, `key^=start` (begins with), `key`
+/// (present),
 /// `!key` (absent), and `key<v`, `key<=v`, `key>v`, `key>=v` (numbers). `@key` is the shape's own key. Blanks
 /// around keys, operators and values are ignored. A value with commas, bars, operators, or blanks at its ends
 /// is written in double quotes, with \" and \\ inside. A shape without the key passes no comparison except

@@ -132,9 +132,9 @@ ShapeRows SignatureBlock::rows() const {
 
 std::size_t SignatureBlock::memoryBytes() const {
     std::size_t bytes = sizeof *this + bytesOf(ids_) + bytesOf(scales_) + bytesOf(qualities_) +
-                        bytesOf(earlier_) + keys_.capacity() + bytesOf(keysEnd_) + bytesOf(metadataOf_) + bytesOf(segmentsEnd_) +
-                        bytesOf(pointsEnd_) + bytesOf(first_) + bytesOf(second_) + bytesOf(segments_) +
-                        bytesOf(points_) + bytesOf(metadata_) + bytesOf(views_);
+                        bytesOf(earlier_) + keys_.capacity() + bytesOf(keysEnd_) + bytesOf(metadataOf_) +
+                        bytesOf(segmentsEnd_) + bytesOf(pointsEnd_) + bytesOf(first_) + bytesOf(second_) +
+                        bytesOf(segments_) + bytesOf(points_) + bytesOf(metadata_) + bytesOf(views_);
     for (const auto& views : views_) bytes += views ? sizeof *views : 0;
     for (const Metadata& metadata : metadata_) {
         // A node of the tree: two strings, three pointers, a colour.

@@ -82,7 +82,7 @@ class SignatureBlock {
     std::vector<std::int64_t> ids_;
     std::vector<double> scales_;
     std::vector<std::uint8_t> qualities_;
-    std::vector<std::uint8_t> earlier_;  // 1: ShapeAttributes::earlier
+    std::vector<std::uint8_t> earlier_;   // 1: ShapeAttributes::earlier
     std::string keys_;                    // one after the other
     std::vector<std::uint32_t> keysEnd_;  // of each row, in keys_
     std::vector<std::uint16_t> metadataOf_;

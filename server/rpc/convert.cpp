@@ -58,7 +58,8 @@ void toProto(const store::Shape& shape, const std::string& collection, std::opti
     toProto(shape.createdAt, out->mutable_created());
     toProto(shape.updatedAt, out->mutable_updated());
     if (shape.failure) toProto(*shape.failure, out->mutable_failure());
-    // A shape that waits with new points is still found by its older ones, whose quality is not that of these.
+    // A shape that waits with new points is still found by its older ones, whose quality is not that of
+    // these.
     if (quality && shape.state == store::ShapeState::kReady) out->set_quality(*quality);
 }
 

@@ -262,9 +262,9 @@ TEST(Filter, AgreesWithAnIndependentEvaluator) {
     const std::vector<std::string> keys = {"label", "year", "größe", "a.b", "x", "1", "-", "日本"};
     const std::vector<std::string> numbers = {"0",       "1",  "-1",   "1.5", "1e3",
                                               "-2.5E-1", ".5", "1000", "007", "2."};
-    const std::vector<std::string> texts = {"",        "cup", "two words", "a,b",         "a=b", " lead",
-                                            "trail\t", "\"",  "\\",        "\\\"",        "!x",  "日本",  "c|u", "cu",
-                                            "12x",     "inf", "+1",        "line\nbreak", "1 "};
+    const std::vector<std::string> texts = {
+        "",   "cup",  "two words", "a,b", "a=b", " lead", "trail\t", "\"",          "\\", "\\\"",
+        "!x", "日本", "c|u",       "cu",  "12x", "inf",   "+1",      "line\nbreak", "1 "};
     int passed = 0;
     const int rounds = 20000;
     for (int round = 0; round < rounds; ++round) {
@@ -279,7 +279,8 @@ TEST(Filter, AgreesWithAnIndependentEvaluator) {
             if (!text.empty()) text += ",";
             for (std::uint64_t i = 1 + random.below(2); i > 0; --i) {
                 PlainTerm term{pick(random, keys),
-                               pick(random, {"present", "absent", "=", "!=", "^=", "<", "<=", ">", ">="}), ""};
+                               pick(random, {"present", "absent", "=", "!=", "^=", "<", "<=", ">", ">="}),
+                               ""};
                 const bool ordered = term.op.front() == '<' || term.op.front() == '>';
                 term.value = pick(random, ordered || random.below(2) == 0 ? numbers : texts);
                 text += term.written(random) + (i > 1 ? "|" : "");

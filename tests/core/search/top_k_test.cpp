@@ -87,8 +87,8 @@ SearchOptions randomOptions(Random& random, const Library& library) {
     options.k = std::max<std::size_t>(1, ks[random.below(ks.size())]);
     const std::vector<double> thresholds = {0.0, 0.0, 0.0, 0.3, 0.9, 1.0, random.uniform()};
     options.threshold = thresholds[random.below(thresholds.size())];
-    const std::vector<const char*> filters = {"", "", "third=1", "fifth", "!fifth, third!=0", "none",
-                                              "@key^=k1", "@key=k12 | fifth"};
+    const std::vector<const char*> filters = {
+        "", "", "third=1", "fifth", "!fifth, third!=0", "none", "@key^=k1", "@key=k12 | fifth"};
     options.filter = Filter::parse(filters[random.below(filters.size())]).value();
     options.score.reflection = random.below(2) == 0;
     options.score.keepScale = random.below(4) == 0;
