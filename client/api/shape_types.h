@@ -45,7 +45,7 @@ struct Shape {
     Timestamp created;
     Timestamp updated;
     std::optional<Error> failure;  ///< set exactly when state is kFailed
-    /// How certain the interior is, [0, 1]. Not set before there is a signature with attributes.
+    /// How certain the interior is, [0, 1]. Set when state is kReady and the signature has attributes.
     std::optional<double> quality;
     /// What the points were sent relative to (see Client::addShape); usually zero.
     Point3 origin;

@@ -36,6 +36,9 @@ def test_a_folder_its_labels_and_its_keys(tmp_path):
     assert [item.key for item in items] == ["bolts/a", "bolts/points", "cups/a", "cups/b"]
     assert items[0].metadata == {"label": "bolts", "file": "a.npy"}
     (tmp_path / "cups/a.xyz").write_text("1 2 3\n")
+    alike = [item.key for item in shapedb.scan_folder(tmp_path) if item.key.startswith("cups/")]
+    assert alike == ["cups/a.npy", "cups/a.xyz", "cups/b"], "files of one name keep their endings"
+    np.save(tmp_path / "cups/a.xyz.npy", solids.ball(10))
     with pytest.raises(shapedb.InvalidInput, match="same key"):
         shapedb.scan_folder(tmp_path)
     (tmp_path / "empty").mkdir()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import threading
+from collections import Counter
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -74,7 +75,8 @@ def scan_folder(folder: PathLike, *, label_from_folder: bool = False,
                 metadata: Optional[Callable[[Path], Metadata]] = None) -> List[Item]:
     """The scan files in and below a folder as items for `Collection.add_many`, sorted by path.
 
-    The key is the path below the folder without its ending. With `label_from_folder` the name of a file's folder
+    The key is the path below the folder without its ending, which stays where files of a folder differ in nothing else
+    (box.stl and box.obj). With `label_from_folder` the name of a file's folder
     becomes the metadata "label"; `metadata`, a function of the path, may give others. Hidden files are left out, links
     to folders are not followed, and a .txt file counts only if its first line looks like a point. Files that this
     package cannot read (.pcd, .off, ...) are left out too; `shapedb add` or trimesh reads those.
@@ -82,7 +84,7 @@ def scan_folder(folder: PathLike, *, label_from_folder: bool = False,
     root = Path(folder)
     if not root.is_dir():
         raise ShapeDBError("file_not_readable", f"{root} is not a folder that can be read")
-    items = []
+    found: List[Tuple[Path, Optional[Metadata]]] = []
     for base, folders, files in os.walk(root):
         folders[:] = [name for name in folders if not name.startswith(".")]
         for name in files:
@@ -92,9 +94,14 @@ def scan_folder(folder: PathLike, *, label_from_folder: bool = False,
             given: Dict[str, Union[str, int, float]] = {"label": path.parent.name} if label_from_folder else {}
             if metadata is not None:
                 given.update(metadata(path))
-            items.append(Item(path.relative_to(root).with_suffix("").as_posix(), path, given or None))
-    if not items:
+            found.append((path, given or None))
+    if not found:
         raise ShapeDBError("file_not_readable", f"{root} has no scan file ({', '.join(sorted(ENDINGS))})")
+    alike = Counter(path.with_suffix("") for path, _ in found)
+    items = []
+    for path, given_metadata in found:
+        named = path if alike[path.with_suffix("")] > 1 else path.with_suffix("")
+        items.append(Item(named.relative_to(root).as_posix(), path, given_metadata))
     items.sort(key=lambda item: item.key)
     for one, next_one in zip(items, items[1:]):
         if one.key == next_one.key:

@@ -69,7 +69,7 @@ class Shape:
     failure: Optional[ShapeFailure] = None
     """Set exactly when the state is "failed"."""
     quality: Optional[float] = None
-    """How certain the interior is, [0, 1]; below 0.5 it is a guess. None before there is a signature."""
+    """How certain the interior is, [0, 1]; below 0.5 it is a guess. None unless the state is "ready"."""
 
     @property
     def label(self) -> Optional[str]:
