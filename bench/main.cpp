@@ -9,7 +9,7 @@
 
 int main(int argc, char** argv) {
     const std::atomic<bool>& interrupted = shapedb::stopFlag();
-    shapedb::cli::Console console(std::cout, std::cerr, isatty(STDERR_FILENO) != 0,
+    shapedb::cli::Console console(std::cout, std::cerr, shapedb::cli::terminalAt(STDERR_FILENO),
                                   shapedb::bench::kProgramName);
     return shapedb::bench::run(argc, argv, console, interrupted);
 }

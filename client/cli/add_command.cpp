@@ -10,14 +10,17 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "client/api/packing.h"
 #include "client/cli/connection.h"
 #include "client/cli/exit_code.h"
+#include "client/cli/failures.h"
 #include "client/cli/parameters.h"
 #include "client/cli/scan_source.h"
 #include "client/cli/session.h"
 #include "client/cli/shape_output.h"
 #include "client/cli/text.h"
 #include "client/cli/units.h"
+#include "client/cli/upload.h"
 #include "core/base/return_if_error.h"
 
 namespace shapedb::cli {
@@ -29,140 +32,70 @@ namespace {
 /// With more files than this only the totals are printed.
 constexpr std::size_t kListedFiles = 30;
 
-struct AddFlags {
-    std::vector<std::string> paths;
-    std::string collection;
-    std::string key;
-    std::string base;
-    std::vector<std::string> metadata;
-    bool labelFromFolder = false;
-    bool insertOnly = false;
-    bool updateOnly = false;
-    bool replace = false;
-    bool wait = false;
-    bool each = false;
-    unsigned jobs = 1;
-    ScanFlags scan;
-    std::optional<LengthUnit> unit;
-};
-
-struct Upload {
-    std::string path;
-    std::string name;  ///< relative to the given path; decides the seed
-    std::string key;
-    std::string label;
-    std::optional<client::AddReply> reply;
-    std::optional<Error> failure;
-};
-
-/// Standard input has no name that a key could come from.
-Result<Upload> uploadOfStandardInput(const AddFlags& flags) {
-    if (flags.key.empty()) return fail(ErrorCode::kInvalidArgument, "standard input needs --key");
-    if (flags.each) {
-        return fail(ErrorCode::kInvalidArgument,
-                    "--each reads a scan twice, which standard input cannot be: give a file");
-    }
-    Upload upload;
-    upload.path = upload.name = "-";
-    return upload;
-}
-
-Result<std::vector<Upload>> listUploads(const AddFlags& flags) {
-    std::vector<Upload> uploads;
-    for (const std::string& path : flags.paths) {
-        if (path == "-") {
-            auto upload = uploadOfStandardInput(flags);
-            RETURN_IF_ERROR(upload);
-            uploads.push_back(std::move(*upload));
-            continue;
-        }
-        const auto files = listScanFiles({path}, !flags.scan.format.empty());
-        RETURN_IF_ERROR(files);
-        for (const ScanFile& file : *files) {
-            Upload upload;
-            upload.path = file.path;
-            upload.name = relativeName(file.path, path);
-            auto key = keyOfFile(file.path, flags.base);
-            RETURN_IF_ERROR(key);
-            upload.key = std::move(*key);
-            upload.label = file.label;
-            uploads.push_back(std::move(upload));
-        }
-    }
-    if (!flags.key.empty()) {
-        if (uploads.size() != 1) {
-            return fail(ErrorCode::kInvalidArgument,
-                        "--key is for one scan, but there are " + std::to_string(uploads.size()) + " files");
-        }
-        uploads.front().key = flags.key;
-    }
-    return uploads;
-}
-
-/// Errors: kInvalidArgument naming two files with one key.
-Result<void> checkKeys(const std::vector<Upload>& uploads) {
-    std::map<std::string, std::string> taken;
-    for (const Upload& upload : uploads) {
-        const auto [other, isNew] = taken.emplace(upload.key, upload.path);
-        if (!isNew) {
-            return fail(ErrorCode::kInvalidArgument, other->second == upload.path
-                                                         ? upload.path + " is given twice"
-                                                         : other->second + " and " + upload.path +
-                                                               " would both get the key '" + upload.key +
-                                                               "'; add them one by one with --key");
-        }
-    }
-    return {};
-}
-
-/// Whether `key` is one that --each may give an object of the scan with the key `of`: of/1, of/2, ...
-bool mayBeObjectOf(const std::string& key, const std::string& of) {
-    const std::size_t slash = key.rfind('/');
-    return slash == of.size() && key.compare(0, slash, of) == 0 && slash + 1 < key.size() &&
-           key.find_first_not_of("0123456789", slash + 1) == std::string::npos;
-}
-
-/// How many objects a scan has is known once it is read. Errors: kInvalidArgument naming two files of which
-/// an object of one may get the key of the other.
-Result<void> checkKeysOfObjects(const std::vector<Upload>& uploads) {
-    std::map<std::string, std::string> taken;
-    for (const Upload& upload : uploads) taken.emplace(upload.key, upload.path);
-    for (const Upload& upload : uploads) {
-        const auto parent = taken.find(upload.key.substr(0, upload.key.rfind('/')));
-        if (parent == taken.end() || !mayBeObjectOf(upload.key, parent->first)) continue;
-        return fail(ErrorCode::kInvalidArgument, "an object of " + parent->second + " and " + upload.path +
-                                                     " might both get the key '" + upload.key +
-                                                     "'; add them one by one with --key");
-    }
-    return {};
-}
-
-client::AddRequest requestFor(const AddFlags& flags, const client::Metadata& metadata, const Upload& upload) {
-    client::AddRequest request;
-    request.shape = {flags.collection, upload.key};
-    // Without any a shape that has the key keeps what it has.
-    if (!metadata.empty() || flags.labelFromFolder) request.metadata = metadata;
-    if (flags.labelFromFolder) request.metadata->emplace("label", upload.label);
-    // Two files may come to the same key, at different times or from different people.
-    if (!flags.replace) request.mode = client::AddMode::kSamePoints;
-    if (flags.insertOnly) request.mode = client::AddMode::kInsertOnly;
-    if (flags.updateOnly) request.mode = client::AddMode::kUpdateOnly;
-    return request;
-}
-
 /// What all uploads of a command have in common.
 struct Terms {
     client::Metadata metadata;
     double factor = 1.0;  ///< to the unit of the collection
+    /// What the collection has under the keys of the files.
+    std::map<std::string, client::Shape> stored;
 };
 
-void send(const client::Client& client, const AddFlags& flags, const Terms& terms, PointCloud points,
-          Upload& upload, const RunContext& context) {
-    if (terms.factor != 1.0) scaleBy(terms.factor, points);
-    auto reply = client.addShape(requestFor(flags, terms.metadata, upload), points, context);
+/// One run of the command.
+struct Run {
+    Session& session;
+    const client::Client& client;
+    const AddFlags& flags;
+    Terms terms;
+    std::vector<Upload> uploads;
+    std::optional<Error> stop;  ///< why it ended before all was done
+
+    [[nodiscard]] RunContext context() const {
+        RunContext context = session.context();
+        context.progress = nullptr;  // progress counts files
+        return context;
+    }
+};
+
+json uploadJson(const Upload& upload) {
+    if (upload.failure) {
+        return {{"file", upload.path}, {"key", upload.key}, {"error", toJson(*upload.failure)}};
+    }
+    json entry = toJson(upload.reply->shape);
+    entry["file"] = upload.path;
+    entry["outcome"] = client::outcomeName(upload.reply->outcome);
+    return entry;
+}
+
+/// The shape that is there already, if nothing need be sent: what an interrupted run has sent is not sent
+/// again.
+const client::Shape* alreadyStored(const Run& run, const client::AddRequest& request,
+                                   const client::PackedPoints& packed) {
+    const auto found = run.terms.stored.find(request.shape.key);
+    if (found == run.terms.stored.end()) return nullptr;
+    const client::Shape& shape = found->second;
+    const bool safe =
+        request.mode == client::AddMode::kSamePoints || request.mode == client::AddMode::kUpsert;
+    const bool same = shape.sha256 == packed.sha256 && shape.origin == packed.origin &&
+                      (!request.metadata || *request.metadata == shape.metadata);
+    // One that failed is tried again.
+    return safe && same && shape.state != client::ShapeState::kFailed ? &shape : nullptr;
+}
+
+void send(const Run& run, PointCloud points, Upload& upload, const RunContext& context) {
+    if (run.terms.factor != 1.0) scaleBy(run.terms.factor, points);
+    const client::AddRequest request = requestFor(run.flags, run.terms.metadata, upload);
+    if (run.terms.stored.count(upload.key) > 0) {
+        const auto packed = client::packPoints(points);
+        const client::Shape* stored = packed ? alreadyStored(run, request, *packed) : nullptr;
+        if (stored != nullptr) {
+            upload.reply = client::AddReply{client::AddOutcome::kUnchanged, *stored};
+            return;
+        }
+    }
+    auto reply = run.client.addShape(request, points, context);
     if (!reply) {
         upload.failure = reply.error();
-        if (reply.error().code == ErrorCode::kAlreadyExists && !flags.insertOnly) {
+        if (reply.error().code == ErrorCode::kAlreadyExists && !run.flags.insertOnly) {
             upload.failure->message += ": --replace replaces them, --key gives this scan another key";
         }
     } else {
@@ -170,16 +103,10 @@ void send(const client::Client& client, const AddFlags& flags, const Terms& term
     }
 }
 
-/// After such an error the other files would fail too.
-bool endsTheRun(const Error& error) {
-    return error.code == ErrorCode::kUnavailable || error.code == ErrorCode::kCancelled ||
-           error.code == ErrorCode::kDeadlineExceeded;
-}
-
 /// Reads a file once and sends it: the whole scan, or with --each each of its objects, with keys KEY/1,
 /// KEY/2, ... if there are several. Returns what was sent, or not.
-std::vector<Upload> uploadFile(const client::Client& client, const AddFlags& flags, const Terms& terms,
-                               const Upload& file, const RunContext& context) {
+std::vector<Upload> uploadFile(const Run& run, const Upload& file, const RunContext& context) {
+    const AddFlags& flags = run.flags;
     std::vector<Upload> uploads{file};
     auto scan = loadScan(file.path, flags.scan, fileSeed(flags.scan.seed, file.name), context, flags.each);
     if (!scan) {
@@ -188,104 +115,129 @@ std::vector<Upload> uploadFile(const client::Client& client, const AddFlags& fla
     }
     const std::size_t objects = flags.each ? scan->scene->objects.size() : 0;
     if (objects == 0) {
-        send(client, flags, terms, std::move(scan->points), uploads.front(), context);
+        send(run, std::move(scan->points), uploads.front(), context);
         return uploads;
     }
     uploads.assign(objects, file);
     for (std::size_t i = 0; i < objects; ++i) {
         if (objects > 1) uploads[i].key += "/" + std::to_string(i + 1);
-        if (i > 0 && uploads[i - 1].failure && endsTheRun(*uploads[i - 1].failure)) {
+        if (i > 0 && uploads[i - 1].failure && endsTheCommand(*uploads[i - 1].failure)) {
             uploads[i].failure = uploads[i - 1].failure;
             continue;
         }
-        send(client, flags, terms, pointsOfObject(scan->points, *scan->scene, i), uploads[i], context);
+        send(run, pointsOfObject(scan->points, *scan->scene, i), uploads[i], context);
     }
     return uploads;
 }
 
-/// `jobs` threads take one file after the other until all are done or the server is gone. Returns the uploads
-/// in the order of the files.
-std::vector<Upload> uploadAll(Session& session, const client::Client& client, const AddFlags& flags,
-                              const Terms& terms, const std::vector<Upload>& files) {
-    RunContext context = session.context();
-    context.progress = nullptr;  // progress counts files
+/// What the collection has under the keys of the files; objects of --each have keys of their own.
+Result<void> lookUp(Run& run, const std::vector<Upload>& files) {
+    constexpr std::size_t kKeysPerRequest = 1000;  // the server's limit
+    const RunContext context = run.context();
+    for (std::size_t at = 0; at < files.size() && !run.flags.each; at += kKeysPerRequest) {
+        std::vector<std::string> keys;
+        for (std::size_t i = at; i < std::min(files.size(), at + kKeysPerRequest); ++i) {
+            keys.push_back(files[i].key);
+        }
+        auto found = run.client.getShapes(run.flags.collection, keys, context);
+        // A wrong key is told with its file.
+        if (!found && found.error().code == ErrorCode::kInvalidArgument) continue;
+        RETURN_IF_ERROR(found);
+        for (client::Shape& shape : found->shapes) {
+            std::string key = shape.key;
+            run.terms.stored.emplace(std::move(key), std::move(shape));
+        }
+        run.session.console().progress("look up", std::min(files.size(), at + kKeysPerRequest), files.size());
+    }
+    return {};
+}
+
+/// `jobs` threads take one file after the other until all are done or the others would fail too. The uploads
+/// are in the order of the files.
+void uploadAll(Run& run, const std::vector<Upload>& files) {
+    const RunContext context = run.context();
     std::vector<std::vector<Upload>> uploadsOf(files.size());
     std::atomic<std::size_t> next{0};
     std::atomic<std::size_t> done{0};
-    std::mutex mutex;
-    std::optional<Error> stop;  // guarded by mutex
+    std::mutex mutex;  // guards run.stop and items
+    const auto finish = [&](std::vector<Upload>& uploads) {
+        const std::lock_guard<std::mutex> lock(mutex);
+        for (Upload& upload : uploads) {
+            if (upload.failure && endsTheCommand(*upload.failure)) {
+                if (!run.stop) run.stop = upload.failure;
+                // Interrupted, not failed.
+                if (upload.failure->code == ErrorCode::kCancelled) upload.failure.reset();
+            }
+            const bool known = upload.failure || (upload.reply && !run.flags.wait);
+            if (known) run.session.console().item(uploadJson(upload));
+        }
+    };
     const auto work = [&] {
         for (std::size_t i = next++; i < files.size(); i = next++) {
             {
                 const std::lock_guard<std::mutex> lock(mutex);
-                if (stop) {
+                if (run.stop) {
                     uploadsOf[i] = {files[i]};
-                    uploadsOf[i].front().failure = Error{stop->code, "not sent: " + stop->message};
                     continue;
                 }
             }
-            uploadsOf[i] = uploadFile(client, flags, terms, files[i], context);
-            const std::optional<Error>& failure = uploadsOf[i].back().failure;
-            if (failure && endsTheRun(*failure)) {
-                const std::lock_guard<std::mutex> lock(mutex);
-                if (!stop) stop = failure;
-            }
-            session.console().progress("upload", ++done, files.size());
+            uploadsOf[i] = uploadFile(run, files[i], context);
+            finish(uploadsOf[i]);
+            run.session.console().progress("upload", ++done, files.size());
         }
     };
     std::vector<std::thread> workers;
-    const std::size_t count = std::min<std::size_t>(std::max(1u, flags.jobs), files.size());
+    const std::size_t count = std::min<std::size_t>(std::max(1u, run.flags.jobs), files.size());
     for (std::size_t i = 1; i < count; ++i) workers.emplace_back(work);
     work();
     for (std::thread& worker : workers) worker.join();
-    std::vector<Upload> uploads;
     for (std::vector<Upload>& some : uploadsOf)
-        std::move(some.begin(), some.end(), std::back_inserter(uploads));
-    return uploads;
+        std::move(some.begin(), some.end(), std::back_inserter(run.uploads));
 }
 
 /// Follows the shapes one after the other; the server segments all of them meanwhile.
-void waitForAll(Session& session, const client::Client& client, const AddFlags& flags,
-                std::vector<Upload>& uploads) {
-    RunContext context = session.context();
-    context.progress = nullptr;
+void waitForAll(Run& run) {
+    const RunContext context = run.context();
     std::size_t done = 0;
-    for (Upload& upload : uploads) {
-        session.console().progress("segment", done++, uploads.size());
+    for (Upload& upload : run.uploads) {
+        run.session.console().progress("segment", done++, run.uploads.size());
         if (!upload.reply) continue;
         client::Shape& shape = upload.reply->shape;
-        if (shape.state == client::ShapeState::kPending) {
-            const auto last = client.watchIngest({flags.collection, upload.key}, {}, context);
-            if (!last) {
+        if (shape.state == client::ShapeState::kPending && !run.stop) {
+            const auto last = run.client.watchIngest({run.flags.collection, upload.key}, {}, context);
+            if (!last && endsTheCommand(last.error())) {
+                run.stop = last.error();
+            } else if (!last) {
                 upload.failure = last.error();
-                continue;
+            } else {
+                shape.state = last->state;
+                shape.failure = last->failure;
+                shape.quality = last->quality;
             }
-            shape.state = last->state;
-            shape.failure = last->failure;
-            shape.quality = last->quality;
         }
         if (shape.failure) upload.failure = shape.failure;
+        run.session.console().item(uploadJson(upload));
     }
 }
 
-json uploadsJson(const std::vector<Upload>& uploads) {
+json uploadsJson(const Run& run) {
     json added = json::array();
     json failed = json::array();
+    json notSent = json::array();
     std::map<std::string, std::size_t> outcomes;
-    for (const Upload& upload : uploads) {
+    for (const Upload& upload : run.uploads) {
         if (upload.failure) {
-            failed.push_back(
-                {{"file", upload.path}, {"key", upload.key}, {"error", toJson(*upload.failure)}});
+            failed.push_back(uploadJson(upload));
         } else if (upload.reply) {
-            const char* outcome = client::outcomeName(upload.reply->outcome);
-            ++outcomes[outcome];
-            json entry = toJson(upload.reply->shape);
-            entry["file"] = upload.path;
-            entry["outcome"] = outcome;
-            added.push_back(std::move(entry));
+            ++outcomes[client::outcomeName(upload.reply->outcome)];
+            added.push_back(uploadJson(upload));
+        } else {
+            notSent.push_back(upload.path);
         }
     }
-    return {{"added", added}, {"failed", failed}, {"outcomes", outcomes}};
+    json document = {{"added", added}, {"failed", failed}, {"outcomes", outcomes}, {"not_sent", notSent}};
+    if (run.stop) document["ended_by"] = toJson(*run.stop);
+    return document;
 }
 
 std::string uploadsText(const std::vector<Upload>& uploads) {
@@ -322,28 +274,36 @@ std::string uploadsText(const std::vector<Upload>& uploads) {
     return text + "\n";
 }
 
+/// What an end before its time has left undone.
+void tellStop(const Run& run) {
+    std::size_t notSent = 0;
+    std::size_t pending = 0;
+    for (const Upload& upload : run.uploads) {
+        if (!upload.reply && !upload.failure) ++notSent;
+        if (upload.reply && upload.reply->shape.state == client::ShapeState::kPending) ++pending;
+    }
+    std::string text = run.stop->code == ErrorCode::kCancelled ? "interrupted" : run.stop->message;
+    if (notSent > 0) {
+        text += ": " + formatCount(notSent) + " of " + formatCount(run.uploads.size(), "scan", "scans") +
+                " not sent; the same command continues";
+    } else if (run.flags.wait && pending > 0) {
+        text += ": all scans are stored, " + formatCount(pending) +
+                " of them not seen to be segmented yet; the server goes on, and the same command waits again";
+    }
+    run.session.console().note(text);
+}
+
 /// Prints each failure; returns the exit code of the command.
-int reportFailures(Session& session, const std::vector<Upload>& uploads) {
-    std::size_t failed = 0;
-    int last = kOk;
-    for (const Upload& upload : uploads) {
-        if (!upload.failure) continue;
-        ++failed;
-        last = exitCodeOf(upload.failure->code);
-        const std::string& message = upload.failure->message;
-        const bool named = message.find(scanName(upload.path)) != std::string::npos;
-        session.console().note(named ? message : scanName(upload.path) + ": " + message);
+int reportFailures(const Run& run) {
+    Failures failures;
+    for (const Upload& upload : run.uploads) {
+        if (upload.failure) failures.add(scanName(upload.path), *upload.failure);
     }
-    if (failed == 0) return kOk;
-    if (uploads.size() > 1) {
-        session.console().note(formatCount(failed) + " of " + formatCount(uploads.size(), "file", "files") +
-                               " failed");
-    }
-    // If everything failed for one reason, that reason's code; otherwise "some failed".
-    const bool interrupted = last == kInterrupted;
-    return failed == uploads.size() && (uploads.size() == 1 || last == kUnavailable) ? last
-           : interrupted                                                             ? kInterrupted
-                                                                                     : kSomeFailed;
+    failures.tell(run.session.console(), run.uploads.size(), "file", "files");
+    if (!run.stop) return failures.exitCode(run.uploads.size());
+    // One file that failed has said why.
+    if (run.uploads.size() > 1 || failures.empty()) tellStop(run);
+    return exitCodeOf(run.stop->code);
 }
 
 CommandResult runAdd(Session& session, const AddFlags& flags) {
@@ -351,17 +311,19 @@ CommandResult runAdd(Session& session, const AddFlags& flags) {
     RETURN_IF_ERROR(metadata);
     const auto files = listUploads(flags);
     RETURN_IF_ERROR(files);
-    RETURN_IF_ERROR(checkKeys(*files));
-    if (flags.each) RETURN_IF_ERROR(checkKeysOfObjects(*files));
     const auto client = connectToServer(session, Work::kHeavy);
     RETURN_IF_ERROR(client);
+    // Told once, not of every file.
+    RETURN_IF_ERROR(client->getCollection(flags.collection, session.context()));
     const auto factor = factorToCollection(*client, flags.collection, flags.unit, session.context());
     RETURN_IF_ERROR(factor);
-    auto uploads = uploadAll(session, *client, flags, {*metadata, *factor}, *files);
-    if (flags.wait) waitForAll(session, *client, flags, uploads);
-    session.console().document(uploadsJson(uploads));
-    session.console().text(uploadsText(uploads));
-    return reportFailures(session, uploads);
+    Run run{session, *client, flags, {*metadata, *factor, {}}, {}, std::nullopt};
+    RETURN_IF_ERROR(lookUp(run, *files));
+    uploadAll(run, *files);
+    if (flags.wait) waitForAll(run);
+    if (!session.console().lines()) session.console().document(uploadsJson(run));
+    session.console().text(uploadsText(run.uploads));
+    return reportFailures(run);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "client/cli/checks.h"
 #include "client/cli/connection.h"
 #include "client/cli/exit_code.h"
 #include "client/cli/fit_output.h"
@@ -13,6 +14,8 @@
 #include "client/cli/session.h"
 #include "client/cli/text.h"
 #include "client/cli/units.h"
+#include "client/io/ply_writer.h"
+#include "client/io/text_file.h"
 #include "core/base/return_if_error.h"
 #include "core/fit/fit.h"
 
@@ -25,6 +28,8 @@ struct AlignFlags {
     std::string other;
     std::string key;
     std::string collection;
+    std::string out;
+    std::string matrix;
     ScoreFlags score;
     std::optional<LengthUnit> unit;
     ScanFlags scan;
@@ -38,29 +43,37 @@ struct AlignFlags {
     }
 };
 
-Result<SurfacePoints> surfaceOf(const std::string& path, const ScanFlags& flags, const RunContext& context) {
-    const auto scan = loadScan(path, flags, flags.seed, context);
-    RETURN_IF_ERROR(scan);
-    auto surface = makeSurfacePoints(scan->points, context);
+/// How the other lies on the query, and its points, where they were, if they are wanted.
+struct Aligned {
+    client::Alignment fit;
+    PointCloud other;
+};
+
+Result<SurfacePoints> surfaceOf(const std::string& path, const PointCloud& points,
+                                const RunContext& context) {
+    auto surface = makeSurfacePoints(points, context);
     if (!surface) return fail(surface.error().code, scanName(path) + ": " + surface.error().message);
     return surface;
 }
 
-Result<client::Alignment> alignFiles(const AlignFlags& flags, const RunContext& context) {
+Result<Aligned> alignFiles(const AlignFlags& flags, const RunContext& context) {
     const auto sizesCount = sizesOfFilesCount(flags.unit, flags.score);
     RETURN_IF_ERROR(sizesCount);
     RETURN_IF_ERROR(checkReadOnce(flags.query, flags.other));
-    const auto query = surfaceOf(flags.query, flags.scan, context);
+    const auto queryScan = loadScan(flags.query, flags.scan, flags.scan.seed, context);
+    RETURN_IF_ERROR(queryScan);
+    auto otherScan = loadScan(flags.other, flags.scan, flags.scan.seed, context);
+    RETURN_IF_ERROR(otherScan);
+    const auto query = surfaceOf(flags.query, queryScan->points, context);
     RETURN_IF_ERROR(query);
-    const auto other = surfaceOf(flags.other, flags.scan, context);
+    const auto other = surfaceOf(flags.other, otherScan->points, context);
     RETURN_IF_ERROR(other);
     const auto found = align(FitQuery(*query), *other, flags.resolve(*sizesCount), context);
     RETURN_IF_ERROR(found);
-    return client::Alignment{toClient(*found), flags.unit.value_or(LengthUnit::kNone)};
+    return Aligned{{toClient(*found), flags.unit.value_or(LengthUnit::kNone)}, std::move(otherScan->points)};
 }
 
-Result<client::Alignment> alignStored(const Session& session, const AlignFlags& flags,
-                                      const RunContext& context) {
+Result<Aligned> alignStored(const Session& session, const AlignFlags& flags, const RunContext& context) {
     auto scan = loadScan(flags.query, flags.scan, flags.scan.seed, context);
     RETURN_IF_ERROR(scan);
     const auto client = connectToServer(session, Work::kHeavy);
@@ -68,11 +81,31 @@ Result<client::Alignment> alignStored(const Session& session, const AlignFlags& 
     const auto factor = factorToCollection(*client, flags.collection, flags.unit, context);
     RETURN_IF_ERROR(factor);
     if (*factor != 1.0) scaleBy(*factor, scan->points);
-    auto found = client->align(scan->points, client::ShapeRef{flags.collection, flags.key},
-                               flags.score.forServer(), context);
+    const client::ShapeRef shape{flags.collection, flags.key};
+    auto found = client->align(scan->points, shape, flags.score.forServer(), context);
     RETURN_IF_ERROR(found);
-    if (*factor != 1.0) scaleBy(1.0 / *factor, *found);
-    return found;
+    Aligned aligned{std::move(*found), {}};
+    if (!flags.out.empty()) {
+        auto stored = client->getPoints(shape, context);
+        RETURN_IF_ERROR(stored);
+        aligned.other = std::move(stored->points);
+    }
+    if (*factor != 1.0) {
+        scaleBy(1.0 / *factor, aligned.fit);
+        scaleBy(1.0 / *factor, aligned.other);
+    }
+    return aligned;
+}
+
+/// --out and --matrix. Moved coordinates have more digits than single precision.
+Result<void> writeFiles(const AlignFlags& flags, const Aligned& aligned) {
+    const Motion& motion = aligned.fit.best.motion;
+    if (!flags.out.empty()) {
+        RETURN_IF_ERROR(
+            writePointsPly(flags.out, applyToCloud(motion, aligned.other), PlyPrecision::kDouble));
+    }
+    if (!flags.matrix.empty()) RETURN_IF_ERROR(writeTextFile(flags.matrix, matrixText(motion)));
+    return {};
 }
 
 CommandResult runAlign(Session& session, const AlignFlags& flags) {
@@ -81,17 +114,25 @@ CommandResult runAlign(Session& session, const AlignFlags& flags) {
                                                      std::string(flags.key.empty() ? "" : ", not both"));
     }
     const RunContext context = session.context();
-    const auto found = flags.key.empty() ? alignFiles(flags, context) : alignStored(session, flags, context);
-    RETURN_IF_ERROR(found);
+    const auto aligned =
+        flags.key.empty() ? alignFiles(flags, context) : alignStored(session, flags, context);
+    RETURN_IF_ERROR(aligned);
+    const client::Alignment& found = aligned->fit;
+    RETURN_IF_ERROR(writeFiles(flags, *aligned));
     const std::string name = flags.key.empty() ? scanName(flags.other) : flags.key;
-    nlohmann::json document = toJson(*found);
+    nlohmann::json document = toJson(found);
     document["query"] = flags.query;
     document["other"] = name;
-    document["unit"] = unitJson(unitOfAnswer(flags.unit, found->unit));
+    document["unit"] = unitJson(unitOfAnswer(flags.unit, found.unit));
+    if (!flags.out.empty()) document["out"] = flags.out;
+    if (!flags.matrix.empty()) document["matrix_file"] = flags.matrix;
+    std::string text = "score " + formatFixed(found.best.score, 3) + "  " + bar(found.best.score, 20) +
+                       "\n\n" + fitMotionText(found.best.motion, name) +
+                       fitText(found, scanName(flags.query), name) + "\nMatrix, from coordinates of " + name +
+                       " to those of " + scanName(flags.query) + ":\n" + matrixText(found.best.motion);
+    if (!flags.out.empty()) text += "\n" + name + ", moved: " + flags.out + "\n";
     session.console().document(document);
-    session.console().text("score " + formatFixed(found->best.score, 3) + "  " + bar(found->best.score, 20) +
-                           "\n\n" + fitMotionText(found->best.motion, name) +
-                           fitText(*found, scanName(flags.query), name));
+    session.console().text(text);
     return kOk;
 }
 
@@ -105,6 +146,11 @@ void addAlignCommand(CLI::App& app, Session& session) {
         "well (two files need no server)");
     command->add_option("QUERY", flags->query, "Scan that stays where it is")->required();
     command->add_option("OTHER", flags->other, "Scan of a whole object that is laid on it");
+    command->add_option("-o,--out", flags->out, "Write OTHER, moved onto QUERY, in double precision")
+        ->type_name("FILE.ply")
+        ->check(endsIn(".ply"));
+    command->add_option("--matrix", flags->matrix, "Write the 4 x 4 matrix, four lines of four numbers")
+        ->type_name("FILE");
     command->add_option("--key", flags->key, "Lay this stored shape on it instead");
     addCollectionOption(*command, flags->collection);
     command->add_flag("--keep-scale", flags->score.keepScale,

@@ -8,6 +8,7 @@
 
 #include "client/cli/connection.h"
 #include "client/cli/exit_code.h"
+#include "client/cli/failures.h"
 #include "client/cli/session.h"
 #include "client/cli/shape_output.h"
 #include "client/cli/text.h"
@@ -70,7 +71,8 @@ Result<void> requireYes(const client::Client& client, const TargetFlags& flags, 
 /// printed after the key. Fills `failed`; returns the exit code.
 CommandResult forEachKey(Session& session, const TargetFlags& flags, json& failed,
                          const std::function<Result<std::string>(const client::ShapeRef&)>& change) {
-    int last = kOk;
+    Failures failures;
+    std::optional<Error> stop;
     for (const std::string& key : flags.keys) {
         const auto done = change({flags.collection, key});
         if (done) {
@@ -79,11 +81,14 @@ CommandResult forEachKey(Session& session, const TargetFlags& flags, json& faile
         }
         if (flags.keys.size() == 1) return fail(done.error());
         failed.push_back({{"key", key}, {"error", toJson(done.error())}});
-        session.console().note(key + ": " + done.error().message);
-        last = exitCodeOf(done.error().code);
-        if (last == kUnavailable || last == kInterrupted) return last;  // the others would fail too
+        failures.add(key, done.error());
+        if (endsTheCommand(done.error())) {
+            stop = done.error();
+            break;
+        }
     }
-    return failed.empty() ? kOk : static_cast<int>(kSomeFailed);
+    failures.tell(session.console(), flags.keys.size(), "key", "keys");
+    return stop ? static_cast<int>(exitCodeOf(stop->code)) : failures.exitCode(flags.keys.size());
 }
 
 CommandResult runDelete(Session& session, const TargetFlags& flags) {

@@ -27,4 +27,32 @@ namespace shapedb::cli {
             ">0", "above zero"};
 }
 
+/// More noise than this share of the diagonal leaves no shape: a percentage was meant.
+constexpr double kMostNoise = 0.2;
+
+/// A share of the diagonal.
+[[nodiscard]] inline CLI::Validator noiseShare() {
+    return {
+        [](const std::string& text) {
+            double value = 0.0;
+            const bool good = CLI::detail::lexical_cast(text, value) && value >= 0.0 && value <= kMostNoise;
+            return good ? std::string()
+                        : "'" + text + "' must be a share of the diagonal, 0 to 0.2: 0.005 is half a percent";
+        },
+        "0 to 0.2", "share of the diagonal"};
+}
+
+/// A file to write that is named as what it will be, e.g. ".ply". A name without an ending will do: devices
+/// have none.
+[[nodiscard]] inline CLI::Validator endsIn(const std::string& ending) {
+    return {[ending](const std::string& text) {
+                std::string own = text.substr(text.find_last_of('/') + 1);
+                own = own.find('.') == std::string::npos ? ending : own.substr(own.rfind('.'));
+                own = CLI::detail::to_lower(own);
+                return own == ending ? std::string()
+                                     : "'" + text + "' cannot be written: only " + ending + " files can";
+            },
+            "", "ending"};
+}
+
 }  // namespace shapedb::cli

@@ -102,6 +102,9 @@ CommandResult runDelete(Session& session, const CollectionFlags& flags) {
     const auto client = connectToServer(session);
     RETURN_IF_ERROR(client);
     const auto deleted = client->deleteCollection(flags.name, flags.force, session.context());
+    if (!deleted && deleted.error().code == ErrorCode::kRejected && !flags.force) {
+        return fail(deleted.error().code, deleted.error().message + ": --force does that");
+    }
     RETURN_IF_ERROR(deleted);
     session.console().document({{"deleted", flags.name}});
     session.console().text(flags.name + ": deleted\n");

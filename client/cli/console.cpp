@@ -1,9 +1,13 @@
 #include "client/cli/console.h"
 
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
 #include <ostream>
 #include <utility>
 
 #include <nlohmann/json.hpp>
+#include <unistd.h>
 
 #include "client/cli/text.h"
 #include "common/safe_text.h"
@@ -14,40 +18,85 @@ namespace {
 
 constexpr auto kBarInterval = std::chrono::milliseconds(100);
 constexpr int kBarWidth = 24;
+/// Before this a pace says little.
+constexpr double kPaceSeconds = 2.0;
+
+std::string dumped(const nlohmann::json& document, int indent) {
+    return escapeUnsafe(document.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace), true);
+}
 
 }  // namespace
 
-Console::Console(std::ostream& out, std::ostream& err, bool errorIsTerminal, std::string program)
-    : out_(out), err_(err), bar_(errorIsTerminal), program_(std::move(program)) {}
+TerminalOptions terminalAt(int descriptor) {
+    const char* term = std::getenv("TERM");
+    if (isatty(descriptor) == 0 || (term != nullptr && std::strcmp(term, "dumb") == 0)) return {};
+    const char* plain = std::getenv("NO_COLOR");
+    return {true, plain == nullptr || *plain == '\0'};
+}
 
-void Console::text(const std::string& text) {
-    if (json_) return;
+Console::Console(std::ostream& out, std::ostream& err, TerminalOptions terminal, std::string program)
+    : out_(out), err_(err), terminal_(terminal), program_(std::move(program)) {}
+
+void Console::write(const std::string& text) {
+    errno = 0;
+    // At once: a later error would not say what became of this.
+    if (!(out_ << text << std::flush) && errno == EPIPE) readerLeft_ = true;
+}
+
+void Console::text(const std::string& text) { ownText(escapeUnsafe(text, true)); }
+
+void Console::ownText(const std::string& text) {
+    if (json()) return;
     clearProgress();
-    out_ << escapeUnsafe(text, true);
+    write(text);
 }
 
 void Console::document(const nlohmann::json& document) {
-    if (!json_) return;
+    if (!json()) return;
     clearProgress();
-    out_ << dump(document) << '\n';
+    write((lines() ? dumpLine(document) : dump(document)) + '\n');
     documentPrinted_ = true;
+}
+
+void Console::item(const nlohmann::json& item) {
+    if (!lines()) return;
+    clearProgress();
+    write(dumpLine(item) + '\n');
 }
 
 void Console::note(const std::string& message) {
     const std::lock_guard<std::mutex> lock(mutex_);
     clearProgressLocked();
-    err_ << program_ << ": " << escapeUnsafe(message, true) << '\n' << std::flush;
+    const std::string name = terminal_.colour ? "\x1b[1;31m" + program_ + ":\x1b[0m " : program_ + ": ";
+    err_ << name << escapeUnsafe(wording_ ? wording_(message) : message, true) << '\n' << std::flush;
 }
 
 void Console::failure(const Error& error) {
     note(error.message);
-    if (json_ && !documentPrinted_) document({{"error", toJson(error)}});
+    const Error told{error.code, wording_ ? wording_(error.message) : error.message};
+    if (json() && !documentPrinted_) document({{"error", toJson(told)}});
+}
+
+std::string Console::pace(const std::string& what, std::uint64_t done, std::uint64_t total,
+                          std::chrono::steady_clock::time_point now) {
+    if (stage_ != what || done < doneAtBegin_) {
+        stage_ = what;
+        stageBegan_ = now;
+        doneAtBegin_ = done;
+    }
+    const double seconds = std::chrono::duration<double>(now - stageBegan_).count();
+    if (seconds < kPaceSeconds || done == doneAtBegin_) return {};
+    const double rate = static_cast<double>(done - doneAtBegin_) / seconds;
+    const std::string text = "  " + formatRate(rate);
+    if (total <= done) return text;
+    return text + ", " + formatSeconds(static_cast<double>(total - done) / rate) + " left";
 }
 
 void Console::progress(const std::string& what, std::uint64_t done, std::uint64_t total) {
-    if (!bar_) return;
+    if (!terminal_.bar) return;
     const std::lock_guard<std::mutex> lock(mutex_);
     const auto now = std::chrono::steady_clock::now();
+    const std::string pace = this->pace(what, done, total, now);
     if (barShown_ && now - lastBar_ < kBarInterval) return;
     lastBar_ = now;
     barShown_ = true;
@@ -58,7 +107,7 @@ void Console::progress(const std::string& what, std::uint64_t done, std::uint64_
     } else {
         text += formatCount(done);
     }
-    err_ << "\r\x1b[K" << text << std::flush;
+    err_ << "\r\x1b[K" << text << pace << std::flush;
 }
 
 void Console::clearProgress() {
@@ -74,13 +123,12 @@ void Console::clearProgressLocked() {
 
 bool Console::flush() {
     clearProgress();
-    out_.flush();
+    write({});
     return static_cast<bool>(out_);
 }
 
-std::string dump(const nlohmann::json& document) {
-    return escapeUnsafe(document.dump(2, ' ', false, nlohmann::json::error_handler_t::replace), true);
-}
+std::string dump(const nlohmann::json& document) { return dumped(document, 2); }
+std::string dumpLine(const nlohmann::json& document) { return dumped(document, -1); }
 
 nlohmann::json toJson(const Error& error) {
     return {{"name", errorCodeName(error.code)}, {"message", error.message}};

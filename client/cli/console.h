@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
 #include <iosfwd>
 #include <mutex>
 #include <string>
@@ -12,23 +13,48 @@
 
 namespace shapedb::cli {
 
-/// With --json the result stream gets exactly one JSON document, otherwise text for people. Errors and notes
-/// go to the error stream as `PROGRAM: MESSAGE`.
+/// What a terminal at the error stream is given.
+struct TerminalOptions {
+    bool bar = false;     ///< a progress bar
+    bool colour = false;  ///< the program's name in red where an error is told
+};
+
+/// The terminal at file descriptor `descriptor`: nothing if it is none or TERM is "dumb", no colour with
+/// NO_COLOR (https://no-color.org).
+[[nodiscard]] TerminalOptions terminalAt(int descriptor);
+
+/// With --json the result stream gets exactly one JSON document, with --json-lines one line of JSON for each
+/// item, otherwise text for people. Errors and notes go to the error stream as `PROGRAM: MESSAGE`.
 ///
 /// Thread-safety: `note` and `progress` from any thread, the rest from one thread.
 class Console {
   public:
-    /// The streams must outlive the console. `errorIsTerminal`: draw a progress bar there.
-    Console(std::ostream& out, std::ostream& err, bool errorIsTerminal, std::string program = "shapedb");
+    enum class Form { kText, kJson, kJsonLines };
 
-    void setJson(bool json) { json_ = json; }
-    [[nodiscard]] bool json() const { return json_; }
+    /// The streams must outlive the console.
+    Console(std::ostream& out, std::ostream& err, TerminalOptions terminal, std::string program = "shapedb");
+
+    void setForm(Form form) { form_ = form; }
+    void setJson(bool json) { form_ = json ? Form::kJson : Form::kText; }
+    /// --json or --json-lines.
+    [[nodiscard]] bool json() const { return form_ != Form::kText; }
+    /// --json-lines: a command with many items gives each to `item` as it comes, and no document.
+    [[nodiscard]] bool lines() const { return form_ == Form::kJsonLines; }
+
+    /// Applied to every message on the error stream.
+    void setWording(std::function<std::string(const std::string&)> wording) { wording_ = std::move(wording); }
 
     /// Text for people; dropped with --json.
     void text(const std::string& text);
 
-    /// The one document of the command; dropped without --json.
+    /// The same for text of the program itself, tabs and all: nothing in it is escaped.
+    void ownText(const std::string& text);
+
+    /// The one document of the command; dropped without --json. With --json-lines it is on one line.
     void document(const nlohmann::json& document);
+
+    /// One line; dropped without --json-lines.
+    void item(const nlohmann::json& item);
 
     /// `PROGRAM: MESSAGE` on the error stream.
     void note(const std::string& message);
@@ -37,32 +63,45 @@ class Console {
     /// "message": ...}} unless a document was already printed.
     void failure(const Error& error);
 
-    /// Redraws the progress bar, at most ten times a second and only if the error stream is a terminal.
-    /// total 0: unknown, only the count is shown.
+    /// Redraws the progress bar, at most ten times a second and only if the error stream is a terminal: how
+    /// much is done, and after two seconds of one `what` how fast it goes and how long it will take. total 0:
+    /// unknown, only the count is shown.
     void progress(const std::string& what, std::uint64_t done, std::uint64_t total);
     /// Erases the bar, so that other output starts on a clean line.
     void clearProgress();
 
     /// False if the result could not be written (a full disk, a closed pipe).
     [[nodiscard]] bool flush();
+    /// Who read the result has closed the pipe, as `head` does: the rest is not wanted.
+    [[nodiscard]] bool readerLeft() const { return readerLeft_; }
 
   private:
+    void write(const std::string& text);
     void clearProgressLocked();
+    std::string pace(const std::string& what, std::uint64_t done, std::uint64_t total,
+                     std::chrono::steady_clock::time_point now);
 
     std::ostream& out_;
     std::ostream& err_;
-    const bool bar_;
+    const TerminalOptions terminal_;
     const std::string program_;
-    bool json_ = false;
+    std::function<std::string(const std::string&)> wording_;
+    Form form_ = Form::kText;
     bool documentPrinted_ = false;
+    bool readerLeft_ = false;
 
     std::mutex mutex_;  ///< guards err_ and the members below
     bool barShown_ = false;
     std::chrono::steady_clock::time_point lastBar_{};
+    std::string stage_;  ///< what the bar shows, since when, and how much was done then
+    std::chrono::steady_clock::time_point stageBegan_{};
+    std::uint64_t doneAtBegin_ = 0;
 };
 
 /// JSON text; bytes that are not UTF-8 become U+FFFD. Does not throw.
 [[nodiscard]] std::string dump(const nlohmann::json& document);
+/// The same on one line.
+[[nodiscard]] std::string dumpLine(const nlohmann::json& document);
 
 /// {"name": ..., "message": ...}
 [[nodiscard]] nlohmann::json toJson(const Error& error);

@@ -65,6 +65,14 @@ std::array<double, 16> matrixOf(const Motion& motion) {
     return matrix;
 }
 
+std::string matrixText(const Motion& motion) {
+    const std::array<double, 16> matrix = matrixOf(motion);
+    std::string text;
+    for (std::size_t i = 0; i < matrix.size(); ++i)
+        text += exactNumber(matrix[i]) + (i % 4 == 3 ? "\n" : " ");
+    return text;
+}
+
 json toJson(const client::Fit& fit) {
     json document = poseJson(fit.best);
     document["kind"] = kindName(fit.kind);

@@ -13,6 +13,9 @@ namespace shapedb::cli {
 /// Row-major 4 x 4: takes a column (x, y, z, 1) of the shape to the query's coordinates.
 [[nodiscard]] std::array<double, 16> matrixOf(const Motion& motion);
 
+/// That matrix with all its digits: four lines of four numbers.
+[[nodiscard]] std::string matrixText(const Motion& motion);
+
 /// {matrix, score, residual, explained_query, explained_other, reflected, scale, ...}; with the members of
 /// the best pose at the top.
 [[nodiscard]] nlohmann::json toJson(const client::Fit& fit);

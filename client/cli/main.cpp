@@ -15,6 +15,6 @@ int main(int argc, char** argv) {
     // through the results of the calls.
     setenv("GRPC_VERBOSITY", "NONE", 0);
 
-    shapedb::cli::Console console(std::cout, std::cerr, isatty(STDERR_FILENO) != 0);
+    shapedb::cli::Console console(std::cout, std::cerr, shapedb::cli::terminalAt(STDERR_FILENO));
     return shapedb::cli::run(argc, argv, console, interrupted, shapedb::buildInfo());
 }

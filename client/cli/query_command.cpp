@@ -1,195 +1,203 @@
-// `shapedb query`: the stored shapes most like a scan, or like a stored shape.
+// `shapedb query`: the stored shapes most like scans, or like a stored shape.
+#include <algorithm>
+#include <filesystem>
 #include <memory>
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "client/cli/checks.h"
 #include "client/cli/connection.h"
 #include "client/cli/exit_code.h"
-#include "client/cli/fit_output.h"
-#include "client/cli/parameters.h"
-#include "client/cli/scan_source.h"
+#include "client/cli/failures.h"
+#include "client/cli/query_output.h"
+#include "client/cli/search_run.h"
 #include "client/cli/session.h"
-#include "client/cli/shape_output.h"
 #include "client/cli/text.h"
 #include "client/cli/units.h"
+#include "client/io/ply_writer.h"
+#include "client/io/text_file.h"
 #include "core/base/return_if_error.h"
 
 namespace shapedb::cli {
 
+namespace fs = std::filesystem;
 using nlohmann::json;
 
 namespace {
 
 struct QueryFlags {
-    std::string path;
+    std::vector<std::string> paths;
     std::string key;
-    client::SearchOptions options;
-    ScoreFlags score;
-    VerifyFlags verify;
-    ScanFlags scan;
-    std::optional<LengthUnit> unit;
-    bool includeSelf = false;
+    SearchFlags search;
     bool explain = false;
     bool noExplanation = false;
+    std::string csv;      ///< -o
+    std::string aligned;  ///< --out-aligned
 };
 
-/// From coordinates of the hit to those of the query.
-std::optional<Motion> motionOf(const client::Hit& hit) {
-    if (hit.fit) return hit.fit->best.motion;
-    if (hit.explanation) return hit.explanation->motion;
-    return std::nullopt;
+/// A key or path as the name of a file: without folders.
+std::string fileNameOf(std::string name) {
+    std::replace(name.begin(), name.end(), '/', '_');
+    return name.front() == '.' ? "_" + name : name;
 }
 
-/// The group of each hit; nothing without groups.
-std::vector<const client::HitGroup*> groupOfHits(const client::SearchReply& reply) {
-    std::vector<const client::HitGroup*> groups;
-    for (const client::HitGroup& group : reply.groups) groups.insert(groups.end(), group.hits, &group);
-    groups.resize(reply.groups.empty() ? 0 : reply.hits.size(), nullptr);
-    return groups;
-}
-
-json valueOf(const client::HitGroup* group) {
-    return group != nullptr && group->value ? json(*group->value) : json();
-}
-
-json replyJson(const client::SearchReply& reply) {
-    json hits = json::array();
-    const auto groups = groupOfHits(reply);
-    for (std::size_t i = 0; i < reply.hits.size(); ++i) {
-        const client::Hit& hit = reply.hits[i];
-        json entry = {{"rank", i + 1},
-                      {"key", hit.shape.key},
-                      {"label", labelOf(hit.shape)},
-                      {"score", hit.score},
-                      {"signature_score", hit.signatureScore},
-                      {"verified", hit.fit.has_value()},
-                      {"verdict", verdictJson(hit.verdict)},
-                      {"verdict_reliability", hit.verdictReliability},
-                      {"shape", toJson(hit.shape)}};
-        if (const auto motion = motionOf(hit)) entry["matrix"] = matrixOf(*motion);
-        if (!groups.empty()) entry["group"] = valueOf(groups[i]);
-        if (hit.fit) entry["fit"] = toJson(*hit.fit);
-        if (hit.explanation) entry["explanation"] = toJson(*hit.explanation);
-        hits.push_back(std::move(entry));
+/// --out-aligned: the query and its hits, in its coordinates. Moved ones have more digits than single
+/// precision.
+Result<void> writeAligned(const Searcher& searcher, const Answer& answer, const fs::path& folder,
+                          const RunContext& context) {
+    std::error_code error;
+    fs::create_directories(folder, error);
+    if (error) return fail(ErrorCode::kFileNotWritable, folder.string() + ": " + error.message());
+    const auto query = searcher.pointsOf(answer, context);
+    RETURN_IF_ERROR(query);
+    RETURN_IF_ERROR(writePointsPly((folder / "query.ply").string(), *query, PlyPrecision::kDouble));
+    const std::size_t digits = std::max<std::size_t>(2, std::to_string(answer.reply.hits.size()).size());
+    for (std::size_t i = 0; i < answer.reply.hits.size(); ++i) {
+        const client::Hit& hit = answer.reply.hits[i];
+        const auto moved = searcher.pointsOf(hit, context);
+        RETURN_IF_ERROR(moved);
+        std::string rank = std::to_string(i + 1);
+        rank.insert(0, digits - rank.size(), '0');
+        const fs::path file = folder / (rank + "_" + fileNameOf(hit.shape.key) + ".ply");
+        RETURN_IF_ERROR(writePointsPly(file.string(), *moved, PlyPrecision::kDouble));
     }
-    json document = {{"hits", hits},
-                     {"candidates", reply.candidates},
-                     {"filtered", reply.filtered},
-                     {"scored", reply.scored},
-                     {"candidates_verified", reply.verified},
-                     {"exact", reply.exact},
-                     {"pending", reply.pending},
-                     {"left_right_untold", reply.leftRightUntold},
-                     {"query", toJson(reply.query)},
-                     {"seconds_segment", reply.secondsSegment},
-                     {"seconds_search", reply.secondsSearch}};
-    if (reply.report) document["report"] = toJson(*reply.report);
-    return document;
+    return {};
 }
 
-std::string replyText(const QueryFlags& flags, const client::SearchReply& reply) {
-    const std::string queryName = flags.path.empty() ? flags.key : "the query";
-    std::string text;
-    if (reply.report) {
-        text += flags.path + ": " + formatCount(reply.report->points, "point", "points") + ", " +
-                formatCount(reply.report->segments, "part", "parts") + ", segmented in " +
-                formatSeconds(reply.secondsSegment) + "\n";
-        if (reply.report->quality < 1.0) text += interiorText(*reply.report, reply.query.scale);
-    }
-    text += formatCount(reply.candidates, "shape", "shapes") + " searched";
-    if (reply.filtered != reply.candidates) text += ", " + formatCount(reply.filtered) + " pass the filter";
-    text += ", " + formatCount(reply.scored) + " scored in full";
-    if (reply.verified > 0) text += ", " + formatCount(reply.verified) + " laid on the query";
-    text += ", in " + formatSeconds(reply.secondsSearch) + "\n";
-    if (!reply.exact) text += "others might fit as well: --candidates lays more on the query\n";
-    if (reply.leftRightUntold) text += kLeftRightUntold;
-    if (reply.pending > 0) {
-        text += formatCount(reply.pending, "shape has", "shapes have") +
-                " no signature yet and could not be searched\n";
-    }
-    text += "\n";
-    if (reply.hits.empty()) return text + "Nothing found.\n";
+/// One run of the command.
+struct QueryRun {
+    Session& session;
+    const QueryFlags& flags;
+    const Searcher& searcher;
+    Explained explained;
+    std::string csv = hitsCsvHeader();
 
-    const auto right = Table::Align::kRight;
-    const auto groups = groupOfHits(reply);
-    std::vector<Table::Column> columns = {{"rank", right}, {"score", right}, {""},
-                                          {"verdict"},     {"label"},        {"key"}};
-    if (!groups.empty()) columns.insert(columns.begin(), {flags.options.groupBy});
-    Table table(std::move(columns));
-    for (std::size_t i = 0; i < reply.hits.size(); ++i) {
-        const client::Hit& hit = reply.hits[i];
-        std::vector<std::string> cells = {std::to_string(i + 1), formatFixed(hit.score, 3),
-                                          bar(hit.score, 20),    verdictText(hit.verdict),
-                                          labelOf(hit.shape),    hit.shape.key};
-        if (!groups.empty()) {
-            const json value = valueOf(groups[i]);
-            const bool first = i == 0 || groups[i] != groups[i - 1];
-            cells.insert(cells.begin(), !first ? "" : value.is_null() ? "(none)" : value.get<std::string>());
+    /// Does with an answer what all queries have in common. `folder`: of --out-aligned.
+    Result<void> keep(const Answer& answer, const fs::path& folder) {
+        csv += hitsCsv(answer);
+        if (flags.aligned.empty()) return {};
+        return writeAligned(searcher, answer, folder, session.context());
+    }
+
+    /// -o, and what was written, for people.
+    Result<std::string> finish() const {
+        std::string text;
+        if (!flags.csv.empty()) {
+            RETURN_IF_ERROR(writeTextFile(flags.csv, csv));
+            text += "Hits: " + flags.csv + "\n";
         }
-        table.add(std::move(cells));
+        if (!flags.aligned.empty()) text += "Aligned with the query: " + flags.aligned + "\n";
+        return text.empty() ? text : "\n" + text;
     }
-    text += table.render();
-    const std::size_t explained = flags.explain ? reply.hits.size() : 1;
-    for (std::size_t i = 0; i < explained; ++i) {
-        const client::Hit& hit = reply.hits[i];
-        if (!hit.explanation) continue;
-        text += "\nWhy " + hit.shape.key + ": " +
-                explanationText(*hit.explanation, reply.query, queryName, hit.shape.key);
-        if (hit.fit) text += fitText(*hit.fit, queryName, hit.shape.key);
-    }
-    return text;
+};
+
+CommandResult runOne(QueryRun& run, const std::string& path) {
+    const RunContext context = run.session.context();
+    const auto answer = run.flags.key.empty() ? run.searcher.withFile(path, context)
+                                              : run.searcher.withKey(run.flags.key, context);
+    RETURN_IF_ERROR(answer);
+    RETURN_IF_ERROR(run.keep(*answer, run.flags.aligned));
+    const auto written = run.finish();
+    RETURN_IF_ERROR(written);
+    json document = answerJson(run.flags.search, *answer);
+    if (!run.flags.csv.empty()) document["out"] = run.flags.csv;
+    if (!run.flags.aligned.empty()) document["out_aligned"] = run.flags.aligned;
+    run.session.console().document(document);
+    run.session.console().text(answerText(run.flags.search, *answer, run.explained) + *written);
+    return kOk;
 }
 
-CommandResult runQuery(Session& session, const QueryFlags& flags) {
-    if (flags.path.empty() == flags.key.empty()) {
+CommandResult runMany(QueryRun& run, const std::vector<ScanFile>& files) {
+    Console& console = run.session.console();
+    json queries = json::array();
+    json failed = json::array();
+    Failures failures;
+    std::optional<Error> stop;
+    std::size_t done = 0;
+    RunContext context = run.session.context();
+    context.progress = nullptr;  // progress counts files
+    for (const ScanFile& file : files) {
+        console.progress("query", done, files.size());
+        const auto answer = run.searcher.withFile(file.path, context);
+        Result<void> kept = answer ? run.keep(*answer, fs::path(run.flags.aligned) / fileNameOf(file.path))
+                                   : Result<void>(fail(answer.error()));
+        if (!kept) {
+            if (endsTheCommand(kept.error())) {
+                stop = kept.error();
+                break;
+            }
+            json entry = {{"file", file.path}, {"error", toJson(kept.error())}};
+            console.item(entry);
+            failed.push_back(std::move(entry));
+            failures.add(file.path, kept.error());
+        } else {
+            json entry = answerJson(run.flags.search, *answer);
+            entry["file"] = file.path;
+            console.item(entry);
+            if (console.json() && !console.lines()) queries.push_back(std::move(entry));
+            console.text((done > 0 ? "\n" : "") + answerText(run.flags.search, *answer, run.explained));
+        }
+        if (console.readerLeft()) break;
+        ++done;
+    }
+    const auto written = run.finish();
+    RETURN_IF_ERROR(written);
+    if (!console.lines()) {
+        json document = {{"queries", queries}, {"failed", failed}};
+        if (stop) document["ended_by"] = toJson(*stop);
+        console.document(document);
+    }
+    console.text(*written);
+    failures.tell(console, files.size(), "query", "queries");
+    if (!stop) return failures.exitCode(files.size());
+    console.note((stop->code == ErrorCode::kCancelled ? "interrupted" : stop->message) + ": " +
+                 formatCount(files.size() - done) + " of " + formatCount(files.size(), "query", "queries") +
+                 " not made");
+    return exitCodeOf(stop->code);
+}
+
+Result<void> checkFlags(const QueryFlags& flags) {
+    if (flags.paths.empty() == flags.key.empty()) {
         return fail(ErrorCode::kInvalidArgument, flags.key.empty()
                                                      ? "give a scan file, or --key with a stored shape"
                                                      : "give either a scan file or --key, not both");
     }
-    client::SearchOptions options = flags.options;
-    options.reflection = !flags.score.noReflection;
-    options.keepScale = flags.score.keepScale;
-    options.freeScale = flags.score.freeScale;
-    options.partial = flags.score.partial;
-    options.verify = flags.verify.verify;
-    options.verifyCandidates = flags.verify.candidates;
-    const VerifyOptions verify = flags.verify.options();
-    options.oneSided = verify.oneSided;
-    options.viewpoint = verify.viewpoint;
-    options.explanation = !flags.noExplanation;
-    const RunContext context = session.context();
-    LoadedScan scan;
-    if (!flags.path.empty()) {
-        auto loaded = loadScan(flags.path, flags.scan, flags.scan.seed, context, true);
-        RETURN_IF_ERROR(loaded);
-        scan = std::move(*loaded);
+    const bool piped = std::count(flags.paths.begin(), flags.paths.end(), "-") > 0;
+    if (piped && flags.paths.size() > 1) {
+        return fail(ErrorCode::kInvalidArgument, "standard input can only be the one query");
     }
+    return {};
+}
+
+CommandResult runQuery(Session& session, const QueryFlags& flags) {
+    RETURN_IF_ERROR(checkFlags(flags));
+    std::vector<ScanFile> files;
+    const bool alone = flags.paths.size() < 2 && (flags.paths.empty() || !fs::is_directory(flags.paths[0]));
+    if (!alone) {
+        auto listed = listScanFiles(flags.paths, !flags.search.scan.format.empty());
+        RETURN_IF_ERROR(listed);
+        files = std::move(*listed);
+    }
+    SearchFlags search = flags.search;
+    // Explanations are long; of many queries they are for those who ask.
+    const bool explains = !flags.noExplanation && (alone || flags.explain || session.console().json());
+    // Without one an unverified hit has no motion.
+    search.options.explanation = explains || (!flags.noExplanation && !(flags.csv + flags.aligned).empty());
     const auto client = connectToServer(session, Work::kHeavy);
     RETURN_IF_ERROR(client);
-    const auto factor = factorToCollection(*client, options.collection, flags.unit, context);
+    const auto factor =
+        factorToCollection(*client, search.options.collection, search.unit, session.context());
     RETURN_IF_ERROR(factor);
-    if (*factor != 1.0) {
-        scaleBy(*factor, scan.points);
-        if (options.viewpoint) options.viewpoint = *factor * *options.viewpoint;
-    }
-    auto reply = flags.path.empty() ? client->searchByKey(options, flags.key, flags.includeSelf, context)
-                                    : client->searchByScan(options, scan.points, context);
-    if (!reply) {
-        if (flags.path.empty()) return fail(reply.error());
-        return fail(reply.error().code, scanName(flags.path) + ": " + reply.error().message);
-    }
-    if (*factor != 1.0) scaleBy(1.0 / *factor, *reply);
-    json document = replyJson(*reply);
-    document["unit"] = unitJson(unitOfAnswer(flags.unit, reply->unit));
-    std::string text = replyText(flags, *reply);
-    if (scan.scene) {
-        document["scene"] = sceneJson(*scan.scene, scan.pointsInScene, flags.scan.isolate);
-        text = sceneText(*scan.scene, scan.pointsInScene, flags.scan.isolate) + text;
-    }
-    session.console().document(document);
-    session.console().text(text);
-    return kOk;
+    const Searcher searcher{*client, search, *factor};
+    const Explained explained = !explains       ? Explained::kNone
+                                : flags.explain ? Explained::kAll
+                                                : Explained::kFirst;
+    QueryRun run{session, flags, searcher, explained};
+    if (alone) return runOne(run, flags.paths.empty() ? "" : flags.paths.front());
+    // Told once, not of every query.
+    RETURN_IF_ERROR(client->getCollection(search.options.collection, session.context()));
+    return runMany(run, files);
 }
 
 }  // namespace
@@ -197,31 +205,30 @@ CommandResult runQuery(Session& session, const QueryFlags& flags) {
 void addQueryCommand(CLI::App& app, Session& session) {
     auto flags = std::make_shared<QueryFlags>();
     CLI::App* command =
-        app.add_subcommand("query", "Find the stored shapes most like a scan, or like a stored shape");
-    command->add_option("PATH", flags->path,
-                        "Scan to search with, or - for standard input; it is not stored");
+        app.add_subcommand("query", "Find the stored shapes most like scans, or like a stored shape");
+    command->add_option(
+        "PATH", flags->paths,
+        "Scans to search with, or folders of them, or - for standard input; they are not stored");
     command->add_option("--key", flags->key, "Search with this stored shape instead");
-    command->add_flag("--include-self", flags->includeSelf,
-                      "With --key: keep the shape itself among the hits");
-    addCollectionOption(*command, flags->options.collection);
-    command->add_option("-k,--k", flags->options.k, "Most hits to return")->capture_default_str();
-    command->add_option("--threshold", flags->options.threshold, "Lowest score of a hit, 0 to 1");
-    command->add_option("--filter", flags->options.filter,
-                        "Only shapes with such metadata, e.g. 'label=cup'");
-    auto* groupBy = command->add_option("--group-by", flags->options.groupBy,
+    addSearchFlags(*command, flags->search);
+    client::SearchOptions& options = flags->search.options;
+    auto* groupBy = command->add_option("--group-by", options.groupBy,
                                         "Show the best of each value of this metadata; -k counts the values");
     groupBy->type_name("NAME");
-    command->add_option("--per-group", flags->options.perGroup, "Most hits of each value [1]")
+    command->add_option("--per-group", options.perGroup, "Most hits of each value [1]")
         ->check(CLI::Range(1, 100))
         ->needs(groupBy);
-    addScoreFlags(*command, flags->score);
-    addFreeScaleFlag(*command, flags->score);
-    addUnitFlag(*command, flags->unit);
-    addVerifyFlags(*command, flags->verify);
     auto* none = command->add_flag("--no-explanation", flags->noExplanation, "Do not explain the hits");
     command->add_flag("--explain", flags->explain, "Explain every hit, not only the first")->excludes(none);
-    addScanFlags(*command, flags->scan);
-    addFormatFlag(*command, flags->scan);
+    command->add_option("-o,--out", flags->csv, "Write a line for each hit")
+        ->type_name("FILE.csv")
+        ->check(endsIn(".csv"));
+    command
+        ->add_option(
+            "--out-aligned", flags->aligned,
+            "Write the query and the hits, laid on it, in its coordinates: PLY files in this folder, "
+            "of several queries in folders below it")
+        ->type_name("DIR");
     command->callback(
         [&session, flags] { session.action = [&session, flags] { return runQuery(session, *flags); }; });
 }

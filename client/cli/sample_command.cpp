@@ -165,7 +165,7 @@ void addSampleCommand(CLI::App& app, Session& session) {
         ->check(CLI::Range(4, 100000000))
         ->capture_default_str();
     command->add_option("--noise", flags->noise, "Gaussian noise, as a share of the bounding-box diagonal")
-        ->check(atLeastZero())
+        ->check(noiseShare())
         ->capture_default_str();
     command->add_option("--seed", flags->seed, "Seed for shapes, poses and noise")->capture_default_str();
     command->add_flag("--upright", flags->upright, "Do not turn, scale or move the shapes");

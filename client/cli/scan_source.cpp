@@ -22,7 +22,7 @@ void addScanFlags(CLI::App& command, ScanFlags& flags) {
         .add_option(
             "--noise", flags.noise,
             "Add Gaussian noise with this standard deviation, as a share of the bounding-box diagonal")
-        ->check(atLeastZero());
+        ->check(noiseShare());
 }
 
 void addFormatFlag(CLI::App& command, ScanFlags& flags) {
@@ -151,15 +151,18 @@ std::string relativeName(const std::string& path, const std::string& folder) {
     return relative.generic_string();
 }
 
-Result<std::string> keyOfFile(const std::string& path, const std::string& base) {
+Result<std::string> keyOfFile(const std::string& path, const std::string& base, bool keepEnding) {
+    const auto named = [&](const fs::path& name) {
+        return keepEnding ? name.generic_string() : withoutScanEnding(name.generic_string());
+    };
     std::error_code error;
     const fs::path here = fs::current_path(error);
     if (error) return fail(ErrorCode::kFileNotReadable, "the current folder: " + error.message());
     const fs::path file = (here / path).lexically_normal();
     const fs::path folder = (here / base / "").lexically_normal();
     const fs::path below = file.lexically_relative(folder);
-    if (!below.empty() && *below.begin() != "..") return withoutScanEnding(below.generic_string());
-    if (base.empty()) return withoutScanEnding(file.relative_path().generic_string());
+    if (!below.empty() && *below.begin() != "..") return named(below);
+    if (base.empty()) return named(file.relative_path());
     return fail(ErrorCode::kInvalidArgument, path + " is not below --base " + base);
 }
 

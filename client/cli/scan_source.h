@@ -74,7 +74,9 @@ struct LoadedScan : Scan {
 /// The key of an uploaded file: its path below `base` (empty: the current folder) without ending, with '/' as
 /// separator; without a base the whole path, from below the root, of a file that is not below the current
 /// folder. Says which file it is however its path was typed; links are names like any other. Errors:
-/// kInvalidArgument (not below `base`), kFileNotReadable (there is no current folder).
-[[nodiscard]] Result<std::string> keyOfFile(const std::string& path, const std::string& base);
+/// kInvalidArgument (not below `base`), kFileNotReadable (there is no current folder). `keepEnding`: with its
+/// ending.
+[[nodiscard]] Result<std::string> keyOfFile(const std::string& path, const std::string& base,
+                                            bool keepEnding = false);
 
 }  // namespace shapedb::cli

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "client/cli/checks.h"
 #include "client/cli/exit_code.h"
 #include "client/cli/local_result.h"
 #include "client/cli/parameters.h"
@@ -95,8 +96,9 @@ void addSegmentCommand(CLI::App& app, Session& session) {
     CLI::App* command = app.add_subcommand("segment", "Cut one scan into its parts (needs no server)");
     command->add_option("FILE", flags->file, "Scan file, or - for standard input: " + scanFormatList())
         ->required();
-    command->add_option("--out", flags->out, "Write the points, coloured and labelled by part")
-        ->type_name("FILE.ply");
+    command->add_option("-o,--out", flags->out, "Write the points, coloured and labelled by part")
+        ->type_name("FILE.ply")
+        ->check(endsIn(".ply"));
     addScanFlags(*command, flags->scan);
     addFormatFlag(*command, flags->scan);
     addParameterFlags(*command, flags->parameters);

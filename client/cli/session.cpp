@@ -9,19 +9,24 @@
 #include <nlohmann/json.hpp>
 
 #include "client/cli/checks.h"
+#include "client/cli/completion.h"
 #include "client/cli/exit_code.h"
+#include "client/cli/usage.h"
 
 namespace shapedb::cli {
 
 namespace {
 
 constexpr const char* kFooter =
-    "Every command takes --json. 'shapedb COMMAND --help' lists its flags.\n"
+    "Every command takes --json. 'shapedb help COMMAND' lists its flags.\n"
     "Exit codes: 0 done, 1 some items failed, 2 wrong usage, 3 bad file or scan,\n"
     "4 not found or wrong state, 5 server unavailable, 6 internal error, 130 interrupted.";
 
 void addGlobalOptions(CLI::App& app, GlobalOptions& options) {
-    app.add_flag("--json", options.json, "Print one JSON document instead of text");
+    auto* json = app.add_flag("--json", options.json, "Print one JSON document instead of text");
+    app.add_flag("--json-lines", options.jsonLines,
+                 "Print one line of JSON for each item, as they come, or one for the result")
+        ->excludes(json);
     app.add_option("--server", options.server, "Server address")
         ->envname("SHAPEDB_SERVER")
         ->default_str("127.0.0.1:7878")
@@ -58,21 +63,28 @@ void letGlobalOptionsFollow(CLI::App& app) {
 }
 
 int finish(Console& console, int exitCode) {
-    if (console.flush()) return exitCode;
+    // `head` has what it wanted of the rest.
+    if (console.flush() || console.readerLeft()) return exitCode;
     console.note("cannot write the result: standard output is closed or full");
     return exitCode == kOk ? kBadData : exitCode;
 }
 
-int usageError(Console& console, const CLI::App& app, const CLI::ParseError& error) {
-    // Point to the help of the subcommand that was being read.
-    std::string command = app.get_name();
-    for (const CLI::App* at = &app; !at->get_subcommands().empty();) {
-        at = at->get_subcommands().front();
-        command += " " + at->get_name();
+/// Messages in the words of the command line, while there is one.
+class Wording {
+  public:
+    Wording(Console& console, const CLI::App& app) : console_(console) {
+        console.setWording([&app](const std::string& message) { return inWordsOfFlags(app, message); });
     }
-    std::string message = error.what();
-    std::replace(message.begin(), message.end(), '\n', ' ');
-    console.failure({ErrorCode::kInvalidArgument, message + " (see '" + command + " --help')"});
+    ~Wording() { console_.setWording({}); }
+    Wording(const Wording&) = delete;
+    Wording& operator=(const Wording&) = delete;
+
+  private:
+    Console& console_;
+};
+
+int usageError(Console& console, const CLI::App& app, const CLI::ParseError& error) {
+    console.failure({ErrorCode::kInvalidArgument, usageMessage(app, error)});
     return finish(console, kUsage);
 }
 
@@ -105,8 +117,12 @@ RunContext Session::context(const std::string& what) {
 int run(int argc, const char* const* argv, Console& console, const std::atomic<bool>& cancel,
         const std::string& build) {
     // Before parsing, so that a parse error is reported as JSON too.
-    console.setJson(
-        std::any_of(argv, argv + argc, [](const char* a) { return std::strcmp(a, "--json") == 0; }));
+    const auto given = [&](const char* flag) {
+        return std::any_of(argv, argv + argc, [&](const char* a) { return std::strcmp(a, flag) == 0; });
+    };
+    console.setForm(given("--json-lines") ? Console::Form::kJsonLines
+                    : given("--json")     ? Console::Form::kJson
+                                          : Console::Form::kText);
     try {
         Session session(console, cancel);
         CLI::App app(
@@ -129,6 +145,16 @@ int run(int argc, const char* const* argv, Console& console, const std::atomic<b
         addCollectionCommands(app, session);
         addAdminCommands(app, session);
         addHealthCommand(app, session);
+        addDuplicatesCommand(app, session);
+        addMatchCommand(app, session);
+        addReportCommand(app, session);
+        addHelpCommands(app, session);
+        if (argc > 1 && std::strcmp(argv[1], "__complete") == 0) {
+            console.setForm(Console::Form::kText);
+            console.ownText(completionText(app, {argv + 2, argv + argc}));
+            return finish(console, kOk);
+        }
+        const Wording wording(console, app);
         letGlobalOptionsFollow(app);
         try {
             app.parse(argc, argv);

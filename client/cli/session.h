@@ -19,6 +19,7 @@ namespace shapedb::cli {
 
 struct GlobalOptions {
     bool json = false;
+    bool jsonLines = false;
     std::string server;   ///< HOST:PORT
     std::string keyFile;  ///< of the API key; this and the next ones override the environment
     client::TlsOptions tls;
@@ -65,6 +66,11 @@ void addChangeCommands(CLI::App& app, Session& session);
 void addCollectionCommands(CLI::App& app, Session& session);
 void addAdminCommands(CLI::App& app, Session& session);
 void addHealthCommand(CLI::App& app, Session& session);
+void addDuplicatesCommand(CLI::App& app, Session& session);
+void addMatchCommand(CLI::App& app, Session& session);
+void addReportCommand(CLI::App& app, Session& session);
+/// help, completion and man: what is said of all the others, which must have been added before.
+void addHelpCommands(CLI::App& app, Session& session);
 /// Below `shapedb admin`.
 void addBackupCommands(CLI::App& admin, Session& session);
 void addKeyCommands(CLI::App& admin, Session& session);

@@ -176,30 +176,43 @@ std::optional<client::ShapeState> stateOf(const std::string& name) {
     return std::nullopt;
 }
 
-/// As many pages as the limit allows.
-Result<client::ListPage> listAll(const client::Client& client, const ListFlags& flags,
-                                 const RunContext& context) {
+/// As many pages as the limit allows. With --json-lines the shapes are printed as they come, and not kept.
+Result<client::ListPage> listAll(Session& session, const client::Client& client, const ListFlags& flags) {
+    const RunContext context = session.context();
+    Console& console = session.console();
+    std::uint64_t listed = 0;
     client::ListRequest request = flags.request;
     request.state = stateOf(flags.state);
     RETURN_IF_ERROR(readOrder(flags, request));
     client::ListPage all;
     do {
-        const std::uint64_t missing = flags.limit ? *flags.limit - all.shapes.size() : kPageSize;
+        const std::uint64_t missing = flags.limit ? *flags.limit - listed : kPageSize;
         request.pageSize = static_cast<std::uint32_t>(std::min<std::uint64_t>(kPageSize, missing));
         auto page = client.listShapes(request, context);
         RETURN_IF_ERROR(page);
-        std::move(page->shapes.begin(), page->shapes.end(), std::back_inserter(all.shapes));
+        listed += page->shapes.size();
+        for (client::Shape& shape : page->shapes) {
+            if (console.lines()) {
+                console.item(toJson(shape));
+            } else {
+                all.shapes.push_back(std::move(shape));
+            }
+        }
         all.nextCursor = page->nextCursor;
         request.cursor = page->nextCursor;
-    } while (!all.nextCursor.empty() && (!flags.limit || all.shapes.size() < *flags.limit));
+    } while (!all.nextCursor.empty() && (!flags.limit || listed < *flags.limit) && !console.readerLeft());
     return all;
 }
 
 CommandResult runList(Session& session, const ListFlags& flags) {
     const auto client = connectToServer(session);
     RETURN_IF_ERROR(client);
-    const auto page = listAll(*client, flags, session.context());
+    const auto page = listAll(session, *client, flags);
     RETURN_IF_ERROR(page);
+    if (session.console().lines()) {
+        if (!page->nextCursor.empty()) session.console().item({{"next_cursor", page->nextCursor}});
+        return kOk;
+    }
     json shapes = json::array();
     Table table(
         {{"id", Table::Align::kRight}, {"key"}, {"label"}, {"state"}, {"points", Table::Align::kRight}});
@@ -301,8 +314,9 @@ std::shared_ptr<ListFlags> addListCommand(CLI::App& app, Session& session, const
 void addShapeCommands(CLI::App& app, Session& session) {
     const auto get = addKeyCommand(app, session, "get", "Show one stored shape", &runGet);
     app.get_subcommand("get")
-        ->add_option("--out", get->out, "Write its points, coloured and labelled by part")
-        ->type_name("FILE.ply");
+        ->add_option("-o,--out", get->out, "Write its points, coloured and labelled by part")
+        ->type_name("FILE.ply")
+        ->check(endsIn(".ply"));
     app.get_subcommand("get")->add_flag("--points", get->points,
                                         "With --out: write the points as they were sent, and nothing else");
     addKeyCommand(app, session, "signature", "Show what a search compares: parts and statistics of a shape",

@@ -1,6 +1,7 @@
 #include "client/cli/text.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <cstdio>
 
@@ -22,6 +23,12 @@ std::string printed(const char* format, double value) {
 std::string formatNumber(double value) {
     if (value == 0.0) return "0";  // also for -0
     return printed("%.4g", value);
+}
+
+std::string exactNumber(double value) {
+    char buffer[32];
+    const auto end = std::to_chars(buffer, buffer + sizeof buffer, value == 0.0 ? 0.0 : value);
+    return {buffer, end.ptr};
 }
 
 std::string formatFixed(double value, int decimals) {
@@ -68,6 +75,13 @@ std::string formatSeconds(double seconds) {
     if (whole < 3600) return pair(whole / 60, "min", whole % 60, "s");
     if (whole < 86400) return pair(whole / 3600, "h", whole % 3600 / 60, "min");
     return pair(whole / 86400, "d", whole % 86400 / 3600, "h");
+}
+
+std::string formatRate(double perSecond) {
+    if (perSecond >= 999.5)
+        return formatCount(static_cast<std::uint64_t>(std::llround(perSecond))) + " a second";
+    return perSecond >= 1.0 ? printed("%.3g", perSecond) + " a second"
+                            : printed("%.2g", 60.0 * perSecond) + " a minute";
 }
 
 std::string formatPercent(double share) {

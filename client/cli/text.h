@@ -14,6 +14,9 @@ namespace shapedb::cli {
 /// Four significant digits, trailing zeros dropped: "0.4891", "12.5", "1.2e+09", "0".
 [[nodiscard]] std::string formatNumber(double value);
 
+/// The shortest text that reads back as the same number: "0.1", "-2.5e-07".
+[[nodiscard]] std::string exactNumber(double value);
+
 /// A fixed number of decimals: "0.489".
 [[nodiscard]] std::string formatFixed(double value, int decimals);
 
@@ -29,6 +32,9 @@ namespace shapedb::cli {
 
 /// "35 ms", "4.2 s", "3 min 20 s", "2 h 5 min", "3 d 4 h". Negative values count as 0.
 [[nodiscard]] std::string formatSeconds(double seconds);
+
+/// "340 a second", "1.2 a second", "4.5 a minute".
+[[nodiscard]] std::string formatRate(double perSecond);
 
 /// "42 %", "0.3 %".
 [[nodiscard]] std::string formatPercent(double share);

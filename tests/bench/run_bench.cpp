@@ -26,7 +26,7 @@ BenchRun runBench(std::vector<std::string> arguments) {
     const std::atomic<bool> cancel{false};
     BenchRun result;
     {
-        cli::Console console(out, err, false, kProgramName);
+        cli::Console console(out, err, {}, kProgramName);
         result.exitCode = run(static_cast<int>(argv.size()), argv.data(), console, cancel);
     }
     result.out = out.str();

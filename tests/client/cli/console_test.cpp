@@ -1,6 +1,8 @@
 #include "client/cli/console.h"
 
+#include <chrono>
 #include <sstream>
+#include <thread>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -11,7 +13,7 @@ namespace {
 TEST(Console, PrintsTextOrJsonNeverBoth) {
     std::ostringstream out;
     std::ostringstream err;
-    Console console(out, err, false);
+    Console console(out, err, {});
     console.text("hello\n");
     console.document({{"a", 1}});
     EXPECT_EQ(out.str(), "hello\n");
@@ -26,7 +28,7 @@ TEST(Console, PrintsTextOrJsonNeverBoth) {
 TEST(Console, FailureIsANoteAndAJsonDocument) {
     std::ostringstream out;
     std::ostringstream err;
-    Console console(out, err, false);
+    Console console(out, err, {});
     console.failure({ErrorCode::kNotFound, "no shape 'x'"});
     EXPECT_EQ(err.str(), "shapedb: no shape 'x'\n");
     EXPECT_EQ(out.str(), "");
@@ -41,7 +43,7 @@ TEST(Console, FailureIsANoteAndAJsonDocument) {
 TEST(Console, PrintsOnlyOneDocument) {
     std::ostringstream out;
     std::ostringstream err;
-    Console console(out, err, false);
+    Console console(out, err, {});
     console.setJson(true);
     console.document({{"done", true}});
     console.failure({ErrorCode::kInternal, "too late"});
@@ -51,11 +53,11 @@ TEST(Console, PrintsOnlyOneDocument) {
 TEST(Console, ShowsProgressOnlyOnATerminalAndErasesIt) {
     std::ostringstream out;
     std::ostringstream err;
-    Console piped(out, err, false);
+    Console piped(out, err, {});
     piped.progress("read", 1, 2);
     EXPECT_EQ(err.str(), "");
 
-    Console terminal(out, err, true);
+    Console terminal(out, err, {true, false});
     terminal.progress("read", 1, 2);
     EXPECT_NE(err.str().find("read"), std::string::npos);
     EXPECT_NE(err.str().find("1 / 2"), std::string::npos);
@@ -65,10 +67,53 @@ TEST(Console, ShowsProgressOnlyOnATerminalAndErasesIt) {
     EXPECT_EQ(out.str(), "");
 }
 
+TEST(Console, TellsThePaceOnceItIsKnown) {
+    std::ostringstream out;
+    std::ostringstream err;
+    Console console(out, err, {true, false});
+    console.progress("upload", 10, 100);
+    EXPECT_EQ(err.str().find("left"), std::string::npos);
+    std::this_thread::sleep_for(std::chrono::milliseconds(2100));
+    console.progress("upload", 30, 100);
+    EXPECT_NE(err.str().find("30 / 100  "), std::string::npos) << err.str();
+    EXPECT_NE(err.str().find(" a second, "), std::string::npos) << err.str();
+    EXPECT_NE(err.str().find(" s left"), std::string::npos) << err.str();
+    err.str("");
+    std::this_thread::sleep_for(std::chrono::milliseconds(110));
+    console.progress("segment", 40, 100);
+    EXPECT_EQ(err.str().find("left"), std::string::npos) << "another stage has its own pace: " << err.str();
+}
+
+TEST(Console, ColoursErrorsOnlyWhereAsked) {
+    std::ostringstream out;
+    std::ostringstream err;
+    Console(out, err, {true, true}).note("careful");
+    EXPECT_EQ(err.str(), "\x1b[1;31mshapedb:\x1b[0m careful\n");
+    err.str("");
+    Console(out, err, {true, false}).note("careful");
+    EXPECT_EQ(err.str(), "shapedb: careful\n");
+    EXPECT_FALSE(terminalAt(-1).bar) << "no terminal";
+}
+
+TEST(Console, JsonLinesHaveAnItemEach) {
+    std::ostringstream out;
+    std::ostringstream err;
+    Console console(out, err, {});
+    console.item({{"a", 1}});
+    EXPECT_EQ(out.str(), "");
+    console.setForm(Console::Form::kJsonLines);
+    console.item({{"a", 1}});
+    console.item({{"b", {1, 2}}});
+    console.text("hello\n");
+    EXPECT_EQ(out.str(), "{\"a\":1}\n{\"b\":[1,2]}\n");
+    console.failure({ErrorCode::kNotFound, "x"});
+    EXPECT_NE(out.str().find("{\"error\":{\"message\":\"x\",\"name\":\"not_found\"}}\n"), std::string::npos);
+}
+
 TEST(Console, JsonSurvivesBytesThatAreNotUtf8) {
     std::ostringstream out;
     std::ostringstream err;
-    Console console(out, err, false);
+    Console console(out, err, {});
     console.setJson(true);
     console.document({{"file", std::string("\xff\xfe.ply")}});
     EXPECT_FALSE(nlohmann::json::parse(out.str(), nullptr, false).is_discarded());
@@ -77,7 +122,7 @@ TEST(Console, JsonSurvivesBytesThatAreNotUtf8) {
 TEST(Console, FlushReportsAFailedWrite) {
     std::ostringstream out;
     std::ostringstream err;
-    Console console(out, err, false);
+    Console console(out, err, {});
     EXPECT_TRUE(console.flush());
     out.setstate(std::ios::badbit);
     EXPECT_FALSE(console.flush());

@@ -65,6 +65,32 @@ TEST_F(KeyCommand, MakesListsAndRevokesKeys) {
     EXPECT_EQ(asAdmin({"admin", "key", "revoke", id}).exitCode, kWrongState);
 }
 
+TEST_F(KeyCommand, ARepeatedAddSendsNothing) {
+    serve({});
+    const auto made = asAdmin({"admin", "key", "create", "--name", "Ann", "--role", "reader"});
+    write("ann.key", made.out);
+    for (const char* name : {"a", "b", "c"})
+        writePoints("in/" + std::string(name) + ".xyz", dumbbellPoints(900));
+    const std::vector<std::string> add = {"add", path("in"), "--base", path("in"), "--json"};
+    ASSERT_EQ(asAdmin(add).exitCode, kOk);
+    // Who may only read cannot send; what an interrupted run has sent need not be.
+    const std::map<std::string, std::string> asReader = {{"SHAPEDB_API_KEY_FILE", path("ann.key")}};
+    const auto again = with(asReader, add);
+    EXPECT_EQ(again.exitCode, kOk) << again.err;
+    EXPECT_EQ(again.json()["outcomes"], json({{"unchanged", 3}}));
+
+    writePoints("in/b.xyz", dumbbellPoints(950));
+    writePoints("in/d.xyz", dumbbellPoints(950));
+    writePoints("in/e.xyz", dumbbellPoints(950));
+    const auto refused = with(asReader, add);
+    EXPECT_EQ(refused.exitCode, kWrongState) << "others must be sent";
+    EXPECT_EQ(refused.json()["outcomes"], json({{"unchanged", 1}}));
+    EXPECT_EQ(refused.json()["not_sent"].size(), 3u) << "what would be refused too is not tried";
+    EXPECT_EQ(refused.json()["ended_by"]["name"], "permission_denied");
+    EXPECT_NE(refused.err.find("3 of 5 scans not sent; the same command continues"), std::string::npos)
+        << refused.err;
+}
+
 TEST_F(KeyCommand, TakesTheKeyFromAFileOrTheEnvironment) {
     serve({});
     const std::string key = testing::readFile(path("admin.key"));

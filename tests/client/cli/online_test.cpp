@@ -68,10 +68,31 @@ TEST_F(Online, AddContinuesAfterABadFile) {
     EXPECT_NE(run.err.find("2 of 3 files failed"), std::string::npos) << run.err;
 }
 
+TEST_F(Online, AddTellsFilesOfOneNameApart) {
+    onlineJson({"collection", "create", "endings"});
+    writePoints("in/a.xyz", dumbbellPoints(500));
+    writePoints("in/a.asc", dumbbellPoints(600));
+    writePoints("in/b.xyz", dumbbellPoints(500));
+    write("in/b.txt", "a note about b\n");
+    const auto keysOf = [&](const std::vector<std::string>& paths) {
+        std::vector<std::string> arguments = {"add", "--base", path("in"), "--collection", "endings"};
+        arguments.insert(arguments.end(), paths.begin(), paths.end());
+        std::vector<std::string> keys;
+        const json document = onlineJson(arguments);
+        for (const json& one : document["added"]) keys.push_back(one["key"]);
+        return keys;
+    };
+    using Names = std::vector<std::string>;
+    EXPECT_EQ(keysOf({path("in")}), (Names{"a.asc", "a.xyz", "b"})) << "a note is no scan";
+    EXPECT_EQ(keysOf({path("in/a.xyz")}), Names{"a.xyz"}) << "the same key however it is named";
+    EXPECT_EQ(onlineJson({"count", "--collection", "endings"})["count"], 3);
+}
+
 TEST_F(Online, AddRefusesTwoFilesWithOneKey) {
     writePoints("in/a.xyz", dumbbellPoints(500));
     writePoints("in/a.txt", dumbbellPoints(600));
-    const CommandRun run = online({"add", path("in/a.xyz"), path("in/a.txt"), "--json"});
+    writePoints("in/a.txt.ply", dumbbellPoints(600));
+    const CommandRun run = online({"add", path("in"), "--json"});
     EXPECT_EQ(run.exitCode, 2);
     EXPECT_NE(run.err.find("would both get the key"), std::string::npos) << run.err;
     const CommandRun twice = online({"add", path("in/a.xyz"), path("in/../in/a.xyz")});

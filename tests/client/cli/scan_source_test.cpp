@@ -97,6 +97,8 @@ TEST_F(ScanSource, AKeyDoesNotDependOnHowThePathWasTyped) {
     EXPECT_EQ(keyOfFile("scans/jug/1.ply", "").value(), "scans/jug/1") << "the same name in another folder";
     EXPECT_EQ(keyOfFile("/data/cup/1.ply", "").value(), "data/cup/1") << "elsewhere: the whole path";
     EXPECT_EQ(keyOfFile("/data/cup/1.ply", "/").value(), "data/cup/1");
+    EXPECT_EQ(keyOfFile("/data/cup/1.ply", "/", true).value(), "data/cup/1.ply");
+    EXPECT_EQ(keyOfFile("scans/cup/1.ply.gz", "", true).value(), "scans/cup/1.ply.gz");
     EXPECT_EQ(keyOfFile("/data/cup/1.ply", "/data/jug").error().code, ErrorCode::kInvalidArgument);
     EXPECT_EQ(keyOfFile("/database/1.ply", "/data").error().code, ErrorCode::kInvalidArgument);
 }

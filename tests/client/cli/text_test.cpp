@@ -19,6 +19,22 @@ TEST(Text, NumbersHaveFourSignificantDigits) {
     EXPECT_EQ(formatFixed(std::numeric_limits<double>::max(), 0).size(), 309u);
 }
 
+TEST(Text, ExactNumbersAreShortAndReadBack) {
+    EXPECT_EQ(exactNumber(0.1), "0.1");
+    EXPECT_EQ(exactNumber(-0.0), "0");
+    EXPECT_EQ(exactNumber(1.0), "1");
+    for (const double value : {1.0 / 3.0, -4'512'345.123456789, 1e-300, 1.7976931348623157e308}) {
+        EXPECT_EQ(std::stod(exactNumber(value)), value);
+    }
+}
+
+TEST(Text, RatesAreOfASecondOrAMinute) {
+    EXPECT_EQ(formatRate(12'345.6), "12,346 a second");
+    EXPECT_EQ(formatRate(34.56), "34.6 a second");
+    EXPECT_EQ(formatRate(1.0), "1 a second");
+    EXPECT_EQ(formatRate(0.05), "3 a minute");
+}
+
 TEST(Text, CountsAreGroupedByThousands) {
     EXPECT_EQ(formatCount(0), "0");
     EXPECT_EQ(formatCount(999), "999");

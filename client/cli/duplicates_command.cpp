@@ -1,0 +1,207 @@
+// `shapedb duplicates`: the pairs of a collection that are nearly the same.
+#include <map>
+#include <memory>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "client/cli/checks.h"
+#include "client/cli/connection.h"
+#include "client/cli/csv.h"
+#include "client/cli/duplicate_search.h"
+#include "client/cli/exit_code.h"
+#include "client/cli/fit_output.h"
+#include "client/cli/parameters.h"
+#include "client/cli/session.h"
+#include "client/cli/text.h"
+#include "client/io/text_file.h"
+#include "core/base/return_if_error.h"
+
+namespace shapedb::cli {
+
+using nlohmann::json;
+
+namespace {
+
+struct DuplicatesFlags {
+    DuplicateOptions options;
+    ScoreFlags score;
+    bool csv = false;
+    bool noVerify = false;
+    std::string out;
+};
+
+/// The group of each shape that is in one.
+std::map<std::size_t, std::size_t> groupNumbers(const DuplicateReport& report) {
+    std::map<std::size_t, std::size_t> numbers;
+    for (std::size_t g = 0; g < report.groups.size(); ++g) {
+        for (const std::size_t shape : report.groups[g]) numbers[shape] = g;
+    }
+    return numbers;
+}
+
+json pairJson(const DuplicateReport& report, const DuplicatePair& pair, std::size_t group) {
+    json entry = {{"group", group + 1},
+                  {"a", report.shapes[pair.a].key},
+                  {"b", report.shapes[pair.b].key},
+                  {"score", pair.score()},
+                  {"signature_score", pair.signatureScore},
+                  {"verdict", verdictJson(pair.fit ? pair.fit->verdict : Verdict::kNone)},
+                  {"mirrored", nullptr},
+                  {"residual", nullptr}};
+    if (pair.fit && pair.fit->pose) {
+        entry["mirrored"] = pair.fit->mirrored;
+        entry["residual"] = pair.fit->pose->residual;
+        entry["matrix"] = matrixOf(pair.fit->pose->motion);
+    }
+    return entry;
+}
+
+std::string duplicatesCsv(const DuplicateReport& report) {
+    const auto groups = groupNumbers(report);
+    std::string text = "group,a,b,score,signature_score,verdict,mirrored,residual\n";
+    for (const DuplicatePair& pair : report.pairs) {
+        CsvRow row;
+        row.add(std::to_string(groups.at(pair.a) + 1));
+        row.add(report.shapes[pair.a].key).add(report.shapes[pair.b].key);
+        row.add(pair.score()).add(pair.signatureScore);
+        const bool laid = pair.fit && pair.fit->pose;
+        row.add(pair.fit && pair.fit->verdict != Verdict::kNone ? verdictName(pair.fit->verdict) : "");
+        row.add(!laid ? "" : pair.fit->mirrored ? "1" : "0");
+        row.add(laid ? exactNumber(pair.fit->pose->residual) : std::string());
+        text += row.line();
+    }
+    return text;
+}
+
+/// Why a shape is in its group: its pair with the first, or else its best. `pairs`: of the group, best first.
+const DuplicatePair* linkOf(const std::vector<const DuplicatePair*>& pairs, std::size_t shape,
+                            std::size_t first) {
+    const DuplicatePair* best = nullptr;
+    for (const DuplicatePair* pair : pairs) {
+        if (pair->a != shape && pair->b != shape) continue;
+        if (pair->a == first || pair->b == first) return pair;
+        if (best == nullptr) best = pair;
+    }
+    return best;
+}
+
+std::string duplicatesText(const DuplicatesFlags& flags, const DuplicateReport& report) {
+    std::size_t members = 0;
+    for (const auto& group : report.groups) members += group.size();
+    const std::string scored = "signatures score " + formatNumber(flags.options.threshold) + " or more";
+    if (report.pairs.empty()) {
+        return "no near-duplicates among " + formatCount(report.shapes.size(), "shape", "shapes") +
+               " (no two " + scored + ")\n";
+    }
+    std::string text = formatCount(members) + " of " + formatCount(report.shapes.size(), "shape", "shapes") +
+                       " have near-duplicates: " + formatCount(report.pairs.size(), "pair", "pairs") +
+                       " in " + formatCount(report.groups.size(), "group", "groups") + " (" + scored +
+                       ")\n\n";
+    const auto numbers = groupNumbers(report);
+    std::map<std::size_t, std::vector<const DuplicatePair*>> pairsOf;  // by group
+    for (const DuplicatePair& pair : report.pairs) pairsOf[numbers.at(pair.a)].push_back(&pair);
+    Table table({{"group", Table::Align::kRight},
+                 {"key"},
+                 {"label"},
+                 {"score", Table::Align::kRight},
+                 {"like"},
+                 {"verdict"}});
+    for (std::size_t g = 0; g < report.groups.size(); ++g) {
+        const std::size_t first = report.groups[g].front();
+        for (const std::size_t shape : report.groups[g]) {
+            const client::Shape& one = report.shapes[shape];
+            if (shape == first) {
+                table.add({std::to_string(g + 1), one.key, labelOf(one)});
+                continue;
+            }
+            const DuplicatePair* link = linkOf(pairsOf[g], shape, first);
+            const std::size_t other = link->a == shape ? link->b : link->a;
+            std::string verdict = link->fit ? verdictText(link->fit->verdict) : std::string();
+            if (link->fit && link->fit->mirrored)
+                verdict += std::string(verdict.empty() ? "" : ", ") + "mirrored";
+            table.add({"", one.key, labelOf(one), formatFixed(link->score(), 3), report.shapes[other].key,
+                       verdict});
+        }
+    }
+    return text + table.render();
+}
+
+CommandResult runDuplicates(Session& session, const DuplicatesFlags& flags) {
+    const auto client = connectToServer(session, Work::kHeavy);
+    RETURN_IF_ERROR(client);
+    DuplicateOptions options = flags.options;
+    options.score = flags.score.forServer();
+    options.compare = !flags.noVerify;
+    RunContext context = session.context();
+    context.progress = nullptr;  // progress counts shapes and pairs
+    Console& console = session.console();
+    const auto report = findDuplicates(
+        *client, options,
+        [&](const char* what, std::uint64_t done, std::uint64_t total) {
+            console.progress(what, done, total);
+        },
+        context);
+    RETURN_IF_ERROR(report);
+    if (!flags.out.empty()) RETURN_IF_ERROR(writeTextFile(flags.out, duplicatesCsv(*report)));
+    const auto numbers = groupNumbers(*report);
+    json pairs = json::array();
+    for (const DuplicatePair& pair : report->pairs) {
+        if (!console.json()) break;
+        json entry = pairJson(*report, pair, numbers.at(pair.a));
+        console.item(entry);
+        if (!console.lines()) pairs.push_back(std::move(entry));
+    }
+    json groups = json::array();
+    for (const auto& group : report->groups) {
+        json keys = json::array();
+        for (const std::size_t shape : group) keys.push_back(report->shapes[shape].key);
+        groups.push_back(std::move(keys));
+    }
+    if (!console.lines()) {
+        console.document({{"threshold", options.threshold},
+                          {"shapes", report->shapes.size()},
+                          {"pairs", pairs},
+                          {"groups", groups}});
+    }
+    console.text(flags.csv ? duplicatesCsv(*report) : duplicatesText(flags, *report));
+    if (!flags.out.empty() && !flags.csv) console.text("\nPairs: " + flags.out + "\n");
+    return kOk;
+}
+
+}  // namespace
+
+void addDuplicatesCommand(CLI::App& app, Session& session) {
+    auto flags = std::make_shared<DuplicatesFlags>();
+    CLI::App* command = app.add_subcommand(
+        "duplicates", "Find the pairs of a collection that are nearly the same: all of them, in groups");
+    auto* positional =
+        command->add_option("COLLECTION", flags->options.collection, "Collection to look in [default]");
+    command->add_option("--collection", flags->options.collection, "The same")
+        ->type_name("NAME")
+        ->excludes(positional);
+    command->add_option("--threshold", flags->options.threshold, "Lowest score of the signatures of a pair")
+        ->check(aboveZero())
+        ->capture_default_str();
+    command->add_option("--filter", flags->options.filter,
+                        "Only among shapes with such metadata, e.g. 'label=cup'");
+    command->add_flag("--csv", flags->csv, "Print a line of CSV for each pair");
+    command->add_option("-o,--out", flags->out, "Write them to a file")
+        ->type_name("FILE.csv")
+        ->check(endsIn(".csv"));
+    command->add_flag(
+        "--no-verify", flags->noVerify,
+        "Do not lay the shapes of each pair on each other, which says what they are and whether one is "
+        "the mirror image of the other");
+    command->add_option("--jobs", flags->options.jobs, "Pairs compared at the same time")
+        ->check(CLI::Range(1, 64))
+        ->capture_default_str();
+    command->add_flag("--no-reflection", flags->score.noReflection,
+                      "Treat mirror images as different shapes");
+    command->add_flag("--keep-scale", flags->score.keepScale, "Compare sizes too");
+    addFreeScaleFlag(*command, flags->score);
+    command->callback(
+        [&session, flags] { session.action = [&session, flags] { return runDuplicates(session, *flags); }; });
+}
+
+}  // namespace shapedb::cli
