@@ -86,6 +86,7 @@ reportTest('mouse and keys turn it, and other hits can be chosen', async (page) 
   await page.keyboard.press('0');
   await page.keyboard.press('PageDown');
   assert.match(await page.locator('#told').innerText(), /^2\. /);
+  await page.locator('canvas').blur();  // the ring around it has the query's colour
   assert.notDeepEqual((await drawn(page)).hit, before.hit);
   assert.deepEqual((await drawn(page)).query.left, before.query.left, 'one camera for all');
   await page.locator('#show-hit').uncheck();
