@@ -26,7 +26,6 @@ TEST_F(Usage, WrongCommandLinesGiveExitCodeTwo) {
         {"segment", "a.ply", "--noise", "5"},  // meant in percent
         {"evaluate", "x", "--noise", "0.5"},
         {"sample", "x", "--noise", "1"},
-        {"list", "--json", "--json-lines"},
         {"segment", "a.ply", "--points", "many"},
         {"segment", "a.ply", "--points", "3"},
         {"segment", "a.ply", "--deep-angle", "90"},

@@ -278,7 +278,9 @@ TEST_F(ScanFiles, SayWhatSharesItsNameInItsFolder) {
     write("s/jug.txt", "1 2 3\n4 5 6\n");
     write("s/.cup.obj", "");
     std::vector<std::string> sharing;
-    for (const ScanFile& file : *listScanFiles({path("s")})) {
+    const auto files = listScanFiles({path("s")});
+    ASSERT_TRUE(files);
+    for (const ScanFile& file : *files) {
         if (file.sharesName) sharing.push_back(file.path.substr(path("s").size() + 1));
     }
     EXPECT_EQ(sharing, (std::vector<std::string>{"box.obj", "box.stl", "jug.ply", "jug.txt"}))

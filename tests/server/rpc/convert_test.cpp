@@ -167,9 +167,15 @@ TEST(Shapes, ReportQualityOfTheServingSignature) {
     pb::Shape plain;
     toProto(store::Shape(), "parts", std::nullopt, &plain);
     EXPECT_FALSE(plain.has_quality()) << "a signature without attributes does not rate the interior";
+    store::Shape shape;
+    shape.state = store::ShapeState::kReady;
     pb::Shape rated;
-    toProto(store::Shape(), "parts", 0.2, &rated);
+    toProto(shape, "parts", 0.2, &rated);
     EXPECT_NEAR(rated.quality(), 0.2, 1e-12);
+    shape.state = store::ShapeState::kPending;
+    pb::Shape replaced;
+    toProto(shape, "parts", 0.2, &replaced);
+    EXPECT_FALSE(replaced.has_quality()) << "that of points which were replaced";
 }
 
 TEST(Reports, ReportOutliersAndInteriorQuality) {
