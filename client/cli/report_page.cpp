@@ -149,7 +149,8 @@ std::string reportHtml(const ReportPage& page) {
         "\"></canvas>\n<div class=\"tools\"><label><input type=\"checkbox\" id=\"show-query\" checked><span "
         "class=\"swatch of-query\"></span>" +
         escaped(page.queryName) +
-        "</label><label><input type=\"checkbox\" id=\"show-hit\" checked aria-label=\"the hit\"><span class=\"swatch "
+        "</label><label><input type=\"checkbox\" id=\"show-hit\" checked aria-label=\"the hit\"><span "
+        "class=\"swatch "
         "of-hit\"></span>"
         "<span id=\"told\" role=\"status\"></span></label><button type=\"button\" id=\"reset\">Reset "
         "view</button></div>\n</div>\n</main>\n<footer>Drag to turn, wheel or two fingers to zoom. A bar of "
