@@ -23,6 +23,7 @@ python_packages=(
   python3-numpy python3-matplotlib python3-pandas
   python3-pytest python3-hypothesis python3-mypy python3-build python3-pip python3-setuptools python3-wheel
 )
+docs_packages=(mkdocs mkdocs-material python3-pymdownx)
 open3d_packages=(python3-open3d)
 browser_packages=(chromium)
 # Node may come from elsewhere than Debian, and then brings its own npm.
@@ -33,8 +34,8 @@ packages_packages=(buildah groff lintian mmdebstrap)
 bench_packages=(libpcl-dev libfaiss-dev libopenblas-dev)
 
 case "${1:-}" in
-  "") packages=("${build_packages[@]}" "${python_packages[@]}" "${browser_packages[@]}") ;;
-  --analysis) packages=("${build_packages[@]}" "${python_packages[@]}" "${browser_packages[@]}" "${analysis_packages[@]}") ;;
+  "") packages=("${build_packages[@]}" "${python_packages[@]}" "${docs_packages[@]}" "${browser_packages[@]}") ;;
+  --analysis) packages=("${build_packages[@]}" "${python_packages[@]}" "${docs_packages[@]}" "${browser_packages[@]}" "${analysis_packages[@]}") ;;
   --build) packages=("${build_packages[@]}") ;;
   --packages) packages=("${build_packages[@]}" "${packages_packages[@]}") ;;
   --open3d) packages=("${open3d_packages[@]}") ;;

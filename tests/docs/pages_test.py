@@ -1,0 +1,120 @@
+"""What must be true of the pages without running them."""
+
+import os
+import re
+import subprocess
+import sys
+import unittest
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+sys.path.insert(0, os.path.join(ROOT, "scripts"))
+
+from documented_pages import blocks_of, commands_of, not_run, pages, read  # noqa: E402
+
+# Blocks of commands that nobody runs, by page; each says why. Run what can be run; what cannot is counted here.
+NOT_RUN = {
+    "README.md": 1,     "docs/benchmarks.md": 7, "docs/configuration.md": 1, "docs/development.md": 5, "docs/file-formats.md": 1, "docs/fit.md": 1,
+    "docs/http.md": 1, "docs/operations.md": 2, "docs/other-languages.md": 1, "docs/python.md": 1, "docs/reliability.md": 1,
+    "docs/retrieval.md": 5, "docs/security.md": 6, "docs/storage.md": 1, "docs/tutorial.md": 1, "docs/verify.md": 2,
+    "docs/views.md": 1, "docs/web.md": 1,
+}
+
+
+def names_of_errors():
+    """Those of core/base/error.h, as errorCodeName writes them."""
+    with open(os.path.join(ROOT, "core/base/error.h"), encoding="utf-8") as file:
+        codes = re.search(r"enum class ErrorCode \{(.*?)\n\};", file.read(), re.DOTALL).group(1)
+    return [re.sub(r"(?<!^)([A-Z])", r"_\1", code).lower() for code in re.findall(r"^\s+k(\w+),", codes, re.MULTILINE)]
+
+
+class Pages(unittest.TestCase):
+    def test_every_page_is_in_the_navigation_once(self):
+        listed = re.findall(r"(?:: |- )([\w-]+\.md)$", read("mkdocs.yml"), re.MULTILINE)
+        self.assertEqual(sorted(listed), sorted(os.path.basename(page) for page in pages() if page.startswith("docs/")))
+
+    def test_troubleshooting_has_every_error(self):
+        names = names_of_errors()
+        self.assertGreater(len(names), 30)
+        page = read("docs/troubleshooting.md")
+        rows = re.findall(r"^\| `(\w+)` \| ([^|]+) \| ([^|]+) \|$", page[page.index("## Errors by name"):], re.MULTILINE)
+        self.assertEqual(sorted(name for name, *_ in rows), sorted(names), "one row each")
+
+    def test_the_api_reference_is_what_proto_says(self):
+        done = subprocess.run([sys.executable, os.path.join(ROOT, "scripts/api-reference.py")], stderr=subprocess.PIPE, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+
+    def test_pictures_are_small_and_used(self):
+        folder = os.path.join(ROOT, "docs/images")
+        text = "".join(read(page) for page in pages())
+        for name in os.listdir(folder):
+            self.assertLess(os.path.getsize(os.path.join(folder, name)), 220_000, name)
+            self.assertIn("images/" + name, text, "nobody shows it")
+
+    def test_links_between_pages_lead_to_files(self):
+        for page in pages():
+            for target in re.findall(r"\]\(([^)#\s]+)(?:#[^)\s]*)?\)", re.sub(r"```.*?```", "", read(page), flags=re.DOTALL)):
+                if not re.match(r"[a-z]+:", target):
+                    path = os.path.normpath(os.path.join(ROOT, os.path.dirname(page), target))
+                    self.assertTrue(os.path.exists(path), f"{page}: {target}")
+
+
+class Commands(unittest.TestCase):
+    def test_that_are_not_run_say_why_and_are_counted(self):
+        counted = {}
+        for where, reason, _ in not_run():
+            self.assertGreater(len(reason.split()), 3, f"{where}: '{reason}' is no reason")
+            page = where.split(":")[0]
+            counted[page] = counted.get(page, 0) + 1
+        self.assertEqual(counted, NOT_RUN)
+
+    def test_are_marked(self):
+        unmarked = [f"{block.where}: {block.lines[0]}" for page in pages() for block in blocks_of(page)
+                    if block.kind == "unmarked" and block.not_run is None]
+        self.assertEqual(unmarked, [], "`$ ` in front of each command, ```sh, or a comment that says why they are not run")
+
+    def test_are_most_of_what_is_shown(self):
+        run = sum(len(commands_of(block)) if block.kind == "console" else 1 for page in pages() for block in blocks_of(page)
+                  if block.kind not in ("data", "unmarked") and block.not_run is None)
+        self.assertGreater(run, 90)
+        self.assertLess(len(not_run()), run / 2)
+
+    def test_hide_in_no_data(self):
+        """A block that is taken for data shows nothing that looks typed."""
+        for page in pages():
+            for block in blocks_of(page):
+                if block.kind == "data":
+                    self.assertFalse([line for line in block.lines if line.startswith("$ ")], block.where)
+
+
+class Blocks(unittest.TestCase):
+    """How a page is read (scripts/documented_pages.py)."""
+
+    def kinds(self, text):
+        return [(block.kind, block.not_run) for block in blocks_of("page.md", text)]
+
+    def test_are_told_apart(self):
+        self.assertEqual(self.kinds("```\n$ shapedb list\nid\n```\n"), [("console", None)])
+        self.assertEqual(self.kinds("```sh\nshapedb admin rebuild\n```\n"), [("sh", None)])
+        self.assertEqual(self.kinds("```\nshapedb admin rebuild\n```\n"), [("unmarked", None)])
+        self.assertEqual(self.kinds("text\n\n    shapedb list\n\ntext\n"), [("unmarked", None)])
+        self.assertEqual(self.kinds("text\n\n    score = 1 / (1 + D)\n"), [("data", None)])
+        self.assertEqual(self.kinds("```json\n{}\n```\n"), [("data", None)])
+        self.assertEqual(self.kinds("```python\nprint(1)\n```\n"), [("python", None)])
+        self.assertEqual(self.kinds("1. Do\n\n       openssl req\n\n2. Then\n"), [("unmarked", None)])
+
+    def test_are_marked_by_the_comment_above(self):
+        self.assertEqual(self.kinds("<!-- not run: takes a day and a half -->\n\n    shapedb list\n"),
+                         [("unmarked", "takes a day and a half")])
+        self.assertEqual(self.kinds("<!-- not run: takes a day and a half -->\ntext\n\n    shapedb list\n"), [("unmarked", None)])
+        block, = blocks_of("page.md", "<!-- setup: mkdir x -->\n```\n$ ls\n```\n")
+        self.assertEqual(block.setup, ["mkdir x"])
+
+    def test_have_commands_over_several_lines(self):
+        block, = blocks_of("page.md", "```\n$ curl a |\n    head\n1\n$ ls\n```\n")
+        found = commands_of(block)
+        self.assertEqual([(each.command, each.expected, each.line) for each in found],
+                         [("curl a |\n    head", ["1"], 3), ("ls", [], 5)])
+
+
+if __name__ == "__main__":
+    unittest.main()
