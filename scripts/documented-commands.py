@@ -43,7 +43,7 @@ VARYING = [
     (re.compile(r"(?<![\w.])\d[\d.]*(e[-+]?\d+)? (ns|us|ms|s|min|h)(?!\w)"), "<time>"),
     (re.compile(r"(\"?seconds\w*\"?: ?)[\d.e-]+"), r"\1<time>"),
     (re.compile(r"(?<![\w.])\d[\d.]* ([KMG]i)?B(?!\w)"), "<bytes>"),
-    (re.compile(r"\(\d+ bytes\)"), "(<bytes>)"),
+    (re.compile(r"(?<![\w.,])\d{4,} bytes"), "<bytes>"),
     (re.compile(r"--cursor \w+"), "--cursor <cursor>"),
     (re.compile(r"(?<!\w)[0-9a-f]{16,}(?!\w)"), "<hex>"),
     (re.compile(r" +"), " "),

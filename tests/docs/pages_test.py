@@ -39,6 +39,23 @@ class Pages(unittest.TestCase):
         rows = re.findall(r"^\| `(\w+)` \| ([^|]+) \| ([^|]+) \|$", page[page.index("## Errors by name"):], re.MULTILINE)
         self.assertEqual(sorted(name for name, *_ in rows), sorted(names), "one row each")
 
+    def test_troubleshooting_quotes_what_the_programs_say(self):
+        page = read("docs/troubleshooting.md")
+        quoted = re.findall(r"^\| `([^`|]{15,})`", page[page.index("## It does not connect"):page.index("## Errors by name")], re.MULTILINE)
+        self.assertGreater(len(quoted), 7)
+        said = ""
+        for folder in ("client", "server", "core", "common"):
+            for place, _, files in os.walk(os.path.join(ROOT, folder)):
+                for name in files:
+                    if name.endswith((".cpp", ".h")) and "node_modules" not in place:
+                        with open(os.path.join(place, name), encoding="utf-8") as file:
+                            said += re.sub(r'"\s*"', "", file.read()).replace('\\"', '"')
+        for message in quoted:
+            for piece in re.split(r"'?\.\.\.'?|\b\d+\b|'\w+'|\bSHAPEDB_|[;?]", message):
+                piece = piece.strip(" ,:'")
+                if len(piece) > 8 and piece != "shapedb: command not found":
+                    self.assertTrue(piece in said, f"nobody says '{piece}' ({message})")
+
     def test_the_api_reference_is_what_proto_says(self):
         done = subprocess.run([sys.executable, os.path.join(ROOT, "scripts/api-reference.py")], stderr=subprocess.PIPE, text=True)
         self.assertEqual(done.returncode, 0, done.stderr)
@@ -56,6 +73,37 @@ class Pages(unittest.TestCase):
                 if not re.match(r"[a-z]+:", target):
                     path = os.path.normpath(os.path.join(ROOT, os.path.dirname(page), target))
                     self.assertTrue(os.path.exists(path), f"{page}: {target}")
+
+
+class Figures(unittest.TestCase):
+    """Figures that several pages show are those of the page that measures them."""
+
+    def test_of_retrieval(self):
+        measured = dict(re.findall(r"^\| `(models[\w.-]*)` \|[^|]*\| ([\d.]+ / [\d.]+) \|", read("docs/retrieval.md"), re.MULTILINE))
+        self.assertEqual(len(measured), 3)
+        for value in measured.values():
+            self.assertIn(f"**{value}**", read("README.md"))
+            self.assertIn(f"**{value}**", read("docs/comparison.md"))
+            self.assertIn("| " + value.replace(" / ", " | ") + " |", read("docs/choosing-parameters.md"))
+
+    def test_of_what_a_score_means(self):
+        """README.md and docs/concepts.md join rows of the table of docs/verify.md."""
+        row = r"^\| (below )?([\d.]+)(?: to ([\d.]+))? \|"
+        measured = [(0.0, float(low)) + (float(hits.replace(",", "")), *map(float, shares)) if below else
+                    (float(low), float(high), float(hits.replace(",", "")), *map(float, shares))
+                    for below, low, high, hits, *shares in
+                    re.findall(row + r" ([\d,]+) \| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \|$", read("docs/verify.md"), re.MULTILINE)]
+        self.assertEqual(len(measured), 7)
+        for page in ("README.md", "docs/concepts.md"):
+            rows = re.findall(row + r" \**(\d+) %\** \| \**(\d+) %\** \| \**(\d+) %\** \|$", read(page), re.MULTILINE)
+            self.assertGreaterEqual(len(rows), 5, page)
+            for below, low, high, *shown in rows:
+                low, high = (0.0, float(low)) if below else (float(low), float(high))
+                inside = [each for each in measured if low <= each[0] and each[1] <= high]
+                hits = sum(each[2] for each in inside)
+                for place, share in enumerate(shown):
+                    mean = 100 * sum(each[2] * each[3 + place] for each in inside) / hits
+                    self.assertLessEqual(abs(mean - int(share)), 0.6, f"{page}: {low} to {high}: {mean}")
 
 
 class Commands(unittest.TestCase):
