@@ -23,7 +23,7 @@ import numpy as np  # noqa: E402
 import shapedb  # noqa: E402
 from PIL import Image  # noqa: E402
 
-PARTS = ["#c8433a", "#3f7fbf", "#4d9c52", "#c98b2b", "#8a5fb0", "#2fa3a0", "#b05a86", "#7a7a35"]
+PARTS = ["#c8433a", "#3f7fbf", "#4d9c52", "#e0a11b", "#8a5fb0", "#2fa3a0", "#b05a86", "#7a7a35"]
 GREY, ORANGE = "#9aa0a6", "#d9702b"
 
 
@@ -47,7 +47,7 @@ def shaded(colours, depth):
     rgb = np.array([matplotlib.colors.to_rgb(colour) for colour in colours]) if not isinstance(colours, str) else \
         np.tile(matplotlib.colors.to_rgb(colours), (len(depth), 1))
     near = (depth - depth.min()) / max(np.ptp(depth), 1e-12)
-    return np.clip(rgb * (0.45 + 0.55 * near)[:, None], 0, 1)
+    return np.clip(rgb * (0.62 + 0.38 * near)[:, None], 0, 1)
 
 
 def draw(axes, points, colours, view=FRONT, size=1.6, title="", alpha=1.0):
@@ -68,9 +68,9 @@ def save(picture, folder, name):
     path = os.path.join(folder, name)
     picture.tight_layout()
     memory = io.BytesIO()
-    picture.savefig(memory, dpi=100)
+    picture.savefig(memory, dpi=100, bbox_inches="tight", pad_inches=0.1)
     plt.close(picture)
-    small = Image.open(memory).convert("RGB").quantize(160, dither=Image.Dither.NONE)
+    small = Image.open(memory).convert("RGB").quantize(240, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
     small.save(path, optimize=True)
     print(f"{path}: {os.path.getsize(path) // 1024} KiB, {small.width} x {small.height}")
 

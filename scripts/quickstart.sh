@@ -57,6 +57,8 @@ step "The same server speaks HTTP: for curl, and for browsers at $http"
 run curl -sS -H 'Content-Type: application/json' -d '{}' "$http/shapedb.v1.ShapeService/CountShapes"
 echo
 
+printf '\nWhat all this means, and the same with your own scan: docs/tutorial.md\n'
+
 if [ "${1:-}" = "--keep" ]; then
   trap - EXIT
   printf '\nThe server is still running at %s and %s (process %s). Try:\n  build/bin/shapedb --server %s list\n' \
