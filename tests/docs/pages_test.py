@@ -41,8 +41,8 @@ class Pages(unittest.TestCase):
 
     def test_troubleshooting_quotes_what_the_programs_say(self):
         page = read("docs/troubleshooting.md")
-        quoted = re.findall(r"^\| `([^`|]{15,})`", page[page.index("## It does not connect"):page.index("## Errors by name")], re.MULTILINE)
-        self.assertGreater(len(quoted), 7)
+        quoted = re.findall(r"^\| `([^`|]{15,})`", page[:page.index("## Errors by name")], re.MULTILINE)
+        self.assertGreater(len(quoted), 14)
         said = ""
         for folder in ("client", "server", "core", "common"):
             for place, _, files in os.walk(os.path.join(ROOT, folder)):
