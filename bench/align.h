@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // How well, and how fast, the motion between two scans of a shape is found: whole scans, scans from one side
 // and pieces, simulated from models, so that the motion is known.
 #pragma once

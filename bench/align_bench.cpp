@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb-bench align`: are known motions found?
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The baseline of `segment`: CGAL's triangulation of the same points and nothing else.
 #pragma once
 

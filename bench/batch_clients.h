@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Clients that send SearchBatch without a pause, in a process of their own: with the measuring client they
 // would share locks and memory, and what they hold up there is not the server's doing.
 #pragma once

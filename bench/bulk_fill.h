@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Fills a database with ready-made shapes, for measurements at sizes that would take days to upload.
 #pragma once
 

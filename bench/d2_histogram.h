@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // D2, the shape distribution of Osada, Funkhouser, Chazelle and Dobkin (2002): how far apart two
 // random points of the shape lie. The simplest useful descriptor, and the unit in which
 // the cost of the others is given.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb-bench find`: how often a search finds the shape that its query was made of, and how long it takes.
 #include <algorithm>
 #include <map>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb-bench fingerprint`: hashes of everything the program computes from a set of scans. Two versions
 // that print the same lines give the same segments, signatures, scores, explanations and hits, bit for bit.
 #include <array>

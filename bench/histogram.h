@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Histograms as descriptors and the usual distances between them.
 #pragma once
 

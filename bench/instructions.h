@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Compares the instruction counts of the jobs (jobs.h) with a committed file: slowdowns show even on a busy
 // machine.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb-bench instructions`: counts the instructions of small fixed jobs and compares them with a file;
 // `shapedb-bench job` runs one of them, for a profiler.
 #include <filesystem>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb-bench interior`: compares the interior and size of damaged scans with those of the clean scan.
 #include <algorithm>
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Small fixed jobs whose instructions are counted: just enough of each costly part of the program to show a
 // slowdown.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb-bench leave-classes-out`: whether the constants of verified search profit from the classes that
 // they are judged by. Those that are best on half of the classes are measured on the other half, beside those
 // shipped.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb-bench load`: what the server adds to the work of core/, latency under load, start-up and memory of
 // a large upload, each with its limit.
 #include <algorithm>

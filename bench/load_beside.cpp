@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Searches beside others: large batches, and far more clients than the server can serve.
 #include <atomic>
 #include <thread>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What the parts of `shapedb-bench load` share.
 #pragma once
 

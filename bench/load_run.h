@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The work of `shapedb-bench load`: starts a server and measures it under load from outside.
 #pragma once
 

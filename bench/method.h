@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Methods to describe shapes and compare the descriptions: ours and the alternatives.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Models that queries are simulated from, and how a query and its shape in the gallery share no point.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Stands in for pcl_methods.cpp and pcl_aligners.cpp where the Point Cloud Library is not wanted.
 #include "bench/peers.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Stands in for faiss_vector_scan.cpp where FAISS is not wanted.
 #include "bench/vector_scan.h"
 

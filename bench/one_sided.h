@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Scans of one side as cameras make them, simulated from models.
 #pragma once
 

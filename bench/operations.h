@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The operations of shapedb-bench. To add one, write a source file, declare its function here and call it in
 // program.cpp.
 #pragma once

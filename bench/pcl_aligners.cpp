@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Registration as users of the Point Cloud Library and of Open3D do it; docs/fit.md gives the settings.
 #include <exception>
 #include <new>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // ESF, VFH and GASD as users of the Point Cloud Library compute them; docs/benchmarks.md gives the
 // settings.
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Peak memory of a piece of work, whatever this process did before.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Global descriptors and registration of the Point Cloud Library. Built only with SHAPEDB_BENCH_PCL.
 #pragma once
 

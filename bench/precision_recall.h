@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The precision-recall curve of leave-one-out retrieval.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The program: reads the command line and runs the operation the user chose.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb-bench retrieval`: our profiles beside other descriptors, on the same points in the same run.
 #include <cmath>
 #include <memory>

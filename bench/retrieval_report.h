@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The report of `shapedb-bench retrieval` as text, Markdown, JSON and a picture.
 #pragma once
 

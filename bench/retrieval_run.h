@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The work of `shapedb-bench retrieval`: every method gets the same points and the same queries.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb-bench segment`: cost of a segmentation beside CGAL's Delaunay triangulation of the same points.
 #include <algorithm>
 #include <chrono>

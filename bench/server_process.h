@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Runs shapedbd as a child process, so that its time and memory are measured separately.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Any number of signatures of made-up shapes, to measure searches on. Their scores are distributed like those
 // of real shapes; docs/benchmarks.md compares the two.
 #pragma once

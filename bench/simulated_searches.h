@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Searches whose right answer is known: every query is made of a shape of the gallery, with which it shares
 // no point.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Processor time of a thread, which other load on the machine affects less than wall time.
 #pragma once
 

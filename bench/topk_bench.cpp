@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb-bench topk`: time of exact search among many signatures beside a flat scan of feature vectors, and
 // a check that it is exact.
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What two unrelated shapes differ by: where the constants kTypical of the attributed score and
 // kTypicalMisfit of the fit come from.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb-bench typical`: measures again what two unrelated shapes differ by.
 #include <algorithm>
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A flat scan of plain feature vectors: the baseline of exact search.
 #pragma once
 

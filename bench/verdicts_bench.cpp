@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb-bench verdicts`: what scores and verdicts are worth, by searches whose right answers are known.
 #include <algorithm>
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb-bench views`: is the right shape among the first of a search with a scan of one side?
 #include <algorithm>
 #include <atomic>

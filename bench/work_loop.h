@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Threads that repeat a piece of work until they are stopped.
 #pragma once
 

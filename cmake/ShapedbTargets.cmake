@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 # How libraries and tests are declared: warnings, optimisation, precompiled headers, sanitizers and include paths
 # are the same everywhere.
 

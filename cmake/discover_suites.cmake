@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 # Run after a test program is linked (see shapedb_test): writes what ctest runs, one test for each suite. A process
 # for each test would make expensive inputs again for every test that shares them. For the same reason the suites of
 # TOGETHER run in one process, as one test that is named after all of them.

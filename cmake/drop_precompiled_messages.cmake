@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 # Removes precompiled headers that contain generated messages: g++ would read the old one while it makes the new one, and
 # new fields would not be seen.
 #   cmake -D FOLDER=build -P drop_precompiled_messages.cmake

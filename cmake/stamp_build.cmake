@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 # Run by every build: writes the one source that knows the commit, and touches it only if something has changed.
 #   cmake -D SOURCE=folder -D OUTPUT=file.cpp -D BUILD_TYPE=Release -D COMPILER="GNU 12.2.0" [-D COMMIT=hash]
 #         -P stamp_build.cmake

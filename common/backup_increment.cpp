@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "common/backup_increment.h"
 
 #include <algorithm>

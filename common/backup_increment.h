@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The beginning of an increment: what has changed from one backup to a later one. Its blocks follow
 // (docs/backup-format.md has the bytes, which are persisted).
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A backup by the hashes of its blocks: enough to find what has changed since, without the backup itself.
 //
 // The hash of a page is its SHA-256. The pages of a block are hashed in pairs, their hashes in pairs again,

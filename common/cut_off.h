@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the status of a call says that the server ended while its client was sending or reading.
 #pragma once
 

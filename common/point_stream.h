@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The form of points on the wire, as client and server agree on it: packed little-endian float32 x y z.
 #pragma once
 

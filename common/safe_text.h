@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Text of strangers, made safe for terminals, logs and keys.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // SHA-256: the checksum of points on the wire and in the database, and of backups.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Files of a person or an operator that are read whole.
 #pragma once
 

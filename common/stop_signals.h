@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How SIGINT and SIGTERM end the programs. SIGPIPE is ignored: when a reader goes away, the write
 // fails.
 #pragma once

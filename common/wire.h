@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What core/ computes as messages of the API: the server sends them, and the `shapedb` command shows what it
 // computed itself in the same form.
 //

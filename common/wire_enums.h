@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Enumerations of the API and those of core/ that mean the same, for client and server alike.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Points of core/ as messages of the API, for client and server alike.
 #pragma once
 

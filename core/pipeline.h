@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // From points to signature: start reading here.
 //
 // A scan is prepared (core/preparation/), its interior found and divided into segments

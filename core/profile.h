@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The named sets of parameters. core/pipeline.h has their values.
 #pragma once
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 # Run by the installation of the Python package. Expects BUILD (folder of the build) and PYTHON. Debian's Python looks
 # into these folders; with another prefix PYTHONPATH has to name lib/python3/dist-packages below it.
 set(folder lib/python3/dist-packages)

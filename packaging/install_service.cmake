@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 # Run by the installation of the server: what names places of the system, known only now. Expects SOURCE and BUILD
 # (folders of the project). Below /usr the configuration is /etc/shapedb/shapedbd.toml, else PREFIX/etc/shapedb/shapedbd.toml;
 # one that exists is left alone.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 # Run by the build: manual pages and completions, as the programs print them, into OUTPUT. Expects SHAPEDB, SHAPEDBD.
 file(REMOVE_RECURSE ${OUTPUT})
 file(MAKE_DIRECTORY ${OUTPUT}/man1 ${OUTPUT}/man8 ${OUTPUT}/completions)

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Makes docs/api-reference.md of proto/: every call, message, field and value with its comment.
 
   scripts/api-reference.py            fails if the page is not what proto/ says
@@ -63,6 +64,7 @@ class Comments:
         """What stands at the top of the file."""
         place = self.places.get((12,))
         text = (place.leading_detached_comments[0] if place.leading_detached_comments else place.leading_comments) if place else ""
+        text = re.sub(r"^ *SPDX-License-Identifier:.*\n", "", text)
         return [linked(" ".join(paragraph.split())) for paragraph in re.split(r"\n\s*\n", text.strip()) if paragraph.strip()]
 
 

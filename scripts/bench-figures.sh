@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
 # Repeats the figures of the first table of docs/retrieval.md, row by row: prints each command, and what it measures.
 #   SHAPEDB_DATA=/data scripts/bench-figures.sh [--quick] [ROW...]    all rows by default; --list names them
 #   --quick      a few shapes of each folder: shows that every command runs; its figures mean nothing

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
 # Measures retrieval beside the peers on the public data of docs/data.md, and writes the tables into
 # docs/benchmarks.md and the plot into docs/images/. Builds the programs first, with the peers
 # (install-deps.sh --bench installs what they need).

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
 # Measures the speeds of docs/benchmarks.md again and saves what the program prints, as text and as JSON, in
 # a folder. Builds the programs first, with the peers (install-deps.sh --bench installs what they need). On a
 # quiet machine with two cores, segment takes a quarter of an hour, topk an hour and 24 GiB, load half an hour.

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
 # Builds ShapeDB with a preset of CMakePresets.json; programs end up in build/bin/. Installs nothing: see
 # install-deps.sh.
 #   scripts/build.sh            the programs, in build/ (preset release)

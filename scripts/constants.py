@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Keeps docs/constants.md complete: one row for every named constant of core/.
 
   scripts/constants.py            fails when a constant is missing from the page, listed but gone,

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Runs what the documentation tells people to type, and compares what is printed with what the pages say.
 
   scripts/documented-commands.py [--update] [--times] [PAGE...]    README.md and all of docs/

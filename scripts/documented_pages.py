@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What the pages of the documentation tell a reader to type, block by block.
 
 A block is fenced by ``` or indented by four blanks. By its first line and what stands behind ``` it is

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Draws the figures of docs/concepts.md again, of the Stanford bunny in SHAPEDB_DATA (docs/data.md).
 
   SHAPEDB_DATA=... scripts/figures.py [FOLDER]    docs/images/ by default

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
 # Makes the container image of docker/Dockerfile with buildah, which needs neither Docker nor its daemon, and tries it.
 #   scripts/image.sh                 the base is made of Debian's packages by mmdebstrap
 #   scripts/image.sh --pull          the base is debian:12-slim of Docker Hub

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
 # Installs the Debian 12 packages that ShapeDB needs, and only those that are missing.
 #   scripts/install-deps.sh             everything to build, test and check, the Python package too, and the npm
 #                                       packages of web/, as do all but --open3d

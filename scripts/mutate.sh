@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
 # Mutation test: changes one line of a source at a time and checks that a test fails. Works on a copy of the tree.
 #   scripts/mutate.sh [--count N] [--seed N] [--folder FOLDER]...
 #     --count    mutants for each folder (40)

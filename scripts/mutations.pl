@@ -1,4 +1,5 @@
 #!/usr/bin/perl
+# SPDX-License-Identifier: GPL-3.0-or-later
 # Lists mutants of C++ sources for scripts/mutate.sh: file, line number, operator and the changed line, separated by
 # tabs. Seeded, at most COUNT of them, spread over the operators.
 #   scripts/mutations.pl SEED COUNT FILE...

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
 # Builds the Debian packages, with a list of what is linked in each (SPDX), into build/packages/.
 #   scripts/package.sh [PRESET]     release by default
 #   BUILD_DIR=folder SHAPEDB_COMMIT=hash scripts/package.sh

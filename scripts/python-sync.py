@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Makes the client that blocks of the one for asyncio: client/python/src/shapedb/_async_*.py -> _*.py.
 
   scripts/python-sync.py            fails if they do not agree

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
 # From a fresh Debian 12 machine to a first result: installs what is missing, builds, starts a
 # server on loopback, uploads sample scans, rebuilds the index and searches with a new, noisy scan.
 #   scripts/quickstart.sh          stops the server at the end; its data stays in build/quickstart/

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Writes what is linked into a program as SPDX 2.3 (JSON): the Debian packages of its shared libraries, and of the
 archives and headers compiled into it; for the server the npm packages in the web page too.
 

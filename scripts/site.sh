@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
 # Builds the documentation as a site in build/site/, for any web server; nothing in it is loaded from elsewhere. It can be read from
 # that folder too, but browsers let it search only when it is served. A link or page of the navigation that leads nowhere is an error.
 #   scripts/site.sh [FOLDER]    into another folder

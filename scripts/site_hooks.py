@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What mkdocs needs to show our pages as they are shown elsewhere (mkdocs.yml)."""
 
 import re

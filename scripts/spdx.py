@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Which licence each file is under, and whether it says so (REUSE, https://reuse.software).
 
   scripts/spdx.py --check          complains of files that do not name their licence or name another one, and of files
@@ -38,7 +39,7 @@ GPL_PATHS = ["common/wire.h", "common/wire.cpp"]
 COPYLEFT_INCLUDES = ("CGAL/", "gmp", "mpfr")
 
 STYLES = {"// {}": ["*.cpp", "*.h", "*.inc", "*.proto", "*.ts", "*.mjs"],
-          "# {}": ["*.py", "*.sh", "*.pl", "*.cmake", "*.toml", "*.yaml", "*.service.in", "*.supp", "CMakeLists.txt",
+          "# {}": ["*.py", "*.sh", "*.pl", "*.cmake", "*.toml", "*.yaml", "*.yml", "*.service.in", "*.supp", "CMakeLists.txt",
                    "*.cmake.in", "_version.py.in", "Dockerfile", ".ci/run", ".clang-format",
                    ".clang-tidy", ".dockerignore", ".gitattributes", ".gitignore", "pytest.ini", "postinst", "prerm",
                    "postrm", "*.sysusers"],

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
 # Installs what is missing, checks the sources, builds with warnings as errors and runs every test but those of
 # bench/, which have a lane of their own (scripts/ci/bench.sh). Everything that reads bytes of strangers is fuzzed for a
 # moment, under sanitizers. Options go to ctest, e.g. -R core.Score; with any, nothing is fuzzed.

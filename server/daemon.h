@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The whole server: opens the store, starts the catalog and the transports, and shuts everything down
 // again. Which store and which transports there are is decided here and nowhere else.
 #pragma once

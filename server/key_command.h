@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedbd key`: API keys, made, listed and revoked on the data directory itself. This is how the first
 // admin key comes into being, which no network call can make.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // shapedbd: reads the configuration, serves until SIGTERM or SIGINT, shuts down cleanly.
 //
 // Prints one line to standard output, `listening on HOST:PORT`, and if it serves HTTP a second one;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What the whole server tells of itself whenever Prometheus asks.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // node build.mjs [FOLDER [PROTOC]]: writes the page's files to FOLDER (dist/), ready to be served. Needs no network.
 //
 // protoc writes gen/: the messages and services of ../proto as TypeScript, so that the page cannot drift from the API.

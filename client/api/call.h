@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How every rpc is made: deadline, cancellation, retries and errors in one place. Private to client/api.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The C++ client of a ShapeDB server. docs/client-library.md walks through it.
 //
 //     auto client = shapedb::client::Client::connect({"127.0.0.1:7878"});

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Between the values of types.h and the messages of the API. Not installed.
 //
 // Values that only a newer server knows (an unknown state, too few extents) become the nearest harmless ones.

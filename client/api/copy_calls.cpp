@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The part of AdminService that moves files: backup and restore of everything, export and import of one
 // collection.
 #include <filesystem>

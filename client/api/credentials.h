@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Who the client is, and how the connection is protected. Private to client/api.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Makes a full backup of a chain, without a server.
 #include <filesystem>
 #include <new>

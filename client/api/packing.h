@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Scans as they are sent: packed little-endian float32.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Whether and when to retry a failed call. Decisions only; call.h does the waiting.
 #pragma once
 

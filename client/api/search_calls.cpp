@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // SearchService.
 #include "client/api/call.h"
 #include "client/api/client.h"

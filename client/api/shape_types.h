@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the client library takes and returns about stored shapes; part of types.h.
 #pragma once
 

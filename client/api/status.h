@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // From the status of a gRPC call to an Error.
 #pragma once
 

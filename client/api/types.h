@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the client library takes and returns, as plain values: copyable, owning, with no invariants beyond the
 // comments. proto/shapedb/v1/ has the messages behind them, with every limit.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A full backup and the increments made after it, read as the backup that they lead to. Private to client/.
 #pragma once
 

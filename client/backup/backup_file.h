@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The file that a backup or an increment is written to. Private to client/.
 #pragma once
 

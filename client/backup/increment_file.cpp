@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "client/backup/increment_file.h"
 
 #include <limits>

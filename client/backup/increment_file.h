@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Reads increments, which may be damaged or no increments at all. Private to client/.
 #pragma once
 

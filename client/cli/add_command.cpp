@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb add`: stores files and folders of scans in a collection.
 #include <algorithm>
 #include <atomic>

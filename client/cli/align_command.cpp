@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb align`: lays one scan on another, without a server, or a stored shape on a scan.
 #include <memory>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A 5x7 pixel font for the labels of a picture; ASCII only.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb delete|metadata|retry`: changes of stored shapes.
 #include <algorithm>
 #include <functional>

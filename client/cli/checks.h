@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Checks of flag values with readable messages: CLI11's own print the limits of a double in full.
 #pragma once
 

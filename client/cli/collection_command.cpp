@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb collection create|get|list|rename|alias|unalias|delete|export|import`.
 #include <memory>
 

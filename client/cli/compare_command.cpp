@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb compare`: the score of two stored shapes, or of two files without a server, explained.
 #include <memory>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What may be typed next, and the scripts by which shells ask for it.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Where output goes: results to one stream, errors and progress to the other.
 #pragma once
 

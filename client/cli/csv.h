@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Rows of CSV files as RFC 4180 has them, but with lines that end as on Unix.
 #pragma once
 

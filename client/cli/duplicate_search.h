@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // All pairs of a collection that score at least a threshold, and the groups that they make.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb duplicates`: the pairs of a collection that are nearly the same.
 #include <map>
 #include <memory>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb evaluate`: how well the method finds shapes of the same class (leave-one-out), or the right
 // entries of a gallery; needs no server.
 #include <memory>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The work behind `shapedb evaluate`: files to signatures to scores, in parallel, with the same result for
 // any number of threads.
 #pragma once

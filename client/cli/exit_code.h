@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Exit codes; docs/command-line.md lists them with the error names.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Pictures of a similarity matrix, labelled with the class names.
 #pragma once
 

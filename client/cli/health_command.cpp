@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb health`: is the server serving? Made for container health checks.
 #include <memory>
 

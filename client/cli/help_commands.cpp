@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb help|completion|man`: what is said of the commands, all made from their definitions.
 #include <filesystem>
 #include <fstream>

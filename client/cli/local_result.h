@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What the command computes itself, in the form of a reply of the server, so that both are shown alike.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Manual pages, made from what the commands say of themselves.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb match`: of two folders, which scan of one belongs to which of the other.
 #include <algorithm>
 #include <memory>

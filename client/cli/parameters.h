@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The flags that choose how a scan is segmented and scored, the same for every command.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb query`: the stored shapes most like scans, or like a stored shape.
 #include <algorithm>
 #include <filesystem>

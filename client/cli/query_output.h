@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Answers of searches as text, as JSON and as rows of a table.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb report`: a search as one page that can be sent around.
 #include <ctime>
 #include <filesystem>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The page of `shapedb report`: one file that needs nothing else.
 #pragma once
 

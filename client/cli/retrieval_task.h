@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The task of a retrieval measurement: which scans of a folder, of which classes, and which entries of a
 // gallery are right for a query. Independent of how scans are described and scored, so that every method is
 // measured on the same task (`shapedb evaluate`, `shapedb-bench retrieval`).

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb sample`: labelled noisy scans of made-up shapes, as test and demo data.
 #include <algorithm>
 #include <filesystem>

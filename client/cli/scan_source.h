@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Scan files as the commands use them: read, degraded on request, named.
 #pragma once
 

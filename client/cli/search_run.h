@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A search with a scan file or a stored shape, as `query` and `report` make it.
 #pragma once
 

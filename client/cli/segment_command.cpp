@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb segment`: the parts and the signature of one scan, without a server.
 #include <memory>
 

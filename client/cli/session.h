@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What every command gets: the global options, the console and the means to stop it.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb get|list|count|watch|signature`: what is stored.
 #include <algorithm>
 #include <memory>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Signatures, shapes and alignments as text and as JSON, the same in every command.
 #pragma once
 

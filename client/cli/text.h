@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Numbers and tables for people; not used for JSON.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The scans of `shapedb add`, and the keys that they get.
 #pragma once
 

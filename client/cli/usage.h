@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What is said of a wrong command line, and in which words: those of the commands and flags.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Stores a scan, then finds the shapes most like it. Usage: quick [HOST:PORT]
 #include <cmath>
 #include <cstdio>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Where a scene puts the parts that it is made of. Private to client/io.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Where the bytes of a scan file come from: the file itself, or what it holds in another encoding. Private to
 // client/io.
 #pragma once

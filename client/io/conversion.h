@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How to get a file that we do not read into a format that we do. Private to client/io.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One reader per format. Private to client/io: callers use readScan.
 //
 // Each starts at the beginning of the file, stops at the first defect, and allocates in proportion to the

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // glTF 2.0: the triangles, strips, fans and points of the scene, where its nodes put them. Skins, morph
 // targets, animations and materials do not change the shape at rest that is read.
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Not tinygltf: the names of files in a stranger's document and the bounds of accessors would have to be
 // checked beside it all the same, and the images that it decodes are not needed.
 #include "client/io/gltf_document.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A glTF 2.0 document with its binary data, and typed access to both that never leaves their bounds. Private
 // to client/io.
 #pragma once

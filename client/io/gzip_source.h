@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a gzip file holds. Private to client/io.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A file read front to back, through a buffer that grows only with the bytes that arrive. Private to
 // client/io.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // LAS 1.0 to 1.4, uncompressed. Debian 12 has neither PDAL nor LASzip; LAZ, the compressed kind, is refused
 // with the way out.
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Wavefront OBJ: v and f lines; nothing else changes the surface.
 //
 // Not tinyobjloader, which reads "v 1 abc nan" as (1, 0, 0) without an error, overflows on long indices

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // OFF (Geomview object file format) as text, with the prefixes that only add data to vertices.
 //
 // Not CGAL's reader, which does not notice what follows the last announced face.

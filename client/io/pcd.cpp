@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // PCD (Point Cloud Library): ASCII, binary and binary_compressed.
 //
 // A point with a coordinate that is not finite means "nothing measured here": it is skipped and counted.

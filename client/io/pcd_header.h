@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The header of a PCD file: its fields, the number of points and the encoding. Private to client/io.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // PLY: ASCII and both binary byte orders, any elements and properties in any order. Written here because
 // Debian 12 packages no PLY library.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The header of a PLY file: its elements, their properties and the encoding. Private to client/io.
 #pragma once
 

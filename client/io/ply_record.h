@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The two ways to read one record of a PLY element, with one interface. Private to client/io.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Writes points to PLY files that any viewer opens.
 //
 // A regular file is written under a temporary name and then renamed: readers never see half a file, and a

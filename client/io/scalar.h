@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The number types of binary PLY and PCD records. Private to client/io.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the format readers produce, and the code they share. Private to client/io.
 #pragma once
 

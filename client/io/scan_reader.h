@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Reads scan files. Only the client reads files, never the server, so a damaged file cannot harm others.
 // docs/file-formats.md says what each format may contain and what is refused.
 //

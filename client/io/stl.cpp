@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // STL, binary and ASCII. Corners at the same position become one vertex.
 #include <algorithm>
 #include <cstdint>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Words and numbers from lines of text: fast, and independent of the locale. Private to client/io.
 #pragma once
 

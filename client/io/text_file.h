@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Writes text to files as ply_writer.h writes points: complete or not at all.
 #pragma once
 

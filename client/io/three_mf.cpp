@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // 3MF: the meshes that the build of the package places, with components and parts of their own (production
 // extension). Read with libzip and Expat rather than lib3mf, so that the bounds on what unpacks and on copies
 // are ours.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How much packed data may unpack to. Private to client/io.
 #pragma once
 

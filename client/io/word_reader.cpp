@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "client/io/word_reader.h"
 
 #include "client/io/text.h"

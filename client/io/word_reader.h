@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The words of a text file, over the ends of lines. Private to client/io.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Plain text points: three numbers at the start of each line, or in the columns that a header names x, y and
 // z.
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The entries of a ZIP archive. Private to client/io.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Union-find: a partition of 0 .. count - 1 that only ever gets coarser.
 #pragma once
 

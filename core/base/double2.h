@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Two doubles in one SSE2 register, for running one computation on two inputs at once. Each half rounds as
 // a plain double does, so results have the same bits.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Errors as values: the one closed enum of everything that can go wrong, and the
 // Result type every fallible function returns.
 //

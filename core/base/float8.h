@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Eight floats computed on at once. Each lane rounds as a plain float does, so results have the same bits
 // whichever registers the compiler has: two of SSE2, or one of AVX in functions compiled for it.
 #pragma once

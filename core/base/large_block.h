@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Uninitialised memory for large arrays, on huge pages where the system has them: random access to an array
 // of hundreds of megabytes waits as much for page tables as for memory.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Units of length of scans: for client and server alike.
 #pragma once
 

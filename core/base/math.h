@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Pi, and angles in degrees and radians.
 #pragma once
 

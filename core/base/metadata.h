@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What clients say about a shape: text under unique text keys, such as its label.
 #pragma once
 

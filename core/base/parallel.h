@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Parallel loops over independent items, on the threads of the caller's oneTBB arena.
 #pragma once
 

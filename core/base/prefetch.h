@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Prefetching for loops that read memory in random order.
 #pragma once
 

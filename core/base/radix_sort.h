@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Stable parallel radix sort by unsigned integer keys.
 #pragma once
 

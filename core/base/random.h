@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A small seeded generator with the same stream on every platform, so that a seed in a test, a document or a
 // bug report means the same points everywhere. (The results of std::normal_distribution and std::shuffle
 // depend on the standard library.)

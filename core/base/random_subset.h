@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Some of many, each subset as likely as any other.
 #pragma once
 

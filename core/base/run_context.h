@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Cancellation, deadline and progress of long-running work.
 #pragma once
 

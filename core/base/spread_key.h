@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Hashing of keys whose bits differ in few places, such as the packed indices of a grid.
 #pragma once
 

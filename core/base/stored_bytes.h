@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How numbers are written into stored bytes: little-endian on every machine, with a checksum at the end.
 #pragma once
 

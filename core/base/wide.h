@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Choosing, at run time, functions compiled for AVX2.
 #pragma once
 

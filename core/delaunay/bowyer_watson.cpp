@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Inserting a site p takes five steps. If one of the first three fails, nothing has changed.
 //
 //   1. locate:       walk to a cell that contains p, or sees it from outside the hull.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Inserting one point into a Delaunay triangulation (Bowyer 1981, Watson 1981): remove the cells whose balls
 // contain it, and join it to the facets around the hole.
 #pragma once

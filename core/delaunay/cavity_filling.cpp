@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Steps 3 to 5 of an insertion (bowyer_watson.cpp): the cells of the cavity give way to new ones that join
 // its facets to the inserted site p.
 //

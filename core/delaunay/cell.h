@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A tetrahedron of the triangulation while points go in, and how its vertices and facets are numbered.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Memory for the cells of a triangulation and their cached balls.
 #pragma once
 

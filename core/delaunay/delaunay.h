@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The Delaunay triangulation of a point cloud as flat arrays: the one data structure of the method.
 //
 // When to take it, and when CGAL's Delaunay_triangulation_3. Both find exactly the same tetrahedra. Take this

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The ball of a cell in double precision, cached beside the cell. It nearly always tells whether a point lies
 // inside, with a fraction of the arithmetic of sideOfSphere and without reading the cell's corners. Within a
 // proven margin of the sphere it says "unknown", and the exact predicate decides.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Builds the triangulation in the cell store, with one thread or several. delaunay.h is what users call.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Hilbert order: points that are close in space are mostly close in memory.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Which worker a vertex or a cell belongs to: what lets workers insert points side by side without locks.
 #pragma once
 

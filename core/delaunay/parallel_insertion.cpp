@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A parallel round has three phases. Only the second inserts.
 //
 //   1. Alone: choose slabs, write down which worker owns each site (and thereby each cell), mark the cells

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Workers that insert points into one Delaunay triangulation at the same time, without locks.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The two exact predicates of a Delaunay triangulation: on which side of a plane, and of a sphere, is a
 // point? An inline floating-point filter answers almost always; what it leaves open goes to CGAL's exact
 // kernel.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Cells from which a worker can start walking when it cannot get through from its last insertion.
 #pragma once
 

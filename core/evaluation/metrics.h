@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // How good a ranking is: the retrieval measures of the Princeton Shape Benchmark and of the SHREC contests
 // over a score matrix, and hit rates of queries against a separate gallery.
 //

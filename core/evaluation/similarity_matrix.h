@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The similarity matrix as a picture, as in Figure 6 of Dey and Goswami (2004). Rows are queries and columns
 // candidates, both grouped by class; in each row the few best scores are shaded by their value. Good
 // retrieval shows as dark blocks along the diagonal.

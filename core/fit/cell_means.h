@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Means of the points in the cells of a cubic grid. For the sources of this folder.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // How well one pose of the other shape explains the query, and how to improve it. For the sources of this
 // folder.
 #pragma once

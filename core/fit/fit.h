@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Aligning two shapes by their surface points: where exactly does the other shape lie on the query, how well
 // does it explain what was scanned, and which other poses are equally good? docs/fit.md describes the method.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The loops in which a fit spends its time: eight points at a time, compiled twice (for any processor, and
 // for AVX2 where there is one), with the same bits. For the sources of this folder.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // One of the two point sets of a fit, laid out for the loops that compare them. For the sources of this
 // folder.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Lines about which the other shape may be turned without a change. For the sources of this folder.
 #pragma once
 

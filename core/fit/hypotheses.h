@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Where to start: poses from laying principal axes on each other, judged by a few points. For the sources of
 // this folder.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Which surface point is nearest to any place, read from a table. For the sources of this folder.
 #pragma once
 

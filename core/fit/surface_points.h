@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A scan reduced to what aligning it needs: some 1,500 points spread evenly over its surface, with normals.
 //
 // They are stored beside the signature of a shape (core/fit/surface_points_codec.h) and read only for the few

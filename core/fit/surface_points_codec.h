@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The persisted byte form of surface points: docs/fit.md describes every byte. Never change it; add a
 // version.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What a verified hit is to the query, in one word, and how often that word is right.
 #pragma once
 

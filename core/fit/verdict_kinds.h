@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a hit may be to the query: for client and server alike.
 #pragma once
 

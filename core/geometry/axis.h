@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A coordinate chosen by the number of its axis.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The size of a shape, by a measure that rotation does not change.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The convex hull of a point cloud. CGAL's, behind a header of our own: it takes long to compile.
 #pragma once
 

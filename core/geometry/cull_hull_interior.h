@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Dropping points that cannot lie on the convex hull, in linear time.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What a far camera sees of points: for each pixel how near the nearest one is.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Triangle meshes, with no more than it takes to turn one into a point cloud.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Interleaving bits, for Morton codes and other keys that follow a tree of cubes.
 #pragma once
 

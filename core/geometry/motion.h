@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Similarity motions: rotation or reflection, uniform scale, translation.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Nearest neighbours. Two structures, each for one use:
 // - NeighbourIndex, a k-d tree, answers any query at any place.
 // - localSpacings needs the three nearest neighbours of every point and nothing else. In Hilbert order,

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Points, and the vector operations used everywhere.
 #pragma once
 

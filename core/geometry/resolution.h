@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How finely floating-point numbers hold the coordinates of a scan: far from the origin they lie further
 // apart, and rounded to them a shape loses its details, then itself.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Measures of single tetrahedra and their facets. Facet i is the one opposite corner i.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Two points in SIMD lanes: the operations of point.h on both at once, with the same bits for each.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Arithmetic that every scorer shares: the weight of a distance, and what keeps bounds safe after rounding.
 #pragma once
 

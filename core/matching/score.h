@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The score of one pair of shapes. To compare a query with many, make its Scorer once (scorer.h).
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What a user can choose about how shapes are compared.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The scale of scores: how a distance between shapes becomes a score in [0, 1].
 #pragma once
 

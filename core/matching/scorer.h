@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // How alike a query is to other shapes (Section 4.2 of the paper): one interface, one folder for each method.
 //
 //   published/   points and weights alone, as in the paper

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What is scored of a shape, and nothing else, in the packed form in which a search keeps it.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Decimating a dense scan: one averaged point per occupied cell of a cubic grid. Where points
 // overlap, averaging also cancels part of the scanner's noise.
 #pragma once

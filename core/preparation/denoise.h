@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Estimating the noise of a scan, and moving its points back to their surface.
 #pragma once
 

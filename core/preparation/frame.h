@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The unit frame, in which all geometry is done.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Options for preparing a scan before it is triangulated.
 #pragma once
 

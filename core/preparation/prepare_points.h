@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // All of the preparation: from a scan to the points that are triangulated.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The first step: from what a client sends to points that geometry can be done on.
 #pragma once
 

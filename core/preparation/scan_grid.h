@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `sanitise` and `decimate` in one pass over a large scan, without copying or sorting its points.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What a scan shows besides one object: the table that it stands on, and other objects.
 //
 // All functions are pure, use no randomness but fixed seeds, and are thread-safe.

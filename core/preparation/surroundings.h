@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // How far the neighbours of each point are, and which points hang together. For the sources of this folder.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Thinning to an even density: no two points that stay are closer than a given distance.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Metadata filters: which shapes a search or a listing considers.
 #pragma once
 

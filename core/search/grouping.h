@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Groups of hits: shapes with the same value under a metadata key.
 #pragma once
 

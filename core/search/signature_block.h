@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What a search reads of up to a thousand shapes, in arrays: all that enters a score and nothing else, at
 // most 512 bytes a shape, and 1,700 more for one with views.
 #pragma once

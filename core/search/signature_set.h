@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The cached signatures of one collection: an immutable snapshot that queries read while the next one is
 // prepared.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Exact top-k: the k best scores of a snapshot, equal to brute force bit for bit.
 #pragma once
 

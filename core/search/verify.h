@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Verified search: the best candidates of a search are laid on the query (core/fit/), and how well they fit
 // is part of their score.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The shapes of which a view is most like a scan of one side: candidates for verifying (verify.h).
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Which rows of a block a search looks at. For the sources of this folder.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // An interior without an angle to set: chosen from the shape itself, with a figure of its quality.
 #pragma once
 

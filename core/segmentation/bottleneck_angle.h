@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The walk of Section 2 for all angles at once: how tightly the shape encloses each Delaunay ball.
 #pragma once
 

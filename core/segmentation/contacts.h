@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Where segments touch, and how wide the saddle between them is.
 #pragma once
 

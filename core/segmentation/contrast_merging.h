@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Merging segments by contrast: how much thicker a segment is than the saddle into it. The paper's
 // criterion (Section 3.3), but with pairs merged in order of contrast and groups compared as they grow.
 // docs/segments.md has the results.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The discrete flow of the distance function between tetrahedra (Section 3.2).
 #pragma once
 

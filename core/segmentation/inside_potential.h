@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Which side of the surface each tetrahedron is on, by global evidence instead of a walk.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The inner big Delaunay balls, which approximate the shape (Section 2).
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What an interior costs by its boundary, and which of many nested interiors costs least.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How an interior may be found, and where one came from. Kept apart from core/segmentation because
 // the client library and the wire use these two as well.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Options of the segmentation. The defaults are those of the paper.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // From a noisy point cloud to the segments of the shape's interior: Sections 2 and 3 of
 // Dey and Goswami, "Shape Segmentation and Matching from Noisy Point Clouds" (2004).
 // Runs the stages in order, each of which has a header: core/preparation/prepare_points.h,

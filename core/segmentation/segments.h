@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Grouping interior tetrahedra into segments: the stable manifolds of maxima (Section 3.2), and
 // their merging (Section 3.3).
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // How webs are peeled off an interior: by the widest way that leads to each tetrahedron from outside.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Covariance matrices as segments and signatures keep them: xx, xy, xz, yy, yz, zz. For the sources of this
 // folder.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The outline of a shape as it lies: a scan of one side shows it as well as a scan of all sides.
 #pragma once
 

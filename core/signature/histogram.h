@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Histograms with soft bins: each value is shared by the two nearest bins, so that a small change
 // of the shape is a small change of the histogram.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Inner distances: lengths of shortest paths that stay in the interior.
 #pragma once
 

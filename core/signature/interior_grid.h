@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The interior on a fine grid that knows where its surface runs between two voxels: for straight lines that
 // must stay inside.
 #pragma once

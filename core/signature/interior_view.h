@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The interior of a segmented shape as the statistics need it: in its own frame and unit.
 #pragma once
 

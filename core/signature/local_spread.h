@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What the surface around a point looks like at a tenth of the shape's size: a rod, a sheet or a body.
 #pragma once
 

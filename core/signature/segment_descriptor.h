@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The segments of a signature as the attributed score compares them: in the frame of the whole body,
 // with sizes as logarithms.
 #pragma once

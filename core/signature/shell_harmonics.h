@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // How points are distributed over the directions, shell by shell around their centroid: the
 // rotation-invariant energies of spherical harmonics (Kazhdan, Funkhouser, Rusinkiewicz 2003).
 #pragma once

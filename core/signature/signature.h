@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The signature of a shape: its heaviest segments as weighted points (Section 4.1), scaled by the
 // shape's bounding box (Section 4.2).
 #pragma once

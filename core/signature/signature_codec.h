@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The persisted byte form of a signature: docs/signature-format.md. Never change it; add a version.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The four bits in which bins of statistics are kept: half the memory for a search to read, and no more
 // loss than from noise (docs/signature.md).
 #pragma once

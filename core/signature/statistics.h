@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Statistics of a shape's interior and surface as a whole: histograms that do not change under
 // rotation, reflection, translation and scaling, and little under bending. They go beyond the paper,
 // whose points and weights alone are a weak signature: docs/signature.md has reasons and figures.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Shortest paths from one place of the interior to all its cells, as a taut string would run.
 #pragma once
 

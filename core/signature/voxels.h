@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The interior on a grid, for fast tests whether a place is inside.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Bending a scan, as joints and soft bodies do.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A labelled collection of shapes: families of parametric solids with limbs, and scans of them.
 // docs/synthetic.md lists what each family varies.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Solids whose volume and balls are known exactly, as ground truth for tests of the segmentation.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Degrading clean point clouds: Gaussian noise, fewer points, a table beneath.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What scanners miss: scans from one side, and pieces.
 //
 // All functions are pure and thread-safe.

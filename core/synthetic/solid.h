@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Solids as unions of primitives, and points sampled from their boundary: for tests with analytic
 // answers and for the synthetic collection.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // How far a scan of one side is from the views of a shape, exactly and by a cheap lower bound.
 //
 // All functions are pure and thread-safe.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What one side of a shape looks like, in 64 bytes: where its surface lies along its own principal axes.
 // docs/views.md has reasons and figures.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Views of a shape: what a camera would see of it from twenty sides, so that a scan of one side can be
 // compared with like. docs/views.md describes the method and what it finds.
 #pragma once

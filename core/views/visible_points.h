@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Which surface points a far camera sees. For the sources of this folder.
 #pragma once
 

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
 # The lane of shapedb-bench: builds it, compares instruction counts with the baseline, runs its tests.
 set -euo pipefail
 cd "$(dirname "$0")/../.."

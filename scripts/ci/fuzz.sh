@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
 # Fuzzes everything that reads bytes of strangers, with AddressSanitizer and UndefinedBehaviorSanitizer.
 #   scripts/ci/fuzz.sh [SECONDS] [TARGET...]     60 seconds each by default; the targets are tests/fuzz/TARGET_fuzz.cpp
 # What was found to be interesting is kept in build-fuzz/corpus/TARGET; an input that fails is left in build-fuzz/.

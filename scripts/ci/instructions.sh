@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
 # Counts the instructions of small fixed jobs under callgrind and compares them with the committed baseline,
 # bench/instructions.json; fails if a job grew by more than 3 %. Counts depend on the compiler, the C library,
 # valgrind and the processor's instruction sets: in another environment than the baseline's the lane shows them,

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
 # What can be checked without compiling: format, layers, test programs, file sizes.
 set -uo pipefail
 cd "$(dirname "$0")/../.."

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
 # Everything that is too slow for every change. Runs all lanes, even after one has failed, and says which failed.
 #   scripts/ci/nightly.sh [LANE]...    sanitize, threads, bench, tidy, fuzz, mutate, reliability, docs, packages; all by default
 set -uo pipefail

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
 # The Debian packages as an administrator meets them, in a minimal Debian 12 of their own: lintian, installation, service,
 # upgrade, removal, purge; then the container image. As root; needs Debian's mirror.
 #   scripts/ci/packages.sh [--keep-packages]      takes build/packages/ as it is instead of building it

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
 # All tests under sanitizers: scripts/ci/sanitize.sh [address,undefined | thread] [CTEST OPTIONS]
 set -euo pipefail
 cd "$(dirname "$0")/../.."

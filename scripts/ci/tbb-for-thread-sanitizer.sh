@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
 # Builds Debian's oneTBB with ThreadSanitizer into build-tbb-thread/ and prints that folder. The sanitizer cannot
 # see how an uninstrumented oneTBB orders its tasks, and reports races between tasks that run one after the other.
 set -euo pipefail

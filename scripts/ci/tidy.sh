@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
 # clang-tidy with the checks of .clang-tidy over the sources of the programs.
 #   scripts/ci/tidy.sh                  every source
 #   scripts/ci/tidy.sh --base REVISION  those that differ from a revision

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Work in many pieces that must not slow down the calls that clients wait for one by one.
 #pragma once
 

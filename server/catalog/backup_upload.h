@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The rules for uploading a backup, whatever the transport; the transport keeps the bytes.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Changes of many shapes of a collection, whatever the transport: which shapes a request means, how the work
 // is divided, and what its caller is told.
 //

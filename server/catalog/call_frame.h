@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The rules around every call, whatever its transport: who may enter, which error a client gets when
 // several could be told, and when it may try again.
 #pragma once

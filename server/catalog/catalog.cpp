@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Start and stop, collections, backup and restore; shapes.cpp has the shapes, rebuilds.cpp the rebuilds,
 // transfer.cpp exports and imports.
 #include "server/catalog/catalog.h"

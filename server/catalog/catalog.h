@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The shapes and collections of a server: store, index, workers and rebuilds, and every rule about
 // what must happen together when one of them changes.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The opaque text that tells where the next page of a listing starts.
 #pragma once
 

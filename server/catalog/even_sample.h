@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Which points of a scan to send to somebody who wants to look at it, not all of it.
 #pragma once
 

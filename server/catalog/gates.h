@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Admission: which calls may enter, write, compute and hold memory.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The limits of the API that are not configurable, whatever the transport. The configurable ones
 // are config::ServerConfig::limits.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Pages of a listing of shapes, and counts, whatever the transport.
 #pragma once
 

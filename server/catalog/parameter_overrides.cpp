@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 #include "server/catalog/parameter_overrides.h"
 
 #include "core/base/return_if_error.h"

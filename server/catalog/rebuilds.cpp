@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Rebuilds: begin, follow, cancel.
 #include <algorithm>
 #include <chrono>

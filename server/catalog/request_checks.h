@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Checks of the fields of a request, whatever its transport. Each error names the field, what is
 // wrong with it and what is allowed.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Receives the points of one upload, whatever the transport.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Runs searches on a limited number of processors.
 #pragma once
 

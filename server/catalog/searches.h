@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The rules of a search, whatever its transport: what a request may ask for, which signature a query
 // has, which hits an answer holds and how large it may be.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A shape is added: what happens in which order, whatever the transport.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Shapes: look up, put, delete, follow, describe.
 #include <utility>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Command line, environment and file become one checked configuration.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Everything an operator can configure, with its defaults. docs/configuration.md documents it;
 // settings.cpp is the one table that names, describes and checks each key.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The table of settings: names in all sources, meaning, range, parser and printer.
 #pragma once
 

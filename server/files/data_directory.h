@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The directory that holds the database and everything the server writes beside it.
 #pragma once
 

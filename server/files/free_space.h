@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Whether the disk has room, asked before it is filled.
 #pragma once
 

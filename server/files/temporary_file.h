@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A file that lives as long as the call that made it.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // One call by the Connect protocol: the request's body becomes messages of a gRPC call, and its answers the
 // answer's body.
 #pragma once

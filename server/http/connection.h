@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // One connection of an HTTP/1.1 client: its requests one after another, with a time limit on everything that
 // it can make us wait for.
 #pragma once

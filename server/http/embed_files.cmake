@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 # cmake -DFOLDER=page -DOUTPUT=embedded_files.cpp -P embed_files.cmake
 # Writes every file below FOLDER, compressed by gzip, as one table (server/http/files.h). The same content gives the
 # same bytes.

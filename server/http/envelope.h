@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The Connect protocol's envelopes: each message of a stream is one byte of flags, its length in four bytes
 // (big-endian), and its bytes.
 #pragma once

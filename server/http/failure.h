@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Failures as HTTP clients see them: those of calls by the Connect protocol's rules, and those of HTTP
 // itself.
 #pragma once

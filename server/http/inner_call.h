@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Calls of the gRPC server in this process: whoever calls through here meets the same handlers, rules, limits
 // and log lines as a gRPC client does.
 #pragma once

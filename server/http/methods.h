@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Which calls there are, and their messages as JSON and as protobuf.
 #pragma once
 

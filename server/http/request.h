@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What the head of a request asks for, and whether it may: before any of its body is read.
 #pragma once
 

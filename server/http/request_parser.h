@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Takes requests apart as their bytes arrive: Boost.Beast's parser with our limits.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // OpenSSL's settings for the connections of one certificate.
 #pragma once
 

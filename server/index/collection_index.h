@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The index that answers searches: for each collection an immutable snapshot of its parameters and
 // signatures, replaced as a whole.
 //

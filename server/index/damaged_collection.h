@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Collections of which something that is stored cannot be read: what takes their place in the index, and what
 // whoever asks for them is told.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Surface points of shapes, read from the store when a search verifies them and kept for the next.
 #pragma once
 

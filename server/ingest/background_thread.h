@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Background work must not slow down the calls that clients wait for.
 #pragma once
 

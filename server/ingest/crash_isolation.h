@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Keeps scans that may have crashed the server apart from the others.
 //
 // When the process dies, every scan being segmented is a suspect. After the restart suspects are segmented

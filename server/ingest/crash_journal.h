@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Which scans a rebuild was segmenting when the process ended, how often, and how.
 //
 // Ingest jobs are counted in the store, but a rebuild has no jobs: without this file, a scan that crashes

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Tells a crash of the segmentation from a kill, a power failure or a crash elsewhere.
 //
 // A process that is killed says nothing; one that crashes runs a signal handler. The handler writes which

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Progress of running segmentations, for callers that watch or wait.
 //
 // The board only tells that something changed; the state of a shape is in the store.

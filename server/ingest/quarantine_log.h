@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The log line of a quarantined scan, the same from workers and from rebuilds.
 #pragma once
 

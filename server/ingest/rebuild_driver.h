@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Segments whole collections again in the background, into a new generation of signatures that
 // replaces the serving one when it is complete.
 //

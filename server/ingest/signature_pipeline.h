@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // From a scan to its signature, as the server runs it: for callers who wait, and in the background
 // for scans in the store.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The workers that turn stored scans into signatures.
 //
 // A job is claimed, segmented and its result committed in the store; then the index is refreshed

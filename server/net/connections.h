@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // How many connections are open, without help from whoever serves and closes them.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // How many files and sockets the process may have open.
 #pragma once
 

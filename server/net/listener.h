@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Accepts connections and hands them over. gRPC's own listener gives up for good when a single accept fails,
 // and takes connections without end; this one does neither.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // When a client that sends or reads too slowly is cut off: one rule for all transports.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The part of AdminService that sends and receives database files: backup and restore of everything, export
 // and import of one collection.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The part of AdminService that concerns API keys.
 #include "core/base/return_if_error.h"
 #include "server/rpc/admin_service.h"

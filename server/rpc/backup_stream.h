@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Sends and receives a database file, or what has changed in it, in chunks.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The answer of SearchBatch, encoded query by query. gRPC would encode the whole of it, megabytes, on the
 // thread of the call at the end, and single searches beside it would wait for the processor meanwhile.
 #pragma once

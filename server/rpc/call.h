@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // One gRPC call around its handler: who may make it (security::Authorization), the rules of
 // catalog::CallFrame, the client's cancellation and deadline, one log line; no exception leaves it.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Turns gRPC's "is this call cancelled?" into a flag for long-running work, and cuts off clients that
 // send or read nothing, or hardly anything: each holds a thread. Their status says why.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // shapedb.v1.CollectionService over gRPC: validate, convert, call the catalog, convert back.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The only conversion between the messages of the API and the types of core/ and store/.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The gRPC server: its handlers, its health service, and where it listens.
 #pragma once
 

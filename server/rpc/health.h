@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What grpc.health.v1 says of the server and of each of its services (docs/operations.md#health).
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // How another transport of this process calls the gRPC handlers.
 #pragma once
 

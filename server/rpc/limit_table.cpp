@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 #include "server/rpc/limit_table.h"
 
 #include "core/base/error.h"

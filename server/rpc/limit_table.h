@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Every limit that a client can meet, in one table: what ServerInfo lists and docs/limits.md describes. The
 // values are the constants and settings by which the limits are enforced; nothing is written twice.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Limits of the gRPC transport; server/catalog/limits.h has those of the API.
 #pragma once
 

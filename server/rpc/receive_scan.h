@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Reads uploads from a gRPC stream: AddShape, SearchByScan, Segment and Align share it.
 #pragma once
 

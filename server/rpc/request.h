@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The one message of a unary call, or of one that is answered by a stream. gRPC would decode it before the
 // handler runs, whoever sent it, and a few megabytes can become a hundred in memory. So the handler reads it,
 // once it is known that the caller may make the call.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // gRPC's credentials for TLS from files that may be replaced while the server runs.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Whether a call is allowed: one check for all operations, whatever the transport.
 #pragma once
 

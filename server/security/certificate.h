@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Certificates and keys for TLS, read from files and checked before anybody depends on them.
 #pragma once
 

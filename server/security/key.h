@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // API keys: who a caller is, and what it may do.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Where API keys are kept. Apart from the shapes: a backup holds no keys, and restoring an old one revives
 // none.
 #pragma once

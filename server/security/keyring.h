@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The API keys of a server: who presents which, and how much each has used.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Every operation of the API, with the role it takes and the kind of work it is. A handler of any transport
 // names its operation here; there is no other way to run one.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Named places at which a test lets the process die. Compiled out, except of the libraries that
 // tests/reliability/ builds for itself with SHAPEDB_FAILPOINTS; a test looks for them in the programs.
 #pragma once

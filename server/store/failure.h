@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // How errors travel inside a store: as the exception `Failure`, which `guarded` turns into an
 // Error at the boundary of every public function. SQL code stays in straight lines, and
 // transactions roll back on every way out.

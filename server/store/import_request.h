@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What Store::importCollection is asked to do.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What the keys and metadata of shapes and the names of collections may be: one rule for uploads, for what is
 // looked up, for databases that are restored or checked, and for what an API key may use.
 #pragma once

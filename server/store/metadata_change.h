@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // How a call changes the metadata of a shape, whichever database keeps them.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The stored form of a collection's parameters: JSON with every field.
 //
 // The names are persisted: never rename one. Text of an older server lacks later fields; these are

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // How the points of a shape are stored. Persisted: docs/storage.md describes the bytes and a test
 // pins them; a change needs a new format byte beside the old ones.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What a put may do, whichever database keeps the shapes: the rules of PutRequest in store.h and the
 // messages of their errors. A store reads what it holds, asks here, and writes, in one transaction.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Scans that bring the server down are not segmented for ever: after several crashes a scan is quarantined,
 // which means failed until it is sent again, retried or replaced. A process that was killed proves nothing
 // against the scans it had in hand, unless that happens over and over.

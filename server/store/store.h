@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What the server keeps on disk, as an interface without SQL. Nothing outside server/store/ knows
 // which database is behind it.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A scan that has passed every check: what the server stores and segments.
 #pragma once
 

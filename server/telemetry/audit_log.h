@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Who was refused, and what administrators did: one JSON object per line, in files of their own.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Log lines with named fields, as text for people or as JSON for machines.
 #pragma once
 

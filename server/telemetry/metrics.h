@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What the server does, in numbers, for Prometheus. docs/metrics.md lists them.
 #pragma once
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A server to attack, and a client without any of our code: grpcio and generated stubs."""
 
 import math

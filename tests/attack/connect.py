@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """HTTP as a stranger would send it: plain sockets and http.client, and the Connect protocol on top of it."""
 
 import http.client

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A leaf page of each table and index is overwritten: what can be served is served, and the rest says what helps."""
 
 import contextlib

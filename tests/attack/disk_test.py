@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Attacks on the disk and on what is kept there."""
 
 import contextlib

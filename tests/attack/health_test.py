@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What grpc.health.v1 says of each service when something is out of order, as docs/operations.md has it."""
 
 import contextlib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What a hostile client may try over HTTP, with sockets of its own."""
 
 import gzip

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """HTTP and the Connect protocol: that every call works, that no rule of gRPC is missing, and who may do what."""
 
 import base64

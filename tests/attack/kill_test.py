@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The server is killed at random times under load, again and again: what it acknowledged is there after each restart.
 
 SHAPEDB_TEST_SCALE multiplies the number of kills, SHAPEDB_TEST_SEED chooses other times and changes.

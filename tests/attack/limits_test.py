@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Each limit of ServerInfo: what is under it and at it is taken, what is over it is refused by name.
 
 A limit without a case here, or without a test of another file that is named here, fails."""

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The numbers for Prometheus, as Prometheus reads them; and that the dashboard, the alert rules and the documentation
 speak of the ones that exist."""
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A client that is not ours, with scans that lie far from the origin of their coordinates."""
 
 import math

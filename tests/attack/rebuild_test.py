@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Reads while rebuilds are put in place: none may fail, however many switches there are."""
 
 import threading

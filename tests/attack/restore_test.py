@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Backups and exports that somebody edited: what no client could have stored does not come in with them."""
 
 import contextlib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Every rpc: who may make it, written down apart from the server's own table, and how to make it by its description."""
 
 from attacker import admin, align, collections, grpc, search, shapes

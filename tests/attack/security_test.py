@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Who may do what: TLS, API keys, roles, collections, limits; and that no secret is told anywhere."""
 
 import datetime

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """A mixed load for a long time: memory, descriptors, threads, the log of the database and temporary files stay flat.
 
 SHAPEDB_TEST_SCALE multiplies the 15 seconds: 240 is an hour. SHAPEDB_TEST_SEED chooses other calls.

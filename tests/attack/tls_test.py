@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """TLS: what listens beyond loopback, certificates that change while calls run, and clients that must show one."""
 
 import os

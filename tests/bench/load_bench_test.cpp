@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The whole operation on a real server, at sizes that take seconds.
 #include <filesystem>
 #include <map>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The program's `run`, called as a shell calls it, and a folder of labelled scans to call it on.
 #pragma once
 

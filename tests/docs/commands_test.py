@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """scripts/documented-commands.py itself: that it finds what a page says wrongly."""
 
 import importlib.util

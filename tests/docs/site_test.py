@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The documentation as a site: it builds, every link and anchor in it leads somewhere, and nothing is loaded from elsewhere."""
 
 import os

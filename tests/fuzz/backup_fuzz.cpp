@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Fuzzes restores: whatever file is offered, it is refused, or the database is sound and can be used
 // afterwards. The input overwrites pieces of a good backup: place (4 bytes), length, bytes; and may cut it.
 #include <fstream>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Fuzzes the files that an operator gives the server: configuration, certificates, keys. The first byte
 // chooses.
 #include "server/config/load.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Fuzzes what HTTP clients send: envelopes in any pieces, requests and their heads, and messages as JSON. The
 // first byte chooses.
 #include <nlohmann/json.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Fuzzes the reader of increments: whatever the file, it is refused, or the chain gives exactly the backup
 // that the increment names. The first byte says how the input is used: as the file; as changes of a good
 // increment (place, byte); as the fields of one whose checksums are right.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Fuzzes the readers of scan files: any bytes give points or an error with a message, and nothing else.
 // The first byte chooses the format, A for the first in scanFileEndings(), the rest is the file.
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Fuzzes the whole road from points to a signature, on tiny clouds: an error, or a signature that can be
 // stored and is alike to itself. Coordinates are small integers, so that points repeat and lie on lines and
 // planes, or any floats.

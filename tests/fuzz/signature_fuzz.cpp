@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Fuzzes what is stored of a shape and what SearchBySignature receives: any bytes are an error, or a value
 // that encodes to the same bytes and scores within [0, 1]. The first byte chooses the format.
 #include <cmath>

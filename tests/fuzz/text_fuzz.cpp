@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Fuzzes the texts of a request: filters, cursors, keys, names, metadata, API keys, and what is shown of
 // them. The first byte chooses which.
 #include "common/safe_text.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Fuzzes the streams that clients send: scans in chunks, and backups in parts. The first byte chooses; after
 // the header each message is a length and its bytes.
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // AdminService on a live server: rebuild, backup, restore, check.
 #include <algorithm>
 #include <atomic>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Each kind of bad input gets its own error and code, stores nothing and leaves a working server.
 #include <cmath>
 #include <limits>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Changes of many shapes, batches, orders, counts, groups and aliases on a live server.
 #include <algorithm>
 #include <future>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // CollectionService on a live server.
 #include "core/pipeline.h"
 #include "tests/integration/support/live_test.h"

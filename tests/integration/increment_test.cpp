@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Backup with a manifest, as any client may send it.
 #include <filesystem>
 #include <string>

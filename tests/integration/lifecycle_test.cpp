@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Drain, kill and restart; a full queue; a scan that crashes the server.
 #include <atomic>
 #include <future>

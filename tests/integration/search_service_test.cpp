@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // SearchService on a live server, against scores computed here by plain loops.
 #include <algorithm>
 #include <future>

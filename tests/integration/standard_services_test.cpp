@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Health and reflection, as load balancers and generic clients speak them; ServerInfo, Stats,
 // and the command line of the program itself.
 #include <fstream>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // ExportCollection and ImportCollection on live servers.
 #include <algorithm>
 #include <cstring>

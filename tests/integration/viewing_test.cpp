@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What is sent to somebody who wants to look at shapes, on a live server.
 #include <string>
 #include <string_view>

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Does scripts/spdx.py notice what it is there for? In a repository made for each test."""
 
 import pathlib

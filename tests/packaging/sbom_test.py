@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Do the lists of what is linked name what is linked, and nothing else? Environment: BUILD, WORK (folders), PAGE (the list
 of npm packages in the web page; empty without one)."""
 

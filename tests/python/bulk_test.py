@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Many uploads: errors that do not stop the others, errors that do, resuming, and Ctrl-C."""
 
 import asyncio

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A server for the tests of one file, and collections of their own in it."""
 
 import itertools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Addresses, keys and TLS options; secrets stay secret."""
 
 import os

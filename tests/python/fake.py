@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A server that fails as it is told, to see what a client does then."""
 
 import concurrent.futures

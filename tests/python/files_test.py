@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scan files: what is read, and what is refused with which words."""
 
 import struct

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A server of one's own: it starts, says why it does not, and never outlives its program."""
 
 import os

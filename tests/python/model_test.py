@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A collection is a mapping: under any series of changes it holds what a dictionary would."""
 
 import hypothesis

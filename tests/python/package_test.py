@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Wheel and source distribution: built without network, installed into an empty folder, used from there."""
 
 import os

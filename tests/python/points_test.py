@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What is taken for a scan, and how it is packed."""
 
 import pickle

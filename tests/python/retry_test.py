@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Retries, deadlines and the names of errors, against a server that fails as it is told."""
 
 import asyncio

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Adding scans and searching for them, on a live server."""
 
 import dataclasses

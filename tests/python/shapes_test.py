@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Collections and shapes on a live server: what is stored is what comes back."""
 
 import datetime

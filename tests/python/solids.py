@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Solids that are told apart: points on their surfaces."""
 
 import numpy as np

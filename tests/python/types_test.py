@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The package is typed: mypy --strict finds nothing in it, nor in what its users write."""
 
 import os

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The process dies between any two steps of what the server does to its files: the next one starts, and
 // nothing that was acknowledged is lost.
 #include <atomic>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Calls of the operating system that fail, each of them once: the error is clear, nothing is lost, and the
 // store works on.
 #include <gtest/gtest.h>

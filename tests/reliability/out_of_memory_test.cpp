@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Each allocation of each call of the store fails once: the error is clear, nothing is lost, and the store
 // works on.
 #include <gtest/gtest.h>

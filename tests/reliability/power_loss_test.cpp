@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Loss of power at any moment: what was acknowledged is there after the next start, and no half of anything
 // else.
 #include <filesystem>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // How thorough the tests are that can be made as long as one likes.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A server with shapes in it, and a browser that looks at its page.
 import { execFileSync, spawn } from 'node:child_process';
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The page as people use it, in a headless Chromium against a real server; what is drawn is judged by its pixels.
 import assert from 'node:assert/strict';
 import { writeFileSync } from 'node:fs';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The file that `shapedb report` writes, in a headless Chromium without a server; what is drawn is judged by its pixels.
 import assert from 'node:assert/strict';
 import { join } from 'node:path';

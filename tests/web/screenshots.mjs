@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // node tests/web/screenshots.mjs FOLDER: the pictures of docs/web.md, of made-up shapes (`shapedb sample`). Needs
 // SHAPEDBD, SHAPEDB and web/node_modules as the tests do.
 import { mkdirSync } from 'node:fs';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The page's arithmetic and file readers without a browser.
 import assert from 'node:assert/strict';
 import { mkdtempSync, rmSync } from 'node:fs';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The address holds the state of the page: whatever is seen is a link. #/PAGE/COLLECTION/KEY/...?option=value
 
 export const kPages = ['shapes', 'shape', 'like', 'compare', 'scan', 'families', 'admin'] as const;

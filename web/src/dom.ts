@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Builds elements. Text always becomes text, never markup: keys and metadata are strangers' words.
 
 export type Child = Node | string | number | null | undefined | false;

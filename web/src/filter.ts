@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Filters (docs/filters.md) as lists of terms, so that a facet can change one of them.
 
 /** The conditions of a filter, without the blanks around them. Never fails: the server says what is wrong with a filter. */

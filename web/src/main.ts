@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The page: reads the address, shows the view it names, and listens for scans that are dropped.
 import type { Address, PageName } from './address';
 import { currentAddress, goTo } from './address';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The scan that was dropped on the page. It stays in this tab: nothing of it is in the address or kept after a reload.
 import { sha256 } from './sha256';
 import { send } from './api/connect';

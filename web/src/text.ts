@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Numbers and values of the API in words.
 import { ShapeState } from '../gen/shapedb/v1/types_pb';
 import { Verdict } from '../gen/shapedb/v1/search_service_pb';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a page of the page is made of.
 import type { Address } from './address';
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The page's side of worker.ts.
 import type { Scan } from './files/decode';
 import type { Outcome, Task } from './worker';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What takes long runs here, so that the page stays at hand: reading files, and distances between clouds.
 import { distancesTo } from './cloud/nearest';
 import type { Scan } from './files/decode';

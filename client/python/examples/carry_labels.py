@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Gives unlabelled shapes of a collection the labels of those they look like.
 
     carry_labels.py HOST:PORT COLLECTION            says what it would do

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Finds scans of the same object in a folder.
 
     duplicates.py FOLDER            with a server of its own, whose data are forgotten

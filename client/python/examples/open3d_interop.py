@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scans from Open3D and back: finds a mesh by a noisy part of its points, and lays it on them.
 
     open3d_interop.py               prints how far apart they are

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Meshes from trimesh and back: files of all its formats can be stored, and what is found is laid on the query.
 
     trimesh_interop.py FOLDER QUERY         writes QUERY.found.ply: the mesh that is most like QUERY, laid on it

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The distance behind the score of signatures with attributes: what the segments of two shapes, and the
 // shapes as a whole, differ by, as one number. docs/scoring.md derives it.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A query with attributes, prepared to be compared with many shapes.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The scorer of the default profile: statistics of the shapes as a whole, and their segments under the
 // best alignment (docs/scoring.md).
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // From alignments of bodies, in their own frames, to what an explanation shows: motions of scans.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // How much of one body another one contains, for a one-sided scan or a broken piece as the query.
 #pragma once
 

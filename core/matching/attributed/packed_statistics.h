@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Statistics as a search reads them: two levels in a byte, in two halves, the second of which is only read
 // where the first does not rule a shape out.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/matching/attributed/segment_match.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // How well the segments of two bodies agree: the best over all alignments of their weighted points
 // (Section 4.2), where each point brings the attributes of its segment.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The segments of a body as they are compared, wherever they are kept.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The first rungs of the ladder of bounds: which rows the statistics alone rule out.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Frames from two directions, and the orthogonal map between two of them.
 #pragma once
 

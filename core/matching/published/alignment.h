@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The best of all alignments of two weighted point sets (Section 4.2).
 //
 // An alignment puts the heaviest points (the anchors) on each other and turns b so that the axis from

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The scorer of the paper: points and weights alone, under the best of all alignments.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The complete check of a database, for Store::check and before a restore.
 #pragma once
 

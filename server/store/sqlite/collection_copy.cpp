@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 #include "server/store/sqlite/collection_copy.h"
 
 #include "server/store/point_blob.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Copies a collection from one database to another, some shapes at a time: exports and imports share it.
 // Functions throw Failure.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // How many changes were acknowledged, kept outside the database.
 //
 // SQLite ignores a damaged end of its write-ahead log, and a log that was removed: it opens an older state

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The private layer over the SQLite C API: connections, cached statements, transactions. Functions
 // throw Failure (server/store/failure.h).
 //

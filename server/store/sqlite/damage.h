@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What of a damaged database can still be read, and what an operator is told of the rest.
 //
 // SQLite says that a page is malformed, but not of which table it is. The small tables, of which everything

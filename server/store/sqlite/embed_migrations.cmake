@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 # cmake -DFOLDER=migrations/x -DFUNCTION=name -DOUTPUT=x.cpp -P embed_migrations.cmake
 # Writes the *.sql files as one C++ array, returned by FUNCTION (server/store/sqlite/migrator.h). Names must be
 # NNNN_words.sql, numbered 1, 2, 3 ... without a gap.

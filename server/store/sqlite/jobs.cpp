@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The job queue.
 #include "server/store/failpoints.h"
 #include "server/store/put_rules.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Listings and counts of shapes.
 #include "core/base/return_if_error.h"
 #include "server/store/sqlite/damage.h"

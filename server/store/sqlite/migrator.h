@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Brings a database to the schema of this program.
 //
 // Migrations are the numbered files of migrations/, compiled in. They only go forward, each in

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What was found when the database was opened, and is told until an operator has acknowledged it.
 #include <algorithm>
 

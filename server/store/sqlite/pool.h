@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Read connections, each lent to one thread at a time.
 #pragma once
 

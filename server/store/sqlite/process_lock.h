@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // One process at a time: a lock file beside the database.
 #pragma once
 

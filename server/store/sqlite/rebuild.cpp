@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Rebuilds: a second generation of signatures is built beside the serving one.
 #include "core/base/return_if_error.h"
 #include "server/store/failpoints.h"

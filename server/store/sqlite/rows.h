@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // From rows to the structs of store.h, and small reads that several files share.
 #pragma once
 

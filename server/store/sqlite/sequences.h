@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The ids that AUTOINCREMENT gives out: never twice, and never to the end.
 #pragma once
 

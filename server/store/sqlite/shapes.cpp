@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Shapes, their points and the signatures that serve.
 #include <algorithm>
 

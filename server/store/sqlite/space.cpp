@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What frees space, and what a full disk still allows.
 #include "core/base/return_if_error.h"
 #include "server/store/failpoints.h"

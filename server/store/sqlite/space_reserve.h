@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Space on the disk that is kept for deletions: to delete, SQLite must write first.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The SQL of the store. Each constant's address is its key in a connection's statement cache.
 //
 // The texts are in sql_statements.inc, so that kStatements lists them all: a test reads the query plan of

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // API keys in an SQLite file of their own.
 #pragma once
 

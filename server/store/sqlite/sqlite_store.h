@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Store on SQLite: one database file in WAL mode.
 #pragma once
 

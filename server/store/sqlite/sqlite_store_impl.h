@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The class behind openSqliteStore; its functions are in collections.cpp, shapes.cpp, listing.cpp, jobs.cpp,
 // rebuild.cpp, maintenance.cpp, notices.cpp, space.cpp, transfer.cpp and sqlite_store.cpp.
 //

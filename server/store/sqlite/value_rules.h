@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What each column of a database may hold. A file that somebody made can hold anything that its types allow;
 // what a client could not have stored must not come in with it.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Files of the server: backup and restore, export and import.
 #include <filesystem>
 #include <fstream>

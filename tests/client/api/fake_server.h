@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A ShapeDB server inside the test process, with scripted answers.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Incremental backups of a real server: whatever happens between them, the chain gives back what there was.
 #include <csignal>
 #include <cstring>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb align`: the matrix and the moved scan, near the origin and far from it.
 #include <cmath>
 #include <fstream>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb admin backup|restore|merge-backups` with increments, as a user types them.
 #include <filesystem>
 #include <string>

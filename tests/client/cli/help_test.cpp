@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What the program says of itself: help, completion, manual pages, and what was probably meant.
 #include <cstdio>
 #include <filesystem>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // API keys and TLS, as a user of the command meets them; against a real shapedbd.
 #include <fstream>
 

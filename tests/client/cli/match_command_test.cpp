@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb match`: which scan of one folder belongs to which of another.
 #include <filesystem>
 #include <fstream>

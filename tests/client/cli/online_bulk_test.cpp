@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Commands on many files or shapes: what is told once, what an interrupt leaves, and results as they come;
 // against a real shapedbd.
 #include <cstdlib>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The commands that change many shapes, list them in other orders, count values and group hits, against a
 // real shapedbd.
 #include <cstdlib>

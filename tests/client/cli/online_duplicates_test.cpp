@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb duplicates` against each shape compared with each; a real shapedbd.
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A real shapedbd, and commands that talk to it.
 #pragma once
 

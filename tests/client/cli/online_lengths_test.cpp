@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Units of length, tables and mirror images in the commands that need a server, against a real shapedbd.
 #include <cmath>
 #include <filesystem>

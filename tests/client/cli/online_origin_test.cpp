@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Scans that lie far from the origin of their coordinates, through the commands.
 #include <algorithm>
 #include <cstdio>

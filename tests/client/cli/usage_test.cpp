@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Command lines that are refused, and what all commands have in common.
 #include <csignal>
 #include <cstdlib>

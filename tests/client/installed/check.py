@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """Installs ShapeDB into folders of its own and uses what is there as a stranger would: builds a program outside the tree
 against the client library, starts the installed server, and talks to it by the program, the command and the Python package.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a program that uses the installed library looks like: prints why a server cannot be reached.
 #include <iostream>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Packed files, standard input and formats that the name does not say.
 #include <cstdlib>
 #include <string>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Truncated, damaged and false files: any bytes give a value or an error, and memory grows with the bytes
 // that are there, not with what a header announces.
 #include <atomic>

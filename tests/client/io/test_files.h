@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Files of every format, in a temporary folder.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // One content in all the ways that programs write it: every reader must see the same points and triangles, or
 // say why not. Each test goes through the formats.
 #include <cctype>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Signatures with attributes: random ones with every kind of degeneracy, and those of scans.
 #pragma once
 

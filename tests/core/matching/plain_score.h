@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The published score straight from its definition, sharing nothing with the code under test: full rotation
 // matrices, every (i, j, k, l, reflection), matching by repeated search.
 #pragma once

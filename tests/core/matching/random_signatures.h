@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Random signatures with every kind of degeneracy, for the tests of matching and search.
 #pragma once
 

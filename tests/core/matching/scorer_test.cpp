@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Scorers through their interface: rows of a block, signatures and free functions agree, and what a scan
 // hands on changes no bit.
 #include "core/matching/scorer.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The search is independent of the method: any scorer can be plugged in.
 #include <algorithm>
 #include <atomic>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The best groups of a search against a plain reference: score everything, sort, and take hit after hit.
 #include <algorithm>
 #include <atomic>

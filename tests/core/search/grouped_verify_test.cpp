@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Verified searches with groups against a plain reference: fit everything, sort, and take hit after hit.
 #include <algorithm>
 #include <map>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The whole road once: noisy scans in random poses to signatures to the nearest of them.
 #include <iostream>
 #include <string>

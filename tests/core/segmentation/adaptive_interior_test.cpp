@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The adaptive interior, together with the preparation, by `segment` on solids of known volume.
 #include "core/segmentation/adaptive_interior.h"
 

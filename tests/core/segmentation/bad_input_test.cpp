@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Every way a scan can be unusable; and how running work is cancelled and observed.
 #include <atomic>
 #include <chrono>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Corners and circumcentres of tetrahedra as rational numbers, for references. Apart from small_clouds.h
 // because it includes CGAL, which is slow to compile.
 #pragma once

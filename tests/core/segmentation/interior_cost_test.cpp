@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The sweep over nested interiors against costs computed anew for every single one.
 #include "core/segmentation/interior_cost.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Scans that have no surface, or walls that the points do not resolve, say so.
 #include <cmath>
 

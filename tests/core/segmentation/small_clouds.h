@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Small point clouds on which every stage is compared with a plain reference: random, noisy, and degenerate
 // on purpose (grids and cospherical points).
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What must not change the attributes of a signature, and how little noise may change them.
 #include <algorithm>
 #include <atomic>

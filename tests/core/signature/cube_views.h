@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Interiors of known form without a scan, made of equal cubes; and reference computations for the tests of
 // several statistics.
 #pragma once

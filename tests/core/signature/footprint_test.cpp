@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Shapes with known outlines, seen from one side and from all sides.
 #include "core/signature/footprint.h"
 

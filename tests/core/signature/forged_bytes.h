@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Bytes of signatures that decodeSignature must refuse.
 #pragma once
 

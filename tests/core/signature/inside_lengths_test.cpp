@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Bending and centrality of shapes whose inside distances are known, with and without noise.
 #include <algorithm>
 #include <cmath>

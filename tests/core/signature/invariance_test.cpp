@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What must not change a signature: rotation, reflection, scale, translation and order of the scan, and the
 // number of threads.
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Spread around points of a rod, a sheet and a ball, and against a plain computation.
 #include "core/signature/local_spread.h"
 

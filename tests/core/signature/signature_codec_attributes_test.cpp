@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Versions 2 to 4 of the format: signatures with attributes.
 #include <cmath>
 #include <cstdint>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Each statistic against a second implementation of its definition, and for shapes with known answers.
 #include "core/signature/statistics.h"
 

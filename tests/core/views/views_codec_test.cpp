@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/views/views_codec.h"
 
 #include <cstring>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A client on the generated stubs that returns everything a call gave back.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Tests that share one running server; each works in a collection of its own.
 #pragma once
 

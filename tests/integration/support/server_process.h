@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Runs shapedbd for a test, in a temporary directory.
 #pragma once
 

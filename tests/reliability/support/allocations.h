@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Memory that runs out inside the store: operator new and SQLite's allocator, counted and made to fail.
 #pragma once
 

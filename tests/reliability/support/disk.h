@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A model of one folder on a disk: what was changed in it, and what of that is certain to be there after
 // the power fails. A file's bytes are kept by a sync of the file, its name by a sync of the folder.
 #pragma once

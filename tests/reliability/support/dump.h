@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Everything in a database as text, to compare two states of it.
 #pragma once
 

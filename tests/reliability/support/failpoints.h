@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Failpoints of the libraries under test (server/store/failpoints.h): counted, and deadly when asked.
 #pragma once
 

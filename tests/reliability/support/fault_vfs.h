@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A VFS of SQLite around the default one: tells the disk (disk.h) what is written, and lets calls fail
 // (faults.h).
 #pragma once

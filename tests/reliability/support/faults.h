@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Input and output that fail at a chosen call.
 #pragma once
 

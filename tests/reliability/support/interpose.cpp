@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The program's own fsync, rename and remove, used by SQLite and the store alike: the C library's, seen by
 // the disk (disk.h) and failing as asked (faults.h).
 #include <cerrno>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A script recorded step by step, so that each step can be repeated from the files before it, with something
 // failing inside.
 #pragma once

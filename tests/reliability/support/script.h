@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Fixed workloads of a store, one call to the store in each step.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Changes of many shapes, on a catalog with a memory store.
 #include "server/catalog/bulk_changes.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The rules around export and import of one collection.
 #include <atomic>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Workers whose queue, or whose collections, are damaged.
 #include <atomic>
 #include <memory>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // API keys in memory, as a plain reference of security::KeyStore.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The Store contract in maps: a plain second implementation for tests of the layers above. Not
 // durable; backups and exports copy the content under the name of the "file".
 #pragma once

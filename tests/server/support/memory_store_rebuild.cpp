@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Rebuilds in the memory store.
 #include "server/store/parameters_codec.h"
 #include "tests/server/support/memory_store.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Listing, and changes of many shapes.
 #include <algorithm>
 #include <tuple>

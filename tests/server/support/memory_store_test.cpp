@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The memory store answers as SQLite does: what tests on it show holds for the server.
 #include "tests/server/support/memory_store.h"
 

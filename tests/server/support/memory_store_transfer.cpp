@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Export and import of one collection.
 #include "core/base/return_if_error.h"
 #include "server/store/put_rules.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The Connect protocol's envelopes: a byte of flags, the length in four bytes (big-endian), and the message.
 
 const kHeadBytes = 5;

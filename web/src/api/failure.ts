@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Why a call failed, in words for the person at the screen.
 
 export class Failure extends Error {

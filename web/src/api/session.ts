@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The API key of this tab. It is kept until the tab is closed, and sent to nobody but the page's own server.
 
 const kName = 'shapedb-key';

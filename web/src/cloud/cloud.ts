@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Points as they are drawn and sent.
 
 /** x y z, x y z, ... as the server has them. */

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How a hit is laid on its query: y = scale * R x + t (proto Motion), between frames in which both have a diagonal of 1.
 import { Matrix4, Quaternion, Vector3 } from 'three';
 

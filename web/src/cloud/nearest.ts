@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How far each point of one cloud is from the nearest of another.
 
 /** Cells in the largest distance that counts. */

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Colours of points: segments, the two sides of a comparison, distances. RGB, 0 to 255.
 export type Rgb = readonly [number, number, number];
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Scan files become points here, in the browser: the server only ever sees points.
 import type { BufferGeometry, Object3D } from 'three';
 import { Mesh } from 'three';

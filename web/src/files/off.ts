@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // OFF files, which three.js does not read: a count of corners and faces, the corners, and of each face how many corners
 // it has and which.
 import { BufferAttribute, BufferGeometry } from 'three';

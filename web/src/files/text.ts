@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Text with a point a line: XYZ, PTS, CSV and the like. three's XYZLoader takes lines of three or six numbers only;
 // scanners also write intensities, commas and headings.
 import type { Positions } from '../cloud/cloud';

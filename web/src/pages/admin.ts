@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The server at work: what it holds, rebuilds, failures with their reasons, keys.
 import type { Address } from '../address';
 import { formatAddress } from '../address';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Two stored shapes, one laid on the other. A hit of a search by key is opened here.
 import type { Address } from '../address';
 import { formatAddress, goTo, linkTo } from '../address';

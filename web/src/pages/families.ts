@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How alike the shapes of a collection are, each with each: near-duplicates and families as a matrix.
 import type { Address } from '../address';
 import { goTo, linkTo, withOptions } from '../address';

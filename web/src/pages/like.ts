@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What is like a stored shape: hits with score, verdict and reasons.
 import type { Address } from '../address';
 import { goTo, linkTo, withOptions } from '../address';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A scan that was dropped on the page: read, sent, shown in segments, searched with, and stored if wanted.
 import type { Address } from '../address';
 import { formatAddress, linkTo } from '../address';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One shape: its points coloured by segment, what is known of it, and what is like it.
 import { Matrix4 } from 'three';
 

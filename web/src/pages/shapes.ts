@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A collection: a wall of pictures, with what to filter it by at the left.
 import type { Address } from '../address';
 import { goTo, withOptions } from '../address';

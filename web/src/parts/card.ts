@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A shape on the wall, and a hit among others.
 import type { Address } from '../address';
 import { linkTo } from '../address';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What is asked and told in front of the page: the API key, and what the keys of the keyboard do.
 import { apiKey, setApiKey } from '../api/session';
 import { h } from '../dom';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Which values shapes have under which metadata key, to choose from: the filter of the address follows.
 import type { Address } from '../address';
 import { goTo, withOptions } from '../address';

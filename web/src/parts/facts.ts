@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Names and values in two columns.
 import type { Child } from '../dom';
 import { h } from '../dom';

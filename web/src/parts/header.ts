@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The bar above every view: which collection, what to do with it, a scan from a file.
 import type { Address, PageName } from '../address';
 import { formatAddress, goTo } from '../address';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Keys that do something wherever the focus is, unless somebody is writing.
 import { currentAddress, goTo, parentOf } from '../address';
 import { showKeys } from './dialogs';

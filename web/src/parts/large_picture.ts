@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The place of a large picture, also where the browser has no WebGL.
 import { h } from '../dom';
 import { Viewer } from '../view/viewer';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a search or a comparison may do, as switches; the address has them.
 import type { Address } from '../address';
 import { goTo, withOptions } from '../address';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A hit laid on its query: the way from beside to on top of it, in colours that tell what matches.
 import { Matrix4, Vector3 } from 'three';
 

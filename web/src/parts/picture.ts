@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The small picture of a shape: drawn when it comes into view, turned by the pointer.
 import type { Rgb } from '../cloud/palette';
 import { kQuery } from '../cloud/palette';

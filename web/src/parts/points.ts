@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Points of shapes with their segments, for the large pictures.
 import { call, follow } from '../api/connect';
 import { isCancelled } from '../api/failure';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Points for small pictures, fetched for many shapes at a time and kept.
 import { call, follow } from '../api/connect';
 import { isCancelled } from '../api/failure';

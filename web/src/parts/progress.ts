@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Stage by stage, what is being done, with a bar where somebody knows how far it is.
 import { h } from '../dom';
 import type { OnProgress } from '../scan_session';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Why two shapes have their score, as bars: how alike they are in each respect.
 import { h } from '../dom';
 import { percent } from '../text';

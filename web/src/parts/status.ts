@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The states in which there is nothing to show yet, or at all.
 import { Failure, isCancelled, messageOf } from '../api/failure';
 import type { Child } from '../dom';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What two shapes are to each other, in words and bars.
 import type { Child } from '../dom';
 import { h } from '../dom';

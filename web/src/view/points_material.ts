@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How points look: round, and as large on the screen as their distance from each other.
 import { ShaderMaterial } from 'three';
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Makes depth seen in a cloud without normals: eye-dome lighting (Boucheny 2009). Points farther from the eye than what is
 // around them on the screen are darkened, which draws outlines and hollows.
 import type { PerspectiveCamera, Scene, WebGLRenderer } from 'three';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Small pictures of shapes, splatted by hand: a wall of them needs no WebGL context, and each takes a millisecond.
 import type { Positions } from '../cloud/cloud';
 import { frameOf, normalised, spacingOf } from '../cloud/cloud';

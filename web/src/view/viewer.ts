@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Draws point clouds that can be turned by mouse, finger and keys; one camera, one or two views side by side.
 import type { Matrix4 } from 'three';
 import {

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Finds 3D objects that look like your scan: the Python client of ShapeDB.
 
     import shapedb

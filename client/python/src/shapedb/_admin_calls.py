@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The calls about collections and the server itself, as values."""
 
 from __future__ import annotations

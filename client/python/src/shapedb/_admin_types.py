@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the maintenance of a server takes and returns: values that do not change."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A connection for asyncio. `_client.py`, the one that blocks, is made of this file by scripts/python-sync.py."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One collection, as `AsyncClient` sees it. `_collection.py` is made of this file by scripts/python-sync.py."""
 
 from __future__ import annotations

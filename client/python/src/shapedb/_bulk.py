@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Many uploads: what is to be sent, what became of it, and the workers that do it."""
 
 from __future__ import annotations

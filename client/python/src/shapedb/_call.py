@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A call as a value: what is asked, and what the answer means. Both clients make the same calls."""
 
 from __future__ import annotations

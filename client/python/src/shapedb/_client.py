@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A connection that blocks. Made of `_async_client.py` by scripts/python-sync.py: change that, not this."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One collection, for `Client`. Made of `_async_collection.py` by scripts/python-sync.py: change that, not this."""
 
 from __future__ import annotations

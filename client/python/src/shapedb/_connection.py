@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How to reach a server: its address, TLS, the API key. The rules are those of the `shapedb` command."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Errors: one class, told apart by the stable names of docs/api.md."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reads the scan files that are common among researchers. The `shapedb` command reads more of them."""
 
 from __future__ import annotations

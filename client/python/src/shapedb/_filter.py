@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Filters (docs/filters.md) with values of strangers in them."""
 
 from __future__ import annotations

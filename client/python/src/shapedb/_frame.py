@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Results as pandas data frames; pandas is only needed here."""
 
 from __future__ import annotations

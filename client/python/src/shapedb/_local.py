@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A server of one's own, for notebooks, scripts and tests."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Points of a mesh: its vertices where these are what was measured, samples of its surface otherwise."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """PLY: ASCII and binary, of either byte order."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scans as they come and as they are sent: arrays of points, packed to little-endian float32."""
 
 from __future__ import annotations

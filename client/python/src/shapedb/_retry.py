@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """When a failed call is tried again, and how long it may take in all."""
 
 from __future__ import annotations

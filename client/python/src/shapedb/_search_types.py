@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What searches, comparisons and alignments return: values that do not change."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Messages to values and values to messages: searches, comparisons, alignments."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The calls about scans and shapes, as values."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Results in words, as the `shapedb` command puts them."""
 
 from __future__ import annotations

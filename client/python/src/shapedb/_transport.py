@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Makes calls: tries, waits, retries. One class blocks, the other is for asyncio; what they decide is in `_retry`."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Vectors of messages. Points travel relative to an origin near them, in the header of their scan, for a float32 holds
 a shape far from 0 no better than its place; all that the server returns is in the coordinates of the scans themselves.
 """

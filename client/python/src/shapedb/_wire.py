@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Messages to values and values to messages: shapes, collections, maintenance. `_search_wire` has searches."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The explanations of signatures with attributes.
 #include <algorithm>
 #include <cmath>

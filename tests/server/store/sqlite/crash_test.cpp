@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Whatever was acknowledged survives a killed process; damage of the files is detected.
 #include <atomic>
 #include <chrono>

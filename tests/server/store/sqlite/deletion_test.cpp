@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Deletions: in pieces when there is much to delete, and repeated when their reply was lost.
 #include <atomic>
 #include <thread>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // One small database per schema version, opened and queried by every later version.
 // SHAPEDB_WRITE_GOLDEN=FILE writes the one of the current schema (docs/storage.md).
 #include <cstdlib>

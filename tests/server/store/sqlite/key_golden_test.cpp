@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // One small file of API keys per schema version, opened and used by every later version.
 // SHAPEDB_WRITE_GOLDEN_KEYS=FILE writes the one of the current schema (docs/storage.md).
 #include <cstdlib>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Listings in every order, page by page, against a plain sort of all shapes.
 #include <algorithm>
 #include <atomic>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Changes that were acknowledged and are gone are noticed at the next start.
 #include <filesystem>
 

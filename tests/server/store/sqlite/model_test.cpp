@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The store behaves like a map: seeded random operations on both with restarts in between (after
 // leveldb's ModelDB).
 #include <algorithm>

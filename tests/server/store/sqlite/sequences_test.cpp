@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A file whose counters stand at their end: refused as a backup, mended as a database.
 #include "server/store/sqlite/sequences.h"
 

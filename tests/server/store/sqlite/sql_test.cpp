@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Query plans: what has to be logarithmic uses an index.
 #include "server/store/sqlite/sql.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Fixtures of the store tests: a private folder with a database, small clouds.
 #pragma once
 

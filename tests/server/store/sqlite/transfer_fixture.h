@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Fixture of the tests of export and import: a store with a collection, and a second store.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What an import refuses, and what is left when an export or import does not come to its end: nothing.
 #include <atomic>
 #include <filesystem>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What no client could have stored is refused in a file, and told of a database: each column with its table,
 // row and value.
 #include <array>

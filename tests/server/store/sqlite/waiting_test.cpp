@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // How many pending shapes no search finds yet: kept by the database, always what a count would say.
 #include <chrono>
 #include <optional>
