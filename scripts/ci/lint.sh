@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# What can be checked without compiling: format, layers, test programs, file sizes.
+# What can be checked without compiling: format, layers, licences, test programs, file sizes.
 set -uo pipefail
 cd "$(dirname "$0")/../.."
 failed=0
@@ -83,6 +83,7 @@ unfinished=$(git grep -nE 'TODO|FIXME|\bXXX\b|DISABLED_' -- '*.cpp' '*.h' '*.ts'
 [ -z "$unfinished" ] || complain "unfinished:"$'\n'"$unfinished"
 
 python3 scripts/python-sync.py || complain "the Python client that blocks is not what scripts/python-sync.py --update makes"
+scripts/spdx.py --check || complain "licences: see scripts/spdx.py"
 python3 scripts/constants.py || complain "docs/constants.md does not list the constants of core/ as they are"
 
 for row in $(scripts/bench-figures.sh --list); do
