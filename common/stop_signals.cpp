@@ -24,6 +24,7 @@ sigset_t endSignals() {
     sigemptyset(&signals);
     sigaddset(&signals, SIGTERM);
     sigaddset(&signals, SIGINT);
+    sigaddset(&signals, SIGHUP);  // its terminal has gone
     return signals;
 }
 

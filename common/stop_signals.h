@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How SIGINT and SIGTERM end the programs. SIGPIPE is ignored: when a reader goes away, the write
-// fails.
+// How SIGINT and SIGTERM end the programs, and SIGHUP those that wait. SIGPIPE is ignored: when a reader goes
+// away, the write fails.
 #pragma once
 
 #include <atomic>

@@ -181,7 +181,10 @@ Result<std::vector<KeyStatus>> Keyring::list() {
     return all;
 }
 
-Result<Key> Keyring::revoke(const std::string& id) {
+Result<Key> Keyring::revoke(const std::string& idOrKey) {
+    // Whoever gives the whole key by mistake must not find its secret in an error and in the log.
+    const auto whole = parseApiKey(idOrKey);
+    const std::string& id = whole ? whole->id : idOrKey;
     const std::lock_guard<std::mutex> lock(mutex_);
     auto key = store_->revoke(id, clock_.wall());
     const auto holder = holderOf(id);

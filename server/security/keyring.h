@@ -85,9 +85,9 @@ class Keyring {
     [[nodiscard]] Result<CreatedKey> create(const KeySpec& spec);
     /// The oldest first.
     [[nodiscard]] Result<std::vector<KeyStatus>> list();
-    /// Nobody can use the key from now on; after an error of the store this holds until the server restarts.
-    /// Errors: kNotFound (there is none, or it was revoked before).
-    [[nodiscard]] Result<Key> revoke(const std::string& id);
+    /// By its id, or the whole key. Nobody can use the key from now on; after an error of the store this
+    /// holds until the server restarts. Errors: kNotFound (there is none, or it was revoked before).
+    [[nodiscard]] Result<Key> revoke(const std::string& idOrKey);
 
     /// Who presents `presented`. Keys that another process has made or revoked count within a second.
     /// While the store cannot be read those that are known count. Errors: kUnauthenticated (no such key,

@@ -7,7 +7,6 @@ import json
 import os
 import re
 import subprocess
-import sys
 import tempfile
 import time
 import unittest
@@ -106,26 +105,6 @@ class Calls(unittest.TestCase):
             self.assertEqual(client.request("DELETE", "/healthz").status, 405)
             self.assertEqual(client.request("POST", "/grpc.health.v1.Health/Check", content_type="application/json",
                                             body="{}").status, 405)
-
-
-class Documentation(unittest.TestCase):
-    def test_examples_work_as_they_stand(self):
-        with open(os.path.join(ROOT, "docs", "http.md")) as page:
-            examples = re.findall(r"^```(sh|python)\n(.*?)^```", page.read(), re.M | re.S)
-        self.assertGreaterEqual(len(examples), 4)
-        # The shape that the others speak of is made by the Python program.
-        examples.sort(key=lambda example: "SearchByKey" in example[1] or "WatchIngest" in example[1])
-        with serve() as server:
-            environment = dict(os.environ, SHAPEDB=f"http://127.0.0.1:{server.http_port}")
-            for language, text in examples:
-                with self.subTest(example=text):
-                    program = ["sh", "-ec", text] if language == "sh" else [sys.executable, "-c", text]
-                    run = subprocess.run(program, env=environment, capture_output=True, timeout=60)
-                    self.assertEqual(run.returncode, 0, run.stderr)
-                    self.assertNotIn(b'"code"', run.stdout)
-                    self.assertTrue(run.stdout)
-            with Http(server) as client:
-                self.assertEqual(client.json("ShapeService/CountShapes", {"collection": "parts"}).json(), {"count": "1"})
 
 
 class Roles(unittest.TestCase):

@@ -40,7 +40,12 @@ bool writeLock(int descriptor, bool complete) {
 ProcessLock::ProcessLock(const std::string& databasePath) {
     const std::string path = databasePath + ".lock";
     // O_CLOEXEC: a child that inherited the descriptor would hold the lock after our end.
-    descriptor_ = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+    // O_NOFOLLOW: it is written, and what a link names is not ours.
+    descriptor_ = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);
+    if (descriptor_ < 0 && errno == ELOOP) {
+        raise(ErrorCode::kStorage,
+              "the lock file '" + path + "' is a symbolic link, which is not followed: remove it");
+    }
     if (descriptor_ < 0) {
         const ErrorCode code = errno == ENOSPC ? ErrorCode::kStorageFull : ErrorCode::kStorage;
         raise(code, "cannot create lock file '" + path + "': " + std::strerror(errno));

@@ -79,6 +79,12 @@ TEST_F(KeyringTest, RevokedKeysAreUselessAtOnce) {
     EXPECT_EQ(problem(other), "");
     EXPECT_EQ(keyring_.revoke(holder->key().id).error().code, ErrorCode::kNotFound) << "only once";
     EXPECT_EQ(keyring_.revoke("0123456789abcdef").error().code, ErrorCode::kNotFound);
+    const auto made = keyring_.create(holder->key().spec);
+    ASSERT_TRUE(made);
+    ASSERT_TRUE(keyring_.revoke(made->text)) << "a whole key, given by mistake";
+    const auto again = keyring_.revoke(made->text);
+    ASSERT_FALSE(again);
+    EXPECT_EQ(again.error().message.find(made->text.substr(made->text.rfind('_') + 1)), std::string::npos);
 }
 
 TEST_F(KeyringTest, SeesWhatAnotherProcessDoes) {

@@ -2,6 +2,7 @@
 #include "server/store/sqlite/sqlite_store.h"
 
 #include <csignal>
+#include <filesystem>
 #include <fstream>
 
 #include <sys/resource.h>
@@ -63,6 +64,25 @@ TEST_F(SqliteStoreTest, StatsCountEverything) {
     EXPECT_EQ(stats.schemaVersion, static_cast<int>(embeddedMigrations().size()));
     ASSERT_TRUE(store_->checkpoint());
     EXPECT_EQ(store_->stats()->walBytes, 0u);
+}
+
+TEST_F(SqliteStoreTest, TheLockFollowsNoLink) {
+    const std::string path = folder_.file("other.db"), foreign = folder_.file("foreign");
+    for (const bool dangling : {false, true}) {
+        if (!dangling) std::ofstream(foreign) << "somebody else's";
+        std::filesystem::create_symlink(foreign, path + ".lock");
+        SqliteOptions own = options();
+        own.path = path;
+        const auto store = openSqliteStore(own);
+        ASSERT_FALSE(store);
+        EXPECT_NE(store.error().message.find("symbolic link"), std::string::npos) << store.error().message;
+        EXPECT_EQ(std::filesystem::exists(foreign), !dangling);
+        if (!dangling) {
+            EXPECT_EQ(std::filesystem::file_size(foreign), 15u);
+        }
+        std::filesystem::remove(path + ".lock");
+        std::filesystem::remove(foreign);
+    }
 }
 
 TEST_F(SqliteStoreTest, OneProcessAtATime) {
