@@ -101,7 +101,6 @@ def test_text(tmp_path):
     assert "line 2" in refusal(tmp_path, "bad.xyz", "1 2 3\n1 two 3\n").message
     assert "announces 5" in refusal(tmp_path, "bad.pts", "5\n1 2 3\n").message
     assert "decimal commas" in refusal(tmp_path, "bad.txt", "1,5 2,5 3,5\n").message
-    assert read(tmp_path, "empty.xyz", "").shape == (0, 3)
 
 
 def test_npy(tmp_path):
@@ -158,3 +157,19 @@ def test_other_formats_are_named(tmp_path):
     with pytest.raises(shapedb.InvalidInput, match="mesh_samples"):
         shapedb.read_scan(tmp_path / "missing.ply", mesh_samples=0)
     assert ENDINGS == {".ply", ".stl", ".obj", ".xyz", ".txt", ".pts", ".asc", ".npy"}
+
+
+@pytest.mark.parametrize("ending", [".ply", ".stl", ".obj", ".xyz", ".npy"])
+def test_an_empty_file_is_told_so(tmp_path, ending):
+    path = tmp_path / ("empty" + ending)
+    path.write_bytes(b"")
+    with pytest.raises(shapedb.ShapeDBError, match="empty.*the file is empty") as refused:
+        shapedb.read_scan(path)
+    assert refused.value.reason == "malformed_file"
+
+
+def test_a_file_without_points_is_told_so(tmp_path):
+    path = tmp_path / "comment.xyz"
+    path.write_text("# nothing\n")
+    with pytest.raises(shapedb.ShapeDBError, match="no points"):
+        shapedb.read_scan(path)

@@ -40,9 +40,14 @@ def read_scan(path: PathLike, *, mesh_samples: int = SAMPLES, seed: int = 1) -> 
         data = Path(name).read_bytes()
     except OSError as error:
         raise ShapeDBError("file_not_readable", f"{name}: cannot be read: {error.strerror or error}") from None
+    if not data:
+        raise InvalidInput("malformed_file", f"{name}: the file is empty")
     try:
         vertices, triangles = reader(data)
-        return points_of_mesh(vertices, triangles, mesh_samples, seed)
+        points = points_of_mesh(vertices, triangles, mesh_samples, seed)
+        if len(points) == 0:
+            raise InvalidInput("malformed_file", "there are no points in the file")
+        return points
     except InvalidInput as error:
         raise InvalidInput(error.reason, f"{name}: {error.message}") from None
     except (ValueError, IndexError, OverflowError) as error:
