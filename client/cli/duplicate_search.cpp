@@ -11,6 +11,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "client/cli/fit_output.h"
 #include "core/base/disjoint_sets.h"
 #include "core/base/return_if_error.h"
 #include "core/search/signature_set.h"
@@ -32,7 +33,7 @@ PairFit fitOf(const client::Comparison& compared) {
     PairFit fit{compared.score, compared.verdict, std::nullopt, false};
     if (compared.fit) {
         fit.pose = compared.fit->best;
-        fit.mirrored = compared.fit->best.motion.reflected && !compared.fit->handednessOpen;
+        fit.mirrored = fitsMirrored(*compared.fit);
     }
     return fit;
 }

@@ -67,7 +67,7 @@ std::string duplicatesCsv(const DuplicateReport& report) {
         row.add(report.shapes[pair.a].key).add(report.shapes[pair.b].key);
         row.add(pair.score()).add(pair.signatureScore);
         const bool laid = pair.fit && pair.fit->pose;
-        row.add(pair.fit && pair.fit->verdict != Verdict::kNone ? verdictName(pair.fit->verdict) : "");
+        row.add(pair.fit ? verdictCell(pair.fit->verdict) : "");
         row.add(!laid ? "" : pair.fit->mirrored ? "1" : "0");
         row.add(laid ? exactNumber(pair.fit->pose->residual) : std::string());
         text += row.line();

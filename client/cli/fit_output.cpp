@@ -113,6 +113,8 @@ json verdictJson(Verdict verdict) {
     return verdict == Verdict::kNone ? json(nullptr) : json(verdictName(verdict));
 }
 
+std::string verdictCell(Verdict verdict) { return verdict == Verdict::kNone ? "" : verdictName(verdict); }
+
 std::string fitText(const client::Fit& fit, const std::string& queryName, const std::string& otherName) {
     const client::FitPose& best = fit.best;
     std::string text = formatPercent(best.explainedQuery) + " of " + queryName + " lies on " + otherName +

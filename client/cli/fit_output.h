@@ -28,6 +28,14 @@ namespace shapedb::cli {
 [[nodiscard]] std::string verdictText(Verdict verdict);
 /// verdictName, or null for none.
 [[nodiscard]] nlohmann::json verdictJson(Verdict verdict);
+/// verdictName, or "" for none: a cell of CSV.
+[[nodiscard]] std::string verdictCell(Verdict verdict);
+
+/// Whether the shape lies on the query only as a mirror image. `Fit`: client::Fit, or core's FitResult.
+template <typename Fit>
+[[nodiscard]] bool fitsMirrored(const Fit& fit) {
+    return fit.best.motion.reflected && !fit.handednessOpen;
+}
 
 /// What is said of SearchReply::leftRightUntold, a line.
 constexpr const char* kLeftRightUntold =

@@ -134,9 +134,7 @@ Result<Matched> matchFolders(Session& session, const MatchFlags& flags) {
     return matched;
 }
 
-bool isMirrored(const Partner& partner) {
-    return partner.fit && partner.fit->best.motion.reflected && !partner.fit->handednessOpen;
-}
+bool isMirrored(const Partner& partner) { return partner.fit && fitsMirrored(*partner.fit); }
 
 json partnerJson(const Matched& matched, const Partner& partner) {
     json entry = {{"file", matched.a[partner.a].path},
@@ -161,7 +159,7 @@ std::string partnersCsv(const Matched& matched) {
         CsvRow row;
         row.add(matched.a[partner.a].path).add(partner.b ? matched.b[*partner.b].path : std::string());
         row.add(partner.score).add(partner.nextScore).add(partner.mutual ? "1" : "0");
-        row.add(partner.verdict == Verdict::kNone ? "" : verdictName(partner.verdict));
+        row.add(verdictCell(partner.verdict));
         row.add(!partner.fit ? "" : isMirrored(partner) ? "1" : "0");
         row.add(partner.fit ? exactNumber(partner.fit->best.residual) : std::string());
         text += row.line();

@@ -145,7 +145,7 @@ std::string hitsCsv(const Answer& answer) {
         CsvRow row;
         row.add(answer.query).add(std::to_string(i + 1)).add(hit.shape.key).add(labelOf(hit.shape));
         row.add(hit.score).add(hit.signatureScore);
-        row.add(hit.verdict == Verdict::kNone ? "" : verdictName(hit.verdict));
+        row.add(verdictCell(hit.verdict));
         const auto motion = motionOf(hit);
         row.add(!motion ? "" : motion->reflected ? "1" : "0");
         if (hit.fit) {

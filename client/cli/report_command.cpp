@@ -61,7 +61,7 @@ ReportHit reportHit(const Answer& answer, const client::Hit& hit, const std::str
     if (hit.verdict != Verdict::kNone) {
         shown.verdict += " (right in " + formatPercent(hit.verdictReliability) + " of such cases)";
     }
-    if (hit.fit && hit.fit->best.motion.reflected && !hit.fit->handednessOpen) shown.facts = "mirrored";
+    if (hit.fit && fitsMirrored(*hit.fit)) shown.facts = "mirrored";
     if (hit.explanation) {
         client::Explanation words = *hit.explanation;
         words.terms.clear();  // they are bars

@@ -141,7 +141,7 @@ security::Credentials Call::credentials() const {
 
 Result<void> Call::begin() {
     RETURN_IF_ERROR(authorization_.begin(credentials()));
-    cancellation_.guard(authorization_.stillAllowed());
+    if (auto still = authorization_.stillAllowed()) cancellation_.guard(std::move(still));
     return frame_.admit(operation_.callClass);
 }
 

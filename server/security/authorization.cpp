@@ -81,12 +81,13 @@ Result<void> Authorization::useScan(std::uint64_t bytes) {
     return spend(holder_->takeScan(bytes, policy_.keyring.clock().wall()));
 }
 
-Result<void> Authorization::requireStill() const { return stillAllowed()(); }
+Result<void> Authorization::requireStill() const {
+    return holder_ ? policy_.keyring.requireUsable(*holder_) : Result<void>();
+}
 
 std::function<Result<void>()> Authorization::stillAllowed() const {
-    return [&keyring = policy_.keyring, holder = holder_] {
-        return holder ? keyring.requireUsable(*holder) : Result<void>();
-    };
+    if (!holder_) return nullptr;
+    return [&keyring = policy_.keyring, holder = holder_] { return keyring.requireUsable(*holder); };
 }
 
 Result<void> Authorization::spend(tl::expected<void, Refusal> taken) {

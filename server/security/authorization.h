@@ -51,7 +51,8 @@ class Authorization {
     /// Again, while a stream lasts and before what it sent is stored: a key that was revoked or has expired
     /// since `begin` stores nothing any more. Cheap. Errors: kUnauthenticated.
     [[nodiscard]] Result<void> requireStill() const;
-    /// requireStill for another thread; may outlive this. Valid from `begin` on.
+    /// requireStill for another thread; may outlive this. Empty for a caller without a key. Valid from
+    /// `begin` on.
     [[nodiscard]] std::function<Result<void>()> stillAllowed() const;
 
     /// At the end of a call: `result`, unless a collection should have been asked for and never was: a
