@@ -3,7 +3,7 @@
 # Installs the Debian 12 packages that ShapeDB needs, and only those that are missing.
 #   scripts/install-deps.sh             everything to build, test and check, the Python package too, and the npm
 #                                       packages of web/, as do all but --open3d
-#   scripts/install-deps.sh --analysis  that, and clang for scripts/ci/tidy.sh and scripts/ci/fuzz.sh
+#   scripts/install-deps.sh --analysis  that, and clang for scripts/ci/tidy.sh, fuzz.sh and sanitize.sh
 #   scripts/install-deps.sh --build     only what is needed to build
 #   scripts/install-deps.sh --packages  everything to build, and what scripts/ci/packages.sh needs
 #   scripts/install-deps.sh --open3d    Open3D, for client/python/examples/open3d_interop.py and its test

@@ -10,7 +10,7 @@ case "$kind" in
   thread) preset=tsan ;;
   *) echo "sanitize: unknown sanitizer $kind; there are address,undefined and thread" >&2; exit 2 ;;
 esac
-scripts/install-deps.sh
+scripts/install-deps.sh --analysis
 if [ "$preset" = tsan ]; then
   TBB_ROOT=$(scripts/ci/tbb-for-thread-sanitizer.sh)
   export TBB_ROOT
