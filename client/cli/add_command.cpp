@@ -114,6 +114,9 @@ std::vector<Upload> uploadFile(const Run& run, const Upload& file, const RunCont
         uploads.front().failure = scan.error();
         return uploads;
     }
+    for (const std::string& list : scan->ignored) {
+        run.session.console().note(file.path + ": passed over: " + list);
+    }
     const std::size_t objects = flags.each ? scan->scene->objects.size() : 0;
     if (objects == 0) {
         send(run, std::move(scan->points), uploads.front(), context);

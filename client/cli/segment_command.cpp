@@ -36,6 +36,7 @@ nlohmann::json segmentJson(const SegmentFlags& flags, const LoadedScan& scan,
     document["scene"] = sceneJson(*scan.scene, scan.pointsInScene, flags.scan.isolate);
     document["sampled_from_mesh"] = scan.sampledFromMesh;
     document["skipped_non_finite"] = scan.skippedNonFinite;
+    document["ignored"] = scan.ignored;
     document["noise"] = flags.scan.noise;
     document["seed"] = flags.scan.seed;
     document["parameters"] = toJson(parameters);
@@ -54,6 +55,7 @@ std::string segmentText(const SegmentFlags& flags, const LoadedScan& scan, const
     if (scan.skippedNonFinite > 0) {
         text += formatCount(scan.skippedNonFinite, "point", "points") + " without a measurement skipped\n";
     }
+    for (const std::string& list : scan.ignored) text += "passed over: " + list + "\n";
     text += sceneText(*scan.scene, scan.pointsInScene, flags.scan.isolate);
     text += preparationText(report);
     text += formatCount(report.segments, "part", "parts") + ", volume " + formatNumber(report.volume) + "; " +

@@ -11,7 +11,10 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <utility>
+#include <vector>
 
+#include "client/io/face_guess.h"
 #include "client/io/formats.h"
 #include "client/io/ply_header.h"
 #include "client/io/ply_record.h"
@@ -32,16 +35,25 @@ Error negativeLength(const InputFile& file, const std::string& where, const PlyE
     return file.malformed(where + ": " + recordName(element, index) + " has a list of negative length");
 }
 
-// Skips one property of the current record.
+// Of a list of the current record; 1 of a single number.
 template <typename Record>
-Result<void> skipProperty(const InputFile& file, Record& record, const PlyElement& element,
-                          std::uint64_t index, const PlyProperty& property) {
+Result<std::int64_t> readLength(const InputFile& file, Record& record, const PlyElement& element,
+                                std::uint64_t index, const PlyProperty& property) {
     std::int64_t length = 1;
     if (property.isList && !record.integer(property.countType, length)) {
         return fail(record.error(element, index, "the length of list " + property.name));
     }
     if (length < 0) return fail(negativeLength(file, record.where(), element, index));
-    if (!record.skip(property.type, static_cast<std::uint64_t>(length))) {
+    return length;
+}
+
+// Skips one property of the current record.
+template <typename Record>
+Result<void> skipProperty(const InputFile& file, Record& record, const PlyElement& element,
+                          std::uint64_t index, const PlyProperty& property) {
+    const auto length = readLength(file, record, element, index, property);
+    RETURN_IF_ERROR(length);
+    if (!record.skip(property.type, static_cast<std::uint64_t>(*length))) {
         return fail(record.error(element, index, property.name));
     }
     return {};
@@ -82,12 +94,16 @@ bool isFaceName(const std::string& name) {
            name == "triangle" || name == "triangles";
 }
 
-// The list of an element that names the corners of faces or strips; kNoProperty if its lists mean something
-// else. Passing over faces in silence would take a mesh for a few points, so the only list of integers of a
-// face counts under any name, and a face without any list of integers is an error.
-Result<std::size_t> findIndices(const InputFile& file, const PlyElement& element) {
+struct Indices {
+    std::size_t at = kNoProperty;  ///< the list that names the corners of faces or strips
+    bool guessed = false;          ///< it does if every entry could
+};
+
+// Passing over faces in silence would take a mesh for a few points, so the only list of integers of a face
+// counts under any name, and a face without any list of integers is an error.
+Result<Indices> findIndices(const InputFile& file, const PlyElement& element) {
     // A grid names the vertex at each place, of which there is one or none.
-    if (element.name == "vertex" || element.name == "range_grid") return kNoProperty;
+    if (element.name == "vertex" || element.name == "range_grid") return Indices{};
     const bool face = isFaceName(element.name) || element.name == "tristrips";
     std::size_t named = kNoProperty;
     std::size_t only = kNoProperty;
@@ -102,12 +118,12 @@ Result<std::size_t> findIndices(const InputFile& file, const PlyElement& element
         ++lists;
     }
     if (named != kNoProperty) {
-        if (!isFloating(element.properties[named].type)) return named;
+        if (!isFloating(element.properties[named].type)) return Indices{named, false};
         return fail(file.malformed("header: the indices of element " + element.name +
                                    " must be integers, not float or double"));
     }
-    if (!face || element.count == 0) return kNoProperty;
-    if (lists == 1) return only;
+    if (element.count == 0 || (!face && lists != 1)) return Indices{};
+    if (lists == 1) return Indices{only, !face};
     return fail(file.malformed("header: element " + element.name +
                                " needs a list vertex_indices, which names " + "its corners" +
                                (lists > 1 ? "; it has several lists under other names" : "")));
@@ -139,6 +155,7 @@ class PlyBody {
             RETURN_IF_ERROR(indices);
             RETURN_IF_ERROR(readElement(element, *indices));
         }
+        settleGuesses();
         const std::string after = "data after the last element; the header announces too few";
         if (isText() && !words_.next().empty()) return fail(file_.malformedLine(after));
         if (!isText() && !file_.onlyPaddingLeft()) return fail(file_.malformedByte(file_.offset(), after));
@@ -174,7 +191,24 @@ class PlyBody {
         return {};
     }
 
-    Result<void> readElement(const PlyElement& element, std::size_t indices) {
+    // Faces under unknown names, if there are no others.
+    void settleGuesses() {
+        const bool hasFaces = !content_.triangles.empty();
+        for (FaceGuess& guess : guesses_) {
+            if (hasFaces || !guess.good()) {
+                content_.ignored.push_back(guess.name());
+                continue;
+            }
+            const std::vector<Triangle> triangles = guess.takeTriangles();
+            content_.triangles.insert(content_.triangles.end(), triangles.begin(), triangles.end());
+        }
+    }
+
+    Result<void> readElement(const PlyElement& element, const Indices& indices) {
+        if (indices.guessed) {
+            guesses_.emplace_back(
+                "list " + element.properties[indices.at].name + " of element " + element.name, vertexCount_);
+        }
         if (isText()) return readElementWith(TextRecord(file_, words_, wordByWord_), element, indices);
         const bool swapped = (header_.encoding == PlyEncoding::kLittleEndian) != machineIsLittleEndian();
         const auto size = element.fixedSize();
@@ -222,15 +256,17 @@ class PlyBody {
     }
 
     template <typename Record>
-    Result<void> readElementWith(Record record, const PlyElement& element, std::size_t indices) {
+    Result<void> readElementWith(Record record, const PlyElement& element, const Indices& indices) {
         if (element.name == "vertex") return readVertices(record, element);
         const bool strips = element.name == "tristrips";
         for (std::uint64_t i = 0; i < element.count; ++i) {
             if (!record.begin()) return fail(record.error(element, i, ""));
             for (std::size_t j = 0; j < element.properties.size(); ++j) {
-                auto done = j != indices ? skipProperty(file_, record, element, i, element.properties[j])
-                            : strips ? readIndices<TriangleStrip>(record, element, i, element.properties[j])
-                                     : readIndices<PolygonFan>(record, element, i, element.properties[j]);
+                const PlyProperty& property = element.properties[j];
+                auto done = j != indices.at   ? skipProperty(file_, record, element, i, property)
+                            : indices.guessed ? readGuess(record, element, i, property)
+                            : strips          ? readIndices<TriangleStrip>(record, element, i, property)
+                                              : readIndices<PolygonFan>(record, element, i, property);
                 RETURN_IF_ERROR(done);
             }
             RETURN_IF_ERROR(endRecord(record, element, i));
@@ -265,23 +301,41 @@ class PlyBody {
         return {};
     }
 
+    template <typename Record>
+    Result<void> readGuess(Record& record, const PlyElement& element, std::uint64_t index,
+                           const PlyProperty& property) {
+        const auto length = readLength(file_, record, element, index, property);
+        RETURN_IF_ERROR(length);
+        FaceGuess& guess = guesses_.back();
+        guess.begin(*length);
+        for (std::int64_t i = 0; i < *length; ++i) {
+            std::int64_t vertex = 0;
+            if (!record.integer(property.type, vertex))
+                return fail(noEntry(record, element, index, property, i));
+            guess.add(vertex);
+        }
+        guess.end();
+        return {};
+    }
+
+    template <typename Record>
+    Error noEntry(const Record& record, const PlyElement& element, std::uint64_t index,
+                  const PlyProperty& property, std::int64_t entry) const {
+        return record.error(element, index, "entry " + std::to_string(entry) + " of " + property.name);
+    }
+
     // Triangles are made while the indices arrive, so the announced length of a list allocates nothing.
     template <typename Builder, typename Record>
     Result<void> readIndices(Record& record, const PlyElement& element, std::uint64_t index,
                              const PlyProperty& property) {
-        std::int64_t length = 0;
-        if (!record.integer(property.countType, length)) {
-            return fail(record.error(element, index, "the length of list " + property.name));
-        }
-        if (length < 0) return fail(negativeLength(file_, record.where(), element, index));
+        const auto length = readLength(file_, record, element, index, property);
+        RETURN_IF_ERROR(length);
         Builder builder(content_.triangles);
         builder.begin();
-        for (std::int64_t i = 0; i < length; ++i) {
+        for (std::int64_t i = 0; i < *length; ++i) {
             std::int64_t vertex = 0;
-            if (!record.integer(property.type, vertex)) {
-                return fail(
-                    record.error(element, index, "entry " + std::to_string(i) + " of " + property.name));
-            }
+            if (!record.integer(property.type, vertex))
+                return fail(noEntry(record, element, index, property, i));
             // -1 ends a strip and starts the next one in the same list.
             if (vertex == -1 && std::is_same_v<Builder, TriangleStrip>) {
                 builder.begin();
@@ -305,6 +359,7 @@ class PlyBody {
     WordReader words_;
     bool wordByWord_ = false;
     VertexSink sink_;
+    std::vector<FaceGuess> guesses_;
     std::array<std::size_t, 3> coordinates_ = {kNoProperty, kNoProperty, kNoProperty};
     std::uint64_t vertexCount_ = 0;
 };

@@ -60,7 +60,7 @@ Result<PlyEncoding> parseFormat(const InputFile& file, std::string_view rest) {
 // The rest of "element vertex 8".
 Result<PlyElement> parseElement(const InputFile& file, std::string_view rest) {
     PlyElement element;
-    element.name = lowerCase(nextWord(rest));
+    element.name = lowerCase(printable(nextWord(rest)));
     const std::string_view count = nextWord(rest);
     if (element.name.empty() || !parseCount(count, element.count)) {
         return fail(file.malformedLine("expected 'element NAME COUNT', found count " + inQuotes(count)));
@@ -87,7 +87,7 @@ Result<PlyProperty> parseProperty(const InputFile& file, std::string_view rest) 
     const auto type = scalarTypeFromName(word);
     if (!type) return fail(unknownType(file, word));
     property.type = *type;
-    property.name = nextWord(rest);
+    property.name = printable(nextWord(rest));
     if (property.name.empty()) return fail(file.malformedLine("expected a property name, found nothing"));
     return property;
 }

@@ -16,14 +16,14 @@ namespace shapedb::io {
 enum class PlyEncoding { kAscii, kLittleEndian, kBigEndian };
 
 struct PlyProperty {
-    std::string name;
+    std::string name;                        ///< printable
     ScalarType type = ScalarType::kFloat32;  ///< of the value, or of each entry of the list
     bool isList = false;
     ScalarType countType = ScalarType::kUint8;  ///< of the number before a list
 };
 
 struct PlyElement {
-    std::string name;         ///< in lower case
+    std::string name;         ///< in lower case, printable
     std::uint64_t count = 0;  ///< as announced, not yet verified
     std::vector<PlyProperty> properties;
 

@@ -23,6 +23,7 @@ struct ScanContent {
     PointCloud vertices;
     std::vector<Triangle> triangles;  ///< indices are below vertices.size()
     std::size_t skippedNonFinite = 0;
+    std::vector<std::string> ignored;  ///< as in Scan
     std::string format;
 };
 

@@ -229,6 +229,7 @@ Result<Scan> readScanUnguarded(const std::string& path, const ReadOptions& optio
 
     Scan scan;
     scan.skippedNonFinite = content->skippedNonFinite;
+    scan.ignored = std::move(content->ignored);
     scan.format = content->format;
     scan.verticesInFile = content->vertices.size() + content->skippedNonFinite;
     scan.trianglesInFile = content->triangles.size();

@@ -48,6 +48,9 @@ struct Scan {
     /// Points of a PCD file skipped because a coordinate is NaN or infinite, which in that format means
     /// "nothing measured here". An error in other formats.
     std::size_t skippedNonFinite = 0;
+    /// What may have been faces, but was not read as such, for people: "list members of element groups" of a
+    /// PLY file.
+    std::vector<std::string> ignored;
     /// True if `points` were sampled from the triangles.
     bool sampledFromMesh = false;
     /// Format and variant for people, e.g. "PLY binary little-endian".

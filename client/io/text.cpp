@@ -105,13 +105,14 @@ bool equalsIgnoringCase(std::string_view word, std::string_view lower) {
                                                      [](char a, char b) { return lowered(a) == b; });
 }
 
-std::string inQuotes(std::string_view word) {
+std::string printable(std::string_view word) {
     constexpr std::size_t kLongest = 40;
-    if (word.empty()) return "nothing";
-    std::string text = "'";
+    std::string text;
     for (const char c : word.substr(0, kLongest)) text += c >= ' ' && c <= '~' ? c : '?';
-    return text + (word.size() > kLongest ? "...'" : "'");
+    return text + (word.size() > kLongest ? "..." : "");
 }
+
+std::string inQuotes(std::string_view word) { return word.empty() ? "nothing" : "'" + printable(word) + "'"; }
 
 std::string inQuotesNotANumber(std::string_view word) {
     const std::size_t comma = word.find(',');

@@ -43,6 +43,9 @@ std::string upperCase(std::string_view word);
 /// Equal except for ASCII case; `lower` must be lower case.
 bool equalsIgnoringCase(std::string_view word, std::string_view lower);
 
+/// For messages: the word, shortened, without control characters.
+std::string printable(std::string_view word);
+
 /// For messages: the word in quotes, shortened, without control characters; "nothing" if empty.
 std::string inQuotes(std::string_view word);
 

@@ -69,6 +69,19 @@ TEST_F(Online, AddContinuesAfterABadFile) {
     EXPECT_NE(run.err.find("2 of 3 files failed"), std::string::npos) << run.err;
 }
 
+TEST_F(Online, AddTellsOfListsThatMayHaveBeenFaces) {
+    onlineJson({"collection", "create", "groups"});
+    const std::string file =
+        write("groups.ply",
+              "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+              "property float z\nelement groups 1\nproperty list uchar int members\n"
+              "end_header\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n2 0 1\n");
+    const CommandRun run = online({"add", file, "--key", "a", "--collection", "groups"});
+    EXPECT_EQ(run.exitCode, 0) << run.err;
+    EXPECT_NE(run.err.find("groups.ply: passed over: list members of element groups"), std::string::npos)
+        << run.err;
+}
+
 TEST_F(Online, AddTellsFilesOfOneNameApart) {
     onlineJson({"collection", "create", "endings"});
     writePoints("in/a.xyz", dumbbellPoints(500));

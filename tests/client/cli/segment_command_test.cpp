@@ -182,6 +182,22 @@ TEST_F(SegmentCommand, TextNamesFileCountsAndSegments) {
     EXPECT_EQ(run.err, "");
 }
 
+TEST_F(SegmentCommand, TellsOfListsThatMayHaveBeenFaces) {
+    const PointCloud points = dumbbellPoints();
+    std::string ply = "ply\nformat ascii 1.0\nelement vertex " + std::to_string(points.size()) +
+                      "\nproperty double x\nproperty double y\nproperty double z\nelement groups 1\n"
+                      "property list uchar int members\nend_header\n";
+    for (const Point3& p : points) {
+        ply += std::to_string(p.x) + " " + std::to_string(p.y) + " " + std::to_string(p.z) + "\n";
+    }
+    const std::string file = write("groups.ply", ply + "2 0 1\n");
+    EXPECT_NE(runCommand({"segment", file}).out.find("passed over: list members of element groups\n"),
+              std::string::npos);
+    EXPECT_EQ(runCommand({"segment", file, "--json"}).json()["ignored"],
+              nlohmann::json::array({"list members of element groups"}));
+    EXPECT_EQ(runCommand({"segment", dumbbell(), "--json"}).json()["ignored"], nlohmann::json::array());
+}
+
 struct BadScan {
     const char* name;
     const char* file;

@@ -338,6 +338,21 @@ std::string base64(const std::string& bytes) {
     return text;
 }
 
+std::string unBase64(const std::string& text) {
+    const std::string letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    std::string bytes;
+    std::uint32_t bits = 0;
+    int held = 0;
+    for (const char c : text.substr(0, text.find('='))) {
+        bits = bits << 6 | static_cast<std::uint32_t>(letters.find(c));
+        held += 6;
+        if (held < 8) continue;
+        held -= 8;
+        bytes += static_cast<char>(bits >> held & 255U);
+    }
+    return bytes;
+}
+
 std::vector<SampleFile> sampleFiles() {
     return {
         {"ascii.ply", asciiPly("\n"), 5, 4},

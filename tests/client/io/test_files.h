@@ -78,6 +78,7 @@ std::string zipArchive(const std::vector<std::pair<std::string, std::string>>& e
 /// A .glb file of a JSON and a binary chunk; no BIN chunk if that is empty.
 std::string glb(const std::string& json, const std::string& binary);
 std::string base64(const std::string& bytes);
+std::string unBase64(const std::string& text);
 
 /// Body of a binary_compressed PCD file: both sizes, then the LZF-compressed data, field by field.
 std::string compressedPcdBody(const std::string& fieldByField);
