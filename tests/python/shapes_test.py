@@ -62,7 +62,7 @@ def test_a_shape_and_its_life(collection):
     ({"metadata": {"a": "\udcff"}}, "invalid_argument"), ({"metadata": {7: "x"}}, "invalid_argument"),
     ({"scan": [(0, 0, 0)] * 10}, "all_points_equal"), ({"scan": np.eye(3)}, "too_few_points"),
     ({"scan": [(i, 0, 0) for i in range(9)]}, "collinear"), ({"scan": [(i, i * i, 0) for i in range(9)]}, "coplanar"),
-    ({"scan": "nothing.npy"}, "file_not_readable"), ({"scan": "scan.pcd"}, "unknown_file_format"),
+    ({"scan": "nothing.npy"}, "file_not_readable"), ({"scan": "scan.las"}, "unknown_file_format"),
 ])
 def test_what_cannot_be_stored_is_refused(collection, arguments, reason):
     given = {"key": "x", "scan": solids.box(100), **arguments}

@@ -15,7 +15,7 @@ from typing import (Any, Awaitable, Callable, Dict, Iterable, Iterator, List, Ma
 
 from ._connection import PathLike
 from ._errors import InvalidInput, ShapeDBError
-from ._files import ENDINGS
+from ._files import ENDINGS, is_scan_file, without_ending
 from ._points import Scan
 from ._progress import Showing, close, shown
 from ._retry import PATIENT, RetryPolicy
@@ -90,7 +90,7 @@ def scan_folder(folder: PathLike, *, label_from_folder: bool = False,
         folders[:] = [name for name in folders if not name.startswith(".")]
         for name in files:
             path = Path(base, name)
-            if name.startswith(".") or path.suffix.lower() not in ENDINGS or not _is_scan(path):
+            if name.startswith(".") or not is_scan_file(path):
                 continue
             given: Dict[str, Union[str, int, float]] = {"label": path.parent.name} if label_from_folder else {}
             if metadata is not None:
@@ -98,10 +98,10 @@ def scan_folder(folder: PathLike, *, label_from_folder: bool = False,
             found.append((path, given or None))
     if not found:
         raise ShapeDBError("file_not_readable", f"{root} has no scan file ({', '.join(sorted(ENDINGS))})")
-    alike = Counter(path.with_suffix("") for path, _ in found)
+    alike = Counter(without_ending(path) for path, _ in found)
     items = []
     for path, given_metadata in found:
-        named = path if alike[path.with_suffix("")] > 1 else path.with_suffix("")
+        named = path if alike[without_ending(path)] > 1 else without_ending(path)
         items.append(Item(named.relative_to(root).as_posix(), path, given_metadata))
     items.sort(key=lambda item: item.key)
     for one, next_one in zip(items, items[1:]):
@@ -109,20 +109,6 @@ def scan_folder(folder: PathLike, *, label_from_folder: bool = False,
             raise InvalidInput("invalid_argument",
                                f"{one.scan!r} and {next_one.scan!r} would have the same key; rename one")
     return items
-
-
-def _is_scan(path: Path) -> bool:
-    if path.suffix.lower() != ".txt":
-        return True
-    with open(path, encoding="utf-8", errors="replace") as file:
-        for line in file:
-            if line.strip() and not line.lstrip().startswith(("#", "//")):
-                fields = line.replace(",", " ").replace(";", " ").split()
-                try:
-                    return len(fields) in (1, 3, 4, 5, 6, 7) and [float(one) for one in fields[:3]] != []
-                except ValueError:
-                    return False
-    return False
 
 
 def items_of(items: Union[PathLike, Iterable[AnyItem], Mapping[str, Scan]]) -> Iterable[Item]:

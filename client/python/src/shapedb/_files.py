@@ -1,149 +1,147 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads the scan files that are common among researchers. The `shapedb` command reads more of them."""
+"""Reads scan files by the rules of the `shapedb` command (docs/file-formats.md), which reads more of them. One set of
+files holds both to each other (tests/support/file_cases/)."""
 
 from __future__ import annotations
 
 import os
-import re
-from pathlib import Path
-from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
-
-import numpy as np
-import numpy.typing as npt
+import warnings
+from pathlib import Path, PurePath
+from typing import Callable, Dict
 
 from ._connection import PathLike
 from ._errors import InvalidInput, ShapeDBError
+from ._gunzip import gunzip, is_packed
 from ._mesh import SAMPLES, points_of_mesh
-from ._points import FloatArray
+from ._npy import read_npy
+from ._obj import read_obj
+from ._off import read_off
+from ._pcd import read_pcd
 from ._ply import read_ply
+from ._points import FloatArray
+from ._resolution import check_not_rounded
+from ._scan_bytes import ScanBytes
+from ._scan_content import Content
+from ._scan_words import in_quotes, malformed
+from ._stl import read_stl
+from ._text_points import begins_with_a_point, read_text_points
 
-Triangles = npt.NDArray[np.int64]
-_NO_TRIANGLES: Triangles = np.zeros((0, 3), dtype=np.int64)
-
-
-def read_scan(path: PathLike, *, mesh_samples: int = SAMPLES, seed: int = 1) -> FloatArray:
-    """The points of a scan file as an (n, 3) array: .ply, .stl, .obj, .xyz, .txt, .pts, .asc, .npy.
-
-    Of a file with triangles, `mesh_samples` points of its surface, unless the vertices are what was measured: the rule
-    is that of `shapedb add` (docs/file-formats.md), the points are not. Raises `ShapeDBError` with file_not_readable,
-    unknown_file_format or malformed_file. For other formats use trimesh or Open3D, whose objects are scans too.
-    """
-    name = os.fspath(path)
-    reader = _READERS.get(Path(name).suffix.lower())
-    if reader is None:
-        raise InvalidInput("unknown_file_format",
-                           f"{name}: this package reads {', '.join(sorted(ENDINGS))}; load other formats with trimesh "
-                           "or Open3D and give the object, or use `shapedb add`")
-    if mesh_samples < 1:
-        raise InvalidInput("invalid_argument", f"mesh_samples is {mesh_samples}; it must be at least 1")
-    try:
-        data = Path(name).read_bytes()
-    except OSError as error:
-        raise ShapeDBError("file_not_readable", f"{name}: cannot be read: {error.strerror or error}") from None
-    if not data:
-        raise InvalidInput("malformed_file", f"{name}: the file is empty")
-    try:
-        vertices, triangles = reader(data)
-        points = points_of_mesh(vertices, triangles, mesh_samples, seed)
-        if len(points) == 0:
-            raise InvalidInput("malformed_file", "there are no points in the file")
-        return points
-    except InvalidInput as error:
-        raise InvalidInput(error.reason, f"{name}: {error.message}") from None
-    except (ValueError, IndexError, OverflowError) as error:
-        raise InvalidInput("malformed_file", f"{name}: {error}") from None
-
-
-def _text(data: bytes) -> str:
-    return data.decode("utf-8-sig", "replace")
-
-
-def _read_table(data: bytes) -> Tuple[FloatArray, Triangles]:
-    """Three numbers at the start of each line."""
-    rows: List[Tuple[float, float, float]] = []
-    announced: Optional[int] = None
-    for number, line in enumerate(_text(data).splitlines(), 1):
-        line = line.strip()
-        if not line or line.startswith(("#", "//")):
-            continue
-        fields = re.split(r"[\s,;]+", line)
-        if not rows and announced is None and len(fields) == 1 and fields[0].isdigit():
-            announced = int(fields[0])
-            continue
-        if not rows and [field.lower() for field in fields[:3]] == ["x", "y", "z"]:
-            continue
-        if re.match(r"-?\d+,\d+\s+-?\d+,\d+", line):
-            raise InvalidInput("malformed_file", f"line {number} has decimal commas; write decimal points")
-        try:
-            x, y, z = (float(field) for field in fields[:3])
-        except ValueError:
-            raise InvalidInput("malformed_file",
-                               f"line {number}: expected three numbers, found '{line[:40]}'") from None
-        rows.append((x, y, z))
-    if announced is not None and announced != len(rows):
-        raise InvalidInput("malformed_file", f"the first line announces {announced} points, there are {len(rows)}")
-    return np.array(rows, dtype=np.float64).reshape(-1, 3), _NO_TRIANGLES
-
-
-def _read_npy(data: bytes) -> Tuple[FloatArray, Triangles]:
-    import io
-    array = np.load(io.BytesIO(data), allow_pickle=False)
-    if not isinstance(array, np.ndarray) or array.ndim != 2 or array.shape[1] < 3 or array.dtype.kind not in "fiu":
-        raise InvalidInput("malformed_file", "it must hold one array of numbers with three columns or more")
-    return array[:, :3].astype(np.float64), _NO_TRIANGLES
-
-
-def _fan(polygon: Sequence[int]) -> List[Tuple[int, int, int]]:
-    return [(polygon[0], polygon[i], polygon[i + 1]) for i in range(1, len(polygon) - 1)]
-
-
-def _read_obj(data: bytes) -> Tuple[FloatArray, Triangles]:
-    vertices: List[List[float]] = []
-    polygons: List[List[int]] = []
-    for number, line in enumerate(_text(data).replace("\\\n", " ").splitlines(), 1):
-        fields = line.split()
-        if not fields or fields[0] not in ("v", "f"):
-            continue
-        try:
-            if fields[0] == "v":
-                x, y, z = (float(field) for field in fields[1:4])
-                vertices.append([x, y, z])
-            else:
-                corners = [int(field.split("/")[0]) for field in fields[1:]]
-                # Counted from 1; negative ones from the last vertex so far.
-                polygons.append([corner - 1 if corner > 0 else len(vertices) + corner for corner in corners])
-        except ValueError:
-            raise InvalidInput("malformed_file", f"line {number}: expected numbers, found '{line[:40]}'") from None
-    if not vertices:
-        raise InvalidInput("malformed_file", "it has no 'v' line")
-    triangles = [triangle for polygon in polygons for triangle in _fan(polygon)]
-    return np.array(vertices, dtype=np.float64), np.array(triangles, dtype=np.int64).reshape(-1, 3)
-
-
-_STL_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-
-
-def _read_stl(data: bytes) -> Tuple[FloatArray, Triangles]:
-    count = int.from_bytes(data[80:84], "little") if len(data) >= 84 else -1
-    if count >= 0 and len(data) == 84 + 50 * count:
-        corners = np.frombuffer(data, _STL_RECORD, count, 84)["corners"].astype(np.float64).reshape(-1, 3)
-    elif data.lstrip().startswith(b"solid"):
-        found = re.findall(r"^\s*vertex\s+(\S+)\s+(\S+)\s+(\S+)\s*$", _text(data), flags=re.MULTILINE)
-        corners = np.array(found, dtype=np.float64).reshape(-1, 3)
-        if "endsolid" not in _text(data) or len(corners) % 3 != 0:
-            raise InvalidInput("malformed_file", "it ends in the middle of a solid")
-    else:
-        raise InvalidInput("malformed_file", "it is neither ASCII STL nor of the size that its binary header announces")
-    if len(corners) == 0:
-        raise InvalidInput("malformed_file", "it has no triangle")
-    vertices, index = np.unique(corners, axis=0, return_inverse=True)
-    return vertices, np.asarray(index, dtype=np.int64).reshape(-1, 3)
-
-
-_READERS: Dict[str, Callable[[bytes], Tuple[Any, Triangles]]] = {
-    ".ply": read_ply, ".stl": _read_stl, ".obj": _read_obj, ".npy": _read_npy,
-    ".xyz": _read_table, ".txt": _read_table, ".pts": _read_table, ".asc": _read_table,
+_READERS: Dict[str, Callable[[ScanBytes], Content]] = {
+    ".ply": read_ply, ".pcd": read_pcd, ".off": read_off, ".obj": read_obj, ".stl": read_stl, ".npy": read_npy,
+    ".xyz": read_text_points, ".xyzn": read_text_points, ".xyzrgb": read_text_points, ".txt": read_text_points,
+    ".pts": read_text_points, ".asc": read_text_points, ".csv": read_text_points,
 }
 
 ENDINGS = frozenset(_READERS)
-"""Of the files that `read_scan` reads."""
+"""Of the files that `read_scan` reads; .gz may follow."""
+
+# What the command reads beside these.
+_OF_THE_COMMAND = (".las", ".gltf", ".glb", ".3mf")
+_PACKED = ".gz"
+_POINTER = b"version https://git-lfs.github.com/spec/"
+_ARCHIVES = ((b"PK\x03\x04", "ZIP archive"), (b"BZh", "file packed by bzip2"), (b"\xfd7zXZ", "file packed by xz"),
+             (b"\x28\xb5\x2f\xfd", "file packed by zstd"), (b"7z\xbc\xaf\x27\x1c", "7-Zip archive"))
+
+
+def read_scan(path: PathLike, *, mesh_samples: int = SAMPLES, seed: int = 1) -> FloatArray:
+    """The points of a scan file as an (n, 3) array: .ply, .pcd, .off, .obj, .stl, text (.xyz, .txt, .csv, ...) and .npy,
+    packed by gzip or not.
+
+    Of a file with triangles, `mesh_samples` points of its surface, unless the vertices are what was measured: the rule
+    is that of `shapedb add` (docs/file-formats.md), the points are not. Points of a PCD file at which nothing was measured
+    are left out. Warns of what may have been faces, but was not read as such. Raises `ShapeDBError` with
+    file_not_readable, unknown_file_format, malformed_file, non_finite_coordinate or coordinate_out_of_range. For other
+    formats use trimesh or Open3D, whose objects are scans too, or `shapedb add`.
+    """
+    name = os.fspath(path)
+    if mesh_samples < 1:
+        raise InvalidInput("invalid_argument", f"mesh_samples is {mesh_samples}; it must be at least 1")
+    content = read_content(name)
+    if content.ignored:
+        warnings.warn(f"{name}: passed over: {', '.join(content.ignored)}", stacklevel=2)
+    try:
+        points = points_of_mesh(content.vertices, content.triangles, mesh_samples, seed)
+    except InvalidInput as error:
+        raise InvalidInput(error.reason, f"{name}: {error.message}") from None
+    if len(points) == 0:
+        raise InvalidInput("malformed_file", f"{name}: there are no points in the file")
+    return points
+
+
+def read_content(name: str) -> Content:
+    """What is in the file, before anything is made of it. Raises `ShapeDBError`."""
+    _reader_of(name)  # a file that is not read is not opened
+    try:
+        data = Path(name).read_bytes()
+    except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
+        why = error.strerror if isinstance(error, OSError) else None
+        raise ShapeDBError("file_not_readable", f"{name}: cannot be read: {why or error}") from None
+    return content_of(name, data)
+
+
+def content_of(name: str, data: bytes) -> Content:
+    """What is in the bytes of the file. Raises `ShapeDBError`."""
+    reader = _reader_of(name)
+    try:
+        data = gunzip(data) if is_packed(data) else data
+        _check_has_content(data)
+        content = reader(ScanBytes(data))
+        check_not_rounded(content.vertices)
+        return content
+    except InvalidInput as error:
+        raise InvalidInput(error.reason, f"{name}: {error.message}") from None
+    except MemoryError:
+        raise ShapeDBError("out_of_memory", f"{name}: not enough memory to read the file") from None
+    except Exception as error:  # a fault of ours, which a strange file must not turn into one of the caller's
+        raise ShapeDBError("internal", f"{name}: reading failed: {error}") from error
+
+
+def ending_of(path: "PurePath | str") -> str:
+    """Of the format, in lower case: ".ply" of "scan.PLY" and of "scan.ply.gz"."""
+    pure = PurePath(path)
+    ending = pure.suffix.lower()
+    return PurePath(pure.stem).suffix.lower() if ending == _PACKED else ending
+
+
+def without_ending(path: Path) -> Path:
+    """ "Hand/193.ply" and "Hand/193.ply.gz" -> "Hand/193"."""
+    return (path.with_suffix("") if path.suffix.lower() == _PACKED else path).with_suffix("")
+
+
+def is_scan_file(path: Path) -> bool:
+    """Text and tables may be about anything: they count if their first line of content looks like a point."""
+    if ending_of(path) not in ENDINGS:
+        return False
+    if ending_of(path) not in (".txt", ".csv"):
+        return True
+    try:
+        data = path.read_bytes()
+        return begins_with_a_point(gunzip(data) if is_packed(data) else data)
+    except (OSError, ValueError):
+        return False
+
+
+def _reader_of(name: str) -> Callable[[ScanBytes], Content]:
+    ending = ending_of(name)
+    if ending in _READERS:
+        return _READERS[ending]
+    known = " ".join(_READERS)
+    if ending in _OF_THE_COMMAND:
+        raise InvalidInput("unknown_file_format",
+                           f"{name}: this package does not read {ending}, but the command does: `shapedb add FILE` stores it. "
+                           f"Or load it with trimesh or Open3D and give the object. The package reads {known}")
+    what = f"unknown file ending {in_quotes(ending)}" if ending else "no file ending"
+    raise InvalidInput("unknown_file_format",
+                       f"{name}: {what}; this package reads {known}, and .gz after that. Load other files with trimesh or "
+                       "Open3D and give the object, or convert them (docs/file-formats.md, \"Other formats\")")
+
+
+def _check_has_content(data: bytes) -> None:
+    """What no reader can make anything of is named for what it is."""
+    if data in (b"", b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff"):
+        raise malformed("the file is empty")
+    if data.startswith(_POINTER):
+        raise malformed("this is a Git LFS pointer, not the file itself; fetch that with 'git lfs pull'")
+    for start, archive in _ARCHIVES:
+        if data.startswith(start):
+            raise malformed(f"this is a {archive}; unpack it first")

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ._errors import InvalidInput
+from ._resolution import origin_of, size_of
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -42,8 +43,6 @@ CHUNK_BYTES = (1 << 20) // 12 * 12
 _LARGEST = float(np.finfo(np.float32).max)
 # Below this diagonal float32 loses detail to subnormals: 2^24 times the smallest normal number.
 _SMALLEST_DIAGONAL = float(np.finfo(np.float32).tiny) * 2.0**24
-# A float32 rounds a coordinate beyond this many box diagonals by more than a millionth of the diagonal.
-_FAR_FROM_ORIGIN = 16.0
 
 
 def as_points(scan: Scan) -> FloatArray:
@@ -124,15 +123,12 @@ def pack(scan: Scan) -> Packed:
     """Checks and packs a scan. If it lies so far from the origin that single precision would hurt its shape, the
     centre of its box is subtracted first, in double precision."""
     points = as_points(scan)
-    low, high = points.min(axis=0), points.max(axis=0)
-    diagonal = float(np.hypot(np.hypot(*(high - low)[:2]), (high - low)[2]))
+    diagonal = size_of(points.min(axis=0), points.max(axis=0))
     if 0.0 < diagonal < _SMALLEST_DIAGONAL:
         raise InvalidInput(
             "coordinate_out_of_range", f"the whole scan is only {diagonal:g} across, too small for single precision "
             f"({_SMALLEST_DIAGONAL:.2g}); use a smaller unit")
-    origin = np.zeros(3)
-    if diagonal > 0.0 and max(np.abs(low).max(), np.abs(high).max()) > _FAR_FROM_ORIGIN * diagonal:
-        origin = low + 0.5 * (high - low)
+    origin = origin_of(points)
     data = np.ascontiguousarray(points - origin, dtype="<f4").tobytes()
     return Packed(data, len(points), hashlib.sha256(data).digest(), origin)
 
