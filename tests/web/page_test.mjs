@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page as people use it, in a headless Chromium against a real server; what is drawn is judged by its pixels.
 import assert from 'node:assert/strict';
-import { writeFileSync } from 'node:fs';
+import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 
@@ -11,6 +11,8 @@ import {
 
 const isBlue = ([r, g, b]) => b > 90 && b > r + 40 && b > g + 15;
 const isOrange = ([r, g, b]) => r > 90 && r > b + 40 && r > g + 15;
+/** Surveyed coordinates, in metres. */
+const kFar = [4_400_000, 5_400_000, 120];
 const kNasty = '<img src=x onerror=document.title="taken">';
 
 let temporary, server, browser, scan;
@@ -114,6 +116,26 @@ pageTest('a dropped scan is shown in segments, searched with and stored', async 
   server.command('delete', 'stored here', '--collection', 'parts');
 });
 
+pageTest('a scan far from 0, 0, 0 keeps its digits', async (page) => {
+  const far = join(temporary.folder, 'far.xyz');
+  const moved = (line) => line.split(' ').map((value, axis) => (axis < 3 ? (Number(value) + kFar[axis]).toFixed(9) : value)).join(' ');
+  writeFileSync(far, readFileSync(scan, 'utf8').trim().split('\n').map(moved).join('\n'));
+  await visit(page, server, '#/shapes/parts');
+  await page.setInputFiles('#file', far);
+  await page.getByText('sent relative to about 4', { exact: false }).waitFor();
+  await page.locator('.hit').first().waitFor();
+  await page.getByText('segment 2', { exact: false }).waitFor();
+  assert.ok(Number(await page.locator('.hit').first().locator('.score-value').innerText()) > 0.99);
+
+  await page.getByText('Store it in parts').click();
+  await page.locator('#store-key').fill('far away');
+  await page.getByRole('button', { name: 'Store', exact: true }).click();
+  await page.getByRole('link', { name: 'far away is stored' }).waitFor();
+  const [x, y, z] = JSON.parse(server.command('get', 'far away', '--collection', 'parts', '--json')).origin;
+  assert.ok(Math.hypot(x - kFar[0], y - kFar[1], z - kFar[2]) < 20, `${x} ${y} ${z}`);
+  server.command('delete', 'far away', '--collection', 'parts');
+});
+
 pageTest('a file that is no scan is refused in words', async (page) => {
   const bad = join(temporary.folder, 'bad.off');
   writeFileSync(bad, 'OFF\n4 1 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 9\n');
@@ -121,7 +143,7 @@ pageTest('a file that is no scan is refused in words', async (page) => {
   await page.setInputFiles('#file', bad);
   const alert = page.getByRole('alert');
   await alert.waitFor();
-  assert.match(await alert.innerText(), /bad\.off cannot be read as OFF: face 1 names a corner that is not there/);
+  assert.match(await alert.innerText(), /bad\.off: line 7: face 0 of 1 names vertex 9, but the file has 4 vertices/);
 });
 
 pageTest('facets filter, and the address is a link to what is seen', async (page) => {

@@ -1,79 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// The page's arithmetic and file readers without a browser.
+// The page's arithmetic without a browser.
 import assert from 'node:assert/strict';
-import { mkdtempSync, rmSync } from 'node:fs';
-import { createRequire } from 'node:module';
-import { join } from 'node:path';
-import { fileURLToPath, pathToFileURL } from 'node:url';
 import { after, before, test } from 'node:test';
 
-const web = fileURLToPath(new URL('../../web', import.meta.url));
-const { build } = createRequire(join(web, 'package.json'))('esbuild');
+import { bundled } from './bundle.mjs';
 
-let folder, page;
+let page, remove;
 
-before(async () => {
-  folder = mkdtempSync(join(web, 'node_modules/.units-'));  // where imports of the bundle are found
-  const parts = ['address', 'filter', 'files/decode', 'cloud/nearest', 'cloud/grouping', 'cloud/motion', 'cloud/cloud', 'api/envelope'];
-  await build({
-    stdin: { contents: parts.map((part) => `export * from './${part}';`).join('\n'), resolveDir: join(web, 'src'), loader: 'ts' },
-    bundle: true, format: 'esm', platform: 'node', outfile: join(folder, 'page.mjs'), logLevel: 'error',
-  });
-  page = await import(pathToFileURL(join(folder, 'page.mjs')));
-});
-after(() => rmSync(folder, { recursive: true, force: true }));
-
-const bytesOf = (text) => new TextEncoder().encode(text).buffer;
-const decode = (name, text) => page.decode(name, bytesOf(text));
-
-const kCorners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]];
-const kFaces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
-const lines = (rows) => rows.map((row) => row.join(' ')).join('\n');
-
-test('points are read from every format', () => {
-  const flat = kCorners.flat();
-  const ply = `ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nend_header\n${lines(kCorners)}\n`;
-  const pcd = `VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 4\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 4\nDATA ascii\n${lines(kCorners)}\n`;
-  const texts = {
-    'a.ply': ply, 'a.pcd': pcd, 'a.off': `OFF\n4 0 0\n${lines(kCorners)}\n`, 'a.xyz': lines(kCorners),
-    'a.csv': `x,y,z,intensity\r\n${kCorners.map((row) => [...row, 7].join(',')).join('\r\n')}`,
-    'A.PTS': `4\n${kCorners.map((row) => [...row, -5, 1, 2, 3].join(' ')).join('\n')}`,
-    'a.obj': kCorners.map((row) => `v ${row.join(' ')}`).join('\n') + '\np 1 2 3 4\n',
-  };
-  for (const [name, text] of Object.entries(texts)) {
-    const scan = decode(name, text);
-    assert.deepEqual([...scan.positions], flat, name);
-    assert.equal(scan.sampled, false, name);
-  }
-});
-
-test('surfaces are sampled, always alike', () => {
-  const off = `OFF # a tetrahedron\n4 4 6\n${lines(kCorners)}\n${lines(kFaces.map((face) => [3, ...face]))}\n`;
-  const obj = `${kCorners.map((row) => `v ${row.join(' ')}`).join('\n')}\n${kFaces.map((face) => `f ${face.map((i) => i + 1).join(' ')}`).join('\n')}\n`;
-  const stl = `solid t\n${kFaces.map((face) => `facet normal 0 0 0\nouter loop\n${face.map((i) => `vertex ${kCorners[i].join(' ')}`).join('\n')}\nendloop\nendfacet`).join('\n')}\nendsolid t\n`;
-  const ply = `ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nelement face 4\nproperty list uchar int vertex_indices\nend_header\n${lines(kCorners)}\n${lines(kFaces.map((face) => [3, ...face]))}\n`;
-  for (const [name, text] of Object.entries({ 'a.off': off, 'a.obj': obj, 'a.stl': stl, 'a.ply': ply })) {
-    const scan = decode(name, text);
-    assert.equal(scan.sampled, true, name);
-    assert.equal(scan.positions.length, 60_000, name);
-    for (let i = 0; i < scan.positions.length; i += 3) {
-      const [x, y, z] = scan.positions.subarray(i, i + 3);
-      const onFace = Math.min(x, y, z, 1 - x - y - z);
-      assert.ok(Math.abs(onFace) < 1e-5, `${name}: ${x} ${y} ${z}`);
-    }
-    assert.deepEqual(decode(name, text).positions, scan.positions, name);
-  }
-});
-
-test('bad files are refused in words', () => {
-  assert.throws(() => decode('a.xyz', '1 2 3\n4 5 x\n'), /a\.xyz .*line 2 does not begin with three numbers/);
-  assert.throws(() => decode('a.xyz', '1 2 3\n'), /1 usable points/);
-  assert.throws(() => decode('a.exe', ''), /this ending is not known/);
-  assert.throws(() => decode('a.off', 'OFF\n9 0 0\n0 0 0\n'), /9 corners and 0 faces are announced/);
-  assert.throws(() => decode('a.ply', 'no ply at all'), /a\.ply/);
-  const some = decode('a.xyz', `nan 0 0\n${lines(kCorners)}\n`);
-  assert.deepEqual([some.positions.length, some.skipped], [12, 1]);
-});
+before(async () => ({ page, remove } = await bundled(
+  ['address', 'filter', 'cloud/nearest', 'cloud/grouping', 'cloud/motion', 'cloud/cloud', 'api/envelope'])));
+after(() => remove());
 
 test('distances are those of trying all', () => {
   let state = 1;

@@ -3,7 +3,8 @@
 import { sha256 } from './sha256';
 import { send } from './api/connect';
 import { chunksOf, pointCount } from './cloud/cloud';
-import type { Positions } from './cloud/cloud';
+import type { Point, Positions } from './cloud/cloud';
+import { withoutEnding } from './files/ending';
 import type { Choices } from './parts/options';
 import { cloudFrom } from './parts/points';
 import type { SegmentedCloud } from './parts/points';
@@ -20,7 +21,9 @@ export type OnProgress = (stage: string, share?: number) => void;
 export interface ScanSession {
   /** Of the file, without its ending. */
   name: string;
+  /** Relative to the origin. */
   positions: Positions;
+  origin: Point;
   /** What there is to say about how the file was read. */
   notes: string[];
   /** By the parameters of a collection, whose name is the key. */
@@ -53,11 +56,18 @@ export async function readDropped(onProgress: OnProgress): Promise<ScanSession> 
   const notes = [`${pointCount(scan.positions).toLocaleString('en')} points`];
   if (scan.sampled) notes.push('a sample of the surface in the file');
   if (scan.skipped > 0) notes.push(`${scan.skipped.toLocaleString('en')} points without finite coordinates left out`);
+  if (scan.origin.some((value) => value !== 0)) notes.push(`sent relative to about ${scan.origin.map((value) => Number(value.toPrecision(6))).join(', ')}`);
+  for (const list of scan.ignored) notes.push(`passed over: ${list}`);
   current = {
-    name: file.name.replace(/\.[^.]*$/, ''), positions: scan.positions, notes, segmented: new Map(), found: new Map(),
+    name: withoutEnding(file.name), positions: scan.positions, origin: scan.origin, notes, segmented: new Map(), found: new Map(),
   };
   pending = undefined;
   return current;
+}
+
+/** What every header of an upload says of the points. */
+export function pointsOf({ positions, origin: [x, y, z] }: Pick<ScanSession, 'positions' | 'origin'>) {
+  return { pointCount: BigInt(pointCount(positions)), ...(x !== 0 || y !== 0 || z !== 0 ? { origin: { x, y, z } } : {}) };
 }
 
 function* requests<H, C>(header: H, positions: Positions, chunk: (xyz: Uint8Array) => C): Generator<H | C> {
@@ -81,7 +91,7 @@ export async function segment(
     part: {
       case: 'header' as const,
       value: {
-        pointCount: BigInt(pointCount(session.positions)),
+        ...pointsOf(session),
         profile: collection.profile,
         ...(collection.segmentation && { segmentation: collection.segmentation }),
         ...(collection.signature && { signature: collection.signature }),
@@ -108,7 +118,7 @@ export async function search(
       case: 'header' as const,
       value: {
         options: { ...others, ...(verify === undefined ? {} : { verify }) },
-        pointCount: BigInt(pointCount(session.positions)),
+        ...pointsOf(session),
       },
     },
   };
@@ -126,7 +136,7 @@ export async function store(
     part: {
       case: 'header' as const,
       value: {
-        collection, key, mode: AddMode.INSERT_ONLY, pointCount: BigInt(pointCount(session.positions)),
+        collection, key, mode: AddMode.INSERT_ONLY, ...pointsOf(session),
         sha256: await sha256(session.positions),
       },
     },

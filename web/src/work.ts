@@ -29,7 +29,14 @@ function run<R>(task: Task): Promise<R> {
 
 /** Rejects with an Error that says what is wrong with the file. */
 export async function decodeFile(file: File): Promise<Scan> {
-  return run<Scan>({ id: ++lastId, kind: 'decode', name: file.name, bytes: await file.arrayBuffer() });
+  let bytes: ArrayBuffer;
+  try {
+    bytes = await file.arrayBuffer();
+  } catch {
+    throw new Error(`${file.name}: the browser cannot read it: it is too large, or has changed or gone since. \`shapedb query\` reads ` +
+      'files of any size');
+  }
+  return run<Scan>({ id: ++lastId, kind: 'decode', name: file.name, bytes });
 }
 
 /** As distancesTo of cloud/nearest.ts. */

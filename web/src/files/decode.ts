@@ -1,94 +1,121 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scan files become points here, in the browser: the server only ever sees points.
-import type { BufferGeometry, Object3D } from 'three';
-import { Mesh } from 'three';
-import { OBJLoader } from 'three/addons/loaders/OBJLoader.js';
-import { PCDLoader } from 'three/addons/loaders/PCDLoader.js';
-import { PLYLoader } from 'three/addons/loaders/PLYLoader.js';
-import { STLLoader } from 'three/addons/loaders/STLLoader.js';
-
-import type { Positions } from '../cloud/cloud';
-import { joinPositions } from '../cloud/cloud';
+// Scan files become points here, in the browser: the server only ever sees points. The readers follow those of the command
+// (client/io/), whose rules docs/file-formats.md has; one set of files holds them to each other
+// (tests/support/file_cases/).
+import type { Point, Positions } from '../cloud/cloud';
+import type { Content } from './content';
+import { endingOf } from './ending';
+import { countText, FileFault } from './fault';
+import { gunzip, isPacked } from './gunzip';
+import { readObj } from './obj';
 import { readOff } from './off';
-import { sampleSurface, triangleCorners } from './mesh';
+import { readPcd } from './pcd';
+import { readPly } from './ply';
+import { checkNotRounded, originOf, relativeTo } from './resolution';
+import { latin1, ScanBytes } from './scan_bytes';
+import { readStl } from './stl';
+import { sampleSurface, wantsSamples } from './surface';
 import { readText } from './text';
+import { inQuotes } from './words';
 
-export const kFileEndings = ['ply', 'pcd', 'obj', 'stl', 'off', 'xyz', 'txt', 'asc', 'pts', 'csv'];
+const kReaders: Record<string, (file: ScanBytes) => Content> = {
+  ply: readPly, pcd: readPcd, off: readOff, obj: readObj, stl: readStl, xyz: readText, xyzn: readText, xyzrgb: readText,
+  txt: readText, pts: readText, asc: readText, csv: readText,
+};
+export const kFileEndings = Object.keys(kReaders);
+
+/** What the command reads beside these. */
+const kOfTheCommand = ['las', 'gltf', 'glb', '3mf'];
+
+const kLeastPoints = 4;
 
 export interface Scan {
+  /** Relative to the origin. */
   positions: Positions;
+  /** 0, 0, 0 unless the scan lies far from there. */
+  origin: Point;
   /** The file held a surface, of which these points are a sample. */
   sampled: boolean;
-  /** Points left out, for a coordinate of theirs was no number. */
+  /** Points left out, for the file says that nothing was measured there. */
   skipped: number;
+  /** Lists of the file that may have named faces, but did not. */
+  ignored: string[];
 }
 
-/** Throws an Error that says what is wrong with the file. */
+/** Throws a FileFault that begins with the name and says what is wrong with the file, and where. */
 export function decode(name: string, bytes: ArrayBuffer): Scan {
-  const raw = rawScan(name, bytes);
-  const positions = raw.positions.every(Number.isFinite) ? raw.positions : onlyFinite(raw.positions);
-  if (positions.length < 12) {
-    throw new Error(`${name} has ${positions.length / 3} usable points; a scan has at least 4`);
-  }
-  return { positions, sampled: raw.sampled, skipped: (raw.positions.length - positions.length) / 3 };
-}
-
-interface RawScan {
-  positions: Positions;
-  sampled: boolean;
-}
-
-function rawScan(name: string, bytes: ArrayBuffer): RawScan {
-  const ending = name.toLowerCase().split('.').pop() ?? '';
-  try {
-    switch (ending) {
-      case 'ply': return fromGeometry(new PLYLoader().parse(bytes));
-      case 'stl': return fromGeometry(triangleCorners(new STLLoader().parse(bytes)));
-      case 'pcd': return fromGeometry(new PCDLoader().parse(bytes).geometry);
-      case 'obj': return fromObject(new OBJLoader().parse(textOf(bytes)));
-      case 'off': return fromGeometry(readOff(textOf(bytes)));
-      case 'xyz': case 'txt': case 'asc': case 'pts': case 'csv':
-        return { positions: readText(textOf(bytes)), sampled: false };
+  return named(name, () => {
+    const content = contentOf(name, new Uint8Array(bytes));
+    checkNotRounded(content.vertices);
+    if (content.vertexCount < kLeastPoints) {
+      throw new FileFault(`the file has ${countText(content.vertexCount, 'point')}; a scan has at least ${kLeastPoints}`,
+        'too_few_points');
     }
-  } catch (error) {
-    throw new Error(`${name} cannot be read as ${ending.toUpperCase()}: ${(error as Error).message}`);
-  }
-  throw new Error(`${name}: this ending is not known. Read are ${kFileEndings.map((one) => `.${one}`).join(' ')}`);
-}
-
-function textOf(bytes: ArrayBuffer): string {
-  return new TextDecoder().decode(bytes);
-}
-
-function fromGeometry(geometry: BufferGeometry): RawScan {
-  if (geometry.index !== null && geometry.index.count >= 3) {
-    return { positions: sampleSurface(geometry), sampled: true };
-  }
-  const attribute = geometry.getAttribute('position');
-  if (attribute === undefined) throw new Error('there are no points in it');
-  return { positions: new Float32Array(attribute.array), sampled: false };
-}
-
-/** All meshes of an OBJ file as one surface, or its points if it has no faces. */
-function fromObject(object: Object3D): RawScan {
-  const parts: { corners: Float32Array; faces: boolean }[] = [];
-  object.traverse((part) => {
-    const geometry = (part as Mesh).geometry;
-    const corners = geometry?.getAttribute('position');
-    if (corners !== undefined) {
-      parts.push({ corners: new Float32Array(corners.array), faces: (part as Mesh).isMesh === true });
-    }
+    const origin = originOf(content.vertices);
+    const vertices = relativeTo(content.vertices, origin);
+    const sampled = wantsSamples(content);
+    const positions = sampled ? sampleSurface(vertices, content.triangles) : vertices;
+    return { positions, origin, sampled, skipped: content.skipped, ignored: content.ignored };
   });
-  const faces = parts.filter((part) => part.faces);
-  if (faces.length === 0) return { positions: joinPositions(parts.map((part) => part.corners)), sampled: false };
-  return fromGeometry(triangleCorners(joinPositions(faces.map((part) => part.corners))));
 }
 
-function onlyFinite(positions: Positions): Positions {
-  const kept: number[] = [];
-  for (let i = 0; i < positions.length; i += 3) {
-    const point = positions.subarray(i, i + 3);
-    if (point.every(Number.isFinite)) kept.push(...point);
-  }
-  return new Float32Array(kept);
+/** What is in the file, before anything is made of it. Throws a FileFault. */
+export function readContent(name: string, bytes: ArrayBuffer): Content {
+  return named(name, () => {
+    const content = contentOf(name, new Uint8Array(bytes));
+    checkNotRounded(content.vertices);
+    return content;
+  });
 }
+
+function named<R>(name: string, read: () => R): R {
+  try {
+    return read();
+  } catch (error) {
+    if (error instanceof FileFault) throw new FileFault(`${name}: ${error.message}`, error.reason);
+    // Never words of the language: the browser may refuse the memory of a huge file.
+    if (error instanceof RangeError) throw new FileFault(`${name}: too large for this browser; use \`shapedb add\``, 'out_of_memory');
+    // A fault of ours.
+    throw new FileFault(`${name}: reading failed: ${(error as Error).message}`, 'internal');
+  }
+}
+
+function contentOf(name: string, bytes: Uint8Array): Content {
+  const read = readerOf(name);
+  const unpacked = isPacked(bytes) ? gunzip(bytes) : bytes;
+  checkHasContent(unpacked);
+  return read(new ScanBytes(unpacked));
+}
+
+function readerOf(name: string): (file: ScanBytes) => Content {
+  const ending = endingOf(name);
+  if (Object.hasOwn(kReaders, ending)) return kReaders[ending]!;
+  const known = kFileEndings.map((one) => `.${one}`).join(' ');
+  if (kOfTheCommand.includes(ending)) {
+    throw new FileFault(`this page does not read .${ending} files, but the command does: \`shapedb query FILE\` searches with it, ` +
+      `\`shapedb add FILE\` stores it. The page reads ${known}`, 'unknown_file_format');
+  }
+  throw new FileFault(`${ending === '' ? 'the file has no ending' : `files that end in ${inQuotes(`.${ending}`)} are not read`}; the page reads ` +
+    `${known}, and .gz after that. What converts other files: docs/file-formats.md, "Other formats"`, 'unknown_file_format');
+}
+
+const kArchives: [start: string, name: string][] = [
+  ['PK\x03\x04', 'ZIP archive'], ['BZh', 'file packed by bzip2'], ['\xfd7zXZ', 'file packed by xz'],
+  ['\x28\xb5\x2f\xfd', 'file packed by zstd'], ['7z\xbc\xaf\x27\x1c', '7-Zip archive'],
+];
+
+/** What no reader can make anything of is named for what it is. */
+function checkHasContent(bytes: Uint8Array): void {
+  const kPointer = 'version https://git-lfs.github.com/spec/';
+  const start = latin1(bytes.subarray(0, kPointer.length));
+  if (['', '\xef\xbb\xbf', '\xff\xfe', '\xfe\xff'].includes(start)) throw new FileFault('the file is empty');
+  if (start === kPointer) {
+    throw new FileFault("this is a Git LFS pointer, not the file itself; fetch that with 'git lfs pull'");
+  }
+  const archive = kArchives.find(([signature]) => start.startsWith(signature));
+  if (archive !== undefined) throw new FileFault(`this is a ${archive[1]}; unpack it first`);
+}
+
+/** What a FileFault of a file may have. */
+export const kReasons = ['malformed_file', 'non_finite_coordinate', 'coordinate_out_of_range', 'too_few_points', 'unknown_file_format'];
+export { FileFault };

@@ -1,34 +1,124 @@
 // SPDX-License-Identifier: Apache-2.0
-// OFF files, which three.js does not read: a count of corners and faces, the corners, and of each face how many corners
-// it has and which.
-import { BufferAttribute, BufferGeometry } from 'three';
+// OFF as text, with the prefixes that only add data to vertices; three.js does not read it.
+import { Content, Corners } from './content';
+import { countText } from './fault';
+import type { FileFault } from './fault';
+import type { ScanBytes } from './scan_bytes';
+import { WordReader } from './word_reader';
+import { countOf, inQuotes, inQuotesNotANumber, realOf } from './words';
 
-/** Without faces: a geometry without index. Throws an Error. */
-export function readOff(text: string): BufferGeometry {
-  const lines = text.split(/\r\n|\r|\n/).map((line) => line.replace(/#.*/, '').trim()).filter((line) => line !== '');
-  const head = (lines.shift() ?? '').match(/^(ST)?(C)?(N)?OFF\s*(.*)$/);
-  if (head === null) throw new Error('it does not begin with OFF');
-  if (/BINARY/.test(head[4]!)) throw new Error('it is binary');
-  const [corners = NaN, faces = NaN] = numbersOf(head[4] === '' ? (lines.shift() ?? '') : head[4]!);
-  if (!(corners >= 0 && faces >= 0)) throw new Error('it does not tell how many corners and faces it has');
-  if (lines.length < corners + faces) throw new Error(`${corners} corners and ${faces} faces are announced, fewer are there`);
-
-  const positions = new Float32Array(3 * corners);
-  for (let i = 0; i < corners; ++i) positions.set(numbersOf(lines[i]!).slice(0, 3), 3 * i);
-  const triangles: number[] = [];
-  for (let i = 0; i < faces; ++i) {
-    const [count = 0, ...face] = numbersOf(lines[corners + i]!);
-    if (face.slice(0, count).some((corner) => !(corner >= 0 && corner < corners)) || face.length < count) {
-      throw new Error(`face ${i + 1} names a corner that is not there`);
-    }
-    for (let j = 2; j < count; ++j) triangles.push(face[0]!, face[j - 1]!, face[j]!);
-  }
-  const geometry = new BufferGeometry();
-  geometry.setAttribute('position', new BufferAttribute(positions, 3));
-  if (triangles.length > 0) geometry.setIndex(triangles);
-  return geometry;
+export function readOff(file: ScanBytes): Content {
+  return new OffReader(file).read();
 }
 
-function numbersOf(line: string): number[] {
-  return line.split(/\s+/).map(Number);
+class OffReader {
+  private readonly content = new Content();
+  private readonly words: WordReader;
+  private vertices = 0;
+  private faces = 0;
+  /** Numbers of a vertex after its coordinates. */
+  private extraNumbers = 0;
+  private onCountsLine = false;
+  private wordByWord = false;
+
+  constructor(private readonly file: ScanBytes) {
+    this.words = new WordReader(file);
+  }
+
+  read(): Content {
+    this.file.decodeText();
+    this.readHeader();
+    this.wordByWord = this.words.hasFewerLinesThan(this.vertices + this.faces);
+    if (this.onCountsLine) this.endRecord();
+    for (let i = 0; i < this.vertices; ++i) this.readVertex(i);
+    const corners = new Corners(this.content);
+    for (let i = 0; i < this.faces; ++i) this.readFace(i, corners);
+    if (this.words.next() !== '') {
+      throw this.file.atLine(`data after the last of the announced ${countText(this.vertices, 'vertex', 'vertices')} and ` +
+        countText(this.faces, 'face'));
+    }
+    return this.content;
+  }
+
+  /** "OFF 8 6 12", "OFF8 6 12" (in well-known collections), or without the word. */
+  private readHeader(): void {
+    let word = this.words.next();
+    if (word === '') throw this.file.atLine('expected OFF; the file has no content');
+    const name = word.toLowerCase().indexOf('off');
+    if (name >= 0) {
+      const prefix = /^(st)?(c)?(n)?(o)ff/i.exec(word);
+      // "nOFF" has vertices of another dimension.
+      if (prefix === null || (prefix[3] === 'n' && prefix[4] === 'O')) {
+        throw this.file.atLine(
+          `expected OFF, COFF, NOFF, STOFF or a mix of these prefixes, found ${inQuotes(word.slice(0, name + 3))}`);
+      }
+      this.extraNumbers = (prefix[1] ? 2 : 0) + (prefix[2] ? 4 : 0) + (prefix[3] ? 3 : 0);
+      word = word.slice(prefix[0].length);
+      if (word === '') word = this.words.next();
+      if (word.toLowerCase() === 'binary') {
+        throw this.file.atLine('binary OFF is not read; convert the file to text OFF or PLY');
+      }
+      if (word === '') throw this.cutShort('the numbers of vertices and faces');
+    }
+    this.readCounts(word);
+  }
+
+  private readCounts(vertices: string): void {
+    const count = (word: string) => {
+      const number = countOf(word);
+      if (number !== undefined) return number;
+      throw this.file.atLine(`expected the numbers of vertices and faces, found ${inQuotesNotANumber(word)}`);
+    };
+    this.vertices = count(vertices);
+    this.faces = count(this.words.next());
+    // The number of edges may be missing. It is there if it is on the line, or on one of its own.
+    this.onCountsLine = !this.words.atLineEnd();
+    if (this.onCountsLine || (this.words.nextLine() && this.words.wordsOnLine().length === 1)) this.words.next();
+  }
+
+  /** What follows on the line is ignored: normal, colour, texture position. */
+  private endRecord(): void {
+    if (!this.wordByWord) this.words.endLine();
+  }
+
+  private readVertex(index: number): void {
+    const name = () => `vertex ${index} of ${this.vertices}`;
+    const number = () => {
+      const word = this.words.next();
+      if (word === '') throw this.cutShort(name());
+      const value = realOf(word);
+      if (value !== undefined) return value;
+      throw this.file.atLine(`expected three numbers for ${name()}, found ${inQuotesNotANumber(word)}`);
+    };
+    this.content.addVertex(number(), number(), number(), () => `line ${this.file.lineNumber}`);
+    if (this.wordByWord) for (let i = 0; i < this.extraNumbers; ++i) this.words.next();
+    this.endRecord();
+  }
+
+  private readFace(index: number, fan: Corners): void {
+    const name = `face ${index} of ${this.faces}`;
+    const word = this.words.next();
+    if (word === '') throw this.cutShort(name);
+    const corners = countOf(word);
+    if (corners === undefined) {
+      throw this.file.atLine(`expected the number of corners of ${name}, found ${inQuotesNotANumber(word)}`);
+    }
+    fan.begin();
+    for (let i = 0; i < corners; ++i) fan.add(this.corner(`corner ${i} of ${name}`, name));
+    this.endRecord();
+  }
+
+  private corner(what: string, face: string): number {
+    const word = this.words.next();
+    if (word === '') throw this.cutShort(what);
+    const vertex = countOf(word);
+    if (vertex === undefined) throw this.file.atLine(`expected ${what}, found ${inQuotesNotANumber(word)}`);
+    if (vertex < this.vertices) return vertex;
+    throw this.file.atLine(
+      `${face} names vertex ${vertex}, but the file has ${countText(this.vertices, 'vertex', 'vertices')}, counted from 0`);
+  }
+
+  private cutShort(expected: string): FileFault {
+    return this.file.afterLastLine(`expected ${expected}`);
+  }
 }

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+// How finely single precision holds the coordinates of a scan, as core/geometry/resolution.h tells.
+import type { Point } from '../cloud/cloud';
+import { FileFault } from './fault';
+
+const kLargestSingle = 3.4028234663852886e38;
+/** 2^24 times the smallest normal number: below this diagonal detail is lost to subnormals. */
+const kSmallestDiagonal = 2 ** -126 * 2 ** 24;
+const kLeastSteps = 1000;
+const kLeastStepsOfAxis = 64;
+const kFarFromOrigin = 16;
+const kFlatShare = 1e-6;
+const kLeastOddShare = 0.125;
+
+interface Axis {
+  low: number;
+  high: number;
+}
+
+function axesOf(vertices: Float64Array): Axis[] {
+  const axes = [0, 1, 2].map(() => ({ low: Infinity, high: -Infinity }));
+  for (let i = 0; i < vertices.length; ++i) {
+    const axis = axes[i % 3]!;
+    const value = vertices[i]!;
+    if (value < axis.low) axis.low = value;
+    if (value > axis.high) axis.high = value;
+  }
+  return axes;
+}
+
+const extentOf = ({ low, high }: Axis) => high - low;
+const largestOf = ({ low, high }: Axis) => Math.max(Math.abs(low), Math.abs(high));
+const sizeOf = (axes: Axis[]) => Math.hypot(...axes.map(extentOf));
+
+/** From the magnitude to the next number of single precision. */
+function stepAt(magnitude: number): number {
+  const single = new Float32Array([Math.min(magnitude, kLargestSingle)]);
+  const bits = new Uint32Array(single.buffer);
+  const from = single[0]!;
+  if (from >= kLargestSingle) return 2 ** 104;
+  ++bits[0]!;
+  return single[0]! - from;
+}
+
+interface Coarse {
+  largest: number;
+  step: number;
+  across: number;
+}
+
+/** Why single precision cannot hold so many points there; undefined if it can. */
+function coarse(axes: Axis[], points: number): Coarse | undefined {
+  const size = sizeOf(axes);
+  const largest = Math.max(...axes.map(largestOf));
+  const step = stepAt(largest);
+  if (size > 0 && step * Math.max(kLeastSteps, Math.sqrt(points)) > size) return { largest, step, across: size };
+  for (const axis of axes) {
+    const extent = extentOf(axis);
+    const own = stepAt(largestOf(axis));
+    if (extent > kFlatShare * size && own * kLeastStepsOfAxis > extent) return { largest: largestOf(axis), step: own, across: extent };
+  }
+  return undefined;
+}
+
+/**
+ * Refuses vertices that were rounded to single precision where that cannot hold them: what is left is not the shape that
+ * was scanned. Vertices on a coarser grid lost nothing and pass.
+ */
+export function checkNotRounded(vertices: Float64Array): void {
+  const axes = axesOf(vertices);
+  if (vertices.length === 0 || axes.some((axis) => largestOf(axis) > kLargestSingle)) return;
+  const found = coarse(axes, vertices.length / 3);
+  if (found === undefined || !vertices.every((value) => Math.fround(value) === value)) return;
+  let odd = 0;
+  for (let i = 0; i < vertices.length; i += 3) {
+    const point = vertices.subarray(i, i + 3);
+    if (point.some((value) => stepAt(Math.abs(value)) >= found.step && value % (2 * found.step) !== 0)) ++odd;
+  }
+  if (odd < (kLeastOddShare * vertices.length) / 3) return;
+  const text = (value: number, digits: number) => Number(value.toPrecision(digits)).toString();
+  throw new FileFault(`coordinates up to ${text(found.largest, 6)} are ${text(found.step, 3)} apart in single precision, but the ` +
+    `scan is only ${text(found.across, 3)} across, and all of them are such numbers: the shape was lost when they were written in ` +
+    'single precision. Write them again in double precision, or relative to a point near the scan', 'coordinate_out_of_range');
+}
+
+/**
+ * What to subtract from the points before they become single precision: the middle of their box if they lie so far from
+ * 0, 0, 0 that rounding would hurt their shape.
+ */
+export function originOf(vertices: Float64Array): Point {
+  const axes = axesOf(vertices);
+  const size = sizeOf(axes);
+  const beyond = vertices.findIndex((value) => Math.abs(value) > kLargestSingle);
+  if (beyond >= 0) {
+    throw new FileFault(`point ${Math.floor(beyond / 3)} has a coordinate beyond single precision (3.4e38); use a larger unit`,
+      'coordinate_out_of_range');
+  }
+  if (size > 0 && size < kSmallestDiagonal) {
+    throw new FileFault(`the whole scan is only ${size.toPrecision(3)} across, too small for single precision; use a smaller unit`,
+      'coordinate_out_of_range');
+  }
+  const far = size > 0 && Math.max(...axes.map(largestOf)) > kFarFromOrigin * size;
+  if (!far && coarse(axes, vertices.length / 3) === undefined) return [0, 0, 0];
+  return axes.map((axis) => axis.low + 0.5 * extentOf(axis)) as Point;
+}
+
+/** The points relative to the origin, subtracted in double precision. */
+export function relativeTo(vertices: Float64Array, origin: Point): Float32Array {
+  const positions = new Float32Array(vertices.length);
+  for (let i = 0; i < vertices.length; ++i) positions[i] = vertices[i]! - origin[i % 3]!;
+  return positions;
+}
