@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which licence each file is under, and whether it says so (REUSE, https://reuse.software).
 
-  scripts/spdx.py --check          complains of files that do not name their licence or name another one, and of files
-                                   under Apache-2.0 that include what is not
+  scripts/spdx.py --check          complains of files that do not name their licence or name another one, of files
+                                   under Apache-2.0 that include what is not, and of what the packages' copyright file
+                                   says otherwise
   scripts/spdx.py --fix            writes the missing SPDX-License-Identifier lines
   scripts/spdx.py --linked FILE    complains of sources in FILE, one path a line, that are not under Apache-2.0
   scripts/spdx.py --licence PATH   prints the licence of a file
@@ -37,6 +38,9 @@ GPL_PATHS = ["common/wire.h", "common/wire.cpp"]
 
 # Libraries that may be in nothing under Apache-2.0.
 COPYLEFT_INCLUDES = ("CGAL/", "gmp", "mpfr")
+
+# What the Debian packages say of each file (https://www.debian.org/doc/packaging-manuals/copyright-format/1.0/).
+COPYRIGHT = "packaging/debian/copyright"
 
 STYLES = {"// {}": ["*.cpp", "*.h", "*.inc", "*.proto", "*.ts", "*.mjs"],
           "# {}": ["*.py", "*.sh", "*.pl", "*.cmake", "*.toml", "*.yaml", "*.yml", "*.service.in", "*.supp", "CMakeLists.txt",
@@ -89,6 +93,27 @@ class Annotations:
             if any(pattern.fullmatch(path) for pattern in patterns):
                 return licence
         return None
+
+
+def copyright_rules() -> list[tuple[list[str], str]]:
+    """The patterns and licence of each paragraph of the copyright file; the last that matches a path counts."""
+    found = []
+    for paragraph in (ROOT / COPYRIGHT).read_text().split("\n\n"):
+        fields = dict(re.findall(r"^(Files|License):((?:.*\n?)(?:^ .*\n?)*)", paragraph, re.MULTILINE))
+        if "Files" in fields:
+            found.append((fields["Files"].split(), fields["License"].split()[0]))
+    return found
+
+
+def copyright_problems(annotations: Annotations) -> list[str]:
+    rules = copyright_rules()
+    found = []
+    for path in tracked_files():
+        said = next((licence for patterns, licence in reversed(rules) if matches(path, patterns)), None)
+        expected = annotations.licence(path) or licence_of(path)
+        if said != expected and not path.startswith("LICENSES/"):
+            found.append(f"{COPYRIGHT} says that {path} is under {said}, and it is under {expected}")
+    return found
 
 
 def stated(text: str) -> str | None:
@@ -172,7 +197,8 @@ def main() -> int:
     if arguments.fix:
         fix(Annotations())
         return 0
-    found = linked_problems(arguments.linked) if arguments.linked else problems(Annotations())
+    annotations = Annotations()
+    found = linked_problems(arguments.linked) if arguments.linked else problems(annotations) + copyright_problems(annotations)
     for problem in found:
         print(f"spdx: {problem}", file=sys.stderr)
     return 1 if found else 0

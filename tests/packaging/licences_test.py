@@ -19,7 +19,8 @@ class Licences(unittest.TestCase):
         self.folder = pathlib.Path(tempfile.mkdtemp())
         self.addCleanup(shutil.rmtree, self.folder)
         self.run_git("init", "-q")
-        for name in ("scripts/spdx.py", "REUSE.toml", "LICENSES/Apache-2.0.txt", "LICENSES/GPL-3.0-or-later.txt"):
+        for name in ("scripts/spdx.py", "REUSE.toml", "LICENSES/Apache-2.0.txt", "LICENSES/GPL-3.0-or-later.txt",
+                     "packaging/debian/copyright"):
             self.write(name, (ROOT / name).read_text())
         self.spdx("--fix")
 
@@ -66,6 +67,16 @@ class Licences(unittest.TestCase):
         complaint = self.complaint()
         for included in ("core/geometry/convex_hull.h", "CGAL/Origin.h", "common/wire.h"):
             self.assertIn(f"is under Apache-2.0 and includes {included}, which is not", complaint)
+
+    def test_the_packages_say_another_licence(self):
+        self.write("common/wire.cpp", GPL)
+        self.write("core/base/a.h", APACHE)
+        name = "packaging/debian/copyright"
+        self.assertEqual(self.complaint(), "")
+        self.write(name, (self.folder / name).read_text().replace("Files: common/wire.h common/wire.cpp", "Files: none"))
+        self.assertIn(f"{name} says that common/wire.cpp is under Apache-2.0, and it is under GPL-3.0-or-later", self.complaint())
+        self.write(name, (ROOT / name).read_text().replace("core/base/* ", ""))
+        self.assertIn(f"{name} says that core/base/a.h is under GPL-3.0-or-later, and it is under Apache-2.0", self.complaint())
 
     def test_a_file_without_comments_that_no_table_names(self):
         self.write("assets/a.bin", "x")
