@@ -9,6 +9,11 @@ build_dir=${BUILD_DIR:-build}
 export CCACHE_BASEDIR="$PWD"
 cmake --preset "${1:-release}" -B "$build_dir" -D SHAPEDB_COMMIT="${SHAPEDB_COMMIT:-}" > /dev/null
 cmake --build "$build_dir" --target shapedbd shapedb_command shapedb_client_installed shapedb_python shapedb_pages shapedb_sbom
+# shapedb-doc has the pages as a site too, where there is mkdocs; never one of other sources, made before.
+rm -rf "$build_dir/site"
+if command -v mkdocs > /dev/null && [ -d /usr/share/mkdocs/themes/material ]; then
+  cmake --build "$build_dir" --target shapedb_site
+fi
 rm -rf "$build_dir/packages"
 # Modes of the files are those of the tree: a umask such as 077 must not be packed.
 umask 022
