@@ -17,8 +17,9 @@ inside() { chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin DEBIAN_FRONT
 server=''
 clean_up() {
   [ -z "$server" ] || kill "$server" 2> /dev/null || true
-  if mountpoint -q "$root/proc"; then umount "$root/proc"; fi
-  rm -rf "$root"
+  # mmdebstrap may leave one of its own below ours. Nothing is deleted through either.
+  while mountpoint -q "$root/proc"; do umount --lazy "$root/proc"; done
+  rm -rf --one-file-system "$root"
 }
 trap clean_up EXIT
 clean_up
