@@ -58,6 +58,14 @@ class Pages(unittest.TestCase):
                 if len(piece) > 8 and piece != "shapedb: command not found":
                     self.assertTrue(piece in said, f"nobody says '{piece}' ({message})")
 
+    def test_concepts_explain_every_reason_of_a_score(self):
+        table = re.search(r"kStatistics.*?\n\}", read("core/signature/statistics.h"), re.DOTALL).group(0)
+        names = re.findall(r'\{"([a-z ]+)", \d', table)
+        self.assertEqual(len(names), 11)
+        page = read("docs/concepts.md")
+        rows = re.findall(r"^\| ([a-z ]+) \| [^|]+ \|$", page[page.index("## Reasons"):page.index("## Views")], re.MULTILINE)
+        self.assertEqual(sorted(set(rows) - {"reason"}), sorted([*names, "fit", "parts"]))
+
     def test_the_api_reference_is_what_proto_says(self):
         done = subprocess.run([sys.executable, os.path.join(ROOT, "scripts/api-reference.py")], stderr=subprocess.PIPE, text=True)
         self.assertEqual(done.returncode, 0, done.stderr)
