@@ -54,11 +54,15 @@ step "Search with a new animal, scanned with more noise"
 build/bin/shapedb sample "$demo/new" --families animal --first 7 --count 1 --points 10000 --noise 0.004 > /dev/null
 run build/bin/shapedb query "$demo"/new/animal/*.ply -k 5
 
+step "The same answer to look at: the hits laid on the query, to be turned in a browser"
+run build/bin/shapedb report "$demo"/new/animal/*.ply -k 5 -o "$demo/report.html"
+
 step "The same server speaks HTTP: for curl, and for browsers at $http"
 run curl -sS -H 'Content-Type: application/json' -d '{}' "$http/shapedb.v1.ShapeService/CountShapes"
 echo
 
-printf '\nWhat all this means, and the same with your own scan: docs/tutorial.md\n'
+printf '\nThe parts of a scan of your own, coloured, for any viewer of point clouds: build/bin/shapedb segment SCAN --out parts.ply\n'
+printf 'What all this means, and a search with your own scan: docs/tutorial.md\n'
 
 if [ "${1:-}" = "--keep" ]; then
   trap - EXIT
