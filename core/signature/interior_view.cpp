@@ -16,7 +16,10 @@ namespace shapedb {
 
 namespace {
 
-constexpr std::uint64_t kSampleSeed = 2004;  // the year of the paper; any number does
+constexpr std::uint64_t kPairSeed = 2004;  // the year of the paper; any number does
+// Once drawn for samples of the interior. The pairs drawn after them, and so the statistics in stored
+// signatures, depend on where the stream stands.
+constexpr std::size_t kPassedOver = 8192;
 
 struct PrincipalFrame {
     Point3 centre;
@@ -78,22 +81,6 @@ void takeTetrahedra(const Segmentation& segmentation, InteriorView& view) {
     view.volume = std::accumulate(view.volumes.begin(), view.volumes.end(), 0.0);
 }
 
-// Stratified by volume along the order of the tetrahedra, which scatters less than independent draws.
-void sampleTetrahedra(InteriorView& view, Random& random) {
-    view.sampled.reserve(InteriorView::kSamples);
-    double passed = 0.0;
-    std::size_t t = 0;
-    for (std::size_t i = 0; i < InteriorView::kSamples; ++i) {
-        const double target = (static_cast<double>(i) + random.uniform()) /
-                              static_cast<double>(InteriorView::kSamples) * view.volume;
-        while (t + 1 < view.volumes.size() && passed + view.volumes[t] < target) passed += view.volumes[t++];
-        // Three draws are left unused: the random pairs drawn after these, and so the statistics stored in
-        // signatures, depend on where the stream stands.
-        for (int unused = 0; unused < 3; ++unused) random.next();
-        view.sampled.push_back(static_cast<std::uint32_t>(t));
-    }
-}
-
 void takeSurface(InteriorView& view) {
     std::vector<std::uint8_t> touched(view.sites.size(), 0);
     for (const auto& v : view.vertices) {
@@ -129,9 +116,9 @@ InteriorView interiorView(const Segmentation& segmentation) {
         view.sites.push_back({dot(d, frame.axes[0]), dot(d, frame.axes[1]), dot(d, frame.axes[2])});
     }
     takeTetrahedra(segmentation, view);
-    Random random(kSampleSeed);
-    sampleTetrahedra(view, random);
     takeSurface(view);
+    Random random(kPairSeed);
+    for (std::size_t i = 0; i < kPassedOver; ++i) random.next();
     view.meanSurfaceDistance = meanDistance(view.surface, random);
     for (std::size_t t = 0; t < view.volumes.size(); ++t) {
         view.meanRadius += view.volumes[t] / view.volume * length(view.centroids[t]);

@@ -23,18 +23,16 @@ struct InteriorView {
     std::vector<double> radii;  ///< circumradii: the local thickness; at most 1
     double volume = 0.0;        ///< sum of `volumes`
 
-    std::vector<std::uint32_t> sampled;  ///< kSamples tetrahedra, evenly drawn by volume
-    PointCloud surface;                  ///< the sites that the interior touches
+    PointCloud surface;  ///< the sites that the interior touches
 
     double meanSurfaceDistance = 0.0;  ///< between two points of `surface`, over kPairs random pairs
     double meanRadius = 0.0;           ///< of the interior's matter, from the origin
 
-    static constexpr std::size_t kSamples = 2048;
     static constexpr std::size_t kPairs = 400000;
 };
 
-/// Deterministic. Samples depend on the order of the tetrahedra, so a turned scan gives other samples of the
-/// same distribution.
+/// Deterministic. The pairs depend on the order of the sites, so a turned scan gives other pairs of the same
+/// distribution.
 [[nodiscard]] InteriorView interiorView(const Segmentation& segmentation);
 
 }  // namespace shapedb

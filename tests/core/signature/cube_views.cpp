@@ -40,11 +40,7 @@ void joinFaces(InteriorView& view) {
     }
 }
 
-void sample(InteriorView& view) {
-    for (std::size_t i = 0; i < InteriorView::kSamples; ++i) {
-        // All tetrahedra have the same volume.
-        view.sampled.push_back(static_cast<std::uint32_t>(i * view.vertices.size() / InteriorView::kSamples));
-    }
+void takeSurface(InteriorView& view) {
     view.surface = view.sites;
     if (view.surface.size() > 400) view.surface.resize(400);
     double sum = 0.0;
@@ -127,7 +123,7 @@ InteriorView viewOfCubes(const std::vector<Cube>& cubes, double side) {
     }
     joinFaces(view);
     measure(view, side);
-    sample(view);
+    takeSurface(view);
     return view;
 }
 

@@ -118,7 +118,6 @@ TEST(InnerDistances, HaveAUnitForASingleTetrahedron) {
     keepOne(view.radii);
     view.neighbours = {{kNoTetrahedron, kNoTetrahedron, kNoTetrahedron, kNoTetrahedron}};
     view.volume = view.volumes.front();
-    std::fill(view.sampled.begin(), view.sampled.end(), 0U);
     const auto inner = innerDistances(view);
     ASSERT_TRUE(inner);
     EXPECT_GT(inner->mean, 0.0);
