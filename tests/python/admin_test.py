@@ -59,6 +59,41 @@ def test_backup_restore_export_import(client, tmp_path):
     assert not (tmp_path / "x").exists() and not list(tmp_path.glob("*.partial"))
 
 
+def test_increments_continue_a_backup(client, tmp_path):
+    collection = client.create_collection("grown", parameters=QUICK)
+    collection.add("box", solids.box(200), wait=True)
+    full, first, second = (tmp_path / name for name in ("full", "1.inc", "2.inc"))
+    client.backup(full)
+    collection.add("ball", solids.ball(300), wait=True)
+    report = client.backup(first, since=full)
+    assert report.bytes == first.stat().st_size < full.stat().st_size
+    collection.delete("box")
+    client.backup(second, since=first)
+    assert reason_of(client.backup, second, since=first) == "already_exists", "others may continue it"
+    collection.delete("ball")
+    client.restore(full, first, second)
+    assert [shape.key for shape in collection.shapes()] == ["ball"]
+    client.restore(full, first)
+    assert sorted(shape.key for shape in collection.shapes()) == ["ball", "box"]
+    assert client.check() == ()
+    np.testing.assert_array_equal(collection.points("ball").shape, (300, 3))
+
+    assert reason_of(client.restore, first) == "invalid_argument", "a full backup comes first"
+    assert reason_of(client.restore, full, second) == "checksum_mismatch", "one between is missing"
+    assert reason_of(client.restore, full, first, first) == "invalid_argument"
+    assert reason_of(client.backup, tmp_path / "x", since=tmp_path / "missing") == "file_not_readable"
+    damaged = bytearray(first.read_bytes())
+    damaged[-1] ^= 1
+    (tmp_path / "damaged").write_bytes(damaged)
+    assert reason_of(client.restore, full, tmp_path / "damaged") == "checksum_mismatch"
+    damaged[120] ^= 1
+    (tmp_path / "damaged").write_bytes(damaged)
+    assert reason_of(client.restore, full, tmp_path / "damaged") == "malformed_file"
+    (tmp_path / "junk").write_bytes(b"no database" * 1000)
+    assert reason_of(client.backup, tmp_path / "x", since=tmp_path / "junk") == "malformed_file"
+    assert not (tmp_path / "x").exists()
+
+
 def test_a_rebuild_is_followed(client):
     collection = client.create_collection("rebuilt", parameters=QUICK)
     collection.add_many({f"s{n}": solids.ball(60, seed=n) for n in range(3)}, progress=False)

@@ -6,7 +6,8 @@ import traceback
 
 import pytest
 import shapedb
-from shapedb._connection import _with_port, is_this_machine, target_of
+from shapedb._address import checked_address
+from shapedb._connection import is_this_machine, target_of
 
 SECRET = "shapedb_1234_s3cr3t"
 
@@ -25,10 +26,21 @@ def refusal(*args, **options):
 
 @pytest.mark.parametrize("given, meant", [
     ("localhost", "localhost:7878"), ("host:1", "host:1"), ("::1", "[::1]:7878"), ("[::1]", "[::1]:7878"),
-    ("[::1]:5", "[::1]:5"), ("unix:/run/x", "unix:/run/x"), ("dns:///host:1", "dns:///host:1"),
+    ("[::1]:5", "[::1]:5"), ("fe80::1%eth0", "[fe80::1%eth0]:7878"), ("unix:/run/x", "unix:/run/x"), ("dns:///host:1", "dns:///host:1"),
 ])
 def test_the_port_is_added(given, meant):
-    assert _with_port(given) == meant
+    assert checked_address(given) == meant
+
+
+@pytest.mark.parametrize("given, why", [
+    ("http://host:7879", "web page"), ("https://host", "TLS is switched on apart"), ("host:99999", "'99999' is no port"),
+    ("host:0", "no port"), ("host:", "no port after the colon"), ("host:http", "'http' is no port"), (":7878", "no host"),
+    ("grpc://host:1", "grpc://"), ("host:1/path", "more than a host"), ("a b:1", "blank"), ("[::1", "] is missing"),
+    ("[::1]x", "after ]"), ("host:1:2", "more than one colon"), ("unix:", "nothing follows"),
+])
+def test_a_wrong_address_is_told_before_anybody_connects(given, why):
+    error = refusal(given)
+    assert error.reason == "invalid_argument" and why in error.message and "HOST:PORT" in error.message
 
 
 @pytest.mark.parametrize("address, local", [

@@ -170,6 +170,9 @@ def test_options_reach_the_server(tools):
     partial = tools.search(query[query[:, 0] > -0.5], k=1, partial=True, one_sided=False)
     assert partial[0].key == "hammer" and "contained parts" in [term.name for term in partial[0].why.terms]
     mirrored = query * (-1, 1, 1)
+    twin, itself = tools.search(mirrored, k=1), tools.search(query, k=1)
+    assert itself[0].mirrored is False and tools.search(query, k=1, verify=False)[0].mirrored is None
+    assert twin[0].mirrored == (twin[0].fit.best.reflected and not twin[0].fit.left_right_open)
     assert tools.search(mirrored, k=1)[0].score > tools.search(mirrored, k=1, reflection=False)[0].score
     smaller = 0.1 * query
     assert tools.search(smaller, k=1)[0].score > tools.search(smaller, k=1, keep_scale=True)[0].score

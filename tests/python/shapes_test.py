@@ -219,3 +219,26 @@ def test_progress_is_told_and_a_broken_listener_does_no_harm(collection, caplog)
     assert collection.add("cloud", points, progress=broken).outcome == "unchanged"
     assert "not today" in caplog.text
     collection.delete("cloud")
+
+
+def test_previews_are_some_points_of_many_shapes(client):
+    previews = client.create_collection("previewed").previews
+    collection = client.collection("previewed")
+    for key in ("box", "ball"):
+        collection.add(key, getattr(solids, key)(3000), wait=True)
+    ball, box = previews(["ball", "none", "box"])
+    assert (ball.key, box.key) == ("ball", "box") and ball.version == collection.get("ball").version
+    assert 100 < len(ball.points) <= 1500 and ball.points.shape == ball.normals.shape
+    assert np.abs(np.linalg.norm(ball.normals, axis=1) - 1.0).max() < 0.02
+    (few,) = previews(["box"], max_points=50)
+    assert 0 < len(few.points) <= 50
+    for keys, options in (([], {}), (["box"], {"max_points": -1}), ("box", {})):
+        with pytest.raises(shapedb.ShapeDBError) as error:
+            previews(keys, **options)
+        assert error.value.reason == "invalid_argument"
+
+
+def test_a_collection_has_a_name(client):
+    for call in (client.collection, client.delete_collection, client.create_collection):
+        with pytest.raises(shapedb.InvalidInput, match="is empty"):
+            call("")

@@ -56,6 +56,14 @@ def test_why():
     assert "mirrored, turned by" in why(motion=turn, reflected=True).replace(" and ", ", ")
 
 
+def test_mirrored_twins_are_told_unless_left_and_right_look_alike():
+    twin = fit(best=pose(reflected=True))
+    assert twin.mirrored and not fit().mirrored and not fit(best=pose(reflected=True), left_right_open=True).mirrored
+    assert why(verdict="same_object", fit=twin).startswith("cup: same object, mirrored (such")
+    assert why(verdict="unrelated", fit=twin).startswith("cup: unrelated (such")
+    assert _text.likeness(None, True) == "mirrored" and _text.likeness(None, None) == ""
+
+
 def test_a_fit():
     assert str(fit()).splitlines() == [
         "87 % of the query lies on the other, 50 % of what the query should show of it is there.",

@@ -19,15 +19,18 @@ import shapedb
 SAME = ("same_object", "same_object_bent")
 
 
-def same_objects(collection: shapedb.Collection, keys: Sequence[str], neighbours: int) -> Dict[str, Dict[str, float]]:
-    """Of each shape the others that are the same object, with their scores."""
-    found: Dict[str, Dict[str, float]] = {}
+Hits = Dict[str, shapedb.Hit]
+
+
+def same_objects(collection: shapedb.Collection, keys: Sequence[str], neighbours: int) -> Dict[str, Hits]:
+    """Of each shape the others that are the same object."""
+    found: Dict[str, Hits] = {}
     for key, result in zip(keys, collection.search_batch(keys, k=neighbours, progress=None)):
-        found[key] = {hit.key: hit.score for hit in result if hit.verdict in SAME}
+        found[key] = {hit.key: hit for hit in result if hit.verdict in SAME}
     return found
 
 
-def groups_of(same: Dict[str, Dict[str, float]]) -> List[Set[str]]:
+def groups_of(same: Dict[str, Hits]) -> List[Set[str]]:
     """Shapes that hang together by pairs that agree."""
     groups: Dict[str, Set[str]] = {key: {key} for key in same}
     for key, others in same.items():
@@ -60,8 +63,8 @@ def main(arguments: Optional[Sequence[str]] = None) -> int:
             first, *others = sorted(group)
             print(first)
             for other in others:
-                score = same[first].get(other)
-                print(f"  = {other}" + (f"  {score:.3f}" if score is not None else ""))
+                hit = same[first].get(other)
+                print(f"  = {other}" + ("" if hit is None else f"  {hit.score:.3f}" + (", mirrored" * bool(hit.mirrored))))
         print(f"{len(keys)} scans, {len(groups)} objects with more than one")
     return 1 if added.errors else 0
 

@@ -31,7 +31,7 @@ from ._search_types import (Comparison, Fit, FitKind, FreeAxis, Group, Hit, Pose
                             Verdict, Why)
 from ._show import show, transform
 from ._types import (Added, AddMode, CollectionInfo, Deleted, Found, IngestEvent, InteriorDoubt, InteriorMethod,
-                     InteriorSource, Metadata, MetadataUpdate, Order, Outcome, Page, Parameters, Profile, Progress,
+                     InteriorSource, Metadata, MetadataUpdate, Order, Outcome, Page, Parameters, Preview, Profile, Progress,
                      ProgressListener, Retried, Segmentation, SegmentationReport, Shape, ShapeFailure, Signature,
                      State, Statistic, Unit, ValueCounts, WeightedPoint)
 from ._version import __version__
@@ -41,7 +41,7 @@ __all__ = [
     "CollectionInfo", "Comparison", "CreatedKey", "Deleted", "Fit", "FitKind", "Found", "FreeAxis", "Group", "Health",
     "Hit", "Imported", "IngestEvent", "InteriorDoubt", "InteriorMethod", "InteriorSource", "InvalidInput", "Item",
     "Key", "KeyLimits", "Limit", "Limits", "LocalClient", "LocalServer", "Metadata", "MetadataUpdate", "Order",
-    "Outcome", "Page", "Parameters", "Pose", "Profile", "Progress", "ProgressListener", "REASONS", "RebuildProgress",
+    "Outcome", "Page", "Parameters", "Pose", "Preview", "Profile", "Progress", "ProgressListener", "REASONS", "RebuildProgress",
     "Restored", "Retried", "RetryPolicy", "Role", "Scan", "SearchResult", "SegmentMatch", "Segmentation",
     "SegmentationReport", "ServerInfo", "Shape", "ShapeDBError", "ShapeFailure", "Signature", "State", "Statistic",
     "Stats", "Term", "Unit", "ValueCounts", "Verdict", "WeightedPoint", "Why", "__version__", "as_points", "local",

@@ -14,6 +14,7 @@ from shapedb.v1 import admin_service_pb2 as admin_pb
 from shapedb.v1 import collection_service_pb2 as collection_pb
 
 from . import _admin_types as types
+from . import _increments as increments
 from ._call import Call, Collector
 from ._connection import PathLike
 from ._errors import InvalidInput, ShapeDBError
@@ -151,14 +152,31 @@ class _Backup(Collector[types.BackupReport]):
             os.unlink(self._partial)
 
 
+class _Increment(_Backup):
+    """What a server from before increments sends is refused: it is everything."""
+
+    def take(self, message: Any) -> None:
+        if self._bytes == 0 and not message.data.startswith(increments.MAGIC):
+            raise ShapeDBError("rejected", "the server makes no increments, only full backups: it is an older one")
+        super().take(message)
+
+
 def _unwritable(path: str, error: OSError) -> ShapeDBError:
     return ShapeDBError("file_not_writable", f"{path} cannot be written: {error.strerror}")
 
 
-def backup(path: PathLike, progress: Showing) -> Call[types.BackupReport]:
-    """Backup."""
-    return Call("AdminService/Backup", admin_pb.BackupRequest(),
-                collect=lambda: _Backup(os.fspath(path), progress), bounded=False)
+def backup(path: PathLike, since: Optional[PathLike], progress: Showing) -> Call[types.BackupReport]:
+    """Backup, of everything or of what has changed since another."""
+    request = admin_pb.BackupRequest()
+    if since is None:
+        return Call("AdminService/Backup", request, collect=lambda: _Backup(os.fspath(path), progress), bounded=False)
+    if os.path.exists(path):  # others may build on it
+        raise ShapeDBError("already_exists",
+                           f"'{os.fspath(path)}' exists, and an increment replaces no file: choose a new name")
+    manifest = increments.manifest_of(os.fspath(since))
+    request.since.bytes, request.since.sha256 = manifest.backup
+    request.since.block_bytes, request.since.block_hashes = manifest.block_bytes, manifest.hashes
+    return Call("AdminService/Backup", request, collect=lambda: _Increment(os.fspath(path), progress), bounded=False)
 
 
 def export(collection: str, path: PathLike, progress: Showing) -> Call[types.BackupReport]:
@@ -167,43 +185,35 @@ def export(collection: str, path: PathLike, progress: Showing) -> Call[types.Bac
                 collect=lambda: _Backup(os.fspath(path), progress), bounded=False)
 
 
-def _chunks_of(path: str, progress: Showing) -> Callable[[], Iterator[Any]]:
+def _chunks_of(paths: Sequence[PathLike], progress: Showing) -> Callable[[], Iterator[Any]]:
     """The size goes with the first chunk, the checksum with the last."""
-    try:
-        with open(path, "rb") as file:  # while it can still be said
-            size = os.fstat(file.fileno()).st_size
-    except OSError as error:
-        raise ShapeDBError("file_not_readable", f"{path} cannot be read: {error.strerror}") from None
-    if size == 0:
-        raise ShapeDBError("file_not_readable", f"{path} is empty, not a backup")
+    chain = increments.Chain([os.fspath(path) for path in paths])
 
     def chunks() -> Iterator[Any]:
         report = reporter(progress, "upload")
         checksum = hashlib.sha256()
         sent = 0
-        with open(path, "rb") as file:
-            # Never beyond the announced size, even if the file grows meanwhile.
-            while data := file.read(min(_CHUNK, size - sent)):
-                checksum.update(data)
-                chunk = admin_pb.BackupChunk(data=data, total_bytes=size if sent == 0 else 0)
-                sent += len(data)
-                if sent == size:
-                    chunk.sha256 = checksum.digest()
-                yield chunk
-                report(sent, size)
+        for data in chain.pieces(_CHUNK):
+            checksum.update(data)
+            chunk = admin_pb.BackupChunk(data=data, total_bytes=chain.bytes if sent == 0 else 0)
+            sent += len(data)
+            if sent == chain.bytes:
+                chunk.sha256 = checksum.digest()
+            yield chunk
+            report(sent, chain.bytes)
 
     return chunks
 
 
-def restore(path: PathLike, progress: Showing) -> Call[types.Restored]:
-    """Restore."""
-    return Call("AdminService/Restore", _chunks_of(os.fspath(path), progress),
+def restore(paths: Sequence[PathLike], progress: Showing) -> Call[types.Restored]:
+    """Restore, of a full backup and its increments."""
+    return Call("AdminService/Restore", _chunks_of(paths, progress),
                 lambda message: plain(types.Restored, message), idempotent=False, bounded=False)
 
 
 def import_collection(path: PathLike, name: str, progress: Showing) -> Call[types.Imported]:
     """ImportCollection."""
-    chunks = _chunks_of(os.fspath(path), progress)
+    chunks = _chunks_of([path], progress)
 
     def messages() -> Iterator[Any]:
         yield admin_pb.ImportCollectionRequest(header=admin_pb.ImportCollectionHeader(collection=name))

@@ -228,6 +228,12 @@ class AsyncCollection:
         return await self._transport.run(
             calls.count_by_value(self._name, metadata_key, filter, state, max_values), timeout)
 
+    async def previews(self, keys: Sequence[str], *, max_points: int = 0,
+                       timeout: Optional[float] = None) -> Tuple[types.Preview, ...]:
+        """Some points of each of up to 1,000 shapes, enough for a small picture: at most `max_points` of each (0: as
+        many as there are, up to 1,500). In the order of the keys, without those that no shape has. No scan is read."""
+        return await self._transport.run(calls.previews(self._name, keys, max_points), timeout)
+
     async def signature(self, key: str, *, timeout: Optional[float] = None) -> types.Signature:
         """The signature that searches use now. Raises not_found, not_ready."""
         return await self._transport.run(calls.signature(self._name, key), timeout)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Callable, Generic, Optional, TypeVar
+from typing import Any, Callable, Generic, Iterator, Optional, TypeVar
 
 from ._errors import ShapeDBError
 
@@ -26,6 +26,28 @@ class Collector(Generic[T]):
         """The call has failed; nothing is to be left of it."""
 
 
+class Upload(Iterator[Any]):
+    """The messages of an upload. A `ShapeDBError` in making them, as of a damaged file, ends the upload early, which no
+    server takes for whole; gRPC would say of it that it is internal."""
+
+    def __init__(self, messages: Iterator[Any]) -> None:
+        self._messages = messages
+        self.error: Optional[ShapeDBError] = None
+
+    def __next__(self) -> Any:
+        try:
+            return next(self._messages)
+        except ShapeDBError as error:
+            self.error = error
+            raise StopIteration from None
+
+
+def raise_error_of(requests: Any) -> None:
+    """The error that ended an upload early, if there is one."""
+    if isinstance(requests, Upload) and requests.error is not None:
+        raise requests.error
+
+
 @dataclass(frozen=True)
 class Call(Generic[T]):
     """One rpc, which can be made several times.
@@ -45,8 +67,8 @@ class Call(Generic[T]):
     """The client's time limit applies; otherwise only the caller's."""
 
     def requests(self) -> Any:
-        """What is handed to gRPC."""
-        return self.request() if callable(self.request) else self.request
+        """What is handed to gRPC: a message, or an `Upload`."""
+        return Upload(self.request()) if callable(self.request) else self.request
 
 
 class Last(Collector[T]):

@@ -15,7 +15,7 @@ from . import _shape_calls as shape_calls
 from . import _types as types
 from ._collection import Collection
 from ._connection import PathLike, target_of
-from ._errors import ShapeDBError
+from ._errors import InvalidInput, ShapeDBError
 from ._points import Scan, pack, text_of
 from ._progress import Showing
 from ._retry import RetryPolicy, seconds_of
@@ -23,6 +23,14 @@ from ._search_types import Fit
 from ._transport import Transport
 
 Self = TypeVar("Self", bound="Client")
+
+
+def _named(name: str) -> str:
+    """The name of a collection. The server takes none for "default", which nobody means who gives one."""
+    if name == "":
+        raise InvalidInput("invalid_argument", "the name of a collection is empty; that without a name of its own is "
+                           "\"default\"")
+    return text_of(name, "the name of a collection")
 
 
 class Client:
@@ -79,7 +87,7 @@ class Client:
 
     def collection(self, name: str = "default") -> Collection:
         """A collection by its name or an alias. Does not ask the server whether there is one."""
-        return Collection(self._transport, text_of(name, "the name of a collection"))
+        return Collection(self._transport, _named(name))
 
     def create_collection(self, name: str, *, description: str = "", profile: Optional[types.Profile] = None,
                                 unit: Optional[types.Unit] = None, parameters: Optional[types.Parameters] = None,
@@ -89,7 +97,7 @@ class Client:
         given = parameters or types.Parameters()
         if unit is not None:
             given = replace(given, unit=unit)
-        call = calls.create_collection(text_of(name, "name"), text_of(description, "description"), profile, given)
+        call = calls.create_collection(_named(name), text_of(description, "description"), profile, given)
         try:
             self._transport.run(call, timeout)
         except ShapeDBError as error:
@@ -104,20 +112,20 @@ class Client:
     def rename_collection(self, name: str, new_name: str, *,
                                 timeout: Optional[float] = None) -> types.CollectionInfo:
         """Gives a collection another name; its shapes and aliases stay. Not repeated by itself."""
-        return self._transport.run(calls.rename_collection(name, new_name), timeout)
+        return self._transport.run(calls.rename_collection(_named(name), _named(new_name)), timeout)
 
     def delete_collection(self, name: str, *, force: bool = False, timeout: Optional[float] = None) -> None:
         """Deletes a collection. Raises rejected if it has shapes and `force` is not set. Not repeated by itself."""
-        self._transport.run(calls.delete_collection(name, force), timeout)
+        self._transport.run(calls.delete_collection(_named(name), force), timeout)
 
     def set_alias(self, alias: str, collection: str, *, timeout: Optional[float] = None) -> types.CollectionInfo:
         """Makes a name stand for a collection, or for another one than before, at one moment. Returns that
         collection."""
-        return self._transport.run(calls.set_alias(alias, collection), timeout)
+        return self._transport.run(calls.set_alias(_named(alias), _named(collection)), timeout)
 
     def delete_alias(self, alias: str, *, timeout: Optional[float] = None) -> None:
         """The collection stays. Not repeated by itself."""
-        self._transport.run(calls.delete_alias(alias), timeout)
+        self._transport.run(calls.delete_alias(_named(alias)), timeout)
 
     def import_collection(self, path: PathLike, name: str = "", *,
                                 progress: Showing = False,
@@ -170,16 +178,19 @@ class Client:
         """Segments the shapes of all collections again, see `Collection.rebuild`."""
         return self._transport.run(calls.rebuild("", cache_only, None, None, detach, progress), timeout)
 
-    def backup(self, path: PathLike, *, progress: Showing = False,
+    def backup(self, path: PathLike, *, since: Optional[PathLike] = None, progress: Showing = False,
                      timeout: Optional[float] = None) -> admin.BackupReport:
-        """Writes a consistent copy of everything to a file, which appears complete or not at all. Without limit but
-        `timeout`."""
-        return self._transport.run(calls.backup(path, progress), timeout)
+        """Writes a consistent copy of everything to a file, which appears complete or not at all. `since`: only what
+        has changed since that backup or increment, as a new increment. Without limit but `timeout`."""
+        call = self._transport.offload(calls.backup, path, since, progress)
+        return self._transport.run(call, timeout)
 
-    def restore(self, path: PathLike, *, progress: Showing = False,
+    def restore(self, path: PathLike, *increments: PathLike, progress: Showing = False,
                       timeout: Optional[float] = None) -> admin.Restored:
-        """Replaces everything on the server with a backup. Not repeated by itself, without limit but `timeout`."""
-        return self._transport.run(calls.restore(path, progress), timeout)
+        """Replaces everything on the server with a backup: a full one, and increments that continue it, oldest first.
+        Not repeated by itself, without limit but `timeout`."""
+        call = self._transport.offload(calls.restore, (path, *increments), progress)
+        return self._transport.run(call, timeout)
 
     def check(self, *, acknowledge: bool = False, progress: Showing = False,
                     timeout: Optional[float] = None) -> Tuple[str, ...]:

@@ -11,11 +11,11 @@ from typing import Any, List, Mapping, Optional, Tuple, Union
 
 import grpc
 
+from ._address import checked_address
 from ._errors import InvalidInput, ShapeDBError
 
 PathLike = Union[str, "os.PathLike[str]"]
 
-DEFAULT_PORT = 7878
 _MOST_BYTES = 1 << 20
 
 
@@ -56,7 +56,7 @@ def target_of(address: Optional[str], *, api_key: Optional[str], api_key_file: O
     def given(value: Optional[PathLike], variable: str) -> str:
         return os.fspath(value) if value is not None else variables.get(variable, "")
 
-    where = _with_port(given(address, "SHAPEDB_SERVER") or "127.0.0.1")
+    where = checked_address(given(address, "SHAPEDB_SERVER") or "127.0.0.1")
     ca = given(tls_ca, "SHAPEDB_TLS_CA")
     certificate = given(client_certificate, "SHAPEDB_CLIENT_CERTIFICATE")
     key = given(client_key, "SHAPEDB_CLIENT_KEY")
@@ -78,18 +78,6 @@ _CHANNEL_OPTIONS: Tuple[Tuple[str, Any], ...] = (
     ("grpc.max_reconnect_backoff_ms", 2000),
     ("grpc.use_local_subchannel_pool", 1),
 )
-
-
-def _with_port(address: str) -> str:
-    """"localhost" -> "localhost:7878", "::1" -> "[::1]:7878"; what has a port or a scheme stays."""
-    if "/" in address or address.startswith(("unix:", "unix-abstract:")):
-        return address
-    if address.startswith("["):
-        return f"{address}:{DEFAULT_PORT}" if address.endswith("]") else address
-    colons = address.count(":")
-    if colons == 1:
-        return address
-    return f"{address}:{DEFAULT_PORT}" if colons == 0 else f"[{address}]:{DEFAULT_PORT}"
 
 
 def is_this_machine(address: str) -> bool:

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 def hits_frame(hits: Sequence["Hit"]) -> "pandas.DataFrame":
     """One row for each hit."""
     import pandas
-    columns = ["rank", "key", "label", "score", "verdict", "verdict_reliability", "signature_score", "group"]
+    columns = ["rank", "key", "label", "score", "verdict", "verdict_reliability", "mirrored", "signature_score",
+               "group"]
     rows = [{"rank": rank, **{name: getattr(hit, name) for name in columns[1:]}, **_metadata(hit.metadata)}
             for rank, hit in enumerate(hits, 1)]
     return pandas.DataFrame(rows) if rows else pandas.DataFrame(columns=columns)

@@ -67,6 +67,11 @@ class Fit:
         """That of the best pose: 4 x 4, from coordinates of the shape to those of the query."""
         return self.best.motion
 
+    @property
+    def mirrored(self) -> bool:
+        """Whether the shape lies on the query only as a mirror image."""
+        return self.best.reflected and not self.left_right_open
+
     def __str__(self) -> str:
         return _text.fit(self, "the query", "the other")
 
@@ -125,8 +130,13 @@ class Why:
 
     @property
     def words(self) -> str:
-        """The verdict in words; empty if the hit was not verified."""
-        return _text.verdict(self.verdict)
+        """The verdict in words, of mirrored twins "same object, mirrored"; empty if the hit was not verified."""
+        return _text.likeness(self.verdict, self.mirrored)
+
+    @property
+    def mirrored(self) -> Optional[bool]:
+        """Whether the other shape lies on the query only as a mirror image; None if it was not laid on it."""
+        return None if self.fit is None else self.fit.mirrored
 
     def __str__(self) -> str:
         return _text.why(self)
@@ -155,6 +165,11 @@ class Hit:
     """None if the hit was not verified."""
     group: Optional[str] = None
     """With `group_by`: the value that it was found under."""
+
+    @property
+    def mirrored(self) -> Optional[bool]:
+        """Whether the hit lies on the query only as a mirror image; None if it was not verified."""
+        return None if self.fit is None else self.fit.mirrored
 
     @property
     def metadata(self) -> Dict[str, str]:
@@ -253,3 +268,8 @@ class Comparison:
     """With `reflection=False`: without a fit a mirrored twin scores nearly as the shape itself."""
     query: Signature = field(repr=False)
     other: Signature = field(repr=False)
+
+    @property
+    def mirrored(self) -> Optional[bool]:
+        """Whether the other lies on the first only as a mirror image; None if they were not laid on each other."""
+        return None if self.fit is None else self.fit.mirrored

@@ -13,7 +13,7 @@ from shapedb.v1 import shape_service_pb2 as pb
 from . import _types as types
 from ._call import Call, Collector, Last
 from ._errors import InvalidInput, ShapeDBError
-from ._points import FloatArray, Packed, text_of, unpack
+from ._points import FloatArray, Packed, read_only, text_of, unpack
 from ._progress import Showing, reporter
 from ._vectors import send_origin, vector_of
 from ._wire import (added_of, enum_number, event_of, fill_metadata_change, fill_parameters, metadata_texts,
@@ -125,6 +125,21 @@ class _Points(Collector[FloatArray]):
 def points(collection: str, key: str) -> Call[FloatArray]:
     """GetPoints."""
     return Call("ShapeService/GetPoints", pb.GetPointsRequest(shape=_ref(collection, key)), collect=_Points)
+
+
+def previews(collection: str, keys: Sequence[str], max_points: int) -> Call[Tuple[types.Preview, ...]]:
+    """GetPreviews."""
+    try:
+        request = pb.GetPreviewsRequest(collection=collection, keys=_keys(keys), max_points=max_points)
+    except (TypeError, ValueError):
+        raise InvalidInput("invalid_argument", f"max_points is {max_points!r}; it must be a whole number, at least "
+                           "0") from None
+    return Call("ShapeService/GetPreviews", request, lambda message: tuple(map(_preview_of, message.previews)))
+
+
+def _preview_of(message: Any) -> types.Preview:
+    normals = np.frombuffer(message.normals, dtype=np.int8).reshape(-1, 3).astype(np.float64) / 127.0
+    return types.Preview(message.key, message.version, read_only(unpack(message.xyz, np.zeros(3))), read_only(normals))
 
 
 def page(collection: str, *, filter: str, state: Optional[types.State], order: types.Order, descending: bool,

@@ -25,9 +25,12 @@ _SHARE_WORTH_LISTING = 0.01
 _ELSEWHERE = 0.1  # centres further apart, in units of the common size, do not lie on each other
 
 
-def verdict(name: Optional[str]) -> str:
-    """A verdict in words."""
-    return "" if name is None else _VERDICTS.get(name, name)
+def likeness(verdict: Optional[str], mirrored: Optional[bool]) -> str:
+    """What two shapes are to each other: a verdict in words, and whether one is the mirror image of the other."""
+    words = [] if verdict is None else [_VERDICTS.get(verdict, verdict)]
+    if mirrored and verdict != "unrelated":
+        words.append("mirrored")
+    return ", ".join(words)
 
 
 def safe(text: str) -> str:
@@ -154,7 +157,7 @@ _COLUMNS = ("rank", "score", "verdict", "label", "key")
 
 
 def _rows(hits: Sequence["Hit"]) -> List[List[str]]:
-    return [[str(rank), f"{hit.score:.3f}", verdict(hit.verdict), hit.label or "", hit.key]
+    return [[str(rank), f"{hit.score:.3f}", likeness(hit.verdict, hit.mirrored), hit.label or "", hit.key]
             for rank, hit in enumerate(hits, 1)]
 
 

@@ -14,7 +14,7 @@ import grpc.aio
 from shapedb.v1 import (admin_service_pb2_grpc, align_service_pb2_grpc, collection_service_pb2,
                         collection_service_pb2_grpc, search_service_pb2_grpc, shape_service_pb2, shape_service_pb2_grpc)
 
-from ._call import Call
+from ._call import Call, raise_error_of
 from ._connection import Target
 from ._errors import Failure
 from ._retry import Attempts, RetryPolicy, cancelled, seconds_of
@@ -114,14 +114,15 @@ class Transport:
                     raise cancelled() from None
                 if not isinstance(error, grpc.RpcError):
                     raise
-                delay = attempts.after(Failure(error, self.target.name))
+                delay = attempts.after(Failure(error, self.target.address, self.target.credentials is not None))
             self.sleep(delay)
 
     def _attempt(self, call: Call[T], timeout: Optional[float], stops: Sequence[Stop]) -> T:
         method = self._find(call.rpc)
         if call.collect is None:
             method = method.future
-        rpc = method(call.requests(), timeout=timeout, metadata=self.target.metadata)
+        requests = call.requests()
+        rpc = method(requests, timeout=timeout, metadata=self.target.metadata)
         for stop in stops:
             stop.enter(rpc)
         try:
@@ -138,6 +139,7 @@ class Transport:
                 raise
         except BaseException:
             rpc.cancel()
+            raise_error_of(requests)
             raise
         finally:
             for stop in stops:
@@ -191,11 +193,12 @@ class AsyncTransport:
             except grpc.RpcError as error:
                 if self._closed:
                     raise cancelled() from None
-                delay = attempts.after(Failure(error, self.target.name))
+                delay = attempts.after(Failure(error, self.target.address, self.target.credentials is not None))
             await self.sleep(delay)
 
     async def _attempt(self, call: Call[T], timeout: Optional[float]) -> T:
-        rpc = self._method(call.rpc)(call.requests(), timeout=timeout, metadata=self.target.metadata)
+        requests = call.requests()
+        rpc = self._method(call.rpc)(requests, timeout=timeout, metadata=self.target.metadata)
         try:
             if call.collect is None:
                 assert call.decode is not None
@@ -211,6 +214,9 @@ class AsyncTransport:
         except asyncio.CancelledError:
             if self._closed:  # by close(), not by a cancellation of this task
                 raise cancelled() from None
+            raise
+        except grpc.RpcError:
+            raise_error_of(requests)
             raise
         finally:
             rpc.cancel()

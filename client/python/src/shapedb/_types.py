@@ -251,6 +251,19 @@ class Statistic:
 
 
 @dataclass(frozen=True, eq=False)
+class Preview:
+    """Some points of a shape, enough for a small picture."""
+
+    key: str
+    version: int
+    """`Shape.version`: which points these were made of."""
+    points: FloatArray = field(repr=False)
+    """About the middle of the box of the scan; none if the shape has no surface points (yet), as with profile "paper"."""
+    normals: FloatArray = field(repr=False)
+    """Of each point; n may as well be -n."""
+
+
+@dataclass(frozen=True, eq=False)
 class Signature:
     """What a search compares. Can be searched with: `collection.search(signature)`."""
 
