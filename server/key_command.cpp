@@ -11,6 +11,7 @@
 
 #include "common/utc_text.h"
 #include "core/base/return_if_error.h"
+#include "server/config/command_line_error.h"
 #include "server/config/load.h"
 #include "server/daemon.h"
 #include "server/security/key.h"
@@ -149,7 +150,9 @@ int runKeyCommand(int argc, char** argv) {
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
-        return app.exit(error) == 0 ? 0 : kWrongCommandLine;
+        if (error.get_exit_code() == 0) return app.exit(error);  // --help
+        return answer(fail(ErrorCode::kInvalidArgument,
+                           config::commandLineMessage(app, error) + " (see 'shapedbd key --help')"));
     }
     return answer([&]() -> Result<void> {
         const auto data = dataDirectoryOf(flags);

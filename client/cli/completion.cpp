@@ -26,15 +26,17 @@ complete -F _shapedb shapedb
 constexpr const char* kZsh = R"sh(#compdef shapedb
 # Completion of shapedb for zsh: eval "$(shapedb completion zsh)", after compinit
 _shapedb() {
-    local line files=
+    local line word told files=
     local -a found
     for line in ${(f)"$("${words[1]}" __complete "${(@)words[2,CURRENT]}" 2>/dev/null)"}; do
         case $line in
             :files) files=1 ;;
-            *) found+=("${${line%%$'\t'*}//:/\\:}:${line#*$'\t'}") ;;
+            *)
+                word=${line%%$'\t'*} told=${line#*$'\t'}
+                found+=("${word//:/\\:}${told:+:$told}") ;;
         esac
     done
-    (( ${#found} )) && _describe -o shapedb found
+    (( ${#found} )) && _describe shapedb found
     [[ -n $files ]] && _files
 }
 if [[ ${funcstack[1]} == _shapedb ]]; then

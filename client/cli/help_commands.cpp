@@ -12,6 +12,7 @@
 #include "client/cli/manual.h"
 #include "client/cli/session.h"
 #include "client/cli/usage.h"
+#include "common/nearest_name.h"
 #include "core/base/return_if_error.h"
 
 namespace shapedb::cli {
@@ -31,10 +32,8 @@ Result<const CLI::App*> commandNamed(const CLI::App& app, const std::vector<std:
             if (sub->get_name() == word) found = sub;
         }
         if (found == nullptr) {
-            const std::string meant = nearestName(word, names);
-            return fail(ErrorCode::kInvalidArgument,
-                        fullName(*at) + " has no command '" + word + "'" +
-                            (meant.empty() ? "" : ": did you mean '" + meant + "'?"));
+            return fail(ErrorCode::kInvalidArgument, fullName(*at) + " has no command '" + word + "'" +
+                                                         didYouMean(nearestName(word, names)));
         }
         at = found;
     }

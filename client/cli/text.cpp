@@ -2,12 +2,12 @@
 #include "client/cli/text.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstdio>
 
 #include "common/safe_text.h"
 #include "common/utc_text.h"
+#include "core/base/number_text.h"
 
 namespace shapedb::cli {
 
@@ -26,11 +26,7 @@ std::string formatNumber(double value) {
     return printed("%.4g", value);
 }
 
-std::string exactNumber(double value) {
-    char buffer[32];
-    const auto end = std::to_chars(buffer, buffer + sizeof buffer, value == 0.0 ? 0.0 : value);
-    return {buffer, end.ptr};
-}
+std::string exactNumber(double value) { return numberText(value); }
 
 std::string formatFixed(double value, int decimals) {
     char buffer[400];  // the largest double has 309 digits before the point
@@ -105,6 +101,8 @@ std::string bar(double share, int width) {
     const int used = eighths / 8 + (eighths % 8 != 0 ? 1 : 0);
     return text.append(static_cast<std::size_t>(std::max(0, width - used)), ' ');
 }
+
+std::string inLine(const std::string& name) { return escapeUnsafe(name); }
 
 std::string escapeXml(const std::string& text) {
     std::string escaped;

@@ -46,6 +46,10 @@ namespace shapedb::cli {
 /// A bar of `width` cells filled to `share` of [0, 1], in eighths: "█████▌    ".
 [[nodiscard]] std::string bar(double share, int width);
 
+/// A name or path as a part of a line: what a stranger may have put in it, line ends too, is escaped
+/// (common/safe_text.h).
+[[nodiscard]] std::string inLine(const std::string& name);
+
 /// For the content or an attribute of an XML element; control characters become `?`.
 [[nodiscard]] std::string escapeXml(const std::string& text);
 

@@ -13,9 +13,6 @@ class ParseError;
 
 namespace shapedb::cli {
 
-/// The name that was probably meant by `typed`; empty if none is near.
-[[nodiscard]] std::string nearestName(const std::string& typed, const std::vector<std::string>& names);
-
 /// One line: what is wrong, what was probably meant, and which --help to look at. `app`: the program, as it
 /// was left by parsing.
 [[nodiscard]] std::string usageMessage(const CLI::App& app, const CLI::ParseError& error);

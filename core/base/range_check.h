@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/base/error.h"
+#include "core/base/number_text.h"
 
 namespace shapedb {
 
@@ -13,7 +14,7 @@ namespace shapedb {
                                                  const char* range) {
     if (holds) return {};
     return fail(ErrorCode::kInvalidArgument,
-                std::string(field) + " is " + std::to_string(value) + "; it must be " + range);
+                std::string(field) + " is " + numberText(value) + "; it must be " + range);
 }
 
 }  // namespace shapedb

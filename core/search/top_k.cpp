@@ -14,6 +14,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include "core/base/number_text.h"
 #include "core/base/return_if_error.h"
 #include "core/search/wanted_rows.h"
 
@@ -67,7 +68,7 @@ Result<void> validate(const SearchOptions& options) {
     if (options.k == 0) return fail(ErrorCode::kInvalidArgument, "k is 0; ask for at least 1 hit");
     if (!(options.threshold >= 0.0 && options.threshold <= 1.0)) {
         return fail(ErrorCode::kInvalidArgument,
-                    "threshold is " + std::to_string(options.threshold) + "; it must be 0 to 1");
+                    "threshold is " + numberText(options.threshold) + "; it must be 0 to 1");
     }
     if (options.grouping && options.grouping->perGroup == 0) {
         return fail(ErrorCode::kInvalidArgument, "0 hits of a group; ask for at least 1");

@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "core/base/number_text.h"
 #include "core/base/random.h"
 #include "core/base/random_subset.h"
 #include "core/geometry/box.h"
@@ -26,7 +27,7 @@ Result<void> addGaussianNoise(PointCloud& points, double shareOfDiagonal, std::u
     if (!std::isfinite(shareOfDiagonal) || shareOfDiagonal < 0.0) {
         return fail(ErrorCode::kInvalidArgument,
                     "the noise must be 0 or a positive share of the box diagonal, but is " +
-                        std::to_string(shareOfDiagonal));
+                        numberText(shareOfDiagonal));
     }
     for (std::size_t i = 0; i < points.size(); ++i) {
         if (!isFinite(points[i])) {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "common/safe_text.h"
+#include "core/base/number_text.h"
 #include "core/base/return_if_error.h"
 #include "core/preparation/frame.h"
 #include "server/catalog/limits.h"
@@ -163,7 +164,7 @@ Result<void> checkOrigin(const Point3& origin) {
 
 Result<void> checkThreshold(double threshold) {
     if (threshold >= 0.0 && threshold <= 1.0) return {};
-    return bad("threshold: " + std::to_string(threshold) + " is outside 0 to 1");
+    return bad("threshold: " + numberText(threshold) + " is outside 0 to 1");
 }
 
 Result<void> checkFilterLength(const std::string& filter) {

@@ -13,7 +13,9 @@
 #include <toml++/toml.h>
 #include <unistd.h>
 
+#include "common/nearest_name.h"
 #include "core/base/return_if_error.h"
+#include "server/config/command_line_error.h"
 #include "server/config/settings.h"
 
 namespace shapedb::config {
@@ -35,6 +37,27 @@ const Setting* findByKey(const std::string& key) {
     const auto& all = settings();
     const auto found = std::find_if(all.begin(), all.end(), [&](const Setting& s) { return s.key == key; });
     return found == all.end() ? nullptr : &*found;
+}
+
+/// "WHAT; shapedbd --help lists the settings", with a stop where WHAT is a question.
+std::string seeHelp(const std::string& what, const char* listed) {
+    return what + (what.back() == '?' ? " " : "; ") + "shapedbd --help lists the " + listed;
+}
+
+/// Of all settings.
+std::vector<std::string> namesOf(std::string Setting::*name) {
+    std::vector<std::string> names;
+    for (const Setting& setting : settings()) names.push_back(setting.*name);
+    return names;
+}
+
+/// By what follows the prefix, which all have.
+std::string nearestVariable(const std::string& name) {
+    const std::size_t prefix = std::char_traits<char>::length(kPrefix);
+    std::vector<std::string> names = namesOf(&Setting::environment);
+    for (std::string& one : names) one.erase(0, prefix);
+    const std::string found = nearestName(name.substr(prefix), names);
+    return found.empty() ? found : kPrefix + found;
 }
 
 Result<void> assign(Loaded& loaded, const Setting& setting, const std::string& text,
@@ -107,7 +130,9 @@ class FileReader {
                 RETURN_IF_ERROR(readTable(*node.as_table(), key + "."));
             } else {
                 return fail(ErrorCode::kInvalidArgument,
-                            where + ": unknown key " + key + "; shapedbd --help lists the settings");
+                            seeHelp(where + ": unknown key " + key +
+                                        didYouMean(nearestName(key, namesOf(&Setting::key))),
+                                    "settings"));
             }
         }
         return {};
@@ -145,8 +170,11 @@ Result<Variables> readEnvironment(const std::vector<std::string>& environment) {
             variables.configFile = value;
         } else if (std::find(std::begin(kForeignVariables), std::end(kForeignVariables), name) ==
                    std::end(kForeignVariables)) {
-            return fail(ErrorCode::kInvalidArgument, "unknown environment variable " + name +
-                                                         ": unset it; shapedbd --help lists the settings");
+            const std::string meant = didYouMean(nearestVariable(name));
+            return fail(ErrorCode::kInvalidArgument,
+                        "unknown environment variable " + name +
+                            (meant.empty() ? ": unset it" : meant + " If not, unset it") +
+                            "; shapedbd --help lists the settings");
         }
     }
     return variables;
@@ -192,8 +220,7 @@ Result<CommandLine> parseCommandLine(int argc, const char* const* argv) {
         commandLine.text = std::string("shapedbd ") + version() + "\n";
         return commandLine;
     } catch (const CLI::ParseError& error) {
-        return fail(ErrorCode::kInvalidArgument,
-                    std::string(error.what()) + "; shapedbd --help lists the flags");
+        return fail(ErrorCode::kInvalidArgument, seeHelp(commandLineMessage(app, error), "flags"));
     }
     for (const auto& [key, option] : options) {
         if (option->count() > 0) commandLine.flags[key] = values[key];

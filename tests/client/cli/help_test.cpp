@@ -6,6 +6,7 @@
 #include <iterator>
 
 #include "client/cli/usage.h"
+#include "common/nearest_name.h"
 #include "tests/client/cli/run_command.h"
 
 namespace shapedb::cli {
@@ -109,6 +110,29 @@ std::string outputOf(const std::string& shell, const std::string& script) {
     return out.empty() ? "nothing" : out;
 }
 
+/// Types into a zsh at a terminal, and prints what it makes of the tabs.
+constexpr const char* kPressTab = R"sh(
+zmodload zsh/zpty
+export TERM=dumb
+zpty shell zsh -f -i
+await() {
+    local part seen=
+    repeat 200; do
+        zpty -r -t shell part && seen+=$part
+        [[ $seen == *$1* ]] && break
+        sleep 0.1
+    done
+    print -r -- "$seen"
+}
+zpty -w shell 'PS1=; autoload -Uz compinit; compinit -u -D; eval "$(shapedb completion zsh)"; echo rea""dy'
+await ready >/dev/null
+zpty -w -n shell $'shapedb admin sta\t'
+await 'ts '
+zpty -w -n shell $'\025shapedb collection create --profile \t\t'
+await 'paper'
+zpty -d shell
+)sh";
+
 TEST_F(Help, ShellsLoadTheirCompletion) {
     EXPECT_EQ(
         outputOf(
@@ -122,11 +146,10 @@ TEST_F(Help, ShellsLoadTheirCompletion) {
     if (!fish.empty()) {
         EXPECT_TRUE(contains(fish, "stats"));
     }
-    const std::string zsh = outputOf("zsh",
-                                     "autoload -Uz compinit; compinit -u -D; eval \"$(shapedb completion "
-                                     "zsh)\"; echo $_comps[shapedb]");
+    const std::string zsh = outputOf("zsh", "source " + write("press.zsh", kPressTab));
     if (!zsh.empty()) {
-        EXPECT_EQ(zsh, "_shapedb\n");
+        EXPECT_TRUE(contains(zsh, "ts ")) << "the rest of shapedb admin stats";
+        EXPECT_TRUE(contains(zsh, "default  paper")) << "what needs no words has none";
     }
     EXPECT_EQ(runCommand({"completion", "tcsh"}).exitCode, 2);
 }

@@ -6,6 +6,8 @@
 
 #include <gtest/gtest.h>
 
+#include "core/base/number_text.h"
+
 namespace shapedb::cli {
 namespace {
 
@@ -64,6 +66,18 @@ TEST(Text, SecondsFromMillisecondsToDays) {
     EXPECT_EQ(formatSeconds(200.0), "3 min 20 s");
     EXPECT_EQ(formatSeconds(7500.0), "2 h 5 min");
     EXPECT_EQ(formatSeconds(3.0 * 86400 + 4 * 3600), "3 d 4 h");
+}
+
+TEST(Text, ANameStaysInItsLine) {
+    EXPECT_EQ(inLine("mug 1.ply"), "mug 1.ply");
+    EXPECT_EQ(inLine("a\nb\xff"), "a\\u000ab\\ufffd");
+}
+
+TEST(Text, NumbersAreAsSomebodyTypesThem) {
+    EXPECT_EQ(numberText(2.0), "2");
+    EXPECT_EQ(numberText(0.1), "0.1");
+    EXPECT_EQ(numberText(-0.0), "0");
+    EXPECT_EQ(numberText(-2.5e-7), "-2.5e-07");
 }
 
 TEST(Text, PercentOfSmallAndLargeShares) {

@@ -161,7 +161,8 @@ TEST_F(Load, ExampleFileHasEveryKeyWithItsDefault) {
 
 TEST_F(Load, UnknownKeysAreRefusedWithTheirLine) {
     expectRefused(loadWith({"--config", file("listen = \"a:1\"\nlisen = \"b:2\"\n").c_str()}),
-                  ErrorCode::kInvalidArgument, {path_ + " line 2", "unknown key lisen"});
+                  ErrorCode::kInvalidArgument,
+                  {path_ + " line 2", "unknown key lisen: did you mean 'listen'? shapedbd"});
     expectRefused(loadWith({"--config", file("[ingest]\n\nthread = 2\n").c_str()}),
                   ErrorCode::kInvalidArgument, {"line 3", "unknown key ingest.thread"});
     expectRefused(loadWith({"--config", file("[ingst]\nthreads = 2\n").c_str()}), ErrorCode::kInvalidArgument,
@@ -170,6 +171,19 @@ TEST_F(Load, UnknownKeysAreRefusedWithTheirLine) {
                   {"ingest"});
     expectRefused(loadWith({"--config", file("[listen]\nx = 3\n").c_str()}), ErrorCode::kInvalidArgument,
                   {"listen"});
+}
+
+TEST_F(Load, WhatWasProbablyMeantIsTold) {
+    expectRefused(loadWith({"--lisen", "a:1"}), ErrorCode::kInvalidArgument,
+                  {"unknown flag --lisen: did you mean '--listen'? shapedbd --help"});
+    expectRefused(loadWith({"--tls-certifcate=x"}), ErrorCode::kInvalidArgument,
+                  {"unknown flag --tls-certifcate: did you mean '--tls-certificate'?"});
+    expectRefused(loadWith({"--zzzzzzzz"}), ErrorCode::kInvalidArgument,
+                  {"unknown flag --zzzzzzzz; shapedbd --help"});
+    expectRefused(loadWith({}, {"SHAPEDB_LISEN=a:1"}), ErrorCode::kInvalidArgument,
+                  {"SHAPEDB_LISEN: did you mean 'SHAPEDB_LISTEN'? If not, unset it"});
+    expectRefused(loadWith({}, {"SHAPEDB_ZZZZZZZZZZZZ=1"}), ErrorCode::kInvalidArgument,
+                  {"SHAPEDB_ZZZZZZZZZZZZ: unset it; shapedbd"});
 }
 
 TEST_F(Load, WrongTypesAreRefusedWithTheirLine) {
