@@ -54,17 +54,17 @@ Result<std::vector<RebuildProgress>> Client::rebuild(
     request.set_detach(rebuild.detach);
     fillParameters(rebuild.parameters, &request);
     std::map<std::string, RebuildProgress> last;
-    const auto made =
-        makeCall(impl_->options, context, kOnceUnbounded, [&](grpc::ClientContext& rpc, Result<void>&) {
-            const auto stream = impl_->admin->Rebuild(&rpc, request);
-            v1::RebuildProgress message;
-            while (stream->Read(&message)) {
-                const RebuildProgress progress = fromWire(message);
-                last[progress.collection] = progress;
-                if (onProgress) onProgress(progress);
-            }
-            return stream->Finish();
-        });
+    const auto made = makeCall(impl_->options, context, kOnceUnbounded, &request,
+                               [&](grpc::ClientContext& rpc, Result<void>&) {
+                                   const auto stream = impl_->admin->Rebuild(&rpc, request);
+                                   v1::RebuildProgress message;
+                                   while (stream->Read(&message)) {
+                                       const RebuildProgress progress = fromWire(message);
+                                       last[progress.collection] = progress;
+                                       if (onProgress) onProgress(progress);
+                                   }
+                                   return stream->Finish();
+                               });
     RETURN_IF_ERROR(made);
     std::vector<RebuildProgress> results;
     for (auto& [name, progress] : last) results.push_back(std::move(progress));
@@ -96,8 +96,8 @@ Result<std::vector<std::string>> Client::Impl::check(
     const v1::CheckRequest& request, const std::function<void(const CheckProgress&)>& onProgress,
     const RunContext& context) {
     std::vector<std::string> problems;
-    const auto made =
-        makeCall(options, context, kIdempotentUnbounded, [&](grpc::ClientContext& rpc, Result<void>&) {
+    const auto made = makeCall(
+        options, context, kIdempotentUnbounded, &request, [&](grpc::ClientContext& rpc, Result<void>&) {
             problems.clear();
             const auto stream = admin->Check(&rpc, request);
             v1::CheckProgress message;
@@ -131,21 +131,22 @@ Result<ServerInfo> Client::serverInfo(const RunContext& context) const {
 
 Result<Health> Client::health(const std::string& service, const RunContext& context) const {
     Health health = Health::kUnknown;
-    const auto made = makeCall(impl_->options, context, kOnce, [&](grpc::ClientContext& rpc, Result<void>&) {
-        grpc::GenericStub stub(impl_->channel);
-        grpc::CompletionQueue queue;
-        const auto call =
-            stub.PrepareUnaryCall(&rpc, "/grpc.health.v1.Health/Check", encodeHealthRequest(service), &queue);
-        call->StartCall();
-        grpc::ByteBuffer response;
-        grpc::Status status;
-        call->Finish(&response, &status, nullptr);
-        void* tag = nullptr;
-        bool ok = false;
-        queue.Next(&tag, &ok);
-        if (status.ok()) health = decodeHealthResponse(response);
-        return status;
-    });
+    const auto made =
+        makeCall(impl_->options, context, kOnce, nullptr, [&](grpc::ClientContext& rpc, Result<void>&) {
+            grpc::GenericStub stub(impl_->channel);
+            grpc::CompletionQueue queue;
+            const auto call = stub.PrepareUnaryCall(&rpc, "/grpc.health.v1.Health/Check",
+                                                    encodeHealthRequest(service), &queue);
+            call->StartCall();
+            grpc::ByteBuffer response;
+            grpc::Status status;
+            call->Finish(&response, &status, nullptr);
+            void* tag = nullptr;
+            bool ok = false;
+            queue.Next(&tag, &ok);
+            if (status.ok()) health = decodeHealthResponse(response);
+            return status;
+        });
     RETURN_IF_ERROR(made);
     return health;
 }

@@ -8,6 +8,7 @@
 #include <random>
 #include <thread>
 
+#include "client/api/request_text.h"
 #include "client/api/retry.h"
 #include "client/api/status.h"
 #include "core/base/return_if_error.h"
@@ -104,8 +105,8 @@ Result<void> makeCallUnguarded(const ClientOptions& options, const RunContext& c
             !proceed && proceed.error().code == ErrorCode::kCancelled) {
             return fail(proceed.error());
         }
-        const Error error = errorOf(status, rpc.GetServerTrailingMetadata(),
-                                    options.address + (options.tls.enabled ? " with TLS" : ""));
+        const Error error =
+            errorOf(status, rpc.GetServerTrailingMetadata(), {options.address, options.tls.enabled});
         if (!traits.idempotent) return fail(error);
         const AttemptFailure failure = failureOf(status, rpc.GetServerTrailingMetadata(), error);
         inARow = failure.code == reason ? inARow + 1 : 1;
@@ -118,8 +119,9 @@ Result<void> makeCallUnguarded(const ClientOptions& options, const RunContext& c
 }  // namespace
 
 Result<void> makeCall(const ClientOptions& options, const RunContext& context, CallTraits traits,
-                      const Attempt& attempt) {
+                      const google::protobuf::Message* text, const Attempt& attempt) {
     try {
+        if (text != nullptr) RETURN_IF_ERROR(requireUtf8(*text));
         return makeCallUnguarded(options, context, traits, attempt);
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::kOutOfMemory, "not enough memory for the call");

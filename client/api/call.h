@@ -50,9 +50,10 @@ constexpr CallTraits kOnceUnbounded{false, false};
 using Attempt = std::function<grpc::Status(grpc::ClientContext& rpc, Result<void>& local)>;
 
 /// Retries until the call succeeds, fails for good or runs out of time, and returns the error of the last
-/// attempt. Never throws.
+/// attempt. `text`: the message with all text that the attempt sends, null if it sends none. Never throws.
 [[nodiscard]] Result<void> makeCall(const ClientOptions& options, const RunContext& context,
-                                    CallTraits traits, const Attempt& attempt);
+                                    CallTraits traits, const google::protobuf::Message* text,
+                                    const Attempt& attempt);
 
 /// A unary rpc.
 template <typename Stub, typename Request, typename Response>
@@ -60,10 +61,11 @@ template <typename Stub, typename Request, typename Response>
     const ClientOptions& options, const RunContext& context, CallTraits traits, Stub& stub,
     grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*), const Request& request) {
     Response response;
-    const auto made = makeCall(options, context, traits, [&](grpc::ClientContext& rpc, Result<void>&) {
-        response.Clear();
-        return (stub.*method)(&rpc, request, &response);
-    });
+    const auto made =
+        makeCall(options, context, traits, &request, [&](grpc::ClientContext& rpc, Result<void>&) {
+            response.Clear();
+            return (stub.*method)(&rpc, request, &response);
+        });
     RETURN_IF_ERROR(made);
     return response;
 }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "client/api/client.h"
 
-#include <algorithm>
 #include <string>
 
 #include <grpcpp/grpcpp.h>
 
+#include "client/api/address.h"
 #include "client/api/call.h"
 #include "client/api/credentials.h"
 #include "client/api/retry.h"
@@ -36,24 +36,6 @@ grpc::ChannelArguments channelArguments() {
     return arguments;
 }
 
-/// "localhost" -> "localhost:7878", "::1" -> "[::1]:7878". Addresses with a port, or with a scheme of their
-/// own ("unix:/path", "dns:///host:1"), stay as they are.
-std::string withDefaultPort(const std::string& address) {
-    const std::string port = ":" + std::to_string(kDefaultPort);
-    if (address.find('/') != std::string::npos || address.rfind("unix:", 0) == 0 ||
-        address.rfind("unix-abstract:", 0) == 0) {
-        return address;
-    }
-    if (!address.empty() && address.front() == '[') {
-        return address.back() == ']' ? address + port : address;
-    }
-    switch (std::count(address.begin(), address.end(), ':')) {
-        case 0: return address + port;
-        case 1: return address;
-        default: return "[" + address + "]" + port;  // a bare IPv6 address
-    }
-}
-
 }  // namespace
 
 Client::Client(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -62,9 +44,8 @@ Client::Client(Client&&) noexcept = default;
 Client& Client::operator=(Client&&) noexcept = default;
 
 Result<Client> Client::connect(ClientOptions options) {
-    if (options.address.empty()) {
-        return fail(ErrorCode::kInvalidArgument, "the server's address is empty; give HOST:PORT");
-    }
+    auto address = checkedAddress(options.address);
+    RETURN_IF_ERROR(address);
     if (options.deadline.count() < 0) {
         return fail(ErrorCode::kInvalidArgument,
                     "deadline is " + std::to_string(options.deadline.count()) + " ms; it must be at least 0");
@@ -72,7 +53,7 @@ Result<Client> Client::connect(ClientOptions options) {
     RETURN_IF_ERROR(validate(options.retry));
     try {
         auto impl = std::make_unique<Impl>();
-        options.address = withDefaultPort(options.address);
+        options.address = std::move(*address);
         auto key = apiKeyOf(options);
         RETURN_IF_ERROR(key);
         options.apiKey = std::move(*key);

@@ -69,21 +69,22 @@ Result<BackupReport> receiveBackup(Stream& stream, BackupFile& file, const Wante
 /// caller commits.
 template <typename Start>
 Result<BackupReport> receiveToFile(const ClientOptions& options, BackupFile& file, const Wanted& wanted,
-                                   const RunContext& context, Start&& start) {
+                                   const RunContext& context, const google::protobuf::Message& request,
+                                   Start&& start) {
     Result<BackupReport> report;
-    const auto made =
-        makeCall(options, context, kIdempotentUnbounded, [&](grpc::ClientContext& rpc, Result<void>& local) {
-            const auto stream = start(rpc);
-            report = receiveBackup(*stream, file, wanted, context);
-            // Only a full disk here, or the wrong answer, ends the call from this side; a
-            // short stream has its reason in the status.
-            if (!report && (report.error().code == ErrorCode::kFileNotWritable ||
-                            report.error().code == ErrorCode::kRejected)) {
-                local = fail(report.error());
-                rpc.TryCancel();
-            }
-            return stream->Finish();
-        });
+    const auto made = makeCall(options, context, kIdempotentUnbounded, &request,
+                               [&](grpc::ClientContext& rpc, Result<void>& local) {
+                                   const auto stream = start(rpc);
+                                   report = receiveBackup(*stream, file, wanted, context);
+                                   // Only a full disk here, or the wrong answer, ends the call from this
+                                   // side; a short stream has its reason in the status.
+                                   if (!report && (report.error().code == ErrorCode::kFileNotWritable ||
+                                                   report.error().code == ErrorCode::kRejected)) {
+                                       local = fail(report.error());
+                                       rpc.TryCancel();
+                                   }
+                                   return stream->Finish();
+                               });
     RETURN_IF_ERROR(made);
     return report;
 }
@@ -162,9 +163,10 @@ grpc::Status finishUpload(Stream& stream, grpc::ClientContext& rpc, const Result
 
 Result<BackupReport> Client::backupToFile(const std::string& path, const RunContext& context) const {
     BackupFile file(path);
-    const auto report = receiveToFile(
-        impl_->options, file, {"backup"}, context,
-        [&](grpc::ClientContext& rpc) { return impl_->admin->Backup(&rpc, v1::BackupRequest()); });
+    const v1::BackupRequest request;
+    const auto report =
+        receiveToFile(impl_->options, file, {"backup"}, context, request,
+                      [&](grpc::ClientContext& rpc) { return impl_->admin->Backup(&rpc, request); });
     RETURN_IF_ERROR(report);
     RETURN_IF_ERROR(file.commit());
     return report;
@@ -176,9 +178,10 @@ Result<IncrementReport> Client::incrementToFile(const std::string& path, const s
     const auto manifest = readManifest(since, context);
     RETURN_IF_ERROR(manifest);
     BackupFile file(path);
-    const auto received = receiveToFile(
-        impl_->options, file, {"increment", true}, context,
-        [&](grpc::ClientContext& rpc) { return impl_->admin->Backup(&rpc, requestSince(*manifest)); });
+    const v1::BackupRequest request = requestSince(*manifest);
+    const auto received =
+        receiveToFile(impl_->options, file, {"increment", true}, context, request,
+                      [&](grpc::ClientContext& rpc) { return impl_->admin->Backup(&rpc, request); });
     RETURN_IF_ERROR(received);
     auto report = reportOf(file, *received, manifest->backup);
     RETURN_IF_ERROR(report);
@@ -192,7 +195,7 @@ Result<BackupReport> Client::exportCollection(const std::string& collection, con
     request.set_collection(collection);
     BackupFile file(path);
     const auto report = receiveToFile(
-        impl_->options, file, {"export"}, context,
+        impl_->options, file, {"export"}, context, request,
         [&](grpc::ClientContext& rpc) { return impl_->admin->ExportCollection(&rpc, request); });
     RETURN_IF_ERROR(report);
     RETURN_IF_ERROR(file.commit());
@@ -208,8 +211,8 @@ Result<RestoreReport> Client::restoreFromFiles(const std::vector<std::string>& f
     auto chain = BackupChain::open(files, context);
     RETURN_IF_ERROR(chain);
     v1::RestoreResponse response;
-    const auto made =
-        makeCall(impl_->options, context, kOnceUnbounded, [&](grpc::ClientContext& rpc, Result<void>& local) {
+    const auto made = makeCall(
+        impl_->options, context, kOnceUnbounded, nullptr, [&](grpc::ClientContext& rpc, Result<void>& local) {
             const auto stream = impl_->admin->Restore(&rpc, &response);
             local = sendChunks(*chain, "restore", context,
                                [&](const v1::BackupChunk& chunk) { return stream->Write(chunk); });
@@ -223,12 +226,12 @@ Result<ImportReport> Client::importCollection(const std::string& path, const std
                                               const RunContext& context) const {
     auto file = BackupChain::open({path}, context);
     RETURN_IF_ERROR(file);
+    v1::ImportCollectionRequest header;
+    header.mutable_header()->set_collection(collection);
     v1::ImportCollectionResponse response;
-    const auto made =
-        makeCall(impl_->options, context, kOnceUnbounded, [&](grpc::ClientContext& rpc, Result<void>& local) {
+    const auto made = makeCall(
+        impl_->options, context, kOnceUnbounded, &header, [&](grpc::ClientContext& rpc, Result<void>& local) {
             const auto stream = impl_->admin->ImportCollection(&rpc, &response);
-            v1::ImportCollectionRequest header;
-            header.mutable_header()->set_collection(collection);
             if (stream->Write(header)) {
                 local = sendChunks(*file, "import", context, [&](v1::BackupChunk chunk) {
                     v1::ImportCollectionRequest request;

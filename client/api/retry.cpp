@@ -5,6 +5,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "core/base/number_text.h"
+
 namespace shapedb::client {
 
 namespace {
@@ -53,10 +55,10 @@ Result<void> validate(const RetryPolicy& policy) {
         return invalid("maxBackoff", std::to_string(policy.maxBackoff.count()) + " ms", "at least 0");
     }
     if (!(policy.multiplier >= 1.0) || !std::isfinite(policy.multiplier)) {
-        return invalid("multiplier", std::to_string(policy.multiplier), "finite and at least 1");
+        return invalid("multiplier", numberText(policy.multiplier), "finite and at least 1");
     }
     if (!(policy.jitter >= 0.0 && policy.jitter <= 1.0)) {
-        return invalid("jitter", std::to_string(policy.jitter), "in [0, 1]");
+        return invalid("jitter", numberText(policy.jitter), "in [0, 1]");
     }
     return {};
 }

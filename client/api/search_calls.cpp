@@ -29,13 +29,13 @@ Result<SearchReply> Client::searchByScan(const SearchOptions& options, const Poi
     fill(options, header->mutable_options());
     fill(*packed, header);
     v1::SearchResponse response;
-    const auto made =
-        makeCall(impl_->options, context, kIdempotent, [&](grpc::ClientContext& rpc, Result<void>&) {
-            response.Clear();
-            const auto stream = impl_->search->SearchByScan(&rpc, &response);
-            writeScan(*stream, request, *packed, context);
-            return stream->Finish();
-        });
+    const auto made = makeCall(impl_->options, context, kIdempotent, &request,
+                               [&](grpc::ClientContext& rpc, Result<void>&) {
+                                   response.Clear();
+                                   const auto stream = impl_->search->SearchByScan(&rpc, &response);
+                                   writeScan(*stream, request, *packed, context);
+                                   return stream->Finish();
+                               });
     RETURN_IF_ERROR(made);
     return fromWire(response);
 }
@@ -103,15 +103,16 @@ Result<Alignment> alignScans(const ClientOptions& options, v1::AlignService::Stu
         wire::toProto(other->origin, header->mutable_other_origin());
     }
     v1::AlignResponse response;
-    const auto made = makeCall(options, context, kIdempotent, [&](grpc::ClientContext& rpc, Result<void>&) {
-        response.Clear();
-        const auto stream = stub.Align(&rpc, &response);
-        if (stream->Write(request) && writeChunks<v1::AlignRequest>(*stream, query, context) &&
-            (other == nullptr || writeChunks<v1::AlignRequest>(*stream, *other, context))) {
-            stream->WritesDone();
-        }
-        return stream->Finish();
-    });
+    const auto made =
+        makeCall(options, context, kIdempotent, &request, [&](grpc::ClientContext& rpc, Result<void>&) {
+            response.Clear();
+            const auto stream = stub.Align(&rpc, &response);
+            if (stream->Write(request) && writeChunks<v1::AlignRequest>(*stream, query, context) &&
+                (other == nullptr || writeChunks<v1::AlignRequest>(*stream, *other, context))) {
+                stream->WritesDone();
+            }
+            return stream->Finish();
+        });
     RETURN_IF_ERROR(made);
     return Alignment{fromWire(response.fit()), wire::fromProto(response.unit()).value_or(LengthUnit::kNone)};
 }

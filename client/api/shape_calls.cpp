@@ -62,12 +62,13 @@ Result<AddReply> Client::addShape(const AddRequest& request, const PointCloud& p
     const v1::AddShapeRequest header = addHeader(request, *packed);
     const CallTraits traits{!request.expectedVersion.has_value(), !request.wait};
     v1::AddShapeResponse response;
-    const auto made = makeCall(impl_->options, context, traits, [&](grpc::ClientContext& rpc, Result<void>&) {
-        response.Clear();
-        const auto stream = impl_->shapes->AddShape(&rpc, &response);
-        writeScan(*stream, header, *packed, context);
-        return stream->Finish();
-    });
+    const auto made =
+        makeCall(impl_->options, context, traits, &header, [&](grpc::ClientContext& rpc, Result<void>&) {
+            response.Clear();
+            const auto stream = impl_->shapes->AddShape(&rpc, &response);
+            writeScan(*stream, header, *packed, context);
+            return stream->Finish();
+        });
     RETURN_IF_ERROR(made);
     return AddReply{fromWire(response.outcome()), fromWire(response.shape())};
 }
@@ -127,14 +128,14 @@ Result<StoredPoints> Client::getPoints(const ShapeRef& shape, const RunContext& 
     v1::GetPointsRequest request;
     fill(shape, request.mutable_shape());
     StoredPoints scan;
-    const auto made =
-        makeCall(impl_->options, context, kIdempotent, [&](grpc::ClientContext& rpc, Result<void>& local) {
-            scan = {};
-            const auto stream = impl_->shapes->GetPoints(&rpc, request);
-            local = readPoints(*stream, scan, context);
-            if (!local) rpc.TryCancel();
-            return stream->Finish();
-        });
+    const auto made = makeCall(impl_->options, context, kIdempotent, &request,
+                               [&](grpc::ClientContext& rpc, Result<void>& local) {
+                                   scan = {};
+                                   const auto stream = impl_->shapes->GetPoints(&rpc, request);
+                                   local = readPoints(*stream, scan, context);
+                                   if (!local) rpc.TryCancel();
+                                   return stream->Finish();
+                               });
     RETURN_IF_ERROR(made);
     if (scan.points.size() != scan.shape.pointCount) {
         return fail(ErrorCode::kCountMismatch, "the server sent " + std::to_string(scan.points.size()) +
@@ -210,16 +211,16 @@ Result<IngestEvent> Client::watchIngest(const ShapeRef& shape,
     v1::WatchIngestRequest request;
     fill(shape, request.mutable_shape());
     IngestEvent last;
-    const auto made =
-        makeCall(impl_->options, context, kIdempotentUnbounded, [&](grpc::ClientContext& rpc, Result<void>&) {
-            const auto stream = impl_->shapes->WatchIngest(&rpc, request);
-            v1::IngestEvent event;
-            while (stream->Read(&event)) {
-                last = fromWire(event);
-                if (onEvent) onEvent(last);
-            }
-            return stream->Finish();
-        });
+    const auto made = makeCall(impl_->options, context, kIdempotentUnbounded, &request,
+                               [&](grpc::ClientContext& rpc, Result<void>&) {
+                                   const auto stream = impl_->shapes->WatchIngest(&rpc, request);
+                                   v1::IngestEvent event;
+                                   while (stream->Read(&event)) {
+                                       last = fromWire(event);
+                                       if (onEvent) onEvent(last);
+                                   }
+                                   return stream->Finish();
+                               });
     RETURN_IF_ERROR(made);
     return last;
 }
@@ -237,14 +238,14 @@ Result<SegmentedScan> Client::getSegments(const ShapeRef& shape, const RunContex
     v1::GetSegmentsRequest request;
     fill(shape, request.mutable_shape());
     SegmentedScan scan;
-    const auto made =
-        makeCall(impl_->options, context, kIdempotent, [&](grpc::ClientContext& rpc, Result<void>& local) {
-            scan = {};
-            const auto stream = impl_->shapes->GetSegments(&rpc, request);
-            local = readSegments(*stream, scan, context);
-            if (!local) rpc.TryCancel();
-            return stream->Finish();
-        });
+    const auto made = makeCall(impl_->options, context, kIdempotent, &request,
+                               [&](grpc::ClientContext& rpc, Result<void>& local) {
+                                   scan = {};
+                                   const auto stream = impl_->shapes->GetSegments(&rpc, request);
+                                   local = readSegments(*stream, scan, context);
+                                   if (!local) rpc.TryCancel();
+                                   return stream->Finish();
+                               });
     RETURN_IF_ERROR(made);
     return scan;
 }
@@ -259,15 +260,15 @@ Result<SegmentedScan> Client::segment(const PointCloud& points, const Parameters
     header->set_summary_only(summaryOnly);
     fillParameters(parameters, header);
     SegmentedScan scan;
-    const auto made =
-        makeCall(impl_->options, context, kIdempotent, [&](grpc::ClientContext& rpc, Result<void>& local) {
-            scan = {};
-            const auto stream = impl_->shapes->Segment(&rpc);
-            writeScan(*stream, request, *packed, context);
-            local = readSegments(*stream, scan, context);
-            if (!local) rpc.TryCancel();
-            return stream->Finish();
-        });
+    const auto made = makeCall(impl_->options, context, kIdempotent, &request,
+                               [&](grpc::ClientContext& rpc, Result<void>& local) {
+                                   scan = {};
+                                   const auto stream = impl_->shapes->Segment(&rpc);
+                                   writeScan(*stream, request, *packed, context);
+                                   local = readSegments(*stream, scan, context);
+                                   if (!local) rpc.TryCancel();
+                                   return stream->Finish();
+                               });
     RETURN_IF_ERROR(made);
     return scan;
 }

@@ -32,39 +32,81 @@ ErrorCode codeOf(grpc::StatusCode code) {
     }
 }
 
+/// What gRPC and OpenSSL say when there is no connection, and what a user needs to hear. `{}` is the address.
+struct Translation {
+    const char* details;
+    const char* plain;
+};
+
+constexpr Translation kTranslations[] = {
+    {"DNS resolution failed", "cannot reach a server at {}: this machine knows no host of that name"},
+    {"C-ares", "cannot reach a server at {}: this machine knows no host of that name"},
+    {"wrong version number",
+     "what answers at {} does not speak TLS: connect without it (no --tls, --tls-ca or SHAPEDB_TLS), or "
+     "switch it on at the server; or it is the port of the web page"},
+    {"certificate verify failed",
+     "the certificate of the server at {} cannot be trusted: it has expired, or another authority signed it "
+     "than those that are trusted here; give the file of the right one with --tls-ca, or renew the "
+     "certificate"},
+    {"is not in peer certificate",
+     "the certificate of the server at {} is for another name: connect by a name that it has, or give that "
+     "name with --server-name"},
+    {"empty address list",
+     "the files for TLS cannot be used for {}: one is not PEM, or the certificate and the key do not belong "
+     "together (--tls-ca, --client-certificate, --client-key)"},
+    {"Failed parsing HTTP/2",
+     "what answers at {} is not a ShapeDB server: is it the right port? (that of the web page is another)"},
+    {"http1.x",
+     "what answers at {} is not a ShapeDB server: is it the right port? (that of the web page is another)"},
+    {"Connection refused", "cannot reach a server at {}: nobody listens there; is shapedbd running?"},
+    {"No such file or directory",
+     "cannot reach a server at {}: there is no such socket; is shapedbd running, and does it listen there?"},
+    {"Permission denied", "cannot reach a server at {}: you may not use that socket"},
+    {"No route to host", "cannot reach a server at {}: no way leads there from this machine"},
+    {"Network is unreachable", "cannot reach a server at {}: no way leads there from this machine"},
+    {"timed out", "cannot reach a server at {}: nothing answers there; is a firewall between?"},
+};
+
+/// What becomes of a call when the server closes the connection at once.
+constexpr const char* kClosed[] = {"Socket closed", "Connection reset by peer", "Endpoint read failed",
+                                   "Broken pipe"};
+constexpr const char* kClosedPlain =
+    "the server at {} closed the connection: it probably wants TLS (--tls, with --tls-ca the file of its "
+    "authority), or is being stopped";
+constexpr const char* kClosedTls =
+    "the server at {} closed the connection: it may ask for a certificate of yours (--client-certificate, "
+    "--client-key), or is being stopped";
+
+std::string about(const std::string& address, std::string text) {
+    return text.replace(text.find("{}"), 2, address);
+}
+
 /// Why there is no connection, in words of a user rather than of gRPC.
-std::string unreachable(const std::string& address, const std::string& details) {
+std::string unreachable(const Peer& peer, const std::string& details) {
     const auto says = [&](const char* words) { return details.find(words) != std::string::npos; };
-    if (says("DNS resolution failed") || says("C-ares")) {
-        return "cannot reach a server at " + address + ": this machine knows no host of that name";
+    for (const Translation& one : kTranslations) {
+        if (says(one.details)) return about(peer.address, one.plain);
     }
-    if (says("Failed parsing HTTP/2") || says("http1.x")) {
-        return "what answers at " + address +
-               " is not a ShapeDB server: is it the right port? (that of the web page is another)";
+    for (const char* closed : kClosed) {
+        if (says(closed)) return about(peer.address, peer.tls ? kClosedTls : kClosedPlain);
     }
-    if (says("Connection refused")) {
-        return "cannot reach a server at " + address + ": nobody listens there; is shapedbd running?";
-    }
-    // What becomes of a call without TLS to a server that wants it.
-    const bool closed = says("Socket closed");
-    return "cannot reach a server at " + address + ": is shapedbd running there" +
-           (closed ? ", and does it want TLS" : "") + "? (" + details + ")";
+    return "cannot reach a server at " + peer.name() + ": is shapedbd running there? (" + details + ")";
 }
 
 }  // namespace
 
-Error errorOf(const grpc::Status& status, const TrailingMetadata& trailing, const std::string& address) {
+Error errorOf(const grpc::Status& status, const TrailingMetadata& trailing, const Peer& peer) {
     if (const auto name = valueOf(trailing, "shapedb-error")) {
         return {errorCodeFromName(*name), status.error_message()};
     }
     const Error error{codeOf(status.error_code()), status.error_message()};
     if (error.message.rfind(kCutOffPrefix, 0) == 0) return error;
     switch (status.error_code()) {
-        case grpc::StatusCode::UNAVAILABLE: return {error.code, unreachable(address, error.message)};
+        case grpc::StatusCode::UNAVAILABLE: return {error.code, unreachable(peer, error.message)};
         case grpc::StatusCode::DEADLINE_EXCEEDED:
-            return {error.code, "the server at " + address + " did not answer before the deadline"};
+            return {error.code, "the server at " + peer.name() + " did not answer before the deadline"};
         case grpc::StatusCode::UNIMPLEMENTED:
-            return {error.code, "what answers at " + address +
+            return {error.code, "what answers at " + peer.name() +
                                     " does not know this call: it is not a ShapeDB server, or an older one" +
                                     (error.message.empty() ? "" : " (" + error.message + ")")};
         default: return error;

@@ -28,6 +28,7 @@ struct RebuildFlags {
 std::string collectionText(const std::string& name) { return name.empty() ? "all collections" : name; }
 
 CommandResult runCancelRebuild(Session& session, const client::Client& client, const RebuildFlags& flags) {
+    session.leftBehind = kPerhapsChanged;
     const auto cancelled = client.cancelRebuild(flags.request.collection, session.context());
     RETURN_IF_ERROR(cancelled);
     session.console().document({{"cancelled", flags.request.collection}});
@@ -36,6 +37,7 @@ CommandResult runCancelRebuild(Session& session, const client::Client& client, c
 }
 
 CommandResult runRebuild(Session& session, const RebuildFlags& flags) {
+    session.leftBehind = "the server goes on; the same command follows it again";
     const auto client = connectToServer(session);
     RETURN_IF_ERROR(client);
     if (flags.cancel) return runCancelRebuild(session, *client, flags);

@@ -120,18 +120,19 @@ CommandResult runAlign(Session& session, const AlignFlags& flags) {
     RETURN_IF_ERROR(aligned);
     const client::Alignment& found = aligned->fit;
     RETURN_IF_ERROR(writeFiles(flags, *aligned));
-    const std::string name = flags.key.empty() ? scanName(flags.other) : flags.key;
+    const std::string name = inLine(flags.key.empty() ? scanName(flags.other) : flags.key);
+    const std::string query = inLine(scanName(flags.query));
     nlohmann::json document = toJson(found);
     document["query"] = flags.query;
-    document["other"] = name;
+    document["other"] = flags.key.empty() ? scanName(flags.other) : flags.key;
     document["unit"] = unitJson(unitOfAnswer(flags.unit, found.unit));
     if (!flags.out.empty()) document["out"] = flags.out;
     if (!flags.matrix.empty()) document["matrix_file"] = flags.matrix;
     std::string text = "score " + formatFixed(found.best.score, 3) + "  " + bar(found.best.score, 20) +
-                       "\n\n" + fitMotionText(found.best.motion, name) +
-                       fitText(found, scanName(flags.query), name) + "\nMatrix, from coordinates of " + name +
-                       " to those of " + scanName(flags.query) + ":\n" + matrixText(found.best.motion);
-    if (!flags.out.empty()) text += "\n" + name + ", moved: " + flags.out + "\n";
+                       "\n\n" + fitMotionText(found.best.motion, name) + fitText(found, query, name) +
+                       "\nMatrix, from coordinates of " + name + " to those of " + query + ":\n" +
+                       matrixText(found.best.motion);
+    if (!flags.out.empty()) text += "\n" + name + ", moved: " + inLine(flags.out) + "\n";
     session.console().document(document);
     session.console().text(text);
     return kOk;

@@ -40,7 +40,7 @@ std::string hexOf(const std::string& digest) { return toHex(digest.data(), diges
 /// "full.db", "full.db and 2 increments".
 std::string chainText(const BackupFlags& flags) {
     if (flags.increments.empty()) return flags.file;
-    return flags.file + " and " + formatCount(flags.increments.size(), "increment", "increments");
+    return inLine(flags.file) + " and " + formatCount(flags.increments.size(), "increment", "increments");
 }
 
 CommandResult runIncrement(Session& session, const client::Client& client, const BackupFlags& flags) {
@@ -55,7 +55,7 @@ CommandResult runIncrement(Session& session, const client::Client& client, const
                                 {"changed_bytes", report->changedBytes},
                                 {"backup_bytes", report->backup.bytes},
                                 {"backup_sha256", hexOf(report->backup.sha256)}});
-    session.console().text(formatBytes(report->bytes) + " written to " + flags.file + ": " +
+    session.console().text(formatBytes(report->bytes) + " written to " + inLine(flags.file) + ": " +
                            formatBytes(report->changedBytes) + " of " + formatBytes(report->backup.bytes) +
                            " changed since " + since + "\n");
     return kOk;
@@ -69,11 +69,12 @@ CommandResult runBackup(Session& session, const BackupFlags& flags) {
     RETURN_IF_ERROR(report);
     session.console().document(
         {{"file", flags.file}, {"bytes", report->bytes}, {"sha256", hexOf(report->sha256)}});
-    session.console().text(formatBytes(report->bytes) + " written to " + flags.file + "\n");
+    session.console().text(formatBytes(report->bytes) + " written to " + inLine(flags.file) + "\n");
     return kOk;
 }
 
 CommandResult runRestore(Session& session, const BackupFlags& flags) {
+    session.leftBehind = kPerhapsChanged;
     const auto client = connectToServer(session);
     RETURN_IF_ERROR(client);
     const auto report = client->restoreFromFiles(flags.chain(), session.context());
@@ -95,8 +96,8 @@ CommandResult runMerge(Session& session, const BackupFlags& flags) {
                                 {"merged", flags.chain()},
                                 {"bytes", report->bytes},
                                 {"sha256", hexOf(report->sha256)}});
-    session.console().text(formatBytes(report->bytes) + " written to " + flags.out + ", merged from " +
-                           chainText(flags) + "\n");
+    session.console().text(formatBytes(report->bytes) + " written to " + inLine(flags.out) +
+                           ", merged from " + chainText(flags) + "\n");
     return kOk;
 }
 

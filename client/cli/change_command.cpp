@@ -70,18 +70,29 @@ Result<void> requireYes(const client::Client& client, const TargetFlags& flags, 
 
 /// Calls `change` for one key after the other, and goes on after an error. `change` returns the text that is
 /// printed after the key. Fills `failed`; returns the exit code.
-CommandResult forEachKey(Session& session, const TargetFlags& flags, json& failed,
+CommandResult forEachKey(Session& session, const client::Client& client, const TargetFlags& flags,
+                         json& failed,
                          const std::function<Result<std::string>(const client::ShapeRef&)>& change) {
+    // Told once, not of every key.
+    if (flags.keys.size() > 1) RETURN_IF_ERROR(client.getCollection(flags.collection, session.context()));
     Failures failures;
     std::optional<Error> stop;
+    std::size_t seen = 0;
     for (const std::string& key : flags.keys) {
+        ++seen;
         const auto done = change({flags.collection, key});
         if (done) {
-            session.console().text(key + ": " + *done + "\n");
+            session.console().text(inLine(key) + ": " + *done + "\n");
             continue;
         }
         if (flags.keys.size() == 1) return fail(done.error());
         failed.push_back({{"key", key}, {"error", toJson(done.error())}});
+        if (session.interrupted() && done.error().code == ErrorCode::kCancelled) {
+            failures.tell(session.console(), flags.keys.size(), "key", "keys");
+            session.console().note("interrupted at " + key + ": " + kPerhapsChanged + "; " +
+                                   formatCount(flags.keys.size() - seen) + " after it were not touched");
+            return kInterrupted;
+        }
         failures.add(key, done.error());
         if (endsTheCommand(done.error())) {
             stop = done.error();
@@ -93,6 +104,7 @@ CommandResult forEachKey(Session& session, const TargetFlags& flags, json& faile
 }
 
 CommandResult runDelete(Session& session, const TargetFlags& flags) {
+    session.leftBehind = !flags.filter ? kPerhapsChanged : "what was deleted before stays deleted";
     RETURN_IF_ERROR(checkTarget(flags));
     const auto client = connectToServer(session);
     RETURN_IF_ERROR(client);
@@ -108,7 +120,7 @@ CommandResult runDelete(Session& session, const TargetFlags& flags) {
     json deleted = json::array();
     json failed = json::array();
     const auto code =
-        forEachKey(session, flags, failed, [&](const client::ShapeRef& ref) -> Result<std::string> {
+        forEachKey(session, *client, flags, failed, [&](const client::ShapeRef& ref) -> Result<std::string> {
             const auto shape = client->deleteShape(ref, flags.expectedVersion, context);
             RETURN_IF_ERROR(shape);
             deleted.push_back(toJson(*shape));
@@ -155,6 +167,7 @@ CommandResult changeWhere(Session& session, const client::Client& client, const 
 }
 
 CommandResult runMetadata(Session& session, const MetadataFlags& flags) {
+    session.leftBehind = !flags.filter ? kPerhapsChanged : "what was changed before stays changed";
     RETURN_IF_ERROR(checkTarget(flags));
     const auto change = changeOf(flags);
     RETURN_IF_ERROR(change);
@@ -166,7 +179,7 @@ CommandResult runMetadata(Session& session, const MetadataFlags& flags) {
     json failed = json::array();
     std::uint64_t changed = 0;
     const auto code =
-        forEachKey(session, flags, failed, [&](const client::ShapeRef& ref) -> Result<std::string> {
+        forEachKey(session, *client, flags, failed, [&](const client::ShapeRef& ref) -> Result<std::string> {
             const auto reply = client->updateMetadata(ref, *change, flags.expectedVersion, context);
             RETURN_IF_ERROR(reply);
             changed += reply->changed;
@@ -202,6 +215,7 @@ Result<client::RetryReply> retry(const client::Client& client, const TargetFlags
 }
 
 CommandResult runRetry(Session& session, const TargetFlags& flags) {
+    session.leftBehind = kPerhapsChanged;
     RETURN_IF_ERROR(checkTarget(flags, true));
     const auto client = connectToServer(session, Work::kHeavy);
     RETURN_IF_ERROR(client);
@@ -212,7 +226,8 @@ CommandResult runRetry(Session& session, const TargetFlags& flags) {
                                 {"not_failed", reply->notFailed},
                                 {"missing", reply->missing}});
     session.console().text(formatCount(reply->queued, "scan", "scans") + " queued again\n");
-    for (const std::string& key : reply->notFailed) session.console().text(key + ": had not failed\n");
+    for (const std::string& key : reply->notFailed)
+        session.console().text(inLine(key) + ": had not failed\n");
     for (const std::string& key : reply->missing) session.console().note(key + ": there is no such shape");
     if (reply->left > 0) {
         session.console().note("the ingest queue has no room for " + formatCount(reply->left) +

@@ -75,6 +75,7 @@ CommandResult show(Session& session, const Result<client::Collection>& collectio
 }
 
 CommandResult runCreate(Session& session, const CollectionFlags& flags) {
+    session.leftBehind = kPerhapsChanged;
     const auto client = connectToServer(session);
     RETURN_IF_ERROR(client);
     return show(session, client->createCollection(flags.name, flags.description, flags.parameters.given,
@@ -100,6 +101,7 @@ CommandResult runList(Session& session, const CollectionFlags&) {
 }
 
 CommandResult runDelete(Session& session, const CollectionFlags& flags) {
+    session.leftBehind = kPerhapsChanged;
     const auto client = connectToServer(session);
     RETURN_IF_ERROR(client);
     const auto deleted = client->deleteCollection(flags.name, flags.force, session.context());
@@ -108,33 +110,36 @@ CommandResult runDelete(Session& session, const CollectionFlags& flags) {
     }
     RETURN_IF_ERROR(deleted);
     session.console().document({{"deleted", flags.name}});
-    session.console().text(flags.name + ": deleted\n");
+    session.console().text(inLine(flags.name) + ": deleted\n");
     return kOk;
 }
 
 CommandResult runRename(Session& session, const CollectionFlags& flags) {
+    session.leftBehind = kPerhapsChanged;
     const auto client = connectToServer(session);
     RETURN_IF_ERROR(client);
     return show(session, client->renameCollection(flags.name, flags.other, session.context()));
 }
 
 CommandResult runAlias(Session& session, const CollectionFlags& flags) {
+    session.leftBehind = kPerhapsChanged;
     const auto client = connectToServer(session);
     RETURN_IF_ERROR(client);
     const auto collection = client->setAlias(flags.name, flags.other, session.context());
     RETURN_IF_ERROR(collection);
     session.console().document({{"alias", flags.name}, {"collection", collection->name}});
-    session.console().text(flags.name + ": stands for " + collection->name + "\n");
+    session.console().text(inLine(flags.name) + ": stands for " + inLine(collection->name) + "\n");
     return kOk;
 }
 
 CommandResult runUnalias(Session& session, const CollectionFlags& flags) {
+    session.leftBehind = kPerhapsChanged;
     const auto client = connectToServer(session);
     RETURN_IF_ERROR(client);
     const auto deleted = client->deleteAlias(flags.name, session.context());
     RETURN_IF_ERROR(deleted);
     session.console().document({{"deleted", flags.name}});
-    session.console().text(flags.name + ": no alias any more\n");
+    session.console().text(inLine(flags.name) + ": no alias any more\n");
     return kOk;
 }
 
@@ -147,12 +152,13 @@ CommandResult runExport(Session& session, const CollectionFlags& flags) {
                                 {"file", flags.file},
                                 {"bytes", report->bytes},
                                 {"sha256", toHex(report->sha256.data(), report->sha256.size())}});
-    session.console().text(flags.name + ": " + formatBytes(report->bytes) + " written to " + flags.file +
-                           "\n");
+    session.console().text(inLine(flags.name) + ": " + formatBytes(report->bytes) + " written to " +
+                           inLine(flags.file) + "\n");
     return kOk;
 }
 
 CommandResult runImport(Session& session, const CollectionFlags& flags) {
+    session.leftBehind = kPerhapsChanged;
     const auto client = connectToServer(session);
     RETURN_IF_ERROR(client);
     const auto report = client->importCollection(flags.file, flags.name, session.context());
@@ -161,8 +167,9 @@ CommandResult runImport(Session& session, const CollectionFlags& flags) {
                                 {"file", flags.file},
                                 {"shapes", report->shapes},
                                 {"shapes_pending", report->shapesPending}});
-    session.console().text(report->collection + ": " + formatCount(report->shapes, "shape", "shapes") +
-                           " imported from " + flags.file +
+    session.console().text(inLine(report->collection) + ": " +
+                           formatCount(report->shapes, "shape", "shapes") + " imported from " +
+                           inLine(flags.file) +
                            (report->shapesPending > 0
                                 ? ", " + formatCount(report->shapesPending) + " of them still to be segmented"
                                 : "") +

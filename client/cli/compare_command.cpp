@@ -112,16 +112,18 @@ CommandResult runCompare(Session& session, const CompareFlags& flags) {
                                {"other", toJson(comparison->other)},
                                {"verdict", verdictJson(comparison->verdict)},
                                {"verdict_reliability", comparison->verdictReliability},
+                               {"mirrored", mirroredJson(fitsMirrored(comparison->fit))},
                                {"left_right_untold", comparison->leftRightUntold},
                                {"unit", unitJson(unitOfAnswer(flags.unit, comparison->unit))}};
     if (comparison->fit) document["fit"] = toJson(*comparison->fit);
     session.console().document(document);
-    const std::string a = flags.files ? scanName(flags.a) : flags.a;
-    const std::string b = flags.files ? scanName(flags.b) : flags.b;
+    const std::string a = inLine(flags.files ? scanName(flags.a) : flags.a);
+    const std::string b = inLine(flags.files ? scanName(flags.b) : flags.b);
     session.console().text(
         "score " + formatFixed(comparison->score, 3) + "  " + bar(comparison->score, 20) + "  " +
-        verdictText(comparison->verdict) + "\n" + (comparison->leftRightUntold ? kLeftRightUntold : "") +
-        "\n" + explanationText(comparison->explanation, comparison->query, a, b) +
+        likenessText(comparison->verdict, fitsMirrored(comparison->fit), a + " is part of " + b) + "\n" +
+        (comparison->leftRightUntold ? kLeftRightUntold : "") + "\n" +
+        explanationText(comparison->explanation, comparison->query, a, b) +
         (comparison->fit ? fitText(*comparison->fit, a, b) : "") + "\n" + a + "\n" +
         signatureTable(comparison->query) + "\n" + b + "\n" + signatureTable(comparison->other));
     return kOk;

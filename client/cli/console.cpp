@@ -69,7 +69,7 @@ void Console::note(const std::string& message) {
     const std::lock_guard<std::mutex> lock(mutex_);
     clearProgressLocked();
     const std::string name = terminal_.colour ? "\x1b[1;31m" + program_ + ":\x1b[0m " : program_ + ": ";
-    err_ << name << escapeUnsafe(wording_ ? wording_(message) : message, true) << '\n' << std::flush;
+    err_ << name << escapeUnsafe(wording_ ? wording_(message) : message) << '\n' << std::flush;
 }
 
 void Console::failure(const Error& error) {
@@ -94,8 +94,11 @@ std::string Console::pace(const std::string& what, std::uint64_t done, std::uint
 }
 
 void Console::progress(const std::string& what, std::uint64_t done, std::uint64_t total) {
-    if (!terminal_.bar) return;
     const std::lock_guard<std::mutex> lock(mutex_);
+    lastWhat_ = what;
+    lastDone_ = done;
+    lastTotal_ = total;
+    if (!terminal_.bar) return;
     const auto now = std::chrono::steady_clock::now();
     const std::string pace = this->pace(what, done, total, now);
     if (barShown_ && now - lastBar_ < kBarInterval) return;
@@ -109,6 +112,13 @@ void Console::progress(const std::string& what, std::uint64_t done, std::uint64_
         text += formatCount(done);
     }
     err_ << "\r\x1b[K" << text << pace << std::flush;
+}
+
+std::string Console::progressText() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (lastWhat_.empty()) return {};
+    return lastWhat_ + ": " + formatCount(lastDone_) +
+           (lastTotal_ > 0 ? " of " + formatCount(lastTotal_) : std::string());
 }
 
 void Console::clearProgress() {

@@ -57,7 +57,7 @@ class Console {
     /// One line; dropped without --json-lines.
     void item(const nlohmann::json& item);
 
-    /// `PROGRAM: MESSAGE` on the error stream.
+    /// `PROGRAM: MESSAGE` on the error stream: one line, whatever is in it.
     void note(const std::string& message);
 
     /// The error that ends the command: a note, and with --json also the document {"error": {"name": ...,
@@ -68,6 +68,8 @@ class Console {
     /// much is done, and after two seconds of one `what` how fast it goes and how long it will take. total 0:
     /// unknown, only the count is shown.
     void progress(const std::string& what, std::uint64_t done, std::uint64_t total);
+    /// What `progress` was told last, whether it was shown or not: "compare: 12 of 340"; empty if nothing.
+    [[nodiscard]] std::string progressText();
     /// Erases the bar, so that other output starts on a clean line.
     void clearProgress();
 
@@ -91,7 +93,10 @@ class Console {
     bool documentPrinted_ = false;
     bool readerLeft_ = false;
 
-    std::mutex mutex_;  ///< guards err_ and the members below
+    std::mutex mutex_;      ///< guards err_ and the members below
+    std::string lastWhat_;  ///< that and its numbers as `progress` was told them last
+    std::uint64_t lastDone_ = 0;
+    std::uint64_t lastTotal_ = 0;
     bool barShown_ = false;
     std::chrono::steady_clock::time_point lastBar_{};
     std::string stage_;  ///< what the bar shows, since when, and how much was done then

@@ -13,6 +13,7 @@
 
 #include "client/cli/fit_output.h"
 #include "core/base/disjoint_sets.h"
+#include "core/base/number_text.h"
 #include "core/base/return_if_error.h"
 #include "core/search/signature_set.h"
 #include "core/search/top_k.h"
@@ -30,11 +31,8 @@ constexpr std::uint32_t kPage = 1000;
 using Progress = std::function<void(const char* what, std::uint64_t done, std::uint64_t total)>;
 
 PairFit fitOf(const client::Comparison& compared) {
-    PairFit fit{compared.score, compared.verdict, std::nullopt, false};
-    if (compared.fit) {
-        fit.pose = compared.fit->best;
-        fit.mirrored = fitsMirrored(*compared.fit);
-    }
+    PairFit fit{compared.score, compared.verdict, std::nullopt, fitsMirrored(compared.fit)};
+    if (compared.fit) fit.pose = compared.fit->best;
     return fit;
 }
 
@@ -237,11 +235,36 @@ std::vector<std::vector<std::size_t>> groupsOf(const std::vector<DuplicatePair>&
     return list;
 }
 
+std::vector<DuplicateLink> linksOf(const std::vector<std::size_t>& group,
+                                   const std::vector<const DuplicatePair*>& pairs) {
+    std::vector<DuplicateLink> links;
+    if (group.empty()) return links;
+    links.push_back({group.front(), nullptr});
+    std::set<std::size_t> listed = {group.front()};
+    // The place of each pair in `pairs` is its rank: the least that leads out of the list comes next.
+    std::map<std::size_t, std::vector<std::size_t>> ranksOf;
+    for (std::size_t rank = 0; rank < pairs.size(); ++rank) {
+        ranksOf[pairs[rank]->a].push_back(rank);
+        ranksOf[pairs[rank]->b].push_back(rank);
+    }
+    const auto& first = ranksOf[group.front()];
+    std::set<std::size_t> leading(first.begin(), first.end());
+    while (!leading.empty()) {
+        const DuplicatePair* pair = pairs[*leading.begin()];
+        leading.erase(leading.begin());
+        const std::size_t next = listed.count(pair->a) > 0 ? pair->b : pair->a;
+        if (!listed.insert(next).second) continue;
+        links.push_back({next, pair});
+        leading.insert(ranksOf[next].begin(), ranksOf[next].end());
+    }
+    return links;
+}
+
 Result<DuplicateReport> findDuplicates(const client::Client& client, const DuplicateOptions& options,
                                        const Progress& progress, const RunContext& context) {
     if (!(options.threshold > 0.0 && options.threshold <= 1.0)) {
-        return fail(ErrorCode::kInvalidArgument, "--threshold is " + std::to_string(options.threshold) +
-                                                     "; it must be above 0, at most 1");
+        return fail(ErrorCode::kInvalidArgument,
+                    "--threshold is " + numberText(options.threshold) + "; it must be above 0, at most 1");
     }
     return DuplicateFinder(client, options, progress, context).run();
 }

@@ -28,7 +28,7 @@ struct PairFit {
     double score = 0.0;
     Verdict verdict = Verdict::kNone;
     std::optional<client::FitPose> pose;  ///< if both have surface points
-    bool mirrored = false;                ///< it fits only as a mirror image
+    std::optional<bool> mirrored;         ///< whether it fits only as a mirror image; set with `pose`
 };
 
 struct DuplicatePair {
@@ -57,6 +57,18 @@ struct DuplicateReport {
     const client::Client& client, const DuplicateOptions& options,
     const std::function<void(const char* what, std::uint64_t done, std::uint64_t total)>& progress,
     const RunContext& context);
+
+/// How a shape hangs together with those of its group that are listed before it.
+struct DuplicateLink {
+    std::size_t shape = 0;
+    const DuplicatePair* pair = nullptr;  ///< with one listed before; null for the first
+};
+
+/// A group as a list: after its first shape always the one that has the best pair with any listed so far,
+/// and that pair. Nobody is shown as the poor likeness of one where a better partner is listed. `pairs`:
+/// at least those of the group, best first.
+[[nodiscard]] std::vector<DuplicateLink> linksOf(const std::vector<std::size_t>& group,
+                                                 const std::vector<const DuplicatePair*>& pairs);
 
 /// Groups of the shapes below `count` that the pairs join.
 [[nodiscard]] std::vector<std::vector<std::size_t>> groupsOf(const std::vector<DuplicatePair>& pairs,

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb duplicates`: the pairs of a collection that are nearly the same.
+#include <algorithm>
 #include <map>
 #include <memory>
 
@@ -41,6 +42,11 @@ std::map<std::size_t, std::size_t> groupNumbers(const DuplicateReport& report) {
     return numbers;
 }
 
+/// Known of pairs that were laid on each other.
+std::optional<bool> mirroredOf(const DuplicatePair& pair) {
+    return pair.fit ? pair.fit->mirrored : std::nullopt;
+}
+
 json pairJson(const DuplicateReport& report, const DuplicatePair& pair, std::size_t group) {
     json entry = {{"group", group + 1},
                   {"a", report.shapes[pair.a].key},
@@ -48,10 +54,9 @@ json pairJson(const DuplicateReport& report, const DuplicatePair& pair, std::siz
                   {"score", pair.score()},
                   {"signature_score", pair.signatureScore},
                   {"verdict", verdictJson(pair.fit ? pair.fit->verdict : Verdict::kNone)},
-                  {"mirrored", nullptr},
+                  {"mirrored", mirroredJson(mirroredOf(pair))},
                   {"residual", nullptr}};
     if (pair.fit && pair.fit->pose) {
-        entry["mirrored"] = pair.fit->mirrored;
         entry["residual"] = pair.fit->pose->residual;
         entry["matrix"] = matrixOf(pair.fit->pose->motion);
     }
@@ -68,23 +73,36 @@ std::string duplicatesCsv(const DuplicateReport& report) {
         row.add(pair.score()).add(pair.signatureScore);
         const bool laid = pair.fit && pair.fit->pose;
         row.add(pair.fit ? verdictCell(pair.fit->verdict) : "");
-        row.add(!laid ? "" : pair.fit->mirrored ? "1" : "0");
+        row.add(mirroredCell(mirroredOf(pair)));
         row.add(laid ? exactNumber(pair.fit->pose->residual) : std::string());
         text += row.line();
     }
     return text;
 }
 
-/// Why a shape is in its group: its pair with the first, or else its best. `pairs`: of the group, best first.
-const DuplicatePair* linkOf(const std::vector<const DuplicatePair*>& pairs, std::size_t shape,
-                            std::size_t first) {
-    const DuplicatePair* best = nullptr;
-    for (const DuplicatePair* pair : pairs) {
-        if (pair->a != shape && pair->b != shape) continue;
-        if (pair->a == first || pair->b == first) return pair;
-        if (best == nullptr) best = pair;
+/// A line of the table: a shape, and what it is to one listed before.
+std::vector<std::string> cellsOf(const DuplicateReport& report, std::size_t group, const DuplicateLink& link,
+                                 bool verified) {
+    const client::Shape& one = report.shapes[link.shape];
+    if (link.pair == nullptr) return {std::to_string(group + 1), one.key, labelOf(one)};
+    const DuplicatePair& pair = *link.pair;
+    std::vector<std::string> cells = {"", one.key, labelOf(one), formatFixed(pair.signatureScore, 3)};
+    if (verified) cells.push_back(formatFixed(pair.score(), 3));
+    cells.push_back(report.shapes[pair.a == link.shape ? pair.b : pair.a].key);
+    // a was the query, but there is none here.
+    if (verified && pair.fit) {
+        cells.push_back(likenessText(pair.fit->verdict, pair.fit->mirrored,
+                                     pair.a == link.shape ? "part of it" : "contains it"));
     }
-    return best;
+    return cells;
+}
+
+/// Of pairs by score: a better verdict counts more, and the twin itself more than its mirror image.
+bool tellsMore(const DuplicatePair* one, const DuplicatePair* other) {
+    const auto rank = [](const DuplicatePair& pair) {
+        return std::pair(pair.fit ? pair.fit->verdict : Verdict::kNone, mirroredOf(pair).value_or(false));
+    };
+    return rank(*one) < rank(*other);
 }
 
 std::string duplicatesText(const DuplicatesFlags& flags, const DuplicateReport& report) {
@@ -102,27 +120,16 @@ std::string duplicatesText(const DuplicatesFlags& flags, const DuplicateReport& 
     const auto numbers = groupNumbers(report);
     std::map<std::size_t, std::vector<const DuplicatePair*>> pairsOf;  // by group
     for (const DuplicatePair& pair : report.pairs) pairsOf[numbers.at(pair.a)].push_back(&pair);
-    Table table({{"group", Table::Align::kRight},
-                 {"key"},
-                 {"label"},
-                 {"score", Table::Align::kRight},
-                 {"like"},
-                 {"verdict"}});
+    for (auto& [group, pairs] : pairsOf) std::stable_sort(pairs.begin(), pairs.end(), tellsMore);
+    const auto right = Table::Align::kRight;
+    std::vector<Table::Column> columns = {{"group", right}, {"key"}, {"label"}, {"signatures", right}};
+    if (!flags.noVerify) columns.push_back({"score", right});
+    columns.push_back({"like"});
+    if (!flags.noVerify) columns.push_back({"verdict"});
+    Table table(std::move(columns));
     for (std::size_t g = 0; g < report.groups.size(); ++g) {
-        const std::size_t first = report.groups[g].front();
-        for (const std::size_t shape : report.groups[g]) {
-            const client::Shape& one = report.shapes[shape];
-            if (shape == first) {
-                table.add({std::to_string(g + 1), one.key, labelOf(one)});
-                continue;
-            }
-            const DuplicatePair* link = linkOf(pairsOf[g], shape, first);
-            const std::size_t other = link->a == shape ? link->b : link->a;
-            std::string verdict = link->fit ? verdictText(link->fit->verdict) : std::string();
-            if (link->fit && link->fit->mirrored)
-                verdict += std::string(verdict.empty() ? "" : ", ") + "mirrored";
-            table.add({"", one.key, labelOf(one), formatFixed(link->score(), 3), report.shapes[other].key,
-                       verdict});
+        for (const DuplicateLink& link : linksOf(report.groups[g], pairsOf[g])) {
+            table.add(cellsOf(report, g, link, !flags.noVerify));
         }
     }
     return text + table.render();
@@ -166,7 +173,7 @@ CommandResult runDuplicates(Session& session, const DuplicatesFlags& flags) {
                           {"groups", groups}});
     }
     console.text(flags.csv ? duplicatesCsv(*report) : duplicatesText(flags, *report));
-    if (!flags.out.empty() && !flags.csv) console.text("\nPairs: " + flags.out + "\n");
+    if (!flags.out.empty() && !flags.csv) console.text("\nPairs: " + inLine(flags.out) + "\n");
     return kOk;
 }
 

@@ -273,7 +273,7 @@ CommandResult runLeaveOneOut(Session& session, const EvaluateFlags& flags) {
     const int exitCode = reportFailures(session, failures);
     console.document(leaveOneOutJson(flags, *parameters, *report, shapes, failures, timing));
     console.text(leaveOneOutText(flags, *parameters, *report, shapes, failures, timing));
-    if (!flags.confusion.empty()) console.text("Similarity matrix: " + flags.confusion + "\n");
+    if (!flags.confusion.empty()) console.text("Similarity matrix: " + inLine(flags.confusion) + "\n");
     return exitCode;
 }
 

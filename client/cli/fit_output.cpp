@@ -97,17 +97,32 @@ std::string fitMotionText(const Motion& motion, const std::string& name) {
     return text + " and moved by " + formatPoint(motion.translation) + ".\n";
 }
 
-std::string verdictText(Verdict verdict) {
+namespace {
+
+std::string verdictText(Verdict verdict, const std::string& part) {
     switch (verdict) {
         case Verdict::kNone: return "";
         case Verdict::kSameObject: return "same object";
         case Verdict::kSameObjectBent: return "same object, bent";
-        case Verdict::kPart: return "query is part of it";
+        case Verdict::kPart: return part;
         case Verdict::kSameKind: return "same kind";
         case Verdict::kUnrelated: return "unrelated";
     }
     return "";
 }
+
+}  // namespace
+
+std::string likenessText(Verdict verdict, std::optional<bool> mirrored, const std::string& part) {
+    const std::string text = verdictText(verdict, part);
+    // Unrelated shapes are nobody's mirror image.
+    if (!mirrored.value_or(false) || verdict == Verdict::kUnrelated) return text;
+    return text.empty() ? "mirrored" : text + ", mirrored";
+}
+
+json mirroredJson(std::optional<bool> mirrored) { return mirrored ? json(*mirrored) : json(nullptr); }
+
+std::string mirroredCell(std::optional<bool> mirrored) { return !mirrored ? "" : *mirrored ? "1" : "0"; }
 
 json verdictJson(Verdict verdict) {
     return verdict == Verdict::kNone ? json(nullptr) : json(verdictName(verdict));

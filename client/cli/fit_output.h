@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
 
 #include <nlohmann/json_fwd.hpp>
@@ -24,8 +25,6 @@ namespace shapedb::cli {
 /// What is done to the shape to lay it on the query, one line.
 [[nodiscard]] std::string fitMotionText(const Motion& motion, const std::string& name);
 
-/// "same object, bent", and so on; "" for none.
-[[nodiscard]] std::string verdictText(Verdict verdict);
 /// verdictName, or null for none.
 [[nodiscard]] nlohmann::json verdictJson(Verdict verdict);
 /// verdictName, or "" for none: a cell of CSV.
@@ -36,6 +35,20 @@ template <typename Fit>
 [[nodiscard]] bool fitsMirrored(const Fit& fit) {
     return fit.best.motion.reflected && !fit.handednessOpen;
 }
+/// The same where the shape may not have been laid on the query.
+template <typename Fit>
+[[nodiscard]] std::optional<bool> fitsMirrored(const std::optional<Fit>& fit) {
+    return fit ? std::optional<bool>(fitsMirrored(*fit)) : std::nullopt;
+}
+/// True, false, or null if that is not known.
+[[nodiscard]] nlohmann::json mirroredJson(std::optional<bool> mirrored);
+/// "1", "0", or "" if that is not known: a cell of CSV.
+[[nodiscard]] std::string mirroredCell(std::optional<bool> mirrored);
+
+/// What two shapes are to each other, in words: "same object, mirrored", "same object, bent", and so on; ""
+/// if nobody knows. `part`: what to say of a query that is a piece of the other.
+[[nodiscard]] std::string likenessText(Verdict verdict, std::optional<bool> mirrored,
+                                       const std::string& part = "query is part of it");
 
 /// What is said of SearchReply::leftRightUntold, a line.
 constexpr const char* kLeftRightUntold =

@@ -91,6 +91,7 @@ std::string keysText(const std::vector<client::Key>& keys) {
 }
 
 CommandResult runCreateKey(Session& session, KeyFlags& flags) {
+    session.leftBehind = kPerhapsChanged;
     const auto client = connectToServer(session);
     RETURN_IF_ERROR(client);
     flags.request.role = roles().at(flags.role);
@@ -122,6 +123,7 @@ CommandResult runListKeys(Session& session, KeyFlags&) {
 }
 
 CommandResult runRevokeKey(Session& session, KeyFlags& flags) {
+    session.leftBehind = kPerhapsChanged;
     const auto client = connectToServer(session);
     RETURN_IF_ERROR(client);
     const auto key = client->revokeKey(flags.id, session.context());

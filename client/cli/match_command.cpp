@@ -134,8 +134,6 @@ Result<Matched> matchFolders(Session& session, const MatchFlags& flags) {
     return matched;
 }
 
-bool isMirrored(const Partner& partner) { return partner.fit && fitsMirrored(*partner.fit); }
-
 json partnerJson(const Matched& matched, const Partner& partner) {
     json entry = {{"file", matched.a[partner.a].path},
                   {"partner", nullptr},
@@ -143,10 +141,9 @@ json partnerJson(const Matched& matched, const Partner& partner) {
                   {"next_score", partner.nextScore},
                   {"mutual", partner.mutual},
                   {"verdict", verdictJson(partner.verdict)},
-                  {"mirrored", nullptr}};
+                  {"mirrored", mirroredJson(fitsMirrored(partner.fit))}};
     if (partner.b) entry["partner"] = matched.b[*partner.b].path;
     if (partner.fit) {
-        entry["mirrored"] = isMirrored(partner);
         entry["residual"] = partner.fit->best.residual;
         entry["matrix"] = matrixOf(partner.fit->best.motion);
     }
@@ -160,7 +157,7 @@ std::string partnersCsv(const Matched& matched) {
         row.add(matched.a[partner.a].path).add(partner.b ? matched.b[*partner.b].path : std::string());
         row.add(partner.score).add(partner.nextScore).add(partner.mutual ? "1" : "0");
         row.add(verdictCell(partner.verdict));
-        row.add(!partner.fit ? "" : isMirrored(partner) ? "1" : "0");
+        row.add(mirroredCell(fitsMirrored(partner.fit)));
         row.add(partner.fit ? exactNumber(partner.fit->best.residual) : std::string());
         text += row.line();
     }
@@ -175,11 +172,10 @@ std::string partnersText(const Matched& matched) {
     for (const Partner& partner : matched.partners) {
         if (partner.b) ++found;
         if (partner.mutual) ++mutual;
-        std::string verdict = verdictText(partner.verdict);
-        if (isMirrored(partner)) verdict += std::string(verdict.empty() ? "" : ", ") + "mirrored";
         table.add({matched.a[partner.a].name, partner.b ? matched.b[*partner.b].name : "(none)",
                    formatFixed(partner.score, 3), bar(partner.score, 20), formatFixed(partner.nextScore, 3),
-                   partner.mutual ? "yes" : "no", verdict});
+                   partner.mutual ? "yes" : "no",
+                   likenessText(partner.verdict, fitsMirrored(partner.fit), "scan is part of it")});
     }
     return (table.empty() ? std::string() : table.render() + "\n") +
            formatCount(found, "scan has", "scans have") + " a partner among " +
@@ -210,7 +206,7 @@ CommandResult runMatch(Session& session, const MatchFlags& flags) {
     for (const json& one : failed) console.item(one);
     if (!console.lines()) console.document({{"matches", matches}, {"failed", failed}});
     console.text(flags.csv ? partnersCsv(*matched) : partnersText(*matched));
-    if (!flags.out.empty() && !flags.csv) console.text("Matches: " + flags.out + "\n");
+    if (!flags.out.empty() && !flags.csv) console.text("Matches: " + inLine(flags.out) + "\n");
     const std::size_t all = matched->a.size() + matched->b.size();
     failures.tell(console, all, "file", "files");
     return failures.exitCode(all);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <set>
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
@@ -41,6 +42,27 @@ struct QueryFlags {
 std::string fileNameOf(std::string name) {
     std::replace(name.begin(), name.end(), '/', '_');
     return name.front() == '.' ? "_" + name : name;
+}
+
+/// --out-aligned of several queries: a folder for each, named as it is below the folder that all are in,
+/// without its ending unless that tells it from another.
+std::vector<fs::path> foldersOf(const std::vector<ScanFile>& files) {
+    std::vector<fs::path> paths;
+    for (const ScanFile& file : files) paths.push_back(fs::absolute(file.path).lexically_normal());
+    fs::path common = paths.empty() ? fs::path() : paths.front().parent_path();
+    const auto isBelow = [&](const fs::path& path) {
+        const auto [end, _] = std::mismatch(common.begin(), common.end(), path.begin(), path.end());
+        return end == common.end();
+    };
+    while (!std::all_of(paths.begin(), paths.end(), isBelow)) common = common.parent_path();
+    std::set<fs::path> taken;
+    for (std::size_t i = 0; i < paths.size(); ++i) {
+        const fs::path name = paths[i].lexically_relative(common);
+        const fs::path bare = withoutScanEnding(name.generic_string());
+        paths[i] = files[i].sharesName || taken.count(bare) > 0 ? name : bare;
+        taken.insert(paths[i]);
+    }
+    return paths;
 }
 
 /// --out-aligned: the query and its hits, in its coordinates. Moved ones have more digits than single
@@ -86,9 +108,9 @@ struct QueryRun {
         std::string text;
         if (!flags.csv.empty()) {
             RETURN_IF_ERROR(writeTextFile(flags.csv, csv));
-            text += "Hits: " + flags.csv + "\n";
+            text += "Hits: " + inLine(flags.csv) + "\n";
         }
-        if (!flags.aligned.empty()) text += "Aligned with the query: " + flags.aligned + "\n";
+        if (!flags.aligned.empty()) text += "Aligned with the query: " + inLine(flags.aligned) + "\n";
         return text.empty() ? text : "\n" + text;
     }
 };
@@ -118,10 +140,12 @@ CommandResult runMany(QueryRun& run, const std::vector<ScanFile>& files) {
     std::size_t done = 0;
     RunContext context = run.session.context();
     context.progress = nullptr;  // progress counts files
-    for (const ScanFile& file : files) {
+    const std::vector<fs::path> folders = foldersOf(files);
+    for (std::size_t i = 0; i < files.size(); ++i) {
+        const ScanFile& file = files[i];
         console.progress("query", done, files.size());
         const auto answer = run.searcher.withFile(file.path, context);
-        Result<void> kept = answer ? run.keep(*answer, fs::path(run.flags.aligned) / fileNameOf(file.path))
+        Result<void> kept = answer ? run.keep(*answer, fs::path(run.flags.aligned) / folders[i])
                                    : Result<void>(fail(answer.error()));
         if (!kept) {
             if (endsTheCommand(kept.error())) {

@@ -40,6 +40,7 @@ json replyJson(const client::SearchReply& reply) {
                       {"verified", hit.fit.has_value()},
                       {"verdict", verdictJson(hit.verdict)},
                       {"verdict_reliability", hit.verdictReliability},
+                      {"mirrored", mirroredJson(fitsMirrored(hit.fit))},
                       {"shape", toJson(hit.shape)}};
         if (const auto motion = motionOf(hit)) entry["matrix"] = matrixOf(*motion);
         if (!groups.empty()) entry["group"] = valueOf(groups[i]);
@@ -64,11 +65,11 @@ json replyJson(const client::SearchReply& reply) {
 
 std::string replyText(const SearchFlags& flags, const Answer& answer, Explained explained) {
     const client::SearchReply& reply = answer.reply;
-    const std::string queryName = answer.stored ? answer.query : "the query";
+    const std::string queryName = answer.stored ? inLine(answer.query) : "the query";
     std::string text;
     if (reply.report) {
-        text += scanName(answer.query) + ": " + formatCount(reply.report->points, "point", "points") + ", " +
-                formatCount(reply.report->segments, "part", "parts") + ", segmented in " +
+        text += inLine(scanName(answer.query)) + ": " + formatCount(reply.report->points, "point", "points") +
+                ", " + formatCount(reply.report->segments, "part", "parts") + ", segmented in " +
                 formatSeconds(reply.secondsSegment) + "\n";
         if (reply.report->quality < 1.0) text += interiorText(*reply.report, reply.query.scale);
     }
@@ -94,9 +95,10 @@ std::string replyText(const SearchFlags& flags, const Answer& answer, Explained 
     Table table(std::move(columns));
     for (std::size_t i = 0; i < reply.hits.size(); ++i) {
         const client::Hit& hit = reply.hits[i];
-        std::vector<std::string> cells = {std::to_string(i + 1), formatFixed(hit.score, 3),
-                                          bar(hit.score, 20),    verdictText(hit.verdict),
-                                          labelOf(hit.shape),    hit.shape.key};
+        std::vector<std::string> cells = {
+            std::to_string(i + 1), formatFixed(hit.score, 3),
+            bar(hit.score, 20),    likenessText(hit.verdict, fitsMirrored(hit.fit)),
+            labelOf(hit.shape),    hit.shape.key};
         if (!groups.empty()) {
             const json value = valueOf(groups[i]);
             const bool first = i == 0 || groups[i] != groups[i - 1];
@@ -111,9 +113,9 @@ std::string replyText(const SearchFlags& flags, const Answer& answer, Explained 
     for (std::size_t i = 0; i < told; ++i) {
         const client::Hit& hit = reply.hits[i];
         if (!hit.explanation) continue;
-        text += "\nWhy " + hit.shape.key + ": " +
-                explanationText(*hit.explanation, reply.query, queryName, hit.shape.key);
-        if (hit.fit) text += fitText(*hit.fit, queryName, hit.shape.key);
+        const std::string key = inLine(hit.shape.key);
+        text += "\nWhy " + key + ": " + explanationText(*hit.explanation, reply.query, queryName, key);
+        if (hit.fit) text += fitText(*hit.fit, queryName, key);
     }
     return text;
 }
@@ -147,7 +149,7 @@ std::string hitsCsv(const Answer& answer) {
         row.add(hit.score).add(hit.signatureScore);
         row.add(verdictCell(hit.verdict));
         const auto motion = motionOf(hit);
-        row.add(!motion ? "" : motion->reflected ? "1" : "0");
+        row.add(mirroredCell(fitsMirrored(hit.fit)));
         if (hit.fit) {
             row.add(hit.fit->best.residual)
                 .add(hit.fit->best.explainedQuery)

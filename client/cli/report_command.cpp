@@ -57,11 +57,10 @@ ReportHit reportHit(const Answer& answer, const client::Hit& hit, const std::str
     shown.key = hit.shape.key;
     shown.label = labelOf(hit.shape);
     shown.score = hit.score;
-    shown.verdict = verdictText(hit.verdict);
+    shown.verdict = likenessText(hit.verdict, fitsMirrored(hit.fit));
     if (hit.verdict != Verdict::kNone) {
         shown.verdict += " (right in " + formatPercent(hit.verdictReliability) + " of such cases)";
     }
-    if (hit.fit && fitsMirrored(*hit.fit)) shown.facts = "mirrored";
     if (hit.explanation) {
         client::Explanation words = *hit.explanation;
         words.terms.clear();  // they are bars
@@ -129,7 +128,7 @@ CommandResult runReport(Session& session, const ReportFlags& flags) {
     nlohmann::json document = answerJson(flags.search, *answer);
     document["out"] = flags.out;
     session.console().document(document);
-    session.console().text(formatCount(page->hits.size(), "hit", "hits") + " in " + flags.out + " (" +
+    session.console().text(formatCount(page->hits.size(), "hit", "hits") + " in " + inLine(flags.out) + " (" +
                            formatBytes(html.size()) + "): open it with a browser\n");
     return kOk;
 }

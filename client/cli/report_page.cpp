@@ -107,9 +107,7 @@ std::string hitHtml(const Place& place, const ReportHit& hit, std::size_t rank) 
                        "</h2><span class=\"score\">" + formatFixed(hit.score, 3) + "</span></div>\n" +
                        barCell(hit.score, " main") + "\n";
     std::string facts = escaped(hit.verdict);
-    for (const std::string& fact : {hit.facts, hit.label}) {
-        if (!fact.empty()) facts += (facts.empty() ? "" : " · ") + escaped(fact);
-    }
+    if (!hit.label.empty()) facts += (facts.empty() ? "" : " · ") + escaped(hit.label);
     text += "<p class=\"facts\">" + facts +
             "</p>\n<button type=\"button\" aria-pressed=\"false\">Show</button>\n";
     if (!hit.bars.empty() || !hit.why.empty())

@@ -21,7 +21,6 @@ struct ReportHit {
     std::string label;
     double score = 0.0;
     std::string verdict;  ///< in words; may be empty
-    std::string facts;    ///< under the key, e.g. "mirrored"; may be empty
     std::string why;      ///< in words, several lines
     std::vector<ReportBar> bars;
     /// Laid on the query, in its coordinates; may be empty.

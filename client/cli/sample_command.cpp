@@ -108,6 +108,7 @@ Result<void> writeAll(Session& session, const SampleFlags& flags, const std::vec
 }
 
 CommandResult runSample(Session& session, const SampleFlags& flags) {
+    session.leftBehind = "the files written so far stay";
     if (flags.list) return listFamilyNames(session);
     if (flags.folder.empty()) {
         return fail(ErrorCode::kInvalidArgument,
@@ -139,8 +140,8 @@ CommandResult runSample(Session& session, const SampleFlags& flags) {
                                 {"noise", flags.noise},
                                 {"seed", flags.seed}});
     session.console().text(formatCount(files.size(), "scan", "scans") + " of " +
-                           formatCount(families->size(), "family", "families") + " in " + flags.folder +
-                           ", " + formatCount(flags.points) + " points each, noise " +
+                           formatCount(families->size(), "family", "families") + " in " +
+                           inLine(flags.folder) + ", " + formatCount(flags.points) + " points each, noise " +
                            formatPercent(flags.noise) + " of the diagonal, seed " +
                            std::to_string(flags.seed) + "\n");
     return kOk;

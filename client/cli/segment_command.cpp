@@ -49,7 +49,7 @@ nlohmann::json segmentJson(const SegmentFlags& flags, const LoadedScan& scan,
 
 std::string segmentText(const SegmentFlags& flags, const LoadedScan& scan, const ShapeParameters& parameters,
                         const client::SegmentationReport& report, const client::Signature& signature) {
-    std::string text = scanName(flags.file) + ": " + scan.format + ", " +
+    std::string text = inLine(scanName(flags.file)) + ": " + scan.format + ", " +
                        formatCount(report.points, "point", "points") +
                        (scan.sampledFromMesh ? " sampled from its surface" : "") + "\n";
     if (scan.skippedNonFinite > 0) {
@@ -66,7 +66,7 @@ std::string segmentText(const SegmentFlags& flags, const LoadedScan& scan, const
         text += interiorText(report, signature.scale);
     }
     text += "\nLargest parts:\n" + signatureTable(signature);
-    if (!flags.out.empty()) text += "\nPoints coloured by part: " + flags.out + "\n";
+    if (!flags.out.empty()) text += "\nPoints coloured by part: " + inLine(flags.out) + "\n";
     return text;
 }
 

@@ -89,12 +89,20 @@ int usageError(Console& console, const CLI::App& app, const CLI::ParseError& err
     return finish(console, kUsage);
 }
 
+/// How far the command was, and what is left of it.
+Error interruption(Session& session) {
+    const std::string done = session.console().progressText();
+    return {ErrorCode::kCancelled,
+            "interrupted" + (done.empty() ? "" : " (" + done + ")") + ": " + session.leftBehind};
+}
+
 int runAction(Session& session) {
     Console& console = session.console();
     const CommandResult result = session.action();
     console.clearProgress();
     if (result) return finish(console, *result);
-    console.failure(result.error());
+    const bool interrupted = session.interrupted() && result.error().code == ErrorCode::kCancelled;
+    console.failure(interrupted ? interruption(session) : result.error());
     return finish(console, exitCodeOf(result.error().code));
 }
 

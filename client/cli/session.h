@@ -27,6 +27,9 @@ struct GlobalOptions {
     std::optional<double> timeoutSeconds;  ///< for the whole command
 };
 
+/// Session::leftBehind of commands that ask the server for one change.
+constexpr const char* kPerhapsChanged = "the server may have done it all the same";
+
 /// The exit code of a finished command, or the error that ended it, which the caller prints.
 using CommandResult = Result<int>;
 
@@ -43,6 +46,11 @@ class Session {
     /// Cancelled by Ctrl-C, limited by --timeout (from the first call on), and shown in the progress bar with
     /// `what` before the stage.
     [[nodiscard]] RunContext context(const std::string& what = {});
+
+    /// What Ctrl-C leaves behind, as the end of "interrupted: "; commands that change something say so here.
+    std::string leftBehind = "there is no result, and nothing was written";
+    /// Whether Ctrl-C was pressed.
+    [[nodiscard]] bool interrupted() const { return cancel_.load(std::memory_order_relaxed); }
 
     /// Set by the subcommand that was named; runs after the whole command line was read.
     std::function<CommandResult()> action;

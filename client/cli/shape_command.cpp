@@ -59,7 +59,8 @@ CommandResult writeScan(Session& session, const client::Client& client, const Ke
     json document = toJson(scan->shape);
     document["out"] = flags.out;
     session.console().document(document);
-    session.console().text(shapeText(scan->shape) + "\nPoints as they were sent: " + flags.out + "\n");
+    session.console().text(shapeText(scan->shape) + "\nPoints as they were sent: " + inLine(flags.out) +
+                           "\n");
     return kOk;
 }
 
@@ -83,7 +84,7 @@ CommandResult runGet(Session& session, const KeyFlags& flags) {
         document["report"] = toJson(scan->report);
         document["signature"] = pointsJson(scan->signature);
         document["out"] = flags.out;
-        text += "\nPoints coloured by part: " + flags.out + "\n";
+        text += "\nPoints coloured by part: " + inLine(flags.out) + "\n";
     }
     session.console().document(document);
     session.console().text(text);
@@ -97,8 +98,8 @@ CommandResult runSignature(Session& session, const KeyFlags& flags) {
     RETURN_IF_ERROR(signature);
     json document = toJson(*signature);
     document["key"] = flags.shape.key;
-    std::string text = flags.shape.key + ": volume " + formatNumber(signature->volume) + ", diagonal " +
-                       formatNumber(signature->scale) + "\n";
+    std::string text = inLine(flags.shape.key) + ": volume " + formatNumber(signature->volume) +
+                       ", diagonal " + formatNumber(signature->scale) + "\n";
     if (signature->attributes) {
         document["statistics"] = statisticsJson(*signature);
         text += qualityText(signature->attributes->quality);
@@ -121,6 +122,7 @@ json eventJson(const client::IngestEvent& event) {
 }
 
 CommandResult runWatch(Session& session, const KeyFlags& flags) {
+    session.leftBehind = "the server goes on with it; the same command follows it again";
     const auto client = connectToServer(session);
     RETURN_IF_ERROR(client);
     json events = json::array();
@@ -130,7 +132,8 @@ CommandResult runWatch(Session& session, const KeyFlags& flags) {
         [&](const client::IngestEvent& event) {
             events.push_back(eventJson(event));
             if (event.state != client::ShapeState::kPending) return;
-            if (event.stage != lastStage) session.console().text(flags.shape.key + ": " + event.stage + "\n");
+            if (event.stage != lastStage)
+                session.console().text(inLine(flags.shape.key) + ": " + event.stage + "\n");
             lastStage = event.stage;
             session.console().progress(event.stage, event.done, event.total);
         },
@@ -140,7 +143,7 @@ CommandResult runWatch(Session& session, const KeyFlags& flags) {
     document["key"] = flags.shape.key;
     document["events"] = events;
     session.console().document(document);
-    session.console().text(flags.shape.key + ": " + client::stateName(last->state) +
+    session.console().text(inLine(flags.shape.key) + ": " + client::stateName(last->state) +
                            (last->quality ? ", " + qualityText(*last->quality) : "\n"));
     if (!last->failure) return kOk;
     session.console().note(flags.shape.key + ": " + last->failure->message);

@@ -11,7 +11,7 @@ namespace shapedb::client {
 namespace {
 
 Error translate(grpc::StatusCode code, const TrailingMetadata& trailing = {}) {
-    return errorOf(grpc::Status(code, "words"), trailing, "host:1");
+    return errorOf(grpc::Status(code, "words"), trailing, {"host:1"});
 }
 
 TEST(Status, ServerErrorNameDecidesTheCode) {
@@ -43,14 +43,14 @@ TEST(Status, MessageNamesAnUnreachableServer) {
 
 TEST(Status, AStrangerIsNotTriedAgain) {
     const grpc::Status status(grpc::StatusCode::UNIMPLEMENTED, "");
-    const Error error = errorOf(status, {}, "host:1");
+    const Error error = errorOf(status, {}, {"host:1"});
     EXPECT_EQ(failureOf(status, {}, error).code, ErrorCode::kRejected);
     EXPECT_NE(error.message.find("not a ShapeDB server"), std::string::npos) << error.message;
 }
 
 TEST(Status, WordsOfGrpcStayInside) {
     const auto message = [](const char* details) {
-        return errorOf(grpc::Status(grpc::StatusCode::UNAVAILABLE, details), {}, "host:1").message;
+        return errorOf(grpc::Status(grpc::StatusCode::UNAVAILABLE, details), {}, {"host:1"}).message;
     };
     EXPECT_EQ(message("DNS resolution failed for host:1: C-ares status is not ARES_SUCCESS qtype=AAAA"),
               "cannot reach a server at host:1: this machine knows no host of that name");
@@ -60,14 +60,43 @@ TEST(Status, WordsOfGrpcStayInside) {
     EXPECT_NE(message("failed to connect to all addresses; last error: UNAVAILABLE: Failed parsing HTTP/2")
                   .find("is not a ShapeDB server"),
               std::string::npos);
-    EXPECT_NE(message("Socket closed").find("does it want TLS"), std::string::npos);
+    EXPECT_NE(message("Socket closed").find("it probably wants TLS"), std::string::npos);
+    EXPECT_NE(
+        message(
+            "failed to connect to all addresses; last error: UNKNOWN: unix:/nope: No such file or directory")
+            .find("there is no such socket"),
+        std::string::npos);
     EXPECT_NE(message("something new").find("(something new)"), std::string::npos) << "nothing is lost";
+}
+
+TEST(Status, FaultsOfTlsNameTheirRemedy) {
+    const auto message = [](const std::string& details) {
+        const grpc::Status status(
+            grpc::StatusCode::UNAVAILABLE,
+            "failed to connect to all addresses; last error: UNKNOWN: ipv4:1.2.3.4:1: " + details);
+        return errorOf(status, {}, {"host:1", true}).message;
+    };
+    const std::string handshake = "Ssl handshake failed: SSL_ERROR_SSL: error:";
+    const std::pair<std::string, std::string> cases[] = {
+        {handshake + "0A00010B:SSL routines::wrong version number", "does not speak TLS"},
+        {handshake + "0A000086:SSL routines::certificate verify failed", "--tls-ca"},
+        {"Peer name host is not in peer certificate", "--server-name"},
+        {"Endpoint read failed", "--client-certificate"},
+    };
+    for (const auto& [details, remedy] : cases) {
+        const std::string told = message(details);
+        EXPECT_NE(told.find(remedy), std::string::npos) << told;
+        EXPECT_NE(told.find("host:1"), std::string::npos) << told;
+        for (const char* inner : {"SSL", "UNKNOWN", "peer", "Endpoint"}) {
+            EXPECT_EQ(told.find(inner), std::string::npos) << told;
+        }
+    }
 }
 
 TEST(Status, ACallThatTheServerCutOffKeepsItsReason) {
     for (const auto code : {grpc::StatusCode::UNAVAILABLE, grpc::StatusCode::DEADLINE_EXCEEDED}) {
         const grpc::Status status(code, kCutOffPrefix + std::string("too slow"));
-        const Error error = errorOf(status, {}, "host:1");
+        const Error error = errorOf(status, {}, {"host:1"});
         EXPECT_EQ(error.message, "cut off by the server: too slow");
         EXPECT_EQ(error.code, translate(code).code);
     }
@@ -76,12 +105,12 @@ TEST(Status, ACallThatTheServerCutOffKeepsItsReason) {
 TEST(Status, ExhaustionWithPushbackIsRetried) {
     const grpc::Status status(grpc::StatusCode::RESOURCE_EXHAUSTED, "full");
     const TrailingMetadata named = {{"shapedb-error", "queue_full"}};
-    EXPECT_EQ(failureOf(status, named, errorOf(status, named, "")).code, ErrorCode::kQueueFull);
+    EXPECT_EQ(failureOf(status, named, errorOf(status, named, {})).code, ErrorCode::kQueueFull);
     const TrailingMetadata hinted = {{"grpc-retry-pushback-ms", "20"}};
-    const AttemptFailure failure = failureOf(status, hinted, errorOf(status, hinted, ""));
+    const AttemptFailure failure = failureOf(status, hinted, errorOf(status, hinted, {}));
     EXPECT_EQ(failure.code, ErrorCode::kQueueFull);
     EXPECT_EQ(failure.pushback, "20");
-    EXPECT_EQ(failureOf(status, {}, errorOf(status, {}, "")).code, ErrorCode::kInternal)
+    EXPECT_EQ(failureOf(status, {}, errorOf(status, {}, {})).code, ErrorCode::kInternal)
         << "a message too large";
 }
 

@@ -26,6 +26,14 @@ TEST(Console, PrintsTextOrJsonNeverBoth) {
     EXPECT_EQ(nlohmann::json::parse(out.str()), nlohmann::json({{"a", 1}}));
 }
 
+TEST(Console, ANoteIsOneLineWhateverNamesAreInIt) {
+    std::ostringstream out;
+    std::ostringstream err;
+    Console console(out, err, {});
+    console.note("a\nb.ply: line 3\x1b[2J \xff");
+    EXPECT_EQ(err.str(), "shapedb: a\\u000ab.ply: line 3\\u001b[2J \\ufffd\n");
+}
+
 TEST(Console, FailureIsANoteAndAJsonDocument) {
     std::ostringstream out;
     std::ostringstream err;

@@ -202,6 +202,38 @@ TEST_F(OnlineBulk, HitsAreWrittenWhereTheQueryIs) {
         ++folders;
     }
     EXPECT_EQ(folders, 2u);
+    onlineJson({"query", scans() + "/human", scans() + "/mug/mug_01.ply", "--collection", "aligned",
+                "--out-aligned", path("three"), "-k", "1"});
+    for (const char* name : {"human/human_01", "human/human_02", "mug/mug_01"}) {
+        EXPECT_TRUE(fs::exists(path(std::string("three/") + name + "/query.ply"))) << name;
+    }
+}
+
+TEST_F(OnlineBulk, NamesThatAreNotUtf8AreRefusedInPlainWords) {
+    onlineJson({"collection", "create", "names", "--profile", "paper"});
+    writePoints("in/caf\xe9.xyz", dumbbellPoints());
+    writePoints("in/two\nlines.xyz", dumbbellPoints());
+    writePoints("in/good.xyz", dumbbellPoints());
+    const CommandRun run = online({"add", path("in"), "--base", path("in"), "--collection", "names"});
+    EXPECT_EQ(run.exitCode, kSomeFailed);
+    EXPECT_NE(run.err.find("the key 'caf\\ufffd' is not UTF-8"), std::string::npos) << run.err;
+    EXPECT_EQ(run.err.find("libprotobuf"), std::string::npos) << run.err;
+    for (const std::string& text : {run.out, run.err}) {
+        EXPECT_EQ(text.find("two\nlines"), std::string::npos) << text;
+        EXPECT_EQ(text.find('\xe9'), std::string::npos) << text;
+    }
+    for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{
+             {"get", "\xff"},
+             {"list", "--filter", "a=\xff"},
+             {"collection", "create", "\xff"},
+             {"metadata", "good", "--set", "a=\xff", "--collection", "names"},
+             {"query", "--key", "\xff"},
+             {"watch", "\xff"}}) {
+        const CommandRun refused = online(arguments);
+        EXPECT_EQ(refused.exitCode, kUsage) << arguments[0] << ": " << refused.err;
+        EXPECT_NE(refused.err.find("is not UTF-8"), std::string::npos) << arguments[0] << ": " << refused.err;
+        EXPECT_EQ(refused.err.find("libprotobuf"), std::string::npos) << refused.err;
+    }
 }
 
 TEST_F(OnlineBulk, FiltersAskForKeysAndAlternatives) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The commands that change many shapes, list them in other orders, count values and group hits, against a
 // real shapedbd.
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -273,6 +274,30 @@ TEST_F(OnlineChanges, CollectionsAreRenamedAndHaveAliases) {
     EXPECT_EQ(onlineJson({"collection", "alias", collection, "later"}, 4)["error"]["name"], "already_exists");
     EXPECT_EQ(onlineJson({"collection", "unalias", "live"})["deleted"], "live");
     EXPECT_EQ(onlineJson({"count", "--collection", "live"}, 4)["error"]["name"], "not_found");
+}
+
+TEST_F(OnlineChanges, ACollectionThatIsNotThereIsOneErrorWithOneExitCode) {
+    for (const std::vector<std::string>& arguments :
+         std::vector<std::vector<std::string>>{{"get", "a"},
+                                               {"list"},
+                                               {"count"},
+                                               {"delete", "a"},
+                                               {"delete", "a", "b"},
+                                               {"delete", "--filter", "a", "--yes"},
+                                               {"metadata", "a", "b", "--set", "x=1"},
+                                               {"retry", "a", "b"},
+                                               {"add", scans()},
+                                               {"query", scans()},
+                                               {"duplicates"},
+                                               {"watch", "a"}}) {
+        std::vector<std::string> there = arguments;
+        there.insert(there.end(), {"--collection", "nowhere"});
+        const CommandRun run = online(there);
+        EXPECT_EQ(run.exitCode, kWrongState) << arguments[0] << ": " << run.err;
+        EXPECT_EQ(std::count(run.err.begin(), run.err.end(), '\n'), 1) << arguments[0] << ": " << run.err;
+        EXPECT_NE(run.err.find("nowhere"), std::string::npos) << run.err;
+    }
+    EXPECT_EQ(textIn({"delete", "a", "b"}).exitCode, kSomeFailed) << "of keys each is named";
 }
 
 }  // namespace

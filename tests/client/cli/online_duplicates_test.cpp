@@ -98,7 +98,9 @@ TEST_F(OnlineDuplicates, AreThosePairsThatScoreTheThreshold) {
     const std::string csv = online({"duplicates", "dup", "--csv", "--no-verify"}).out;
     EXPECT_EQ(csv.rfind("group,a,b,score,signature_score,verdict,mirrored,residual\n1,", 0), 0u) << csv;
     EXPECT_EQ(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')), 1 + best["pairs"].size());
-    EXPECT_EQ(online({"duplicates", "dup", "--threshold", "1.5"}).exitCode, kUsage);
+    const CommandRun high = online({"duplicates", "dup", "--threshold", "2"});
+    EXPECT_EQ(high.exitCode, kUsage);
+    EXPECT_NE(high.err.find("--threshold is 2;"), std::string::npos) << high.err;
     EXPECT_NE(online({"duplicates", "dup", "--threshold", "0.9", "--filter", "none"})
                   .out.find("no near-duplicates"),
               std::string::npos);
@@ -117,7 +119,23 @@ TEST_F(OnlineDuplicates, MirroredTwinsAreMarked) {
     for (const json& pair : found["pairs"]) {
         EXPECT_EQ(pair["mirrored"], pair["a"] == "right" || pair["b"] == "right") << pair;
     }
-    EXPECT_NE(online({"duplicates", "twins", "--threshold", "0.8"}).out.find("mirrored"), std::string::npos);
+    const std::string text = online({"duplicates", "twins", "--threshold", "0.8"}).out;
+    std::size_t mirrored = 0;
+    for (std::size_t at = 0; (at = text.find("mirrored", at)) != std::string::npos; ++at) ++mirrored;
+    EXPECT_EQ(mirrored, 1u) << "the twin that is not mirrored is shown beside the one that it is:\n" << text;
+    EXPECT_NE(text.find("signatures  score"), std::string::npos) << "which of the two the threshold is for";
+    EXPECT_EQ(online({"duplicates", "twins", "--no-verify"}).out.find("verdict"), std::string::npos);
+
+    // One search tells the same in its words, its JSON and its CSV.
+    const json hits =
+        onlineJson({"query", path("in/right.xyz"), "--collection", "twins", "-o", path("h.csv")});
+    ASSERT_EQ(hits["hits"].size(), 3u);
+    for (const json& hit : hits["hits"]) EXPECT_EQ(hit["mirrored"], hit["key"] != "right") << hit;
+    const std::string told = online({"query", path("in/right.xyz"), "--collection", "twins"}).out;
+    EXPECT_NE(told.find("same object, mirrored"), std::string::npos) << told;
+    const json compared = onlineJson({"compare", "left", "right", "--collection", "twins"});
+    EXPECT_EQ(compared["mirrored"], true);
+    EXPECT_EQ(onlineJson({"compare", "left", "turned", "--collection", "twins"})["mirrored"], false);
 }
 
 TEST_F(OnlineDuplicates, AreAllFoundThoughAnAnswerHasNoRoomForThem) {
@@ -140,6 +158,27 @@ TEST_F(OnlineDuplicates, AreAllFoundThoughAnAnswerHasNoRoomForThem) {
             << "scored here or there, the same";
         EXPECT_TRUE(pair["mirrored"].is_null());
     }
+}
+
+TEST(DuplicateGroups, ShowEachShapeWithItsBestOfThoseBefore) {
+    const auto pair = [](std::size_t a, std::size_t b, double score) {
+        return DuplicatePair{a, b, score, std::nullopt};
+    };
+    // 0 is the mirror image of 1 and 2, which are one object; 3 hangs on 2 alone.
+    const std::vector<DuplicatePair> pairs = {pair(1, 2, 0.99), pair(0, 2, 0.95), pair(0, 1, 0.94),
+                                              pair(2, 3, 0.91)};
+    std::vector<const DuplicatePair*> ranked;
+    for (const DuplicatePair& one : pairs) ranked.push_back(&one);
+    const auto links = linksOf({0, 1, 2, 3}, ranked);
+    ASSERT_EQ(links.size(), 4u);
+    EXPECT_EQ(links[0].pair, nullptr);
+    const std::pair<std::size_t, const DuplicatePair*> expected[] = {
+        {2, &pairs[1]}, {1, &pairs[0]}, {3, &pairs[3]}};
+    for (std::size_t i = 1; i < links.size(); ++i) {
+        EXPECT_EQ(links[i].shape, expected[i - 1].first);
+        EXPECT_EQ(links[i].pair, expected[i - 1].second);
+    }
+    EXPECT_TRUE(linksOf({}, {}).empty());
 }
 
 TEST(DuplicateGroups, AreWhatHangsTogether) {
