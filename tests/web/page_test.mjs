@@ -17,6 +17,22 @@ const kNasty = '<img src=x onerror=document.title="taken">';
 
 let temporary, server, browser, scan;
 
+/** An egg with a horn at one side: y times `sign`. */
+function handed(sign) {
+  const lines = [];
+  for (let i = 0; i < 4000; ++i) {
+    const z = 1 - (2 * i + 1) / 4000;
+    const [r, turn] = [Math.sqrt(1 - z * z), 2.399963 * i];
+    lines.push([r * Math.cos(turn), sign * 0.6 * r * Math.sin(turn), 0.4 * z].join(' '));
+  }
+  for (let i = 0; i < 2500; ++i) {
+    const [t, turn] = [i / 2500, 2.399963 * i];
+    lines.push([0.9 + 0.5 * t + 0.05 * Math.cos(turn), sign * (0.45 * t + 0.25 * t * t + 0.05 * Math.sin(turn)),
+      0.9 * t * t + 0.05 * Math.cos(2 * turn)].join(' '));
+  }
+  return `${lines.join('\n')}\n`;
+}
+
 before(async () => {
   temporary = temporaryFolder();
   const folder = temporary.folder;
@@ -26,6 +42,11 @@ before(async () => {
   [server, browser] = await Promise.all([startServer(join(folder, 'data')), startBrowser()]);
   server.command('collection', 'create', 'parts');
   server.command('add', join(folder, 'scans'), '--base', join(folder, 'scans'), '--collection', 'parts', '--label-from-folder', '--wait');
+  server.command('collection', 'create', 'twins');
+  for (const [key, sign] of [['left', 1], ['right', -1]]) {
+    writeFileSync(join(folder, `${key}.xyz`), handed(sign));
+    server.command('add', join(folder, `${key}.xyz`), '--key', key, '--collection', 'twins', '--wait');
+  }
   server.command('add', scan, '--key', kNasty, '--meta', `note=${kNasty}`, '--collection', 'parts', '--wait');
 });
 
@@ -60,6 +81,29 @@ pageTest('a collection is a wall of pictures, and strangers\' words stay words',
   assert.ok(!(await page.title()).includes('taken'));
 });
 
+pageTest('keys in folders show their folders', async (page) => {
+  await visit(page, server, '#/shapes/parts');
+  const shown = await page.locator('.card-key').allInnerTexts();
+  assert.ok(shown.some((text) => /^mug\/\s+mug_01$/.test(text)), shown.join(' | '));
+  assert.equal(await page.locator('.card-key .folder').count(), 9);
+});
+
+pageTest('a view that there is not is told as such', async (page) => {
+  await page.goto(`${server.url}/#/bogus/parts`);
+  await page.getByRole('heading', { name: 'There is no view “bogus”' }).waitFor();
+  assert.equal(await page.getByText('collection', { exact: false }).getByRole('alert').count(), 0);
+  assert.match(await page.title(), /No such view/);
+});
+
+pageTest('mirrored twins are told', async (page) => {
+  await visit(page, server, '#/compare/twins/left/right');
+  assert.match(await page.locator('.verdict').innerText(), /^same object, mirrored/);
+  await visit(page, server, '#/like/twins/left');
+  assert.match(await page.locator('.hit .verdict').first().innerText(), /^same object, mirrored/);
+  await visit(page, server, '#/families/twins');
+  await page.locator('.pair-verdict', { hasText: 'same object, mirrored' }).waitFor();
+});
+
 pageTest('a search by key ranks, says what it found, and lays a hit on the query', async (page) => {
   await visit(page, server, '#/like/parts/human%2Fhuman_01');
   const first = page.locator('.hit').first();
@@ -74,6 +118,16 @@ pageTest('a search by key ranks, says what it found, and lays a hit on the query
   assert.ok(query.count > 1_000 && hit.count > 1_000, `${query.count} and ${hit.count} pixels`);
   for (const side of ['left', 'right', 'top', 'bottom']) {
     assert.ok(Math.abs(query[side] - hit[side]) < 0.1 * aligned.height, `${side}: ${query[side]} and ${hit[side]}`);
+  }
+
+  // Each alone covers as much as before, so both are seen where they lie on each other.
+  for (const [name, is, other] of [['query', isOrange, isBlue], ['hit', isBlue, isOrange]]) {
+    await page.locator('.overlay-controls').getByLabel(name, { exact: true }).uncheck();
+    await settled(page);
+    const alone = await pixelsOf(page, '.viewer');
+    assert.ok(boxOf(alone, is).count > 1_000, `without the ${name}: ${boxOf(alone, is).count} pixels`);
+    assert.ok(boxOf(alone, other).count < 100, `without the ${name}: ${boxOf(alone, other).count} pixels of it`);
+    await page.locator('.overlay-controls').getByLabel(name, { exact: true }).check();
   }
 
   const slider = page.locator('.between');

@@ -6,6 +6,8 @@ export type PageName = (typeof kPages)[number];
 
 export interface Address {
   page: PageName;
+  /** What the address says where there is no such page; `page` is the wall then. */
+  unknown?: string;
   /** Empty: none chosen yet. */
   collection: string;
   keys: string[];
@@ -15,8 +17,10 @@ export interface Address {
 export function parseAddress(hash: string): Address {
   const [path = '', query = ''] = splitOnce(hash.replace(/^#\/?/, ''), '?');
   const [page = '', collection = '', ...keys] = path.split('/').map(decode);
+  const known = kPages.find((name) => name === page);
+  if (known === undefined && page !== '') return { page: 'shapes', unknown: page, collection: '', keys: [], options: {} };
   return {
-    page: kPages.find((name) => name === page) ?? 'shapes',
+    page: known ?? 'shapes',
     collection,
     keys,
     options: Object.fromEntries(new URLSearchParams(query)),

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page: reads the address, shows the view it names, and listens for scans that are dropped.
 import type { Address, PageName } from './address';
-import { currentAddress, goTo } from './address';
+import { currentAddress, goTo, kPages } from './address';
 import { call } from './api/connect';
 import { Failure } from './api/failure';
 import { apiKey } from './api/session';
@@ -68,18 +68,23 @@ function refreshHeader(address: Address): void {
 
 function showIn(address: Address, signal: AbortSignal, focused: string): void {
   fillHeader(address);
-  if (address.collection === '' && address.page !== 'admin') {
+  if (address.collection === '' && address.unknown === undefined && address.page !== 'admin') {
     fill(main, empty('There is no collection yet', 'Make one with ', h('code', {}, 'shapedb collection create NAME'),
       ' and add scans with ', h('code', {}, 'shapedb add FOLDER --collection NAME'), '.'));
     return;
   }
-  shown = kViews[address.page](address, signal);
+  shown = address.unknown === undefined ? kViews[address.page](address, signal) : noSuchView(address.unknown);
   document.title = `${shown.title} · ShapeDB`;
   fill(main, shown.element);
   main.dataset['shown'] = location.hash;
   const again = focused === '' ? null : document.getElementById(focused);
   if (again !== null) again.focus();
   else if (focused !== '' || document.activeElement === document.body) main.focus({ preventScroll: true });
+}
+
+function noSuchView(name: string): View {
+  return { title: 'No such view', element: h('div', { class: 'content narrow' }, empty(`There is no view “${name}”`,
+    `Those of this page are ${kPages.join(', ')}. `, h('a', { href: '#/' }, 'To the shapes'))) };
 }
 
 /** Without a collection in the address: the first that has shapes. */

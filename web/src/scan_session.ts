@@ -123,7 +123,7 @@ export async function search(
     },
   };
   const [answer] = await send(SearchService.method.searchByScan, requests(header, session.positions, chunkPart),
-    { signal, onSent: stagesOf(onProgress, 'Searching: segmented, scored, then the best laid on the scan') });
+    { signal, onSent: stagesOf(onProgress, 'The server segments the scan, scores the shapes and lays the best on it; it does not tell how far it is') });
   session.found.set(id, answer!);
   return answer!;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Numbers and values of the API in words.
 import { ShapeState } from '../gen/shapedb/v1/types_pb';
+import type { Fit } from '../gen/shapedb/v1/search_service_pb';
 import { Verdict } from '../gen/shapedb/v1/search_service_pb';
 
 const kCount = new Intl.NumberFormat('en');
@@ -54,12 +55,23 @@ export function stateName(state: ShapeState): string {
   }
 }
 
-/** What the hit is to the query; empty: not verified. */
-export function verdictName(verdict: Verdict): string {
+/** Whether the shape lies on the query only as a mirror image; undefined: it was not laid on it. */
+export function fitsMirrored(fit: Fit | undefined): boolean | undefined {
+  return fit === undefined ? undefined : fit.best?.motion?.reflected === true && !fit.leftRightOpen;
+}
+
+/** What the hit is to the query, of mirrored twins "same object, mirrored"; empty: not verified. */
+export function likeness(verdict: Verdict, fit: Fit | undefined, part = 'the query is a piece of it'): string {
+  const name = verdictName(verdict, part);
+  // Unrelated shapes are nobody's mirror image.
+  return fitsMirrored(fit) && verdict !== Verdict.UNRELATED ? [name, 'mirrored'].filter(Boolean).join(', ') : name;
+}
+
+function verdictName(verdict: Verdict, part: string): string {
   switch (verdict) {
     case Verdict.SAME_OBJECT: return 'same object';
     case Verdict.SAME_OBJECT_BENT: return 'same object, bent';
-    case Verdict.PART: return 'the query is a piece of it';
+    case Verdict.PART: return part;
     case Verdict.SAME_KIND: return 'same kind';
     case Verdict.UNRELATED: return 'unrelated';
     case Verdict.UNSPECIFIED: return '';

@@ -6,8 +6,9 @@ import { call } from '../api/connect';
 import { groupedOrder } from '../cloud/grouping';
 import { likenessColour } from '../cloud/palette';
 import { fill, h } from '../dom';
-import { counted, score } from '../text';
-import { shortKey } from '../parts/card';
+import { count, counted, likeness, score } from '../text';
+import { equalTerm } from '../filter';
+import { keyLines } from '../parts/card';
 import { pictureOf } from '../parts/picture';
 import { empty, fillWhenLoaded } from '../parts/status';
 import { filterField } from './like';
@@ -17,46 +18,72 @@ import { ShapeOrder, ShapeService } from '../../gen/shapedb/v1/shape_service_pb'
 import type { Shape } from '../../gen/shapedb/v1/types_pb';
 import { ShapeState } from '../../gen/shapedb/v1/types_pb';
 
-const kMostShapes = 80;
+/** Of so many the matrix is still there in a few seconds, with two pixels or more for each. */
+const kMostShapes = 300;
+const kQueriesOfACall = 50;
+const kMostFilterBytes = 16_000;
+const kMostPairs = 24;
 /** From this score on two shapes are near-duplicates (docs/verify.md: 93 % of such hits are the same object). */
 const kDuplicate = 0.9;
 
 export function familiesView(address: Address, signal: AbortSignal): View {
   const place = h('div', {});
   const element = h('div', { class: 'content' }, h('h1', {}, 'Families and near-duplicates'),
-    h('p', { class: 'faint' }, `Each of the first ${kMostShapes} shapes that pass the filter against each other, ` +
-      'by their signatures; like shapes stand together.'),
+    h('p', { class: 'faint' }, 'Each shape against each other, by their signatures; like shapes stand together.'),
     filterField(address), place);
   void fillWhenLoaded(place, 'Each is being compared with each', signal, async () => {
-    const { shapes } = await call(ShapeService.method.listShapes, {
-      collection: address.collection, filter: address.options['filter'] ?? '', state: ShapeState.READY,
-      pageSize: kMostShapes, order: ShapeOrder.ID,
-    }, { signal });
-    if (shapes.length < 2) return [empty('There is nothing to compare', 'It takes two shapes that are ready.')];
-    const scores = await scoresOf(address, shapes, signal);
+    const filter = address.options['filter'] ?? '';
+    const [page, all] = await Promise.all([
+      call(ShapeService.method.listShapes, {
+        collection: address.collection, filter, state: ShapeState.READY, pageSize: kMostShapes, order: ShapeOrder.ID,
+      }, { signal }),
+      call(ShapeService.method.countShapes, { collection: address.collection, filter, state: ShapeState.READY }, { signal }),
+    ]);
+    if (page.shapes.length < 2) return [empty('There is nothing to compare', 'It takes two shapes that are ready.')];
+    const { shapes, filter: among } = chosen(page.shapes, filter, Number(all.count));
+    const scores = await scoresOf(address, shapes, among, signal);
     const order = groupedOrder(scores);
-    return [duplicates(shapes, scores, address, signal), matrix(shapes, scores, order, address, signal)];
+    return [
+      shapes.length < Number(all.count) && h('p', { class: 'note' },
+        `These are the first ${count(shapes.length)} of ${count(all.count)} shapes. A filter chooses others; `,
+        h('code', {}, `shapedb duplicates ${address.collection}`), ' finds the near-duplicates among all.'),
+      duplicates(shapes, scores, address, signal), matrix(shapes, scores, order, address, signal),
+    ];
   });
   return { title: 'Families', element };
 }
 
-/** scores[i][j], symmetric. */
-async function scoresOf(address: Address, shapes: Shape[], signal: AbortSignal): Promise<Float64Array[]> {
+/** The shapes to compare, of `total` that pass the filter, and a filter that only they pass: an answer has no room for others. */
+function chosen(listed: Shape[], filter: string, total: number): { shapes: Shape[]; filter: string } {
+  if (listed.length === total) return { shapes: listed, filter };
+  const terms: string[] = [];
+  let bytes = 0;
+  for (const { key } of listed) {
+    const term = equalTerm('@key', key);
+    bytes += new TextEncoder().encode(term).length + 1;
+    if (bytes > kMostFilterBytes) break;
+    terms.push(term);
+  }
+  return { shapes: listed.slice(0, terms.length), filter: terms.join('|') };
+}
+
+/** scores[i][j], symmetric. `among`: a filter that the shapes pass, and few others. */
+async function scoresOf(address: Address, shapes: Shape[], among: string, signal: AbortSignal): Promise<Float64Array[]> {
   const place = new Map(shapes.map((shape, i) => [shape.key, i]));
-  const answer = await call(SearchService.method.searchBatch, {
-    options: {
-      collection: address.collection, filter: address.options['filter'] ?? '', k: 1_000, noExplanation: true, verify: false,
-    },
-    queries: shapes.map(({ key }) => ({ by: { case: 'key' as const, value: key } })),
-  }, { signal });
-  const scores = shapes.map(() => new Float64Array(shapes.length));
-  answer.responses.forEach((response, i) => {
-    scores[i]![i] = 1;
-    for (const hit of response.hits) {
-      const j = place.get(hit.shape?.key ?? '');
-      if (j !== undefined) scores[i]![j] = scores[j]![i] = Math.max(hit.score, scores[i]![j]!);
-    }
-  });
+  const scores = shapes.map((_, i) => Float64Array.from(shapes, (_other, j) => (i === j ? 1 : 0)));
+  for (let first = 0; first < shapes.length; first += kQueriesOfACall) {
+    const answer = await call(SearchService.method.searchBatch, {
+      options: { collection: address.collection, filter: among, k: shapes.length, noExplanation: true, verify: false },
+      queries: shapes.slice(first, first + kQueriesOfACall).map(({ key }) => ({ by: { case: 'key' as const, value: key } })),
+    }, { signal });
+    answer.responses.forEach((response, query) => {
+      const i = first + query;
+      for (const hit of response.hits) {
+        const j = place.get(hit.shape?.key ?? '');
+        if (j !== undefined) scores[i]![j] = scores[j]![i] = Math.max(hit.score, scores[i]![j]!);
+      }
+    });
+  }
   return scores;
 }
 
@@ -67,19 +94,41 @@ function duplicates(shapes: Shape[], scores: Float64Array[], address: Address, s
   });
   pairs.sort((a, b) => b.score - a.score);
   if (pairs.length === 0) return h('p', { class: 'note' }, `No two of them score ${kDuplicate} or more: no near-duplicates.`);
+  const shown = pairs.slice(0, kMostPairs).map(({ i, j, score: value }) => ({
+    a: shapes[i]!, b: shapes[j]!, value, verdict: h('span', { class: 'pair-verdict' }),
+  }));
+  void tellVerdicts(shown, signal);
   const picture = ({ collection, key, version }: Shape) => pictureOf({ collection, key, version }, signal);
   return h('section', {}, h('h2', {}, counted(pairs.length, 'pair'), ' of near-duplicates'),
-    h('div', { class: 'pairs' }, ...pairs.slice(0, 24).map(({ i, j, score: value }) =>
-      h('a', { class: 'pair', href: linkTo(address, 'compare', [shapes[i]!.key, shapes[j]!.key]) },
-        picture(shapes[i]!), picture(shapes[j]!),
-        h('span', { class: 'card-key', title: `${shapes[i]!.key} and ${shapes[j]!.key}` }, `${shortKey(shapes[i]!.key)}, ${shortKey(shapes[j]!.key)}`), h('span', {}, score(value))))));
+    pairs.length > shown.length && h('p', { class: 'faint' }, `The best ${shown.length} of them:`),
+    h('div', { class: 'pairs' }, ...shown.map(({ a, b, value, verdict }) =>
+      h('a', { class: 'pair', href: linkTo(address, 'compare', [a.key, b.key]) },
+        picture(a), picture(b),
+        keyLines(a.key), keyLines(b.key),
+        h('span', {}, score(value)), verdict))));
+}
+
+/** Lays the shapes of each pair on each other, which tells twins from mirrored ones. */
+async function tellVerdicts(
+  pairs: { a: Shape; b: Shape; verdict: HTMLElement }[], signal: AbortSignal,
+): Promise<void> {
+  for (const { a, b, verdict } of pairs) {
+    try {
+      const answer = await call(SearchService.method.compare, {
+        query: { collection: a.collection, key: a.key }, other: { collection: b.collection, key: b.key },
+      }, { signal });
+      fill(verdict, likeness(answer.verdict, answer.fit, 'one is a piece of the other'));
+    } catch {
+      if (signal.aborted) return;  // otherwise one of them is gone, or has no surface points: nothing to say
+    }
+  }
 }
 
 /** One picture instead of thousands of elements; the pointer tells which two it is on. */
 function matrix(
   shapes: Shape[], scores: Float64Array[], order: number[], address: Address, signal: AbortSignal,
 ): HTMLElement {
-  const cell = Math.max(6, Math.floor(640 / shapes.length));
+  const cell = Math.max(2, Math.floor(640 / shapes.length));
   const side = cell * shapes.length;
   const canvas = h('canvas', { width: side, height: side, class: 'matrix', role: 'img', 'aria-label': summaryOf(shapes, scores) });
   const context = canvas.getContext('2d')!;
@@ -112,7 +161,7 @@ function matrix(
 }
 
 function named({ collection, key, version }: Shape, signal: AbortSignal): HTMLElement {
-  return h('div', {}, pictureOf({ collection, key, version }, signal), h('span', { class: 'card-key', title: key }, shortKey(key)));
+  return h('div', {}, pictureOf({ collection, key, version }, signal), keyLines(key));
 }
 
 function summaryOf(shapes: Shape[], scores: Float64Array[]): string {

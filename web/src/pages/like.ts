@@ -70,7 +70,8 @@ export function hits(
 function summary(response: SearchResponse, filter: string): string {
   const filtered = filter !== '' ? `, ${count(response.filtered)} pass the filter` : '';
   const pending = response.pending > 0n ? `; ${counted(response.pending, 'shape')} still waiting` : '';
-  return `${counted(response.candidates, 'shape')} searched${filtered}, ${count(response.scored)} scored in full, ` +
+  const segmented = response.report === undefined ? '' : `Segmented in ${seconds(response.secondsSegment)}; `;
+  return `${segmented}${counted(response.candidates, 'shape')} searched${filtered}, ${count(response.scored)} scored in full, ` +
     `${count(response.candidatesVerified)} laid on the query, in ${seconds(response.secondsSearch)}${pending}`;
 }
 

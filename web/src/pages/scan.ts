@@ -7,6 +7,7 @@ import { isCancelled } from '../api/failure';
 import { frameOf, normalised, thinned } from '../cloud/cloud';
 import { coloured, kQuery } from '../cloud/palette';
 import { fill, h } from '../dom';
+import { facts } from '../parts/facts';
 import { kSearchOptions, switches } from '../parts/options';
 import { fillOverlay } from '../parts/overlay';
 import { pictureHint, viewerIn } from '../parts/large_picture';
@@ -19,6 +20,7 @@ import type { ScanSession } from '../scan_session';
 import { droppedFile, readDropped, scanSession, search, segment, store } from '../scan_session';
 import { filterField, hits, searchOptionsOf } from './like';
 import { segmentList, showSegments } from './shape';
+import { seconds } from '../text';
 import type { View } from '../view';
 import { CollectionService } from '../../gen/shapedb/v1/collection_service_pb';
 import { ShapeService } from '../../gen/shapedb/v1/shape_service_pb';
@@ -90,7 +92,7 @@ async function fillSegments(
     const cloud = await segment(session, await collectionOf(address, signal), progress.tell, signal);
     if (signal.aborted) return;
     showSegments(viewer, drawable(cloud));
-    progress.element.replaceWith(h('div', {}, ...doubts(cloud.report), ...segmentList(cloud)));
+    progress.element.replaceWith(h('div', {}, ...doubts(cloud.report), ...segmentList(cloud), stageTimes(cloud.report)));
   } catch (error) {
     if (!signal.aborted && !isCancelled(error)) progress.element.replaceWith(failed(error));
   }
@@ -104,6 +106,13 @@ function drawable(cloud: SegmentedCloud): SegmentedCloud {
     positions: thinned(cloud.positions, kMostDrawn),
     segments: Int32Array.from({ length: kMostDrawn }, (_, i) => cloud.segments[Math.floor(i * step)]!),
   };
+}
+
+/** What the server did one after the other. */
+function stageTimes(report: SegmentationReport | undefined): HTMLElement | null {
+  if (report === undefined || report.stages.length === 0) return null;
+  return h('details', {}, h('summary', {}, `Segmented in ${seconds(report.totalSeconds)}, stage by stage`),
+    facts(report.stages.map((one) => [one.stage, seconds(one.seconds)])));
 }
 
 /** What one should know before relying on the segments. */

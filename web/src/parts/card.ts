@@ -3,8 +3,8 @@
 import type { Address } from '../address';
 import { linkTo } from '../address';
 import { h } from '../dom';
-import { count, percent, score, stateName, verdictClass, verdictName } from '../text';
-import type { Hit } from '../../gen/shapedb/v1/search_service_pb';
+import { count, likeness, percent, score, stateName, verdictClass } from '../text';
+import type { Fit, Hit } from '../../gen/shapedb/v1/search_service_pb';
 import { Verdict } from '../../gen/shapedb/v1/search_service_pb';
 import type { Shape } from '../../gen/shapedb/v1/types_pb';
 import { ShapeState } from '../../gen/shapedb/v1/types_pb';
@@ -21,24 +21,25 @@ export function shapeCard(shape: Shape, address: Address, signal: AbortSignal): 
   const bad = state !== ShapeState.READY;
   return h('a', { class: 'card', href: linkTo(address, 'shape', [key]) },
     pictureOf({ collection, key, version }, signal),
-    keyLine(key),
+    keyLines(key),
     h('span', { class: 'card-note' }, noteOf(shape)),
     bad && h('span', { class: `badge state-${stateName(state)}`, title: shape.failure?.message }, stateName(state)));
 }
 
-/** Of keys that are paths the end says most. */
-export function shortKey(key: string): string {
-  return key.split('/').filter((part) => part !== '').pop() ?? key;
-}
-
-function keyLine(key: string): HTMLElement {
-  return h('span', { class: 'card-key', title: key }, shortKey(key));
+/** A key: of one that is a path the folder, whose end says most, above the name. */
+export function keyLines(key: string): HTMLElement {
+  const at = key.replace(/\/+$/, '').lastIndexOf('/') + 1;
+  return h('span', { class: 'card-key', title: key },
+    // Set from right to left, so that the beginning is what has no room; inside it is the text it is.
+    at > 0 && h('span', { class: 'folder' }, h('bdi', { dir: 'ltr' }, key.slice(0, at))),
+    h('span', { class: 'name' }, key.slice(at)));
 }
 
 /** What tells it from others at a glance. */
 function noteOf(shape: Shape): string {
-  const folder = shape.key.slice(0, -shortKey(shape.key).length).replace(/\/$/, '');
-  const [first] = [shape.metadata['label'], folder, ...givenMetadata(shape).map(([, value]) => value)].filter(Boolean);
+  const label = shape.metadata['label'] ?? '';
+  // Often the folder has its name.
+  const [first] = [shape.key.includes(`${label}/`) ? '' : label, ...givenMetadata(shape).filter(([name]) => name !== 'label').map(([, value]) => value)].filter(Boolean);
   return first ?? `${count(shape.pointCount)} points`;
 }
 
@@ -48,10 +49,10 @@ export function hitCard(hit: Hit, rank: number, href: string, signal: AbortSigna
   return h('a', { class: 'card hit', href },
     pictureOf({ collection, key, version }, signal),
     h('span', { class: 'rank' }, rank),
-    keyLine(key),
+    keyLines(key),
     h('span', { class: 'card-note' }, noteOf(shape)),
     scoreLine(hit.score),
-    verdictLine(hit.verdict, hit.verdictReliability),
+    verdictLine(hit),
     hit.explanation && smallReasons(hit.explanation.terms));
 }
 
@@ -61,9 +62,13 @@ export function scoreLine(value: number): HTMLElement {
   return h('span', { class: 'score' }, h('span', { class: 'score-value' }, score(value)), bar);
 }
 
-export function verdictLine(verdict: Verdict, reliability: number): HTMLElement {
+/** `part`: what to say of a query that is a piece of the other. */
+export function verdictLine(
+  { verdict, verdictReliability, fit }: Pick<Hit, 'verdict' | 'verdictReliability'> & { fit?: Fit | undefined },
+  part?: string,
+): HTMLElement {
   if (verdict === Verdict.UNSPECIFIED) return h('span', { class: 'verdict none' }, 'not verified');
   return h('span', { class: `verdict ${verdictClass(verdict)}` },
-    verdictName(verdict),
-    h('span', { class: 'reliability' }, ` right in ${percent(reliability)} of such cases`));
+    likeness(verdict, fit, part),
+    h('span', { class: 'reliability' }, ` right in ${percent(verdictReliability)} of such cases`));
 }

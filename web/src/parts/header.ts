@@ -30,7 +30,7 @@ export function header(address: Address, collections: Collection[], actions: Hea
     collectionChoice(address, collections),
     h('nav', { 'aria-label': 'Views' }, ...kLinks.map(({ page, name, also }) => h('a', {
       href: formatAddress({ page, collection: address.collection, keys: [], options: {} }),
-      'aria-current': address.page === page || also.includes(address.page) ? 'page' : undefined,
+      'aria-current': address.unknown === undefined && (address.page === page || also.includes(address.page)) ? 'page' : undefined,
     }, name))),
     keySearch(address),
     h('button', { type: 'button', class: 'primary', onclick: () => file.click() }, 'Search with a scan'), file,

@@ -97,10 +97,15 @@ class Overlay {
       },
     });
     const aligned = this.input.motion !== undefined;
+    const shown = (name: string, layer: Layer) => {
+      const box = h('input', { type: 'checkbox', checked: true, onchange: () => layer.setVisible(box.checked) });
+      return h('label', { class: 'switch' }, box, name);
+    };
     return h('div', { class: 'overlay-controls' },
       aligned && h('label', { class: 'slider', for: id }, 'as scanned', slider, 'aligned'),
       this.colourChoice(),
-      h('label', { class: 'switch' }, split, 'side by side'));
+      h('span', { class: 'switches' }, shown('query', this.layers.query), shown('hit', this.layers.hit),
+        h('label', { class: 'switch' }, split, 'side by side')));
   }
 
   private colourChoice(): HTMLElement {

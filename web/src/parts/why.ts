@@ -27,7 +27,7 @@ export function why(likeness: Likeness): Child[] {
   const { fit, explanation } = likeness;
   return [
     h('div', { class: 'verdict-box' }, scoreLine(likeness.score),
-      verdictLine(likeness.verdict, likeness.verdictReliability)),
+      verdictLine(likeness)),
     fit && h('h2', {}, 'How they lie on each other'),
     fit && fitFacts(fit),
     explanation && explanation.terms.length > 0 && h('h2', {}, 'Why this score'),

@@ -111,7 +111,7 @@ export class Viewer {
     this.redraw();
   }
 
-  /** Two views with one camera: the first layer left, the others right. */
+  /** Two views with one camera: the first layer left, the others right. Otherwise each shines through what covers it. */
   setSplit(split: boolean): void {
     this.split = split;
     this.redraw();
@@ -151,13 +151,13 @@ export class Viewer {
     const height = this.element.clientHeight;
     if (width === 0 || height === 0) return;
     this.renderer.setSize(width, height, true);
-    const views = this.split ? 2 : 1;
+    const parts = this.layers.length > 1 ? 2 : 1;
     this.camera.aspect = this.aspect();
     this.camera.updateProjectionMatrix();
     this.styleLayers(height);
     const shown = this.layers.map((layer) => layer.visible);
-    this.shading.draw(this.scene, this.camera, views, (view) => {
-      this.layers.forEach((layer, i) => (layer.visible = shown[i]! && (views === 1 || (i === 0) === (view === 0))));
+    this.shading.draw(this.scene, this.camera, parts, this.split, (part) => {
+      this.layers.forEach((layer, i) => (layer.visible = shown[i]! && (parts === 1 || (i === 0) === (part === 0))));
     });
     this.layers.forEach((layer, i) => (layer.visible = shown[i]!));
   }
