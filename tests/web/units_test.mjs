@@ -8,7 +8,7 @@ import { bundled } from './bundle.mjs';
 let page, remove;
 
 before(async () => ({ page, remove } = await bundled(
-  ['address', 'filter', 'cloud/nearest', 'cloud/grouping', 'cloud/motion', 'cloud/cloud', 'api/envelope'])));
+  ['address', 'filter', 'cloud/nearest', 'cloud/grouping', 'cloud/motion', 'cloud/cloud', 'api/envelope', 'text'])));
 after(() => remove());
 
 test('distances are those of trying all', () => {
@@ -62,7 +62,18 @@ test('filters keep their other terms', () => {
 test('an address comes back as it was', () => {
   const address = { page: 'compare', collection: 'a.b-c', keys: ['x/y?&#%', 'ключ'], options: { filter: 'a=1, b>=2' } };
   assert.deepEqual(page.parseAddress(page.formatAddress(address)), address);
-  assert.deepEqual(page.parseAddress('#/nonsense/c/100%'), { page: 'shapes', collection: 'c', keys: ['100%'], options: {} });
+  assert.deepEqual(page.parseAddress('#/shapes/c/100%'), { page: 'shapes', collection: 'c', keys: ['100%'], options: {} });
+  assert.deepEqual(page.parseAddress('#/nonsense/c'), { page: 'shapes', unknown: 'nonsense', collection: '', keys: [], options: {} });
+});
+
+test('a mirrored twin is told, unless left and right look alike', () => {
+  const fit = (reflected, leftRightOpen) => ({ best: { motion: { reflected } }, leftRightOpen });
+  const [same, unrelated] = [1, 5];  // Verdict
+  assert.equal(page.likeness(same, fit(true, false)), 'same object, mirrored');
+  assert.equal(page.likeness(same, fit(true, true)), 'same object');
+  assert.equal(page.likeness(same, undefined), 'same object');
+  assert.equal(page.likeness(unrelated, fit(true, false)), 'unrelated');
+  assert.equal(page.fitsMirrored(undefined), undefined);
 });
 
 test('envelopes are found in any pieces', () => {
