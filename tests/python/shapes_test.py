@@ -242,3 +242,20 @@ def test_a_collection_has_a_name(client):
     for call in (client.collection, client.delete_collection, client.create_collection):
         with pytest.raises(shapedb.InvalidInput, match="is empty"):
             call("")
+
+
+def test_text_that_is_not_utf8_is_refused_wherever_it_enters(client):
+    collection, bad = client.collection("x"), "caf\udce9"
+    for call in (lambda: client.collection(bad), lambda: client.create_collection("a", description=bad),
+                 lambda: client.rename_collection("a", bad), lambda: client.set_alias(bad, "x"),
+                 lambda: client.import_collection("none", bad), lambda: client.create_key(bad, "reader"),
+                 lambda: client.create_key("n", "reader", collections=[bad]), lambda: client.revoke_key(bad),
+                 lambda: client.health(bad), lambda: collection.get(bad), lambda: collection.previews([bad]),
+                 lambda: list(collection.shapes(key_prefix=bad)), lambda: collection.page(cursor=bad),
+                 lambda: collection.count(key_prefix=bad), lambda: collection.count_by_value(bad),
+                 lambda: collection.count_by_value("a", filter=bad), lambda: collection.update_metadata("a", {bad: 1}),
+                 lambda: collection.update_metadata("a", {"b": bad}), lambda: collection.update_metadata("a", remove=[bad]),
+                 lambda: collection.search(key="a", group_by=bad), lambda: collection.search_batch([bad]),
+                 lambda: collection.compare("a", "b", other_collection=bad)):
+        with pytest.raises(shapedb.InvalidInput, match="is not UTF-8"):
+            call()

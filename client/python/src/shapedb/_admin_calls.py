@@ -18,6 +18,7 @@ from . import _increments as increments
 from ._call import Call, Collector
 from ._connection import PathLike
 from ._errors import InvalidInput, ShapeDBError
+from ._points import text_of
 from ._progress import Showing, reporter
 from ._types import CollectionInfo, Parameters, Profile
 from ._wire import collection_of, enum_number, fill_parameters, info_of, key_of, plain
@@ -213,6 +214,7 @@ def restore(paths: Sequence[PathLike], progress: Showing) -> Call[types.Restored
 
 def import_collection(path: PathLike, name: str, progress: Showing) -> Call[types.Imported]:
     """ImportCollection."""
+    text_of(name, "the name of a collection")
     chunks = _chunks_of([path], progress)
 
     def messages() -> Iterator[Any]:
@@ -258,7 +260,7 @@ _HEALTH: Tuple[types.Health, ...] = ("unknown", "serving", "not_serving")
 
 def health(service: str) -> Call[types.Health]:
     """grpc.health.v1: asked and answered with messages of the same bytes, see `_transport`."""
-    return Call("Health/Check", collection_pb.GetCollectionRequest(name=service),
+    return Call("Health/Check", collection_pb.GetCollectionRequest(name=text_of(service, "service")),
                 lambda message: _HEALTH[message.count] if message.count < len(_HEALTH) else "unknown",
                 idempotent=False)
 
@@ -268,7 +270,8 @@ def create_key(name: str, role: types.Role, collections: Sequence[str], expires:
     """CreateKey."""
     if isinstance(collections, str):
         raise InvalidInput("invalid_argument", "collections is a text; give a list of names")
-    request = admin_pb.CreateKeyRequest(name=name, collections=collections)
+    request = admin_pb.CreateKeyRequest(
+        name=text_of(name, "name"), collections=[text_of(one, "the name of a collection") for one in collections])
     request.role = enum_number(admin_pb.Role, "ROLE_", role, "role")  # type: ignore[assignment]
     for limit in ("calls_per_second", "scans_per_day", "bytes_per_day"):
         setattr(request.limits, limit, getattr(limits, limit))
@@ -288,5 +291,5 @@ def list_keys() -> Call[Tuple[types.Key, ...]]:
 
 def revoke_key(id: str) -> Call[types.Key]:
     """RevokeKey."""
-    return Call("AdminService/RevokeKey", admin_pb.RevokeKeyRequest(id=id), lambda message: key_of(message.key),
+    return Call("AdminService/RevokeKey", admin_pb.RevokeKeyRequest(id=text_of(id, "id")), lambda message: key_of(message.key),
                 idempotent=False)

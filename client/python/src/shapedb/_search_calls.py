@@ -135,7 +135,7 @@ def compare(query: Tuple[str, str], other: Tuple[str, str], options: CompareOpti
     """Compare; shapes are (collection, key)."""
     request = pb.CompareRequest()
     request.query.collection, request.query.key = query[0], text_of(query[1], "key")
-    request.other.collection, request.other.key = other[0], text_of(other[1], "key")
+    request.other.collection, request.other.key = text_of(other[0], "other_collection"), text_of(other[1], "key")
     options.fill(request)
     return Call("SearchService/Compare", request, lambda message: comparison_of(message, other[1]))
 

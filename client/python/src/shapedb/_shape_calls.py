@@ -129,8 +129,9 @@ def points(collection: str, key: str) -> Call[FloatArray]:
 
 def previews(collection: str, keys: Sequence[str], max_points: int) -> Call[Tuple[types.Preview, ...]]:
     """GetPreviews."""
+    request = pb.GetPreviewsRequest(collection=collection, keys=_keys(keys))
     try:
-        request = pb.GetPreviewsRequest(collection=collection, keys=_keys(keys), max_points=max_points)
+        request.max_points = max_points
     except (TypeError, ValueError):
         raise InvalidInput("invalid_argument", f"max_points is {max_points!r}; it must be a whole number, at least "
                            "0") from None
@@ -146,7 +147,8 @@ def page(collection: str, *, filter: str, state: Optional[types.State], order: t
          key_prefix: str, page_size: int, cursor: str) -> Call[types.Page]:
     """ListShapes."""
     request = pb.ListShapesRequest(collection=collection, filter=text_of(filter, "filter"), state=state_number(state),
-                                   page_size=page_size, cursor=cursor, descending=descending, key_prefix=key_prefix)
+                                   page_size=page_size, cursor=text_of(cursor, "cursor"), descending=descending,
+                                   key_prefix=text_of(key_prefix, "key_prefix"))
     request.order = enum_number(pb.ShapeOrder, "SHAPE_ORDER_", order, "order")  # type: ignore[assignment]
     return Call("ShapeService/ListShapes", request,
                 lambda message: types.Page(tuple(map(shape_of, message.shapes)), message.next_cursor))
@@ -156,7 +158,7 @@ def count(collection: str, filter: str, state: Optional[types.State], key_prefix
     """CountShapes."""
     return Call("ShapeService/CountShapes",
                 pb.CountShapesRequest(collection=collection, filter=text_of(filter, "filter"),
-                                      state=state_number(state), key_prefix=key_prefix),
+                                      state=state_number(state), key_prefix=text_of(key_prefix, "key_prefix")),
                 lambda message: int(message.count))
 
 
@@ -164,7 +166,8 @@ def count_by_value(collection: str, metadata_key: str, filter: str, state: Optio
                    max_values: int) -> Call[types.ValueCounts]:
     """CountByValue."""
     return Call("ShapeService/CountByValue",
-                pb.CountByValueRequest(collection=collection, metadata_key=metadata_key, filter=filter,
+                pb.CountByValueRequest(collection=collection, metadata_key=text_of(metadata_key, "metadata_key"),
+                                       filter=text_of(filter, "filter"),
                                        state=state_number(state), max_values=max_values), value_counts_of)
 
 

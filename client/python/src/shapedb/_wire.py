@@ -229,5 +229,5 @@ def fill_metadata_change(change: Any, put: Optional[Mapping[str, Any]], remove: 
     """Into a `MetadataChange`."""
     change.SetInParent()
     change.set.update(metadata_texts(put or {}))
-    change.remove.extend(remove)
+    change.remove.extend(text_of(key, "a metadata key") for key in remove)
     change.replace_all = replace_all
