@@ -121,6 +121,14 @@ class Client {
     /// The stored points of a shape; nothing is segmented. Errors: kNotFound, kChecksumMismatch.
     [[nodiscard]] Result<StoredPoints> getPoints(const ShapeRef& shape, const RunContext& context = {}) const;
 
+    /// Some points of each of up to 1,000 shapes, at most `mostPoints` of each (0: as many as there are, up
+    /// to 1,500); no scan is read. In the order of the keys, without those that no shape has. Errors:
+    /// kNotFound (the collection), kInvalidArgument.
+    [[nodiscard]] Result<std::vector<Preview>> getPreviews(const std::string& collection,
+                                                           const std::vector<std::string>& keys,
+                                                           std::uint32_t mostPoints = 0,
+                                                           const RunContext& context = {}) const;
+
     /// One page. Errors: kNotFound, kMalformedFilter, kMalformedCursor, kInvalidArgument.
     [[nodiscard]] Result<ListPage> listShapes(const ListRequest& request,
                                               const RunContext& context = {}) const;

@@ -98,6 +98,44 @@ Result<FoundShapes> Client::getShapes(const std::string& collection, const std::
 
 namespace {
 
+Result<Preview> previewOf(const v1::Preview& message) {
+    Preview preview;
+    preview.key = message.key();
+    preview.version = message.version();
+    RETURN_IF_ERROR(unpackPoints(message.xyz(), {}, preview.points));
+    const std::string& normals = message.normals();
+    for (std::size_t i = 0; i + 2 < normals.size(); i += 3) {
+        const auto part = [&](std::size_t axis) {
+            return static_cast<signed char>(normals[i + axis]) / 127.0;
+        };
+        preview.normals.push_back({part(0), part(1), part(2)});
+    }
+    return preview;
+}
+
+}  // namespace
+
+Result<std::vector<Preview>> Client::getPreviews(const std::string& collection,
+                                                 const std::vector<std::string>& keys,
+                                                 std::uint32_t mostPoints, const RunContext& context) const {
+    v1::GetPreviewsRequest request;
+    request.set_collection(collection);
+    request.mutable_keys()->Add(keys.begin(), keys.end());
+    request.set_max_points(mostPoints);
+    const auto response = callUnary(impl_->options, context, kIdempotent, *impl_->shapes,
+                                    &v1::ShapeService::Stub::GetPreviews, request);
+    RETURN_IF_ERROR(response);
+    std::vector<Preview> previews;
+    for (const v1::Preview& message : response->previews()) {
+        auto preview = previewOf(message);
+        RETURN_IF_ERROR(preview);
+        previews.push_back(std::move(*preview));
+    }
+    return previews;
+}
+
+namespace {
+
 Result<void> readPoints(grpc::ClientReader<v1::StoredPoints>& stream, StoredPoints& scan,
                         const RunContext& context) {
     Sha256 hash;

@@ -131,6 +131,16 @@ struct StoredPoints {
     PointCloud points;
 };
 
+/// Some points of a shape, enough for a small picture.
+struct Preview {
+    std::string key;
+    std::int64_t version = 0;  ///< Shape::version: which points these were made of
+    /// About the middle of the box of the scan. None if the shape has no surface points (yet), as with
+    /// profile "paper".
+    PointCloud points;
+    PointCloud normals;  ///< of each point; n may as well be -n
+};
+
 struct ValueCountRequest {
     std::string collection{};
     std::string metadataKey{};  ///< whose values are counted

@@ -115,8 +115,9 @@ std::string verdictText(Verdict verdict, const std::string& part) {
 
 std::string likenessText(Verdict verdict, std::optional<bool> mirrored, const std::string& part) {
     const std::string text = verdictText(verdict, part);
-    // Unrelated shapes are nobody's mirror image.
-    if (!mirrored.value_or(false) || verdict == Verdict::kUnrelated) return text;
+    // Of different objects neither is the mirror image of the other.
+    const bool different = verdict == Verdict::kSameKind || verdict == Verdict::kUnrelated;
+    if (!mirrored.value_or(false) || different) return text;
     return text.empty() ? "mirrored" : text + ", mirrored";
 }
 

@@ -28,6 +28,7 @@ struct KeyFlags {
     client::ShapeRef shape;
     std::string out;
     bool points = false;
+    bool preview = false;
 };
 
 std::string shapeText(const client::Shape& shape) {
@@ -64,12 +65,35 @@ CommandResult writeScan(Session& session, const client::Client& client, const Ke
     return kOk;
 }
 
+/// --preview: writes what pictures are made of.
+CommandResult writePreview(Session& session, const client::Client& client, const KeyFlags& flags) {
+    const RunContext context = session.context();
+    const auto shape = client.getShape(flags.shape, context);
+    RETURN_IF_ERROR(shape);
+    const auto previews = client.getPreviews(flags.shape.collection, {flags.shape.key}, 0, context);
+    RETURN_IF_ERROR(previews);
+    if (previews->empty() || previews->front().points.empty()) {
+        return fail(ErrorCode::kNotReady, flags.shape.key +
+                                              ": it has no surface points to draw, as those of "
+                                              "profile paper never have");
+    }
+    RETURN_IF_ERROR(writePointsPly(flags.out, previews->front().points, PlyPrecision::kSingle));
+    json document = toJson(*shape);
+    document["out"] = flags.out;
+    session.console().document(document);
+    session.console().text(shapeText(*shape) + "\n" + formatCount(previews->front().points.size()) +
+                           " points about the middle of its box: " + inLine(flags.out) + "\n");
+    return kOk;
+}
+
 CommandResult runGet(Session& session, const KeyFlags& flags) {
-    if (flags.points && flags.out.empty()) {
-        return fail(ErrorCode::kInvalidArgument, "--points needs --out FILE.ply, the file to write");
+    if ((flags.points || flags.preview) && flags.out.empty()) {
+        return fail(ErrorCode::kInvalidArgument, std::string(flags.points ? "--points" : "--preview") +
+                                                     " needs --out FILE.ply, the file to write");
     }
     const auto client = connectToServer(session);
     RETURN_IF_ERROR(client);
+    if (flags.preview) return writePreview(session, *client, flags);
     if (flags.points) return writeScan(session, *client, flags);
     const RunContext context = session.context();
     const auto shape = client->getShape(flags.shape, context);
@@ -321,8 +345,11 @@ void addShapeCommands(CLI::App& app, Session& session) {
         ->add_option("-o,--out", get->out, "Write its points, coloured and labelled by part")
         ->type_name("FILE.ply")
         ->check(endsIn(".ply"));
-    app.get_subcommand("get")->add_flag("--points", get->points,
-                                        "With --out: write the points as they were sent, and nothing else");
+    app.get_subcommand("get")
+        ->add_flag("--points", get->points,
+                   "With --out: write the points as they were sent, and nothing else")
+        ->excludes(app.get_subcommand("get")->add_flag(
+            "--preview", get->preview, "With --out: write the 1,000 points or so that pictures are made of"));
     addKeyCommand(app, session, "signature", "Show what a search compares: parts and statistics of a shape",
                   &runSignature);
     addKeyCommand(app, session, "watch", "Follow a shape until it is segmented", &runWatch);

@@ -87,6 +87,7 @@ class Fields(unittest.TestCase):
             ("collection", "delete", "e", "--force"), ("get", "human/human_01", "--collection", "c"),
             ("get", "human/human_01", "--collection", "c", "--out", path("o.ply")),
             ("get", "human/human_01", "--collection", "c", "--out", path("p.ply"), "--points"), ("list", "--collection", "c"),
+            ("get", "human/human_01", "--collection", "c", "--out", path("q.ply"), "--preview"),
             ("list", "--collection", "c", "--limit", "1"), ("count", "--collection", "c"),
             ("count", "--collection", "c", "--by", "label"), ("watch", "mug/mug_01", "--collection", "c"),
             ("signature", "mug/mug_01", "--collection", "c"), ("query", one, "--collection", "c", "--group-by", "label"),

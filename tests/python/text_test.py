@@ -61,6 +61,7 @@ def test_mirrored_twins_are_told_unless_left_and_right_look_alike():
     assert twin.mirrored and not fit().mirrored and not fit(best=pose(reflected=True), left_right_open=True).mirrored
     assert why(verdict="same_object", fit=twin).startswith("cup: same object, mirrored (such")
     assert why(verdict="unrelated", fit=twin).startswith("cup: unrelated (such")
+    assert why(verdict="same_kind", fit=twin).startswith("cup: same kind (such")
     assert _text.likeness(None, True) == "mirrored" and _text.likeness(None, None) == ""
 
 

@@ -30,6 +30,7 @@ TEST(FitOutput, LikenessIsTheVerdictAndWhetherItIsMirrored) {
     EXPECT_EQ(likenessText(Verdict::kSameObject, false), "same object");
     EXPECT_EQ(likenessText(Verdict::kSameKind, std::nullopt), "same kind");
     EXPECT_EQ(likenessText(Verdict::kUnrelated, true), "unrelated") << "nobody's mirror image";
+    EXPECT_EQ(likenessText(Verdict::kSameKind, true), "same kind") << "another object";
     EXPECT_EQ(likenessText(Verdict::kNone, true), "mirrored");
     EXPECT_EQ(likenessText(Verdict::kNone, false), "");
     EXPECT_EQ(likenessText(Verdict::kPart, false), "query is part of it");

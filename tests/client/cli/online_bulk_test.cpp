@@ -11,6 +11,7 @@
 
 #include <sys/wait.h>
 
+#include "client/api/client.h"
 #include "client/cli/exit_code.h"
 #include "client/io/scan_reader.h"
 #include "core/geometry/point.h"
@@ -207,6 +208,32 @@ TEST_F(OnlineBulk, HitsAreWrittenWhereTheQueryIs) {
     for (const char* name : {"human/human_01", "human/human_02", "mug/mug_01"}) {
         EXPECT_TRUE(fs::exists(path(std::string("three/") + name + "/query.ply"))) << name;
     }
+}
+
+TEST_F(OnlineBulk, PreviewsAreSomePointsOfAShape) {
+    onlineJson({"collection", "create", "previews"});
+    onlineJson({"add", scans() + "/mug/mug_01.ply", "--key", "mug", "--collection", "previews", "--wait"});
+    onlineJson({"get", "mug", "--collection", "previews", "--preview", "--out", path("small.ply")});
+    const auto scan = readScan(scans() + "/mug/mug_01.ply");
+    const auto small = readScan(path("small.ply"));
+    ASSERT_TRUE(scan && small);
+    EXPECT_GT(small->points.size(), 300u);
+    EXPECT_LT(small->points.size(), scan->points.size());
+    onlineJson({"get", "mug", "--collection", "previews", "--preview"}, kUsage);
+    onlineJson({"get", "none", "--collection", "previews", "--preview", "--out", path("n.ply")}, kWrongState);
+
+    const auto client = client::Client::connect({server()->address()});
+    ASSERT_TRUE(client);
+    const auto previews = client->getPreviews("previews", {"none", "mug"}, 50);
+    ASSERT_TRUE(previews) << previews.error().message;
+    ASSERT_EQ(previews->size(), 1u);
+    const client::Preview& preview = previews->front();
+    EXPECT_EQ(preview.key, "mug");
+    EXPECT_GT(preview.points.size(), 0u);
+    EXPECT_LE(preview.points.size(), 50u);
+    ASSERT_EQ(preview.normals.size(), preview.points.size());
+    for (const Point3& normal : preview.normals) EXPECT_NEAR(length(normal), 1.0, 0.02);
+    EXPECT_EQ(client->getPreviews("previews", {}).error().code, ErrorCode::kInvalidArgument);
 }
 
 TEST_F(OnlineBulk, NamesThatAreNotUtf8AreRefusedInPlainWords) {

@@ -28,7 +28,7 @@ _ELSEWHERE = 0.1  # centres further apart, in units of the common size, do not l
 def likeness(verdict: Optional[str], mirrored: Optional[bool]) -> str:
     """What two shapes are to each other: a verdict in words, and whether one is the mirror image of the other."""
     words = [] if verdict is None else [_VERDICTS.get(verdict, verdict)]
-    if mirrored and verdict != "unrelated":
+    if mirrored and verdict not in ("same_kind", "unrelated"):  # of different objects neither is the other's image
         words.append("mirrored")
     return ", ".join(words)
 
