@@ -63,8 +63,9 @@ export function fitsMirrored(fit: Fit | undefined): boolean | undefined {
 /** What the hit is to the query, of mirrored twins "same object, mirrored"; empty: not verified. */
 export function likeness(verdict: Verdict, fit: Fit | undefined, part = 'the query is a piece of it'): string {
   const name = verdictName(verdict, part);
-  // Unrelated shapes are nobody's mirror image.
-  return fitsMirrored(fit) && verdict !== Verdict.UNRELATED ? [name, 'mirrored'].filter(Boolean).join(', ') : name;
+  // Of different objects neither is the mirror image of the other.
+  const different = verdict === Verdict.SAME_KIND || verdict === Verdict.UNRELATED;
+  return fitsMirrored(fit) && !different ? [name, 'mirrored'].filter(Boolean).join(', ') : name;
 }
 
 function verdictName(verdict: Verdict, part: string): string {
