@@ -19,12 +19,20 @@ extern "C" void requestStop(int signal) {
     std::signal(signal, SIG_DFL);
 }
 
-sigset_t endSignals() {
+constexpr int kOfPeople[] = {SIGTERM, SIGINT, SIGHUP, SIGQUIT};  // SIGHUP: the terminal has gone
+constexpr int kOfTheSystem[] = {SIGPWR, SIGXCPU};
+constexpr int kWithoutUse[] = {SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGIO, SIGSTKFLT};
+
+sigset_t signalsOfPeople() {
     sigset_t signals;
     sigemptyset(&signals);
-    sigaddset(&signals, SIGTERM);
-    sigaddset(&signals, SIGINT);
-    sigaddset(&signals, SIGHUP);  // its terminal has gone
+    for (const int signal : kOfPeople) sigaddset(&signals, signal);
+    return signals;
+}
+
+sigset_t endSignals() {
+    sigset_t signals = signalsOfPeople();
+    for (const int signal : kOfTheSystem) sigaddset(&signals, signal);
     return signals;
 }
 
@@ -41,13 +49,16 @@ StopSignals::StopSignals() {
     const sigset_t signals = endSignals();
     pthread_sigmask(SIG_BLOCK, &signals, nullptr);
     std::signal(SIGPIPE, SIG_IGN);
+    for (const int signal : kWithoutUse) std::signal(signal, SIG_IGN);
+    for (int signal = SIGRTMIN; signal <= SIGRTMAX; ++signal) std::signal(signal, SIG_IGN);
 }
 
 int StopSignals::wait(int exitCode) const {
     const sigset_t signals = endSignals();
     int received = 0;
     sigwait(&signals, &received);
-    std::thread([signals, exitCode] {
+    // Not the system's, which repeats SIGXCPU every second.
+    std::thread([signals = signalsOfPeople(), exitCode] {
         int second = 0;
         sigwait(&signals, &second);
         ::_exit(exitCode);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// shapedbd: reads the configuration, serves until SIGTERM or SIGINT, shuts down cleanly.
+// shapedbd: reads the configuration, serves until a signal (common/stop_signals.h), shuts down cleanly.
 //
 // Prints one line to standard output, `listening on HOST:PORT`, and if it serves HTTP a second one;
 // everything else is logged. `shapedbd key` makes, lists and revokes API keys
