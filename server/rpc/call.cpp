@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <iterator>
 #include <optional>
 #include <string_view>
 #include <utility>
@@ -15,6 +16,7 @@
 #include "server/catalog/request_checks.h"
 #include "server/rpc/inside.h"
 #include "server/rpc/status.h"
+#include "server/rpc/trace_parent.h"
 #include "server/security/key.h"
 
 namespace shapedb::rpc {
@@ -77,27 +79,11 @@ std::string keyPresented(const grpc::ServerContext& context) {
     return std::string(bearer ? value.substr(kScheme.size()) : value);
 }
 
-/// The trace id in W3C's `traceparent` (version-trace-parent-flags, in hexadecimal digits), so that the log
-/// line of a call can be found from the client's; empty if there is none that is valid.
+/// So that the log line of a call can be found from the client's. Of several headers none counts.
 std::optional<std::string> traceOf(const grpc::ServerContext& context) {
-    constexpr std::size_t kTraceAt = 3, kTraceDigits = 32, kParentAt = 36, kParentDigits = 16, kBytes = 55;
-    const auto found = context.client_metadata().find("traceparent");
-    if (found == context.client_metadata().end()) return std::nullopt;
-    const std::string_view value(found->second.data(), found->second.size());
-    // Later versions may append to it.
-    if (value.size() < kBytes || (value.size() > kBytes && value[kBytes] != '-')) return std::nullopt;
-    for (std::size_t i = 0; i < kBytes; ++i) {
-        const bool dash = i == 2 || i == kParentAt - 1 || i == kParentAt + kParentDigits;
-        const bool digit = std::string_view("0123456789abcdef").find(value[i]) != std::string_view::npos;
-        if (dash ? value[i] != '-' : !digit) return std::nullopt;
-    }
-    const std::string_view trace = value.substr(kTraceAt, kTraceDigits);
-    const std::string_view parent = value.substr(kParentAt, kParentDigits);
-    const auto allZero = [](std::string_view text) {
-        return text.find_first_not_of('0') == std::string_view::npos;
-    };
-    if (value.substr(0, 2) == "ff" || allZero(trace) || allZero(parent)) return std::nullopt;
-    return std::string(trace);
+    const auto [first, last] = context.client_metadata().equal_range("traceparent");
+    if (first == last || std::next(first) != last) return std::nullopt;
+    return traceIdOf({first->second.data(), first->second.size()});
 }
 
 std::string metadatum(const grpc::ServerContext& context, const char* key) {

@@ -197,7 +197,7 @@ class Traces(unittest.TestCase):
     def test_are_written_to_the_log_line_of_the_call(self):
         good = f"00-{self.TRACE}-00f067aa0ba902b7-01"
         bad = [good.upper(), good[:-1], "ff" + good[2:], good.replace(self.TRACE, "0" * 32), good + "x",
-               good.replace("00f067aa0ba902b7", "0" * 16), "nonsense"]
+               good.replace("00f067aa0ba902b7", "0" * 16), "nonsense", good + "-x", good + "-"]
         with Server("--log-format", "json") as server, server.connect() as client:
             from attacker import shapes
             client.shapes.CountShapes(shapes.CountShapesRequest(), timeout=10, metadata=(("traceparent", good),))
