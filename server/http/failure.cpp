@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "common/api_key_text.h"
 #include "server/rpc/status.h"
 #include "shapedb/v1/types.pb.h"
 
@@ -29,7 +30,7 @@ std::string base64(const std::string& bytes) {
 std::string dump(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
 Json jsonOf(const Failure& failure) {
-    Json json = {{"code", codeName(failure.code)}, {"message", failure.message}};
+    Json json = {{"code", codeName(failure.code)}, {"message", maskSecrets(failure.message)}};
     if (failure.name.empty()) return json;
     v1::ErrorDetail detail;
     detail.set_name(failure.name);

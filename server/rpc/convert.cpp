@@ -24,10 +24,9 @@ void toProto(store::TimestampMs time, google::protobuf::Timestamp* out) {
 }
 
 store::TimestampMs fromProto(const google::protobuf::Timestamp& time) {
-    // The range of Timestamp: years 1 to 9999.
-    constexpr std::int64_t kFirst = -62'135'596'800;
-    constexpr std::int64_t kLast = 253'402'300'799;
-    return std::clamp(time.seconds(), kFirst, kLast) * 1'000 +
+    // Further than any rule allows, and small enough to count in milliseconds.
+    constexpr std::int64_t kFar = std::int64_t{1} << 50;
+    return std::clamp(time.seconds(), -kFar, kFar) * 1'000 +
            std::clamp(time.nanos(), 0, 999'999'999) / 1'000'000;
 }
 

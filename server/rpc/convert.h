@@ -31,7 +31,7 @@ void toProto(const store::Shape& shape, const std::string& collection, std::opti
 void toProto(const Error& failure, pb::Failure* out);
 void toProto(const store::Collection& collection, const ShapeParameters& parameters, pb::Collection* out);
 void toProto(store::TimestampMs time, google::protobuf::Timestamp* out);
-/// Rounds towards the past. What is out of range becomes the nearest time that is in it.
+/// Rounds towards the past. What is beyond 2^50 seconds becomes that; whether it is allowed is for others.
 [[nodiscard]] store::TimestampMs fromProto(const google::protobuf::Timestamp& time);
 
 /// Empty for UNSPECIFIED. Errors: kInvalidArgument (a number without a name).

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "server/rpc/status.h"
 
+#include "common/api_key_text.h"
 #include "common/safe_text.h"
 #include "server/rpc/message_limits.h"
 
@@ -50,11 +51,21 @@ grpc::StatusCode statusCodeOf(ErrorCode code) noexcept {
     return grpc::StatusCode::INTERNAL;
 }
 
+const char* nameOfCutOff(grpc::StatusCode code) noexcept {
+    switch (code) {
+        case grpc::StatusCode::DEADLINE_EXCEEDED: return errorCodeName(ErrorCode::kDeadlineExceeded);
+        case grpc::StatusCode::UNAVAILABLE: return errorCodeName(ErrorCode::kUnavailable);
+        case grpc::StatusCode::UNAUTHENTICATED: return errorCodeName(ErrorCode::kUnauthenticated);
+        case grpc::StatusCode::PERMISSION_DENIED: return errorCodeName(ErrorCode::kPermissionDenied);
+        default: return errorCodeName(ErrorCode::kCancelled);
+    }
+}
+
 grpc::Status makeStatus(const Error& error, grpc::ServerContext& context,
                         std::optional<std::chrono::milliseconds> retryAfter) {
     context.AddTrailingMetadata(kErrorNameKey, errorCodeName(error.code));
     if (retryAfter) context.AddTrailingMetadata(kRetryKey, std::to_string(retryAfter->count()));
-    return {statusCodeOf(error.code), cutText(error.message, kMaxErrorMessageBytes)};
+    return {statusCodeOf(error.code), cutText(maskSecrets(error.message), kMaxErrorMessageBytes)};
 }
 
 }  // namespace shapedb::rpc

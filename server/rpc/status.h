@@ -21,8 +21,11 @@ constexpr const char* kRetryKey = "grpc-retry-pushback-ms";
 /// The mapping of errors to gRPC codes (a table in docs/api.md).
 [[nodiscard]] grpc::StatusCode statusCodeOf(ErrorCode code) noexcept;
 
-/// The status of a failed call; adds the trailing metadata and cuts the message to
-/// kMaxErrorMessageBytes.
+/// The name of the error of a call that was cut off, of which gRPC sends nothing but code and message.
+[[nodiscard]] const char* nameOfCutOff(grpc::StatusCode code) noexcept;
+
+/// The status of a failed call; adds the trailing metadata, masks secrets in the message and cuts
+/// it to kMaxErrorMessageBytes.
 [[nodiscard]] grpc::Status makeStatus(const Error& error, grpc::ServerContext& context,
                                       std::optional<std::chrono::milliseconds> retryAfter = std::nullopt);
 

@@ -7,6 +7,7 @@
 #include <openssl/crypto.h>
 #include <openssl/rand.h>
 
+#include "common/api_key_text.h"
 #include "common/safe_text.h"
 #include "core/base/return_if_error.h"
 #include "server/store/key_rules.h"
@@ -14,9 +15,8 @@
 namespace shapedb::security {
 namespace {
 
-constexpr const char* kPrefix = "shapedb_";
-constexpr std::size_t kIdBytes = 8;
-constexpr std::size_t kSecretBytes = 32;
+constexpr std::size_t kIdBytes = kApiKeyIdDigits / 2;
+constexpr std::size_t kSecretBytes = kApiKeySecretDigits / 2;
 
 Result<std::string> randomHex(std::size_t bytes) {
     std::array<unsigned char, kSecretBytes> random{};
@@ -69,10 +69,14 @@ Result<void> validate(const KeySpec& spec, UnixMs now) {
     if (spec.expires && *spec.expires <= now) {
         return fail(ErrorCode::kInvalidArgument, "the key would have expired before it exists");
     }
+    if (spec.expires && *spec.expires > store::kLastMoment) {
+        return fail(ErrorCode::kInvalidArgument,
+                    "the key would expire after the year 9999: leave the expiry out for one that never does");
+    }
     return {};
 }
 
-std::string ApiKey::text() const { return kPrefix + id + "_" + secret; }
+std::string ApiKey::text() const { return std::string(kApiKeyPrefix) + id + "_" + secret; }
 
 Result<std::string> makeSecret() { return randomHex(kSecretBytes); }
 
@@ -85,13 +89,12 @@ Result<ApiKey> makeApiKey() {
 }
 
 std::optional<ApiKey> parseApiKey(const std::string& text) {
-    const std::string prefix = kPrefix;
-    const std::size_t underscore = prefix.size() + 2 * kIdBytes;
-    if (text.size() != underscore + 1 + 2 * kSecretBytes || text.compare(0, prefix.size(), prefix) != 0 ||
-        text[underscore] != '_') {
+    const std::size_t underscore = kApiKeyPrefix.size() + kApiKeyIdDigits;
+    if (text.size() != underscore + 1 + kApiKeySecretDigits ||
+        text.compare(0, kApiKeyPrefix.size(), kApiKeyPrefix) != 0 || text[underscore] != '_') {
         return std::nullopt;
     }
-    ApiKey key{text.substr(prefix.size(), 2 * kIdBytes), text.substr(underscore + 1)};
+    ApiKey key{text.substr(kApiKeyPrefix.size(), kApiKeyIdDigits), text.substr(underscore + 1)};
     if (!isHex(key.id) || !isHex(key.secret)) return std::nullopt;
     return key;
 }

@@ -61,7 +61,7 @@ struct KeyUsage {
 [[nodiscard]] Result<Role> roleFromName(const std::string& name);
 
 /// Errors: kInvalidArgument (the name is not 1 to kMaxNameBytes of safe UTF-8; more than kMaxCollections, or
-/// one with a name that no collection can have; an expiry that is not after `now`).
+/// one with a name that no collection can have; an expiry that is not after `now`, or after the year 9999).
 [[nodiscard]] Result<void> validate(const KeySpec& spec, UnixMs now);
 
 /// The whole key, as a client sends it: "shapedb_ID_SECRET", both in hexadecimal digits.

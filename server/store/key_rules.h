@@ -4,10 +4,14 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 
 namespace shapedb::store {
+
+/// The last millisecond of the year 9999, beyond which clients know no time. Since 1970.
+constexpr std::int64_t kLastMoment = 253'402'300'799'999;
 
 constexpr std::size_t kMaxKeyBytes = 512;
 constexpr std::size_t kMaxCollectionNameBytes = 128;

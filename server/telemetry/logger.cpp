@@ -15,6 +15,7 @@
 #include <spdlog/sinks/stdout_sinks.h>
 #include <sys/stat.h>
 
+#include "common/api_key_text.h"
 #include "common/safe_text.h"
 
 namespace shapedb::telemetry {
@@ -25,10 +26,10 @@ using Value = decltype(Field::value);
 /// Longer than any reason of ours.
 constexpr std::size_t kMaxFieldBytes = 2'048;
 
-/// A JSON string literal; invalid UTF-8 becomes U+FFFD.
+/// A JSON string literal without secrets; invalid UTF-8 becomes U+FFFD.
 std::string jsonString(const std::string& text) {
-    // A stranger must not fill the disk with one call.
-    const std::string cut = cutText(text, kMaxFieldBytes);
+    // A stranger must not fill the disk with one call. What is left of a secret that is cut is masked too.
+    const std::string cut = maskSecrets(cutText(text, kMaxFieldBytes));
     // What JSON need not escape may still write on the terminal of whoever reads the log.
     return escapeUnsafe(nlohmann::json(cut).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
 }
@@ -53,7 +54,7 @@ std::string show(const Value& value, bool json) {
         [json](const auto& v) -> std::string {
             using T = std::decay_t<decltype(v)>;
             if constexpr (std::is_same_v<T, std::string>) {
-                return !json && v.size() <= kMaxFieldBytes && plainWord(v) ? v : jsonString(v);
+                return !json && v.size() <= kMaxFieldBytes && plainWord(v) ? maskSecrets(v) : jsonString(v);
             } else if constexpr (std::is_same_v<T, bool>) {
                 return v ? "true" : "false";
             } else if constexpr (std::is_same_v<T, double>) {

@@ -24,8 +24,9 @@ struct Field {
 };
 
 /// Writes whole lines, never interleaved; texts are cut at 2 KiB. Values may hold any bytes: control
-/// characters, quotes and invalid UTF-8 are escaped, so that no client can forge a line. Thread-safe. There
-/// is no global logger.
+/// characters, quotes and invalid UTF-8 are escaped, so that no client can forge a line, and secrets of API
+/// keys are masked (common/api_key_text.h), wherever a client put them. Thread-safe. There is no global
+/// logger.
 class Logger {
   public:
     virtual ~Logger() = default;

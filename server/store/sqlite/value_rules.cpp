@@ -14,8 +14,6 @@ namespace shapedb::store {
 
 namespace {
 
-/// The last millisecond of the year 9999, beyond which clients know no time.
-constexpr std::int64_t kLastMoment = 253'402'300'799'999;
 /// Stands for ValueRules::mostCounted.
 constexpr std::int64_t kCounted = -1;
 /// Messages of failures name keys and parameters, and have their length.

@@ -65,6 +65,9 @@ TEST(KeySpecs, AreChecked) {
     EXPECT_TRUE(refuses([](KeySpec& s) { s.collections = {"no spaces"}; }));
     EXPECT_TRUE(refuses([](KeySpec& s) { s.collections.assign(1'001, "x"); }));
     EXPECT_TRUE(refuses([](KeySpec& s) { s.expires = 1'999; }));
+    EXPECT_FALSE(refuses([](KeySpec& s) { s.expires = 253'402'300'799'999; })) << "the end of the year 9999";
+    EXPECT_TRUE(refuses([](KeySpec& s) { s.expires = 253'402'300'800'000; }));
+    EXPECT_TRUE(refuses([](KeySpec& s) { s.expires = std::numeric_limits<UnixMs>::max(); }));
 }
 
 TEST(Roles, HaveNames) {
