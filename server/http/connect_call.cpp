@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "common/cut_off.h"
 #include "core/base/return_if_error.h"
 #include "server/rpc/message_limits.h"
 
@@ -217,13 +218,7 @@ void ConnectCall::abandon() {
     leave();
 }
 
-void ConnectCall::cutOff(const std::string& why) {
-    Failure failure;
-    failure.code = Code::kCanceled;
-    failure.message = why;
-    failure.name = errorCodeName(ErrorCode::kCancelled);
-    fail(failure);
-}
+void ConnectCall::cutOff(const Error& why) { fail(refuse(why.code, kCutOffPrefix + why.message).value()); }
 
 void ConnectCall::leave() {
     if (inner_) inner_->cancel();

@@ -64,8 +64,8 @@ class ConnectCall : public std::enable_shared_from_this<ConnectCall> {
     void sent();
     /// The client has gone: cancels the call, and touches the client no more.
     void abandon();
-    /// The client is cut off: tells it why, and cancels the call.
-    void cutOff(const std::string& why);
+    /// The client is cut off: tells it why, as gRPC clients are told, and cancels the call.
+    void cutOff(const Error& why);
 
   private:
     struct Message {

@@ -123,7 +123,8 @@ void Connection::processBody() {
     while (state_ == State::kBody && !parser_.done() && call->wantsBody()) {
         const RequestParser::Step step = parser_.step();
         if (step == RequestParser::Step::kTooLittle) return;
-        if (step == RequestParser::Step::kBad) return call->cutOff(parser_.problem().message);
+        if (step == RequestParser::Step::kBad)
+            return call->cutOff({ErrorCode::kMalformedStream, parser_.problem().message});
     }
     if (state_ != State::kBody || !parser_.done()) return;
     state_ = State::kAnswer;
@@ -312,7 +313,9 @@ void Connection::look(Clock::time_point now) {
     if (writing_ && writePace_.pace(services_.pace, now) != net::Pace::kGood) return closeNow();
     if (state_ != State::kBody || !call_->waitsForBodyAlone()) return;
     const net::Pace pace = readPace_.pace(services_.pace, now);
-    if (pace != net::Pace::kGood) call_->cutOff(net::reasonOf(pace, services_.pace));
+    if (pace != net::Pace::kGood) {
+        call_->cutOff({ErrorCode::kDeadlineExceeded, net::reasonOf(pace, services_.pace)});
+    }
 }
 
 }  // namespace shapedb::http

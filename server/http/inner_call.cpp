@@ -7,6 +7,7 @@
 #include <grpcpp/channel.h>
 #include <grpcpp/support/slice.h>
 
+#include "common/cut_off.h"
 #include "server/rpc/status.h"
 
 namespace shapedb::http {
@@ -53,7 +54,11 @@ Ending endingOf(const grpc::Status& status, const grpc::ClientContext& context) 
     ending.failure.code = codeOfNumber(status.error_code());
     ending.failure.message = status.error_message();
     const auto name = ending.trailers.find(rpc::kErrorNameKey);
-    if (name != ending.trailers.end()) ending.failure.name = name->second;
+    if (name != ending.trailers.end()) {
+        ending.failure.name = name->second;
+    } else if (ending.failure.message.rfind(kCutOffPrefix, 0) == 0) {
+        ending.failure.name = rpc::nameOfCutOff(status.error_code());
+    }
     ending.failure.retryAfter = retryAfter(ending.trailers);
     return ending;
 }
