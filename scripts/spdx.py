@@ -30,7 +30,7 @@ APACHE = "Apache-2.0"
 APACHE_PATHS = [
     "proto/*", "client/api/*", "client/backup/*", "client/io/*", "client/examples/*", "client/python/*", "web/*", "common/*",
     "core/base/*", "core/profile.h", "core/fit/verdict_kinds.h", "core/segmentation/interior_kinds.h",
-    "core/geometry/box.h", "core/geometry/mesh.*", "core/geometry/motion.*", "core/geometry/point.h",
+    "core/geometry/box.h", "core/geometry/main_part.*", "core/geometry/mesh.*", "core/geometry/motion.*", "core/geometry/point.h",
     "core/geometry/resolution.*", "tests/client/installed/*", "tests/integration/protocols/*", "tests/python/*", "tests/web/*",
 ]
 # Of these folders, what knows core/ as a whole.

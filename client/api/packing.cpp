@@ -9,6 +9,7 @@
 #include "common/sha256.h"
 #include "core/base/return_if_error.h"
 #include "core/geometry/box.h"
+#include "core/geometry/main_part.h"
 #include "core/geometry/resolution.h"
 
 namespace shapedb::client {
@@ -40,6 +41,14 @@ Result<Box> checkedBox(const PointCloud& points) {
         box.add(p);
     }
     return box;
+}
+
+/// What to subtract from the points. A few strays, as at 0, 0, 0, do not count.
+Point3 originFor(const PointCloud& points) {
+    MainPart part = mainPartOf(points);
+    if (part.isPoint()) part = {boxOf(points), points.size(), 0};
+    const bool near = !isFarFromOrigin(part.box) && !coarseInSinglePrecision(part);
+    return near ? Point3{} : part.box.low + 0.5 * part.box.extent();
 }
 
 void putFloat(char* to, double value) {
@@ -83,8 +92,16 @@ Result<PackedPoints> packPoints(const PointCloud& points) {
 
     PackedPoints packed;
     packed.count = points.size();
-    if (isFarFromOrigin(*box) || coarseInSinglePrecision(*box, points.size())) {
-        packed.origin = box->low + 0.5 * extent;
+    packed.origin = originFor(points);
+    const Point3 reach{std::max(box->high.x - packed.origin.x, packed.origin.x - box->low.x),
+                       std::max(box->high.y - packed.origin.y, packed.origin.y - box->low.y),
+                       std::max(box->high.z - packed.origin.z, packed.origin.z - box->low.z)};
+    if (const double most = std::max({reach.x, reach.y, reach.z}); most > kLargest) {
+        char buffer[160];
+        std::snprintf(buffer, sizeof buffer,
+                      "a point lies %g away from most others, beyond single precision (3.4e38); drop it",
+                      most);
+        return fail(ErrorCode::kCoordinateOutOfRange, buffer);
     }
     packed.bytes.resize(points.size() * kPointBytes);
     char* to = packed.bytes.data();

@@ -12,6 +12,7 @@
 #include "client/io/output_file.h"
 #include "core/base/return_if_error.h"
 #include "core/geometry/box.h"
+#include "core/geometry/main_part.h"
 #include "core/geometry/resolution.h"
 
 namespace shapedb {
@@ -150,7 +151,7 @@ Result<void> writeLabelledPly(const std::string& path, const PointCloud& points,
                                                      " labels for " + std::to_string(points.size()) +
                                                      " points; one each is needed");
     }
-    const bool far = !points.empty() && isFarFromOrigin(boxOf(points));
+    const bool far = !points.empty() && isFarFromOrigin(mainPartOf(points).box);
     return writePlyGuarded(path, points, &labels, far ? PlyPrecision::kDouble : PlyPrecision::kSingle);
 }
 

@@ -7,6 +7,8 @@
 #include <cstdio>
 #include <limits>
 
+#include "core/base/count_text.h"
+
 namespace shapedb {
 
 namespace {
@@ -74,7 +76,8 @@ std::string CoarseCoordinates::text(const char* precision) const {
     std::snprintf(buffer, sizeof buffer,
                   "coordinates up to %.6g are %.3g apart in %s, but the scan is only %.3g across", largest,
                   step, precision, across);
-    return buffer;
+    if (strays == 0) return buffer;
+    return buffer + std::string(", without ") + countText(strays, "point") + " far from the others";
 }
 
 bool isFarFromOrigin(const Box& box) {
@@ -98,6 +101,20 @@ std::optional<CoarseCoordinates> coarseInSinglePrecision(const Box& box, std::ui
     return std::nullopt;
 }
 
+std::optional<CoarseCoordinates> coarseInSinglePrecision(const MainPart& part) {
+    auto found = coarseInSinglePrecision(part.box, part.points);
+    if (found) found->strays = part.strays;
+    return found;
+}
+
+bool maybeFlattened(const MainPart& part) {
+    const auto axes = axesOf(part.box);
+    const double hidden = kFlatShare * sizeOf(axes);
+    return std::any_of(axes.begin(), axes.end(), [&](const Axis& axis) {
+        return axis.largest > 0.0 && stepAt<float>(axis.largest) > hidden;
+    });
+}
+
 std::optional<CoarseCoordinates> coarseInDoublePrecision(const Box& box, const Point3& origin) {
     auto axes = axesOf({box.low + origin, box.high + origin});
     // The sums may all be the same number.
@@ -108,13 +125,11 @@ std::optional<CoarseCoordinates> coarseInDoublePrecision(const Box& box, const P
 
 Result<void> checkNotRounded(const PointCloud& points) {
     if (points.empty()) return {};
-    Box box;
     for (const Point3& p : points) {
         if (!isFinite(p) || std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) > kLargestSingle)
             return {};
-        box.add(p);
     }
-    const auto found = coarseInSinglePrecision(box, points.size());
+    const auto found = coarseInSinglePrecision(mainPartOf(points));
     if (!found) return {};
     // Almost always the first point says that they were not.
     const bool rounded = std::all_of(points.begin(), points.end(), [](const Point3& p) {

@@ -9,6 +9,7 @@
 
 #include "core/base/error.h"
 #include "core/geometry/box.h"
+#include "core/geometry/main_part.h"
 #include "core/geometry/point.h"
 
 namespace shapedb {
@@ -28,11 +29,13 @@ constexpr double kFarFromOrigin = 16.0;
 
 /// A scan whose coordinates are too far apart. Scan units.
 struct CoarseCoordinates {
-    double largest = 0.0;  ///< coordinate, by magnitude
-    double step = 0.0;     ///< from there to the next number
-    double across = 0.0;   ///< size of the scan, or its extent along the axis that is concerned
+    double largest = 0.0;      ///< coordinate, by magnitude
+    double step = 0.0;         ///< from there to the next number
+    double across = 0.0;       ///< size of the scan, or its extent along the axis that is concerned
+    std::uint64_t strays = 0;  ///< points that do not count as the scan
 
-    /// "coordinates up to 4.4e+06 are 0.5 apart in single precision, but the scan is only 2.5 across".
+    /// "coordinates up to 4.4e+06 are 0.5 apart in single precision, but the scan is only 2.5 across",
+    /// with strays "..., without 3 points far from the others".
     [[nodiscard]] std::string text(const char* precision = "single precision") const;
 };
 
@@ -45,6 +48,14 @@ struct CoarseCoordinates {
 /// Nothing if it can, and for points that are all equal. `box`: of at least one point, finite, within single
 /// precision.
 [[nodiscard]] std::optional<CoarseCoordinates> coarseInSinglePrecision(const Box& box, std::uint64_t points);
+
+/// The same of the main part of a scan: strays do not widen it. Nothing of a part that is one
+/// point.
+[[nodiscard]] std::optional<CoarseCoordinates> coarseInSinglePrecision(const MainPart& part);
+
+/// Whether a scan that seems flat, or a single point, may only be so because single precision rounded it
+/// there: its step is more than a millionth of the size.
+[[nodiscard]] bool maybeFlattened(const MainPart& part);
 
 /// Why double precision cannot hold the sums of `origin` and the points in `box`: fewer than
 /// kLeastDoubleSteps across.

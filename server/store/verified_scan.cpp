@@ -8,6 +8,7 @@
 #include <new>
 #include <string>
 
+#include "core/base/count_text.h"
 #include "core/base/return_if_error.h"
 #include "core/geometry/resolution.h"
 #include "core/preparation/frame.h"
@@ -23,6 +24,13 @@ namespace {
 
 /// Enough that a sample of a real scan spans space.
 constexpr std::size_t kSamplePoints = 256;
+/// Points of a shape.
+constexpr std::size_t kFewest = 4;
+
+constexpr char kSendRelative[] =
+    "send points relative to an origin near them, which the field origin of the header names (their "
+    "differences "
+    "from it, in double precision)";
 
 Point3 pointAt(const std::vector<float>& xyz, std::size_t i) {
     return {xyz[3 * i], xyz[3 * i + 1], xyz[3 * i + 2]};
@@ -35,6 +43,24 @@ PointCloud toCloud(const std::vector<float>& xyz) {
     points.reserve(xyz.size() / 3);
     for (std::size_t i = 0; i < xyz.size() / 3; ++i) points.push_back(pointAt(xyz, i));
     return points;
+}
+
+Result<void> checkPlacement(const Box& box, const Point3& origin) {
+    if (origin == Point3{}) return {};
+    const Box placed{box.low + origin, box.high + origin};
+    for (const double value :
+         {placed.low.x, placed.low.y, placed.low.z, placed.high.x, placed.high.y, placed.high.z}) {
+        if (std::abs(value) <= kMaxCoordinate) continue;
+        char text[128];
+        std::snprintf(text, sizeof text,
+                      "origin: with the points it gives coordinates up to %.3g, beyond 3.4e38", value);
+        return fail(ErrorCode::kCoordinateOutOfRange, text);
+    }
+    if (const auto coarse = coarseInDoublePrecision(box, origin)) {
+        return fail(ErrorCode::kCoordinateOutOfRange, "origin: " + coarse->text("double precision") +
+                                                          ": use coordinates that begin nearer to the scan");
+    }
+    return {};
 }
 
 Result<VerifiedScan> VerifiedScan::verify(std::vector<float> xyz, const Point3& origin) {
@@ -85,30 +111,24 @@ Box ScanVerifier::box() const {
     return box;
 }
 
+MainPart ScanVerifier::mainPart() const {
+    return mainPartOf(xyz_.size() / 3, [&](std::size_t i) { return pointAt(xyz_, i); });
+}
+
 // A shape far from the origin loses its details in single precision.
 Result<void> ScanVerifier::checkResolution() const {
-    const Box box = this->box();
-    if (const auto coarse = coarseInSinglePrecision(box, xyz_.size() / 3)) {
+    const MainPart part = mainPart();
+    if (const auto coarse = coarseInSinglePrecision(part)) {
+        return fail(ErrorCode::kCoordinateOutOfRange, coarse->text() + ": " + kSendRelative);
+    }
+    if (part.isPoint() && part.strays > 0 && maybeFlattened(part)) {
         return fail(ErrorCode::kCoordinateOutOfRange,
-                    coarse->text() +
-                        ": send points relative to an origin near them, which the field origin of the "
-                        "header names (their differences from it, in double precision)");
+                    "in single precision all points but " + std::to_string(part.strays) +
+                        " are the same one: if they differed before, " + kSendRelative);
     }
-    if (origin_ == Point3{}) return {};
-    const Box placed{box.low + origin_, box.high + origin_};
-    for (const double value :
-         {placed.low.x, placed.low.y, placed.low.z, placed.high.x, placed.high.y, placed.high.z}) {
-        if (std::abs(value) <= kMaxCoordinate) continue;
-        char text[128];
-        std::snprintf(text, sizeof text,
-                      "origin: with the points it gives coordinates up to %.3g, beyond 3.4e38", value);
-        return fail(ErrorCode::kCoordinateOutOfRange, text);
-    }
-    if (const auto coarse = coarseInDoublePrecision(box, origin_)) {
-        return fail(ErrorCode::kCoordinateOutOfRange, "origin: " + coarse->text("double precision") +
-                                                          ": use coordinates that begin nearer to the scan");
-    }
-    return {};
+    if (!part.isPoint()) RETURN_IF_ERROR(checkPlacement(part.box, origin_));
+    // Of all points, which is the rule for those that are stored.
+    return checkPlacement(box(), origin_);
 }
 
 /// Looks at a sample first: adding points cannot flatten a sample that spans space, and the
@@ -124,8 +144,27 @@ Result<void> ScanVerifier::checkUsable() const {
         for (std::size_t i = 0; i < count; i += step) sample.push_back(pointAt(xyz_, i));
         if (sanitise(sample)) return {};
     }
-    RETURN_IF_ERROR(sanitise(toCloud(xyz_)));
+    const auto sanitised = sanitise(toCloud(xyz_));
+    if (!sanitised) return fail(withRemedy(sanitised.error()));
     return {};
+}
+
+/// Of points that seem to be no shape: what else can be the reason, and what then helps.
+Error ScanVerifier::withRemedy(Error error) const {
+    const bool flat = error.code == ErrorCode::kAllPointsEqual || error.code == ErrorCode::kTooFewPoints ||
+                      error.code == ErrorCode::kCollinear || error.code == ErrorCode::kCoplanar;
+    if (!flat || xyz_.size() < 3 * kFewest) return error;
+    const MainPart part = mainPart();
+    if (part.strays > 0 && box().diagonal() * kFlatnessTolerance > part.box.diagonal()) {
+        error.message +=
+            ". All but " + countText(part.strays, "point") +
+            " are so near to each other that they count as one there: drop those that lie far away";
+    } else if (maybeFlattened(part)) {
+        error.message +=
+            std::string(". If the points were other ones before they were written in single precision, ") +
+            kSendRelative;
+    }
+    return error;
 }
 
 Result<VerifiedScan> ScanVerifier::finish(const Checksum* expected) {

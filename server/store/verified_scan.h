@@ -11,6 +11,7 @@
 #include "common/sha256.h"
 #include "core/base/error.h"
 #include "core/geometry/box.h"
+#include "core/geometry/main_part.h"
 #include "core/geometry/point.h"
 
 namespace shapedb::store {
@@ -48,6 +49,10 @@ class VerifiedScan {
     Point3 origin_;
 };
 
+/// Whether points in `box` may be relative to `origin`; both finite. Errors: kCoordinateOutOfRange (they are
+/// beyond kMaxCoordinate with it, or double precision cannot hold the sums, as coarseInDoublePrecision).
+[[nodiscard]] Result<void> checkPlacement(const Box& box, const Point3& origin);
+
 /// Checks a scan piece by piece while it arrives. Not thread-safe. After an error only destruction.
 class ScanVerifier {
   public:
@@ -66,7 +71,7 @@ class ScanVerifier {
 
     /// `expected` is the checksum the sender announced; null: none. Errors: kChecksumMismatch;
     /// kCoordinateOutOfRange (the points are so far from 0, 0, 0 that single precision cannot hold them, as
-    /// coarseInSinglePrecision; the origin is so far that double precision cannot, as
+    /// coarseInSinglePrecision of the main part; the origin is so far that double precision cannot, as
     /// coarseInDoublePrecision, or beyond kMaxCoordinate with them); those of `sanitise`: the points could
     /// never be segmented. What only the segmentation can see (no interior) is found later.
     [[nodiscard]] Result<VerifiedScan> finish(const Checksum* expected = nullptr);
@@ -76,7 +81,9 @@ class ScanVerifier {
     Result<void> take(std::size_t first);
     Result<void> checkUsable() const;
     [[nodiscard]] Box box() const;
+    [[nodiscard]] MainPart mainPart() const;
     Result<void> checkResolution() const;
+    [[nodiscard]] Error withRemedy(Error error) const;
 
     std::vector<float> xyz_;
     std::uint64_t expected_ = 0;  ///< points; 0: not known

@@ -137,6 +137,32 @@ TEST(Packing, PointsThatWereRoundedBeforeAreRefused) {
     EXPECT_EQ(refused.error().code, ErrorCode::kCoordinateOutOfRange);
 }
 
+TEST(Packing, StraysDoNotChooseTheOrigin) {
+    const Point3 far{4.5e6, -5.4e6, 300.0};
+    for (const double size : {0.1, 2.0, 100.0, 5'000.0}) {
+        for (const PointCloud& strays :
+             std::vector<PointCloud>{{{}}, {{}, {}, {1e7, 1e7, 1e7}}, {{-1e30, 0.0, 0.0}}}) {
+            PointCloud points = cloud(size, far);
+            const PointCloud scan = points;
+            points.insert(points.begin(), strays.begin(), strays.end());
+            const auto packed = packPoints(points);
+            ASSERT_TRUE(packed) << packed.error().message;
+            EXPECT_LT(distance(packed->origin, far), size);
+            const PointCloud back = unpacked(*packed);
+            for (std::size_t i = 0; i < scan.size(); ++i) {
+                EXPECT_LT(distance(back[i + strays.size()], scan[i]), 1e-6 * size);
+            }
+        }
+    }
+    PointCloud near = cloud(2.0, {});
+    near.push_back({1e9, 0.0, 0.0});
+    EXPECT_EQ(packPoints(near)->origin, Point3{});
+    // What would be infinite once the origin is subtracted.
+    PointCloud apart = cloud(1e30, {3e38, 0.0, 0.0});
+    apart.push_back({-3e38, 0.0, 0.0});
+    EXPECT_EQ(packPoints(apart).error().code, ErrorCode::kCoordinateOutOfRange);
+}
+
 TEST(Packing, AThinStripIsSentRelativeToItself) {
     // 5 diagonals away, so not far, but its width has few steps there.
     PointCloud strip = cloud(1.0, {});

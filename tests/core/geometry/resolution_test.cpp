@@ -108,6 +108,35 @@ TEST(Resolution, RoundedPointsAreToldFromOthers) {
     EXPECT_TRUE(checkNotRounded(mixed));
 }
 
+TEST(Resolution, StraysDoNotWidenAScan) {
+    const PointCloud lost = rounded(cloud({2.0, 2.0, 2.0}, {4.4e6, -5.2e6, 120.0}));
+    for (const PointCloud& strays :
+         std::vector<PointCloud>{{{}}, {{}, {}, {1e9, 5.0, 0.0}}, {{3e38, 0.0, 0.0}}}) {
+        PointCloud points = lost;
+        points.insert(points.begin() + 7, strays.begin(), strays.end());
+        points = rounded(points);
+        const auto found = coarseInSinglePrecision(mainPartOf(points));
+        ASSERT_TRUE(found);
+        EXPECT_EQ(found->strays, strays.size());
+        EXPECT_LT(found->across, 4.0);
+        EXPECT_FALSE(checkNotRounded(points));
+    }
+    PointCloud one = lost;
+    one.push_back({});
+    const std::string text = coarseInSinglePrecision(mainPartOf(one))->text();
+    EXPECT_NE(text.find("across, without 1 point far from the others"), std::string::npos) << text;
+}
+
+TEST(Resolution, TellsWhatMayHaveBeenFlattened) {
+    const auto maybe = [](const Point3& low, const Point3& high) {
+        return maybeFlattened({{low, high}, 9, 0});
+    };
+    EXPECT_TRUE(maybe({4.4e6, 1.0, 2.0}, {4.4e6, 1.0, 2.0})) << "one point";
+    EXPECT_FALSE(maybe({}, {})) << "where numbers are as fine as they can be";
+    EXPECT_TRUE(maybe({4.4e6, 0.0, 0.0}, {4.4e6, 900.0, 900.0})) << "a plane";
+    EXPECT_FALSE(maybe({5.0, 0.0, 0.0}, {5.0, 2.0, 2.0}));
+}
+
 TEST(Resolution, PointsOnACoarserGridLostNothing) {
     PointCloud voxels;
     for (int i = 0; i < 1000; ++i) {

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // How finely single precision holds the coordinates of a scan, as core/geometry/resolution.h tells.
 import type { Point } from '../cloud/cloud';
-import { FileFault } from './fault';
+import { countText, FileFault } from './fault';
+import { type Axis, axesOf, extentOf, isPoint, mainPartOf, sizeOf } from './main_part';
 
 const kLargestSingle = 3.4028234663852886e38;
 /** 2^24 times the smallest normal number: below this diagonal detail is lost to subnormals. */
@@ -12,25 +13,7 @@ const kFarFromOrigin = 16;
 const kFlatShare = 1e-6;
 const kLeastOddShare = 0.125;
 
-interface Axis {
-  low: number;
-  high: number;
-}
-
-function axesOf(vertices: Float64Array): Axis[] {
-  const axes = [0, 1, 2].map(() => ({ low: Infinity, high: -Infinity }));
-  for (let i = 0; i < vertices.length; ++i) {
-    const axis = axes[i % 3]!;
-    const value = vertices[i]!;
-    if (value < axis.low) axis.low = value;
-    if (value > axis.high) axis.high = value;
-  }
-  return axes;
-}
-
-const extentOf = ({ low, high }: Axis) => high - low;
 const largestOf = ({ low, high }: Axis) => Math.max(Math.abs(low), Math.abs(high));
-const sizeOf = (axes: Axis[]) => Math.hypot(...axes.map(extentOf));
 
 /** From the magnitude to the next number of single precision. */
 function stepAt(magnitude: number): number {
@@ -67,9 +50,9 @@ function coarse(axes: Axis[], points: number): Coarse | undefined {
  * was scanned. Vertices on a coarser grid lost nothing and pass.
  */
 export function checkNotRounded(vertices: Float64Array): void {
-  const axes = axesOf(vertices);
-  if (vertices.length === 0 || axes.some((axis) => largestOf(axis) > kLargestSingle)) return;
-  const found = coarse(axes, vertices.length / 3);
+  if (vertices.length === 0 || axesOf(vertices).some((axis) => largestOf(axis) > kLargestSingle)) return;
+  const part = mainPartOf(vertices);
+  const found = coarse(part.axes, part.points);
   if (found === undefined || !vertices.every((value) => Math.fround(value) === value)) return;
   let odd = 0;
   for (let i = 0; i < vertices.length; i += 3) {
@@ -78,29 +61,34 @@ export function checkNotRounded(vertices: Float64Array): void {
   }
   if (odd < (kLeastOddShare * vertices.length) / 3) return;
   const text = (value: number, digits: number) => Number(value.toPrecision(digits)).toString();
+  const without = part.strays > 0 ? `, without ${countText(part.strays, 'point')} far from the others` : '';
   throw new FileFault(`coordinates up to ${text(found.largest, 6)} are ${text(found.step, 3)} apart in single precision, but the ` +
-    `scan is only ${text(found.across, 3)} across, and all of them are such numbers: the shape was lost when they were written in ` +
+    `scan is only ${text(found.across, 3)} across${without}, and all of them are such numbers: the shape was lost when they were written in ` +
     'single precision. Write them again in double precision, or relative to a point near the scan', 'coordinate_out_of_range');
 }
 
 /**
- * What to subtract from the points before they become single precision: the middle of their box if they lie so far from
- * 0, 0, 0 that rounding would hurt their shape.
+ * What to subtract from the points before they become single precision: the middle of their box, without strays, if they
+ * lie so far from 0, 0, 0 that rounding would hurt their shape.
  */
 export function originOf(vertices: Float64Array): Point {
-  const axes = axesOf(vertices);
-  const size = sizeOf(axes);
+  const all = axesOf(vertices);
+  const whole = sizeOf(all);
   const beyond = vertices.findIndex((value) => Math.abs(value) > kLargestSingle);
   if (beyond >= 0) {
     throw new FileFault(`point ${Math.floor(beyond / 3)} has a coordinate beyond single precision (3.4e38); use a larger unit`,
       'coordinate_out_of_range');
   }
-  if (size > 0 && size < kSmallestDiagonal) {
-    throw new FileFault(`the whole scan is only ${size.toPrecision(3)} across, too small for single precision; use a smaller unit`,
+  if (whole > 0 && whole < kSmallestDiagonal) {
+    throw new FileFault(`the whole scan is only ${whole.toPrecision(3)} across, too small for single precision; use a smaller unit`,
       'coordinate_out_of_range');
   }
+  if (vertices.length === 0) return [0, 0, 0];
+  const part = mainPartOf(vertices);
+  const [axes, points] = isPoint(part) ? [all, vertices.length / 3] : [part.axes, part.points];
+  const size = sizeOf(axes);
   const far = size > 0 && Math.max(...axes.map(largestOf)) > kFarFromOrigin * size;
-  if (!far && coarse(axes, vertices.length / 3) === undefined) return [0, 0, 0];
+  if (!far && coarse(axes, points) === undefined) return [0, 0, 0];
   return axes.map((axis) => axis.low + 0.5 * extentOf(axis)) as Point;
 }
 

@@ -121,7 +121,7 @@ class Packed:
 
 def pack(scan: Scan) -> Packed:
     """Checks and packs a scan. If it lies so far from the origin that single precision would hurt its shape, the
-    centre of its box is subtracted first, in double precision."""
+    centre of its box, without strays, is subtracted first, in double precision."""
     points = as_points(scan)
     diagonal = size_of(points.min(axis=0), points.max(axis=0))
     if 0.0 < diagonal < _SMALLEST_DIAGONAL:
@@ -129,6 +129,9 @@ def pack(scan: Scan) -> Packed:
             "coordinate_out_of_range", f"the whole scan is only {diagonal:g} across, too small for single precision "
             f"({_SMALLEST_DIAGONAL:.2g}); use a smaller unit")
     origin = origin_of(points)
+    if np.abs(points - origin).max() > _LARGEST:
+        raise InvalidInput("coordinate_out_of_range",
+                           "a point lies too far from most others for single precision (3.4e38); drop it")
     data = np.ascontiguousarray(points - origin, dtype="<f4").tobytes()
     return Packed(data, len(points), hashlib.sha256(data).digest(), origin)
 

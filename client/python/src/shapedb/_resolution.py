@@ -19,6 +19,11 @@ _FLAT_SHARE = 1e-6
 _LEAST_ODD_SHARE = 0.125
 # A float32 rounds a coordinate beyond this many box diagonals by more than a millionth of the diagonal.
 _FAR_FROM_ORIGIN = 16.0
+# Strays are beyond so many diagonals of the box of the middle half; of less, where that is a point. As
+# core/geometry/main_part.h tells.
+_MAIN_REACH = 4.0
+_SAMPLE = 65_536
+_SHARES = (0.25, 0.1, 0.01)
 
 
 class Coarse(NamedTuple):
@@ -30,6 +35,15 @@ class Coarse(NamedTuple):
     """From there to the next number."""
     across: float
     """Size of the scan, or its extent along the axis that is concerned."""
+    strays: int = 0
+    """Points that were left out, because they lie far from the others."""
+
+    def text(self) -> str:
+        text = (f"coordinates up to {self.largest:.6g} are {self.step:.3g} apart in single precision, but the scan is only "
+                f"{self.across:.3g} across")
+        if self.strays == 0:
+            return text
+        return f"{text}, without {self.strays:,} point{'s' if self.strays > 1 else ''} far from the others"
 
 
 def _steps(magnitudes: FloatArray) -> FloatArray:
@@ -41,6 +55,27 @@ def _steps(magnitudes: FloatArray) -> FloatArray:
 def size_of(low: FloatArray, high: FloatArray) -> float:
     extent = high - low
     return float(np.hypot(np.hypot(extent[0], extent[1]), extent[2]))
+
+
+def _within(points: FloatArray, sample: FloatArray, share: float) -> FloatArray:
+    """What lies within reach of the middle of the sample."""
+    left_out = int(share * (len(sample) - 1))
+    ranks = [left_out, len(sample) - 1 - left_out]
+    low, high = np.partition(sample, ranks, axis=0)[ranks]
+    reach = _MAIN_REACH * size_of(low, high)
+    if reach > 0.0:
+        centre = 0.5 * low + 0.5 * high
+        low, high = centre - reach, centre + reach
+    part: FloatArray = points[((points >= low) & (points <= high)).all(axis=1)]
+    return part
+
+
+def main_part(points: FloatArray) -> FloatArray:
+    """The points without strays: more than half of them, whatever up to a quarter do."""
+    sample = points[::-(-len(points) // _SAMPLE)]
+    parts = [part for part in (_within(points, sample, share) for share in _SHARES) if 2 * len(part) > len(points)]
+    with_extent = [part for part in parts if (part.min(axis=0) < part.max(axis=0)).any()]
+    return (with_extent or parts[-1:] or [points])[0]
 
 
 def coarse_in_single_precision(low: FloatArray, high: FloatArray, points: int) -> Optional[Coarse]:
@@ -61,7 +96,8 @@ def check_not_rounded(points: FloatArray) -> None:
     was scanned. Points on a coarser grid lost nothing and pass, and what is not finite is left to other checks."""
     if not len(points) or not np.isfinite(points).all() or np.abs(points).max() > _LARGEST:
         return
-    found = coarse_in_single_precision(points.min(axis=0), points.max(axis=0), len(points))
+    part = main_part(points)
+    found = coarse_in_single_precision(part.min(axis=0), part.max(axis=0), len(part))
     if found is None or (points.astype(np.float32).astype(np.float64) != points).any():
         return
     odd = (_steps(np.abs(points)) >= found.step) & (np.fmod(points, 2.0 * found.step) != 0.0)
@@ -69,18 +105,20 @@ def check_not_rounded(points: FloatArray) -> None:
         return
     raise InvalidInput(
         "coordinate_out_of_range",
-        f"coordinates up to {found.largest:.6g} are {found.step:.3g} apart in single precision, but the scan is only "
-        f"{found.across:.3g} across, and all of them are such numbers: the shape was lost when they were written in single "
-        "precision. Write them again in double precision, or relative to a point near the scan")
+        found._replace(strays=len(points) - len(part)).text() + ", and all of them are such numbers: the shape was lost when "
+        "they were written in single precision. Write them again in double precision, or relative to a point near the scan")
 
 
 def origin_of(points: FloatArray) -> FloatArray:
-    """What to subtract before points become single precision: the centre of their box if they lie so far from the origin
-    that rounding would hurt their shape, else zero."""
-    low, high = points.min(axis=0), points.max(axis=0)
+    """What to subtract before points become single precision: the centre of their box, without strays, if they lie so far
+    from the origin that rounding would hurt their shape, else zero."""
+    part = main_part(points)
+    if (part.min(axis=0) == part.max(axis=0)).all():
+        part = points
+    low, high = part.min(axis=0), part.max(axis=0)
     size = size_of(low, high)
     far = size > 0.0 and float(max(np.abs(low).max(), np.abs(high).max())) > _FAR_FROM_ORIGIN * size
-    if not far and coarse_in_single_precision(low, high, len(points)) is None:
+    if not far and coarse_in_single_precision(low, high, len(part)) is None:
         return np.zeros(3)
     centre: FloatArray = low + 0.5 * (high - low)
     return centre
