@@ -80,6 +80,16 @@ class Edited(unittest.TestCase):
             client.admin.ImportCollection(imported(export), timeout=60)
             client.add("more", ball(300))
 
+    def test_an_export_does_not_take_the_place_of_everything(self):
+        with Server() as server, server.connect() as client:
+            client.add("ball", ball(300))
+            client.collections.CreateCollection(collections.CreateCollectionRequest(name="other"), timeout=10)
+            export = list(client.admin.ExportCollection(admin.ExportCollectionRequest(collection="default"), timeout=60))
+            before = self.state(client)
+            self.refused(lambda: client.admin.Restore(iter(export), timeout=60),
+                         ["export of one collection, 'default'", "shapedb collection import"])
+            self.assertEqual(self.state(client), before)
+
     def test_databases_are_told_by_the_check(self):
         with Server() as server:
             with server.connect() as client:

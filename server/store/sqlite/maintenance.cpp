@@ -58,6 +58,21 @@ std::int64_t separateIds(Connection& copy, Connection& live, std::int64_t marked
     return commits;
 }
 
+/// A file that a server wrote as the export of one collection: made at once, with a schema that knows
+/// exports, and never opened by a server, whose first act is a counted change.
+constexpr char kIsExport[] =
+    "SELECT (SELECT commits FROM tally) = 0 AND (SELECT count(*) FROM collection) = 1 "
+    "AND (SELECT count(DISTINCT applied_at) FROM schema_migration WHERE number <= 5) = 1";
+
+void requireWholeBackup(Connection& copy, const std::string& path) {
+    if (copy.integer(kIsExport) == 0) return;
+    raise(
+        ErrorCode::kMalformedFile,
+        "'" + path + "' cannot be restored: it is the export of one collection, '" +
+            copy.text("SELECT name FROM collection") +
+            "', and would replace all collections; take it in beside them with 'shapedb collection import'");
+}
+
 }  // namespace
 
 Result<void> SqliteStore::backup(const std::string& path, const RunContext& context) {
@@ -93,6 +108,7 @@ Result<void> SqliteStore::restore(const std::string& path, const RunContext& con
     return guarded("restore the backup", [&] {
         const TemporaryDatabase temporary(options_.path + ".restore");
         const auto copy = checkedCopy(path, "restored", temporary.path(), options_, context);
+        requireWholeBackup(*copy, path);
         // Until the end: no id may be given out between reading the last ones and replacing the tables.
         const std::lock_guard<std::mutex> lock(writerMutex_);
         SHAPEDB_FAILPOINT("restore.checked");

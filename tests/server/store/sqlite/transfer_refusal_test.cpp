@@ -56,6 +56,35 @@ TEST_F(SqliteTransferRefusalTest, RefusesHostileFiles) {
     ASSERT_TRUE(other_->importCollection(good, as("copy"), {})) << "the file itself is good";
 }
 
+TEST_F(SqliteTransferRefusalTest, AnExportIsNotRestored) {
+    const std::string exportFile = exported();
+    const Collection mine = other_->createCollection("mine", "", "").value();
+    ASSERT_TRUE(other_->putShape(request(mine.id, "kept", cloud(1))));
+    const auto refused = other_->restore(exportFile, {}, {});
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::kMalformedFile);
+    for (const char* words : {"export of one collection, 'parts'", "shapedb collection import"}) {
+        EXPECT_NE(refused.error().message.find(words), std::string::npos) << refused.error().message;
+    }
+    EXPECT_TRUE(other_->getShape(mine.id, "kept")) << "the others are there";
+    // The backup of a server that has this collection alone is one all the same.
+    const std::string backup = folder_.file("whole.db");
+    ASSERT_TRUE(store_->backup(backup, {}));
+    ASSERT_TRUE(other_->restore(backup, {}, {}));
+    EXPECT_EQ(other_->listCollections()->size(), 1u);
+    // Also one of before exports, whose commits nobody had counted.
+    const std::string old = folder_.file("old.db");
+    {
+        Connection connection(old, OpenMode::kReadWriteCreate, 0);
+        migrate(connection, {embeddedMigrations().begin(), embeddedMigrations().begin() + 3}, 1);
+        connection.execute(
+            "INSERT INTO collection (name, description, parameters, generation, created_at) VALUES ('b', '', "
+            "'', 1, 0)");
+    }
+    const auto restored = other_->restore(old, {}, {});
+    ASSERT_TRUE(restored) << restored.error().message;
+}
+
 // A file of schema version 1 whose trigger is never done when the first migration changes the table.
 TEST_F(SqliteTransferRefusalTest, AMigrationThatNeverEndsCanBeCancelled) {
     const std::string path = folder_.file("endless.db");
