@@ -39,12 +39,17 @@ void SqliteStore::compareCommits() {
                    "an older copy of the database was put in its place; restore a backup, or send the "
                    "scans again");
     }
-    // A file that was put into a new folder has no mark, and a new database no commits.
-    if (!mark && commits > 0 && lock_.wasComplete()) {
-        notice(0, "the file '" + options_.path +
-                      ".commits', which counts acknowledged changes outside the database, is missing or "
-                      "damaged: changes may be missing, and nobody can tell; compare with what was sent "
-                      "last, or restore a backup");
+    // A file that was closed or is a backup, and was put into a new folder, has no mark.
+    if (!mark && (wasOpen_ || (commits > 0 && lock_.wasComplete()))) {
+        const std::string how = wasOpen_ ? ", and the last server did not close the database" : "";
+        notice(
+            0,
+            "the file '" + options_.path +
+                ".commits', which counts acknowledged changes outside the database, is missing or damaged" +
+                how +
+                ": changes may be missing, and nobody can tell; compare with what was sent last, or restore "
+                "a "
+                "backup");
     }
     SHAPEDB_FAILPOINT("open.counted");
     mark_.write(countCommits(*writer_));

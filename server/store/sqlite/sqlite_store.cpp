@@ -25,6 +25,9 @@ namespace shapedb::store {
 
 namespace {
 
+/// Programs with an earlier schema left the file open always.
+constexpr int kFirstClosed = 7;
+
 constexpr int kWalAutoCheckpointPages = 1000;
 /// Beyond this size a commit waits for readers, so that the log can start from the beginning.
 constexpr std::uint64_t kWalBoundBytes = 64u << 20;
@@ -127,8 +130,14 @@ void rewriteOldWal(Connection& writer) {
     }
 }
 
-/// Opens the database, checks that it is ours before writing a byte, and migrates it.
-std::unique_ptr<Connection> openWriter(const SqliteOptions& options) {
+/// While a server has it open, the file itself says so: it has a write-ahead log. One that was closed cleanly
+/// is complete without any file beside it, like a backup.
+bool isOpenInFile(Connection& connection) { return connection.text("PRAGMA journal_mode") == "wal"; }
+
+/// Opens the database, checks that it is ours before writing a byte, and migrates it. `wasOpen`: its last
+/// server did not close it, and counted its commits.
+std::unique_ptr<Connection> openWriter(const SqliteOptions& options, const CommitMark& mark,
+                                       const ProcessLock& lock, bool* wasOpen) {
     requireUsableFile(options);
     auto writer = std::make_unique<Connection>(options.path, OpenMode::kReadWrite, options.busyTimeoutMs);
     if (identify(*writer) != FileKind::kOurs) {
@@ -137,6 +146,13 @@ std::unique_ptr<Connection> openWriter(const SqliteOptions& options) {
     if (schemaVersion(*writer) > static_cast<int>(embeddedMigrations().size())) {
         migrate(*writer, embeddedMigrations(), options.now());  // refuses, with the reason
     }
+    *wasOpen = isOpenInFile(*writer) && schemaVersion(*writer) >= kFirstClosed;
+    // Before the file says that it is open: from then on a mark that is missing was lost.
+    if (!*wasOpen && !lock.wasComplete() && !mark.read()) {
+        mark.write(0);
+        static_cast<void>(mark.sync());
+    }
+    SHAPEDB_FAILPOINT("open.mark");
     const std::string mode = writer->text("PRAGMA journal_mode=WAL");
     if (mode != "wal") {
         raise(ErrorCode::kStorage, "'" + options.path + "' cannot use a write-ahead log (journal mode " +
@@ -162,9 +178,9 @@ SqliteStore::SqliteStore(const SqliteOptions& options)
       walPath_(options_.path + "-wal"),
       lock_(options_.path),
       reserve_(options_.path + ".reserve"),
-      writer_(openWriter(options_)),
-      readers_(std::make_unique<ReaderPool>(options_.path, options_.readers, options_.busyTimeoutMs)),
       mark_(options_.path + ".commits"),
+      writer_(openWriter(options_, mark_, lock_, &wasOpen_)),
+      readers_(std::make_unique<ReaderPool>(options_.path, options_.readers, options_.busyTimeoutMs)),
       walAttemptAt_(kWalBoundBytes) {
     // Without it deletions may be refused on a full disk; uploads ask again.
     static_cast<void>(reserve_.hold());
@@ -180,6 +196,16 @@ SqliteStore::SqliteStore(const SqliteOptions& options)
     // and shapes, which are left where they are if the disk fails: no client sees them.
     static_cast<void>(dropImport());
     static_cast<void>(dropDeleted());
+}
+
+SqliteStore::~SqliteStore() {
+    readers_.reset();
+    // Without a log beside it the file is whole. Otherwise the next start finds it open, and what belongs to
+    // it there.
+    static_cast<void>(guarded("close the database", [&] {
+        const std::string mode = writer_->text("PRAGMA journal_mode=DELETE");
+        if (mode != "delete") raise(ErrorCode::kStorage, "somebody else reads the database");
+    }));
 }
 
 void SqliteStore::commit(Transaction& transaction, std::int64_t changesBefore) {

@@ -40,7 +40,8 @@ class SqliteStore final : public Store {
   public:
     /// Throws Failure.
     explicit SqliteStore(const SqliteOptions& options);
-    ~SqliteStore() override = default;
+    /// Closes the file so that it is whole without what is beside it.
+    ~SqliteStore() override;
 
     Result<Collection> createCollection(const std::string& name, const std::string& description,
                                         const std::string& parameters) override;
@@ -233,9 +234,10 @@ class SqliteStore final : public Store {
     std::mutex importMutex_;     ///< one import at a time
     std::mutex largeScanMutex_;  ///< one compressed copy of a large scan at a time, to bound memory
     std::mutex writerMutex_;
+    CommitMark mark_;
+    bool wasOpen_ = false;  ///< in the file, when it was found: its last server did not close it
     std::unique_ptr<Connection> writer_;
     std::unique_ptr<ReaderPool> readers_;
-    CommitMark mark_;
     std::int64_t missingCommits_ = 0;         ///< under findingsMutex_, as the next three
     std::vector<std::string> findings_;       ///< what was noticed when the database was opened
     std::vector<std::string> notices_;        ///< what waits for `acknowledge`

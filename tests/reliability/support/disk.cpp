@@ -34,6 +34,7 @@ Disk::Disk(std::string folder) : folder_(std::move(folder)) {
         names_[entry.path().string()] = std::move(file);
     }
     durableNames_ = names_;
+    markNamed_ = hasMark();
     watching = this;
 }
 
@@ -90,6 +91,7 @@ void Disk::synced(const std::string& path) {
     if (path == folder_) {
         durableNames_ = names_;
         pendingNames_.clear();
+        markNamed_ = markNamed_ || hasMark();
         return;
     }
     const auto found = names_.find(path);
@@ -143,10 +145,17 @@ std::string Disk::bytesAfter(const File& file, Loss loss, Random& random) {
     return bytes;
 }
 
-// The file that remembers how many changes were acknowledged is written without SQLite and never synced: it
-// is as it is now, or was never there.
+bool Disk::hasMark() const {
+    for (const auto& entry : fs::directory_iterator(folder_)) {
+        if (endsWith(entry.path().filename().string(), ".commits")) return true;
+    }
+    return false;
+}
+
+// The file that remembers how many changes were acknowledged is written without SQLite, and its name synced
+// at start: it is as it is now, or before that was never there.
 void Disk::addMark(Image& image, Loss loss, Random& random) const {
-    if (loss == Loss::kRandom && random.below(3) == 0) return;
+    if (!markNamed_ && loss == Loss::kRandom && random.below(3) == 0) return;
     for (const auto& entry : fs::directory_iterator(folder_)) {
         const std::string name = entry.path().filename().string();
         if (endsWith(name, ".commits")) image[name] = readFile(entry.path().string());

@@ -72,12 +72,14 @@ class Disk {
     void rename(Renaming change);
     FilePtr file(const std::string& path);
     static std::string bytesAfter(const File& file, Loss loss, Random& random);
+    [[nodiscard]] bool hasMark() const;
     void addMark(Image& image, Loss loss, Random& random) const;
 
     std::string folder_;
     Names names_;
     Names durableNames_;
     std::vector<Renaming> pendingNames_;
+    bool markNamed_ = false;  ///< the name of the file of addMark is certain
 };
 
 }  // namespace shapedb::reliability

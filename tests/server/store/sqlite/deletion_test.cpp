@@ -68,19 +68,20 @@ TEST_F(DeletionTest, IsCompletedAtTheNextStartAndLeftOutOfRestores) {
     const Collection gone = large("gone");
     std::string database;
     std::string log;
+    std::string mark;
     const std::string backup = folder_.file("backup");
     ASSERT_TRUE(store_->deleteCollection(gone.id, [&] {
         EXPECT_TRUE(store_->backup(backup, {}));
         database = slurp(options().path);
         log = slurp(options().path + "-wal");
+        mark = slurp(options().path + ".commits");
     }));
     // As a process that was killed in between leaves it.
     store_.reset();
     spill(options().path, database);
     spill(options().path + "-wal", log);
     std::filesystem::remove(options().path + "-shm");
-    std::filesystem::remove(options().path + ".commits");
-    std::filesystem::remove(options().path + ".lock");
+    spill(options().path + ".commits", mark);
     ASSERT_GT(rows("shape"), 0);
     open();
     EXPECT_EQ(rows("shape"), 0);

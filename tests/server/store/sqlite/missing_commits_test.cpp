@@ -138,6 +138,70 @@ TEST_F(MissingCommitsTest, AMarkThatIsGoneIsTold) {
     }
 }
 
+TEST_F(MissingCommitsTest, AFirstRunThatLostItsLogAndItsMarkIsTold) {
+    // Nothing was written back yet: the file has no commit, and would pass for a new one.
+    const Collection c = collection();
+    put(c.id, "a", 1);
+    for (const bool lockToo : {false, true}) {
+        dieWith([&] {
+            fs::remove(wal());
+            fs::remove(options().path + ".commits");
+            if (lockToo) fs::remove(options().path + ".lock");
+        });
+        ASSERT_EQ(store_->findings().size(), 1u) << lockToo;
+        EXPECT_NE(store_->findings()[0].find("the last server did not close the database"), std::string::npos)
+            << store_->findings()[0];
+        EXPECT_EQ(store_->notices(), 1u);
+        EXPECT_EQ(store_->check({})->size(), 1u);
+        ASSERT_TRUE(store_->acknowledge());
+        expectSound();
+    }
+}
+
+TEST_F(MissingCommitsTest, ACopyOfTheFileAloneIsToldIfAServerHadItOpen) {
+    const Collection c = collection();
+    put(c.id, "a", 1);
+    ASSERT_TRUE(store_->checkpoint());
+    put(c.id, "b", 2);
+    const std::string inUse = slurp(options().path);
+    store_.reset();
+    const std::string closed = slurp(options().path);
+    EXPECT_FALSE(fs::exists(wal()));
+    for (const bool wasClosed : {true, false}) {
+        const Folder fresh;
+        SqliteOptions there = options();
+        there.path = fresh.file("shapes.db");
+        spill(there.path, wasClosed ? closed : inUse);
+        for (int start = 0; start < 2; ++start) {
+            const auto opened = openSqliteStore(there);
+            ASSERT_TRUE(opened) << opened.error().message;
+            EXPECT_EQ((*opened)->findings().size(), wasClosed ? 0u : 1u);
+            EXPECT_EQ((*opened)->getShape(c.id, "b").has_value(), wasClosed);
+        }
+    }
+}
+
+TEST_F(MissingCommitsTest, NoneAfterDeathsAtTheFirstStart) {
+    // As a process leaves it that dies once the file says that it is open: the mark is there.
+    const Folder fresh;
+    SqliteOptions there = options();
+    there.path = fresh.file("shapes.db");
+    std::string file;
+    std::string mark;
+    {
+        const auto opened = openSqliteStore(there);
+        ASSERT_TRUE(opened);
+        file = slurp(there.path);
+        mark = slurp(there.path + ".commits");
+    }
+    for (const std::string end : {"-wal", "-shm", ".lock", ".reserve"}) fs::remove(there.path + end);
+    spill(there.path, file);
+    spill(there.path + ".commits", mark);
+    const auto opened = openSqliteStore(there);
+    ASSERT_TRUE(opened);
+    EXPECT_TRUE((*opened)->findings().empty());
+}
+
 TEST_F(MissingCommitsTest, ABackupInANewFolderHasNoMarkAndLacksNothing) {
     const Collection c = collection();
     put(c.id, "a", 1);
