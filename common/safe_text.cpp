@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "common/safe_text.h"
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <cstdio>
+#include <iterator>
 
 namespace shapedb {
 
@@ -38,17 +40,40 @@ Character characterAt(std::string_view text, std::size_t at) noexcept {
     return {code, length};
 }
 
+struct CodeRange {
+    std::uint32_t first;
+    std::uint32_t last;
+};
+
+/// Unicode 15: general categories Cc (control), Cf (format), Zl and Zp (separators of lines and paragraphs),
+/// and the property Default_Ignorable_Code_Point (shown as nothing).
+constexpr CodeRange kUnsafe[] = {
+    {0x0, 0x1f},        {0x7f, 0x9f},       {0xad, 0xad},       {0x34f, 0x34f},     {0x600, 0x605},
+    {0x61c, 0x61c},     {0x6dd, 0x6dd},     {0x70f, 0x70f},     {0x890, 0x891},     {0x8e2, 0x8e2},
+    {0x115f, 0x1160},   {0x17b4, 0x17b5},   {0x180b, 0x180f},   {0x200b, 0x200f},   {0x2028, 0x202e},
+    {0x2060, 0x206f},   {0x3164, 0x3164},   {0xfe00, 0xfe0f},   {0xfeff, 0xfeff},   {0xffa0, 0xffa0},
+    {0xfff0, 0xfffb},   {0x110bd, 0x110bd}, {0x110cd, 0x110cd}, {0x13430, 0x1343f}, {0x1bca0, 0x1bca3},
+    {0x1d173, 0x1d17a}, {0xe0000, 0xe0fff}};
+
 bool isUnsafe(std::uint32_t code) noexcept {
-    const auto within = [&](std::uint32_t first, std::uint32_t last) {
-        return code >= first && code <= last;
-    };
-    return code < 0x20 || within(0x7f, 0x9f) ||  // C0, DEL, C1
-           code == 0xad || code == 0x61c ||
-           code == 0x180e ||  // soft hyphen, Arabic letter mark, Mongolian separator
-           code == 0x200b || within(0x200e, 0x200f) ||  // zero width space, left-to-right and right-to-left
-           within(0x2028, 0x202e) ||                    // separators, embeddings
-           within(0x2060, 0x206f) ||                    // word joiner, isolates
-           code == 0xfeff || within(0xfff9, 0xfffb);    // byte order mark, annotations
+    // The last one that does not begin behind it.
+    const CodeRange* const next =
+        std::upper_bound(std::begin(kUnsafe), std::end(kUnsafe), code,
+                         [](std::uint32_t c, const CodeRange& range) { return c < range.first; });
+    return next != std::begin(kUnsafe) && code <= std::prev(next)->last;
+}
+
+/// "\u200b", and of what has more than 16 bits both halves, as JSON spells it.
+std::string escapeOf(std::uint32_t code) {
+    std::array<char, 32> text{};
+    if (code <= 0xffff) {
+        std::snprintf(text.data(), text.size(), "\\u%04x", code);
+    } else {
+        const std::uint32_t rest = code - 0x10000;
+        std::snprintf(text.data(), text.size(), "\\u%04x\\u%04x", 0xd800 + (rest >> 10),
+                      0xdc00 + (rest & 0x3ff));
+    }
+    return text.data();
 }
 
 }  // namespace
@@ -80,9 +105,7 @@ std::string escapeUnsafe(std::string_view text, bool newlines) {
         if (character.length == 0) {
             safe += "\\ufffd";
         } else if (isUnsafe(character.code) && !kept) {
-            std::array<char, 8> escaped{};
-            std::snprintf(escaped.data(), escaped.size(), "\\u%04x", static_cast<unsigned>(character.code));
-            safe += escaped.data();
+            safe += escapeOf(character.code);
         } else {
             safe.append(text, i, character.length);
         }

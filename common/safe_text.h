@@ -12,13 +12,13 @@ namespace shapedb {
 [[nodiscard]] bool isUtf8(std::string_view text) noexcept;
 
 /// The byte at which the first character begins that changes how a terminal or a log shows the text, or that
-/// hides in it: control characters (C0, DEL, C1), marks that change the direction of writing, line and
-/// paragraph separators, invisible characters (zero width space, byte order mark; not the joiners that some
-/// scripts need), and bytes that are no UTF-8. npos: there is none.
+/// hides in it: control characters (C0, DEL, C1), line and paragraph separators, characters of format such as
+/// marks that change the direction of writing, those that are shown as nothing (zero width space, joiners,
+/// variation selectors, fillers, tags, byte order mark), and bytes that are no UTF-8. npos: there is none.
 [[nodiscard]] std::size_t findUnsafe(std::string_view text) noexcept;
 
-/// Each of these characters as \uXXXX, as JSON spells them, and each invalid byte as \ufffd. `newlines`: keep
-/// line feeds.
+/// Each of these characters as \uXXXX, or two of these, as JSON spells them, and each invalid byte as \ufffd.
+/// `newlines`: keep line feeds.
 [[nodiscard]] std::string escapeUnsafe(std::string_view text, bool newlines = false);
 
 /// At most `limit` bytes of `text`, never half a UTF-8 character.

@@ -29,7 +29,7 @@ std::optional<std::string> problemOfKey(const std::string& key) {
     if (auto problem = problemOfText(key, kMaxKeyBytes)) return problem;
     const std::size_t at = findUnsafe(key);
     if (at == std::string::npos) return std::nullopt;
-    return "control character at byte " + std::to_string(at);
+    return "control or invisible character at byte " + std::to_string(at);
 }
 
 bool isNameByte(char c) noexcept { return isAlphanumeric(c) || c == '_' || c == '.' || c == '-'; }

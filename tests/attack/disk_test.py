@@ -115,6 +115,7 @@ class Keys(unittest.TestCase):
     def test_that_would_act_on_a_terminal_are_refused(self):
         attacks = [chr(c) for c in [*range(0x20), *range(0x7f, 0xa0)]]
         attacks += ["\u061c", "\u200e", "\u200f", "\u2028", "\u2029", "\u202e", "\u2066", "\u2069", "\ufeff"]
+        attacks += ["\u200c", "\u200d", "\u034f", "\u115f", "\u3164", "\ufe0f", "\U000e0001", "\U000e0020", "\U000e007f"]
         with Server() as server, server.connect() as client:
             for attack in attacks:
                 with self.assertRaises(grpc.RpcError) as failure:
@@ -126,6 +127,7 @@ class Keys(unittest.TestCase):
                     self.assertNotIn(attack, log, repr(attack))
             self.assertNotIn("\n[2J", log)
             self.assertIn("\\u202e", log)
+            self.assertIn("\\udb40\\udc01", log)
             # Values may hold anything; what shows them escapes it.
             client.add("good", ball(500), metadata={"note": "\x1b[2J\r\nnext \u202e"})
             self.assertEqual(client.count(), 1)

@@ -22,6 +22,9 @@ ATTACKS = {
     "UPDATE shape SET updated_at = -1": ("table shape, row 1", "'-1'"),
     f"UPDATE sqlite_sequence SET seq = {NEAR} WHERE name = 'shape'": ("table shape", str(NEAR)),
     f"UPDATE sqlite_sequence SET seq = {NEAR} WHERE name = 'job'": ("table job", str(NEAR)),
+    "UPDATE shape SET key = 'a' || char(917505)": ("table shape, row 1", "'a\\udb40\\udc01'"),
+    "UPDATE shape SET origin_x = 1e12": ("shape 'ball': origin: coordinates up to 1e+12", "double precision"),
+    "UPDATE shape SET origin_y = 1e38": ("shape 'ball': origin: coordinates up to 1e+38", "double precision"),
     f"UPDATE shape SET version = {NEAR}": ("table shape, row 1", str(NEAR)),
 }
 

@@ -2,12 +2,16 @@
 #include "server/store/sqlite/check.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "common/safe_text.h"
+#include "core/geometry/box.h"
+#include "core/preparation/frame.h"
 #include "server/store/key_rules.h"
 #include "server/store/sqlite/damage.h"
 #include "server/store/sqlite/rows.h"
 #include "server/store/sqlite/sequences.h"
+#include "server/store/verified_scan.h"
 
 namespace shapedb::store {
 
@@ -24,8 +28,9 @@ constexpr char kTallyProblems[] =
     "OR t.point_bytes <> (SELECT total(point_bytes) FROM shape_points) "
     "OR t.stored_point_bytes <> (SELECT total(stored_bytes) FROM shape_points)";
 constexpr char kAllPoints[] =
-    "SELECT s.key, s.point_count, s.checksum, p.points, p.point_bytes, p.stored_bytes FROM shape s "
-    "LEFT JOIN shape_points p ON p.shape_id = s.id ORDER BY s.id";
+    "SELECT s.key, s.point_count, s.checksum, p.points, p.point_bytes, p.stored_bytes, s.origin_x, "
+    "s.origin_y, "
+    "s.origin_z FROM shape s LEFT JOIN shape_points p ON p.shape_id = s.id ORDER BY s.id";
 constexpr char kAllSignatures[] =
     "SELECT g.shape_id, g.points_version, g.generation, g.digest, g.bytes, g.views FROM signature g "
     "JOIN shape s ON s.id = g.shape_id";
@@ -54,9 +59,9 @@ constexpr Rule kRulesOfOthers[] = {
     {"SELECT 'table rebuild, row ' || r.id FROM rebuild r JOIN collection c ON c.id = r.collection_id WHERE "
      "r.state = 0 AND r.target_generation <> c.generation + 1",
      "runs into a generation that is not the next one of its collection"},
-    {"SELECT 'table deleted_shape, row ' || id FROM deleted_shape WHERE NOT max(abs(origin_x), "
+    {"SELECT 'table deleted_shape, row ' || id FROM deleted_shape WHERE (max(abs(origin_x), "
      "abs(origin_y), "
-     "abs(origin_z)) <= 3.4e38 OR length(checksum) <> 32 OR CASE WHEN json_valid(metadata) THEN "
+     "abs(origin_z)) <= 3.4e38) IS NOT 1 OR length(checksum) <> 32 OR CASE WHEN json_valid(metadata) THEN "
      "json_type(metadata) <> 'object' ELSE 1 END",
      "has an origin, a checksum or metadata that is none"},
     {"SELECT 'table job, row ' || id FROM job WHERE state = 1 AND attempts < 1",
@@ -102,7 +107,9 @@ constexpr Rule kRules[] = {
      "> "
      "64) m ON m.shape_id = s.id",
      "has more than 64 entries of metadata"},
-    {"SELECT s.key FROM shape s WHERE max(abs(s.origin_x), abs(s.origin_y), abs(s.origin_z)) > 3.4e38",
+    // SQLite reads what is not a number as NULL.
+    {"SELECT s.key FROM shape s WHERE (max(abs(s.origin_x), abs(s.origin_y), abs(s.origin_z)) <= 3.4e38) IS "
+     "NOT 1",
      "has points relative to an origin that is out of range"},
 };
 
@@ -236,9 +243,21 @@ class Checker {
                     add("shape " + quoted(query.text(0)) +
                         ": the stored byte counts do not match its points");
                 }
+                origin(query, loaded);
             });
         }
         context_.report("points", total, total);
+    }
+
+    /// Columns 6 to 8 of kAllPoints, beside the points. What is none at all is found by a rule.
+    void origin(const Query& query, const std::vector<float>& points) {
+        for (const int column : {6, 7, 8}) {
+            if (query.isNull(column) || !(std::abs(query.real(column)) <= kMaxCoordinate)) return;
+        }
+        const Point3 origin{query.real(6), query.real(7), query.real(8)};
+        if (origin == Point3{}) return;
+        const auto placed = checkPlacement(boxOf(toCloud(points)), origin);
+        if (!placed) add("shape " + named(query) + ": " + placed.error().message);
     }
 
     void signatures() {

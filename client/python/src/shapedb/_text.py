@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import html
 import math
+import re
 from typing import TYPE_CHECKING, List, Optional, Sequence
 
 import numpy as np
@@ -20,6 +21,9 @@ _VERDICTS = {
     "same_kind": "same kind",
     "unrelated": "unrelated",
 }
+# What Unicode has shown as nothing (Default_Ignorable_Code_Point) and Python calls printable.
+_IGNORED = re.compile("[\u034f\u115f\u1160\u17b4\u17b5\u180b-\u180f\u2065\u3164\ufe00-\ufe0f\uffa0\ufff0-\ufff8"
+                      "\U000e0000-\U000e0fff]")
 _LISTED_PAIRS = 3
 _SHARE_WORTH_LISTING = 0.01
 _ELSEWHERE = 0.1  # centres further apart, in units of the common size, do not lie on each other
@@ -35,7 +39,7 @@ def likeness(verdict: Optional[str], mirrored: Optional[bool]) -> str:
 
 def safe(text: str) -> str:
     """Text of strangers without what a terminal would obey."""
-    return "".join(c if c.isprintable() else "?" for c in text)
+    return _IGNORED.sub("?", "".join(c if c.isprintable() else "?" for c in text))
 
 
 def percent(share: float) -> str:
