@@ -50,12 +50,25 @@ Result<std::unique_ptr<telemetry::AuditLog>> openAudit(const config::ServerConfi
     return telemetry::AuditLog::open(file.empty() ? config.data + "/" + kAuditFile : file, log);
 }
 
+/// A server that cannot be administered may be meant so, or have been set up half.
+void warnOfMissingRole(security::Role highest, telemetry::Logger& log) {
+    const bool reader = highest == security::Role::kReader;
+    log.warn(std::string("no API key that can be used has the role admin: with keys, this server only ") +
+                 (reader ? "answers reads, and nobody can store anything" : "takes reads and writes") +
+                 "; make one with 'shapedbd key create --role admin' on its machine",
+             {{"highest_role", std::string(security::roleName(highest))}});
+}
+
 /// Errors: kRejected (keys are required and there is none).
 Result<std::unique_ptr<security::Keyring>> openKeys(const config::ServerConfig& config,
                                                     const telemetry::LoggerPtr& log) {
     auto keyring = openKeyring(config.data, log);
     RETURN_IF_ERROR(keyring);
-    if (!config::keysRequired(config) || (*keyring)->hasUsableKey()) return keyring;
+    if (!config::keysRequired(config)) return keyring;
+    if (const auto highest = (*keyring)->highestUsableRole()) {
+        if (log != nullptr && *highest != security::Role::kAdmin) warnOfMissingRole(*highest, *log);
+        return keyring;
+    }
     return fail(ErrorCode::kRejected,
                 "this server wants API keys, and there is none that can be used: make the first one with "
                 "'shapedbd key create --data " +

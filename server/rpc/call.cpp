@@ -157,6 +157,7 @@ Result<catalog::FoundShape> Call::shape(const v1::ShapeRef& ref) {
 }
 
 grpc::Status Call::finish(Result<void> result) {
+    authorization_.endScans(bytes_);
     result = frame_.settle(authorization_.settle(std::move(result)), cancellation_.end());
     const auto hint = authorization_.retryAfter() ? authorization_.retryAfter() : frame_.retryHint();
     const grpc::Status status = result ? grpc::Status::OK : makeStatus(result.error(), context_, hint);

@@ -78,7 +78,15 @@ bool Authorization::sees(const std::string& collection) const {
 
 Result<void> Authorization::useScan(std::uint64_t bytes) {
     if (!holder_) return {};
-    return spend(holder_->takeScan(bytes, policy_.keyring.clock().wall()));
+    announcedAt_ = policy_.keyring.clock().wall();
+    RETURN_IF_ERROR(spend(holder_->takeScan(bytes, announcedAt_)));
+    announced_ += bytes;
+    return {};
+}
+
+void Authorization::endScans(std::uint64_t arrived) {
+    const std::uint64_t announced = std::exchange(announced_, 0);
+    if (announced > arrived) holder_->giveBack(announced - arrived, announcedAt_);
 }
 
 Result<void> Authorization::requireStill() const {

@@ -47,6 +47,8 @@ class Authorization {
     [[nodiscard]] bool sees(const std::string& collection) const;
     /// Before a scan of so many bytes is received. Errors: kRateLimited.
     [[nodiscard]] Result<void> useScan(std::uint64_t bytes);
+    /// At the end of the call: of what was announced only the bytes that arrived count.
+    void endScans(std::uint64_t arrived);
 
     /// Again, while a stream lasts and before what it sent is stored: a key that was revoked or has expired
     /// since `begin` stores nothing any more. Cheap. Errors: kUnauthenticated.
@@ -75,6 +77,8 @@ class Authorization {
     const Operation& operation_;
     std::shared_ptr<KeyHolder> holder_;  ///< null: a caller without a key, who may do everything
     bool usedCollection_ = false;
+    std::uint64_t announced_ = 0;  ///< bytes of scans, counted before they came
+    UnixMs announcedAt_ = 0;       ///< the last of them
     std::optional<std::chrono::milliseconds> retryAfter_;
 };
 

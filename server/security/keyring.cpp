@@ -87,6 +87,11 @@ tl::expected<void, Refusal> KeyHolder::takeScan(std::uint64_t bytes, UnixMs now)
     return {};
 }
 
+void KeyHolder::giveBack(std::uint64_t bytes, UnixMs taken) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (usage_.day == dayOf(taken)) usage_.bytes -= std::min(bytes, usage_.bytes);
+}
+
 KeyUsage KeyHolder::usage(UnixMs now) const {
     const std::lock_guard<std::mutex> lock(mutex_);
     beginDay(dayOf(now));
@@ -235,12 +240,16 @@ Result<void> Keyring::requireUsable(const KeyHolder& holder) {
     return usableNow(holder);
 }
 
-bool Keyring::hasUsableKey() const {
+std::optional<Role> Keyring::highestUsableRole() const {
     const std::lock_guard<std::mutex> lock(mutex_);
     const UnixMs now = clock_.wall();
-    return std::any_of(holders_.begin(), holders_.end(), [&](const auto& entry) {
-        return !entry.second->revoked() && entry.second->key().isUsable(now);
-    });
+    std::optional<Role> highest;
+    for (const auto& [id, holder] : holders_) {
+        const Key& key = holder->key();
+        if (holder->revoked() || !key.isUsable(now)) continue;
+        highest = std::max(highest.value_or(key.spec.role), key.spec.role);
+    }
+    return highest;
 }
 
 Result<void> Keyring::saveUsage() {
@@ -249,7 +258,10 @@ Result<void> Keyring::saveUsage() {
     for (const auto& [id, holder] : holders_) {
         const KeyUsage usage = holder->usage(clock_.wall());
         const KeyUsage& saved = saved_[id];
-        if (usage.scans == 0 || (usage.day == saved.day && usage.scans == saved.scans)) continue;
+        if (usage.scans == 0 ||
+            (usage.day == saved.day && usage.scans == saved.scans && usage.bytes == saved.bytes)) {
+            continue;
+        }
         changed[id] = usage;
     }
     if (changed.empty()) return {};

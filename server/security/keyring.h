@@ -46,6 +46,8 @@ class KeyHolder {
     /// Counts one scan of `bytes` bytes, or nothing at all if that is more than is left of the day. Errors:
     /// kRateLimited, until midnight UTC.
     [[nodiscard]] tl::expected<void, Refusal> takeScan(std::uint64_t bytes, UnixMs now);
+    /// Bytes that were taken at `taken` and did not arrive, if that day lasts.
+    void giveBack(std::uint64_t bytes, UnixMs taken);
     /// Of the day of `now`.
     [[nodiscard]] KeyUsage usage(UnixMs now) const;
 
@@ -95,8 +97,8 @@ class Keyring {
     [[nodiscard]] Result<std::shared_ptr<KeyHolder>> find(const std::string& presented);
     /// Whether who presented this key may still use it. Errors: kUnauthenticated (revoked or expired since).
     [[nodiscard]] Result<void> requireUsable(const KeyHolder& holder);
-    /// Whether there is a key that can be used.
-    [[nodiscard]] bool hasUsableKey() const;
+    /// The highest role of the keys that can be used; nothing if there is none.
+    [[nodiscard]] std::optional<Role> highestUsableRole() const;
     [[nodiscard]] const Clock& clock() const { return clock_; }
 
     /// Writes what has been used since the last time; call now and then. A process that dies loses what it

@@ -11,7 +11,7 @@ import time
 import unittest
 
 from attacker import (SecuredServer, Server, admin, ball, collections, eventually, grpc, main, pack, reason, shapes,
-                      types)
+                      types, upload)
 from google.protobuf import timestamp_pb2
 from rpcs import ADMIN, COLLECTION, READER, RULES, WHOLE_SERVER, WRITER, call, methods
 
@@ -244,6 +244,45 @@ class Keys(unittest.TestCase):
             server.start()
             with server.connect(key=daily.secret) as client:
                 self.limited(client, "after a restart", ball(4))
+
+    def test_bytes_that_never_came_are_not_charged(self):
+        with SecuredServer() as server:
+            daily = server.make(WRITER, limits=admin.KeyLimits(bytes_per_day=12 * 1_000))
+            with server.connect(key=daily.secret) as client:
+                def cut_off():
+                    yield from list(upload("lost", ball(700)))[:1]
+                    yield shapes.AddShapeRequest(chunk=types.PointChunk(xyz=pack(ball(100))))
+                for _ in range(3):
+                    with self.assertRaises(grpc.RpcError) as error:
+                        client.shapes.AddShape(cut_off(), timeout=10)
+                    self.assertEqual(reason(error.exception), "count_mismatch")
+                client.add("kept", ball(700), wait=False)
+                self.limited(client, "too many bytes", ball(4))
+            with server.local() as local:
+                listed = {k.id: k for k in local.admin.ListKeys(admin.ListKeysRequest(), timeout=10).keys}
+                self.assertEqual(listed[daily.key.id].bytes_today, 12_000)
+
+    def test_never_expire_beyond_what_clients_can_tell(self):
+        from google.protobuf import timestamp_pb2
+        with SecuredServer() as server:
+            for seconds in (1 << 62, 253_402_300_800, -(1 << 62)):
+                with self.assertRaises(grpc.RpcError) as error:
+                    server.make(READER, expires=timestamp_pb2.Timestamp(seconds=seconds))
+                self.assertEqual(reason(error.exception), "invalid_argument")
+            late = server.make(READER, expires=timestamp_pb2.Timestamp(seconds=253_402_300_799))
+            self.assertEqual(late.key.expires.seconds, 253_402_300_799)
+
+    def test_of_a_server_that_nobody_can_administer_are_told(self):
+        with SecuredServer() as server:
+            self.assertNotIn("has the role admin", server.log())
+            with server.local() as local:
+                first = local.admin.ListKeys(admin.ListKeysRequest(), timeout=10).keys[0]
+                server.make(READER)
+                local.admin.RevokeKey(admin.RevokeKeyRequest(id=first.id), timeout=10)
+            self.assertEqual(server.stop(), 0)
+            server.start()
+            self.assertIn("nobody can store anything", server.log())
+            self.assertIn("highest_role=reader", server.log())
 
     def limited(self, client, name, points):
         with self.assertRaises(grpc.RpcError) as error:

@@ -64,10 +64,10 @@ TEST_F(KeyringTest, KeysExpire) {
     const std::string key = make(Role::kReader, {}, time_.wall + 1'000);
     time_.pass(milliseconds(999));
     EXPECT_EQ(problem(key), "");
-    EXPECT_TRUE(keyring_.hasUsableKey());
+    EXPECT_TRUE(keyring_.highestUsableRole());
     time_.pass(milliseconds(1));
     EXPECT_EQ(problem(key), "the API key 'test' has expired");
-    EXPECT_FALSE(keyring_.hasUsableKey());
+    EXPECT_FALSE(keyring_.highestUsableRole());
 }
 
 TEST_F(KeyringTest, RevokedKeysAreUselessAtOnce) {
@@ -152,6 +152,35 @@ TEST_F(KeyringTest, CallsAreTakenFromABucketOfOneSecond) {
     int burst = 0;
     while (take()) ++burst;
     EXPECT_EQ(burst, 5) << "no more than a second's worth is saved up";
+}
+
+TEST_F(KeyringTest, TheHighestRoleIsThatOfKeysThatCanBeUsed) {
+    EXPECT_EQ(keyring_.highestUsableRole(), std::nullopt);
+    static_cast<void>(make(Role::kReader));
+    EXPECT_EQ(keyring_.highestUsableRole(), Role::kReader);
+    const std::string admin = make(Role::kAdmin);
+    static_cast<void>(make(Role::kWriter));
+    EXPECT_EQ(keyring_.highestUsableRole(), Role::kAdmin);
+    ASSERT_TRUE(keyring_.revoke(admin));
+    EXPECT_EQ(keyring_.highestUsableRole(), Role::kWriter);
+}
+
+TEST_F(KeyringTest, BytesThatDidNotArriveAreGivenBackWithinTheirDay) {
+    time_.wall = 20'000 * kDay;
+    const std::string key = make(Role::kWriter, {0, 3, 1'000});
+    const auto holder = keyring_.find(key).value();
+    ASSERT_TRUE(holder->takeScan(1'000, time_.wall));
+    ASSERT_TRUE(keyring_.saveUsage());
+    holder->giveBack(900, time_.wall);
+    EXPECT_EQ(holder->usage(time_.wall).bytes, 100u);
+    EXPECT_EQ(holder->usage(time_.wall).scans, 1u) << "a scan was begun";
+    EXPECT_TRUE(holder->takeScan(900, time_.wall));
+    ASSERT_TRUE(keyring_.saveUsage());
+    const UnixMs taken = time_.wall;
+    time_.wall += kDay;
+    ASSERT_TRUE(holder->takeScan(500, time_.wall));
+    holder->giveBack(900, taken);
+    EXPECT_EQ(holder->usage(time_.wall).bytes, 500u) << "of another day";
 }
 
 TEST_F(KeyringTest, ScansAndBytesAreCountedByDay) {
