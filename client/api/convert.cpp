@@ -34,8 +34,12 @@ Motion fromWire(const v1::Motion& from) {
 Error fromWire(const v1::Failure& from) { return {errorCodeFromName(from.error()), from.message()}; }
 
 Timestamp fromWire(const google::protobuf::Timestamp& from) {
-    return Timestamp(std::chrono::duration_cast<Timestamp::duration>(std::chrono::seconds(from.seconds()) +
-                                                                     std::chrono::nanoseconds(from.nanos())));
+    // Whatever a server sends: seconds reach further than microseconds.
+    using std::chrono::seconds;
+    constexpr auto kLast = std::chrono::duration_cast<seconds>(Timestamp::duration::max()) - seconds(1);
+    const seconds whole = std::clamp(seconds(from.seconds()), -kLast, kLast);
+    return Timestamp(whole +
+                     std::chrono::duration_cast<Timestamp::duration>(std::chrono::nanoseconds(from.nanos())));
 }
 
 google::protobuf::Timestamp toWire(Timestamp from) {

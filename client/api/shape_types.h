@@ -16,7 +16,12 @@ namespace shapedb::client {
 
 using shapedb::Metadata;
 
-using Timestamp = std::chrono::system_clock::time_point;
+/// The clock's own nanoseconds end in the year 2262, before keys may.
+using Timestamp = std::chrono::time_point<std::chrono::system_clock, std::chrono::microseconds>;
+
+[[nodiscard]] inline Timestamp currentTime() {
+    return std::chrono::floor<Timestamp::duration>(std::chrono::system_clock::now());
+}
 
 /// Names one shape. An empty collection is "default".
 struct ShapeRef {

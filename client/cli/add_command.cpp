@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/api/packing.h"
+#include "client/cli/checks.h"
 #include "client/cli/connection.h"
 #include "client/cli/exit_code.h"
 #include "client/cli/failures.h"
@@ -82,9 +83,29 @@ const client::Shape* alreadyStored(const Run& run, const client::AddRequest& req
     return safe && same && shape.state != client::ShapeState::kFailed ? &shape : nullptr;
 }
 
+/// --update-only without --replace: the version with which the request finds the shape, or not the same one.
+/// Errors: kNotFound, those of Client::getShapes.
+Result<std::int64_t> versionToUpdate(const Run& run, const std::string& key, const RunContext& context) {
+    const auto known = run.terms.stored.find(key);
+    if (known != run.terms.stored.end()) return known->second.version;
+    const auto found = run.client.getShapes(run.flags.collection, {key}, context);
+    RETURN_IF_ERROR(found);
+    if (!found->shapes.empty()) return found->shapes.front().version;
+    return fail(ErrorCode::kNotFound,
+                "no shape has the key '" + key + "': without --update-only it is added");
+}
+
 void send(const Run& run, PointCloud points, Upload& upload, const RunContext& context) {
     if (run.terms.factor != 1.0) scaleBy(run.terms.factor, points);
-    const client::AddRequest request = requestFor(run.flags, run.terms.metadata, upload);
+    client::AddRequest request = requestFor(run.flags, run.terms.metadata, upload);
+    if (run.flags.updateOnly && !run.flags.replace) {
+        const auto version = versionToUpdate(run, upload.key, context);
+        if (!version) {
+            upload.failure = version.error();
+            return;
+        }
+        request.expectedVersion = *version;
+    }
     if (run.terms.stored.count(upload.key) > 0) {
         const auto packed = client::packPoints(points);
         const client::Shape* stored = packed ? alreadyStored(run, request, *packed) : nullptr;
@@ -337,8 +358,12 @@ void addAddCommand(CLI::App& app, Session& session) {
     CLI::App* command = app.add_subcommand("add", "Store scans: files, or folders searched to any depth");
     command->add_option("PATH", flags->paths, "Scan files or folders, or - for standard input")->required();
     addCollectionOption(*command, flags->collection);
-    command->add_option("--key", flags->key,
-                        "Key, if there is only one scan [path below the current folder, without ending]");
+    command
+        ->add_option("--key", flags->key,
+                     "Key, if there is only one scan [path below the current folder, without ending]")
+        ->check(notEmpty());
+    command->add_flag("--keep-ending", flags->keepEnding,
+                      "Keys keep the endings of the files, as for box.stl beside box.obj");
     command->add_option("--base", flags->base, "Keys are paths below this folder instead of the current one")
         ->type_name("DIR")
         ->check(CLI::ExistingDirectory);
@@ -348,7 +373,7 @@ void addAddCommand(CLI::App& app, Session& session) {
         ->type_name("NAME=VALUE")
         ->allow_extra_args(false);
     auto* insertOnly = command->add_flag("--insert-only", flags->insertOnly, "Fail if the key is taken");
-    command->add_flag("--update-only", flags->updateOnly, "Replace what has the key; fail if it is free")
+    command->add_flag("--update-only", flags->updateOnly, "Fail if no shape has the key")
         ->excludes(insertOnly);
     command->add_flag("--replace", flags->replace, "Replace other points that have the key")
         ->excludes(insertOnly);

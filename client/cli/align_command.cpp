@@ -153,7 +153,7 @@ void addAlignCommand(CLI::App& app, Session& session) {
         ->check(endsIn(".ply"));
     command->add_option("--matrix", flags->matrix, "Write the 4 x 4 matrix, four lines of four numbers")
         ->type_name("FILE");
-    command->add_option("--key", flags->key, "Lay this stored shape on it instead");
+    command->add_option("--key", flags->key, "Lay this stored shape on it instead")->check(notEmpty());
     addCollectionOption(*command, flags->collection);
     command->add_flag("--keep-scale", flags->score.keepScale,
                       "Both have the same unit of length: do not scale");

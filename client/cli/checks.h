@@ -43,6 +43,12 @@ constexpr double kMostNoise = 0.2;
         "0 to 0.2", "share of the diagonal"};
 }
 
+/// An empty one is what a script with an unset variable gives, not a flag left out.
+[[nodiscard]] inline CLI::Validator notEmpty() {
+    return {[](const std::string& text) { return text.empty() ? std::string("is empty") : std::string(); },
+            "", "not empty"};
+}
+
 /// A file to write that is named as what it will be, e.g. ".ply". A name without an ending will do: devices
 /// have none.
 [[nodiscard]] inline CLI::Validator endsIn(const std::string& ending) {

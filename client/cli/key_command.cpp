@@ -62,7 +62,7 @@ json keyJson(const client::Key& key) {
 std::string stateText(const client::Key& key) {
     if (key.revoked) return "revoked " + timeText(*key.revoked);
     if (!key.expires) return "valid";
-    const bool valid = std::chrono::system_clock::now() < *key.expires;
+    const bool valid = client::currentTime() < *key.expires;
     return (valid ? "until " : "expired ") + timeText(*key.expires);
 }
 
@@ -96,7 +96,7 @@ CommandResult runCreateKey(Session& session, KeyFlags& flags) {
     RETURN_IF_ERROR(client);
     flags.request.role = roles().at(flags.role);
     if (flags.validDays > 0) {
-        flags.request.expires = std::chrono::system_clock::now() + std::chrono::hours(24) * flags.validDays;
+        flags.request.expires = client::currentTime() + std::chrono::hours(24) * flags.validDays;
     }
     const auto created = client->createKey(flags.request, session.context());
     RETURN_IF_ERROR(created);

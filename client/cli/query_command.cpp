@@ -234,7 +234,7 @@ void addQueryCommand(CLI::App& app, Session& session) {
     command->add_option(
         "PATH", flags->paths,
         "Scans to search with, or folders of them, or - for standard input; they are not stored");
-    command->add_option("--key", flags->key, "Search with this stored shape instead");
+    command->add_option("--key", flags->key, "Search with this stored shape instead")->check(notEmpty());
     addSearchFlags(*command, flags->search);
     client::SearchOptions& options = flags->search.options;
     auto* groupBy = command->add_option("--group-by", options.groupBy,

@@ -78,7 +78,7 @@ std::string aboutText(const ReportFlags& flags, const Answer& answer) {
     std::string text =
         formatCount(answer.reply.filtered, "shape", "shapes") + " of collection " + collection + " searched";
     if (!flags.search.options.filter.empty()) text += ", with " + flags.search.options.filter;
-    return text + ", " + timeText(std::chrono::system_clock::now());
+    return text + ", " + timeText(client::currentTime());
 }
 
 Result<ReportPage> makePage(Session& session, const ReportFlags& flags, const Searcher& searcher,
@@ -142,7 +142,7 @@ void addReportCommand(CLI::App& app, Session& session) {
         "Write a search as one HTML file: the query and its hits, laid on it and turnable, with the reasons");
     command->add_option("QUERY", flags->path,
                         "Scan to search with, or - for standard input; it is not stored");
-    command->add_option("--key", flags->key, "Search with this stored shape instead");
+    command->add_option("--key", flags->key, "Search with this stored shape instead")->check(notEmpty());
     command->add_option("-o,--out", flags->out, "File to write")
         ->type_name("FILE.html")
         ->required()

@@ -159,8 +159,9 @@ std::string Table::render() const {
     return text;
 }
 
-std::string timeText(std::chrono::system_clock::time_point time) {
-    return utcText(std::chrono::system_clock::to_time_t(time), "%Y-%m-%dT%H:%M:%SZ");
+std::string timeText(client::Timestamp time) {
+    const auto seconds = std::chrono::floor<std::chrono::seconds>(time.time_since_epoch());
+    return utcText(seconds.count(), "%Y-%m-%dT%H:%M:%SZ");
 }
 
 }  // namespace shapedb::cli

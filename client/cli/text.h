@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "client/api/shape_types.h"
 #include "core/geometry/point.h"
 
 namespace shapedb::cli {
@@ -83,6 +84,6 @@ class Table {
 };
 
 /// UTC, as in "2026-11-29T15:04:05Z".
-[[nodiscard]] std::string timeText(std::chrono::system_clock::time_point time);
+[[nodiscard]] std::string timeText(client::Timestamp time);
 
 }  // namespace shapedb::cli

@@ -29,7 +29,7 @@ Result<void> listPath(const AddFlags& flags, const std::string& path, std::vecto
         Upload upload;
         upload.path = file.path;
         upload.name = relativeName(file.path, path);
-        auto key = keyOfFile(file.path, flags.base, file.sharesName);
+        auto key = keyOfFile(file.path, flags.base, flags.keepEnding);
         RETURN_IF_ERROR(key);
         upload.key = std::move(*key);
         upload.label = file.label;
@@ -44,11 +44,12 @@ Result<void> checkKeys(const std::vector<Upload>& uploads) {
     for (const Upload& upload : uploads) {
         const auto [other, isNew] = taken.emplace(upload.key, upload.path);
         if (!isNew) {
-            return fail(ErrorCode::kInvalidArgument, other->second == upload.path
-                                                         ? upload.path + " is given twice"
-                                                         : other->second + " and " + upload.path +
-                                                               " would both get the key '" + upload.key +
-                                                               "'; add them one by one with --key");
+            return fail(ErrorCode::kInvalidArgument,
+                        other->second == upload.path ? upload.path + " is given twice"
+                                                     : other->second + " and " + upload.path +
+                                                           " would both get the key '" + upload.key +
+                                                           "': --keep-ending tells files apart that differ "
+                                                           "in their endings, --key names one");
         }
     }
     return {};
@@ -110,7 +111,7 @@ client::AddRequest requestFor(const AddFlags& flags, const client::Metadata& met
     // Two files may come to the same key, at different times or from different people.
     if (!flags.replace) request.mode = client::AddMode::kSamePoints;
     if (flags.insertOnly) request.mode = client::AddMode::kInsertOnly;
-    if (flags.updateOnly) request.mode = client::AddMode::kUpdateOnly;
+    if (flags.updateOnly && flags.replace) request.mode = client::AddMode::kUpdateOnly;
     return request;
 }
 

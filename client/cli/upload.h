@@ -23,6 +23,7 @@ struct AddFlags {
     bool insertOnly = false;
     bool updateOnly = false;
     bool replace = false;
+    bool keepEnding = false;
     bool wait = false;
     bool each = false;
     unsigned jobs = 1;
@@ -40,13 +41,13 @@ struct Upload {
     std::optional<Error> failure;  ///< it was not stored, or with --wait could not be segmented
 };
 
-/// The files of the paths with their keys. Of files that differ only in their ending (box.stl beside
-/// box.obj), given or not, the key keeps it.
+/// The files of the paths with their keys, which depend on nothing but the path and the flags.
 ///
 /// Errors: those of listScanFiles and keyOfFile; kInvalidArgument naming two files with one key, with --each
 /// also if an object of one may get the key of the other.
 [[nodiscard]] Result<std::vector<Upload>> listUploads(const AddFlags& flags);
 
+/// Other points of a key that is taken are replaced with --replace alone, also with --update-only.
 [[nodiscard]] client::AddRequest requestFor(const AddFlags& flags, const client::Metadata& metadata,
                                             const Upload& upload);
 

@@ -82,24 +82,52 @@ TEST_F(Online, AddTellsOfListsThatMayHaveBeenFaces) {
         << run.err;
 }
 
-TEST_F(Online, AddTellsFilesOfOneNameApart) {
+TEST_F(Online, AKeyDependsOnItsPathAlone) {
     onlineJson({"collection", "create", "endings"});
     writePoints("in/a.xyz", dumbbellPoints(500));
-    writePoints("in/a.asc", dumbbellPoints(600));
-    writePoints("in/b.xyz", dumbbellPoints(500));
-    write("in/b.txt", "a note about b\n");
-    const auto keysOf = [&](const std::vector<std::string>& paths) {
+    const auto keysOf = [&](const std::vector<std::string>& words) {
         std::vector<std::string> arguments = {"add", "--base", path("in"), "--collection", "endings"};
-        arguments.insert(arguments.end(), paths.begin(), paths.end());
+        arguments.insert(arguments.end(), words.begin(), words.end());
         std::vector<std::string> keys;
         const json document = onlineJson(arguments);
         for (const json& one : document["added"]) keys.push_back(one["key"]);
         return keys;
     };
     using Names = std::vector<std::string>;
-    EXPECT_EQ(keysOf({path("in")}), (Names{"a.asc", "a.xyz", "b"})) << "a note is no scan";
-    EXPECT_EQ(keysOf({path("in/a.xyz")}), Names{"a.xyz"}) << "the same key however it is named";
+    EXPECT_EQ(keysOf({path("in")}), Names{"a"});
+    writePoints("in/a.asc", dumbbellPoints(600));
+    write("in/a.txt", "a note about a\n");
+    EXPECT_EQ(keysOf({path("in/a.xyz")}), Names{"a"}) << "also with another file beside it";
+    const CommandRun both = online({"add", "--base", path("in"), "--collection", "endings", path("in")});
+    EXPECT_EQ(both.exitCode, 2);
+    EXPECT_NE(both.err.find("--keep-ending"), std::string::npos) << both.err;
+    EXPECT_EQ(onlineJson({"add", "--base", path("in"), "--collection", "endings", path("in/a.asc")},
+                         4)["failed"][0]["error"]["name"],
+              "already_exists");
+    EXPECT_EQ(keysOf({path("in"), "--keep-ending"}), (Names{"a.asc", "a.xyz"})) << "a note is no scan";
     EXPECT_EQ(onlineJson({"count", "--collection", "endings"})["count"], 3);
+}
+
+TEST_F(Online, UpdateOnlyReplacesNoPoints) {
+    onlineJson({"collection", "create", "updates"});
+    writePoints("in/a.xyz", dumbbellPoints(500));
+    writePoints("in/b.xyz", dumbbellPoints(600));
+    const auto add = [&](const std::string& file, std::vector<std::string> flags) {
+        std::vector<std::string> words = {"add", path(file), "--collection", "updates", "--key", "k"};
+        words.insert(words.end(), flags.begin(), flags.end());
+        return words;
+    };
+    EXPECT_EQ(onlineJson(add("in/a.xyz", {"--update-only"}), 4)["failed"][0]["error"]["name"], "not_found");
+    EXPECT_EQ(onlineJson(add("in/a.xyz", {"--update-only", "--replace"}), 4)["failed"][0]["error"]["name"],
+              "not_found");
+    onlineJson(add("in/a.xyz", {}));
+    EXPECT_EQ(onlineJson(add("in/a.xyz", {"--update-only", "--meta", "n=1"}))["outcomes"],
+              json({{"metadata changed", 1}}));
+    const CommandRun refused = online(add("in/b.xyz", {"--update-only"}));
+    EXPECT_EQ(refused.exitCode, 4);
+    EXPECT_NE(refused.err.find("--replace replaces them"), std::string::npos) << refused.err;
+    EXPECT_EQ(onlineJson(add("in/b.xyz", {"--update-only", "--replace"}))["outcomes"],
+              json({{"replaced", 1}}));
 }
 
 TEST_F(Online, AddRefusesTwoFilesWithOneKey) {
