@@ -100,3 +100,9 @@ def test_a_table_of_hits_hides_what_terminals_obey():
     assert _text.table([hit]).splitlines()[1] == "   1  0.500  same object, bent  <b>    a?key"
     assert "&lt;b&gt;" in _text.html_table([hit]) and hit.label == "<b>"
     assert dataclasses.replace(hit, key="b").key == "b"
+
+
+def test_text_of_strangers_shows_what_would_hide():
+    for hidden in "\x1b\x9b\u200b\u200c\u034f\u115f\u3164\ufe0f\U000e0001\U000e0041":
+        assert _text.safe(f"a{hidden}b") == "a?b"
+    assert _text.safe("Schränke 山/川 שלום") == "Schränke 山/川 שלום"
