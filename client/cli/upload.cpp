@@ -29,7 +29,7 @@ Result<void> listPath(const AddFlags& flags, const std::string& path, std::vecto
         Upload upload;
         upload.path = file.path;
         upload.name = relativeName(file.path, path);
-        auto key = keyOfFile(file.path, flags.base, flags.keepEnding);
+        auto key = keyOfFile(file.path, flags.base, flags.keepEnding || file.sharesName);
         RETURN_IF_ERROR(key);
         upload.key = std::move(*key);
         upload.label = file.label;

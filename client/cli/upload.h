@@ -41,7 +41,8 @@ struct Upload {
     std::optional<Error> failure;  ///< it was not stored, or with --wait could not be segmented
 };
 
-/// The files of the paths with their keys, which depend on nothing but the path and the flags.
+/// The files of the paths with their keys. Of files that differ only in their ending (box.stl beside
+/// box.obj), given or not, the key keeps it.
 ///
 /// Errors: those of listScanFiles and keyOfFile; kInvalidArgument naming two files with one key, with --each
 /// also if an object of one may get the key of the other.

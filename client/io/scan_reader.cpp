@@ -277,6 +277,39 @@ Result<void> searchFolder(const std::string& folder, std::vector<std::string>& f
     return {};
 }
 
+// The scan files of a folder by their names without endings.
+using NamesOfFolder = std::map<std::string, std::vector<std::string>>;
+
+NamesOfFolder namesOfFolder(const fs::path& folder) {
+    NamesOfFolder names;
+    std::error_code error;
+    for (auto entry = fs::directory_iterator(folder, error); !error && entry != fs::directory_iterator();
+         entry.increment(error)) {
+        const std::string file = entry->path().filename().string();
+        std::error_code statusError;
+        if (file[0] == '.' || formatOf(file) == nullptr || !entry->is_regular_file(statusError)) continue;
+        names[withoutScanEnding(file)].push_back(entry->path().string());
+    }
+    return names;
+}
+
+// Whether the folder of each file has another scan of its name.
+void markSharedNames(std::vector<ScanFile>& files) {
+    std::map<fs::path, NamesOfFolder> folders;
+    for (ScanFile& file : files) {
+        const fs::path path(file.path);
+        const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+        auto known = folders.find(folder);
+        if (known == folders.end()) known = folders.emplace(folder, namesOfFolder(folder)).first;
+        const auto alike = known->second.find(withoutScanEnding(path.filename().string()));
+        if (alike == known->second.end()) continue;
+        file.sharesName =
+            std::any_of(alike->second.begin(), alike->second.end(), [&](const std::string& other) {
+                return fs::path(other).filename() != path.filename() && isScanFile(other);
+            });
+    }
+}
+
 Result<std::vector<ScanFile>> listScanFilesUnguarded(const std::vector<std::string>& paths, bool anyEnding) {
     std::vector<std::string> found;
     for (const std::string& path : paths) {
@@ -305,6 +338,7 @@ Result<std::vector<ScanFile>> listScanFilesUnguarded(const std::vector<std::stri
         std::string label = fs::absolute(path).lexically_normal().parent_path().filename().string();
         files.push_back({std::move(path), std::move(label)});
     }
+    markSharedNames(files);
     return files;
 }
 

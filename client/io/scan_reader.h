@@ -103,6 +103,8 @@ struct ScanFile {
     std::string path;
     /// Name of the file's folder: "Hand" for "scans/Hand/193.ply", the current folder for "193.ply".
     std::string label;
+    /// Its folder has another scan file of the same name with another ending.
+    bool sharesName = false;
 };
 
 /// The scan files among files and folders, sorted by path, each once. Folders are searched to any depth for

@@ -82,9 +82,12 @@ TEST_F(Online, AddTellsOfListsThatMayHaveBeenFaces) {
         << run.err;
 }
 
-TEST_F(Online, AKeyDependsOnItsPathAlone) {
+TEST_F(Online, AddTellsFilesOfOneNameApart) {
     onlineJson({"collection", "create", "endings"});
     writePoints("in/a.xyz", dumbbellPoints(500));
+    writePoints("in/a.asc", dumbbellPoints(600));
+    writePoints("in/b.xyz", dumbbellPoints(500));
+    write("in/b.txt", "a note about b\n");
     const auto keysOf = [&](const std::vector<std::string>& words) {
         std::vector<std::string> arguments = {"add", "--base", path("in"), "--collection", "endings"};
         arguments.insert(arguments.end(), words.begin(), words.end());
@@ -94,18 +97,11 @@ TEST_F(Online, AKeyDependsOnItsPathAlone) {
         return keys;
     };
     using Names = std::vector<std::string>;
-    EXPECT_EQ(keysOf({path("in")}), Names{"a"});
-    writePoints("in/a.asc", dumbbellPoints(600));
-    write("in/a.txt", "a note about a\n");
-    EXPECT_EQ(keysOf({path("in/a.xyz")}), Names{"a"}) << "also with another file beside it";
-    const CommandRun both = online({"add", "--base", path("in"), "--collection", "endings", path("in")});
-    EXPECT_EQ(both.exitCode, 2);
-    EXPECT_NE(both.err.find("--keep-ending"), std::string::npos) << both.err;
-    EXPECT_EQ(onlineJson({"add", "--base", path("in"), "--collection", "endings", path("in/a.asc")},
-                         4)["failed"][0]["error"]["name"],
-              "already_exists");
-    EXPECT_EQ(keysOf({path("in"), "--keep-ending"}), (Names{"a.asc", "a.xyz"})) << "a note is no scan";
+    EXPECT_EQ(keysOf({path("in")}), (Names{"a.asc", "a.xyz", "b"})) << "a note is no scan";
+    EXPECT_EQ(keysOf({path("in/a.xyz")}), Names{"a.xyz"}) << "the same key however it is named";
     EXPECT_EQ(onlineJson({"count", "--collection", "endings"})["count"], 3);
+    EXPECT_EQ(keysOf({path("in"), "--keep-ending"}), (Names{"a.asc", "a.xyz", "b.xyz"}))
+        << "whatever else is in the folder";
 }
 
 TEST_F(Online, UpdateOnlyReplacesNoPoints) {

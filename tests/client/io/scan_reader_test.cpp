@@ -270,6 +270,26 @@ TEST_F(ScanFiles, SearchesFoldersAndLabelsByFolder) {
                                                                      {"scans/hand/b.ply", "hand"}}));
 }
 
+TEST_F(ScanFiles, SayWhatSharesItsNameInItsFolder) {
+    for (const char* name :
+         {"s/box.stl", "s/box.obj", "s/cup.ply", "s/jug.ply", "s/sub/cup.obj", "s/can.xyz.gz"}) {
+        write(name, "");
+    }
+    write("s/cup.txt", "the cup is blue\n");
+    write("s/jug.txt", "1 2 3\n4 5 6\n");
+    write("s/.cup.obj", "");
+    std::vector<std::string> sharing;
+    const auto files = listScanFiles({path("s")});
+    ASSERT_TRUE(files);
+    for (const ScanFile& file : *files) {
+        if (file.sharesName) sharing.push_back(file.path.substr(path("s").size() + 1));
+    }
+    EXPECT_EQ(sharing, (std::vector<std::string>{"box.obj", "box.stl", "jug.ply", "jug.txt"}))
+        << "notes and hidden files are no scans, folders have names of their own";
+    EXPECT_TRUE(listScanFiles({path("s/box.stl")})->front().sharesName) << "also of one that is given alone";
+    EXPECT_FALSE(listScanFiles({path("s/cup.ply")})->front().sharesName);
+}
+
 TEST_F(ScanFiles, ErrorsNameBadPaths) {
     EXPECT_EQ(listScanFiles({path("missing")}).error().code, ErrorCode::kFileNotReadable);
     const auto unknown = listScanFiles({write("a.e57", "")});
