@@ -148,6 +148,17 @@ test('a scan far from 0, 0, 0 keeps its digits', () => {
   assert.ok(inside, 'samples of a surface far away lie in its box');
 });
 
+test('a few strays hide no scan that lies far away', () => {
+  const grid = (base) => Array.from({ length: 500 }, (_, i) => [i % 10, Math.floor(i / 10) % 10, Math.floor(i / 100)].map(
+    (value, axis) => base[axis] + value / 7));
+  const far = [4_400_000, 5_400_000, 120];
+  const scan = decode('a.xyz', lines([[0, 0, 0], ...grid(far), [0, 0, 0]]));
+  assert.ok(scan.origin.every((value, axis) => Math.abs(value - far[axis]) < 2), `${scan.origin}`);
+  assert.deepEqual(decode('a.xyz', lines([[1e7, 0, 0], ...grid([0, 0, 0])])).origin, [0, 0, 0], 'the scan is here');
+  const rounded = grid(far).map((point) => point.map(Math.fround));
+  assert.throws(() => decode('a.xyz', lines([[0, 0, 0], ...rounded])), /in single precision.*without 1 point far from the others/);
+});
+
 test('gzip is unpacked as zlib packs it', () => {
   const { gzipSync, deflateRawSync, constants } = zlib;
   let state = 3;
