@@ -218,8 +218,8 @@ TEST_F(TransferRpc, RefusesBadImportsAndKeepsNothing) {
     EXPECT_TRUE(eventually([&] { return std::filesystem::is_empty(directory()->path() + "/data/tmp"); }));
 }
 
-// An export can also become the content of a server.
-TEST_F(TransferRpc, AnExportCanBeRestored) {
+// It would take the place of all collections.
+TEST_F(TransferRpc, AnExportIsImportedAndNotRestored) {
     ASSERT_TRUE(addAndWait(client, collection, "k", dumbbell(1)).ok());
     const auto saved = exportCollection(client, collection);
     ASSERT_TRUE(saved.ok()) << saved;
@@ -229,10 +229,17 @@ TEST_F(TransferRpc, AnExportCanBeRestored) {
     CallContext context;
     pb::RestoreResponse restored;
     const auto writer = other.admin->Restore(&context, &restored);
-    for (const pb::BackupChunk& chunk : saved.messages) ASSERT_TRUE(writer->Write(chunk));
+    for (const pb::BackupChunk& chunk : saved.messages) {
+        if (!writer->Write(chunk)) break;
+    }
     writer->WritesDone();
-    ASSERT_TRUE(writer->Finish().ok());
-    EXPECT_EQ(restored.shapes(), 1u);
+    const grpc::Status refused = writer->Finish();
+    EXPECT_EQ(refused.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+    EXPECT_NE(refused.error_message().find("shapedb collection import"), std::string::npos)
+        << refused.error_message();
+    const auto imported = importCollection(other, collection, saved.messages);
+    ASSERT_TRUE(imported.ok()) << imported;
+    EXPECT_EQ(imported.value.shapes(), 1u);
     EXPECT_EQ(searchByScan(other, searchOptions(collection), dumbbell(9)).value.candidates(), 1u);
     ASSERT_TRUE(addAndWait(other, "", "k", dumbbell(2)).ok()) << "the default collection is there";
 }
