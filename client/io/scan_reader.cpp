@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <map>
 #include <new>
+#include <optional>
 #include <string_view>
 #include <system_error>
 #include <utility>
@@ -14,6 +15,7 @@
 #include "client/io/conversion.h"
 #include "client/io/formats.h"
 #include "client/io/input_file.h"
+#include "client/io/kind_of_content.h"
 #include "client/io/scan_content.h"
 #include "client/io/text.h"
 #include "core/base/return_if_error.h"
@@ -208,6 +210,38 @@ Result<void> checkHasContent(InputFile& file, const Format& format) {
     return {};
 }
 
+// What to say in place of a reader's complaint about a file that is not what its ending says.
+std::optional<Error> ofAnotherFormat(const InputFile& file, const Format& format, const ReadOptions& options,
+                                     std::string_view start, std::optional<std::uint64_t> size) {
+    const std::string ending(io::endingOfContent(start, size));
+    const Format* found = formatWithEnding(ending);
+    if (found == nullptr || found->read == format.read) return std::nullopt;
+    const auto* expected = std::find_if(kFormats.begin(), kFormats.end(), [&](const Format& candidate) {
+        return candidate.read == format.read;
+    });
+    const bool named = !options.format.empty() || file.isStandardInput();
+    return file.malformed("this is " + std::string(io::kindName(ending)) + ", not " +
+                          std::string(io::kindName(expected->ending)) + ": " +
+                          (named ? "" : "rename it to end in " + ending + ", or ") + "say --format " +
+                          ending.substr(1));
+}
+
+Result<ScanContent> readContent(InputFile& file, const Format& format, const ReadOptions& options) {
+    const std::string start(file.peek(io::kKindBytes));
+    const auto size = file.remaining();
+    const auto usable = checkHasContent(file, format);
+    auto content = usable ? format.read(file, options.maxPoints) : fail(usable.error());
+    // The real reason comes before the parser's complaint about an early end.
+    if (file.failure()) return fail(*file.failure());
+    if (content) return content;
+    const bool refused = content.error().code == ErrorCode::kMalformedFile ||
+                         content.error().code == ErrorCode::kNonFiniteCoordinate;
+    if (auto error = refused ? ofAnotherFormat(file, format, options, start, size) : std::nullopt) {
+        return fail(std::move(*error));
+    }
+    return content;
+}
+
 Result<Scan> readScanUnguarded(const std::string& path, const ReadOptions& options,
                                const RunContext& context) {
     if (options.meshSamples == 0) {
@@ -218,10 +252,7 @@ Result<Scan> readScanUnguarded(const std::string& path, const ReadOptions& optio
     RETURN_IF_ERROR(file);
     const auto format = chooseFormat(path, options.format);
     RETURN_IF_ERROR(format);
-    RETURN_IF_ERROR(checkHasContent(*file, **format));
-    auto content = (*format)->read(*file, options.maxPoints);
-    // The real reason comes before the parser's complaint about an early end.
-    if (file->failure()) return fail(*file->failure());
+    auto content = readContent(*file, **format, options);
     RETURN_IF_ERROR(content);
     // The vertices: samples of their triangles have digits that tell nothing.
     const auto intact = checkNotRounded(content->vertices);

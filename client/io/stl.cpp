@@ -123,6 +123,20 @@ class StlReader {
         });
     }
 
+    // Four letters where the number of triangles stands are no number: millions, which the file does not
+    // have.
+    static bool isOfLetters(std::uint64_t count) {
+        for (int i = 0; i < 4; ++i, count >>= 8) {
+            if (const std::uint64_t letter = count & 0xff; letter < '\t' || letter > '~') return false;
+        }
+        return true;
+    }
+
+    Error notStl() {
+        return file_.malformed(
+            "this is no STL file: it does not begin with 'solid' and has not the size of a binary one");
+    }
+
     // The header must be in the buffer.
     std::uint64_t announcedTriangles() const {
         return loadAs<std::uint32_t>(file_.data() + kHeaderBytes, !machineIsLittleEndian());
@@ -143,6 +157,7 @@ class StlReader {
         file_.consume(static_cast<std::size_t>(kHeaderBytes + 4));
         const auto left = file_.remaining();
         if (left && count > *left / kTriangleBytes) {
+            if (isOfLetters(count)) return fail(notStl());
             return fail(file_.malformedByte(
                 kHeaderBytes, "the header announces " + countText(count, "triangle") +
                                   ", but the file has room for " + std::to_string(*left / kTriangleBytes)));
@@ -163,6 +178,7 @@ class StlReader {
         if (done < count) {
             const std::uint64_t place = start + done * kTriangleBytes;
             if (!file_.fill(kTriangleBytes)) {
+                if (isOfLetters(count)) return fail(notStl());
                 return fail(file_.malformedByte(place, "the file ends inside triangle " +
                                                            std::to_string(done) + " of " +
                                                            std::to_string(count)));

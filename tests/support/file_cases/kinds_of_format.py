@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What is peculiar to one format."""
 
+import gzip
 import struct
 
-from shapes import (CUBE, FACES, FAR, SQUARES, VERTICES, numbered, obj_text, off_text, pcd_header, ply_binary, ply_header, ply_text,
-                    reads, refused, rows)
+from shapes import (CUBE, FACES, FAR, SQUARES, VERTICES, binaries, numbered, obj_text, off_text, pcd_header, ply_binary, ply_header,
+                    ply_text, reads, refused, rows, stl_binary, texts)
 
 
 def cases():
@@ -19,6 +20,7 @@ def cases():
     yield from refused_text()
     yield from far()
     yield from other_formats()
+    yield from wrong_endings()
 
 
 def ply_faces():
@@ -285,3 +287,41 @@ def other_formats():
     for name in ("scan.e57", "scan.laz", "model.fbx", "scan", "notes.md", "scan.gz"):
         yield refused(f"no format: {name}", name, "1 2 3\n", reason="unknown_file_format")
 
+
+NAMES = {
+    "ply": "a PLY file", "pcd": "a PCD file", "off": "an OFF file", "obj": "an OBJ file", "stl": "an STL file", "xyz": "text with a point on each line",
+    "las": "a LAS file", "gltf": "a glTF file", "glb": "a glTF file", "3mf": "a 3MF file",
+}
+
+
+def wrong_endings():
+    """Each format under the endings of all others is named, and no reader makes a count of its letters."""
+    files = {**{name: data.encode() for name, (data, _) in texts().items()}, **{name: data for name, (data, _) in binaries().items()},
+             "bigtitle.stl": stl_binary(b"\x80 exported by a test"), "binary.stl": stl_binary(), "points.las": b"LASF" + bytes(223) + b"\1" * 60,
+             "scene.gltf": b'{"asset": {"version": "2.0"}, "scenes": []}', "scene.glb": b"glTF\2\0\0\0\24\0\0\0" + bytes(8),
+             "part.3mf": b"PK\3\4" + bytes(26) + b"3D/3dmodel.model" + bytes(60)}
+    for name, data in files.items():
+        kind = {"csv": "xyz", "pts": "xyz"}.get(name.split(".")[-1], name.split(".")[-1])
+        for ending in ("ply", "pcd", "off", "obj", "stl", "xyz", "csv"):
+            other = "xyz" if ending == "csv" else ending
+            if other != kind:
+                yield refused(f"{ending}: the bytes of {name}", f"a.{ending}", data,
+                              f"this is {NAMES[kind]}, not {NAMES[other]}: rename it to end in .{kind}")
+    for name, text in texts().items():
+        kind = "stl" if name != "stl" else "ply"
+        yield refused(f"{kind}: packed {name}", f"a.{kind}.gz", gzip.compress(text[0].encode(), mtime=0), f"not {NAMES[kind]}: rename it")
+        utf16 = ("\ufeff" + text[0]).encode("utf-16-le")
+        yield refused(f"{kind}: {name} in UTF-16", f"a.{kind}", utf16, f"not {NAMES[kind]}: rename it")
+    yield refused("stl: a PLY header in capitals", "a.stl", ply_binary().replace(b"ply\n", b"PLY\r", 1), "this is a PLY file")
+    yield refused("ply: the shortest PCD", "a.ply", "FIELDS x y z\nPOINTS 1\nDATA ascii\n1 2 3\n", "this is a PCD file")
+    for first in ("COFF", "STCNOFF", "off", "OFF BINARY", "OFF5 4 0"):
+        yield refused(f"ply: {first}", "a.ply", f"# a comment\n{first}\n", "this is an OFF file")
+    # What begins like no format keeps the words of the reader, and a damaged file those of its own.
+    for name, text, *says in (
+        ("ply: a sentence", "Off we go\n", "expected 'ply'"), ("pcd: a sentence", "version two of this text\n", "DATA line"),
+        ("off: whole numbers", "1 2 3\n4 5 6\n", "line 2"), ("off: an archive", "PK\3\4 of another kind", "unpack it first"),
+        ("ply: an STL file without facets", "solid\n", "expected 'ply'"), ("ply: damaged", "ply\nformat solid\n", "line 2"),
+    ):
+        yield refused(f"{name}, as it is", f"a.{name.split(':')[0]}", text, *says)
+    document = b"%PDF-1.4 " + bytes(range(128, 192)) + b" of some words" + bytes(40)
+    yield refused("stl: letters for a number", "a.stl", document, "this is no STL file: it does not begin with 'solid'")

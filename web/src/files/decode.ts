@@ -7,6 +7,7 @@ import type { Content } from './content';
 import { endingOf } from './ending';
 import { countText, FileFault } from './fault';
 import { gunzip, isPacked } from './gunzip';
+import { endingOfContent, kKindNames } from './kind_of_content';
 import { readObj } from './obj';
 import { readOff } from './off';
 import { readPcd } from './pcd';
@@ -83,8 +84,21 @@ function named<R>(name: string, read: () => R): R {
 function contentOf(name: string, bytes: Uint8Array): Content {
   const read = readerOf(name);
   const unpacked = isPacked(bytes) ? gunzip(bytes) : bytes;
-  checkHasContent(unpacked);
-  return read(new ScanBytes(unpacked));
+  try {
+    checkHasContent(unpacked);
+    return read(new ScanBytes(unpacked));
+  } catch (error) {
+    throw (error instanceof FileFault ? ofAnotherFormat(read, unpacked) : undefined) ?? error;
+  }
+}
+
+/** What to say in place of the reader's complaint about a file that is not what its ending says. */
+function ofAnotherFormat(read: (file: ScanBytes) => Content, bytes: Uint8Array): FileFault | undefined {
+  const ending = endingOfContent(bytes);
+  if (ending === undefined || kReaders[ending] === read) return undefined;
+  const expected = kFileEndings.find((one) => kReaders[one] === read)!;
+  const elsewhere = kReaders[ending] === undefined ? ' (the command reads that, this page does not)' : '';
+  return new FileFault(`this is ${kKindNames[ending]}, not ${kKindNames[expected]}: rename it to end in .${ending}${elsewhere}`);
 }
 
 function readerOf(name: string): (file: ScanBytes) => Content {

@@ -7,11 +7,12 @@ from __future__ import annotations
 import os
 import warnings
 from pathlib import Path, PurePath
-from typing import Callable, Dict
+from typing import Callable, Dict, Optional
 
 from ._connection import PathLike
 from ._errors import InvalidInput, ShapeDBError
 from ._gunzip import gunzip, is_packed
+from ._kind_of_content import NAMES, ending_of_content
 from ._mesh import SAMPLES, points_of_mesh
 from ._npy import read_npy
 from ._obj import read_obj
@@ -83,9 +84,7 @@ def content_of(name: str, data: bytes) -> Content:
     """What is in the bytes of the file. Raises `ShapeDBError`."""
     reader = _reader_of(name)
     try:
-        data = gunzip(data) if is_packed(data) else data
-        _check_has_content(data)
-        content = reader(ScanBytes(data))
+        content = _read(reader, gunzip(data) if is_packed(data) else data)
         check_not_rounded(content.vertices)
         return content
     except InvalidInput as error:
@@ -94,6 +93,24 @@ def content_of(name: str, data: bytes) -> Content:
         raise ShapeDBError("out_of_memory", f"{name}: not enough memory to read the file") from None
     except Exception as error:  # a fault of ours, which a strange file must not turn into one of the caller's
         raise ShapeDBError("internal", f"{name}: reading failed: {error}") from error
+
+
+def _read(reader: Callable[[ScanBytes], Content], data: bytes) -> Content:
+    try:
+        _check_has_content(data)
+        return reader(ScanBytes(data))
+    except InvalidInput as error:
+        raise _of_another_format(reader, data) or error from None
+
+
+def _of_another_format(reader: Callable[[ScanBytes], Content], data: bytes) -> Optional[InvalidInput]:
+    """What to say in place of the reader's complaint about a file that is not what its ending says."""
+    ending = ending_of_content(data)
+    if not ending or _READERS.get(ending) is reader:
+        return None
+    expected = next(name for name in _READERS if _READERS[name] is reader)
+    elsewhere = "" if ending in _READERS else " (the command reads that, this package does not)"
+    return malformed(f"this is {NAMES[ending]}, not {NAMES[expected]}: rename it to end in {ending}{elsewhere}")
 
 
 def ending_of(path: "PurePath | str") -> str:

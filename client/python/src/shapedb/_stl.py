@@ -60,6 +60,9 @@ def _read_binary(file: ScanBytes) -> Content:
     file.offset += _HEADER_BYTES + 4
     room = file.remaining // _RECORD.itemsize
     if count > room:
+        # Four letters where the number of triangles stands are no number.
+        if re.fullmatch(rb"[\t-~]{4}", file.data[file.offset - 4:file.offset]):
+            raise malformed("this is no STL file: it does not begin with 'solid' and has not the size of a binary one")
         raise file.at_byte(_HEADER_BYTES,
                            f"the header announces {count_text(count, 'triangle')}, but the file has room for {room}")
     corners = np.frombuffer(file.data, _RECORD, count, file.offset)["corners"].astype(np.float64).reshape(-1, 3)
