@@ -47,6 +47,10 @@ before(async () => {
     writeFileSync(join(folder, `${key}.xyz`), handed(sign));
     server.command('add', join(folder, `${key}.xyz`), '--key', key, '--collection', 'twins', '--wait');
   }
+  server.command('collection', 'create', 'sized', '--units', 'mm');
+  server.command('add', join(folder, 'scans/mug/mug_01.ply'), '--key', 'small', '--collection', 'sized', '--wait');
+  scanAgain(join(folder, 'scans/mug/mug_01.ply'), join(folder, 'large.xyz'));
+  server.command('add', join(folder, 'large.xyz'), '--key', 'large', '--collection', 'sized', '--wait');
   server.command('add', scan, '--key', kNasty, '--meta', `note=${kNasty}`, '--collection', 'parts', '--wait');
 });
 
@@ -110,9 +114,18 @@ pageTest('a search by key ranks, says what it found, and lays a hit on the query
   assert.match(await first.locator('.verdict').innerText(), /^same object/);
   assert.ok(Number(await first.locator('.score-value').innerText()) > 0.6);
   assert.equal(await first.locator('.reason').count(), 4);
+  // In plain words, without a pointer over them.
+  assert.match(await first.locator('.fit-words').innerText(), /^\d+ % of the query lies on the hit, \d+ % of what the query should show/);
+  const seen = await first.locator('.reason .meaning').all();
+  assert.equal(seen.length, 4);
+  for (const one of seen) assert.ok(await one.isVisible() && (await one.innerText()).length > 20);
   await first.click();
   await page.locator('.overlay-controls').waitFor();
   await settled(page);
+  assert.match(await page.locator('.panel .fit-words').innerText(), /lies on the hit/);
+  const rows = page.locator('table.reasons tbody tr');
+  assert.ok(await rows.count() >= 10);
+  assert.equal(await rows.locator('.meaning').count(), await rows.count(), 'every reason is explained');
   const aligned = await pixelsOf(page, '.viewer');
   const [query, hit] = [boxOf(aligned, isBlue), boxOf(aligned, isOrange)];
   assert.ok(query.count > 1_000 && hit.count > 1_000, `${query.count} and ${hit.count} pixels`);
@@ -143,6 +156,27 @@ pageTest('a search by key ranks, says what it found, and lays a hit on the query
   await settled(page);
   const near = boxOf(await pixelsOf(page, '.viewer'), ([r, g, b]) => b > r && b > 90);
   assert.ok(near.count > 1_000, `${near.count} pixels are near: scans of one object touch`);
+});
+
+pageTest('whether sizes count is shown as it is', async (page) => {
+  const box = page.getByLabel('Same size');
+  const sizes = async (address) => {
+    await visit(page, server, address);
+    return [await box.isChecked(), await page.locator('.hit .score-value').first().innerText()];
+  };
+  const [ticked, score] = await sizes('#/like/sized/small');
+  assert.equal(ticked, true, 'a collection with a unit');
+  assert.deepEqual(await sizes('#/like/sized/small?size=1'), [true, score]);
+  await visit(page, server, '#/like/sized/small');
+  await box.uncheck();
+  await page.waitForFunction(() => location.hash.endsWith('size=0'));
+  const [free, freeScore] = await sizes('#/like/sized/small?size=0');
+  assert.equal(free, false);
+  assert.ok(Number(freeScore) > Number(score) + 0.1, `${freeScore} without sizes, ${score} with them`);
+  await visit(page, server, '#/compare/sized/small/large');
+  assert.equal(await box.isChecked(), true);
+  await visit(page, server, '#/like/twins/left');
+  assert.equal(await box.isChecked(), false, 'a collection without one');
 });
 
 pageTest('a dropped scan is shown in segments, searched with and stored', async (page) => {

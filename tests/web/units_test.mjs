@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page's arithmetic without a browser.
 import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
 import { after, before, test } from 'node:test';
 
 import { bundled } from './bundle.mjs';
@@ -8,7 +9,7 @@ import { bundled } from './bundle.mjs';
 let page, remove;
 
 before(async () => ({ page, remove } = await bundled(
-  ['address', 'filter', 'cloud/nearest', 'cloud/grouping', 'cloud/motion', 'cloud/cloud', 'api/envelope', 'text'])));
+  ['address', 'filter', 'cloud/nearest', 'cloud/grouping', 'cloud/motion', 'cloud/cloud', 'api/envelope', 'text', 'parts/reasons'])));
 after(() => remove());
 
 test('distances are those of trying all', () => {
@@ -74,6 +75,19 @@ test('a mirrored twin is told, unless left and right look alike', () => {
   assert.equal(page.likeness(same, undefined), 'same object');
   assert.equal(page.likeness(unrelated, fit(true, false)), 'unrelated');
   assert.equal(page.fitsMirrored(undefined), undefined);
+});
+
+test('reasons say what docs/concepts.md says of them', () => {
+  const text = readFileSync(new URL('../../docs/concepts.md', import.meta.url), 'utf8');
+  const reasons = text.slice(text.indexOf('## Reasons'), text.indexOf('## Views'));
+  const rows = [...reasons.matchAll(/^\| ([a-z ]+) \| ([^|]+) \|$/gm)].map(([, name, meaning]) => [name, meaning]).slice(1);
+  assert.ok(rows.length >= 14);
+  assert.deepEqual(page.kMeanings, Object.fromEntries(rows));
+});
+
+test('how two lie on each other is said in words', () => {
+  assert.equal(page.fitWords({ explainedQuery: 0.33, explainedOther: 0.984 }),
+    '33 % of the query lies on the hit, 98 % of what the query should show of it is there');
 });
 
 test('envelopes are found in any pieces', () => {

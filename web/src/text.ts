@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Numbers and values of the API in words.
 import { ShapeState } from '../gen/shapedb/v1/types_pb';
-import type { Fit } from '../gen/shapedb/v1/search_service_pb';
+import type { Fit, FitPose } from '../gen/shapedb/v1/search_service_pb';
 import { Verdict } from '../gen/shapedb/v1/search_service_pb';
 
 const kCount = new Intl.NumberFormat('en');
@@ -66,6 +66,11 @@ export function likeness(verdict: Verdict, fit: Fit | undefined, part = 'the que
   // Of different objects neither is the mirror image of the other.
   const different = verdict === Verdict.SAME_KIND || verdict === Verdict.UNRELATED;
   return fitsMirrored(fit) && !different ? [name, 'mirrored'].filter(Boolean).join(', ') : name;
+}
+
+/** How the two lie on each other, as the command says it. */
+export function fitWords({ explainedQuery, explainedOther }: FitPose, query = 'the query', hit = 'the hit'): string {
+  return `${percent(explainedQuery)} of ${query} lies on ${hit}, ${percent(explainedOther)} of what ${query} should show of it is there`;
 }
 
 function verdictName(verdict: Verdict, part: string): string {

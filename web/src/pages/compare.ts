@@ -28,7 +28,7 @@ export function compareView(address: Address, signal: AbortSignal): View {
         h('a', {
           class: 'button', href: formatAddress({ ...address, keys: [other, query] }),
         }, 'Swap')),
-      switches(address, ['partial', 'mirror', 'size']), reasons));
+      switches(address, ['partial', 'mirror', 'size'], signal), reasons));
   fill(picture, loading('The points of both are being fetched and segmented'));
   void fillWhenLoaded(reasons, 'The two are being laid on each other', signal, async () => {
     const answer = await compare(address, query, other, signal);
@@ -42,9 +42,9 @@ export function compareView(address: Address, signal: AbortSignal): View {
 
 function compare(address: Address, query: string, other: string, signal: AbortSignal): Promise<CompareResponse> {
   const { collection } = address;
-  const { partial, forbidReflection, keepScale } = choicesOf(address);
+  const { partial, forbidReflection, keepScale, freeScale } = choicesOf(address);
   return call(SearchService.method.compare, {
-    query: { collection, key: query }, other: { collection, key: other }, partial, forbidReflection, keepScale,
+    query: { collection, key: query }, other: { collection, key: other }, partial, forbidReflection, keepScale, freeScale,
   }, { signal });
 }
 

@@ -19,7 +19,7 @@ const kHits = 24;
 
 /** SearchOptions as the address has them. */
 export function searchOptionsOf(address: Address) {
-  const { partial, forbidReflection, keepScale, verify } = choicesOf(address);
+  const { partial, forbidReflection, keepScale, freeScale, verify } = choicesOf(address);
   return {
     collection: address.collection,
     k: Math.min(Math.max(Number(address.options['k']) || kHits, 1), 200),
@@ -27,6 +27,7 @@ export function searchOptionsOf(address: Address) {
     partial,
     forbidReflection,
     keepScale,
+    freeScale,
     ...(verify === undefined ? {} : { verify }),
   };
 }
@@ -38,7 +39,7 @@ export function likeView(address: Address, signal: AbortSignal): View {
   const element = h('div', { class: 'content' },
     h('div', { class: 'query' }, query,
       h('div', {}, h('h1', {}, 'Like ', h('a', { href: linkTo(address, 'shape', [key]) }, key)),
-        switches(address, ['partial', 'mirror', 'size', 'verify']), filterField(address))),
+        switches(address, ['partial', 'mirror', 'size', 'verify'], signal), filterField(address))),
     results);
   void storedShape(address.collection, key, signal)
     .then(({ version }) => query.replaceChildren(pictureOf({ collection: address.collection, key, version }, signal)))

@@ -69,7 +69,7 @@ function showScan(place: HTMLElement, session: ScanSession, address: Address, si
     h('div', { class: 'with-panel' },
       h('div', { class: 'content' }, h('h1', {}, session.name), stage, pictureHint()), about),
     h('div', { class: 'content' }, h('h2', {}, `Like it in ${address.collection}`),
-      switches(address, ['partial', 'mirror', 'size', 'verify']), filterField(address), results));
+      switches(address, ['partial', 'mirror', 'size', 'verify'], signal), filterField(address), results));
   const viewer = viewerIn(stage, `${session.name}, coloured by segment`, signal);
   const points = thinned(session.positions, kMostDrawn);
   viewer?.addLayer(normalised(points, frameOf(points)), coloured(points.length / 3, () => kQuery));

@@ -3,7 +3,7 @@
 import type { Address } from '../address';
 import { linkTo } from '../address';
 import { h } from '../dom';
-import { count, likeness, percent, score, stateName, verdictClass } from '../text';
+import { count, fitWords, likeness, percent, score, stateName, verdictClass } from '../text';
 import type { Fit, Hit } from '../../gen/shapedb/v1/search_service_pb';
 import { Verdict } from '../../gen/shapedb/v1/search_service_pb';
 import type { Shape } from '../../gen/shapedb/v1/types_pb';
@@ -53,6 +53,7 @@ export function hitCard(hit: Hit, rank: number, href: string, signal: AbortSigna
     h('span', { class: 'card-note' }, noteOf(shape)),
     scoreLine(hit.score),
     verdictLine(hit),
+    hit.fit?.best && h('span', { class: 'fit-words' }, fitWords(hit.fit.best)),
     hit.explanation && smallReasons(hit.explanation.terms));
 }
 

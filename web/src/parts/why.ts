@@ -2,7 +2,7 @@
 // What two shapes are to each other, in words and bars.
 import type { Child } from '../dom';
 import { h } from '../dom';
-import { percent } from '../text';
+import { fitWords, percent } from '../text';
 import { scoreLine, verdictLine } from './card';
 import { facts } from './facts';
 import { allReasons } from './reasons';
@@ -29,6 +29,7 @@ export function why(likeness: Likeness): Child[] {
     h('div', { class: 'verdict-box' }, scoreLine(likeness.score),
       verdictLine(likeness)),
     fit && h('h2', {}, 'How they lie on each other'),
+    fit?.best && h('p', { class: 'fit-words' }, `${fitWords(fit.best)}.`),
     fit && fitFacts(fit),
     explanation && explanation.terms.length > 0 && h('h2', {}, 'Why this score'),
     explanation && explanation.terms.length > 0 && allReasons(explanation.terms),
@@ -44,8 +45,6 @@ function fitFacts(fit: Fit): HTMLElement {
   };
   return facts([
     ['query', kinds[fit.kind]],
-    ['query on hit', percent(best.explainedQuery)],
-    ['hit on query', percent(best.explainedOther)],
     ['apart', `${percent(best.residual)} of the query's size`],
     ['scaled by', motion.scale.toPrecision(4)],
     ['mirrored', fit.leftRightOpen ? 'cannot be told' : motion.reflected ? 'yes' : 'no'],
