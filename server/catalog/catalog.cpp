@@ -244,7 +244,7 @@ Result<void> Catalog::restore(const std::string& path, const RunContext& context
     RETURN_IF_ERROR(restores_.beginRestore());
     Result<void> restored = restoreExclusively(path, context, mayReplace);
     restores_.endRestore();
-    if (!restored) return fail(named(restored.error(), path, "the backup"));
+    if (!restored) return fail(named(restored.error(), path, "the file"));
     return restored;
 }
 

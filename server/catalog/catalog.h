@@ -193,7 +193,7 @@ class Catalog {
     [[nodiscard]] Result<void> admitImport(const std::string& name) const;
     /// Adds the collection of an exported file under `name`, or under its own if that is empty; searches find
     /// it, and workers get its pending shapes, when this returns. `mayUse` is asked for the name before
-    /// anything is stored, and once more before any of it is seen. Errors, which call the file "the export":
+    /// anything is stored, and once more before any of it is seen. Errors, which call it "the file":
     /// kInvalidArgument (name, description, metadata), kMalformedFile (also: parameters), those of `mayUse`
     /// and of store::Store::importCollection.
     using MayUse = std::function<Result<void>(const std::string& name)>;
@@ -330,7 +330,7 @@ class Catalog {
     /// As store::Store; logs what was told.
     [[nodiscard]] Result<void> acknowledge();
     /// Replaces everything by the backup `path` while workers and rebuilds pause, and loads the index.
-    /// Errors, which call the file "the backup": kRejected (another restore is running), those of
+    /// Errors, which call it "the file": kRejected (another restore is running), those of
     /// store::Store::restore and of `mayReplace`; those of CollectionIndex::loadAll, after which the content
     /// is replaced but cannot be looked up.
     [[nodiscard]] Result<void> restore(const std::string& path, const RunContext& context,

@@ -78,7 +78,7 @@ Result<index::SnapshotPtr> Catalog::importCollection(const std::string& path, co
     const auto imported = store_->importCollection(path, request, context);
     if (!imported) {
         if (prepared) index_.remove(*prepared);
-        return fail(named(imported.error(), path, "the export"));
+        return fail(named(imported.error(), path, "the file"));
     }
     auto shown = index_.show(imported->id);
     workers_.wake();

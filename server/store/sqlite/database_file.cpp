@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "server/store/sqlite/database_file.h"
 
+#include <array>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <string_view>
 #include <vector>
 
 #include <fcntl.h>
@@ -83,6 +85,10 @@ void copyBytes(const std::string& from, const std::string& to, const RunContext&
     }
 }
 
+[[noreturn]] void raiseForeign(const std::string& path, const FileUse& use) {
+    raise(ErrorCode::kMalformedFile, quoted(path) + " is no " + use.kind + " of ShapeDB");
+}
+
 /// A file of a running database is not a backup.
 void requireBackupFile(const std::string& path, const std::string& livePath) {
     std::error_code error;
@@ -100,9 +106,19 @@ void requireBackupFile(const std::string& path, const std::string& livePath) {
     }
 }
 
+/// SQLite opens any file, and speaks of damage then.
+void requireDatabase(const std::string& copyPath, const std::string& path, const FileUse& use) {
+    constexpr std::string_view kStart("SQLite format 3\0", 16);
+    std::array<char, kStart.size()> start{};
+    const File copy(copyPath, O_RDONLY);
+    const ssize_t got = copy.get() < 0 ? 0 : ::read(copy.get(), start.data(), start.size());
+    if (got != static_cast<ssize_t>(start.size()) || std::string_view(start.data(), start.size()) != kStart) {
+        raiseForeign(path, use);
+    }
+}
+
 /// Migrates the private copy of a backup and checks it.
 void prepareCopy(Connection& copy, const SqliteOptions& options, const RunContext& context) {
-    if (identify(copy) != FileKind::kOurs) raise(ErrorCode::kDataLoss, "it is not a ShapeDB database");
     if (copy.integer("PRAGMA page_size") != kPageSize) {
         raise(ErrorCode::kDataLoss, "its page size is not " + std::to_string(kPageSize));
     }
@@ -120,8 +136,11 @@ void prepareCopy(Connection& copy, const SqliteOptions& options, const RunContex
 }
 
 /// What is wrong with the copy of `path`, as an error of the file that was named.
-Failure blamed(const Failure& failure, const std::string& path, const char* use) {
-    const std::string message = "'" + path + "' cannot be " + use + ": " + failure.error.message;
+Failure blamed(const Failure& failure, const std::string& path, const FileUse& use) {
+    std::string message = quoted(path) + " cannot be " + use.done + ": " + failure.error.message;
+    // The database that runs is not damaged.
+    const std::size_t remedy = message.find(std::string("; ") + kDamageRemedy);
+    if (remedy != std::string::npos) message.resize(remedy);
     switch (failure.error.code) {
         case ErrorCode::kDataLoss:
         case ErrorCode::kInternal:  // a constraint broken by the file's content
@@ -177,14 +196,17 @@ void makeEmptyDatabase(Connection& connection, std::int64_t nowMs) {
     migrate(connection, embeddedMigrations(), nowMs);
 }
 
-std::unique_ptr<Connection> checkedCopy(const std::string& path, const char* use, const std::string& copyPath,
-                                        const SqliteOptions& options, const RunContext& context) {
+std::unique_ptr<Connection> checkedCopy(const std::string& path, const FileUse& use,
+                                        const std::string& copyPath, const SqliteOptions& options,
+                                        const RunContext& context) {
     requireBackupFile(path, options.path);
     // The file that the user named stays as it is; migrations change the copy.
     copyBytes(path, copyPath, context);
     SHAPEDB_FAILPOINT("restore.copied");
+    requireDatabase(copyPath, path, use);
     try {
         auto copy = std::make_unique<Connection>(copyPath, OpenMode::kReadWrite, options.busyTimeoutMs);
+        if (identify(*copy) != FileKind::kOurs) raiseForeign(path, use);
         prepareCopy(*copy, options, context);
         return copy;
     } catch (const Failure& failure) {

@@ -49,11 +49,19 @@ class NewFile {
 /// Gives an empty file the schema of this program.
 void makeEmptyDatabase(Connection& connection, std::int64_t nowMs);
 
+/// What somebody wants of a file, for messages.
+struct FileUse {
+    const char* kind;  ///< "backup"
+    const char* done;  ///< completes "cannot be ..."
+};
+inline constexpr FileUse kRestored{"backup", "restored"};
+inline constexpr FileUse kImported{"export", "imported"};
+
 /// A copy at `copyPath` of a file that somebody named, with the schema of this program and no problem that
-/// `check` finds; an unfinished import is gone. The file itself is left alone. `use` completes "cannot be
-/// ...". Reports "copy" (bytes), "integrity" and "points". Throws Failure kFileNotReadable, kMalformedFile,
-/// kSchemaTooNew (naming `path`), kCancelled, kDeadlineExceeded.
-[[nodiscard]] std::unique_ptr<Connection> checkedCopy(const std::string& path, const char* use,
+/// `check` finds; an unfinished import is gone. The file itself is left alone. Reports "copy" (bytes),
+/// "integrity" and "points". Throws Failure kFileNotReadable, kMalformedFile, kSchemaTooNew (naming `path`),
+/// kCancelled, kDeadlineExceeded.
+[[nodiscard]] std::unique_ptr<Connection> checkedCopy(const std::string& path, const FileUse& use,
                                                       const std::string& copyPath,
                                                       const SqliteOptions& options,
                                                       const RunContext& context);

@@ -107,7 +107,7 @@ Result<void> SqliteStore::restore(const std::string& path, const RunContext& con
                                   const std::function<Result<void>()>& replacing) {
     return guarded("restore the backup", [&] {
         const TemporaryDatabase temporary(options_.path + ".restore");
-        const auto copy = checkedCopy(path, "restored", temporary.path(), options_, context);
+        const auto copy = checkedCopy(path, kRestored, temporary.path(), options_, context);
         requireWholeBackup(*copy, path);
         // Until the end: no id may be given out between reading the last ones and replacing the tables.
         const std::lock_guard<std::mutex> lock(writerMutex_);

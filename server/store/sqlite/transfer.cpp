@@ -103,7 +103,7 @@ Result<Collection> SqliteStore::importCollection(const std::string& path, const 
     if (!oneAtATime) return fail(ErrorCode::kRejected, "another import is running: try again after it");
     auto imported = guarded("import the collection", [&] {
         const TemporaryDatabase temporary(options_.path + ".import");
-        const auto file = checkedCopy(path, "imported", temporary.path(), options_, context);
+        const auto file = checkedCopy(path, kImported, temporary.path(), options_, context);
         const Collection from = onlyCollection(*file, path);
         Collection wanted = from;
         wanted.id = 0;

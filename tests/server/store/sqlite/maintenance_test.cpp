@@ -26,11 +26,14 @@ class SqliteMaintenanceTest : public StoreTest {
         ASSERT_TRUE(store_->backup(backup_, {}));
     }
 
-    void expectRefused(const std::string& path, ErrorCode code) {
+    void expectRefused(const std::string& path, ErrorCode code, const std::string& says = {}) {
         const Shape before = put(collection_.id, "live", 99);
         const auto refused = store_->restore(path, {}, {});
         ASSERT_FALSE(refused);
         EXPECT_EQ(refused.error().code, code) << refused.error().message;
+        EXPECT_NE(refused.error().message.find(says), std::string::npos) << refused.error().message;
+        // The database that runs is not damaged.
+        EXPECT_EQ(refused.error().message.find("admin check"), std::string::npos) << refused.error().message;
         EXPECT_TRUE(store_->getShape(collection_.id, "live").value() == before);
         EXPECT_FALSE(std::filesystem::exists(folder_.file("shapes.db.restore")));
         expectSound();
@@ -131,17 +134,18 @@ TEST_F(SqliteMaintenanceTest, RefusesBadBackups) {
     expectRefused(folder_.file("missing.db"), ErrorCode::kFileNotReadable);
     expectRefused(folder_.file("."), ErrorCode::kFileNotReadable);
     const std::string path = folder_.file("bad.db");
-    spill(path, "");
-    expectRefused(path, ErrorCode::kMalformedFile);
-    spill(path, std::string(10000, 'x'));
-    expectRefused(path, ErrorCode::kMalformedFile);
+    const std::string noBackup = "'" + path + "' is no backup of ShapeDB";
+    for (const std::string& bytes : {std::string(), std::string("ply\n"), std::string(10000, 'x')}) {
+        spill(path, bytes);
+        expectRefused(path, ErrorCode::kMalformedFile, noBackup);
+    }
     spill(path, slurp(backup_).substr(0, 40000));
-    expectRefused(path, ErrorCode::kMalformedFile);
+    expectRefused(path, ErrorCode::kMalformedFile, "cannot be restored: ");
     spill(path, slurp(backup_));
     spill(path + "-wal", "in use");
     expectRefused(path, ErrorCode::kMalformedFile);
     expectRefused(folder_.file("shapes.db"), ErrorCode::kMalformedFile);
-    expectRefused(changed("PRAGMA application_id=1"), ErrorCode::kMalformedFile);
+    expectRefused(changed("PRAGMA application_id=1"), ErrorCode::kMalformedFile, "is no backup of ShapeDB");
     const std::string next = std::to_string(embeddedMigrations().size() + 1);
     expectRefused(changed("PRAGMA user_version=" + next), ErrorCode::kSchemaTooNew);
     expectRefused(changed("INSERT INTO schema_migration VALUES (" + next +

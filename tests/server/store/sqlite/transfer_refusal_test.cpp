@@ -20,9 +20,9 @@ TEST_F(SqliteTransferRefusalTest, RefusesHostileFiles) {
     const std::string path = folder_.file("bad.db");
     expectRefused(folder_.file("missing.db"), ErrorCode::kFileNotReadable);
     spill(path, std::string(10'000, 'x'));
-    expectRefused(path, ErrorCode::kMalformedFile);
+    expectRefused(path, ErrorCode::kMalformedFile, "'" + path + "' is no export of ShapeDB");
     spill(path, "");
-    expectRefused(path, ErrorCode::kMalformedFile);
+    expectRefused(path, ErrorCode::kMalformedFile, "is no export of ShapeDB");
     spill(path, slurp(good).substr(0, 40'960));
     expectRefused(path, ErrorCode::kMalformedFile);
     std::string damaged = slurp(good);
