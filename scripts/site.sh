@@ -16,7 +16,8 @@ case "${1:-}" in
   *)
     target=$(realpath -m "${1:-build/site}")
     printed=$(mkdocs build --strict --clean --site-dir "$target" 2>&1) || { grep -v '^INFO' <<< "$printed" >&2; exit 1; }
-    find "$target" -name 'sitemap.xml*' -delete  # it needs the address of the site
+    # They need the address of the site.
+    find "$target" \( -name 'sitemap.xml*' -o -name 404.html \) -delete
     echo "the site is $target/index.html"
     ;;
 esac

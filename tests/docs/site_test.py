@@ -53,7 +53,7 @@ class Site(unittest.TestCase):
         assert code == 0, printed
         cls.pages = {}
         for name in sorted(os.listdir(cls.folder)):
-            if name.endswith(".html") and name != "404.html":
+            if name.endswith(".html"):
                 with open(os.path.join(cls.folder, name), encoding="utf-8") as file:
                     cls.pages[name] = Page(file.read())
 
@@ -92,6 +92,7 @@ class Site(unittest.TestCase):
         for name, page in self.pages.items():
             for rel, address in page.loaded:
                 if rel != "canonical":
+                    self.assertFalse(address.startswith("/"), f"{name} is in a folder, or below one: {address}")
                     self.assertFalse(urlsplit(address).netloc, f"{name} loads {address}")
                     self.assertTrue(os.path.isfile(os.path.join(self.folder, urlsplit(address).path)), f"{name}: {address}")
         for folder, _, files in os.walk(self.folder):
