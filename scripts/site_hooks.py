@@ -4,7 +4,8 @@
 import re
 
 MARKER = re.compile(r"^[ \t]*<!-- (setup|not run|output|data)\b.*-->[ \t]*\n", re.MULTILINE)
-LINK = re.compile(r"(?<!!)\[((?:[^\[\]]|\[[^\]]*\])*)\]\((\.\./[^)\s]+)\)")
+LINK_TEXT = r"(?<!!)\[((?:[^\[\]]|\[[^\]]*\])*)\]"
+LINK = re.compile(LINK_TEXT + r"\((\.\./[^)\s]+)\)")
 ITEM = re.compile(r"([-*]|\d+\.) +")
 
 

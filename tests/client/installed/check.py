@@ -26,7 +26,7 @@ COMPONENTS = {
     "client": ["bin/shapedb"],
     "development": ["include/shapedb/client/api/client.h", "share/shapedb/proto/shapedb/v1/types.proto"],
     "python": ["lib/python3/dist-packages/shapedb/__init__.py", "lib/python3/dist-packages/shapedb/v1/types_pb2.py"],
-    "docs": ["share/doc/shapedb/docs/install.md", "share/doc/shapedb/README.md"],
+    "docs": ["share/doc/shapedb/docs/install.md", "share/doc/shapedb/README.md", "share/doc/shapedb/LICENSES/Apache-2.0.txt"],
 }
 
 
@@ -75,6 +75,18 @@ class Installed(unittest.TestCase):
                 self.assertNotIn(file, found, f"in {component} too")
                 found[file] = component
         self.assertEqual(set(found), files_below(PREFIX))
+
+    def test_links_between_installed_pages_lead_to_files(self):
+        folder = PREFIX / "share/doc/shapedb"
+        pages = [*folder.glob("*.md"), *folder.glob("docs/*.md")]
+        self.assertGreater(len(pages), 40)
+        kept = 0
+        for page in pages:
+            for target in re.findall(r"\]\(([^)#\s]+)(?:#[^)\s]*)?\)", re.sub(r"```.*?```", "", page.read_text(), flags=re.DOTALL)):
+                if not re.match(r"[a-z]+:", target):
+                    self.assertTrue((page.parent / target).exists(), f"{page}: {target}")
+                    kept += 1
+        self.assertGreater(kept, 300)
 
     def test_a_program_outside_the_tree_links_the_library(self):
         self.assertEqual(run(WORK / "program/program"), "unavailable\n")
