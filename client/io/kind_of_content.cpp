@@ -170,6 +170,25 @@ std::string_view endingOfContent(std::string_view head, std::optional<std::uint6
     return size && hasSizeOfStl(head, *size) ? ".stl" : "";
 }
 
+bool hasTextForBinary(std::string_view head) {
+    constexpr std::size_t kLeastText = 12;
+    constexpr std::size_t kMostText = 1024;
+    constexpr std::string_view kEndOfPly = "end_header";
+    const std::string lower = lowerCase(head);
+    std::size_t at = std::min(lower.find("\ndata binary"), lower.find("\rdata binary"));
+    if (const std::size_t format = lower.find("format binary"); format < at) {
+        const std::size_t end = lower.find(kEndOfPly, format);
+        at = end == std::string::npos ? end : end + kEndOfPly.size() - 1;
+    }
+    if (at == std::string::npos) return false;
+    const std::size_t lineEnd = lower.find_first_of("\r\n", at + 1);
+    if (lineEnd == std::string::npos) return false;
+    const std::string_view body = std::string_view(lower).substr(lineEnd).substr(0, kMostText);
+    const auto isOfText = [](char c) { return (c >= ' ' && c <= '~') || (c >= '\t' && c <= '\r'); };
+    return body.size() >= kLeastText && std::all_of(body.begin(), body.end(), isOfText) &&
+           body.find_first_of("0123456789") != std::string_view::npos;
+}
+
 std::string_view kindName(std::string_view ending) {
     for (const auto& [known, name] : kKindNames) {
         if (known == ending) return name;

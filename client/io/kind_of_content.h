@@ -18,6 +18,9 @@ constexpr std::size_t kKindBytes = std::size_t{1} << 16;
 /// no other mark.
 std::string_view endingOfContent(std::string_view head, std::optional<std::uint64_t> size);
 
+/// The header of a PLY or PCD file announces binary data, and text follows.
+bool hasTextForBinary(std::string_view head);
+
 /// For messages, of such an ending: "a PLY file".
 std::string_view kindName(std::string_view ending);
 

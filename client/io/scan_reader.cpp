@@ -210,12 +210,16 @@ Result<void> checkHasContent(InputFile& file, const Format& format) {
     return {};
 }
 
-// What to say in place of a reader's complaint about a file that is not what its ending says.
-std::optional<Error> ofAnotherFormat(const InputFile& file, const Format& format, const ReadOptions& options,
-                                     std::string_view start, std::optional<std::uint64_t> size) {
+// What to say in place of a reader's complaint about a file that is not what its ending or its header says.
+std::optional<Error> ofAnotherKind(const InputFile& file, const Format& format, const ReadOptions& options,
+                                   std::string_view start, std::optional<std::uint64_t> size) {
     const std::string ending(io::endingOfContent(start, size));
     const Format* found = formatWithEnding(ending);
-    if (found == nullptr || found->read == format.read) return std::nullopt;
+    if (found == nullptr) return std::nullopt;
+    if (found->read == format.read) {
+        if (!io::hasTextForBinary(start)) return std::nullopt;
+        return file.malformed("the header announces binary data, but text follows: it should say 'ascii'");
+    }
     const auto* expected = std::find_if(kFormats.begin(), kFormats.end(), [&](const Format& candidate) {
         return candidate.read == format.read;
     });
@@ -236,7 +240,7 @@ Result<ScanContent> readContent(InputFile& file, const Format& format, const Rea
     if (content) return content;
     const bool refused = content.error().code == ErrorCode::kMalformedFile ||
                          content.error().code == ErrorCode::kNonFiniteCoordinate;
-    if (auto error = refused ? ofAnotherFormat(file, format, options, start, size) : std::nullopt) {
+    if (auto error = refused ? ofAnotherKind(file, format, options, start, size) : std::nullopt) {
         return fail(std::move(*error));
     }
     return content;

@@ -323,5 +323,9 @@ def wrong_endings():
         ("ply: an STL file without facets", "solid\n", "expected 'ply'"), ("ply: damaged", "ply\nformat solid\n", "line 2"),
     ):
         yield refused(f"{name}, as it is", f"a.{name.split(':')[0]}", text, *says)
+    for form in ("binary_little_endian", "binary_big_endian"):
+        yield refused(f"ply: {form} that is text", "a.ply", ply_text().replace("ascii", form), "announces binary data, but text follows")
+    for form in ("binary", "binary_compressed"):
+        yield refused(f"pcd: {form} that is text", "a.pcd", pcd_header(form, 50) + rows(after=" 255"), "announces binary data, but text follows")
     document = b"%PDF-1.4 " + bytes(range(128, 192)) + b" of some words" + bytes(40)
     yield refused("stl: letters for a number", "a.stl", document, "this is no STL file: it does not begin with 'solid'")

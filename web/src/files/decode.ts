@@ -7,7 +7,7 @@ import type { Content } from './content';
 import { endingOf } from './ending';
 import { countText, FileFault } from './fault';
 import { gunzip, isPacked } from './gunzip';
-import { endingOfContent, kKindNames } from './kind_of_content';
+import { endingOfContent, hasTextForBinary, kKindNames } from './kind_of_content';
 import { readObj } from './obj';
 import { readOff } from './off';
 import { readPcd } from './pcd';
@@ -88,14 +88,17 @@ function contentOf(name: string, bytes: Uint8Array): Content {
     checkHasContent(unpacked);
     return read(new ScanBytes(unpacked));
   } catch (error) {
-    throw (error instanceof FileFault ? ofAnotherFormat(read, unpacked) : undefined) ?? error;
+    throw (error instanceof FileFault ? ofAnotherKind(read, unpacked) : undefined) ?? error;
   }
 }
 
-/** What to say in place of the reader's complaint about a file that is not what its ending says. */
-function ofAnotherFormat(read: (file: ScanBytes) => Content, bytes: Uint8Array): FileFault | undefined {
+/** What to say in place of the reader's complaint about a file that is not what its ending or its header says. */
+function ofAnotherKind(read: (file: ScanBytes) => Content, bytes: Uint8Array): FileFault | undefined {
   const ending = endingOfContent(bytes);
-  if (ending === undefined || kReaders[ending] === read) return undefined;
+  if (ending === undefined) return undefined;
+  if (kReaders[ending] === read) {
+    return hasTextForBinary(bytes) ? new FileFault("the header announces binary data, but text follows: it should say 'ascii'") : undefined;
+  }
   const expected = kFileEndings.find((one) => kReaders[one] === read)!;
   const elsewhere = kReaders[ending] === undefined ? ' (the command reads that, this page does not)' : '';
   return new FileFault(`this is ${kKindNames[ending]}, not ${kKindNames[expected]}: rename it to end in .${ending}${elsewhere}`);

@@ -26,6 +26,14 @@ export function endingOfContent(bytes: Uint8Array): string | undefined {
   return endingOfText(textOf(head)) ?? (hasSizeOfStl(bytes) ? 'stl' : undefined);
 }
 
+/** The header of a PLY or PCD file announces binary data, and text follows. */
+export function hasTextForBinary(bytes: Uint8Array): boolean {
+  const head = latin1(bytes.subarray(0, kHeadBytes)).toLowerCase();
+  const header = /^(.*?format binary.*?end_header|.*?[\r\n]data binary\w*)[ \t]*\r?\n?/s.exec(head);
+  const body = header === null ? '' : head.slice(header[0].length, header[0].length + 1024);
+  return /^[\t-\r -~]{12,}$/.test(body) && /\d/.test(body);
+}
+
 /** Without what marks UTF-8 and UTF-16. */
 function textOf(head: string): string {
   const text = head.replace(/^(\xef\xbb\xbf|\xff\xfe|\xfe\xff)/, '');

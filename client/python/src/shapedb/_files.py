@@ -12,7 +12,7 @@ from typing import Callable, Dict, Optional
 from ._connection import PathLike
 from ._errors import InvalidInput, ShapeDBError
 from ._gunzip import gunzip, is_packed
-from ._kind_of_content import NAMES, ending_of_content
+from ._kind_of_content import NAMES, ending_of_content, has_text_for_binary
 from ._mesh import SAMPLES, points_of_mesh
 from ._npy import read_npy
 from ._obj import read_obj
@@ -100,14 +100,17 @@ def _read(reader: Callable[[ScanBytes], Content], data: bytes) -> Content:
         _check_has_content(data)
         return reader(ScanBytes(data))
     except InvalidInput as error:
-        raise _of_another_format(reader, data) or error from None
+        raise _of_another_kind(reader, data) or error from None
 
 
-def _of_another_format(reader: Callable[[ScanBytes], Content], data: bytes) -> Optional[InvalidInput]:
-    """What to say in place of the reader's complaint about a file that is not what its ending says."""
+def _of_another_kind(reader: Callable[[ScanBytes], Content], data: bytes) -> Optional[InvalidInput]:
+    """What to say in place of the reader's complaint about a file that is not what its ending or its
+    header says."""
     ending = ending_of_content(data)
-    if not ending or _READERS.get(ending) is reader:
+    if not ending:
         return None
+    if _READERS.get(ending) is reader:
+        return malformed("the header announces binary data, but text follows: it should say 'ascii'") if has_text_for_binary(data) else None
     expected = next(name for name in _READERS if _READERS[name] is reader)
     elsewhere = "" if ending in _READERS else " (the command reads that, this package does not)"
     return malformed(f"this is {NAMES[ending]}, not {NAMES[expected]}: rename it to end in {ending}{elsewhere}")

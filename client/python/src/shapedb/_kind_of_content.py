@@ -34,6 +34,14 @@ def ending_of_content(data: bytes) -> str:
     return _ending_of_text(_text_of(head)) or (".stl" if _has_size_of_stl(data) else "")
 
 
+def has_text_for_binary(data: bytes) -> bool:
+    """The header of a PLY or PCD file announces binary data, and text follows."""
+    head = data[:_HEAD_BYTES].lower()
+    header = re.match(rb"(.*?format binary.*?end_header|.*?[\r\n]data binary\w*)[ \t]*\r?\n?", head, re.DOTALL)
+    body = head[header.end():][:1024] if header else b""
+    return re.fullmatch(rb"[\t-\r -~]{12,}", body) is not None and re.search(rb"[0-9]", body) is not None
+
+
 def _text_of(head: bytes) -> str:
     """A letter for each byte, without what marks UTF-8 and UTF-16."""
     marked = re.sub(rb"^(\xef\xbb\xbf|\xff\xfe|\xfe\xff)", b"", head)
