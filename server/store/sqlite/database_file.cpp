@@ -86,7 +86,7 @@ void copyBytes(const std::string& from, const std::string& to, const RunContext&
 }
 
 [[noreturn]] void raiseForeign(const std::string& path, const FileUse& use) {
-    raise(ErrorCode::kMalformedFile, quoted(path) + " is no " + use.kind + " of ShapeDB");
+    raise(ErrorCode::kMalformedFile, quoted(path) + " " + use.foreign);
 }
 
 /// A file of a running database is not a backup.

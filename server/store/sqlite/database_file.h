@@ -51,11 +51,11 @@ void makeEmptyDatabase(Connection& connection, std::int64_t nowMs);
 
 /// What somebody wants of a file, for messages.
 struct FileUse {
-    const char* kind;  ///< "backup"
-    const char* done;  ///< completes "cannot be ..."
+    const char* done;     ///< completes "cannot be ..."
+    const char* foreign;  ///< of a file of something else
 };
-inline constexpr FileUse kRestored{"backup", "restored"};
-inline constexpr FileUse kImported{"export", "imported"};
+inline constexpr FileUse kRestored{"restored", "is no backup of ShapeDB"};
+inline constexpr FileUse kImported{"imported", "is no export of ShapeDB"};
 
 /// A copy at `copyPath` of a file that somebody named, with the schema of this program and no problem that
 /// `check` finds; an unfinished import is gone. The file itself is left alone. Reports "copy" (bytes),

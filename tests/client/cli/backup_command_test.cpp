@@ -90,6 +90,8 @@ TEST_F(BackupCommand, MistakesAreExplained) {
             "neither a backup nor an increment");
     refused({"admin", "restore", full, path("2.sdbi"), path("1.sdbi")}, 2, "it belongs after");
     refused({"admin", "restore", path("1.sdbi")}, 2, "is an increment");
+    refused({"admin", "restore", path("a.xyz")}, 3, "the file is no backup of ShapeDB");
+    refused({"collection", "import", path("a.xyz")}, 3, "the file is no export of ShapeDB");
     refused({"admin", "merge-backups", full, path("1.sdbi")}, 2, "--out");
     refused({"admin", "merge-backups", full, "--out", path("m.db")}, 2, "INCREMENT");
     refused({"admin", "merge-backups", full, path("1.sdbi"), "--out", full}, 2, "choose another name");
