@@ -57,7 +57,7 @@ TEST_F(Las, ScalesAndShiftsTheIntegersOfEveryVersion) {
 
 TEST_F(Las, DefectsNameTheByte) {
     const Header h;
-    expectError("a.las", "ply\n" + std::string(300, ' '), kMalformed, {"byte 0", "LASF"});
+    expectError("a.las", "LASX" + std::string(300, ' '), kMalformed, {"byte 0", "LASF"});
     expectError("b.las", las(h, "").substr(0, 200), kMalformed, {"ends inside its header"});
     Header two;
     two.count = 2;

@@ -48,7 +48,7 @@ TEST_F(Off, ReadsExtraColumnsCommentsAndPolygons) {
 
 TEST_F(Off, DefectsNameTheLine) {
     expectError("empty.off", "", kMalformed, {"the file is empty"});
-    expectError("a.off", "ply\n", kMalformed, {"line 1", "'ply'"});
+    expectError("a.off", "OBJ\n", kMalformed, {"line 1", "'OBJ'"});
     expectError("b.off", "OFF BINARY\n", kMalformed, {"line 1", "binary OFF"});
     expectError("c.off", "4OFF\n1 0 0\n1 2 3 4\n", kMalformed, {"line 1", "'4OFF'"});
     expectError("d.off", "OFF\n", kMalformed, {"after line 1", "numbers of vertices"});

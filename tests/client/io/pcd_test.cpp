@@ -114,7 +114,7 @@ TEST_F(Pcd, EmptyCloudsAreEmptyScans) {
 
 TEST_F(Pcd, HeaderDefectsNameTheLine) {
     expectError("empty.pcd", "", kMalformed, {"the file is empty"});
-    expectError("a.pcd", "ply\n", kMalformed, {"line 1", "PCD keyword", "'ply'"});
+    expectError("a.pcd", "PCD\n", kMalformed, {"line 1", "PCD keyword", "'PCD'"});
     expectError("b.pcd", "FIELDS x y\n", kMalformed, {"line 1", "'z'"});
     expectError("c.pcd", "FIELDS x y z x\n", kMalformed, {"line 1", "'x'", "twice"});
     expectError("d.pcd", "FIELDS x y z\nSIZE 4 4\n", kMalformed, {"line 2", "SIZE", "'z'"});
