@@ -30,7 +30,7 @@ bool stopCountingSqliteMemory() noexcept;
 /// a time may have it open: an flock on `path`.lock is held until the store is destroyed, which no
 /// call may outlive.
 ///
-/// Errors: kStorage (cannot be opened or created; in use: names the process), kStorageFull,
+/// Errors: kStorage (cannot be opened or created; a symbolic link; in use: names the process), kStorageFull,
 /// kSchemaTooNew, kDataLoss (not a ShapeDB database, damaged, empty, or only its log is there: says
 /// what to do), kInvalidArgument.
 [[nodiscard]] Result<std::unique_ptr<Store>> openSqliteStore(const SqliteOptions& options);

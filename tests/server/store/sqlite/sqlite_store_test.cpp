@@ -85,6 +85,22 @@ TEST_F(SqliteStoreTest, TheLockFollowsNoLink) {
     }
 }
 
+// Else two stores, each with a lock beside its own link, would have one database open.
+TEST_F(SqliteStoreTest, TheDatabaseIsNoLink) {
+    const std::string path = folder_.file("link.db");
+    for (const std::string& target : {options().path, folder_.file("nowhere.db")}) {
+        std::filesystem::create_symlink(target, path);
+        SqliteOptions own = options();
+        own.path = path;
+        const auto store = openSqliteStore(own);
+        ASSERT_FALSE(store) << target;
+        EXPECT_EQ(store.error().code, ErrorCode::kStorage);
+        EXPECT_NE(store.error().message.find("symbolic link"), std::string::npos) << store.error().message;
+        std::filesystem::remove(path);
+    }
+    EXPECT_FALSE(std::filesystem::exists(folder_.file("nowhere.db")));
+}
+
 TEST_F(SqliteStoreTest, OneProcessAtATime) {
     const auto second = openSqliteStore(options());
     ASSERT_FALSE(second);
