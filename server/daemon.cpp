@@ -162,7 +162,9 @@ Result<void> Daemon::Parts::serve() {
 
 Result<void> Daemon::Parts::serveHttp() {
     if (config.http.listen.empty()) return {};
-    RETURN_IF_ERROR(http.listen(grpc.inside(), [this] { return grpc.serving(); }));
+    RETURN_IF_ERROR(http.listen(
+        grpc.inside(), [this] { return grpc.serving(); },
+        [this](bool accepting) { grpc.reportAccepting(accepting); }));
     log->info("HTTP is served", {{"address", http.endpoint().text()}});
     return {};
 }

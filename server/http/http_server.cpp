@@ -118,6 +118,7 @@ struct HttpServer::Parts {
     std::condition_variable changed;
     std::map<const Connection*, std::weak_ptr<Connection>> open;
     std::atomic<bool> accepting{true};
+    std::function<void(bool)> onAccepting;
     net::Listener listener;
 };
 
@@ -134,8 +135,10 @@ Result<void> HttpServer::useTls(const security::TlsIdentity& identity) {
     return {};
 }
 
-Result<void> HttpServer::listen(rpc::Inside inside, std::function<bool()> serving) {
+Result<void> HttpServer::listen(rpc::Inside inside, std::function<bool()> serving,
+                                std::function<void(bool)> onAccepting) {
     Parts& parts = *parts_;
+    parts.onAccepting = std::move(onAccepting);
     if (parts.config.http.listen.empty()) return {};
     const auto wanted = config::parseEndpoint(parts.config.http.listen);
     RETURN_IF_ERROR(wanted);
@@ -164,6 +167,7 @@ void HttpServer::Parts::startListening() {
     events.onConnection = [this](int socket) { accept(socket); };
     events.onProblem = [this](const std::string& problem) {
         accepting = problem.empty();
+        onAccepting(problem.empty());
         if (problem.empty()) return log->info("HTTP connections are accepted again");
         log->error("HTTP connections cannot be accepted", {{"reason", problem}});
     };

@@ -29,9 +29,11 @@ class HttpServer {
     Result<void> useTls(const security::TlsIdentity& identity);
 
     /// Returns once it serves at http.listen; does nothing if that is empty. `inside` leads to a gRPC server
-    /// that serves until `shutDown` has returned; `serving` says how it is doing, from any thread. Call once.
-    /// Errors: those of net::Listener::open.
-    [[nodiscard]] Result<void> listen(rpc::Inside inside, std::function<bool()> serving);
+    /// that serves until `shutDown` has returned; `serving` says how it is doing, from any thread.
+    /// `onAccepting` is told, by a thread of the listener, when connections cannot be accepted (false) and
+    /// when they can again. Call once. Errors: those of net::Listener::open.
+    [[nodiscard]] Result<void> listen(rpc::Inside inside, std::function<bool()> serving,
+                                      std::function<void(bool)> onAccepting);
 
     /// Where it listens: the host asked for and the port in use.
     [[nodiscard]] const config::Endpoint& endpoint() const;

@@ -247,6 +247,10 @@ Inside GrpcServer::inside() const {
 
 const config::Endpoint& GrpcServer::endpoint() const { return parts_->network.listener.endpoint(); }
 
+void GrpcServer::reportAccepting(bool accepting) {
+    accepting ? parts_->health->listenerRecovered() : parts_->health->listenerFailed();
+}
+
 void GrpcServer::reportNotServing() {
     if (parts_->health) parts_->health->end();
 }

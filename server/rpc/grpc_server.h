@@ -64,6 +64,9 @@ class GrpcServer {
     /// cancelled, before `shutDown`.
     [[nodiscard]] Inside inside() const;
 
+    /// A listener of another transport cannot accept connections (false), or can again: health tells it as of
+    /// the own ones. From any thread between `listen` and `shutDown`.
+    void reportAccepting(bool accepting);
     /// Health says NOT_SERVING from now on; calls are still answered.
     void reportNotServing();
     /// Cancels the calls still running and waits for them. Idempotent.

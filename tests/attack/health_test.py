@@ -128,6 +128,18 @@ class Health(unittest.TestCase):
             self.assertTrue(eventually(lambda: serving(client) == ALL, 30), server.log())
             self.assertIn("connections are accepted again", server.log())
 
+    def test_with_a_dead_listener_of_http_is_bad_until_it_is_back(self):
+        with SecuredServer("--http-listen", "127.0.0.1:0") as server, server.local() as client:
+            self.assertEqual(serving(client), ALL)  # and its connection is open
+            before = resource.prlimit(server.process.pid, resource.RLIMIT_NOFILE)
+            resource.prlimit(server.process.pid, resource.RLIMIT_NOFILE, (8, before[1]))
+            with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", server.http_port), timeout=5):
+                self.assertTrue(eventually(lambda: serving(client) == [], 30), server.log())
+            self.assertIn("HTTP connections cannot be accepted", server.log())
+            resource.prlimit(server.process.pid, resource.RLIMIT_NOFILE, before)
+            self.assertTrue(eventually(lambda: serving(client) == ALL, 30), server.log())
+            self.assertIn("HTTP connections are accepted again", server.log())
+
     def test_watchers_see_the_end_of_each_service(self):
         with Server("--shutdown-drain-seconds", "2") as server, server.connect() as client:
             seen = {}
