@@ -117,7 +117,7 @@ Admission::Admission(std::uint64_t uploadBytes, int uploadCalls)
     : calls({kMaxOrdinaryCalls, uploadCalls, kMaxAdminCalls, kMaxLongAdminCalls}),
       uploads(uploadBytes, "bytes of points that uploads in progress may hold (limits.max_upload_bytes)"),
       followers(kMaxFollowers, "calls that may wait for shapes and rebuilds"),
-      requests(kMaxRequestsBytes, "bytes that large requests may become in memory"),
+      requests(kMaxRequestsBytes, "bytes that large messages may become in memory"),
       answers(kMaxAnswersBytes, "bytes that answers to searches may take together"),
       copies(kMaxCopies, "places for a backup or restore in transit") {}
 

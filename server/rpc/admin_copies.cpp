@@ -86,8 +86,7 @@ class ReceivedFile {
 /// Takes the messages of an import in their order: one header, then chunks. Returns the name asked for. Takes
 /// the place of a copy once it is known whether the caller may use that name.
 Result<std::string> receiveExport(const Services& services, Call& call, catalog::Budget::Share& copy,
-                                  grpc::ServerReader<v1::ImportCollectionRequest>& reader,
-                                  ReceivedFile& file) {
+                                  Upload<v1::ImportCollectionRequest>& messages, ReceivedFile& file) {
     std::optional<std::string> name;
     const auto take = [&](const v1::ImportCollectionRequest& request) -> Result<void> {
         if (request.has_header() == name.has_value()) {
@@ -102,7 +101,7 @@ Result<std::string> receiveExport(const Services& services, Call& call, catalog:
         }
         return copy.take(1);
     };
-    RETURN_IF_ERROR(receiveMessages<v1::ImportCollectionRequest>(reader, call, take));
+    RETURN_IF_ERROR(receiveMessages(services, messages, call, take));
     if (!name) return fail(ErrorCode::kMalformedStream, "the stream ended before the header");
     RETURN_IF_ERROR(file.finish(call));
     return *name;
@@ -131,8 +130,7 @@ grpc::Status AdminServiceHandler::backup(grpc::ServerContext* context, Request<v
     });
 }
 
-grpc::Status AdminServiceHandler::Restore(grpc::ServerContext* context,
-                                          grpc::ServerReader<v1::BackupChunk>* reader,
+grpc::Status AdminServiceHandler::restore(grpc::ServerContext* context, Upload<v1::BackupChunk>& chunks,
                                           v1::RestoreResponse* response) {
     return handle(services_, context, operations::kRestore, [&](Call& call) -> Result<void> {
         call.frame().expectRestore();
@@ -140,11 +138,13 @@ grpc::Status AdminServiceHandler::Restore(grpc::ServerContext* context,
         RETURN_IF_ERROR(copy.take(1));
         auto file = ReceivedFile::create(services_.temporaryDirectory, "the restore");
         RETURN_IF_ERROR(file);
-        v1::BackupChunk chunk;
-        while (call.read(*reader, &chunk)) {
+        for (;;) {
+            const auto chunk = chunks.next(call, services_.admission.requests);
+            RETURN_IF_ERROR(chunk);
+            if (*chunk == nullptr) break;
             RETURN_IF_ERROR(call.run().checkpoint());
             RETURN_IF_ERROR(call.authorization().requireStill());
-            RETURN_IF_ERROR(file->add(chunk));
+            RETURN_IF_ERROR(file->add(**chunk));
         }
         if (call.clientGone()) return fail(ErrorCode::kCancelled, "the client cancelled the restore");
         RETURN_IF_ERROR(file->finish(call));
@@ -177,14 +177,14 @@ grpc::Status AdminServiceHandler::exportCollection(grpc::ServerContext* context,
                   });
 }
 
-grpc::Status AdminServiceHandler::ImportCollection(grpc::ServerContext* context,
-                                                   grpc::ServerReader<v1::ImportCollectionRequest>* reader,
+grpc::Status AdminServiceHandler::importCollection(grpc::ServerContext* context,
+                                                   Upload<v1::ImportCollectionRequest>& messages,
                                                    v1::ImportCollectionResponse* response) {
     return handle(services_, context, operations::kImportCollection, [&](Call& call) -> Result<void> {
         catalog::Budget::Share copy(services_.admission.copies);
         auto file = ReceivedFile::create(services_.temporaryDirectory, "the import");
         RETURN_IF_ERROR(file);
-        const auto name = receiveExport(services_, call, copy, *reader, *file);
+        const auto name = receiveExport(services_, call, copy, messages, *file);
         RETURN_IF_ERROR(name);
         const auto mayUse = [&](const std::string& wanted) -> Result<void> {
             RETURN_IF_ERROR(call.useCollection(wanted));

@@ -45,6 +45,8 @@ AdminServiceHandler::AdminServiceHandler(const Services& services) : services_(s
     serve("Rebuild", this, &AdminServiceHandler::rebuild);
     serve("CancelRebuild", this, &AdminServiceHandler::cancelRebuild);
     serve("Backup", this, &AdminServiceHandler::backup);
+    serve("Restore", this, &AdminServiceHandler::restore);
+    serve("ImportCollection", this, &AdminServiceHandler::importCollection);
     serve("ExportCollection", this, &AdminServiceHandler::exportCollection);
     serve("Check", this, &AdminServiceHandler::check);
     serve("Stats", this, &AdminServiceHandler::stats);

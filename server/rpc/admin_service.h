@@ -21,13 +21,12 @@ class AdminServiceHandler final : public ReadsRequests<v1::AdminService> {
                                v1::CancelRebuildResponse* response);
     grpc::Status backup(grpc::ServerContext* context, Request<v1::BackupRequest>& request,
                         Replies<v1::BackupChunk>* writer);
-    grpc::Status Restore(grpc::ServerContext* context, grpc::ServerReader<v1::BackupChunk>* reader,
-                         v1::RestoreResponse* response) override;
+    grpc::Status restore(grpc::ServerContext* context, Upload<v1::BackupChunk>& chunks,
+                         v1::RestoreResponse* response);
     grpc::Status exportCollection(grpc::ServerContext* context, Request<v1::ExportCollectionRequest>& request,
                                   Replies<v1::BackupChunk>* writer);
-    grpc::Status ImportCollection(grpc::ServerContext* context,
-                                  grpc::ServerReader<v1::ImportCollectionRequest>* reader,
-                                  v1::ImportCollectionResponse* response) override;
+    grpc::Status importCollection(grpc::ServerContext* context, Upload<v1::ImportCollectionRequest>& messages,
+                                  v1::ImportCollectionResponse* response);
     grpc::Status check(grpc::ServerContext* context, Request<v1::CheckRequest>& request,
                        Replies<v1::CheckProgress>* writer);
     grpc::Status stats(grpc::ServerContext* context, Request<v1::StatsRequest>& request,

@@ -85,13 +85,16 @@ FitOptions optionsFrom(const v1::AlignHeader& header) {
 
 }  // namespace
 
-grpc::Status AlignServiceHandler::Align(grpc::ServerContext* context,
-                                        grpc::ServerReader<v1::AlignRequest>* reader,
+AlignServiceHandler::AlignServiceHandler(const Services& services) : services_(services) {
+    serve("Align", this, &AlignServiceHandler::align);
+}
+
+grpc::Status AlignServiceHandler::align(grpc::ServerContext* context, Upload<v1::AlignRequest>& messages,
                                         v1::AlignResponse* response) {
     return handle(services_, context, operations::kAlign, [&](Call& call) -> Result<void> {
         Uploads uploads(services_, call);
         const auto take = [&](const v1::AlignRequest& message) { return uploads.take(message); };
-        RETURN_IF_ERROR(receiveMessages<v1::AlignRequest>(*reader, call, take));
+        RETURN_IF_ERROR(receiveMessages(services_, messages, call, take));
         const auto query = uploads.query();
         RETURN_IF_ERROR(query);
         const v1::AlignHeader& header = uploads.header();

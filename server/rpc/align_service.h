@@ -2,18 +2,19 @@
 // shapedb.v1.AlignService over gRPC: validate, convert, call the catalog, convert back.
 #pragma once
 
+#include "server/rpc/request.h"
 #include "server/rpc/services.h"
 #include "shapedb/v1/align_service.grpc.pb.h"
 
 namespace shapedb::rpc {
 
 /// Thread-safe. `services` must outlive it.
-class AlignServiceHandler final : public shapedb::v1::AlignService::Service {
+class AlignServiceHandler final : public ReadsRequests<v1::AlignService> {
   public:
-    explicit AlignServiceHandler(const Services& services) : services_(services) {}
+    explicit AlignServiceHandler(const Services& services);
 
-    grpc::Status Align(grpc::ServerContext* context, grpc::ServerReader<v1::AlignRequest>* reader,
-                       v1::AlignResponse* response) override;
+    grpc::Status align(grpc::ServerContext* context, Upload<v1::AlignRequest>& messages,
+                       v1::AlignResponse* response);
 
   private:
     const Services& services_;

@@ -57,8 +57,8 @@ std::vector<LimitRow> limitTable(const config::ServerConfig& config) {
         {"verify_candidates", kMostVerified, "candidates", "candidates that one search verifies", invalid},
         {"answer_bytes", kMaxAnswerBytes, "bytes", "answer to a search, a batch or GetShapes", invalid},
         {"requests_bytes", kMaxRequestsBytes, "bytes",
-         "what requests above 16 KiB may become in memory, 32 bytes for each of theirs, of all calls "
-         "together",
+         "what messages above 16 KiB may become in memory, 32 bytes for each of theirs, of all calls "
+         "together; blocks of points and backups do not count",
          "queue_full"},
         {"answers_bytes", kMaxAnswersBytes, "bytes", "answers to searches being made, of all calls together",
          full},

@@ -8,25 +8,27 @@
 #include "common/wire_vector.h"
 #include "core/base/return_if_error.h"
 #include "server/catalog/scan_upload.h"
-#include "server/rpc/call.h"
+#include "server/rpc/request.h"
 
 namespace shapedb::rpc {
 
 /// Calls `take(message)` with each message of an upload, which has a header or a chunk, until the client has
-/// sent all. Errors: those of `take`; kMalformedStream (neither of the two); kUnauthenticated (the key was
-/// revoked meanwhile); kCancelled, kDeadlineExceeded.
-template <typename Request, typename Reader, typename Take>
-Result<void> receiveMessages(Reader& reader, Call& call, Take&& take) {
-    Request request;
-    while (call.read(reader, &request)) {
+/// sent all. Errors: those of `take` and of Upload::next; kMalformedStream (neither of the two);
+/// kUnauthenticated (the key was revoked meanwhile); kCancelled, kDeadlineExceeded.
+template <typename Message, typename Take>
+Result<void> receiveMessages(const Services& services, Upload<Message>& messages, Call& call, Take&& take) {
+    for (;;) {
+        const auto message = messages.next(call, services.admission.requests);
+        RETURN_IF_ERROR(message);
+        if (*message == nullptr) break;
         RETURN_IF_ERROR(call.run().checkpoint());
         RETURN_IF_ERROR(call.authorization().requireStill());
-        if (!request.has_header() && !request.has_chunk()) {
+        if (!(*message)->has_header() && !(*message)->has_chunk()) {
             return fail(ErrorCode::kMalformedStream, "message with neither header nor chunk");
         }
-        RETURN_IF_ERROR(take(request));
+        RETURN_IF_ERROR(take(**message));
     }
-    // `Read` also returns false when the client has gone: then the upload is not complete.
+    // They also end when the client has gone: then the upload is not complete.
     if (call.clientGone()) return fail(ErrorCode::kCancelled, "the client cancelled the upload");
     return call.authorization().requireStill();
 }
@@ -45,13 +47,13 @@ inline Result<void> receiveChunk(const std::string& xyz, catalog::ScanUpload& up
 /// `onHeader(header)` checks the other fields of the header as soon as it arrives, so that a hopeless
 /// upload is refused before its points are sent. What the header's isolation leaves out is gone. Errors:
 /// those of ScanUpload, of isolated and of `onHeader`; kCancelled, kDeadlineExceeded.
-template <typename Request, typename Reader, typename OnHeader>
-Result<store::VerifiedScan> receiveScan(Reader& reader, catalog::ScanUpload& upload, Call& call,
-                                        OnHeader&& onHeader) {
+template <typename Message, typename OnHeader>
+Result<store::VerifiedScan> receiveScan(const Services& services, Upload<Message>& messages,
+                                        catalog::ScanUpload& upload, Call& call, OnHeader&& onHeader) {
     IsolateOptions isolation;
-    const auto take = [&](const Request& request) -> Result<void> {
-        if (request.has_chunk()) return receiveChunk(request.chunk().xyz(), upload, call);
-        const auto& header = request.header();
+    const auto take = [&](const Message& message) -> Result<void> {
+        if (message.has_chunk()) return receiveChunk(message.chunk().xyz(), upload, call);
+        const auto& header = message.header();
         // First, since it asks whether the caller may.
         RETURN_IF_ERROR(onHeader(header));
         RETURN_IF_ERROR(
@@ -59,7 +61,7 @@ Result<store::VerifiedScan> receiveScan(Reader& reader, catalog::ScanUpload& upl
         isolation = isolationFrom(header.isolation());
         return call.useScan(header.point_count());
     };
-    RETURN_IF_ERROR(receiveMessages<Request>(reader, call, take));
+    RETURN_IF_ERROR(receiveMessages(services, messages, call, take));
     auto scan = upload.finish();
     RETURN_IF_ERROR(scan);
     auto isolated = catalog::isolated(std::move(*scan), isolation, call.run());

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The one message of a unary call, or of one that is answered by a stream. gRPC would decode it before the
-// handler runs, whoever sent it, and a few megabytes can become a hundred in memory. So the handler reads it,
-// once it is known that the caller may make the call.
+// The messages of a call. gRPC would decode the one message of a unary call, or of one that is answered by a
+// stream, before the handler runs, whoever sent it, and a few megabytes can become a hundred in memory. So
+// the handler reads it, once it is known that the caller may make the call, and if there is room. The same
+// holds for each message of an upload.
 #pragma once
 
 #include <cstdint>
@@ -18,6 +19,7 @@
 #include "core/base/return_if_error.h"
 #include "server/catalog/gates.h"
 #include "server/rpc/call.h"
+#include "server/rpc/plain_message.h"
 
 namespace shapedb::rpc {
 
@@ -25,6 +27,13 @@ namespace shapedb::rpc {
 constexpr std::uint64_t kMostDecodedPerByte = 32;
 /// Messages up to this size need no room: that many calls are not made at a time.
 constexpr std::uint64_t kSmallMessageBytes = std::uint64_t{16} << 10;
+
+/// Errors: kInvalidArgument.
+template <typename Message>
+Result<void> decode(grpc::ByteBuffer& bytes, Message& message) {
+    if (grpc::SerializationTraits<Message>::Deserialize(&bytes, &message).ok()) return {};
+    return fail(ErrorCode::kInvalidArgument, "the message is not a " + Message::descriptor()->full_name());
+}
 
 /// Used by the thread of its call. `stream`, given at construction, must outlive it.
 template <typename Message>
@@ -40,11 +49,11 @@ class Request {
     [[nodiscard]] Result<void> receive(Call& call, catalog::Budget& room) {
         grpc::ByteBuffer bytes;
         if (!read_(call, &bytes)) return fail(ErrorCode::kCancelled, "the client has gone");
-        if (bytes.Length() <= kSmallMessageBytes) return decode(bytes);
+        if (bytes.Length() <= kSmallMessageBytes) return decode(bytes, message_);
         {
             catalog::Budget::Share decoding(room);
             RETURN_IF_ERROR(decoding.take(kMostDecodedPerByte * bytes.Length()));
-            RETURN_IF_ERROR(decode(bytes));
+            RETURN_IF_ERROR(decode(bytes, message_));
         }
         share_ = std::make_unique<catalog::Budget::Share>(room);
         return share_->take(message_.SpaceUsedLong());
@@ -55,12 +64,39 @@ class Request {
     const Message* operator->() const { return &message_; }
 
   private:
-    Result<void> decode(grpc::ByteBuffer& bytes) {
-        if (grpc::SerializationTraits<Message>::Deserialize(&bytes, &message_).ok()) return {};
-        return fail(ErrorCode::kInvalidArgument,
-                    "the message is not a " + Message::descriptor()->full_name());
+    std::function<bool(Call&, grpc::ByteBuffer*)> read_;
+    std::unique_ptr<catalog::Budget::Share> share_;
+    Message message_;
+};
+
+/// The messages of an upload, one after the other. Used by the thread of its call. `stream`, given at
+/// construction, must outlive it.
+template <typename Message>
+class Upload {
+  public:
+    template <typename Stream>
+    explicit Upload(Stream& stream)
+        : read_([&stream](Call& call, grpc::ByteBuffer* bytes) { return call.read(stream, bytes); }) {}
+
+    /// The next one, without fields that the API does not have; it holds room until the one after it is asked
+    /// for, unless it is small or plain. Null at the end, and when the client has gone. Errors: kQueueFull
+    /// (no room), kInvalidArgument (not such a message).
+    [[nodiscard]] Result<const Message*> next(Call& call, catalog::Budget& room) {
+        message_ = Message();
+        share_.reset();
+        grpc::ByteBuffer bytes;
+        if (!read_(call, &bytes)) return nullptr;
+        if (bytes.Length() > kSmallMessageBytes && !isPlain(bytes, *Message::descriptor())) {
+            share_ = std::make_unique<catalog::Budget::Share>(room);
+            RETURN_IF_ERROR(share_->take(kMostDecodedPerByte * bytes.Length()));
+        }
+        RETURN_IF_ERROR(decode(bytes, message_));
+        // Whoever keeps a copy of a header keeps what was checked, and no more.
+        message_.DiscardUnknownFields();
+        return &message_;
     }
 
+  private:
     std::function<bool(Call&, grpc::ByteBuffer*)> read_;
     std::unique_ptr<catalog::Budget::Share> share_;
     Message message_;
@@ -69,6 +105,9 @@ class Request {
 /// What a handler writes its stream of answers to.
 template <typename Response>
 using Replies = grpc::ServerSplitStreamer<grpc::ByteBuffer, Response>;
+/// The same, of an upload.
+template <typename Response>
+using UploadReplies = grpc::ServerReaderWriter<Response, grpc::ByteBuffer>;
 
 /// As `handle` (call.h) of a call with one message, which is received before `body` runs.
 template <typename Message, typename Body>
@@ -110,14 +149,43 @@ grpc::internal::MethodHandler* methodHandler(Handler* handler,
         });
 }
 
-/// `Service` of the API, generated, whose methods with one message read it themselves.
+/// For the same: an upload that is answered with one message.
+template <typename Handler, typename Message, typename Response>
+grpc::internal::MethodHandler* methodHandler(Handler* handler,
+                                             grpc::Status (Handler::*method)(grpc::ServerContext*,
+                                                                             Upload<Message>&, Response*)) {
+    return new grpc::internal::ClientStreamingHandler<Handler, grpc::ByteBuffer, Response>(
+        [method](Handler* self, grpc::ServerContext* context, grpc::ServerReader<grpc::ByteBuffer>* reader,
+                 Response* response) {
+            Upload<Message> upload(*reader);
+            return (self->*method)(context, upload, response);
+        },
+        handler);
+}
+
+/// For the same: an upload that is answered with a stream of messages.
+template <typename Handler, typename Message, typename Response>
+grpc::internal::MethodHandler* methodHandler(Handler* handler,
+                                             grpc::Status (Handler::*method)(grpc::ServerContext*,
+                                                                             Upload<Message>&,
+                                                                             UploadReplies<Response>*)) {
+    return new grpc::internal::BidiStreamingHandler<Handler, grpc::ByteBuffer, Response>(
+        [method](Handler* self, grpc::ServerContext* context, UploadReplies<Response>* stream) {
+            Upload<Message> upload(*stream);
+            return (self->*method)(context, upload, stream);
+        },
+        handler);
+}
+
+/// `Service` of the API, generated, whose methods read their messages themselves.
 template <typename Service>
 class ReadsRequests : public Service::Service {
   protected:
     /// In the constructor, for each of them: `rpc` is its name in the API, `method` one of `handler`, this.
-    template <typename Handler, typename Message, typename Reply>
+    /// `Received`: Request or Upload.
+    template <typename Handler, template <typename> class Received, typename Message, typename Reply>
     void serve(const char* rpc, Handler* handler,
-               grpc::Status (Handler::*method)(grpc::ServerContext*, Request<Message>&, Reply*)) {
+               grpc::Status (Handler::*method)(grpc::ServerContext*, Received<Message>&, Reply*)) {
         const auto* service =
             Message::descriptor()->file()->pool()->FindServiceByName(Service::service_full_name());
         this->MarkMethodStreamed(service->FindMethodByName(rpc)->index(), methodHandler(handler, method));

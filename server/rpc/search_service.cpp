@@ -121,6 +121,7 @@ Result<void> searchBatch(const Services& services, const Call& call, catalog::Pr
 }  // namespace
 
 SearchServiceHandler::SearchServiceHandler(const Services& services) : services_(services) {
+    serve("SearchByScan", this, &SearchServiceHandler::searchByScan);
     serve("SearchByKey", this, &SearchServiceHandler::searchByKey);
     serve("SearchBySignature", this, &SearchServiceHandler::searchBySignature);
     serve("SearchBatch", this, &SearchServiceHandler::searchBatch);
@@ -140,8 +141,8 @@ grpc::Status SearchServiceHandler::searchByKey(grpc::ServerContext* context,
     });
 }
 
-grpc::Status SearchServiceHandler::SearchByScan(grpc::ServerContext* context,
-                                                grpc::ServerReader<v1::SearchByScanRequest>* reader,
+grpc::Status SearchServiceHandler::searchByScan(grpc::ServerContext* context,
+                                                Upload<v1::SearchByScanRequest>& messages,
                                                 v1::SearchResponse* response) {
     return handle(services_, context, operations::kSearchByScan, [&](Call& call) -> Result<void> {
         catalog::PreparedSearch prepared;
@@ -152,7 +153,7 @@ grpc::Status SearchServiceHandler::SearchByScan(grpc::ServerContext* context,
             prepared = std::move(*checked);
             return {};
         };
-        const auto scan = receiveScan<v1::SearchByScanRequest>(*reader, upload, call, checkSearchHeader);
+        const auto scan = receiveScan(services_, messages, upload, call, checkSearchHeader);
         RETURN_IF_ERROR(scan);
 
         const auto searched = services_.searches.byScan(prepared, *scan, call.run());

@@ -17,9 +17,8 @@ class SearchServiceHandler final : public ReadsRequests<v1::SearchService> {
 
     grpc::Status searchByKey(grpc::ServerContext* context, Request<v1::SearchByKeyRequest>& request,
                              v1::SearchResponse* response);
-    grpc::Status SearchByScan(grpc::ServerContext* context,
-                              grpc::ServerReader<v1::SearchByScanRequest>* reader,
-                              v1::SearchResponse* response) override;
+    grpc::Status searchByScan(grpc::ServerContext* context, Upload<v1::SearchByScanRequest>& messages,
+                              v1::SearchResponse* response);
     grpc::Status searchBySignature(grpc::ServerContext* context,
                                    Request<v1::SearchBySignatureRequest>& request,
                                    v1::SearchResponse* response);

@@ -123,6 +123,8 @@ Result<void> sendPoints(Call& call, Writer& writer, const std::vector<float>& xy
 }  // namespace
 
 ShapeServiceHandler::ShapeServiceHandler(const Services& services) : services_(services) {
+    serve("AddShape", this, &ShapeServiceHandler::addShape);
+    serve("Segment", this, &ShapeServiceHandler::segment);
     serve("GetShape", this, &ShapeServiceHandler::getShape);
     serve("GetShapes", this, &ShapeServiceHandler::getShapes);
     serve("GetPoints", this, &ShapeServiceHandler::getPoints);
@@ -139,15 +141,15 @@ ShapeServiceHandler::ShapeServiceHandler(const Services& services) : services_(s
     serve("GetSegments", this, &ShapeServiceHandler::getSegments);
 }
 
-grpc::Status ShapeServiceHandler::AddShape(grpc::ServerContext* context,
-                                           grpc::ServerReader<v1::AddShapeRequest>* reader,
+grpc::Status ShapeServiceHandler::addShape(grpc::ServerContext* context,
+                                           Upload<v1::AddShapeRequest>& messages,
                                            v1::AddShapeResponse* response) {
     return handle(services_, context, operations::kAddShape,
-                  [&](Call& call) { return addShape(call, *reader, *response); });
+                  [&](Call& call) { return add(call, messages, *response); });
 }
 
-Result<void> ShapeServiceHandler::addShape(Call& call, grpc::ServerReader<v1::AddShapeRequest>& reader,
-                                           v1::AddShapeResponse& response) {
+Result<void> ShapeServiceHandler::add(Call& call, Upload<v1::AddShapeRequest>& messages,
+                                      v1::AddShapeResponse& response) {
     catalog::ShapeAddition addition(services_.catalog, call.frame(), services_.config.limits.maxPoints,
                                     services_.admission.uploads);
     const auto takeHeader = [&](const v1::AddShapeHeader& message) -> Result<void> {
@@ -159,7 +161,7 @@ Result<void> ShapeServiceHandler::addShape(Call& call, grpc::ServerReader<v1::Ad
         header->collection = *collection;
         return addition.begin(std::move(*header), message.wait());
     };
-    auto scan = receiveScan<v1::AddShapeRequest>(reader, addition.upload(), call, takeHeader);
+    auto scan = receiveScan(services_, messages, addition.upload(), call, takeHeader);
     RETURN_IF_ERROR(scan);
     const auto added = addition.finish(std::move(*scan));
     RETURN_IF_ERROR(added);
@@ -463,8 +465,8 @@ grpc::Status ShapeServiceHandler::getSegments(grpc::ServerContext* context,
     });
 }
 
-grpc::Status ShapeServiceHandler::Segment(
-    grpc::ServerContext* context, grpc::ServerReaderWriter<v1::SegmentedPoints, v1::SegmentRequest>* stream) {
+grpc::Status ShapeServiceHandler::segment(grpc::ServerContext* context, Upload<v1::SegmentRequest>& messages,
+                                          UploadReplies<v1::SegmentedPoints>* writer) {
     return handle(services_, context, operations::kSegment, [&](Call& call) -> Result<void> {
         catalog::ScanUpload upload(services_.config.limits.maxPoints, services_.admission.uploads);
         ShapeParameters parameters;
@@ -478,14 +480,14 @@ grpc::Status ShapeServiceHandler::Segment(
             summaryOnly = header.summary_only();
             return {};
         };
-        const auto scan = receiveScan<v1::SegmentRequest>(*stream, upload, call, checkSegmentHeader);
+        const auto scan = receiveScan(services_, messages, upload, call, checkSegmentHeader);
         RETURN_IF_ERROR(scan);
         catalog::SegmentationSlots::Slot slot(services_.catalog.segmentationSlots());
         const auto description = services_.catalog.describe(slot, *scan, parameters, call.run());
         RETURN_IF_ERROR(description);
         // Without points: a sample of none.
         const catalog::EvenSample sample(summaryOnly ? 0 : scan->points().size() / 3, 0);
-        return sendSegments(call, *stream, *description, scan->points(), scan->origin(), sample);
+        return sendSegments(call, *writer, *description, scan->points(), scan->origin(), sample);
     });
 }
 

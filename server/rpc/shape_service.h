@@ -15,8 +15,8 @@ class ShapeServiceHandler final : public ReadsRequests<v1::ShapeService> {
   public:
     explicit ShapeServiceHandler(const Services& services);
 
-    grpc::Status AddShape(grpc::ServerContext* context, grpc::ServerReader<v1::AddShapeRequest>* reader,
-                          v1::AddShapeResponse* response) override;
+    grpc::Status addShape(grpc::ServerContext* context, Upload<v1::AddShapeRequest>& messages,
+                          v1::AddShapeResponse* response);
     grpc::Status getShape(grpc::ServerContext* context, Request<v1::GetShapeRequest>& request,
                           v1::GetShapeResponse* response);
     grpc::Status getShapes(grpc::ServerContext* context, Request<v1::GetShapesRequest>& request,
@@ -45,12 +45,11 @@ class ShapeServiceHandler final : public ReadsRequests<v1::ShapeService> {
                               v1::GetSignatureResponse* response);
     grpc::Status getSegments(grpc::ServerContext* context, Request<v1::GetSegmentsRequest>& request,
                              Replies<v1::SegmentedPoints>* writer);
-    grpc::Status Segment(grpc::ServerContext* context,
-                         grpc::ServerReaderWriter<v1::SegmentedPoints, v1::SegmentRequest>* stream) override;
+    grpc::Status segment(grpc::ServerContext* context, Upload<v1::SegmentRequest>& messages,
+                         UploadReplies<v1::SegmentedPoints>* writer);
 
   private:
-    Result<void> addShape(Call& call, grpc::ServerReader<v1::AddShapeRequest>& reader,
-                          v1::AddShapeResponse& response);
+    Result<void> add(Call& call, Upload<v1::AddShapeRequest>& messages, v1::AddShapeResponse& response);
     Result<void> changeMetadata(Call& call, const index::SnapshotPtr& collection,
                                 const v1::UpdateMetadataRequest& request,
                                 v1::UpdateMetadataResponse& response);

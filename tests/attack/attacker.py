@@ -3,6 +3,7 @@
 
 import math
 import os
+import re
 import resource
 import signal
 import struct
@@ -11,6 +12,7 @@ import sys
 import tempfile
 import time
 import unittest
+import urllib.request
 
 # Servers are started while channels are open, and grpcio would wait for these before each fork.
 os.environ["GRPC_ENABLE_FORK_SUPPORT"] = "0"
@@ -119,6 +121,16 @@ class Server:
 
     def connect(self, **options):
         return Client(self.address, **options)
+
+    def metrics(self):
+        """The page of metrics; takes --metrics-listen."""
+        port = re.search(r"""metrics are served.*port"?[=:](\d+)""", self.log())[1]
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", timeout=30) as page:
+            return page.read().decode()
+
+    def begun(self, kind="upload"):
+        """How many calls of this kind have begun and run; takes --metrics-listen."""
+        return int(re.search(rf'^shapedb_calls_running\{{kind="{kind}"\}} (\d+)', self.metrics(), re.MULTILINE)[1])
 
 
 class Bearer(grpc.UnaryUnaryClientInterceptor, grpc.UnaryStreamClientInterceptor, grpc.StreamUnaryClientInterceptor,
