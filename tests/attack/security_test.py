@@ -357,15 +357,17 @@ class Secrets(unittest.TestCase):
                 self.assertEqual(local.count(), 2, "what is there is as it was")
 
     def test_a_download_ends_soon_after_its_key(self):
-        def in_two_seconds():
-            soon = timestamp_pb2.Timestamp()
-            soon.FromDatetime(datetime.datetime.utcnow() + datetime.timedelta(seconds=2))
-            return soon
+        def soon(end):
+            moment = timestamp_pb2.Timestamp()
+            moment.FromDatetime(end)
+            return moment
 
         with SecuredServer() as server, server.local() as local:
             local.add("large", [(i % 1000, i // 1000, (i * i) % 999) for i in range(1_000_000)], timeout=120)
             for ended in ("was revoked", "has expired"):
-                expires = {"expires": in_two_seconds()} if ended == "has expired" else {}
+                # Late enough for a slow machine to begin the download.
+                end = datetime.datetime.utcnow() + datetime.timedelta(seconds=6)
+                expires = {"expires": soon(end)} if ended == "has expired" else {}
                 key = server.make(READER, **expires)
                 with self.subTest(ended), server.connect(key=key.secret) as client:
                     request = shapes.GetPointsRequest(shape=shapes.ShapeRef(key="large"))
@@ -373,6 +375,8 @@ class Secrets(unittest.TestCase):
                     self.assertEqual(next(download).shape.key, "large")
                     if ended == "was revoked":
                         local.admin.RevokeKey(admin.RevokeKeyRequest(id=key.key.id), timeout=10)
+                    else:
+                        time.sleep(max(0, (end - datetime.datetime.utcnow()).total_seconds()))
                     time.sleep(3)  # what is not read stops the server from sending more
                     with self.assertRaises(grpc.RpcError) as failure:
                         for _ in download:
@@ -381,23 +385,23 @@ class Secrets(unittest.TestCase):
                     self.assertIn(ended, failure.exception.details())
 
     def test_a_long_upload_ends_soon_after_its_key(self):
-        with SecuredServer() as server:
+        with SecuredServer("--metrics-listen", "127.0.0.1:0") as server:
             key = server.make(WRITER)
             stop = threading.Event()
 
             def drip():
-                yield shapes.AddShapeRequest(header=shapes.AddShapeHeader(key="slow", point_count=100_000))
+                yield shapes.AddShapeRequest(header=shapes.AddShapeHeader(key="slow", point_count=1_000_000))
                 while not stop.wait(0.1):
                     yield shapes.AddShapeRequest(chunk=types.PointChunk(xyz=b"\0" * 12_000))
 
             with server.connect(key=key.secret) as client:
                 running = client.shapes.AddShape.future(drip(), timeout=60)
-                time.sleep(0.5)
+                self.assertTrue(eventually(lambda: server.begun() == 1))
                 # By another process: it is noticed within a second.
                 server.key_command("revoke", key.key.id)
                 began = time.monotonic()
                 self.assertEqual(reason(running.exception()), "unauthenticated")
-                self.assertLess(time.monotonic() - began, 8)
+                self.assertLess(time.monotonic() - began, 20, "not only when the client has sent everything")
                 stop.set()
 
     def test_a_flood_of_refusals_pushes_nothing_out_of_the_audit_log(self):
