@@ -7,16 +7,32 @@ cd "$(dirname "$0")/../.."
 lanes=("$@")
 [ ${#lanes[@]} -gt 0 ] || lanes=(sanitize threads bench tidy fuzz mutate reliability docs packages)
 
+build=${BUILD_DIR:-build}
+
+# scaled COUNT PROGRAM FILTER: fails also if no test has such a name, which GoogleTest takes for success.
+scaled() {
+  if [ -z "$("$build/tests/$2" --gtest_filter="$3" --gtest_list_tests | grep '^  ')" ]; then
+    echo "nightly: no test is called $3" >&2
+    return 1
+  fi
+  SHAPEDB_TEST_SCALE=$1 "$build/tests/$2" --gtest_filter="$3"
+}
+
+# attack COUNT NAME
+attack() {
+  SHAPEDB_TEST_SCALE=$1 ctest --test-dir "$build" --output-on-failure --no-tests=error -R "^attack\\.$2\$"
+}
+
 # The long counts of docs/reliability.md. Not by ctest, whose limits of time are those of the short ones.
 reliability() {
-  local tests=${BUILD_DIR:-build}/tests
   scripts/install-deps.sh && scripts/build.sh dev || return 1
-  SHAPEDB_TEST_SCALE=40 "$tests/shapedb_reliability_test" --gtest_filter='*PowerLoss*:*IoError*' || return 1
-  SHAPEDB_TEST_SCALE=40 "$tests/shapedb_reliability_test" --gtest_filter='*OutOfMemory*' || return 1
-  SHAPEDB_TEST_SCALE=20 "$tests/shapedb_reliability_test" --gtest_filter='*Failpoint*' || return 1
-  SHAPEDB_TEST_SCALE=20 "$tests/shapedb_server_test" --gtest_filter='*ModelTest*' || return 1
-  SHAPEDB_TEST_SCALE=10 ctest --test-dir "${BUILD_DIR:-build}" --output-on-failure -R '^attack\.kill$' || return 1
-  SHAPEDB_TEST_SCALE=240 ctest --test-dir "${BUILD_DIR:-build}" --output-on-failure -R '^attack\.soak$'
+  scaled 40 shapedb_reliability_test '*PowerLoss*' || return 1
+  scaled 40 shapedb_reliability_test '*IoError*' || return 1
+  scaled 40 shapedb_reliability_test '*OutOfMemory*' || return 1
+  scaled 20 shapedb_reliability_test '*Failpoint*' || return 1
+  scaled 20 shapedb_server_test '*ModelTest*' || return 1
+  attack 10 kill || return 1
+  attack 240 soak
 }
 
 failed=()
