@@ -18,6 +18,7 @@ constexpr const char* kTypeUrl = "type.googleapis.com";
 constexpr std::string_view kPackage = "/shapedb.v1.";
 /// Of what protobuf says of bad JSON, which quotes it.
 constexpr std::size_t kMostReasonBytes = 512;
+constexpr int kMostNested = 32;
 
 std::string typeUrl(const std::string& type) { return std::string(kTypeUrl) + "/" + type; }
 
@@ -29,6 +30,27 @@ Method methodOf(const protobuf::MethodDescriptor& descriptor) {
     method.clientStreams = descriptor.client_streaming();
     method.serverStreams = descriptor.server_streaming();
     return method;
+}
+
+/// Whether lists and objects nest deeper than those of any message. protobuf (3.21) takes some hundred bytes
+/// for each level of lists and bounds them not at all. Its texts begin and end with either kind of quotes.
+bool nestsTooDeep(std::string_view json) {
+    int depth = 0;
+    char quote = 0;
+    for (std::size_t i = 0; i < json.size(); ++i) {
+        const char c = json[i];
+        if (quote != 0) {
+            if (c == '\\') ++i;
+            if (c == quote) quote = 0;
+        } else if (c == '"' || c == '\'') {
+            quote = c;
+        } else if (c == '[' || c == '{') {
+            if (++depth > kMostNested) return true;
+        } else if (c == ']' || c == '}') {
+            --depth;
+        }
+    }
+    return false;
 }
 
 }  // namespace
@@ -55,6 +77,11 @@ const Method* Methods::find(std::string_view path) const {
 bool Methods::isCall(std::string_view path) { return path.substr(0, kPackage.size()) == kPackage; }
 
 OrFailure<std::string> Methods::requestFromJson(const Method& method, std::string_view json) const {
+    if (nestsTooDeep(json)) {
+        return refuse(ErrorCode::kInvalidArgument, "the message is no JSON of " + method.requestType +
+                                                       ": it nests more than " + std::to_string(kMostNested) +
+                                                       " deep");
+    }
     std::string bytes;
     const auto status = protobuf::util::JsonToBinaryString(types_.get(), typeUrl(method.requestType),
                                                            {json.data(), json.size()}, &bytes, {});

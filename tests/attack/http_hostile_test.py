@@ -31,6 +31,21 @@ class Requests(unittest.TestCase):
                 self.assertIn(answer.error()["code"], ("invalid_argument", "unimplemented"), body[:20])
                 client.connection.close()
 
+    def test_that_nest_deep_take_no_memory(self):
+        with serve() as server, Http(server) as client:
+            client.json("ShapeService/CountShapes")
+            before = server.peak()
+            deep = b"[" * (2 * MIB)
+            for text in (b'{"filter":' + deep, deep, b'{"x":' * (MIB // 4), b"{'\"': " + deep, b"{'\\'\"': " + deep,
+                         b'{"\\"\'": ' + deep):
+                answer = client.request("POST", COUNT, text, content_type="application/json")
+                self.assertEqual((answer.status, answer.json()["code"]), (400, "invalid_argument"), text[:20])
+                self.assertIn("nests more than 32 deep", answer.json()["message"], text[:20])
+            self.assertLess(server.peak() - before, 40 * MIB)
+            flat = b'{"filter": "' + b"[" * 100 + b'"}'
+            answer = client.request("POST", COUNT, flat, content_type="application/json")
+            self.assertNotIn(b"nests", answer.body, "in a text it is no list")
+
     def test_that_two_could_read_in_two_ways_are_refused(self):
         """Request smuggling."""
         hidden = head("/healthz", method="GET")

@@ -73,6 +73,15 @@ TEST(Methods, DeepNestingDoesNotExhaustTheStack) {
     for (int i = 0; i < 1'000'000; ++i) deep += "{\"a\":";
     EXPECT_FALSE(methods().requestFromJson(method("SearchService/SearchByKey"), deep));
     EXPECT_FALSE(methods().requestFromJson(method("SearchService/SearchByKey"), std::string(1'000'000, '[')));
+    // Where texts end and lists begin is as protobuf has it, which takes both kinds of quotes.
+    const std::string lists(33, '[');
+    for (const std::string begin : {"", "{\"key\": ", "{'\"': ", "{'\\'\"': ", "{\"\\\"'\": "}) {
+        const auto refused = methods().requestFromJson(method("SearchService/SearchByKey"), begin + lists);
+        ASSERT_FALSE(refused) << begin;
+        EXPECT_NE(refused.error().message.find("nests more than 32 deep"), std::string::npos) << begin;
+    }
+    EXPECT_TRUE(methods().requestFromJson(method("SearchService/SearchByKey"),
+                                          R"({"key": "\"'[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[["})"));
 }
 
 TEST(Methods, AnswersAreCanonicalJson) {
