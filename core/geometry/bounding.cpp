@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/base/random.h"
+#include "core/base/return_if_error.h"
 #include "core/geometry/convex_hull.h"
 #include "core/geometry/cull_hull_interior.h"
 #include "core/geometry/motion.h"
@@ -125,11 +126,12 @@ class BoxTrial {
     std::size_t next_ = 0;
 };
 
-PointCloud farthestVertices(const PointCloud& vertices) {
+Result<PointCloud> farthestVertices(const PointCloud& vertices, const RunContext& context) {
     if (vertices.size() <= static_cast<std::size_t>(kCoarseDirections)) return vertices;
     Random random(2);
     std::vector<std::uint8_t> taken(vertices.size(), 0);
     for (int i = 0; i < kCoarseDirections; ++i) {
+        RETURN_IF_ERROR(context.checkpoint());
         const Point3 direction = randomDirection(random);
         const auto farthest = std::max_element(
             vertices.begin(), vertices.end(),
@@ -185,9 +187,11 @@ void sortBySize(std::vector<OrientedBox>& boxes) {
     });
 }
 
-double leastSquaredDiagonal(const PointCloud& vertices) {
+Result<double> leastSquaredDiagonal(const PointCloud& vertices, const RunContext& context) {
     const std::vector<Vec3x2> all = inPairs(vertices);
-    const std::vector<Vec3x2> outline = inPairs(farthestVertices(vertices));
+    const auto farthest = farthestVertices(vertices, context);
+    RETURN_IF_ERROR(farthest);
+    const std::vector<Vec3x2> outline = inPairs(*farthest);
     Random random(1);
     std::vector<OrientedBox> boxes(kStarts);
     for (OrientedBox& box : boxes) {
@@ -196,11 +200,15 @@ double leastSquaredDiagonal(const PointCloud& vertices) {
     }
     sortBySize(boxes);
     boxes.resize(kCoarseDescents);
-    for (OrientedBox& box : boxes) box = descend(outline, box, kFirstStep, kRefineStep, random);
+    for (OrientedBox& box : boxes) {
+        RETURN_IF_ERROR(context.checkpoint());
+        box = descend(outline, box, kFirstStep, kRefineStep, random);
+    }
     sortBySize(boxes);
     boxes.resize(kFineDescents);
     double least = INFINITY;
     for (OrientedBox& box : boxes) {
+        RETURN_IF_ERROR(context.checkpoint());
         box.squaredDiagonal = extentOf(all, box.axes).squaredDiagonal();
         least = std::min(least, descend(all, box, kFirstStep, kLastStep, random).squaredDiagonal);
     }
@@ -209,10 +217,14 @@ double leastSquaredDiagonal(const PointCloud& vertices) {
 
 }  // namespace
 
-Result<double> smallestBoxDiagonal(const PointCloud& points) {
+Result<double> smallestBoxDiagonal(const PointCloud& points, const RunContext& context) {
     if (points.empty()) return fail(ErrorCode::kInvalidArgument, "no points to bound");
     try {
-        return std::sqrt(leastSquaredDiagonal(convexHullVertices(cullHullInterior(points))));
+        const PointCloud candidates = cullHullInterior(points);
+        RETURN_IF_ERROR(context.checkpoint());
+        const auto least = leastSquaredDiagonal(convexHullVertices(candidates), context);
+        RETURN_IF_ERROR(least);
+        return std::sqrt(*least);
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::kOutOfMemory, "not enough memory to bound the points");
     } catch (const std::exception& e) {

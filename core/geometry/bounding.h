@@ -3,6 +3,7 @@
 #pragma once
 
 #include "core/base/error.h"
+#include "core/base/run_context.h"
 #include "core/geometry/point.h"
 
 namespace shapedb {
@@ -15,7 +16,7 @@ namespace shapedb {
 /// between several of nearly the same volume; the least diagonal is the same for all of them.
 /// docs/algorithm.md has the figures.
 ///
-/// Errors: kInvalidArgument when there are no points; kOutOfMemory; kInternal.
-[[nodiscard]] Result<double> smallestBoxDiagonal(const PointCloud& points);
+/// Errors: kInvalidArgument when there are no points; kCancelled, kDeadlineExceeded; kOutOfMemory; kInternal.
+[[nodiscard]] Result<double> smallestBoxDiagonal(const PointCloud& points, const RunContext& context = {});
 
 }  // namespace shapedb

@@ -221,7 +221,7 @@ std::vector<std::uint8_t> onHull(std::size_t siteCount, const Tetrahedra& tetrah
 // Size of the interior, in the unit of the sites. When it touches every site on the hull, these suffice: they
 // have the same hull as all of them, so the same boxes hold them.
 Result<double> interiorSize(const PointCloud& sites, const std::vector<std::int32_t>& siteLabels,
-                            const Tetrahedra& tetrahedra) {
+                            const Tetrahedra& tetrahedra, const RunContext& context) {
     const std::vector<std::uint8_t> on = onHull(sites.size(), tetrahedra);
     bool hullTouched = true;
     for (std::size_t i = 0; i < sites.size(); ++i)
@@ -230,7 +230,7 @@ Result<double> interiorSize(const PointCloud& sites, const std::vector<std::int3
     for (std::size_t i = 0; i < sites.size(); ++i) {
         if (siteLabels[i] >= 0 && (on[i] || !hullTouched)) touched.push_back(sites[i]);
     }
-    return smallestBoxDiagonal(touched);
+    return smallestBoxDiagonal(touched, context);
 }
 
 void toScanUnits(const Frame& frame, PointCloud sites, Segmentation& result) {
@@ -372,7 +372,7 @@ Result<Segmentation> segmentOrThrow(const PointCloud& points, const Segmentation
     }
     RETURN_IF_ERROR(context.checkpoint());
     const std::vector<std::int32_t> siteLabels = labelSites(prepared->sites.size(), result);
-    const auto size = interiorSize(prepared->sites, siteLabels, result.tetrahedra);
+    const auto size = interiorSize(prepared->sites, siteLabels, result.tetrahedra, context);
     RETURN_IF_ERROR(size);
     result.size = *size * prepared->frame.unit;
     RETURN_IF_ERROR(context.checkpoint());
