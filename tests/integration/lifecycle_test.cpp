@@ -77,7 +77,7 @@ TEST_F(Lifecycle, TerminationRequeuesJobsForTheRestart) {
     const auto began = std::chrono::steady_clock::now();
     server->signal(SIGTERM);
     EXPECT_EQ(server->wait(), 0) << server->log();
-    EXPECT_LT(std::chrono::steady_clock::now() - began, std::chrono::seconds(4));
+    EXPECT_LT(std::chrono::steady_clock::now() - began, std::chrono::seconds(15));
     // Three drains: a job that is put back has not used up an attempt.
     for (int i = 0; i < 2; ++i) {
         start({"--ingest-threads", "1", "--shutdown-drain-seconds", "0"});
@@ -109,18 +109,18 @@ TEST_F(Lifecycle, NewCallsAreRefusedWhileDraining) {
     CallContext context;
     pb::AddShapeResponse response;
     const auto upload = client->shapes->AddShape(&context, &response);  // keeps the drain waiting
+    const Scan scan = slowScan(4, 60'000);
+    const std::vector<std::string> chunks = chunksOf(scan, 30'000);
     pb::AddShapeRequest message;
-    *message.mutable_header() = headerFor("", "k", dumbbell());
+    *message.mutable_header() = headerFor("", "k", scan);
     ASSERT_TRUE(upload->Write(message));
-    ASSERT_TRUE(eventually([&] { return statsOf(*client).collections() == 1; }));
-    // Nothing tells when the handler of the upload has begun; before that it counts as a new call.
-    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+    // More than HTTP/2 lets a client send before the handler reads: once it is written, the call has begun.
+    message.mutable_chunk()->set_xyz(chunks.front());
+    ASSERT_TRUE(upload->Write(message));
     server->signal(SIGTERM);
     EXPECT_TRUE(eventually([&] { return getShape(*client, "", "k").error == "unavailable"; }));
-    for (const std::string& chunk : chunksOf(dumbbell())) {
-        message.mutable_chunk()->set_xyz(chunk);
-        EXPECT_TRUE(upload->Write(message));
-    }
+    message.mutable_chunk()->set_xyz(chunks.back());
+    EXPECT_TRUE(upload->Write(message));
     upload->WritesDone();
     EXPECT_TRUE(upload->Finish().ok()) << "a call that was running may finish";
     EXPECT_EQ(server->wait(), 0);
@@ -375,7 +375,7 @@ TEST_F(Lifecycle, StalledUploadIsCutOff) {
               "(limits.stall_seconds)");
     const auto took = std::chrono::steady_clock::now() - began;
     EXPECT_GT(took, std::chrono::milliseconds(700));
-    EXPECT_LT(took, std::chrono::seconds(5));
+    EXPECT_LT(took, std::chrono::seconds(20));
     EXPECT_TRUE(eventually(
         [&] { return server->log().find("neither sent nor read anything") != std::string::npos; }));
     EXPECT_TRUE(add("k", dumbbell())) << "the server is unharmed";

@@ -242,7 +242,8 @@ TEST(Client, BadScansAreNotSent) {
 TEST(Client, HonoursTheDeadlinesOfOptionsAndContext) {
     FakeServer server;
     server.shapes.answer = [](grpc::ServerContext& context, int) {
-        for (int i = 0; i < 300 && !context.IsCancelled(); ++i) std::this_thread::sleep_for(milliseconds(10));
+        for (int i = 0; i < 3'000 && !context.IsCancelled(); ++i)
+            std::this_thread::sleep_for(milliseconds(10));
         return grpc::Status::OK;
     };
     ClientOptions options;
@@ -250,13 +251,13 @@ TEST(Client, HonoursTheDeadlinesOfOptionsAndContext) {
     options.deadline = milliseconds(200);
     const auto impatient = Client::connect(options);
     Result<Shape> shape;
-    EXPECT_LT(secondsOf([&] { shape = impatient->getShape({"", "a"}); }), 2.0);
+    EXPECT_LT(secondsOf([&] { shape = impatient->getShape({"", "a"}); }), 10.0);
     ASSERT_FALSE(shape);
     EXPECT_EQ(shape.error().code, ErrorCode::kDeadlineExceeded);
 
     RunContext context;
     context.deadline = RunContext::Clock::now() + milliseconds(200);
-    EXPECT_LT(secondsOf([&] { shape = server.client().getShape({"", "a"}, context); }), 2.0);
+    EXPECT_LT(secondsOf([&] { shape = server.client().getShape({"", "a"}, context); }), 10.0);
     ASSERT_FALSE(shape);
     EXPECT_EQ(shape.error().code, ErrorCode::kDeadlineExceeded);
 }
@@ -264,7 +265,8 @@ TEST(Client, HonoursTheDeadlinesOfOptionsAndContext) {
 TEST(Client, CancellingEndsARunningCall) {
     FakeServer server;
     server.shapes.answer = [](grpc::ServerContext& context, int) {
-        for (int i = 0; i < 500 && !context.IsCancelled(); ++i) std::this_thread::sleep_for(milliseconds(10));
+        for (int i = 0; i < 3'000 && !context.IsCancelled(); ++i)
+            std::this_thread::sleep_for(milliseconds(10));
         return grpc::Status::OK;
     };
     std::atomic<bool> cancel{false};
@@ -275,7 +277,7 @@ TEST(Client, CancellingEndsARunningCall) {
         cancel = true;
     });
     Result<Shape> shape;
-    EXPECT_LT(secondsOf([&] { shape = server.client().getShape({"", "a"}, context); }), 2.0);
+    EXPECT_LT(secondsOf([&] { shape = server.client().getShape({"", "a"}, context); }), 10.0);
     later.join();
     ASSERT_FALSE(shape);
     EXPECT_EQ(shape.error().code, ErrorCode::kCancelled);
@@ -296,7 +298,7 @@ TEST(Client, CancellingEndsTheWaitBetweenAttempts) {
         cancel = true;
     });
     Result<AddReply> reply;
-    EXPECT_LT(secondsOf([&] { reply = server.client().addShape({{"", "a"}}, cloud(10), context); }), 2.0);
+    EXPECT_LT(secondsOf([&] { reply = server.client().addShape({{"", "a"}}, cloud(10), context); }), 10.0);
     later.join();
     EXPECT_FALSE(reply);
 }
