@@ -103,8 +103,9 @@ void createDatabase(const SqliteOptions& options) {
 void requireUsableFile(const SqliteOptions& options) {
     // The log and the lock are beside the link: through two of them two servers would have one database open.
     if (std::filesystem::is_symlink(options.path)) {
-        raise(ErrorCode::kStorage, "the database '" + options.path +
-                                       "' is a symbolic link, which is not followed: put the file itself there");
+        raise(ErrorCode::kStorage,
+              "the database '" + options.path +
+                  "' is a symbolic link, which is not followed: put the file itself there");
     }
     if (std::filesystem::is_directory(options.path)) {
         raise(ErrorCode::kStorage, "the database path '" + options.path + "' is a folder");
