@@ -36,8 +36,9 @@ _READERS: Dict[str, Callable[[ScanBytes], Content]] = {
 ENDINGS = frozenset(_READERS)
 """Of the files that `read_scan` reads; .gz may follow."""
 
-# What the command reads beside these.
-_OF_THE_COMMAND = (".las", ".gltf", ".glb", ".3mf")
+_BY_TRIMESH = 'trimesh.load(FILE, force="mesh")'
+# What the command reads beside these, and who reads it in Python.
+_OF_THE_COMMAND = {".las": "laspy.read(FILE).xyz", ".gltf": _BY_TRIMESH, ".glb": _BY_TRIMESH, ".3mf": _BY_TRIMESH}
 _PACKED = ".gz"
 _POINTER = b"version https://git-lfs.github.com/spec/"
 _ARCHIVES = ((b"PK\x03\x04", "ZIP archive"), (b"BZh", "file packed by bzip2"), (b"\xfd7zXZ", "file packed by xz"),
@@ -52,7 +53,7 @@ def read_scan(path: PathLike, *, mesh_samples: int = SAMPLES, seed: int = 1) -> 
     is that of `shapedb add` (docs/file-formats.md), the points are not. Points of a PCD file at which nothing was measured
     are left out. Warns of what may have been faces, but was not read as such. Raises `ShapeDBError` with
     file_not_readable, unknown_file_format, malformed_file, non_finite_coordinate or coordinate_out_of_range. For other
-    formats use trimesh or Open3D, whose objects are scans too, or `shapedb add`.
+    formats use trimesh, Open3D or laspy, or `shapedb add`.
     """
     name = os.fspath(path)
     if mesh_samples < 1:
@@ -149,7 +150,7 @@ def _reader_of(name: str) -> Callable[[ScanBytes], Content]:
     if ending in _OF_THE_COMMAND:
         raise InvalidInput("unknown_file_format",
                            f"{name}: this package does not read {ending}, but the command does: `shapedb add FILE` stores it. "
-                           f"Or load it with trimesh or Open3D and give the object. The package reads {known}")
+                           f"Or give {_OF_THE_COMMAND[ending]}. The package reads {known}")
     what = f"unknown file ending {in_quotes(ending)}" if ending else "no file ending"
     raise InvalidInput("unknown_file_format",
                        f"{name}: {what}; this package reads {known}, and .gz after that. Load other files with trimesh or "
