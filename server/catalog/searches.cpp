@@ -249,7 +249,12 @@ Result<ScanSearch> Searches::byScan(const PreparedSearch& search, const store::V
             RETURN_IF_ERROR(context.checkpoint());
         }
     }
-    auto found = run(search, query, context);
+    // Its own progress would be told on threads that all searches share, by a client that may be slow to hear
+    // it.
+    context.report("search", 0, 0);
+    RunContext quiet = context;
+    quiet.progress = nullptr;
+    auto found = run(search, query, quiet);
     RETURN_IF_ERROR(found);
     return ScanSearch{std::move(*description), std::move(*found)};
 }

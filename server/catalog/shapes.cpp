@@ -317,6 +317,7 @@ Result<Catalog::StoredScan> Catalog::storedScan(const FoundShape& found, Budget:
 
 Result<Description> Catalog::describe(SegmentationSlots::Slot& slot, const store::VerifiedScan& scan,
                                       const ShapeParameters& parameters, const RunContext& context) {
+    context.report("queued", 0, 0);
     RETURN_IF_ERROR(slot.acquire(context));
     return pipeline_.describe(scan.points(), scan.origin(), parameters, context);
 }

@@ -12,6 +12,7 @@
 #include "server/rpc/call.h"
 #include "server/rpc/convert.h"
 #include "server/rpc/receive_scan.h"
+#include "server/rpc/stage_reports.h"
 
 namespace shapedb::rpc {
 namespace {
@@ -122,6 +123,7 @@ Result<void> searchBatch(const Services& services, const Call& call, catalog::Pr
 
 SearchServiceHandler::SearchServiceHandler(const Services& services) : services_(services) {
     serve("SearchByScan", this, &SearchServiceHandler::searchByScan);
+    serve("SearchByScanInStages", this, &SearchServiceHandler::searchByScanInStages);
     serve("SearchByKey", this, &SearchServiceHandler::searchByKey);
     serve("SearchBySignature", this, &SearchServiceHandler::searchBySignature);
     serve("SearchBatch", this, &SearchServiceHandler::searchBatch);
@@ -144,26 +146,42 @@ grpc::Status SearchServiceHandler::searchByKey(grpc::ServerContext* context,
 grpc::Status SearchServiceHandler::searchByScan(grpc::ServerContext* context,
                                                 Upload<v1::SearchByScanRequest>& messages,
                                                 v1::SearchResponse* response) {
-    return handle(services_, context, operations::kSearchByScan, [&](Call& call) -> Result<void> {
-        catalog::PreparedSearch prepared;
-        catalog::ScanUpload upload(services_.config.limits.maxPoints, services_.admission.uploads);
-        const auto checkSearchHeader = [&](const v1::SearchByScanHeader& header) -> Result<void> {
-            auto checked = prepare(services_, call, header.options());
-            RETURN_IF_ERROR(checked);
-            prepared = std::move(*checked);
-            return {};
-        };
-        const auto scan = receiveScan(services_, messages, upload, call, checkSearchHeader);
-        RETURN_IF_ERROR(scan);
+    return handle(services_, context, operations::kSearchByScan,
+                  [&](Call& call) { return searchByScan(call, messages, call.run(), *response); });
+}
 
-        const auto searched = services_.searches.byScan(prepared, *scan, call.run());
-        RETURN_IF_ERROR(searched);
-        const Description& description = searched->description;
-        toProto(description.segmentation, response->mutable_report());
-        response->set_seconds_segment(description.segmentation.totalSeconds);
-        catalog::AnswerRoom room(services_.admission.answers);
-        return answer(services_, prepared, description.signature, searched->found, room, response);
+grpc::Status SearchServiceHandler::searchByScanInStages(grpc::ServerContext* context,
+                                                        Upload<v1::SearchByScanRequest>& messages,
+                                                        UploadReplies<v1::SearchByScanEvent>* writer) {
+    return handle(services_, context, operations::kSearchByScanInStages, [&](Call& call) -> Result<void> {
+        v1::SearchByScanEvent last;
+        RETURN_IF_ERROR(searchByScan(call, messages,
+                                     tellingStages<v1::SearchByScanEvent>(call, *writer, true),
+                                     *last.mutable_response()));
+        return call.write(*writer, last);
     });
+}
+
+Result<void> SearchServiceHandler::searchByScan(Call& call, Upload<v1::SearchByScanRequest>& messages,
+                                                const RunContext& running, v1::SearchResponse& response) {
+    catalog::PreparedSearch prepared;
+    catalog::ScanUpload upload(services_.config.limits.maxPoints, services_.admission.uploads);
+    const auto checkSearchHeader = [&](const v1::SearchByScanHeader& header) -> Result<void> {
+        auto checked = prepare(services_, call, header.options());
+        RETURN_IF_ERROR(checked);
+        prepared = std::move(*checked);
+        return {};
+    };
+    const auto scan = receiveScan(services_, messages, upload, call, checkSearchHeader);
+    RETURN_IF_ERROR(scan);
+
+    const auto searched = services_.searches.byScan(prepared, *scan, running);
+    RETURN_IF_ERROR(searched);
+    const Description& description = searched->description;
+    toProto(description.segmentation, response.mutable_report());
+    response.set_seconds_segment(description.segmentation.totalSeconds);
+    catalog::AnswerRoom room(services_.admission.answers);
+    return answer(services_, prepared, description.signature, searched->found, room, &response);
 }
 
 grpc::Status SearchServiceHandler::searchBySignature(grpc::ServerContext* context,

@@ -16,6 +16,7 @@
 #include "server/rpc/convert.h"
 #include "server/rpc/message_limits.h"
 #include "server/rpc/receive_scan.h"
+#include "server/rpc/stage_reports.h"
 
 namespace shapedb::rpc {
 namespace {
@@ -471,6 +472,7 @@ grpc::Status ShapeServiceHandler::segment(grpc::ServerContext* context, Upload<v
         catalog::ScanUpload upload(services_.config.limits.maxPoints, services_.admission.uploads);
         ShapeParameters parameters;
         bool summaryOnly = false;
+        bool reportStages = false;
         const auto checkSegmentHeader = [&](const v1::SegmentHeader& header) -> Result<void> {
             const auto wanted = overridesFrom(header.profile(), header.segmentation(), header.signature());
             RETURN_IF_ERROR(wanted);
@@ -478,12 +480,14 @@ grpc::Status ShapeServiceHandler::segment(grpc::ServerContext* context, Upload<v
             RETURN_IF_ERROR(checked);
             parameters = *checked;
             summaryOnly = header.summary_only();
+            reportStages = header.report_stages();
             return {};
         };
         const auto scan = receiveScan(services_, messages, upload, call, checkSegmentHeader);
         RETURN_IF_ERROR(scan);
+        const RunContext running = tellingStages<v1::SegmentedPoints>(call, *writer, reportStages);
         catalog::SegmentationSlots::Slot slot(services_.catalog.segmentationSlots());
-        const auto description = services_.catalog.describe(slot, *scan, parameters, call.run());
+        const auto description = services_.catalog.describe(slot, *scan, parameters, running);
         RETURN_IF_ERROR(description);
         // Without points: a sample of none.
         const catalog::EvenSample sample(summaryOnly ? 0 : scan->points().size() / 3, 0);

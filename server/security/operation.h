@@ -80,6 +80,8 @@ inline constexpr Operation kSearchByKey{"SearchService", "SearchByKey", Role::kR
                                         Scope::kCollections};
 inline constexpr Operation kSearchByScan{"SearchService", "SearchByScan", Role::kReader, CallClass::kUpload,
                                          Scope::kCollections};
+inline constexpr Operation kSearchByScanInStages{"SearchService", "SearchByScanInStages", Role::kReader,
+                                                 CallClass::kUpload, Scope::kCollections};
 inline constexpr Operation kSearchBySignature{"SearchService", "SearchBySignature", Role::kReader,
                                               CallClass::kOrdinary, Scope::kCollections};
 inline constexpr Operation kSearchBatch{"SearchService", "SearchBatch", Role::kReader, CallClass::kOrdinary,
@@ -132,7 +134,7 @@ inline constexpr Operation kRevokeKey{"AdminService", "RevokeKey", Role::kAdmin,
                                       Scope::kKeys};
 
 /// All of the above. A test compares it with the services in proto/.
-inline constexpr std::array<const Operation*, 41> kAll{&kAddShape,
+inline constexpr std::array<const Operation*, 42> kAll{&kAddShape,
                                                        &kGetShape,
                                                        &kGetShapes,
                                                        &kGetPoints,
@@ -150,6 +152,7 @@ inline constexpr std::array<const Operation*, 41> kAll{&kAddShape,
                                                        &kSegment,
                                                        &kSearchByKey,
                                                        &kSearchByScan,
+                                                       &kSearchByScanInStages,
                                                        &kSearchBySignature,
                                                        &kSearchBatch,
                                                        &kCompare,

@@ -312,6 +312,8 @@ def stalled_uploads(client, stop):
             key="idle", point_count=100)), shapes.AddShapeRequest(chunk=some)]),
         "SearchByScan": (client.search.SearchByScan, [search.SearchByScanRequest(header=search.SearchByScanHeader(
             options=search.SearchOptions(k=1), point_count=100))]),
+        "SearchByScanInStages": (client.search.SearchByScanInStages, [search.SearchByScanRequest(
+            header=search.SearchByScanHeader(options=search.SearchOptions(k=1), point_count=100))]),
         "Align": (client.align.Align, [align.AlignRequest(header=align.AlignHeader(
             query_points=100, other_points=100)), align.AlignRequest(chunk=some)]),
         "Segment": (client.shapes.Segment, [shapes.SegmentRequest(header=shapes.SegmentHeader(point_count=100))]),
@@ -324,7 +326,7 @@ def stalled_uploads(client, stop):
         if name == "ImportCollection":
             # The status of the restore comes before its place is free.
             assert eventually(lambda: copies_are_free(client)), "the place for copies is still taken"
-        if name == "Segment":
+        if name in ("Segment", "SearchByScanInStages"):
             call = method(then_nothing(*messages), timeout=60)
             yield name, lambda call=call: list(call)
         else:

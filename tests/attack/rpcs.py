@@ -20,6 +20,7 @@ RULES = {
     },
     "SearchService": {
         "SearchByKey": (READER, COLLECTION), "SearchByScan": (READER, COLLECTION),
+        "SearchByScanInStages": (READER, COLLECTION),
         "SearchBySignature": (READER, COLLECTION), "SearchBatch": (READER, COLLECTION),
         "Compare": (READER, COLLECTION),
     },
@@ -42,12 +43,14 @@ RULES = {
 def messages(rpc, collection):
     """What is sent to an rpc so that it concerns a collection; harmless where it is allowed."""
     ref = shapes.ShapeRef(collection=collection, key="nobody")
+    by_scan = search.SearchByScanRequest(header=search.SearchByScanHeader(
+        options=search.SearchOptions(collection=collection, k=1), point_count=4))
     special = {
         "AddShape": [shapes.AddShapeRequest(header=shapes.AddShapeHeader(
             collection=collection, key="k", point_count=3))],
         "SearchByKey": [search.SearchByKeyRequest(options=search.SearchOptions(collection=collection, k=1), key="k")],
-        "SearchByScan": [search.SearchByScanRequest(header=search.SearchByScanHeader(
-            options=search.SearchOptions(collection=collection, k=1), point_count=4))],
+        "SearchByScan": [by_scan],
+        "SearchByScanInStages": [by_scan],
         "SearchBySignature": [search.SearchBySignatureRequest(
             options=search.SearchOptions(collection=collection, k=1))],
         "SearchBatch": [search.SearchBatchRequest(options=search.SearchOptions(collection=collection, k=1))],

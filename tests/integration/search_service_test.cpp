@@ -180,6 +180,33 @@ TEST_F(SearchRpc, ByScanSegmentsTheQueryLikeTheLibrary) {
     EXPECT_EQ(listAll(client, collection).size(), 12u) << "a query is not stored";
 }
 
+TEST_F(SearchRpc, InStagesTheAnswerIsTheSameAndLast) {
+    const Scan scan = familyScan("hammer", 1, 99);
+    const auto plain = searchByScan(client, searchOptions(collection, 50), scan);
+    ASSERT_TRUE(plain.ok()) << plain;
+    const auto told = searchInStages(client, searchOptions(collection, 50), scan);
+    ASSERT_TRUE(told.ok()) << told;
+    const pb::SearchResponse& answer = told.messages.back().response();
+    ASSERT_EQ(answer.hits_size(), plain.value.hits_size());
+    for (int i = 0; i < answer.hits_size(); ++i) {
+        EXPECT_EQ(answer.hits(i).shape().key(), plain.value.hits(i).shape().key());
+        EXPECT_EQ(answer.hits(i).score(), plain.value.hits(i).score());
+    }
+    std::vector<std::string> names;
+    for (const pb::SearchByScanEvent& message : told.messages) {
+        const std::string& stage = message.stage().stage();
+        if (message.has_stage() && (names.empty() || names.back() != stage)) names.push_back(stage);
+    }
+    std::vector<std::string> expected{"queued"};
+    for (const pb::StageTime& stage : answer.report().stages()) expected.push_back(stage.stage());
+    expected.emplace_back("search");
+    EXPECT_EQ(names, expected);
+
+    const auto refused = searchInStages(client, searchOptions("nosuch", 50), scan);
+    EXPECT_EQ(refused.error, "not_found") << refused;
+    EXPECT_TRUE(refused.messages.empty());
+}
+
 TEST_F(SearchRpc, BySignatureAndBatchAgreeWithByKey) {
     pb::SearchBySignatureRequest bySignature;
     *bySignature.mutable_options() = searchOptions(collection, 7);

@@ -284,6 +284,18 @@ TEST_F(ShapeRpc, SegmentAndGetSegmentsAgreeWithTheLibrary) {
 
     header.set_summary_only(true);
     EXPECT_EQ(segmentScan(client, header, scan).messages.size(), 1u);
+    header.set_report_stages(true);
+    const auto told = segmentScan(client, header, scan);
+    ASSERT_TRUE(told.ok()) << told;
+    std::vector<std::string> names;
+    for (const pb::SegmentedPoints& message : told.messages) {
+        const std::string& stage = message.stage().stage();
+        if (message.has_stage() && (names.empty() || names.back() != stage)) names.push_back(stage);
+    }
+    std::vector<std::string> expectedNames{"queued"};
+    for (const pb::StageTime& stage : summary.report().stages()) expectedNames.push_back(stage.stage());
+    EXPECT_EQ(names, expectedNames);
+    EXPECT_TRUE(told.messages.back().has_summary());
     EXPECT_TRUE(listAll(client, collection).empty()) << "Segment stores nothing";
 
     ASSERT_TRUE(addAndWait(client, collection, "k", scan).ok());

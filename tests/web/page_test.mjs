@@ -204,6 +204,28 @@ pageTest('a dropped scan is shown in segments, searched with and stored', async 
   server.command('delete', 'stored here', '--collection', 'parts');
 });
 
+pageTest('the stages of a scan are told while they run', async (page) => {
+  await visit(page, server, '#/shapes/parts');
+  // What is shown goes when it is done, so that each stage is noted as it comes.
+  await page.evaluate(() => {
+    window.told = new Set();
+    new MutationObserver((changes) => {
+      for (const { addedNodes } of changes) {
+        for (const node of addedNodes) if (node.parentElement?.matches('.stages')) window.told.add(node.textContent);
+      }
+    }).observe(document.body, { childList: true, subtree: true });
+  });
+  await page.setInputFiles('#file', scan);
+  await page.locator('.hit').first().waitFor();
+  await page.getByText('Segmented in', { exact: false }).first().waitFor();
+  const told = await page.evaluate(() => [...window.told]);
+  for (const stage of ['Tetrahedra are laid between the points', 'Inside is told from outside', 'Parts are found',
+    'Shapes are scored, the best are laid on it']) {
+    assert.ok(told.includes(stage), `${stage}: ${told.join(' | ')}`);
+  }
+  assert.ok(!told.some((words) => words.startsWith('Stage: ')), told.join(' | '));
+});
+
 pageTest('a scan far from 0, 0, 0 keeps its digits', async (page) => {
   const far = join(temporary.folder, 'far.xyz');
   const moved = (line) => line.split(' ').map((value, axis) => (axis < 3 ? (Number(value) + kFar[axis]).toFixed(9) : value)).join(' ');

@@ -6,6 +6,8 @@ import { chunksOf, pointCount } from './cloud/cloud';
 import type { Point, Positions } from './cloud/cloud';
 import { withoutEnding } from './files/ending';
 import type { Choices } from './parts/options';
+import { tellStage } from './stages';
+import type { OnProgress } from './stages';
 import { cloudFrom } from './parts/points';
 import type { SegmentedCloud } from './parts/points';
 import { decodeFile } from './work';
@@ -14,9 +16,6 @@ import type { SearchResponse } from '../gen/shapedb/v1/search_service_pb';
 import { SearchService } from '../gen/shapedb/v1/search_service_pb';
 import type { AddShapeResponse } from '../gen/shapedb/v1/shape_service_pb';
 import { AddMode, ShapeService } from '../gen/shapedb/v1/shape_service_pb';
-
-/** Told as it goes; `share` undefined: nobody knows how far it is. */
-export type OnProgress = (stage: string, share?: number) => void;
 
 export interface ScanSession {
   /** Of the file, without its ending. */
@@ -77,9 +76,11 @@ function* requests<H, C>(header: H, positions: Positions, chunk: (xyz: Uint8Arra
 
 const chunkPart = (xyz: Uint8Array) => ({ part: { case: 'chunk' as const, value: { xyz } } });
 
-function stagesOf(onProgress: OnProgress, after: string): (share: number) => void {
+function sending(onProgress: OnProgress, after: string): (share: number) => void {
   return (share) => (share < 1 ? onProgress('Points are being sent', share) : onProgress(after));
 }
+
+const kSent = 'The server checks the points';
 
 /** The scan in segments, as shapes of the collection are. */
 export async function segment(
@@ -95,11 +96,15 @@ export async function segment(
         profile: collection.profile,
         ...(collection.segmentation && { segmentation: collection.segmentation }),
         ...(collection.signature && { signature: collection.signature }),
+        reportStages: true,
       },
     },
   };
   const answers = await send(ShapeService.method.segment, requests(header, session.positions, chunkPart),
-    { signal, onSent: stagesOf(onProgress, 'The scan is being segmented') });
+    {
+      signal, onSent: sending(onProgress, kSent),
+      onAnswer: ({ part }) => part.case === 'stage' && tellStage(onProgress, part.value),
+    });
   const cloud = cloudFrom(answers);
   session.segmented.set(collection.name, cloud);
   return cloud;
@@ -122,10 +127,14 @@ export async function search(
       },
     },
   };
-  const [answer] = await send(SearchService.method.searchByScan, requests(header, session.positions, chunkPart),
-    { signal, onSent: stagesOf(onProgress, 'The server segments the scan, scores the shapes and lays the best on it; it does not tell how far it is') });
-  session.found.set(id, answer!);
-  return answer!;
+  const answers = await send(SearchService.method.searchByScanInStages, requests(header, session.positions, chunkPart),
+    {
+      signal, onSent: sending(onProgress, kSent),
+      onAnswer: ({ part }) => part.case === 'stage' && tellStage(onProgress, part.value),
+    });
+  const answer = answers.at(-1)!.part.value as SearchResponse;
+  session.found.set(id, answer);
+  return answer;
 }
 
 /** Stores the scan under a key that must be free. */
@@ -142,6 +151,6 @@ export async function store(
     },
   };
   const [answer] = await send(ShapeService.method.addShape, requests(header, session.positions, chunkPart),
-    { signal, onSent: stagesOf(onProgress, 'The scan is being stored') });
+    { signal, onSent: sending(onProgress, 'The scan is being stored') });
   return answer!;
 }

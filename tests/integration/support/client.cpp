@@ -124,26 +124,44 @@ Reply<pb::SearchResponse> searchByScan(Client& client, const pb::SearchOptions& 
     return reply;
 }
 
-Stream<pb::SegmentedPoints> segmentScan(Client& client, pb::SegmentHeader header, const Scan& scan,
-                                        std::chrono::milliseconds timeout) {
-    CallContext context(timeout);
-    const auto stream = client.shapes->Segment(&context);
+namespace {
+
+/// A header, the points, and all that is answered.
+template <typename Request, typename Answer, typename Call, typename Header>
+Stream<Answer> sendScan(CallContext& context, Call& stream, Header header, const Scan& scan) {
     header.set_point_count(scan.size() / 3);
-    pb::SegmentRequest message;
+    Request message;
     *message.mutable_header() = header;
-    bool open = stream->Write(message);
+    bool open = stream.Write(message);
     for (const std::string& chunk : chunksOf(scan, 50'000)) {
         message.mutable_chunk()->set_xyz(chunk);
-        open = open && stream->Write(message);
+        open = open && stream.Write(message);
     }
-    stream->WritesDone();
-    Stream<pb::SegmentedPoints> result;
-    pb::SegmentedPoints part;
-    while (stream->Read(&part)) result.messages.push_back(part);
-    static_cast<Outcome&>(result) = context.outcome(stream->Finish());
+    stream.WritesDone();
+    Stream<Answer> result;
+    Answer part;
+    while (stream.Read(&part)) result.messages.push_back(part);
+    static_cast<Outcome&>(result) = context.outcome(stream.Finish());
     return result;
 }
 
+}  // namespace
+
+Stream<pb::SearchByScanEvent> searchInStages(Client& client, const pb::SearchOptions& options,
+                                             const Scan& scan, std::chrono::milliseconds timeout) {
+    CallContext context(timeout);
+    pb::SearchByScanHeader header;
+    *header.mutable_options() = options;
+    return sendScan<pb::SearchByScanRequest, pb::SearchByScanEvent>(
+        context, *client.searches->SearchByScanInStages(&context), header, scan);
+}
+
+Stream<pb::SegmentedPoints> segmentScan(Client& client, const pb::SegmentHeader& header, const Scan& scan,
+                                        std::chrono::milliseconds timeout) {
+    CallContext context(timeout);
+    return sendScan<pb::SegmentRequest, pb::SegmentedPoints>(context, *client.shapes->Segment(&context),
+                                                             header, scan);
+}
 Reply<pb::Shape> getShape(Client& client, const std::string& collection, const std::string& key) {
     pb::GetShapeRequest request;
     request.mutable_shape()->set_collection(collection);

@@ -118,8 +118,11 @@ Stream<Response> drain(CallContext& context, grpc::ClientReaderInterface<Respons
 [[nodiscard]] Reply<pb::SearchResponse> searchByScan(
     Client& client, const pb::SearchOptions& options, const Scan& scan,
     std::chrono::milliseconds timeout = std::chrono::seconds(60));
+[[nodiscard]] Stream<pb::SearchByScanEvent> searchInStages(
+    Client& client, const pb::SearchOptions& options, const Scan& scan,
+    std::chrono::milliseconds timeout = std::chrono::seconds(60));
 [[nodiscard]] Stream<pb::SegmentedPoints> segmentScan(
-    Client& client, pb::SegmentHeader header, const Scan& scan,
+    Client& client, const pb::SegmentHeader& header, const Scan& scan,
     std::chrono::milliseconds timeout = std::chrono::seconds(60));
 
 [[nodiscard]] Reply<pb::Shape> getShape(Client& client, const std::string& collection,

@@ -82,19 +82,26 @@ export async function follow<I extends DescMessage, O extends DescMessage>(
   }
 }
 
-/** Many messages, and all that is answered at the end. */
+/** Many messages, and all that is answered at the end; `onAnswer` is told each as it arrives. */
 export async function send<I extends DescMessage, O extends DescMessage>(
   method: Method<I, O>,
   requests: Iterable<MessageInitShape<I>>,
-  options: CallOptions = {},
+  options: CallOptions & { onAnswer?: (answer: MessageShape<O>) => void } = {},
 ): Promise<MessageShape<O>[]> {
   const parts: BlobPart[] = [];
   for (const request of requests) {
     parts.push(...(inEnvelope(toBinary(method.input, create(method.input, request))) as BlobPart[]));
   }
   const answers: MessageShape<O>[] = [];
-  const bytes = await upload(method, new Blob(parts), options);
-  if (!takeAnswers(method.output, new EnvelopeReader(), bytes, (answer) => answers.push(answer))) throw unreachable();
+  const envelopes = new EnvelopeReader();
+  let ended = false;
+  await upload(method, new Blob(parts), options, (bytes) => {
+    ended = takeAnswers(method.output, envelopes, bytes, (answer) => {
+      answers.push(answer);
+      options.onAnswer?.(answer);
+    });
+  });
+  if (!ended) throw unreachable();
   return answers;
 }
 
@@ -116,20 +123,39 @@ function takeAnswers<O extends DescMessage>(
   return false;
 }
 
-/** XMLHttpRequest, for fetch does not tell how much has been sent. */
-function upload(method: DescMethod, body: Blob, options: CallOptions): Promise<Uint8Array> {
+/** One byte for each letter of x-user-defined, in which XMLHttpRequest hands out what has arrived so far. */
+function bytesOf(text: string): Uint8Array {
+  const bytes = new Uint8Array(text.length);
+  for (let i = 0; i < text.length; ++i) bytes[i] = text.charCodeAt(i);
+  return bytes;
+}
+
+/** XMLHttpRequest, for fetch does not tell how much has been sent. `onBytes` gets the answer piece by piece. */
+function upload(method: DescMethod, body: Blob, options: CallOptions, onBytes: (bytes: Uint8Array) => void): Promise<void> {
   return new Promise((resolve, reject) => {
     const request = new XMLHttpRequest();
     request.open('POST', pathOf(method));
     for (const [name, value] of Object.entries(headersOf('application/connect+proto'))) {
       request.setRequestHeader(name, value);
     }
-    request.responseType = 'arraybuffer';
+    request.overrideMimeType('text/plain; charset=x-user-defined');
+    let taken = 0;
+    const take = () => {
+      if (request.status !== 200) return;
+      const text = request.responseText;
+      try {
+        if (text.length > taken) onBytes(bytesOf(text.slice(taken)));
+      } catch (error) {
+        reject(error as Error);
+      }
+      taken = text.length;
+    };
     request.upload.onprogress = (event) => options.onSent?.(event.total > 0 ? event.loaded / event.total : 1);
+    request.onprogress = take;
     request.onload = () => {
-      const bytes = new Uint8Array(request.response as ArrayBuffer);
-      if (request.status === 200) return resolve(bytes);
-      reject(failureFrom(parsed(new TextDecoder().decode(bytes)), request.status));
+      take();
+      if (request.status === 200) return resolve();
+      reject(failureFrom(parsed(new TextDecoder().decode(bytesOf(request.responseText))), request.status));
     };
     request.onerror = () => reject(unreachable());
     request.onabort = () => reject(new DOMException('cancelled', 'AbortError'));

@@ -20,11 +20,12 @@ import type { ScanSession } from '../scan_session';
 import { droppedFile, readDropped, scanSession, search, segment, store } from '../scan_session';
 import { filterField, hits, searchOptionsOf } from './like';
 import { segmentList, showSegments } from './shape';
+import { stageInWords, tellStage } from '../stages';
 import { seconds } from '../text';
 import type { View } from '../view';
 import { CollectionService } from '../../gen/shapedb/v1/collection_service_pb';
 import { ShapeService } from '../../gen/shapedb/v1/shape_service_pb';
-import type { SegmentationReport } from '../../gen/shapedb/v1/types_pb';
+import type { SegmentationReport, StageTime } from '../../gen/shapedb/v1/types_pb';
 import { ShapeState } from '../../gen/shapedb/v1/types_pb';
 
 /** Drawn of a scan at hand. */
@@ -112,7 +113,16 @@ function drawable(cloud: SegmentedCloud): SegmentedCloud {
 function stageTimes(report: SegmentationReport | undefined): HTMLElement | null {
   if (report === undefined || report.stages.length === 0) return null;
   return h('details', {}, h('summary', {}, `Segmented in ${seconds(report.totalSeconds)}, stage by stage`),
-    facts(report.stages.map((one) => [one.stage, seconds(one.seconds)])));
+    facts(Array.from(timesInWords(report.stages), ([words, spent]) => [words, seconds(spent)])));
+}
+
+function timesInWords(stages: StageTime[]): Map<string, number> {
+  const times = new Map<string, number>();
+  for (const { stage, seconds: spent } of stages) {
+    const words = stageInWords(stage);
+    times.set(words, (times.get(words) ?? 0) + spent);
+  }
+  return times;
 }
 
 /** What one should know before relying on the segments. */
@@ -198,7 +208,6 @@ async function watch(collection: string, key: string, progress: Progress, signal
   await follow(ShapeService.method.watchIngest, { shape: { collection, key } }, (event) => {
     if (event.state === ShapeState.FAILED) throw new Error(event.failure?.message ?? 'it could not be segmented');
     if (event.state !== ShapeState.PENDING) return;
-    const share = event.total > 0n ? Number(event.done) / Number(event.total) : undefined;
-    progress.tell(event.stage === '' ? 'It waits for its turn' : `Stage: ${event.stage}`, share);
+    tellStage(progress.tell, event);
   }, { signal });
 }

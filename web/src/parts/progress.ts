@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Stage by stage, what is being done, with a bar where somebody knows how far it is.
 import { h } from '../dom';
-import type { OnProgress } from '../scan_session';
+import type { OnProgress } from '../stages';
 
 export class Progress {
   readonly element = h('ol', { class: 'stages', 'aria-live': 'polite' });
