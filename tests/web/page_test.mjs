@@ -246,6 +246,27 @@ pageTest('a scan far from 0, 0, 0 keeps its digits', async (page) => {
   server.command('delete', 'far away', '--collection', 'parts');
 });
 
+pageTest('of a large shape some points come at first, and all on demand', async (page) => {
+  sample(join(temporary.folder, 'large'), '--families', 'mug', '--count', '1', '--points', '70000');
+  server.command('add', join(temporary.folder, 'large/mug/mug_01.ply'), '--key', 'large', '--collection', 'parts', '--wait');
+  const sizes = [];
+  await page.route('**/GetSegments', async (route) => {
+    const response = await route.fetch();
+    sizes.push((await response.body()).length);
+    await route.fulfill({ response });
+  });
+  await visit(page, server, '#/shape/parts/large');
+  const button = page.getByRole('button', { name: 'Show all 70,000 points' });
+  await button.click();
+  await button.waitFor({ state: 'detached' });
+  await settled(page);
+  // 12 bytes of coordinates for each point, and its segment in one.
+  const [few, all] = sizes.map((size) => size / 13);
+  assert.ok(few > 55_000 && few < 68_000, `${few} points at first`);
+  assert.ok(all > 69_000, `${all} points on demand`);
+  server.command('delete', 'large', '--collection', 'parts');
+});
+
 pageTest('a file that is no scan is refused in words', async (page) => {
   const bad = join(temporary.folder, 'bad.off');
   writeFileSync(bad, 'OFF\n4 1 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 9\n');
