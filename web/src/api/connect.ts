@@ -75,11 +75,14 @@ export async function follow<I extends DescMessage, O extends DescMessage>(
   const response = await post(method, 'application/connect+proto', body, options);
   const envelopes = new EnvelopeReader();
   const reader = response.body!.getReader();
+  let ended = false;
+  // To the very end: a body that is not read until then counts as cancelled, and its connection is closed.
   for (;;) {
     const { done, value } = await reader.read();
-    if (done) throw unreachable();
-    if (takeAnswers(method.output, envelopes, value, onAnswer)) return;
+    if (done) break;
+    ended = takeAnswers(method.output, envelopes, value, onAnswer) || ended;
   }
+  if (!ended) throw unreachable();
 }
 
 /** Many messages, and all that is answered at the end; `onAnswer` is told each as it arrives. */
