@@ -64,7 +64,7 @@ Result<Aligned> alignFiles(const AlignFlags& flags, const RunContext& context) {
     const auto queryScan = loadScan(flags.query, flags.scan, flags.scan.seed, context);
     RETURN_IF_ERROR(queryScan);
     auto otherScan = loadScan(flags.other, flags.scan, flags.scan.seed, context);
-    RETURN_IF_ERROR(otherScan);
+    if (!otherScan) return fail(withKeyHint(otherScan.error(), flags.other));
     const auto query = surfaceOf(flags.query, queryScan->points, context);
     RETURN_IF_ERROR(query);
     const auto other = surfaceOf(flags.other, otherScan->points, context);

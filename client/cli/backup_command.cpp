@@ -138,7 +138,7 @@ void addBackupCommands(CLI::App& admin, Session& session) {
         addFileCommand(admin, session, "merge-backups",
                        "Make one full backup of one and its increments; needs no server", merge, &runMerge);
     addIncrements(*command, merge)->required();
-    command->add_option("--out", merge->out, "The new full backup")->type_name("FILE")->required();
+    command->add_option("-o,--out", merge->out, "The new full backup")->type_name("FILE")->required();
 }
 
 }  // namespace shapedb::cli

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb compare`: the score of two stored shapes, or of two files without a server, explained.
+#include <filesystem>
 #include <memory>
 
 #include <CLI/CLI.hpp>
@@ -83,6 +84,18 @@ Result<client::Comparison> compareFiles(Session& session, const CompareFlags& fl
     return comparison;
 }
 
+/// Names of files were given where keys are meant.
+Error withFilesHint(Error error, const CompareFlags& flags) {
+    const auto isFile = [](const std::string& name) {
+        std::error_code unknown;
+        return std::filesystem::is_regular_file(name, unknown);
+    };
+    if (error.code == ErrorCode::kNotFound && isFile(flags.a) && isFile(flags.b)) {
+        error.message += "; files are compared with --files";
+    }
+    return error;
+}
+
 Result<client::Comparison> compareStored(Session& session, const CompareFlags& flags) {
     if (flags.parameters.any()) {
         return fail(ErrorCode::kInvalidArgument,
@@ -95,7 +108,7 @@ Result<client::Comparison> compareStored(Session& session, const CompareFlags& f
     RETURN_IF_ERROR(factor);
     auto comparison = client->compare({flags.collection, flags.a}, {flags.collection, flags.b},
                                       flags.score.forServer(), context);
-    RETURN_IF_ERROR(comparison);
+    if (!comparison) return fail(withFilesHint(comparison.error(), flags));
     if (*factor != 1.0) scaleBy(1.0 / *factor, *comparison);
     return comparison;
 }

@@ -124,7 +124,7 @@ void addHelpCommands(CLI::App& app, Session& session) {
     CLI::App* man =
         app.add_subcommand("man", "Print the manual page of a command, or write all: man -l <(shapedb man)");
     man->add_option("COMMAND", manual->words, "e.g. query, or admin key create; none: shapedb itself");
-    man->add_option("--out", manual->folder, "Write the pages of all commands into this folder")
+    man->add_option("-o,--out", manual->folder, "Write the pages of all commands into this folder")
         ->type_name("DIR");
     man->callback([&session, &app, manual] {
         session.action = [&session, &app, manual] { return runManual(session, app, *manual); };

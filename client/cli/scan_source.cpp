@@ -116,6 +116,14 @@ std::uint64_t fileSeed(std::uint64_t seed, const std::string& name) {
     return Random(seed ^ hash).next();
 }
 
+Error withKeyHint(Error error, const std::string& path) {
+    std::error_code unknown;
+    const bool missing = fs::status(path, unknown).type() == fs::file_type::not_found;
+    if (missing && error.code == ErrorCode::kFileNotReadable)
+        error.message += "; a stored shape is named with --key";
+    return error;
+}
+
 Result<LoadedScan> loadScan(const std::string& path, const ScanFlags& flags, std::uint64_t seed,
                             const RunContext& context, bool look) {
     if (flags.points && *flags.points < 4) {

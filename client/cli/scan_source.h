@@ -69,6 +69,10 @@ struct LoadedScan : Scan {
 [[nodiscard]] Result<LoadedScan> loadScan(const std::string& path, const ScanFlags& flags, std::uint64_t seed,
                                           const RunContext& context = {}, bool look = false);
 
+/// `error` of `path`, for commands with --key: where there is no such file, the key of a stored shape may
+/// have been meant.
+[[nodiscard]] Error withKeyHint(Error error, const std::string& path);
+
 /// `path` relative to `folder`, with '/' as separator; the file name if `folder` is the file itself.
 [[nodiscard]] std::string relativeName(const std::string& path, const std::string& folder);
 

@@ -40,7 +40,7 @@ void addSearchFlags(CLI::App& command, SearchFlags& flags) {
 
 Result<Answer> Searcher::withFile(const std::string& path, const RunContext& context) const {
     auto scan = loadScan(path, flags.scan, flags.scan.seed, context, true);
-    RETURN_IF_ERROR(scan);
+    if (!scan) return fail(withKeyHint(scan.error(), path));
     Answer answer;
     answer.query = path;
     answer.points = scan->points;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <regex>
 #include <utility>
 
 #include <CLI/CLI.hpp>
@@ -49,6 +50,62 @@ std::string meantCommand(const CLI::App& app, const std::string& typed) {
     return nearestName(typed, own);
 }
 
+/// What the values of an option are, after "is not".
+std::string kindOf(const CLI::App& command, const std::string& name) {
+    for (const CLI::App* app = &command; app != nullptr; app = app->get_parent()) {
+        for (const CLI::Option* option : optionsOf(*app)) {
+            if (!option->check_name(name)) continue;
+            const std::string type = option->get_type_name();
+            if (option->get_expected_max() == 0) return "true or false";
+            if (type.find("UINT") == 0) return "a whole number of 0 or more that is not too large";
+            if (type.find("INT") == 0) return "a whole number that is not too large";
+        }
+    }
+    return "a number";
+}
+
+/// A sentence of CLI11 in the words of the others; what it says is `pattern`.
+struct Rewording {
+    const char* pattern;
+    std::string (*reworded)(const std::smatch& found, const CLI::App& command);
+};
+
+std::string noneOf(const std::smatch& found, const CLI::App&) {
+    std::vector<std::string> names = CLI::detail::split(found.str(3), ',');
+    std::string text = found.str(1) + ": '" + found.str(2) + "' is none of ";
+    for (std::size_t i = 0; i < names.size(); ++i) text += (i == 0 ? "" : ", ") + names[i];
+    return text + didYouMean(nearestName(found.str(2), names));
+}
+
+const std::array<Rewording, 6> kRewordings = {{
+    {"Could not convert: (\\S+) = (.*)",
+     [](const std::smatch& found, const CLI::App& command) {
+         return found.str(1) + ": '" + found.str(2) + "' is not " + kindOf(command, found.str(1));
+     }},
+    {"(\\S+): Value (.*) not in range (\\S+) to (\\S+)",
+     [](const std::smatch& found, const CLI::App&) {
+         return found.str(1) + ": '" + found.str(2) + "' must be a number, " + found.str(3) + " to " +
+                found.str(4);
+     }},
+    {"(\\S+): (.*) not in \\{(.*)\\}", noneOf},
+    {"(\\S+): 1 required \\S+ missing",
+     [](const std::smatch& found, const CLI::App&) { return found.str(1) + " needs a value"; }},
+    {"(\\S+): At least (\\d+) required but received (\\d+)",
+     [](const std::smatch& found, const CLI::App&) {
+         return found.str(1) + " needs " + found.str(2) + " values, not " + found.str(3);
+     }},
+    {"A subcommand is required",
+     [](const std::smatch&, const CLI::App&) { return std::string("give a command"); }},
+}};
+
+std::string inPlainWords(const std::string& message, const CLI::App& command) {
+    for (const Rewording& one : kRewordings) {
+        std::smatch found;
+        if (std::regex_match(message, found, std::regex(one.pattern))) return one.reworded(found, command);
+    }
+    return message;
+}
+
 std::string complaint(const CLI::App& app, const CLI::App& command, const CLI::ParseError& error) {
     const std::vector<std::string> unknown = app.remaining(true);
     const std::string first = unknown.empty() ? std::string() : unknown.front();
@@ -59,9 +116,10 @@ std::string complaint(const CLI::App& app, const CLI::App& command, const CLI::P
     if (!first.empty() && !shownCommands(command).empty()) {
         return "unknown command '" + first + "'" + didYouMean(meantCommand(command, first));
     }
+    if (!first.empty()) return "there is no place for '" + first + "'";
     std::string message = error.what();
     std::replace(message.begin(), message.end(), '\n', ' ');
-    return message;
+    return inPlainWords(message, command);
 }
 
 /// Fields of requests whose flags have other names.

@@ -171,6 +171,7 @@ TEST_F(Help, ManualPagesCoverAllCommands) {
         for (const char* section : {".SH NAME", ".SH SYNOPSIS", ".SH OPTIONS"}) {
             EXPECT_TRUE(contains(text, section)) << entry.path();
         }
+        EXPECT_FALSE(contains(text, "\\fB\\-\\-out\\fR")) << entry.path() << ": --out is -o everywhere";
     }
     EXPECT_EQ(runCommand({"man", "quer"}).exitCode, 2);
 }

@@ -236,6 +236,17 @@ TEST_F(Online, CompareAgreesForStoredShapesAndFiles) {
               "invalid_argument");
 }
 
+TEST_F(Online, FilesInThePlaceOfKeysAndKeysInThatOfFilesAreAdvised) {
+    const std::string file = scans() + "/mug/mug_01.ply";
+    const std::string notStored = onlineJson({"compare", file, file}, 4)["error"]["message"];
+    EXPECT_NE(notStored.find("; files are compared with --files"), std::string::npos) << notStored;
+    const std::string neither = onlineJson({"compare", file, "nosuch"}, 4)["error"]["message"];
+    EXPECT_EQ(neither.find("--files"), std::string::npos) << neither;
+    const std::string noFile = onlineJson({"query", "mug/mug_01"}, 3)["error"]["message"];
+    EXPECT_NE(noFile.find("No such file or directory; a stored shape is named with --key"), std::string::npos)
+        << noFile;
+}
+
 TEST_F(Online, ListPagesAndFiltersByState) {
     fill("list");
     const json all = onlineJson({"list", "--collection", "list"});

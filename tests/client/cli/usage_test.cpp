@@ -76,6 +76,39 @@ TEST_F(Usage, QueryWithoutAShapeSaysWhatItNeeds) {
     EXPECT_NE(runCommand({"query", "a.ply", "--key", "b"}).err.find("not both"), std::string::npos);
 }
 
+TEST_F(Usage, WrongValuesAreToldInPlainWords) {
+    const std::vector<std::pair<std::vector<std::string>, std::string>> wrong = {
+        {{"query", "a.ply", "-k", "abc"}, "--k: 'abc' is not a whole number of 0 or more"},
+        {{"query", "a.ply", "-k", "1.5"}, "--k: '1.5' is not a whole number of 0 or more"},
+        {{"query", "a.ply", "--threshold", "half"}, "--threshold: 'half' is not a number"},
+        {{"query", "a.ply", "--viewpoint", "1,a,3"}, "--viewpoint: '1,a,3' is not a number"},
+        {{"query", "a.ply", "--viewpoint", "1,2"}, "--viewpoint needs 3 values, not 2"},
+        {{"query", "a.ply", "-k"}, "--k needs a value"},
+        {{"query", "a.ply", "--candidates", "abc"}, "--candidates: 'abc' must be a number, 1 to 10000"},
+        {{"list", "--state", "redy"},
+         "--state: 'redy' is none of pending, ready, failed: did you mean 'ready'?"},
+        {{"completion", "tcsh"}, "SHELL: 'tcsh' is none of bash, zsh, fish"},
+        {{"health", "extra"}, "there is no place for 'extra'"},
+        {{"admin"}, "give a command (see 'shapedb admin --help')"},
+        {{}, "give a command (see 'shapedb --help')"},
+    };
+    for (const auto& [arguments, told] : wrong) {
+        const CommandRun run = runCommand(arguments);
+        EXPECT_EQ(run.exitCode, 2) << run.err;
+        EXPECT_EQ(run.err.rfind("shapedb: " + told, 0), 0u) << run.err;
+    }
+}
+
+TEST_F(Usage, AKeyInThePlaceOfAFileIsAdvised) {
+    const CommandRun run = runCommand({"align", writePoints("a.xyz", dumbbellPoints()), "mug/mug_01"});
+    EXPECT_EQ(run.exitCode, 3);
+    EXPECT_NE(
+        run.err.find("mug/mug_01: cannot be read: No such file or directory; a stored shape is named with "
+                     "--key\n"),
+        std::string::npos)
+        << run.err;
+}
+
 TEST_F(Usage, ErrorIsADocumentWithJson) {
     const CommandRun run = runCommand({"segment", "--json", "--no-such-flag"});
     EXPECT_EQ(run.exitCode, 2);
