@@ -147,7 +147,7 @@ grpc::Status SearchServiceHandler::searchByScan(grpc::ServerContext* context,
                                                 Upload<v1::SearchByScanRequest>& messages,
                                                 v1::SearchResponse* response) {
     return handle(services_, context, operations::kSearchByScan,
-                  [&](Call& call) { return searchByScan(call, messages, call.run(), *response); });
+                  [&](Call& call) { return receiveAndSearch(call, messages, call.run(), *response); });
 }
 
 grpc::Status SearchServiceHandler::searchByScanInStages(grpc::ServerContext* context,
@@ -155,15 +155,15 @@ grpc::Status SearchServiceHandler::searchByScanInStages(grpc::ServerContext* con
                                                         UploadReplies<v1::SearchByScanEvent>* writer) {
     return handle(services_, context, operations::kSearchByScanInStages, [&](Call& call) -> Result<void> {
         v1::SearchByScanEvent last;
-        RETURN_IF_ERROR(searchByScan(call, messages,
-                                     tellingStages<v1::SearchByScanEvent>(call, *writer, true),
-                                     *last.mutable_response()));
+        RETURN_IF_ERROR(receiveAndSearch(call, messages,
+                                         tellingStages<v1::SearchByScanEvent>(call, *writer, true),
+                                         *last.mutable_response()));
         return call.write(*writer, last);
     });
 }
 
-Result<void> SearchServiceHandler::searchByScan(Call& call, Upload<v1::SearchByScanRequest>& messages,
-                                                const RunContext& running, v1::SearchResponse& response) {
+Result<void> SearchServiceHandler::receiveAndSearch(Call& call, Upload<v1::SearchByScanRequest>& messages,
+                                                    const RunContext& running, v1::SearchResponse& response) {
     catalog::PreparedSearch prepared;
     catalog::ScanUpload upload(services_.config.limits.maxPoints, services_.admission.uploads);
     const auto checkSearchHeader = [&](const v1::SearchByScanHeader& header) -> Result<void> {

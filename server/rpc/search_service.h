@@ -21,8 +21,7 @@ class SearchServiceHandler final : public ReadsRequests<v1::SearchService> {
                              v1::SearchResponse* response);
     grpc::Status searchByScan(grpc::ServerContext* context, Upload<v1::SearchByScanRequest>& messages,
                               v1::SearchResponse* response);
-    grpc::Status searchByScanInStages(grpc::ServerContext* context,
-                                      Upload<v1::SearchByScanRequest>& messages,
+    grpc::Status searchByScanInStages(grpc::ServerContext* context, Upload<v1::SearchByScanRequest>& messages,
                                       UploadReplies<v1::SearchByScanEvent>* writer);
     grpc::Status searchBySignature(grpc::ServerContext* context,
                                    Request<v1::SearchBySignatureRequest>& request,
@@ -32,8 +31,8 @@ class SearchServiceHandler final : public ReadsRequests<v1::SearchService> {
 
   private:
     /// `running`: the context of the search, once the scan has arrived.
-    Result<void> searchByScan(Call& call, Upload<v1::SearchByScanRequest>& messages,
-                              const RunContext& running, v1::SearchResponse& response);
+    Result<void> receiveAndSearch(Call& call, Upload<v1::SearchByScanRequest>& messages,
+                                  const RunContext& running, v1::SearchResponse& response);
     /// The answer is encoded already.
     grpc::Status searchBatch(grpc::ServerContext* context, Request<v1::SearchBatchRequest>& request,
                              grpc::ByteBuffer* response);
