@@ -23,7 +23,7 @@ struct AlignSettings {
     bool toldKind = true;  ///< fitted as what the condition says; otherwise automatic
 };
 
-/// What is missing from a query, and as what it is fitted when the kind is told.
+/// What is missing from a query, and the kind it is fitted as when the fit is given one.
 struct AlignCondition {
     const char* name;
     FitKind kind;

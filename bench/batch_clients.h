@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Clients that send SearchBatch without a pause, in a process of their own: with the measuring client they
-// would share locks and memory, and what they hold up there is not the server's doing.
+// Clients that send SearchBatch without a pause, in a process of their own: inside the measuring client they
+// would share its locks and memory, and delays there would be blamed on the server.
 #pragma once
 
 #include <cstdint>

@@ -63,7 +63,7 @@ struct Verdict {
 [[nodiscard]] std::string verdictText(const Verdict& verdict, const Counts& baseline, const Counts& measured,
                                       double margin);
 
-/// Of this machine and program. Errors: kUnavailable: `valgrind` cannot be run.
+/// Describes this machine and program. Errors: kUnavailable: `valgrind` cannot be run.
 [[nodiscard]] Result<CountingEnvironment> countingEnvironment(const std::string& valgrind);
 /// Runs `program` `job NAME --folder FOLDER` under callgrind. Errors: kUnavailable, kInternal.
 [[nodiscard]] Result<std::uint64_t> countInstructions(const std::string& valgrind, const std::string& program,

@@ -13,7 +13,7 @@
 
 namespace shapedb {
 
-/// So much says how long the whole beginning is.
+/// This many bytes tell how long the whole beginning is.
 constexpr std::size_t kIncrementPrefixBytes = 104;
 
 struct IncrementHead {
@@ -27,7 +27,7 @@ struct IncrementHead {
 
 [[nodiscard]] std::string encodeIncrementHead(const IncrementHead& head);
 
-/// Of all blocks that it brings.
+/// The size of all blocks that it brings.
 [[nodiscard]] std::uint64_t changedBytes(const IncrementHead& head);
 
 /// The size of the beginning, at most 2.4 MB, of an increment of `fileBytes` that begins with `prefix`.

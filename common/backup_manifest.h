@@ -54,7 +54,7 @@ class BlockHash {
   public:
     /// Takes the next whole pages of the block.
     void update(const char* data, std::size_t size);
-    /// Of all pages since the last `finish`, of which there must be one.
+    /// The hash of all pages since the last `finish`; there must be at least one.
     [[nodiscard]] Sha256Digest finish();
 
   private:

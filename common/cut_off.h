@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the status of a call says that the server ended while its client was sending or reading.
+// How the status of a call shows that the server cut it off while its client was sending or reading.
 #pragma once
 
 namespace shapedb {

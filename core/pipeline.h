@@ -28,7 +28,8 @@ struct ShapeParameters {
     /// Whether a collection keeps views of its shapes (core/views/views.h), so that queries of one side find
     /// them.
     bool views = false;
-    /// Of the scans of a collection. With a unit sizes count in searches unless they say otherwise.
+    /// The unit of the scans of a collection. If there is one, sizes count in searches unless those say
+    /// otherwise.
     LengthUnit unit = LengthUnit::kNone;
 };
 

@@ -44,7 +44,7 @@ Result<telemetry::LoggerPtr> openLog(const config::ServerConfig::Log& log) {
     return telemetry::makeLogger({*level, log.format == "json", log.file});
 }
 
-/// What an operator has allowed, and should not have without thinking.
+/// Warns of settings that leave the server open to others.
 void warnOfOpenDoors(const config::ServerConfig& config, const config::Endpoint& endpoint,
                      const telemetry::LoggerPtr& log) {
     if (endpoint.isLoopback()) return;

@@ -305,7 +305,7 @@ class Client {
     /// Reads the whole database. Returns the problems found, one line each; empty if it is sound.
     [[nodiscard]] Result<std::vector<std::string>> check(
         const std::function<void(const CheckProgress&)>& onProgress, const RunContext& context = {}) const;
-    /// The same; what it returns of acknowledged changes that are missing is not told any more from then on.
+    /// The same; acknowledged changes that it returns as missing are not reported again.
     [[nodiscard]] Result<std::vector<std::string>> checkAndAcknowledge(
         const std::function<void(const CheckProgress&)>& onProgress, const RunContext& context = {}) const;
 

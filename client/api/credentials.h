@@ -13,7 +13,7 @@
 
 namespace shapedb::client {
 
-/// Of `address`, which names its port or scheme. Names are not resolved.
+/// Whether `address`, which names its port or scheme, is on this machine. Names are not resolved.
 [[nodiscard]] bool isThisMachine(const std::string& address);
 
 /// The API key of the options; empty: none. Errors: kFileNotReadable, kInvalidArgument (an empty file; the

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What protobuf would send although it may not, with a word of its own on standard error: text that is no
-// UTF-8. Private to client/api.
+// Refuses text that is not UTF-8: protobuf would only complain on standard error and send it all the same.
+// Private to client/api.
 #pragma once
 
 #include <google/protobuf/message.h>

@@ -237,7 +237,7 @@ struct SearchReply {
     std::uint64_t verified = 0;    ///< candidates that were laid on the query
     bool exact = true;             ///< false: verifying more candidates could change the hits
     std::uint64_t pending = 0;     ///< shapes of the collection that have no signature yet
-    /// Of all lengths: that of the collection.
+    /// The unit of all lengths: that of the collection.
     LengthUnit unit = LengthUnit::kNone;
     /// Mirror images were to count as different (SearchOptions::reflection), but nothing was laid on the
     /// query: they score nearly alike.
@@ -263,7 +263,8 @@ struct Comparison {
     std::optional<Fit> fit{};  ///< how `other` lies on `query`, if both have surface points
     Verdict verdict = Verdict::kNone;
     double verdictReliability = 0.0;  ///< as in Hit
-    /// Of all lengths; kNone if the two are in collections of different units, and each in its own.
+    /// The unit of all lengths; kNone if the two shapes are in collections of different units: then each has
+    /// its own.
     LengthUnit unit = LengthUnit::kNone;
     bool leftRightUntold = false;  ///< as in SearchReply
 };
@@ -303,7 +304,7 @@ struct BackupReport {
     std::string sha256;  ///< 32 bytes
 };
 
-/// Of an increment.
+/// A finished increment.
 struct IncrementReport {
     std::uint64_t bytes = 0;         ///< of its file
     std::uint64_t changedBytes = 0;  ///< of the database, in blocks of some pages
@@ -387,7 +388,7 @@ struct KeyLimits {
     std::uint64_t bytesPerDay = 0;  ///< of points received
 };
 
-/// What whoever makes an API key decides.
+/// A request for a new API key.
 struct KeyRequest {
     std::string name;  ///< whose key it is; several may share it
     Role role = Role::kReader;

@@ -31,7 +31,7 @@ class BackupChain {
     [[nodiscard]] static Result<BackupChain> open(const std::vector<std::string>& files,
                                                   const RunContext& context);
 
-    /// Of the backup that the chain leads to.
+    /// The size of the backup that the chain leads to.
     [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
 
     /// The next bytes, as many as `most`, whole pages, unless the end comes before; 0 at the end. The last

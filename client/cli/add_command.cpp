@@ -165,7 +165,7 @@ Result<void> lookUp(Run& run, const std::vector<Upload>& files) {
             keys.push_back(files[i].key);
         }
         auto found = run.client.getShapes(run.flags.collection, keys, context);
-        // A wrong key is told with its file.
+        // A wrong key is reported with its file.
         if (!found && found.error().code == ErrorCode::kInvalidArgument) continue;
         RETURN_IF_ERROR(found);
         for (client::Shape& shape : found->shapes) {
@@ -299,7 +299,7 @@ std::string uploadsText(const std::vector<Upload>& uploads) {
     return text + "\n";
 }
 
-/// What an end before its time has left undone.
+/// Reports what an interrupted command has not done.
 void tellStop(const Run& run) {
     std::size_t notSent = 0;
     std::size_t pending = 0;
@@ -338,7 +338,7 @@ CommandResult runAdd(Session& session, const AddFlags& flags) {
     RETURN_IF_ERROR(files);
     const auto client = connectToServer(session, Work::kHeavy);
     RETURN_IF_ERROR(client);
-    // Told once, not of every file.
+    // Checked first, so that a wrong collection is reported once and not for every file.
     RETURN_IF_ERROR(client->getCollection(flags.collection, session.context()));
     const auto factor = factorToCollection(*client, flags.collection, flags.unit, session.context());
     RETURN_IF_ERROR(factor);

@@ -84,7 +84,7 @@ CommandResult runCheck(Session& session, bool acknowledge) {
     session.console().text(problems->empty()
                                ? "the database is sound\n"
                                : formatCount(problems->size(), "problem", "problems") + " found\n");
-    if (acknowledge) session.console().text("changes that are missing are not told any more\n");
+    if (acknowledge) session.console().text("missing changes will not be reported again\n");
     return problems->empty() ? kOk : kDefect;
 }
 

@@ -73,7 +73,7 @@ Result<void> requireYes(const client::Client& client, const TargetFlags& flags, 
 CommandResult forEachKey(Session& session, const client::Client& client, const TargetFlags& flags,
                          json& failed,
                          const std::function<Result<std::string>(const client::ShapeRef&)>& change) {
-    // Told once, not of every key.
+    // Checked first, so that a wrong collection is reported once and not for every key.
     if (flags.keys.size() > 1) RETURN_IF_ERROR(client.getCollection(flags.collection, session.context()));
     Failures failures;
     std::optional<Error> stop;

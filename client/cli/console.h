@@ -17,7 +17,7 @@ namespace shapedb::cli {
 /// What a terminal at the error stream is given.
 struct TerminalOptions {
     bool bar = false;     ///< a progress bar
-    bool colour = false;  ///< the program's name in red where an error is told
+    bool colour = false;  ///< the program's name in red where an error is reported
 };
 
 /// The terminal at file descriptor `descriptor`: nothing if it is none or TERM is "dumb", no colour with

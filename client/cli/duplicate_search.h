@@ -37,7 +37,7 @@ struct DuplicatePair {
     double signatureScore = 0.0;  ///< the same from either side
     std::optional<PairFit> fit;   ///< of b laid on a; not set unless compared
 
-    /// That of the fit, or else of the signatures.
+    /// The score of the fit or, without one, of the signatures.
     [[nodiscard]] double score() const { return fit ? fit->score : signatureScore; }
 };
 

@@ -27,7 +27,7 @@ void Failures::tell(Console& console, std::size_t all, const char* singular, con
     for (const Failure& one : failures_) ++alike[one.error.message];
     for (const Failure& one : failures_) {
         std::size_t& left = alike[one.error.message];
-        if (left == 0) continue;  // told with the first
+        if (left == 0) continue;  // reported with the first
         const bool named = one.error.message.find(one.item) != std::string::npos;
         std::string text = named ? one.error.message : one.item + ": " + one.error.message;
         if (left > 1) text += "; the same of " + formatCount(left - 1, "other", "others");

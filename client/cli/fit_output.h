@@ -50,7 +50,7 @@ template <typename Fit>
 [[nodiscard]] std::string likenessText(Verdict verdict, std::optional<bool> mirrored,
                                        const std::string& part = "query is part of it");
 
-/// What is said of SearchReply::leftRightUntold, a line.
+/// The line for SearchReply::leftRightUntold.
 constexpr const char* kLeftRightUntold =
     "mirror images score nearly alike here: only laying shapes on the query (--verify) tells left from "
     "right\n";

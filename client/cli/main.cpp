@@ -12,7 +12,7 @@
 
 int main(int argc, char** argv) {
     const std::atomic<bool>& interrupted = shapedb::stopFlag();
-    // gRPC writes its own log lines to standard error unless told not to; errors reach the user
+    // gRPC writes its own log lines to standard error unless switched off; errors reach the user
     // through the results of the calls.
     setenv("GRPC_VERBOSITY", "NONE", 0);
 

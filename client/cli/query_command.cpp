@@ -103,7 +103,7 @@ struct QueryRun {
         return writeAligned(searcher, answer, folder, session.context());
     }
 
-    /// -o, and what was written, for people.
+    /// Writes the file of -o; returns a sentence about what was written.
     Result<std::string> finish() const {
         std::string text;
         if (!flags.csv.empty()) {
@@ -220,7 +220,7 @@ CommandResult runQuery(Session& session, const QueryFlags& flags) {
                                                 : Explained::kFirst;
     QueryRun run{session, flags, searcher, explained};
     if (alone) return runOne(run, flags.paths.empty() ? "" : flags.paths.front());
-    // Told once, not of every query.
+    // Checked first, so that a wrong collection is reported once and not for every query.
     RETURN_IF_ERROR(client->getCollection(search.options.collection, session.context()));
     return runMany(run, files);
 }

@@ -55,7 +55,7 @@ CLI::App& addScanFlagsButNoise(CLI::App& command, ScanFlags& flags) {
 
 namespace {
 
-/// Groups of points whose shares are told.
+/// How many groups of points are listed with their shares.
 constexpr std::size_t kMostListed = 8;
 
 double shareOf(std::uint64_t part, std::size_t points) {

@@ -48,8 +48,8 @@ void addFormatFlag(CLI::App& command, ScanFlags& flags);
 /// order of files, the number of threads or the other files.
 [[nodiscard]] std::uint64_t fileSeed(std::uint64_t seed, const std::string& name);
 
-/// What a scan shows besides its object, for people: a table under it, several objects, and what of them was
-/// left out. Empty if there is nothing to say.
+/// A sentence about what a scan shows besides its object: a table under it, several objects, and which of
+/// them were left out. Empty if there is nothing to say.
 [[nodiscard]] std::string sceneText(const Scene& scene, std::size_t points, const IsolateOptions& isolate);
 /// {plane: null or {share, point, normal, removed}, objects: [shares]}.
 [[nodiscard]] nlohmann::json sceneJson(const Scene& scene, std::size_t points, const IsolateOptions& isolate);

@@ -10,7 +10,7 @@
 
 namespace shapedb::cli {
 
-/// Below this quality an interior is a guess, and the user is told so.
+/// Below this quality an interior is a guess, and the output says so.
 constexpr double kQualityWorthWarning = 0.5;
 
 /// List of {position, weight, volume_share, peak_radius, extents}, heaviest first.

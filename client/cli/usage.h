@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What is said of a wrong command line, and in which words: those of the commands and flags.
+// Messages about a wrong command line, in terms of commands and flags.
 #pragma once
 
 #include <string>

@@ -27,7 +27,7 @@ class GltfDocument {
 
     const nlohmann::json& root() const { return root_; }
     const std::string& format() const { return format_; }
-    /// Of the file and the files that it names: what there is cannot be more than this allows.
+    /// Bytes of the file and of the files that it names: a bound for what can be in them.
     std::uint64_t bytesRead() const { return bytesRead_; }
 
     /// The element `index` of the array `name`; an error that says who names it if there is none.

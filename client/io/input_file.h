@@ -70,7 +70,7 @@ class InputFile {
     /// The next line without its end: LF, CR LF, or CR alone. False at the end of the file; a last line of
     /// nothing but zero bytes or Ctrl-Z is none. The view is valid until the next call of a non-const member.
     bool readLine(std::string_view& line);
-    /// Of the line last read, from 1.
+    /// The number of the line last read, from 1.
     std::uint64_t lineNumber() const { return lineNumber_; }
     /// To be called after the last line before binary data. Of lines that end in CR alone, a line feed after
     /// the last is data.

@@ -27,7 +27,7 @@ constexpr float kPixelSpacings = 1.7f;
 constexpr float kDepthTolerance = 1.0f;
 constexpr int kMostPixels = 64;
 
-// Less weight of the other shape than this, in points, explains nothing.
+// Where less of the other shape than this weight, in points, is left, it explains nothing.
 constexpr float kLeastWeight = 4.0f;
 
 constexpr double kDamping = 1e-4;

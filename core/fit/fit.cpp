@@ -50,22 +50,22 @@ constexpr int kTurns = 24;
 constexpr float kScoreWidth = 0.02f;
 constexpr float kResidualWithin = 0.06f;
 
-// Poses further apart than this differ clearly, and one whose score is at least this share of the best is as
-// good.
+// Poses further apart than kDifferent differ clearly; one whose score is at least kAsGood times the best is
+// as good.
 constexpr double kDifferent = 0.04;
 constexpr double kAsGood = 0.97;
 
-// The same of a mirrored and an unmirrored pose: closer than two scans of one object come to each other.
+// As kAsGood, for a mirrored pose and one that is not: closer than the scores of two scans of one object.
 constexpr double kHandsAlike = 0.99;
 
 // By FitKind.
 constexpr std::array<double, 3> kTypicalMisfit{0.70, 0.65, 0.60};
 constexpr std::array<FitKind, 3> kKinds{FitKind::kWhole, FitKind::kOneSided, FitKind::kPiece};
 
-// What 1 - F of two clean scans of one object is at least.
+// The least 1 - F of two clean scans of one object.
 constexpr double kScansApart = 0.06;
 
-// A score of whole shapes from which on no other kind is tried.
+// From this score of whole shapes on, no other kind is tried.
 constexpr double kWholeEnough = 0.85;
 
 // Of the diagonals of two shapes whose scales are kept.

@@ -83,8 +83,8 @@ struct FitResult {
     std::vector<FreeAxis> axes;  ///< one for a bottle; three for a ball, which may be turned any way
 };
 
-/// So many poses are refined to the end beside the best: three, and one of the other hand if they are all of
-/// one. More would take more time of every fit of a search, for shapes that few ask about (a cube has 24).
+/// How many poses beside the best are refined to the end: three, and one of the other hand if all of those
+/// have the same. More would slow down every fit of a search for the sake of rare shapes (a cube has 24).
 constexpr std::size_t kMostAlternatives = 4;
 
 struct FitPoints;

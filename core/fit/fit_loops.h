@@ -61,8 +61,8 @@ struct StepSums {
     static constexpr std::size_t kPlane = kUnknowns * (kUnknowns + 1) / 2 + kUnknowns;
     static constexpr std::size_t kPoint = 17;
     std::array<double, kPlane> plane{};  ///< upper triangle by rows, each row followed by its right-hand side
-    /// Of weight w, place y, difference e = y - target: w, w y, w y y' (xx, xy, xz, yy, yz, zz), w e,
-    /// w (y x e), w (y . e).
+    /// For weight w, place y and difference e = y - target, the sums of: w, w y, w y y' (xx, xy, xz, yy, yz,
+    /// zz), w e, w (y x e), w (y . e).
     std::array<double, kPoint> point{};
 };
 

@@ -19,8 +19,8 @@ struct TurnAxis {
 /// The principal axes of the other shape through the mean of its points, where `pose` takes them.
 [[nodiscard]] std::array<TurnAxis, 3> axesOf(const Comparison& comparison, const Motion& pose);
 
-/// Of the principal axes of the other shape, laid on the query by `pose`, those about which every turn leaves
-/// the score nearly as it is.
+/// The principal axes of the other shape, laid on the query by `pose`, about which it can be turned by any
+/// angle with hardly any change of the score.
 [[nodiscard]] std::vector<TurnAxis> freeAxes(Comparison& comparison, const Motion& pose, const FitView& view);
 
 /// Whether turns about the axes take one pose to within `apart` of the other.

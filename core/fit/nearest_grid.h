@@ -25,8 +25,8 @@ struct SurfaceColumns {
 /// further. A place outside the grid takes the cell of the border that is nearest to it.
 class NearestGrid {
   public:
-    /// Of the first `count` points (1 to 65,535), which lie within `half` of the origin on each axis and have
-    /// a box of diagonal 1.
+    /// Builds the grid of the first `count` points (1 to 65,535), which lie within `half` of the origin on
+    /// each axis and have a box of diagonal 1.
     void build(const SurfaceColumns& points, std::size_t count, const Point3& half);
 
     /// The cell of a place is trunc(scale() * place + offset), each coordinate clamped to [0, last].

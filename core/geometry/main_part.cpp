@@ -17,7 +17,8 @@ Box reachOf(PointCloud& sample, double share) {
         middle.add(Point3{atRank(&Point3::x, rank), atRank(&Point3::y, rank), atRank(&Point3::z, rank)});
     }
     const Point3 extent = middle.extent();
-    // Of a small extent the square may be zero, of halves the sum is finite.
+    // std::hypot, since the square of a small extent may be zero; halves, since the sum of large coordinates
+    // may be infinite.
     const double reach = kMainReach * std::hypot(extent.x, extent.y, extent.z);
     const Point3 centre = 0.5 * middle.low + 0.5 * middle.high;
     if (reach == 0.0) return middle;

@@ -23,17 +23,18 @@ namespace shapedb {
 
 namespace {
 
-// More points than this are represented by so many.
+// Scans with more points are represented by this many of them.
 constexpr std::size_t kMostPoints = 20000;
 constexpr std::size_t kFewestPoints = 16;
 
-// Planes through three points; one that holds a fifth of the points is drawn with them all but certainly.
+// How many planes through three random points are tried: enough to find a plane with a fifth of the points
+// almost certainly.
 constexpr int kDraws = 1500;
 constexpr std::size_t kCountedPoints = 2000;  // among which the points of a drawn plane are counted
 constexpr int kPlanes = 3;                    // looked at, most points first
 
-// Shares of the diagonal of the scan: points so near are counted, and belong to the fitted plane at least and
-// at most so near.
+// Shares of the diagonal of the scan: the distance up to which points are counted, and bounds of the distance
+// up to which they belong to the fitted plane.
 constexpr double kCountedWithin = 0.006;
 constexpr double kLeastWithin = 0.002;
 constexpr double kWithinDeviations = 3.0;  // of its own points
@@ -43,17 +44,18 @@ constexpr double kLeastRestShare = 0.03;
 constexpr double kOneSideShare = 0.95;
 
 // The plane and what stands on it are compared in cells of this share of the diagonal. The plane reaches
-// beyond if it has so many cells with nothing above, for one with something above.
+// beyond what stands on it if the cells with nothing above are at least this many times those with something.
 constexpr double kCell = 1.0 / 48.0;
 constexpr double kBeyond = 0.3;
-// It does so in so many of these directions, seen from the middle of what is above.
+// It must do so in kLeastDirections of kDirections directions, seen from the middle of what is above.
 constexpr std::size_t kDirections = 16;
 constexpr std::size_t kLeastDirections = 11;
-// And so much of what is above is above the convex hull of the plane's points: a handle is not above a blade.
+// And at least this share of what is above must be above the convex hull of the plane's points: a handle is
+// not above a blade.
 constexpr double kAbovePlane = 0.8;
 
-// An object has so much of all points beside the plane, or of those of the largest: of a hundred equal ones
-// each has a hundredth.
+// An object has at least this share of all points off the plane, or of the points of the largest object: each
+// of a hundred equal ones has only a hundredth of all.
 constexpr double kLeastObject = 0.02;
 constexpr double kLikeLargest = 0.25;
 

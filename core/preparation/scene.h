@@ -31,7 +31,7 @@ struct Scene {
     /// wider than the gaps between its own, and at least 2 % of the points beside the plane or a quarter of
     /// those of the largest group. At least one, unless all points are on the plane.
     std::vector<std::uint64_t> objects;
-    /// Of each point: an index into `objects`, kOnPlane, or kNoObject where a smaller group was left out.
+    /// For each point an index into `objects`, kOnPlane, or kNoObject where a smaller group was left out.
     std::vector<std::int32_t> objectOfPoint;
 };
 constexpr std::int32_t kOnPlane = -1;
@@ -46,7 +46,7 @@ constexpr std::int32_t kNoObject = -2;
 /// Errors: kCancelled, kDeadlineExceeded, kOutOfMemory.
 [[nodiscard]] Result<Scene> findScene(const PointCloud& points, const RunContext& context = {});
 
-/// What is kept of a scene.
+/// Which part of a scene to keep.
 struct IsolateOptions {
     bool dropPlane = false;  ///< leave out the plane that the objects stand on
     bool largest = false;    ///< keep the largest object alone, without the plane

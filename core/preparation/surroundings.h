@@ -27,7 +27,7 @@ struct Surroundings {
     }
 };
 
-/// Of more than kReachNeighbours points; `index` holds them. Errors: kCancelled, kDeadlineExceeded.
+/// For more than kReachNeighbours points; `index` holds them. Errors: kCancelled, kDeadlineExceeded.
 [[nodiscard]] Result<Surroundings> measureReaches(const PointCloud& points, const NeighbourIndex& index,
                                                   const RunContext& context);
 

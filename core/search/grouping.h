@@ -21,7 +21,7 @@ struct Grouping {
 /// Null: the shapes of the group do not have the key. Points into the set or block that it was read from.
 using GroupValue = const std::string*;
 
-/// Of a row; the same of a shape by its id, which must be in the set.
+/// The group of a row, or of the shape with this id, which must be in the set.
 [[nodiscard]] GroupValue groupOf(const SignatureBlock& block, std::size_t row, const std::string& key);
 [[nodiscard]] GroupValue groupOf(const SignatureSet& set, std::int64_t id, const std::string& key);
 
@@ -49,8 +49,8 @@ class GroupMap {
     bool hasWithout_ = false;
 };
 
-/// Of hits in the order of their rank, the first `perGroup` of each of the first `k` groups, in the same
-/// order. `groupOfHit(hit)` is a GroupValue.
+/// Keeps, of hits ordered by rank, the first `perGroup` of each of the first `k` groups, in the same order.
+/// `groupOfHit(hit)` is a GroupValue.
 template <typename Hit, typename GroupOfHit>
 void keepBestOfGroups(std::vector<Hit>& hits, std::size_t k, std::size_t perGroup,
                       const GroupOfHit& groupOfHit) {

@@ -56,7 +56,7 @@ class SignatureBlock {
     /// True: with ShapeAttributes; false: weighted points alone.
     [[nodiscard]] bool attributed(std::size_t row) const { return segmentsEnd_[row] > segmentsBegin(row); }
     [[nodiscard]] std::size_t attributedCount() const { return attributedCount_; }
-    /// Of attributed rows.
+    /// The row must be attributed.
     [[nodiscard]] std::uint8_t quality(std::size_t row) const { return qualities_[row]; }
 
     /// Null for a row without views.
@@ -64,8 +64,8 @@ class SignatureBlock {
         return views_.empty() ? nullptr : views_[row].get();
     }
 
-    /// What scorers read, with the bits of the signatures that were appended: of attributed ones the
-    /// segments, statistics and quality, of others the points. Valid while the block lives unchanged.
+    /// What scorers read, bit for bit as in the signatures that were appended: segments, statistics and
+    /// quality of attributed ones, the points of others. Valid while the block lives unchanged.
     [[nodiscard]] ShapeRows rows() const;
 
     [[nodiscard]] std::size_t memoryBytes() const;

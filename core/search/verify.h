@@ -31,8 +31,8 @@ struct VerifyOptions {
     std::size_t mostCandidates = 0;
     /// Whether a camera saw the query from one place; nothing: judged from the points.
     std::optional<bool> oneSided{};
-    /// Where that camera stood, in coordinates of the query: tells front from back. One that has it is of one
-    /// side, whatever `oneSided` says.
+    /// Where that camera stood, in coordinates of the query: tells front from back. A query that has it
+    /// shows one side, whatever `oneSided` says.
     std::optional<Point3> viewpoint{};
 };
 

@@ -81,7 +81,7 @@ void BackgroundLane::take(std::unique_lock<std::mutex>& lock) {
         job.error = done.error();
     }
     if (!job.hasMore()) {
-        // It may stand in the queue, put there before it failed.
+        // It may have been queued before it failed.
         for (auto it = waiting_.begin(); it != waiting_.end();)
             it = *it == &job ? waiting_.erase(it) : it + 1;
         if (job.running == 0) changed_.notify_all();

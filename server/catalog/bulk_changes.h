@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Changes of many shapes of a collection, whatever the transport: which shapes a request means, how the work
-// is divided, and what its caller is told.
+// is divided, and what is reported to its caller.
 //
 // The shapes are found in reads, which hold up nobody, and changed in transactions of a few
 // (kShapesPerChange). Each transaction looks at its shapes again: one that was deleted, or no longer passes
@@ -53,8 +53,8 @@ struct BulkMetadata {
     std::string firstRefusedKey;
     std::optional<Error> firstRefused;
 };
-/// Of all shapes that pass the filter. A change that replaces all leaves keys that begin with
-/// kMetadataOfPoints. Errors: kInvalidArgument (the change).
+/// Changes all shapes that pass the filter. A change that replaces all metadata leaves keys that begin with
+/// kMetadataOfPoints alone. Errors: kInvalidArgument (the change).
 [[nodiscard]] Result<BulkMetadata> changeMetadata(Catalog& catalog, const index::Snapshot& collection,
                                                   const std::string& filter,
                                                   const store::MetadataChange& change,
@@ -64,9 +64,9 @@ struct ChangedShape {
     bool changed = false;  ///< false: it had this metadata before
     store::Shape shape;    ///< as it is now
 };
-/// Of one shape. A repeated request whose reply was lost is recognised: the shape is one version further than
-/// expected, and as requested. Errors: kInvalidArgument (key, the change, what the shape would have after
-/// it), kNotFound, kVersionConflict.
+/// Changes one shape. A repeated request whose reply was lost is recognised: the shape is one version further
+/// than expected, and as requested. Errors: kInvalidArgument (key, the change, what the shape would have
+/// after it), kNotFound, kVersionConflict.
 [[nodiscard]] Result<ChangedShape> changeMetadataOf(Catalog& catalog, const index::SnapshotPtr& collection,
                                                     const std::string& key,
                                                     const store::MetadataChange& change,

@@ -41,7 +41,7 @@ Catalog::Catalog(std::unique_ptr<store::Store> store, ingest::SignaturePipeline 
 Catalog::~Catalog() = default;
 
 Result<void> Catalog::start() {
-    // First, so that the index loads it with the others. Where that cannot be told, it is left as it is.
+    // First, so that the index loads it with the others. If its state cannot be read, it is left as it is.
     if (const auto ensured = ensureDefaultCollection(*store_); !ensured) {
         if (ensured.error().code != ErrorCode::kDataLoss) return ensured;
         log_->error("cannot tell whether the default collection is there",

@@ -106,7 +106,7 @@ struct RebuildRequest {
     std::optional<ParameterOverrides> change;  ///< empty: the parameters stay
 };
 
-/// What a caller of `Catalog::rebuild` is told of one collection.
+/// What `Catalog::rebuild` reports about one collection.
 struct RebuildProgress {
     std::string collection;
     std::uint64_t done = 0;    ///< shapes, failed ones included
@@ -117,7 +117,7 @@ struct RebuildProgress {
 };
 using OnRebuildProgress = std::function<Result<void>(const RebuildProgress&)>;
 
-/// What a caller who follows a shape is told.
+/// What is reported to a caller who follows a shape.
 struct IngestEvent {
     store::ShapeState state = store::ShapeState::kPending;
     std::string stage;  ///< this and the next two only while pending, as ProgressBoard::Status
@@ -327,7 +327,7 @@ class Catalog {
     /// As store::Store.
     [[nodiscard]] Result<void> backup(const std::string& path, const RunContext& context);
     [[nodiscard]] Result<std::vector<std::string>> check(const RunContext& context);
-    /// As store::Store; logs what was told.
+    /// As store::Store; logs what it reports.
     [[nodiscard]] Result<void> acknowledge();
     /// Replaces everything by the backup `path` while workers and rebuilds pause, and loads the index.
     /// Errors, which call it "the file": kRejected (another restore is running), those of

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a client is told about a file of the server.
+// How messages to clients name a file of the server.
 #pragma once
 
 #include <string>

@@ -58,14 +58,14 @@ constexpr std::size_t kMaxAnswerBytes = std::size_t{64} << 20;
 /// The answers being made of all calls together; more are refused. In memory they take about four times as
 /// much.
 constexpr std::size_t kMaxAnswersBytes = std::size_t{192} << 20;
-/// Of memory that large messages of all calls may become when they are decoded.
+/// Memory that the large messages of all calls may take once decoded.
 constexpr std::uint64_t kMaxRequestsBytes = std::uint64_t{512} << 20;
 
 // Calls at a time. A transport needs a thread for each, and some to refuse the rest.
 constexpr int kMaxOrdinaryCalls = 208;
 constexpr int kMaxAdminCalls = 16;
-/// Of them, those that last: rebuilds, checks and copies. The others always find a place, so that a key can
-/// be revoked and a rebuild cancelled.
+/// How many of them may be long ones: rebuilds, checks and copies. The others always find a place, so that a
+/// key can be revoked and a rebuild cancelled.
 constexpr int kMaxLongAdminCalls = 12;
 /// Calls that only wait for a shape or a rebuild. With all uploads (limits.max_uploads) they leave places for
 /// searches.

@@ -32,9 +32,10 @@ struct ParameterOverrides {
     std::optional<bool> views;
     std::optional<LengthUnit> unit;
 
-    /// Of something that has parameters already. Errors: kInvalidArgument (names parameter, value and range).
+    /// The parameters of something that has some already. Errors: kInvalidArgument (names parameter, value
+    /// and range).
     [[nodiscard]] Result<ShapeParameters> applyTo(const ShapeParameters& current) const;
-    /// Of something new, which has the default profile unless another is named. Errors: as `applyTo`.
+    /// The parameters of something new: the default profile unless another is named. Errors: as `applyTo`.
     [[nodiscard]] Result<ShapeParameters> ofNew() const;
 };
 

@@ -52,7 +52,8 @@ constexpr const char* kDefaultCollection = "default";
 /// more than `maxK`.
 [[nodiscard]] Result<void> checkGrouping(const std::string& groupBy, std::uint32_t perGroup, std::uint32_t k,
                                          std::uint32_t maxK);
-/// Of points: finite, and none beyond kMaxCoordinate. Errors: kNonFiniteCoordinate, kCoordinateOutOfRange.
+/// The origin of points: finite, no coordinate beyond kMaxCoordinate. Errors: kNonFiniteCoordinate,
+/// kCoordinateOutOfRange.
 [[nodiscard]] Result<void> checkOrigin(const Point3& origin);
 /// [0, 1], not NaN.
 [[nodiscard]] Result<void> checkThreshold(double threshold);

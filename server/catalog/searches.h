@@ -82,7 +82,7 @@ struct FoundHit {
     std::optional<Explanation> explanation;  ///< its motion is that of `fit`, if there is one
     std::shared_ptr<const FitResult> fit;    ///< null if it was not verified
     Verdict verdict = Verdict::kNone;
-    /// Of a search with groups: the value that the group has in common, empty for shapes without the key.
+    /// In a search with groups, the value that the group has in common; empty for shapes without the key.
     std::optional<std::string> group;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What is said of a wrong command line of shapedbd.
+// Messages about a wrong command line of shapedbd.
 #pragma once
 
 #include <string>

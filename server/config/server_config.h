@@ -49,7 +49,7 @@ struct ServerConfig {
         std::uint64_t maxPoints = 5'000'000;  ///< of one scan
         std::uint32_t maxK = 1'000;           ///< hits of one search
         std::uint32_t maxBatch = 1'000;       ///< queries of one SearchBatch
-        /// Of the points of all uploads in progress.
+        /// Bytes of points that all uploads in progress may hold.
         std::uint64_t maxUploadBytes = std::uint64_t{1} << 30;
         int maxUploads = 64;    ///< uploads in progress
         int stallSeconds = 60;  ///< after which a client that neither sends nor reads is cut off

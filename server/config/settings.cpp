@@ -211,7 +211,7 @@ Setting optionalPath(const std::string& key, Field field, std::string help) {
     return setting;
 }
 
-/// Nobody sets this by accident, or without knowing what it means.
+/// Long on purpose: nobody should set it by accident or without knowing what it means.
 constexpr const char* kAnyoneMayDoAll =
     "security.anyone_on_the_network_may_read_change_and_delete_everything";
 

@@ -30,7 +30,7 @@ class ByteStream {
     void writeSome(boost::asio::const_buffer bytes, Done done);
     /// The other side reads the end after what was written.
     void endWriting();
-    /// What is under way ends with an error. Idempotent.
+    /// Reads and writes in progress end with an error. Idempotent.
     void close();
 
   private:

@@ -89,7 +89,7 @@ class ConnectCall : public std::enable_shared_from_this<ConnectCall> {
     void leave();
 
     const CallServices services_;
-    CallClient* client_;  ///< null: nothing more is told
+    CallClient* client_;  ///< null: nothing more is reported
     const Method& method_;
     const CallForm form_;
     const std::string peer_;

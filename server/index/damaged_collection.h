@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Collections of which something that is stored cannot be read: what takes their place in the index, and what
-// whoever asks for them is told.
+// Collections whose stored data cannot be read in full: what stands for them in the index, and the error
+// that their callers get.
 #pragma once
 
 #include <memory>

@@ -21,7 +21,7 @@ namespace shapedb::ingest {
 [[nodiscard]] Result<std::vector<store::Crash>> installCrashMarker(const std::string& path);
 
 /// While it lives, a crash of this thread is put down to the scan. Gives the thread a signal stack of its
-/// own, so that an overflow of the stack is told too. Does nothing without an installed marker.
+/// own, so that an overflow of the stack is noticed too. Does nothing without an installed marker.
 class InHand {
   public:
     InHand(std::int64_t shapeId, std::int64_t pointsVersion);

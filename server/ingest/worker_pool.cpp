@@ -43,7 +43,7 @@ WorkerPool::WorkerPool(store::Store& store, index::CollectionIndex& index, Progr
 WorkerPool::~WorkerPool() { stop(); }
 
 Result<void> WorkerPool::recover() {
-    // Those of a restore are of another server: it did not die of them.
+    // The crashes count once only: jobs that come with a restore are another server's.
     const auto quarantined = store_.recoverJobs(options_.maxAttempts, std::exchange(options_.crashes, {}));
     {
         const std::lock_guard<std::mutex> lock(mutex_);

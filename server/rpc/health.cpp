@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::chrono::milliseconds kLook{100};
 
-/// What a name needs to be serving, beside a server that listens and is not about to end.
+/// What must work for a name to be SERVING, besides a server that listens and is not shutting down.
 enum class Need {
     kNothing,
     kContent,       ///< collections can be looked up
@@ -22,8 +22,8 @@ struct Name {
     const char* name;
     Need need;
 };
-// The services of the API, and of one the part that fails alone. The empty name is the server as a whole. All
-// of them are documented; others are NOT_FOUND.
+// The services of the API, and parts that can fail on their own. The empty name is the server as a whole. All
+// names are documented; others are NOT_FOUND.
 constexpr Name kNames[] = {
     {"", Need::kContent},
     {"shapedb.v1.ShapeService", Need::kContent},

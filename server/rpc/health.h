@@ -31,7 +31,7 @@ class Health {
     /// A listener cannot accept connections, or can again.
     void listenerFailed();
     void listenerRecovered();
-    /// What is told of the server as a whole.
+    /// The health of the server as a whole.
     [[nodiscard]] bool serving() const;
     /// Whether all listeners accept connections.
     [[nodiscard]] bool accepting() const;

@@ -18,7 +18,7 @@ static_assert(kMaxCallThreads >= catalog::kMaxOrdinaryCalls + catalog::kMaxAdmin
 /// Memory that gRPC may use for connections and messages in transit, all together.
 constexpr std::size_t kTransportBytes = std::size_t{1} << 30;
 constexpr std::size_t kLabelledChunkPoints = 32'768;  ///< in one LabelledChunk
-/// Of an error message: it travels in a header, and headers are small.
+/// Length of an error message: it travels in a header, and headers are small.
 constexpr std::size_t kMaxErrorMessageBytes = 2'048;
 
 constexpr std::chrono::milliseconds kKeepaliveTime{60'000};

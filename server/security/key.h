@@ -27,7 +27,7 @@ struct KeyLimits {
     std::uint64_t bytesPerDay = 0;     ///< of points received
 };
 
-/// What whoever makes a key decides.
+/// A request for a new key.
 struct KeySpec {
     std::string name;  ///< for people; several keys may share it
     Role role = Role::kReader;

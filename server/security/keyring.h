@@ -18,7 +18,7 @@
 
 namespace shapedb::security {
 
-/// What a refused caller is told: the error, and when it may try again.
+/// Why a caller is refused, and when it may try again.
 struct Refusal {
     Error error;
     std::chrono::milliseconds retryAfter{0};

@@ -24,7 +24,7 @@ class UsageSaver {
 
     Keyring& keyring_;
     const telemetry::LoggerPtr log_;
-    bool failing_ = false;  ///< told once
+    bool failing_ = false;  ///< reported once
     std::optional<RepeatingThread> thread_;
 };
 

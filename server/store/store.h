@@ -458,11 +458,11 @@ class Store {
     [[nodiscard]] virtual Result<void> checkpoint() = 0;
     /// What an operator must know of how the database was found when it was opened: acknowledged changes that
     /// are missing, what was mended. One line each; `check` lists them too. Empty after a restore. That
-    /// changes are missing, or may be, is told at every start until `acknowledge`.
+    /// changes are missing, or may be, is reported at every start until `acknowledge`.
     [[nodiscard]] virtual std::vector<std::string> findings() const = 0;
     /// How many of them wait for `acknowledge`. Reads no disk.
     [[nodiscard]] virtual std::size_t notices() const = 0;
-    /// Missing changes are told no more. Returns what was told of them, one line each.
+    /// Stops reports of missing changes. Returns what was reported, one line for each.
     [[nodiscard]] virtual Result<std::vector<std::string>> acknowledge() = 0;
 };
 

@@ -34,7 +34,7 @@ class VerifiedScan {
     [[nodiscard]] const std::vector<float>& points() const noexcept { return xyz_; }
     [[nodiscard]] std::uint64_t pointCount() const noexcept { return xyz_.size() / 3; }
     [[nodiscard]] std::uint64_t bytes() const noexcept { return xyz_.size() * sizeof(float); }
-    /// Of the points alone. Two scans are the same if this and the origin are.
+    /// The hash of the points alone. Two scans are the same if this and the origin are.
     [[nodiscard]] const Checksum& checksum() const noexcept { return checksum_; }
     /// Added to each point it gives the coordinates that the client has. Usually 0, 0, 0.
     [[nodiscard]] const Point3& origin() const noexcept { return origin_; }

@@ -32,8 +32,8 @@ class AuditLog {
     /// Whose refusals are counted apart in one minute; the rest together.
     static constexpr std::size_t kCountedSources = 64;
 
-    /// Lines that cannot be written are told in `log`, once a minute. Errors: kFileNotWritable (also: a file
-    /// is a link).
+    /// Lines that cannot be written are reported in `log`, once a minute. Errors: kFileNotWritable (also: a
+    /// file is a link).
     [[nodiscard]] static Result<std::unique_ptr<AuditLog>> open(const std::string& path,
                                                                 const LoggerPtr& log);
     AuditLog(LoggerPtr administration, LoggerPtr refusals);

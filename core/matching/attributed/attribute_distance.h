@@ -31,7 +31,7 @@ struct AttributeDistance {
     double containedWeight = 0.0;  ///< partial: of the contained parts against all of the above, [0, 1]
 };
 
-/// What about a shape decides how much each statistic counts.
+/// The properties of a shape that decide how much each statistic counts.
 struct Grounds {
     Grounds(std::uint8_t ofInterior, bool ofEarlier = false) : quality(ofInterior), earlier(ofEarlier) {}
 
@@ -49,8 +49,9 @@ struct Grounds {
 /// distances. Rises with the agreement. Unrelated shapes (D = 1) typically score 0.2.
 [[nodiscard]] double attributeScore(const AttributeDistance& distance, double agreement);
 
-/// Of a piece and its whole: D as above (without the difference of sizes), for a piece still resembles its
-/// whole, and by up to a half the share of the piece that the whole does not contain. Rises with both.
+/// The score of a piece in its whole, from D as above (without the difference of sizes), since a piece still
+/// resembles its whole, and, for up to half of it, from the share of the piece that the whole does not
+/// contain.
 [[nodiscard]] double partialScore(const AttributeDistance& distance, double agreement, double share);
 
 /// For bounds of many candidates: what one level of difference in each statistic adds to D, of shapes with
@@ -75,7 +76,7 @@ struct LevelWeights {
 [[nodiscard]] std::vector<ScoreTerm> scoreTerms(const LevelSums& sums, Grounds a, Grounds b,
                                                 double agreement);
 
-/// Of a piece and its whole: also the term of what the whole contains of it.
+/// The terms for a piece and its whole, including the share of the piece that the whole contains.
 [[nodiscard]] std::vector<ScoreTerm> partialTerms(const LevelSums& sums, Grounds a, Grounds b,
                                                   double agreement, double share);
 

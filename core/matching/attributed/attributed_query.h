@@ -38,7 +38,7 @@ class AttributedQuery {
     [[nodiscard]] double scale() const { return packed_.row().scale; }
     [[nodiscard]] const StatisticsDifference& difference() const { return difference_; }
 
-    /// Of an attributed shape.
+    /// `shape` must be attributed.
     [[nodiscard]] LevelSums levelSums(const ShapeRow& shape) const {
         HalfSums first;
         difference_.first(shape.firstHalf, 1, &first);

@@ -18,7 +18,7 @@ struct alignas(32) HalfRow {
     std::array<std::uint8_t, kHalfRowBytes> bytes{};
 };
 
-/// Of an odd number of statistics the first half holds one more.
+/// The first half holds one more if the number of statistics is odd.
 constexpr std::size_t kKindsPerHalf = (kStatisticKinds + 1) / 2;
 constexpr std::size_t kKindsInSecondHalf = kStatisticKinds - kKindsPerHalf;
 
@@ -50,7 +50,7 @@ class StatisticsDifference {
   public:
     StatisticsDifference(const HalfRow& first, const HalfRow& second, Instructions use = Instructions::kBest);
 
-    /// Of each of rows[0, count); in the order of kFirstHalf.
+    /// The sums of each of rows[0, count), in the order of kFirstHalf.
     void first(const HalfRow* rows, std::size_t count, HalfSums* sums) const noexcept;
     /// In the order of kSecondHalf.
     [[nodiscard]] HalfSums second(const HalfRow& row) const noexcept;

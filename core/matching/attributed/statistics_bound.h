@@ -12,7 +12,7 @@
 
 namespace shapedb {
 
-/// What of a score the statistics bound.
+/// Which part of a score the statistics bound.
 enum class StatisticsRule {
     kWhole,         ///< the mean distance
     kWholeAndSize,  ///< with the difference of sizes
@@ -30,7 +30,7 @@ class StatisticsBound {
   public:
     StatisticsBound(const AttributedQuery& query, StatisticsRule rule);
 
-    /// As Scorer::scan, of the attributed rows: those that could score `least` if the rest of them
+    /// Like Scorer::scan, for attributed rows: finds those that could score `least` if the rest of them
     /// agreed fully. Survivor::findings are the LevelSums.
     void scan(const ShapeRows& rows, const std::vector<std::uint8_t>& wanted, double least,
               std::vector<Survivor>& left, ScanCounts& counts) const;

@@ -60,7 +60,7 @@ class Connection {
     void rewriteWal();
 
     sqlite3* handle() const noexcept { return db_; }
-    /// `sql`, unless null, is the statement that failed: damage is told with the tables it reads.
+    /// `sql`, unless null, is the statement that failed: damage is reported with the tables it reads.
     [[noreturn]] void raiseLast(int code, const char* sql = nullptr) const;
 
   private:
@@ -174,7 +174,8 @@ class Transaction {
     bool open_ = true;
 };
 
-/// Runs `body`; damage that it meets is told with `remedy` in place of what helps a database that is served.
+/// Runs `body`; damage that it meets is reported with `remedy` in place of what helps a database that is
+/// served.
 template <typename Body>
 auto withRemedy(const std::string& remedy, Body&& body) {
     try {

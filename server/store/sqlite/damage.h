@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What of a damaged database can still be read, and what an operator is told of the rest.
+// Which parts of a damaged database can still be read, and what is reported of the others.
 //
 // SQLite says that a page is malformed, but not of which table it is. The small tables, of which everything
 // else depends, are therefore checked when the database is opened; the large ones are read by the index,

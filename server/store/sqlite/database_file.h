@@ -49,7 +49,7 @@ class NewFile {
 /// Gives an empty file the schema of this program.
 void makeEmptyDatabase(Connection& connection, std::int64_t nowMs);
 
-/// What somebody wants of a file, for messages.
+/// How messages say what a file was to be used for.
 struct FileUse {
     const char* done;     ///< completes "cannot be ..."
     const char* foreign;  ///< of a file of something else
