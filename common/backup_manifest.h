@@ -38,7 +38,8 @@ struct BackupManifest {
     std::vector<Sha256Digest> blocks;             ///< in the order of the file; the last may be shorter
 };
 
-/// The smallest blocks that a file of so many bytes may have; the largest ones for a file that has too many.
+/// The smallest blocks that a file of this many bytes may have; the largest ones for a file that has too
+/// many.
 [[nodiscard]] std::uint64_t backupBlockBytes(std::uint64_t bytes);
 /// How many blocks such a file has. `blockBytes` must not be 0.
 [[nodiscard]] std::uint64_t countBlocks(std::uint64_t bytes, std::uint64_t blockBytes);

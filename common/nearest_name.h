@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What somebody meant who mistyped a name.
+// Which name was meant by a mistyped one.
 #pragma once
 
 #include <string>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Text of strangers, made safe for terminals, logs and keys.
+// Untrusted text, made safe for terminals, logs and keys.
 #pragma once
 
 #include <cstddef>

@@ -125,7 +125,7 @@ int main(int argc, char** argv) {
     // Beyond a limit of file sizes, writing fails with EFBIG, which is reported; the signal would end the
     // process.
     std::signal(SIGXFSZ, SIG_IGN);
-    // What gRPC would write to standard error is about strangers who break the protocol, and without end.
+    // gRPC would write endless lines to standard error about clients that break the protocol.
     setenv("GRPC_VERBOSITY", "NONE", 0);
     shapedb::store::stopCountingSqliteMemory();
     try {

@@ -33,7 +33,7 @@ Result<client::Client> connectToServer(const Session& session, Work work) {
     }
     if (session.options().timeoutSeconds) {
         options.deadline = std::chrono::milliseconds(0);
-        // Whoever says how long to wait means it.
+        // A user who sets a timeout wants retries until it passes.
         options.retry.maxAttempts = kPatientAttempts;
         options.retry.maxQueueAttempts = kPatientAttempts;
     }

@@ -46,7 +46,7 @@ template <typename Fit>
 [[nodiscard]] std::string mirroredCell(std::optional<bool> mirrored);
 
 /// What two shapes are to each other, in words: "same object, mirrored", "same object, bent", and so on; ""
-/// if nobody knows. `part`: what to say of a query that is a piece of the other.
+/// if that is unknown. `part`: what to say of a query that is a piece of the other.
 [[nodiscard]] std::string likenessText(Verdict verdict, std::optional<bool> mirrored,
                                        const std::string& part = "query is part of it");
 

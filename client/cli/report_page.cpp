@@ -82,7 +82,7 @@ class Place {
     double scale_ = 1.0;
 };
 
-/// Words of strangers, as content or in an attribute. Lines are kept.
+/// Escapes untrusted text for use as content or in an attribute. Line ends are kept.
 std::string escaped(const std::string& text) {
     std::string out;
     std::size_t at = 0;

@@ -24,7 +24,7 @@ class FaceGuess {
     const std::string& name() const { return name_; }
     bool good() const { return good_; }
 
-    /// A list of so many entries.
+    /// Begins a list with this many entries.
     void begin(std::int64_t length) {
         corners_.clear();
         if (length < 3 || length > kMostCorners) reject();

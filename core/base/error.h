@@ -45,7 +45,7 @@ enum class ErrorCode {
     kVersionConflict,  ///< the expected version is not the current one
     kNotReady,         ///< the shape exists but has no signature (yet)
     kRejected,         ///< the operation makes no sense in this state; the message says which
-    // Who asks may not do it.
+    // The caller is not allowed to do it.
     kUnauthenticated,   ///< no API key, or one that is unknown, revoked or has expired
     kPermissionDenied,  ///< the API key does not allow this
     // The system cannot do it now.

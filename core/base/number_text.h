@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Numbers in messages and files: as somebody would type them.
+// Numbers in messages and files, as a person would type them.
 #pragma once
 
 #include <charconv>

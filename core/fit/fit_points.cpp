@@ -14,7 +14,7 @@ namespace {
 constexpr std::size_t kSpacingSamples = 100;
 constexpr int kHullDirections = 80;
 
-// Over every so many-th point; a search tree for all of them would take longer than all else here.
+// Over every n-th point; a search tree for all of them would take longer than all else here.
 float meanSpacing(const SurfaceColumns& points, std::size_t count) {
     const std::size_t step = std::max<std::size_t>(1, count / kSpacingSamples);
     double sum = 0.0;

@@ -31,7 +31,7 @@ struct PackedSurfacePoint {
 /// Positions are stored as multiples of one over this, from -1 to 1.
 constexpr int kSurfaceSteps = 32767;
 
-/// At most so many points are kept of a scan.
+/// The most points that are kept of a scan.
 constexpr std::size_t kMostSurfacePoints = 1500;
 
 /// Surface points in farthest-point order: each lies as far as possible from all before it, so that the

@@ -17,7 +17,7 @@ namespace shapedb {
 /// Steps of single precision across a scan: with fewer they are coarser than the details that tell shapes
 /// apart.
 constexpr double kLeastSteps = 1'000.0;
-/// The same along each axis on which the scan is not flat: a thin scan needs not so many across its thin
+/// The same along each axis on which the scan is not flat: a thin scan needs fewer across its thin
 /// side.
 constexpr double kLeastStepsOfAxis = 64.0;
 /// Steps of double precision across a scan: a millionth of its size.

@@ -24,7 +24,7 @@ namespace shapedb {
 
 /// How candidates are verified.
 struct VerifyOptions {
-    /// At most so many candidates are laid on the query: those that the signatures rank first; of a query of
+    /// The most candidates that are laid on the query: those that the signatures rank first; of a query of
     /// one side mostly those that views rank first (docs/views.md). With fewer shapes in the collection, or
     /// when no other can reach the hits, the answer is exact. 0: 32 for a reliable query, 64 for others, 128
     /// for pieces (ScoreOptions::partial), of which signatures know least.

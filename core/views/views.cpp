@@ -13,7 +13,7 @@ namespace shapedb {
 
 namespace {
 
-// Points that a pixel of the depth buffer holds on average: so many that the back does not shine through.
+// Points that a pixel of the depth buffer holds on average: enough to keep the back from shining through.
 constexpr double kScanPerPixel = 16.0;
 constexpr double kSurfacePerPixel = 8.0;
 constexpr const char* kStage = "views";

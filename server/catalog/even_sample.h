@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which points of a scan to send to somebody who wants to look at it, not all of it.
+// A sample of the points of a scan, enough to look at it.
 #pragma once
 
 #include <algorithm>

@@ -132,7 +132,7 @@ Result<void> Catalog::followRebuild(const std::string& collection, store::Rebuil
         }
         for (bool waiting = true; waiting;) {
             RETURN_IF_ERROR(checkpoint());
-            // In short pieces, so that the caller is asked in between.
+            // In short pieces, to check in between whether the caller still waits.
             briefly.deadline = std::min(context.deadline, RunContext::Clock::now() + kProgressInterval);
             const auto changed = rebuilds_.waitForChange(rebuild, briefly);
             if (changed) {

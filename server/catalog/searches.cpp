@@ -15,7 +15,7 @@ namespace shapedb::catalog {
 namespace {
 
 // Rows read together. Each read takes locks of SQLite that all connections share, and a thread of low
-// priority that is held up inside one holds up all the others: so few reads, each of little memory.
+// priority that is held up inside one holds up all the others: so there are few reads, each of little memory.
 constexpr std::size_t kHitsAtOnce = 64;
 
 // Whether sizes are compared, of shapes in collections with this unit.

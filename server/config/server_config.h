@@ -42,7 +42,7 @@ struct ServerConfig {
         std::uint64_t maxQueuedJobs = 10'000;
         std::uint64_t maxQueuedBytes = std::uint64_t{4}
                                        << 30;  ///< of the points of queued scans, uncompressed
-        int maxAttempts = 2;                   ///< after so many crashes a scan is quarantined
+        int maxAttempts = 2;                   ///< crashes after which a scan is quarantined
     } ingest;
 
     struct Limits {

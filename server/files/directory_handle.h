@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An open directory: its entries are reached through it, so that no link that somebody puts in the way is
-// followed.
+// An open directory: its entries are reached through it, so that no symbolic link put in the way is followed.
 #pragma once
 
 #include <functional>

@@ -13,7 +13,7 @@ namespace {
 
 namespace asio = boost::asio;
 
-/// A client that goes on before it has its answer: so much is kept, and its end is noticed within that.
+/// How much is kept of what a client sends before it has its answer; its end is noticed within that.
 constexpr std::size_t kMostAhead = 16'384;
 constexpr std::size_t kWriteBytes = 65'536;
 constexpr std::chrono::milliseconds kLook{500};
@@ -201,8 +201,8 @@ void Connection::onRead(const boost::system::error_code& error, std::size_t byte
 }
 
 void Connection::onEndOfClient() {
-    // Who sends no more has gone, also if it might still read: its call is cancelled. What is there already
-    // is sent.
+    // A client that has stopped sending counts as gone, even if it might still read: its call is cancelled.
+    // What is there already is sent.
     if (!answered_ || pieces_.empty()) return closeNow();
     keep_ = false;
     clientEnded_ = true;

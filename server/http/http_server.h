@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The HTTP server: where it listens, its threads and its connections. What it is asked goes to the gRPC
+// The HTTP server: where it listens, its threads and its connections. Requests go to the gRPC
 // server's handlers.
 #pragma once
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Calls of the gRPC server in this process: whoever calls through here meets the same handlers, rules, limits
-// and log lines as a gRPC client does.
+// Calls of the gRPC server in this process: they meet the same handlers, rules, limits
+// and log lines as those of a gRPC client.
 #pragma once
 
 #include <condition_variable>

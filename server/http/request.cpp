@@ -121,7 +121,7 @@ OrFailure<void> checkHead(const Head& head, const Hosts& hosts) {
     if (head.target.empty() || head.target.front() != '/') {
         return refuseWith(400, Code::kInvalidArgument, "the request target is no path");
     }
-    // Whoever stands before us must not read another length than we do (request smuggling).
+    // A proxy in front must not read another length than we do (request smuggling).
     if (head.count("transfer-encoding") > 0 && lower(head.field("transfer-encoding")) != "chunked") {
         return refuseWith(501, Code::kUnimplemented, "the only Transfer-Encoding is chunked");
     }

@@ -390,7 +390,7 @@ Result<void> CollectionIndex::refresh(std::int64_t collectionId, const std::vect
     const SlotPtr slot = find(collectionId);
     if (!slot) return {};
     return guarded([&] {
-        // Before waiting for the lock: whoever gets it next applies all marks at once.
+        // Before waiting for the lock: the next thread that gets it applies all marks at once.
         slot->mark(shapeIds);
         const std::lock_guard<std::mutex> lock(slot->apply);
         return slot->stale ? reloadLocked(*slot) : applyDirty(*slot);

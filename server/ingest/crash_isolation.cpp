@@ -7,7 +7,7 @@ namespace shapedb::ingest {
 
 namespace {
 
-/// How often one who waits checks for cancellation.
+/// How often a waiting thread checks for cancellation.
 constexpr std::chrono::milliseconds kLookForCancel{20};
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How many connections are open, without help from whoever serves and closes them.
+// How many connections are open, found out without the code that serves and closes them.
 #pragma once
 
 #include <cstddef>

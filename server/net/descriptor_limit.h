@@ -13,7 +13,7 @@ constexpr std::size_t kReservedDescriptors = 256;
 std::size_t raiseDescriptorLimit();
 
 /// `wanted` connections, or as many as a limit of `descriptors` has room for beside those that are reserved:
-/// at least half of them in any case. Of each of so many `transports`, which share the room alike.
+/// at least half of them in any case. For each of `transports` transports, which share the room equally.
 [[nodiscard]] std::size_t connectionsWithin(std::size_t descriptors, std::size_t wanted,
                                             std::size_t transports = 1);
 

@@ -16,7 +16,7 @@ namespace shapedb::rpc {
 /// A shapedb.v1.SearchBatchResponse in the making.
 class BatchAnswer {
   public:
-    /// For so many queries, at least 1, all unanswered.
+    /// For this many queries, at least 1, all unanswered.
     explicit BatchAnswer(std::size_t queries) : encoded_(queries) {}
 
     /// Encodes the answer of query `i`. Threads may set different queries at the same time. At most 2 GiB - 1

@@ -23,7 +23,7 @@
 
 namespace shapedb::rpc {
 
-/// At most so many bytes of memory become of a byte of a message: many empty texts of two bytes each.
+/// The most bytes of memory that one byte of a message can become: many empty texts of two bytes each.
 constexpr std::uint64_t kMostDecodedPerByte = 32;
 /// Messages up to this size need no room: that many calls are not made at a time.
 constexpr std::uint64_t kSmallMessageBytes = std::uint64_t{16} << 10;

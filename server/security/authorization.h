@@ -45,7 +45,7 @@ class Authorization {
     [[nodiscard]] Result<void> useAllCollections();
     /// Whether the caller may know of the collection.
     [[nodiscard]] bool sees(const std::string& collection) const;
-    /// Before a scan of so many bytes is received. Errors: kRateLimited.
+    /// To be called before a scan of this many bytes is received. Errors: kRateLimited.
     [[nodiscard]] Result<void> useScan(std::uint64_t bytes);
     /// At the end of the call: of what was announced only the bytes that arrived count.
     void endScans(std::uint64_t arrived);

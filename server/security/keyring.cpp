@@ -187,7 +187,7 @@ Result<std::vector<KeyStatus>> Keyring::list() {
 }
 
 Result<Key> Keyring::revoke(const std::string& idOrKey) {
-    // Whoever gives the whole key by mistake must not find its secret in an error and in the log.
+    // If the whole key is given by mistake, its secret must not appear in an error or in the log.
     const auto whole = parseApiKey(idOrKey);
     const std::string& id = whole ? whole->id : idOrKey;
     const std::lock_guard<std::mutex> lock(mutex_);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What Store::importCollection is asked to do.
+// The parameters of Store::importCollection.
 #pragma once
 
 #include <functional>

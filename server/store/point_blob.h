@@ -40,7 +40,7 @@ class PointEncoding {
     /// Calls `sink` with pieces that add up to `size()` bytes. Throws what it throws.
     void write(const Sink& sink) const;
 
-    /// Scans of up to so many bytes make a whole blob.
+    /// Scans of up to this many bytes are stored as one blob.
     static constexpr std::size_t kWholeBytes = std::size_t{8} << 20;
 
   private:

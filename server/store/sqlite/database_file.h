@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Database files other than the live one: made for whoever asked, or received and not to be trusted.
+// Database files other than the live one: made for a client, or received and not to be trusted.
 // Functions throw Failure.
 #pragma once
 

@@ -22,7 +22,7 @@ bool contains(const std::vector<std::string>& lines, const std::string& line) {
     return std::find(lines.begin(), lines.end(), line) != lines.end();
 }
 
-/// No server gave out so many ids since the backup was made, for want of the last one.
+/// No server has given out this many ids since the backup was made; used where the last id is unknown.
 constexpr std::int64_t kBeyondUnknownIds = std::int64_t{1} << 40;
 
 /// Ids are never reused, not even across a restore: new rows continue after both histories, and jobs

@@ -25,7 +25,7 @@ class SpaceReserve {
     /// kStorageFull (there is none). Where space cannot be taken for another reason, such as a limit of file
     /// sizes, there is no reserve, and no error.
     [[nodiscard]] Result<void> hold();
-    /// Gives the space to whoever writes next. False if there was none to give.
+    /// Frees the space for the next write. False if there was none to give.
     bool release();
 
     /// While it lives, the space is given to its owner, and `hold` waits. At its end the space is taken back,
