@@ -8,6 +8,7 @@
 #include <tuple>
 #include <utility>
 
+#include "core/base/disjoint_sets.h"
 #include "core/base/parallel.h"
 #include "core/base/return_if_error.h"
 #include "core/delaunay/delaunay.h"
@@ -134,26 +135,15 @@ std::vector<CellPair> touchingCells(const InteriorGrid& grid, const Cells& cells
     return pairs;
 }
 
-std::uint32_t rootOf(std::vector<std::uint32_t>& parent, std::uint32_t cell) {
-    while (parent[cell] != cell) cell = parent[cell] = parent[parent[cell]];
-    return cell;
-}
-
 // A shape thinner than a voxel may fall apart in the grid: pieces that share facets of tetrahedra, or a
 // tetrahedron, are joined where they do.
 void joinPieces(const InteriorView& view, const InteriorGrid& grid, const Cells& cells,
                 std::vector<CellPair>& pairs) {
-    std::vector<std::uint32_t> parent(cells.size());
-    std::iota(parent.begin(), parent.end(), 0U);
-    for (const auto& [a, b] : pairs) {
-        const std::uint32_t rootA = rootOf(parent, a);
-        const std::uint32_t rootB = rootOf(parent, b);
-        parent[std::max(rootA, rootB)] = std::min(rootA, rootB);
-    }
-    for (std::uint32_t c = 0; c < parent.size(); ++c) parent[c] = rootOf(parent, c);
-    const auto pieces = std::count_if(parent.begin(), parent.end(),
-                                      [&, c = 0U](std::uint32_t p) mutable { return p == c++; });
-    if (pieces < 2) return;
+    DisjointSets pieces(cells.size());
+    for (const auto& [a, b] : pairs) pieces.unite(a, b);
+    std::uint32_t count = 0;
+    for (std::uint32_t c = 0; c < pieces.size(); ++c) count += pieces.isRepresentative(c) ? 1 : 0;
+    if (count < 2) return;
     const auto cellOf = [&](std::size_t t) {
         const std::uint32_t voxel = grid.voxelAt(view.centroids[t]);
         return voxel == InteriorGrid::kNoVoxel ? InnerDistances::kNoCell : cells.ofVoxel[voxel];
@@ -164,7 +154,7 @@ void joinPieces(const InteriorView& view, const InteriorGrid& grid, const Cells&
         for (const std::uint32_t next : view.neighbours[t]) {
             if (next == kNoTetrahedron || next < t) continue;
             const std::uint32_t b = cellOf(next);
-            if (b == InnerDistances::kNoCell || parent[a] == parent[b]) continue;
+            if (b == InnerDistances::kNoCell || pieces.find(a) == pieces.find(b)) continue;
             pairs.push_back(std::minmax(a, b));
         }
     }
@@ -172,7 +162,7 @@ void joinPieces(const InteriorView& view, const InteriorGrid& grid, const Cells&
         if (m.voxel == InteriorGrid::kNoVoxel) continue;
         const std::uint32_t a = cells.ofVoxel[m.voxel];
         const std::uint32_t b = cellOf(m.tetrahedron);
-        if (b == InnerDistances::kNoCell || parent[a] == parent[b]) continue;
+        if (b == InnerDistances::kNoCell || pieces.find(a) == pieces.find(b)) continue;
         pairs.push_back(std::minmax(a, b));
     }
     keepDistinct(pairs);
