@@ -34,16 +34,6 @@ std::string fromHex(const std::string& hex) {
     return bytes;
 }
 
-std::string toHex(const std::string& bytes) {
-    std::string hex;
-    for (const char c : bytes) {
-        char two[3];
-        std::snprintf(two, sizeof two, "%02x", static_cast<unsigned char>(c));
-        hex += two;
-    }
-    return hex;
-}
-
 // Version 1, byte by byte. Never edit: stored shapes have these bytes.
 const char* const kGolden =
     "53444246"          // SDBF
@@ -75,7 +65,9 @@ void expectRefused(const std::string& bytes, ErrorCode code, const std::string& 
     EXPECT_NE(decoded.error().message.find(why), std::string::npos) << decoded.error().message;
 }
 
-TEST(SurfacePointsCodec, WritesTheGoldenBytes) { EXPECT_EQ(toHex(encodeSurfacePoints(small())), kGolden); }
+TEST(SurfacePointsCodec, WritesTheGoldenBytes) {
+    EXPECT_EQ(testing_support::toHex(encodeSurfacePoints(small())), kGolden);
+}
 
 TEST(SurfacePointsCodec, ReadsTheGoldenBytes) {
     const auto decoded = decodeSurfacePoints(fromHex(kGolden));

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Bytes of signatures that decodeSignature must refuse.
+// For tests of stored bytes: as text, and forged ones that must be refused.
 #pragma once
 
 #include <cstdint>
+#include <cstdio>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -10,6 +11,16 @@
 #include "core/signature/signature_codec.h"
 
 namespace shapedb::testing_support {
+
+inline std::string toHex(const std::string& bytes) {
+    std::string hex;
+    for (const char c : bytes) {
+        char two[3];
+        std::snprintf(two, sizeof two, "%02x", static_cast<unsigned char>(c));
+        hex += two;
+    }
+    return hex;
+}
 
 /// The last four bytes replaced by the checksum of those before, so that only the checks of numbers can
 /// refuse. A second CRC-32, by the bits.

@@ -25,16 +25,6 @@ ViewSet small() {
     return set;
 }
 
-std::string toHex(const std::string& bytes) {
-    std::string hex;
-    for (const char c : bytes) {
-        char two[3];
-        std::snprintf(two, sizeof two, "%02x", static_cast<unsigned char>(c));
-        hex += two;
-    }
-    return hex;
-}
-
 template <typename T>
 std::string forged(std::string bytes, std::size_t at, const T& value) {
     std::memcpy(&bytes[at], &value, sizeof value);
@@ -52,17 +42,17 @@ void expectRefused(const std::string& bytes, ErrorCode code, const std::string& 
 TEST(ViewsCodec, WritesTheGoldenBytes) {
     const std::string bytes = encodeViews(small());
     ASSERT_EQ(bytes.size(), 1372u);
-    EXPECT_EQ(toHex(bytes.substr(0, 8)),
+    EXPECT_EQ(testing_support::toHex(bytes.substr(0, 8)),
               "53444256"  // SDBV
               "01"        // version
               "14"        // views
               "0000");    // reserved
     EXPECT_EQ(
-        toHex(bytes.substr(8 + 68, 68)),
+        testing_support::toHex(bytes.substr(8 + 68, 68)),
         "0d141b222930373e454c535a61686f767d848b9299a0a7aeb5bcc3cad1d8dfe6edf4fb020910171e252c333a41484f56"
         "5d646b727980878e959ca3aab1b8bfc6"
-        "0000003f");                                               // size
-    EXPECT_EQ(toHex(bytes.substr(bytes.size() - 4)), "a0f36180");  // CRC-32 of all before
+        "0000003f");                                                                // size
+    EXPECT_EQ(testing_support::toHex(bytes.substr(bytes.size() - 4)), "a0f36180");  // CRC-32 of all before
 }
 
 TEST(ViewsCodec, KeepsAShapeToTheLastBit) {
