@@ -43,7 +43,7 @@ Result<Box> checkedBox(const PointCloud& points) {
     return box;
 }
 
-/// What to subtract from the points. A few strays, as at 0, 0, 0, do not count.
+/// What to subtract from the points. A few outliers, as at 0, 0, 0, do not count.
 Point3 originFor(const PointCloud& points) {
     MainPart part = mainPartOf(points);
     if (part.isPoint()) part = {boxOf(points), points.size(), 0};

@@ -25,11 +25,11 @@ struct PackedPoints {
     Point3 origin;       ///< subtracted from every point, scan units; zero unless they lie far from it
 };
 
-/// The origin is the middle of the box around the main part of the points, so without strays, if that lies
+/// The origin is the middle of the box around the main part of the points, so without outliers, if that lies
 /// far from 0, 0, 0 (isFarFromOrigin) or single precision cannot hold it there.
 ///
 /// Errors: kTooFewPoints (none); kNonFiniteCoordinate; kCoordinateOutOfRange (beyond the largest float32, the
-/// whole scan too small for one, a stray too far from the others, or rounded before: checkNotRounded). The
+/// whole scan too small for one, an outlier too far from the others, or rounded before: checkNotRounded). The
 /// message names the first such point.
 [[nodiscard]] Result<PackedPoints> packPoints(const PointCloud& points);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where the points of a scan lie, whatever a few strays do: a point at 0, 0, 0 that stands for "nothing
+// Where the points of a scan lie, whatever a few outliers do: a point at 0, 0, 0 that stands for "nothing
 // seen", or one that a scanner placed kilometres away, says nothing about the size of the rest.
 #pragma once
 
@@ -13,16 +13,16 @@
 
 namespace shapedb {
 
-/// Strays are beyond this many diagonals of the box that holds the middle half of each coordinate, from its
+/// Outliers are beyond this many diagonals of the box that holds the middle half of each coordinate, from its
 /// middle. The surface of a ball ends before two of them.
 constexpr double kMainReach = 4.0;
 
 struct MainPart {
-    Box box;                   ///< of the points that are no strays
+    Box box;                   ///< of the points that are no outliers
     std::uint64_t points = 0;  ///< that many; more than half of all
-    std::uint64_t strays = 0;
+    std::uint64_t outliers = 0;
 
-    /// All points but the strays are one.
+    /// All points but the outliers are one.
     [[nodiscard]] bool isPoint() const { return box.low == box.high; }
 };
 
@@ -50,13 +50,13 @@ MainPart within(const Box& reach, std::size_t count, const PointAt& pointAt) {
             ++part.points;
         }
     }
-    part.strays = count - part.points;
+    part.outliers = count - part.points;
     return part;
 }
 
 }  // namespace main_part
 
-/// Up to about a quarter of all points may be strays, wherever they lie; less where the middle is a point.
+/// Up to about a quarter of all points may be outliers, wherever they lie; less where the middle is a point.
 /// `pointAt(i)` gives the finite points, `count` at least one. Does not depend on the order of up to kSample
 /// points.
 template <typename PointAt>

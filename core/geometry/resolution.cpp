@@ -76,8 +76,8 @@ std::string CoarseCoordinates::text(const char* precision) const {
     std::snprintf(buffer, sizeof buffer,
                   "coordinates up to %.6g are %.3g apart in %s, but the scan is only %.3g across", largest,
                   step, precision, across);
-    if (strays == 0) return buffer;
-    return buffer + std::string(", without ") + countText(strays, "point") + " far from the others";
+    if (outliers == 0) return buffer;
+    return buffer + std::string(", without ") + countText(outliers, "point") + " far from the others";
 }
 
 bool isFarFromOrigin(const Box& box) {
@@ -103,7 +103,7 @@ std::optional<CoarseCoordinates> coarseInSinglePrecision(const Box& box, std::ui
 
 std::optional<CoarseCoordinates> coarseInSinglePrecision(const MainPart& part) {
     auto found = coarseInSinglePrecision(part.box, part.points);
-    if (found) found->strays = part.strays;
+    if (found) found->outliers = part.outliers;
     return found;
 }
 

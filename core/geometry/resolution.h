@@ -29,13 +29,13 @@ constexpr double kFarFromOrigin = 16.0;
 
 /// A scan whose coordinates are too far apart. Scan units.
 struct CoarseCoordinates {
-    double largest = 0.0;      ///< coordinate, by magnitude
-    double step = 0.0;         ///< from there to the next number
-    double across = 0.0;       ///< size of the scan, or its extent along the axis that is concerned
-    std::uint64_t strays = 0;  ///< points that do not count as the scan
+    double largest = 0.0;        ///< coordinate, by magnitude
+    double step = 0.0;           ///< from there to the next number
+    double across = 0.0;         ///< size of the scan, or its extent along the axis that is concerned
+    std::uint64_t outliers = 0;  ///< points that do not count as the scan
 
     /// "coordinates up to 4.4e+06 are 0.5 apart in single precision, but the scan is only 2.5 across",
-    /// with strays "..., without 3 points far from the others".
+    /// with outliers "..., without 3 points far from the others".
     [[nodiscard]] std::string text(const char* precision = "single precision") const;
 };
 
@@ -49,7 +49,7 @@ struct CoarseCoordinates {
 /// precision.
 [[nodiscard]] std::optional<CoarseCoordinates> coarseInSinglePrecision(const Box& box, std::uint64_t points);
 
-/// The same of the main part of a scan: strays do not widen it. Nothing of a part that is one
+/// The same of the main part of a scan: outliers do not widen it. Nothing of a part that is one
 /// point.
 [[nodiscard]] std::optional<CoarseCoordinates> coarseInSinglePrecision(const MainPart& part);
 

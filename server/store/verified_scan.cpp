@@ -121,9 +121,9 @@ Result<void> ScanVerifier::checkResolution() const {
     if (const auto coarse = coarseInSinglePrecision(part)) {
         return fail(ErrorCode::kCoordinateOutOfRange, coarse->text() + ": " + kSendRelative);
     }
-    if (part.isPoint() && part.strays > 0 && maybeFlattened(part)) {
+    if (part.isPoint() && part.outliers > 0 && maybeFlattened(part)) {
         return fail(ErrorCode::kCoordinateOutOfRange,
-                    "in single precision all points but " + std::to_string(part.strays) +
+                    "in single precision all points but " + std::to_string(part.outliers) +
                         " are the same one: if they differed before, " + kSendRelative);
     }
     if (!part.isPoint()) RETURN_IF_ERROR(checkPlacement(part.box, origin_));
@@ -155,9 +155,9 @@ Error ScanVerifier::withRemedy(Error error) const {
                       error.code == ErrorCode::kCollinear || error.code == ErrorCode::kCoplanar;
     if (!flat || xyz_.size() < 3 * kFewest) return error;
     const MainPart part = mainPart();
-    if (part.strays > 0 && box().diagonal() * kFlatnessTolerance > part.box.diagonal()) {
+    if (part.outliers > 0 && box().diagonal() * kFlatnessTolerance > part.box.diagonal()) {
         error.message +=
-            ". All but " + countText(part.strays, "point") +
+            ". All but " + countText(part.outliers, "point") +
             " are so near to each other that they count as one there: drop those that lie far away";
     } else if (maybeFlattened(part)) {
         error.message +=

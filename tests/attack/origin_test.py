@@ -241,13 +241,13 @@ class Origins(unittest.TestCase):
             self.client.shapes.GetShape(shapes.GetShapeRequest(shape=self.ref("lost")))
         self.assertEqual(failure.exception.code(), grpc.StatusCode.NOT_FOUND)
 
-    def test_strays_do_not_hide_that_a_scan_is_lost(self):
+    def test_outliers_do_not_hide_that_a_scan_is_lost(self):
         remedy = "field origin of the header"
-        for strays in ([(0, 0, 0)], [(0, 0, 0)] * 5, [(1e7, 1e7, 0), (0, 0, 0), (0, 1e7, 1e7), (1e7, 0, 1e7)]):
+        for outliers in ([(0, 0, 0)], [(0, 0, 0)] * 5, [(1e7, 1e7, 0), (0, 0, 0), (0, 1e7, 1e7), (1e7, 0, 1e7)]):
             for size in (0.02, 1.0, 40.0):
                 lost = single(at([tuple(size * c for c in p) for p in self.points], SITE))
-                self.assert_refused(lambda: self.add("lost", strays + lost), remedy)
-                self.assert_refused(lambda: self.add("lost", lost + strays), remedy)
+                self.assert_refused(lambda: self.add("lost", outliers + lost), remedy)
+                self.assert_refused(lambda: self.add("lost", lost + outliers), remedy)
 
     def test_origins_have_limits(self):
         points = self.points

@@ -42,13 +42,13 @@ def test_far_from_the_origin_the_shape_is_kept(points, distance):
     np.testing.assert_allclose(unpack(packed.data, packed.origin), far, rtol=0, atol=3e-6)
 
 
-@pytest.mark.parametrize("strays", [[(0, 0, 0)], [(0, 0, 0), (1e7, 0, 0), (-1e30, 0, 0)]])
-def test_strays_do_not_choose_the_origin(strays):
+@pytest.mark.parametrize("outliers", [[(0, 0, 0)], [(0, 0, 0), (1e7, 0, 0), (-1e30, 0, 0)]])
+def test_outliers_do_not_choose_the_origin(outliers):
     far = solids.ball() + (4.5e6, -5.4e6, 300.0)
-    packed = pack(np.vstack([strays, far]))
+    packed = pack(np.vstack([outliers, far]))
     assert np.abs(packed.origin - (4.5e6, -5.4e6, 300.0)).max() < 2.0
-    np.testing.assert_allclose(unpack(packed.data, packed.origin)[len(strays):], far, rtol=0, atol=3e-6)
-    assert not pack(np.vstack([strays, solids.ball()])).origin.any()
+    np.testing.assert_allclose(unpack(packed.data, packed.origin)[len(outliers):], far, rtol=0, atol=3e-6)
+    assert not pack(np.vstack([outliers, solids.ball()])).origin.any()
     with pytest.raises(shapedb.InvalidInput, match="too far from most others"):
         pack(np.vstack([[(-3e38, 0, 0)], 1e30 * solids.ball() + (3e38, 0, 0)]))
 

@@ -148,7 +148,7 @@ test('a scan far from 0, 0, 0 keeps its digits', () => {
   assert.ok(inside, 'samples of a surface far away lie in its box');
 });
 
-test('a few strays hide no scan that lies far away', () => {
+test('a few outliers hide no scan that lies far away', () => {
   const grid = (base) => Array.from({ length: 500 }, (_, i) => [i % 10, Math.floor(i / 10) % 10, Math.floor(i / 100)].map(
     (value, axis) => base[axis] + value / 7));
   const far = [4_400_000, 5_400_000, 120];

@@ -137,20 +137,20 @@ TEST(Packing, PointsThatWereRoundedBeforeAreRefused) {
     EXPECT_EQ(refused.error().code, ErrorCode::kCoordinateOutOfRange);
 }
 
-TEST(Packing, StraysDoNotChooseTheOrigin) {
+TEST(Packing, OutliersDoNotChooseTheOrigin) {
     const Point3 far{4.5e6, -5.4e6, 300.0};
     for (const double size : {0.1, 2.0, 100.0, 5'000.0}) {
-        for (const PointCloud& strays :
+        for (const PointCloud& outliers :
              std::vector<PointCloud>{{{}}, {{}, {}, {1e7, 1e7, 1e7}}, {{-1e30, 0.0, 0.0}}}) {
             PointCloud points = cloud(size, far);
             const PointCloud scan = points;
-            points.insert(points.begin(), strays.begin(), strays.end());
+            points.insert(points.begin(), outliers.begin(), outliers.end());
             const auto packed = packPoints(points);
             ASSERT_TRUE(packed) << packed.error().message;
             EXPECT_LT(distance(packed->origin, far), size);
             const PointCloud back = unpacked(*packed);
             for (std::size_t i = 0; i < scan.size(); ++i) {
-                EXPECT_LT(distance(back[i + strays.size()], scan[i]), 1e-6 * size);
+                EXPECT_LT(distance(back[i + outliers.size()], scan[i]), 1e-6 * size);
             }
         }
     }

@@ -100,22 +100,22 @@ TEST_F(OnlineOrigins, SurveyedCoordinatesAreThoseOfTheFiles) {
     }
 }
 
-TEST_F(OnlineOrigins, AStrayPointDoesNotChooseTheOrigin) {
-    onlineJson({"collection", "create", "strays"});
+TEST_F(OnlineOrigins, AnOutlierDoesNotChooseTheOrigin) {
+    onlineJson({"collection", "create", "outliers"});
     const PointCloud local = readScan(scans() + "/mug/mug_01.ply").value().points;
-    // Far, but not so far that all the rest is one point beside the stray.
+    // Far, but not so far that all the rest is one point beside the outlier.
     const double scale = 300.0 / boxOf(local).diagonal();
     const Point3 at{4.4e6, -5.2e6, 120.0};
     PointCloud surveyed;
     for (const Point3& p : local) surveyed.push_back(at + scale * p);
     write("clean.xyz", xyzText(surveyed));
     surveyed.insert(surveyed.begin(), Point3{});
-    write("stray.xyz", xyzText(surveyed));
-    onlineJson({"add", path("clean.xyz"), path("stray.xyz"), "--base", folder(), "--collection", "strays",
+    write("outlier.xyz", xyzText(surveyed));
+    onlineJson({"add", path("clean.xyz"), path("outlier.xyz"), "--base", folder(), "--collection", "outliers",
                 "--wait"});
-    const json shape = onlineJson({"get", "stray", "--collection", "strays"});
+    const json shape = onlineJson({"get", "outlier", "--collection", "outliers"});
     EXPECT_NEAR(shape["origin"][0].get<double>(), at.x, 300.0);
-    EXPECT_GT(onlineJson({"compare", "clean", "stray", "--collection", "strays"})["score"].get<double>(),
+    EXPECT_GT(onlineJson({"compare", "clean", "outlier", "--collection", "outliers"})["score"].get<double>(),
               0.8);
 }
 

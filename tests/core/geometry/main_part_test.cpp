@@ -20,22 +20,22 @@ PointCloud cube(std::size_t count, const Point3& at, double size = 2.0) {
     return points;
 }
 
-TEST(MainPart, StraysDoNotBelongToIt) {
+TEST(MainPart, OutliersDoNotBelongToIt) {
     const Point3 at{4.4e6, -5.2e6, 120.0};
-    const std::vector<PointCloud> ofStrays = {{{}},
-                                              {{}, {}, {}},
-                                              {{1e9, 0.0, 0.0}},
-                                              {{}, {-1e9, 1e9, 3e38}},
-                                              {{4.4e6 + 100.0, -5.2e6, 120.0}},
-                                              cube(20, {}, 1e7)};
+    const std::vector<PointCloud> ofOutliers = {{{}},
+                                                {{}, {}, {}},
+                                                {{1e9, 0.0, 0.0}},
+                                                {{}, {-1e9, 1e9, 3e38}},
+                                                {{4.4e6 + 100.0, -5.2e6, 120.0}},
+                                                cube(20, {}, 1e7)};
     for (const std::size_t count : {100u, 1'000u, 200'000u}) {
         const PointCloud points = cube(count, at);
-        for (const PointCloud& strays : ofStrays) {
+        for (const PointCloud& outliers : ofOutliers) {
             for (const bool first : {true, false}) {
                 PointCloud all = points;
-                all.insert(first ? all.begin() : all.end(), strays.begin(), strays.end());
+                all.insert(first ? all.begin() : all.end(), outliers.begin(), outliers.end());
                 const MainPart part = mainPartOf(all);
-                EXPECT_EQ(part.strays, strays.size()) << count;
+                EXPECT_EQ(part.outliers, outliers.size()) << count;
                 EXPECT_EQ(part.points, count);
                 EXPECT_EQ(part.box.low, boxOf(points).low);
                 EXPECT_EQ(part.box.high, boxOf(points).high);
@@ -61,7 +61,7 @@ TEST(MainPart, IsTheWholeOfUsualScans) {
     for (const PointCloud& scan :
          {cube(1'000, {5.0, 6.0, 7.0}), jack, rod, unseen, four, PointCloud{{1, 2, 3}}}) {
         const MainPart part = mainPartOf(scan);
-        EXPECT_EQ(part.strays, 0u);
+        EXPECT_EQ(part.outliers, 0u);
         EXPECT_EQ(part.points, scan.size());
         EXPECT_EQ(part.box.high, boxOf(scan).high);
     }
@@ -70,15 +70,16 @@ TEST(MainPart, IsTheWholeOfUsualScans) {
 TEST(MainPart, MayBeOnePoint) {
     PointCloud points(1'000, Point3{1.0, 2.0, 3.0});
     EXPECT_TRUE(mainPartOf(points).isPoint());
-    EXPECT_EQ(mainPartOf(points).strays, 0u);
+    EXPECT_EQ(mainPartOf(points).outliers, 0u);
     points.push_back({});
     EXPECT_TRUE(mainPartOf(points).isPoint());
-    EXPECT_EQ(mainPartOf(points).strays, 1u);
+    EXPECT_EQ(mainPartOf(points).outliers, 1u);
 }
 
 TEST(MainPart, HoldsTheLargestAndSmallestNumbers) {
-    EXPECT_EQ(mainPartOf(PointCloud{{-3.4e38, 0, 0}, {3.4e38, 0, 0}, {0, 3.4e38, 0}, {0, 0, 1}}).strays, 0u);
-    EXPECT_EQ(mainPartOf(cube(100, {}, 1e-300)).strays, 0u);
+    EXPECT_EQ(mainPartOf(PointCloud{{-3.4e38, 0, 0}, {3.4e38, 0, 0}, {0, 3.4e38, 0}, {0, 0, 1}}).outliers,
+              0u);
+    EXPECT_EQ(mainPartOf(cube(100, {}, 1e-300)).outliers, 0u);
 }
 
 }  // namespace

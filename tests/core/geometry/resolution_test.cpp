@@ -108,16 +108,16 @@ TEST(Resolution, RoundedPointsAreToldFromOthers) {
     EXPECT_TRUE(checkNotRounded(mixed));
 }
 
-TEST(Resolution, StraysDoNotWidenAScan) {
+TEST(Resolution, OutliersDoNotWidenAScan) {
     const PointCloud lost = rounded(cloud({2.0, 2.0, 2.0}, {4.4e6, -5.2e6, 120.0}));
-    for (const PointCloud& strays :
+    for (const PointCloud& outliers :
          std::vector<PointCloud>{{{}}, {{}, {}, {1e9, 5.0, 0.0}}, {{3e38, 0.0, 0.0}}}) {
         PointCloud points = lost;
-        points.insert(points.begin() + 7, strays.begin(), strays.end());
+        points.insert(points.begin() + 7, outliers.begin(), outliers.end());
         points = rounded(points);
         const auto found = coarseInSinglePrecision(mainPartOf(points));
         ASSERT_TRUE(found);
-        EXPECT_EQ(found->strays, strays.size());
+        EXPECT_EQ(found->outliers, outliers.size());
         EXPECT_LT(found->across, 4.0);
         EXPECT_FALSE(checkNotRounded(points));
     }

@@ -103,13 +103,13 @@ TEST(Views, OfSurfacePointsAloneAreMuchTheSame) {
     EXPECT_LT(apart(*alone, viewsOf(points)), 60.0);
 }
 
-TEST(Views, IgnoreStrayPointsFarAway) {
+TEST(Views, IgnoreOutliersFarAway) {
     const PointCloud points = scan("bird");
-    PointCloud stray = points;
-    stray.push_back({1e6, 1e6, -1e6});
+    PointCloud withOutlier = points;
+    withOutlier.push_back({1e6, 1e6, -1e6});
     const SurfacePoints surface = surfaceOf(points);
     EXPECT_EQ(*makeViews(surface, points), *makeViews(surface, points));
-    EXPECT_LT(apart(*makeViews(surface, stray), *makeViews(surface, points)), 5.0);
+    EXPECT_LT(apart(*makeViews(surface, withOutlier), *makeViews(surface, points)), 5.0);
 }
 
 TEST(Views, OfAFlatScanAreFinite) {

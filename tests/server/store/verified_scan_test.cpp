@@ -113,19 +113,19 @@ std::vector<float> farCube(float size, std::vector<float> first, std::size_t poi
     return first;
 }
 
-TEST(VerifiedScan, StraysDoNotHideThatAScanIsLost) {
-    const std::vector<std::vector<float>> ofStrays = {
+TEST(VerifiedScan, OutliersDoNotHideThatAScanIsLost) {
+    const std::vector<std::vector<float>> ofOutliers = {
         {0, 0, 0}, {0, 0, 0, 0, 0, 0, 0, 0, 0}, {1e9f, 0, 0}, {0, 0, 0, 1e6f, 0, 0, 0, 1e6f, 0, 0, 0, 1e6f}};
-    for (const auto& strays : ofStrays) {
+    for (const auto& outliers : ofOutliers) {
         for (const float size : {1e-3f, 0.1f, 0.7f, 2.0f, 50.0f, 200.0f}) {
             for (const std::size_t points : {100u, 2'000u}) {
-                const auto refused = VerifiedScan::verify(farCube(size, strays, points));
-                ASSERT_FALSE(refused) << size << ", " << strays.size() / 3 << " strays";
+                const auto refused = VerifiedScan::verify(farCube(size, outliers, points));
+                ASSERT_FALSE(refused) << size << ", " << outliers.size() / 3 << " outliers";
                 EXPECT_NE(refused.error().message.find("field origin of the header"), std::string::npos)
                     << size << ": " << refused.error().message;
             }
         }
-        EXPECT_TRUE(VerifiedScan::verify(farCube(5'000.0f, strays))) << "large enough to keep its shape";
+        EXPECT_TRUE(VerifiedScan::verify(farCube(5'000.0f, outliers))) << "large enough to keep its shape";
     }
 }
 
@@ -147,7 +147,7 @@ TEST(VerifiedScan, WhatRoundingFlattenedIsToldTheRemedy) {
     EXPECT_NE(refused.error().message.find("field origin"), std::string::npos) << refused.error().message;
 }
 
-TEST(VerifiedScan, AFarStrayIsToldToBeDropped) {
+TEST(VerifiedScan, AFarOutlierIsToldToBeDropped) {
     auto xyz = cube(1'000);
     for (int axis = 0; axis < 3; ++axis) xyz.push_back(-4.4e6f);
     const auto refused = VerifiedScan::verify(xyz);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where the points of a scan lie, whatever a few strays do, as core/geometry/main_part.h tells.
+// Where the points of a scan lie, whatever a few outliers do, as core/geometry/main_part.h tells.
 
 export interface Axis {
   low: number;
@@ -7,10 +7,10 @@ export interface Axis {
 }
 
 export interface MainPart {
-  /** Of the points that are no strays. */
+  /** Of the points that are no outliers. */
   axes: Axis[];
   points: number;
-  strays: number;
+  outliers: number;
 }
 
 const kReach = 4;
@@ -68,10 +68,10 @@ export function mainPartOf(vertices: Float64Array): MainPart {
       if (holds) ++points;
       return holds;
     });
-    const part = { axes, points, strays: count - points };
+    const part = { axes, points, outliers: count - points };
     if (2 * points <= count) continue;
     if (!isPoint(part)) return part;
     point = part;
   }
-  return point ?? { axes: axesOf(vertices), points: count, strays: 0 };
+  return point ?? { axes: axesOf(vertices), points: count, outliers: 0 };
 }

@@ -61,14 +61,14 @@ export function checkNotRounded(vertices: Float64Array): void {
   }
   if (odd < (kLeastOddShare * vertices.length) / 3) return;
   const text = (value: number, digits: number) => Number(value.toPrecision(digits)).toString();
-  const without = part.strays > 0 ? `, without ${countText(part.strays, 'point')} far from the others` : '';
+  const without = part.outliers > 0 ? `, without ${countText(part.outliers, 'point')} far from the others` : '';
   throw new FileFault(`coordinates up to ${text(found.largest, 6)} are ${text(found.step, 3)} apart in single precision, but the ` +
     `scan is only ${text(found.across, 3)} across${without}, and all of them are such numbers: the shape was lost when they were written in ` +
     'single precision. Write them again in double precision, or relative to a point near the scan', 'coordinate_out_of_range');
 }
 
 /**
- * What to subtract from the points before they become single precision: the middle of their box, without strays, if they
+ * What to subtract from the points before they become single precision: the middle of their box, without outliers, if they
  * lie so far from 0, 0, 0 that rounding would hurt their shape.
  */
 export function originOf(vertices: Float64Array): Point {

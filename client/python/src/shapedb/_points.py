@@ -121,7 +121,7 @@ class Packed:
 
 def pack(scan: Scan) -> Packed:
     """Checks and packs a scan. If it lies so far from the origin that single precision would hurt its shape, the
-    centre of its box, without strays, is subtracted first, in double precision."""
+    centre of its box, without outliers, is subtracted first, in double precision."""
     points = as_points(scan)
     diagonal = size_of(points.min(axis=0), points.max(axis=0))
     if 0.0 < diagonal < _SMALLEST_DIAGONAL:

@@ -19,7 +19,7 @@ _FLAT_SHARE = 1e-6
 _LEAST_ODD_SHARE = 0.125
 # A float32 rounds a coordinate beyond this many box diagonals by more than a millionth of the diagonal.
 _FAR_FROM_ORIGIN = 16.0
-# Strays are beyond so many diagonals of the box of the middle half; of less, where that is a point. As
+# Outliers are beyond so many diagonals of the box of the middle half; of less, where that is a point. As
 # core/geometry/main_part.h tells.
 _MAIN_REACH = 4.0
 _SAMPLE = 65_536
@@ -35,15 +35,15 @@ class Coarse(NamedTuple):
     """From there to the next number."""
     across: float
     """Size of the scan, or its extent along the axis that is concerned."""
-    strays: int = 0
+    outliers: int = 0
     """Points that were left out, because they lie far from the others."""
 
     def text(self) -> str:
         text = (f"coordinates up to {self.largest:.6g} are {self.step:.3g} apart in single precision, but the scan is only "
                 f"{self.across:.3g} across")
-        if self.strays == 0:
+        if self.outliers == 0:
             return text
-        return f"{text}, without {self.strays:,} point{'s' if self.strays > 1 else ''} far from the others"
+        return f"{text}, without {self.outliers:,} point{'s' if self.outliers > 1 else ''} far from the others"
 
 
 def _steps(magnitudes: FloatArray) -> FloatArray:
@@ -71,7 +71,7 @@ def _within(points: FloatArray, sample: FloatArray, share: float) -> FloatArray:
 
 
 def main_part(points: FloatArray) -> FloatArray:
-    """The points without strays: more than half of them, whatever up to a quarter do."""
+    """The points without outliers: more than half of them, whatever up to a quarter do."""
     sample = points[::-(-len(points) // _SAMPLE)]
     parts = [part for part in (_within(points, sample, share) for share in _SHARES) if 2 * len(part) > len(points)]
     with_extent = [part for part in parts if (part.min(axis=0) < part.max(axis=0)).any()]
@@ -105,12 +105,12 @@ def check_not_rounded(points: FloatArray) -> None:
         return
     raise InvalidInput(
         "coordinate_out_of_range",
-        found._replace(strays=len(points) - len(part)).text() + ", and all of them are such numbers: the shape was lost when "
+        found._replace(outliers=len(points) - len(part)).text() + ", and all of them are such numbers: the shape was lost when "
         "they were written in single precision. Write them again in double precision, or relative to a point near the scan")
 
 
 def origin_of(points: FloatArray) -> FloatArray:
-    """What to subtract before points become single precision: the centre of their box, without strays, if they lie so far
+    """What to subtract before points become single precision: the centre of their box, without outliers, if they lie so far
     from the origin that rounding would hurt their shape, else zero."""
     part = main_part(points)
     if (part.min(axis=0) == part.max(axis=0)).all():
