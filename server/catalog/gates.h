@@ -160,7 +160,7 @@ struct Admission {
     Budget uploads;    ///< bytes of points being received, or sent as they were received
     Budget followers;  ///< calls that wait for a shape or a rebuild
     Budget requests;   ///< bytes that large messages may become when they are decoded
-    Budget answers;    ///< bytes of the answers to searches, as encoded, while they are made
+    Budget answers;    ///< bytes of large answers, as encoded, until they are written
     Budget copies;     ///< copies of the database on their way to or from a client
 };
 

@@ -73,24 +73,19 @@ Result<std::string> listPage(
 
 Result<std::vector<std::string>> visitShapes(
     Catalog& catalog, const index::Snapshot& collection, const std::vector<std::string>& keys,
+    AnswerRoom& room,
     const std::function<std::size_t(const store::Shape&, std::optional<double> quality)>& visit) {
     RETURN_IF_ERROR(checkKeys(keys));
     const auto found = catalog.getShapes(collection.collection.id, keys);
     RETURN_IF_ERROR(found);
     std::vector<std::string> missing;
-    std::size_t bytes = 0;
     for (std::size_t i = 0; i < keys.size(); ++i) {
         const std::optional<store::Shape>& shape = (*found)[i];
         if (!shape) {
             missing.push_back(keys[i]);
             continue;
         }
-        bytes += visit(*shape, qualityIn(collection.signatures, shape->id));
-        if (bytes > kMaxAnswerBytes) {
-            return fail(ErrorCode::kInvalidArgument, "keys: the answer would exceed " +
-                                                         std::to_string(kMaxAnswerBytes) +
-                                                         " bytes; ask for fewer shapes");
-        }
+        RETURN_IF_ERROR(room.take(visit(*shape, qualityIn(collection.signatures, shape->id))));
     }
     return missing;
 }

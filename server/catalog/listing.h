@@ -11,6 +11,7 @@
 
 #include "core/base/error.h"
 #include "core/base/run_context.h"
+#include "server/catalog/answer_room.h"
 #include "server/catalog/catalog.h"
 #include "server/catalog/cursor.h"
 
@@ -44,10 +45,11 @@ struct ListRequest {
     const RunContext& context,
     const std::function<std::size_t(const store::Shape&, std::optional<double> quality)>& visit);
 
-/// Calls `visit` with the shape of each key, in their order, as above. Returns the keys that no shape has.
-/// Errors: kInvalidArgument (keys, an answer beyond kMaxAnswerBytes); those of the store.
+/// Calls `visit` with the shape of each key, in their order, as above; what it returns is taken from `room`.
+/// Returns the keys that no shape has. Errors: kInvalidArgument (keys); those of the store and of `room`.
 [[nodiscard]] Result<std::vector<std::string>> visitShapes(
     Catalog& catalog, const index::Snapshot& collection, const std::vector<std::string>& keys,
+    AnswerRoom& room,
     const std::function<std::size_t(const store::Shape&, std::optional<double> quality)>& visit);
 
 /// Errors: kInvalidArgument, kMalformedFilter, kCancelled, kDeadlineExceeded; those of the store.

@@ -28,18 +28,6 @@ Result<bool> sizesCount(bool keepScale, bool freeScale, LengthUnit unit) {
 
 }  // namespace
 
-Result<void> AnswerRoom::take(std::size_t bytes) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    if (bytes > left_) {
-        return fail(ErrorCode::kInvalidArgument,
-                    "the answer would exceed " + std::to_string(kMaxAnswerBytes) +
-                        " bytes; ask for fewer hits or queries, or for no explanations");
-    }
-    RETURN_IF_ERROR(share_.take(bytes));
-    left_ -= bytes;
-    return {};
-}
-
 Result<PreparedSearch> Searches::prepare(index::SnapshotPtr collection, const SearchRequest& request) const {
     if (collection->damage) return fail(*collection->damage);
     RETURN_IF_ERROR(checkK(request.k, maxK_));

@@ -86,21 +86,6 @@ struct FoundHit {
     std::optional<std::string> group;
 };
 
-/// How many bytes an answer may still grow by. One for each request; thread-safe.
-class AnswerRoom {
-  public:
-    /// `all`: what the answers of all calls may take together; must outlive this.
-    explicit AnswerRoom(Budget& all) : share_(all) {}
-
-    /// Errors: kInvalidArgument, saying how to ask for less; kQueueFull (the answers of other calls).
-    [[nodiscard]] Result<void> take(std::size_t bytes);
-
-  private:
-    std::mutex mutex_;
-    std::size_t left_ = kMaxAnswerBytes;
-    Budget::Share share_;
-};
-
 /// Thread-safe. The references must outlive it.
 class Searches {
   public:

@@ -17,6 +17,7 @@
 #include <grpcpp/support/sync_stream.h>
 
 #include "core/base/return_if_error.h"
+#include "server/catalog/answer_room.h"
 #include "server/catalog/gates.h"
 #include "server/rpc/call.h"
 #include "server/rpc/plain_message.h"
@@ -59,6 +60,12 @@ class Request {
         return share_->take(message_.SpaceUsedLong());
     }
 
+    /// For the answer, held until this is destroyed, which is after the answer was written. Once for a call.
+    [[nodiscard]] catalog::AnswerRoom& answerRoom(catalog::Budget& answers) {
+        answer_ = std::make_unique<catalog::AnswerRoom>(answers);
+        return *answer_;
+    }
+
     /// After `receive`.
     const Message& operator*() const { return message_; }
     const Message* operator->() const { return &message_; }
@@ -66,6 +73,7 @@ class Request {
   private:
     std::function<bool(Call&, grpc::ByteBuffer*)> read_;
     std::unique_ptr<catalog::Budget::Share> share_;
+    std::unique_ptr<catalog::AnswerRoom> answer_;
     Message message_;
 };
 

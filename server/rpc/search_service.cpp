@@ -90,10 +90,9 @@ Result<void> answer(const Services& services, const catalog::PreparedSearch& pre
 }
 
 Result<void> search(const Services& services, const Call& call, const catalog::PreparedSearch& prepared,
-                    const VerifiableQuery& query, pb::SearchResponse* response) {
+                    const VerifiableQuery& query, catalog::AnswerRoom& room, pb::SearchResponse* response) {
     const auto found = services.searches.run(prepared, query, call.run());
     RETURN_IF_ERROR(found);
-    catalog::AnswerRoom room(services.admission.answers);
     return answer(services, prepared, query.signature, *found, room, response);
 }
 
@@ -105,10 +104,10 @@ catalog::QuerySource sourceFrom(const v1::SearchBatchRequest::Query& query) {
 }
 
 Result<void> searchBatch(const Services& services, const Call& call, catalog::PreparedSearch& prepared,
-                         const v1::SearchBatchRequest& request, BatchAnswer& batch) {
+                         const v1::SearchBatchRequest& request, catalog::AnswerRoom& room,
+                         BatchAnswer& batch) {
     std::vector<catalog::QuerySource> sources;
     for (const auto& query : request.queries()) sources.push_back(sourceFrom(query));
-    catalog::AnswerRoom room(services.admission.answers);
     return services.searches.runBatch(
         prepared, sources, call.run(),
         [&](std::size_t i, const Signature& query, const VerifiedResult& found) -> Result<void> {
@@ -139,7 +138,8 @@ grpc::Status SearchServiceHandler::searchByKey(grpc::ServerContext* context,
         RETURN_IF_ERROR(prepared);
         const auto query = services_.searches.storedQuery(*prepared, request->key(), request->include_self());
         RETURN_IF_ERROR(query);
-        return search(services_, call, *prepared, *query, response);
+        return search(services_, call, *prepared, *query, request.answerRoom(services_.admission.answers),
+                      response);
     });
 }
 
@@ -187,15 +187,15 @@ Result<void> SearchServiceHandler::receiveAndSearch(Call& call, Upload<v1::Searc
 grpc::Status SearchServiceHandler::searchBySignature(grpc::ServerContext* context,
                                                      Request<v1::SearchBySignatureRequest>& request,
                                                      v1::SearchResponse* response) {
-    return handle(services_, context, operations::kSearchBySignature, request,
-                  [&](Call& call) -> Result<void> {
-                      const auto prepared = prepare(services_, call, request->options());
-                      RETURN_IF_ERROR(prepared);
-                      auto signature = decodeSignature(request->signature());
-                      RETURN_IF_ERROR(signature);
-                      return search(services_, call, *prepared,
-                                    {{std::move(*signature), std::nullopt}, nullptr}, response);
-                  });
+    return handle(
+        services_, context, operations::kSearchBySignature, request, [&](Call& call) -> Result<void> {
+            const auto prepared = prepare(services_, call, request->options());
+            RETURN_IF_ERROR(prepared);
+            auto signature = decodeSignature(request->signature());
+            RETURN_IF_ERROR(signature);
+            return search(services_, call, *prepared, {{std::move(*signature), std::nullopt}, nullptr},
+                          request.answerRoom(services_.admission.answers), response);
+        });
 }
 
 grpc::Status SearchServiceHandler::searchBatch(grpc::ServerContext* context,
@@ -210,7 +210,8 @@ grpc::Status SearchServiceHandler::searchBatch(grpc::ServerContext* context,
         auto prepared = prepare(services_, call, request->options());
         RETURN_IF_ERROR(prepared);
         BatchAnswer batch(static_cast<std::size_t>(count));
-        RETURN_IF_ERROR(rpc::searchBatch(services_, call, *prepared, *request, batch));
+        RETURN_IF_ERROR(rpc::searchBatch(services_, call, *prepared, *request,
+                                         request.answerRoom(services_.admission.answers), batch));
         *response = batch.message();
         return {};
     });

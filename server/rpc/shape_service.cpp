@@ -197,7 +197,8 @@ grpc::Status ShapeServiceHandler::getShapes(grpc::ServerContext* context,
             return out->ByteSizeLong();
         };
         const auto missing = catalog::visitShapes(services_.catalog, **collection,
-                                                  {request->keys().begin(), request->keys().end()}, visit);
+                                                  {request->keys().begin(), request->keys().end()},
+                                                  request.answerRoom(services_.admission.answers), visit);
         RETURN_IF_ERROR(missing);
         for (const std::string& key : *missing) response->add_missing(key);
         return {};
@@ -245,7 +246,8 @@ grpc::Status ShapeServiceHandler::getPreviews(grpc::ServerContext* context,
             return preview->ByteSizeLong();
         };
         RETURN_IF_ERROR(catalog::visitShapes(services_.catalog, **collection,
-                                             {request->keys().begin(), request->keys().end()}, visit));
+                                             {request->keys().begin(), request->keys().end()},
+                                             request.answerRoom(services_.admission.answers), visit));
         return read;
     });
 }
