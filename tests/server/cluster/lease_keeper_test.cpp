@@ -20,7 +20,7 @@ using std::chrono::milliseconds;
 constexpr milliseconds kTerm{1'000};
 
 /// Servers that talk to one table without delay.
-struct LeaseKeeping : testing::Test {
+struct LeaseKeeping : ::testing::Test {
     sim::Database table{1};
 
     LeaseKeeper server(const std::string& name) {
