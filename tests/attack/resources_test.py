@@ -248,7 +248,7 @@ class UploadMessages(unittest.TestCase):
                         codes.add((error.code(), reason(error)))
 
             bombs = list(upload_bombs())
-            self.assertEqual(len(bombs), 6 * 3)
+            self.assertEqual(len(bombs), 7 * 3)
             # Three of each client at a time, of other kinds.
             threads = [threading.Thread(target=send_all, args=(client, bombs[first::3]))
                        for client in clients for first in range(3)]
