@@ -129,13 +129,13 @@ Result<void> checkNotRounded(const PointCloud& points) {
         if (!isFinite(p) || std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) > kLargestSingle)
             return {};
     }
-    const auto found = coarseInSinglePrecision(mainPartOf(points));
-    if (!found) return {};
-    // Almost always the first point says that they were not.
+    // First, for it is cheap: mostly the first point says that they were not.
     const bool rounded = std::all_of(points.begin(), points.end(), [](const Point3& p) {
         return isSingle(p.x) && isSingle(p.y) && isSingle(p.z);
     });
-    if (!rounded || !useStep(points, found->step)) return {};
+    if (!rounded) return {};
+    const auto found = coarseInSinglePrecision(mainPartOf(points));
+    if (!found || !useStep(points, found->step)) return {};
     return fail(ErrorCode::kCoordinateOutOfRange,
                 found->text() +
                     ", and all of them are such numbers: the shape was lost when they were written in "

@@ -118,7 +118,7 @@ Admission::Admission(std::uint64_t uploadBytes, int uploadCalls)
       uploads(uploadBytes, "bytes of points that uploads in progress may hold (limits.max_upload_bytes)"),
       followers(kMaxFollowers, "calls that may wait for shapes and rebuilds"),
       requests(kMaxRequestsBytes, "bytes that large messages may become in memory"),
-      answers(kMaxAnswersBytes, "bytes that answers to searches may take together"),
+      answers(kMaxAnswersBytes, "bytes that large answers may take together"),
       copies(kMaxCopies, "places for a backup or restore in transit") {}
 
 }  // namespace shapedb::catalog

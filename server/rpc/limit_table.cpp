@@ -60,8 +60,8 @@ std::vector<LimitRow> limitTable(const config::ServerConfig& config) {
          "what messages above 16 KiB may become in memory, 32 bytes for each of theirs, of all calls "
          "together; blocks of points and backups do not count",
          "queue_full"},
-        {"answers_bytes", kMaxAnswersBytes, "bytes", "answers to searches being made, of all calls together",
-         full},
+        {"answers_bytes", kMaxAnswersBytes, "bytes",
+         "large answers until they are written, of all calls together", full},
         // Listings and changes of many.
         {"keys", kMaxKeys, "keys", "keys that one call names", invalid},
         {"page_size", kMaxPageSize, "shapes", "page of a listing", invalid},

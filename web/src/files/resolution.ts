@@ -51,9 +51,10 @@ function coarse(axes: Axis[], points: number): Coarse | undefined {
  */
 export function checkNotRounded(vertices: Float64Array): void {
   if (vertices.length === 0 || axesOf(vertices).some((axis) => largestOf(axis) > kLargestSingle)) return;
+  if (!vertices.every((value) => Math.fround(value) === value)) return;
   const part = mainPartOf(vertices);
   const found = coarse(part.axes, part.points);
-  if (found === undefined || !vertices.every((value) => Math.fround(value) === value)) return;
+  if (found === undefined) return;
   let odd = 0;
   for (let i = 0; i < vertices.length; i += 3) {
     const point = vertices.subarray(i, i + 3);

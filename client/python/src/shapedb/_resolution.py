@@ -73,9 +73,15 @@ def _within(points: FloatArray, sample: FloatArray, share: float) -> FloatArray:
 def main_part(points: FloatArray) -> FloatArray:
     """The points without outliers: more than half of them, whatever up to a quarter do."""
     sample = points[::-(-len(points) // _SAMPLE)]
-    parts = [part for part in (_within(points, sample, share) for share in _SHARES) if 2 * len(part) > len(points)]
-    with_extent = [part for part in parts if (part.min(axis=0) < part.max(axis=0)).any()]
-    return (with_extent or parts[-1:] or [points])[0]
+    point = points
+    for share in _SHARES:
+        part = _within(points, sample, share)
+        if 2 * len(part) <= len(points):
+            continue
+        if (part.min(axis=0) < part.max(axis=0)).any():
+            return part
+        point = part
+    return point
 
 
 def coarse_in_single_precision(low: FloatArray, high: FloatArray, points: int) -> Optional[Coarse]:
@@ -96,9 +102,11 @@ def check_not_rounded(points: FloatArray) -> None:
     was scanned. Points on a coarser grid lost nothing and pass, and what is not finite is left to other checks."""
     if not len(points) or not np.isfinite(points).all() or np.abs(points).max() > _LARGEST:
         return
+    if (points.astype(np.float32).astype(np.float64) != points).any():
+        return
     part = main_part(points)
     found = coarse_in_single_precision(part.min(axis=0), part.max(axis=0), len(part))
-    if found is None or (points.astype(np.float32).astype(np.float64) != points).any():
+    if found is None:
         return
     odd = (_steps(np.abs(points)) >= found.step) & (np.fmod(points, 2.0 * found.step) != 0.0)
     if np.count_nonzero(odd.any(axis=1)) < _LEAST_ODD_SHARE * len(points):
