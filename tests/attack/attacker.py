@@ -240,6 +240,14 @@ def eventually(condition, seconds=60):
     return True
 
 
+def run_together(threads):
+    """Until all have ended."""
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+
+
 def main():
     sys.stdout.reconfigure(line_buffering=True)
     unittest.main(verbosity=2)

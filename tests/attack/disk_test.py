@@ -10,7 +10,7 @@ import threading
 import time
 import unittest
 
-from attacker import MIB, Server, admin, ball, collections, eventually, grpc, main, reason, search, shapes
+from attacker import MIB, Server, admin, ball, collections, eventually, grpc, main, reason, run_together, search, shapes
 
 
 class DataDirectory(unittest.TestCase):
@@ -65,10 +65,7 @@ class Copies(unittest.TestCase):
                     outcomes.append(error)
 
             threads = [threading.Thread(target=first, args=(stream,)) for stream in streams]
-            for thread in threads:
-                thread.start()
-            for thread in threads:
-                thread.join()
+            run_together(threads)
             refused = [error for error in outcomes if error is not None]
             self.assertGreaterEqual(len(refused), 1)
             for error in refused:

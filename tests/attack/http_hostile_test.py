@@ -8,7 +8,7 @@ import threading
 import time
 import unittest
 
-from attacker import MIB, ball, collections, eventually, main, shapes, types
+from attacker import MIB, ball, collections, eventually, main, run_together, shapes, types
 from connect import COUNT, JSON, Http, Raw, answers, count_request, envelope, head, serve
 
 
@@ -305,10 +305,7 @@ class Connections(unittest.TestCase):
                         codes.append(client.json("ShapeService/CountShapes").status)
 
             threads = [threading.Thread(target=flood) for _ in range(30)]
-            for thread in threads:
-                thread.start()
-            for thread in threads:
-                thread.join()
+            run_together(threads)
             self.assertEqual(len(codes), 3_000)
             self.assertLessEqual(set(codes), {200, 429})
 

@@ -8,7 +8,7 @@ import time
 import unittest
 
 from attacker import (MIB, SecuredServer, Server, admin, align, ball, collections, eventually, grpc, limits_of,
-                      main, pack, reason, search, shapes, types)
+                      main, pack, reason, run_together, search, shapes, types)
 from rpcs import methods
 
 
@@ -201,10 +201,7 @@ class Messages(unittest.TestCase):
                     refused.append((error.code(), reason(error)))
 
             threads = [threading.Thread(target=work, args=(client,)) for client in clients]
-            for thread in threads:
-                thread.start()
-            for thread in threads:
-                thread.join()
+            run_together(threads)
             for client in clients:
                 client.channel.close()
             self.assertEqual(set(refused) - {(grpc.StatusCode.INVALID_ARGUMENT, "invalid_argument"),
@@ -252,10 +249,7 @@ class UploadMessages(unittest.TestCase):
             # Three of each client at a time, of other kinds.
             threads = [threading.Thread(target=send_all, args=(client, bombs[first::3]))
                        for client in clients for first in range(3)]
-            for thread in threads:
-                thread.start()
-            for thread in threads:
-                thread.join()
+            run_together(threads)
             for client in clients:
                 client.channel.close()
             self.assertTrue(server.running())
@@ -409,10 +403,7 @@ class Floods(unittest.TestCase):
                             failures.put(call.exception())
 
             threads = [threading.Thread(target=flood) for _ in range(8)]
-            for thread in threads:
-                thread.start()
-            for thread in threads:
-                thread.join()
+            run_together(threads)
             while not failures.empty():
                 failure = failures.get()
                 self.assertEqual(failure.code(), grpc.StatusCode.RESOURCE_EXHAUSTED, failure)
