@@ -7,8 +7,8 @@
 #include "common/sha256.h"
 #include "core/base/return_if_error.h"
 #include "server/store/point_blob.h"
-#include "server/store/sqlite/rows.h"
-#include "server/store/sqlite/sql.h"
+#include "server/store/sql/rows.h"
+#include "server/store/sql/sql.h"
 
 namespace shapedb::bench {
 
@@ -27,8 +27,8 @@ struct Scan {
     Checksum checksum = sha256(points.data(), points.size() * sizeof(float));
 };
 
-void insertReady(Connection& connection, std::int64_t collectionId, const FillShape& shape, const Scan& scan,
-                 TimestampMs now) {
+void insertReady(SqliteConnection& connection, std::int64_t collectionId, const FillShape& shape,
+                 const Scan& scan, TimestampMs now) {
     Query(connection, sql::kInsertShape, collectionId, shape.key, scan.points.size() / 3,
           BlobView{scan.checksum.data(), scan.checksum.size()}, now, 0.0, 0.0, 0.0)
         .run();
@@ -55,7 +55,7 @@ Result<void> fillDatabase(const SqliteOptions& options, const std::string& colle
     const auto created = (*store)->createCollection(collection, "", parameters);
     RETURN_IF_ERROR(created);
     const auto filled = guarded("fill the database", [&] {
-        Connection connection(options.path, OpenMode::kReadWrite, kBusyTimeoutMs);
+        SqliteConnection connection(options.path, OpenMode::kReadWrite, kBusyTimeoutMs);
         const Scan scan;
         for (std::uint64_t i = 0; i < count;) {
             if (const auto go = context.checkpoint(); !go) raise(go.error().code, go.error().message);

@@ -6,6 +6,7 @@
 #   scripts/install-deps.sh --analysis  that, and clang for scripts/ci/tidy.sh, fuzz.sh and sanitize.sh
 #   scripts/install-deps.sh --build     only what is needed to build
 #   scripts/install-deps.sh --packages  everything to build, and what scripts/ci/packages.sh needs
+#   scripts/install-deps.sh --postgres  everything to build, and the PostgreSQL server that tests of its store start
 #   scripts/install-deps.sh --open3d    Open3D, for client/python/examples/open3d_interop.py and its test
 #   scripts/install-deps.sh --bench     everything to build, and the Point Cloud Library and FAISS, which
 #                                       shapedb-bench measures too (preset peers)
@@ -15,7 +16,7 @@ build_packages=(
   ca-certificates g++ cmake ninja-build ccache mold pkg-config git
   libcgal-dev libgmp-dev libmpfr-dev libeigen3-dev libtbb-dev libexpected-dev
   libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc
-  libsqlite3-dev libzstd-dev libssl-dev libboost-dev libspdlog-dev libtomlplusplus-dev prometheus-cpp-dev
+  libsqlite3-dev libpq-dev libzstd-dev libssl-dev libboost-dev libspdlog-dev libtomlplusplus-dev prometheus-cpp-dev
   libcli11-dev nlohmann-json3-dev libpng-dev liblzf-dev zlib1g-dev libzip-dev libexpat1-dev
   libgtest-dev libgmock-dev clang-format-14 valgrind curl
   python3-grpcio python3-protobuf openssl
@@ -32,6 +33,7 @@ command -v node >/dev/null || build_packages+=(nodejs)
 command -v npm >/dev/null || build_packages+=(npm)
 analysis_packages=(clang-14 clang-tidy-14 libclang-rt-14-dev)
 packages_packages=(buildah groff lintian mmdebstrap)
+postgres_packages=(postgresql-15)
 bench_packages=(libpcl-dev libfaiss-dev libopenblas-dev)
 
 case "${1:-}" in
@@ -39,9 +41,10 @@ case "${1:-}" in
   --analysis) packages=("${build_packages[@]}" "${python_packages[@]}" "${docs_packages[@]}" "${browser_packages[@]}" "${analysis_packages[@]}") ;;
   --build) packages=("${build_packages[@]}") ;;
   --packages) packages=("${build_packages[@]}" "${packages_packages[@]}") ;;
+  --postgres) packages=("${build_packages[@]}" "${postgres_packages[@]}") ;;
   --open3d) packages=("${open3d_packages[@]}") ;;
   --bench) packages=("${build_packages[@]}" "${bench_packages[@]}") ;;
-  *) echo "install-deps: unknown option $1; there are --build, --analysis, --bench, --packages and --open3d" >&2; exit 2 ;;
+  *) echo "install-deps: unknown option $1; there are --build, --analysis, --bench, --packages, --postgres and --open3d" >&2; exit 2 ;;
 esac
 
 # Exactly what web/package-lock.json names, and no script of any package is run.

@@ -36,7 +36,9 @@ Catalog::Catalog(std::unique_ptr<store::Store> store, ingest::SignaturePipeline 
       index_(*store_, log_),
       workers_(*store_, index_, board_, isolation_, pipeline_, log_, options_.workers),
       rebuilds_(*store_, index_, workers_, isolation_, pipeline_, log_, options_.rebuilds),
-      slots_(options_.segmentations) {}
+      slots_(options_.segmentations),
+      follower_({*store_, index_, restores_, directory_, [this] { workers_.wake(); },
+                 [this](std::int64_t id) { workers_.supersedeCollection(id); }, log_}) {}
 
 Catalog::~Catalog() = default;
 
@@ -49,6 +51,7 @@ Result<void> Catalog::start() {
     }
     const auto began = std::chrono::steady_clock::now();
     const std::vector<std::string> known = store_->findings();
+    RETURN_IF_ERROR(follower_.begin());
     RETURN_IF_ERROR(index_.loadAll());
     for (const std::string& finding : store_->findings()) {
         if (std::find(known.begin(), known.end(), finding) == known.end()) log_->error(finding);
@@ -60,10 +63,12 @@ Result<void> Catalog::start() {
          {"bytes", totals.bytes},
          {"seconds", std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count()}});
     RETURN_IF_ERROR(workers_.start());
+    if (store_->isShared()) follower_.start();
     return rebuilds_.start();
 }
 
 Result<void> Catalog::stop() {
+    follower_.stop();
     rebuilds_.stop();
     workers_.stop();
     return store_->checkpoint();
@@ -113,6 +118,7 @@ Result<index::SnapshotPtr> Catalog::createCollection(const std::string& name, co
     RETURN_IF_ERROR(checkDescription(description));
     const RestoreGate::Write write(restores_);
     RETURN_IF_ERROR(requireContent());
+    const std::lock_guard<std::mutex> lock(directory_);
     const auto created = store_->createCollection(name, description, store::encodeParameters(parameters));
     RETURN_IF_ERROR(created);
     return index_.add(*created);
@@ -139,6 +145,7 @@ Result<void> Catalog::deleteCollection(const std::string& name, bool force) {
         return code == ErrorCode::kNotFound || code == ErrorCode::kStorageFull;
     };
     if (!cancelled && !mayGoOn(cancelled.error().code)) return cancelled;
+    const std::lock_guard<std::mutex> lock(directory_);
     // The store first, which may refuse; the index and the workers follow.
     bool gone = false;
     const auto deleted = store_->deleteCollection(collection.id, [&] {
@@ -176,6 +183,7 @@ Result<index::SnapshotPtr> Catalog::renameCollection(const std::string& name, co
     const auto found = collectionNamed(name);
     RETURN_IF_ERROR(found);
     const std::int64_t id = (*found)->collection.id;
+    const std::lock_guard<std::mutex> lock(directory_);
     return index_.rename(id, [&] { return store_->renameCollection(id, newName); });
 }
 
@@ -186,7 +194,7 @@ Result<index::SnapshotPtr> Catalog::setAlias(const std::string& alias, const std
     RETURN_IF_ERROR(checkCollectionName(name));
     const RestoreGate::Write write(restores_);
     // One after the other, so that store and index end with the same.
-    const std::lock_guard<std::mutex> lock(aliases_);
+    const std::lock_guard<std::mutex> lock(directory_);
     const auto found = collection(name);
     RETURN_IF_ERROR(found);
     RETURN_IF_ERROR(store_->setAlias(alias, (*found)->collection.id));
@@ -200,7 +208,7 @@ Result<void> Catalog::deleteAlias(const std::string& alias) {
     }
     const RestoreGate::Write write(restores_);
     RETURN_IF_ERROR(requireContent());
-    const std::lock_guard<std::mutex> lock(aliases_);
+    const std::lock_guard<std::mutex> lock(directory_);
     RETURN_IF_ERROR(store_->deleteAlias(alias));
     index_.removeAlias(alias);
     return {};
@@ -278,6 +286,7 @@ Result<void> Catalog::replaceContent(const std::string& path, const RunContext& 
     }
     // The content of an export has no default collection.
     Result<void> loaded = ensureDefaultCollection(*store_);
+    if (loaded) loaded = follower_.begin();
     if (loaded) loaded = index_.loadAll();
     lost_ = !loaded;
     if (loaded) {

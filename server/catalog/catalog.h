@@ -18,6 +18,7 @@
 #include "core/base/error.h"
 #include "core/base/metadata.h"
 #include "core/base/run_context.h"
+#include "server/catalog/change_follower.h"
 #include "server/catalog/gates.h"
 #include "server/catalog/parameter_overrides.h"
 #include "server/index/collection_index.h"
@@ -380,9 +381,10 @@ class Catalog {
     ingest::WorkerPool workers_;
     ingest::RebuildDriver rebuilds_;
     RestoreGate restores_;
-    std::mutex aliases_;  ///< held while an alias changes
-    bool lost_ = false;   ///< the last content restored could not be loaded; only restores look at it
+    std::mutex directory_;  ///< held while collections come, go, or change names or aliases
+    bool lost_ = false;     ///< the last content restored could not be loaded; only restores look at it
     SegmentationSlots slots_;
+    ChangeFollower follower_;  ///< idle unless the store is shared
 };
 
 }  // namespace shapedb::catalog

@@ -15,6 +15,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -175,6 +176,18 @@ struct SignatureRow {
     /// leaves those of the shape as they are. Never read: see getSurface.
     std::string surface{};
     std::string views{};  ///< core/views/views_codec.h; empty: none
+};
+
+/// An entry of the log of a collection's changes (Store::changesAfter).
+struct Change {
+    std::int64_t number = 0;                ///< 1, 2, 3, ... in the order in which they were committed
+    std::optional<std::int64_t> shapeId{};  ///< empty: more than one changed, load the collection again
+};
+
+/// How far the logs of a shared database go.
+struct ChangeLogs {
+    std::int64_t directory = 0;  ///< rises when collections or aliases come, go, or change their names
+    std::map<std::int64_t, std::int64_t> last;  ///< the number of the last change, by collection
 };
 
 /// What verifying a shape needs.
@@ -372,6 +385,19 @@ class Store {
     [[nodiscard]] virtual Result<std::vector<IndexRow>> loadIndex(std::int64_t collectionId,
                                                                   std::int64_t afterId,
                                                                   std::size_t limit) = 0;
+
+    // Changes by other servers -------------------------------------------------------
+
+    /// Whether other servers may change the content. If not, the next two find nothing.
+    [[nodiscard]] virtual bool isShared() const noexcept { return false; }
+    [[nodiscard]] virtual Result<ChangeLogs> changeLogs() { return ChangeLogs{}; }
+    /// Changes of the collection with a number > `number`, in ascending order, at most `limit`. Old ones are
+    /// forgotten: then the first is not `number` + 1.
+    [[nodiscard]] virtual Result<std::vector<Change>> changesAfter(std::int64_t collectionId,
+                                                                   std::int64_t number, std::size_t limit) {
+        static_cast<void>(collectionId), static_cast<void>(number), static_cast<void>(limit);
+        return std::vector<Change>{};
+    }
 
     // Rebuild ----------------------------------------------------------------------
     //

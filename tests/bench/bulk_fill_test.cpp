@@ -3,7 +3,7 @@
 
 #include <atomic>
 
-#include "tests/server/store/sqlite/store_fixture.h"
+#include "tests/server/store/store_fixture.h"
 
 namespace shapedb::bench {
 

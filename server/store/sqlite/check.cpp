@@ -8,8 +8,8 @@
 #include "core/geometry/box.h"
 #include "core/preparation/frame.h"
 #include "server/store/key_rules.h"
+#include "server/store/sql/rows.h"
 #include "server/store/sqlite/damage.h"
-#include "server/store/sqlite/rows.h"
 #include "server/store/sqlite/sequences.h"
 #include "server/store/verified_scan.h"
 
@@ -115,7 +115,7 @@ constexpr Rule kRules[] = {
 
 class Checker {
   public:
-    Checker(Connection& connection, const ValueRules& values, const RunContext& context)
+    Checker(SqliteConnection& connection, const ValueRules& values, const RunContext& context)
         : connection_(connection), values_(values), context_(context) {}
 
     std::vector<std::string> run() {
@@ -276,7 +276,7 @@ class Checker {
         }
     }
 
-    Connection& connection_;
+    SqliteConnection& connection_;
     const ValueRules& values_;
     const RunContext& context_;
     std::vector<std::string> problems_;
@@ -284,7 +284,7 @@ class Checker {
 
 }  // namespace
 
-std::vector<std::string> checkDatabase(Connection& connection, const ValueRules& values,
+std::vector<std::string> checkDatabase(SqliteConnection& connection, const ValueRules& values,
                                        const RunContext& context) {
     return Checker(connection, values, context).run();
 }

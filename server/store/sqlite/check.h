@@ -15,7 +15,7 @@ namespace shapedb::store {
 /// in one snapshot.
 /// Reports the stages "integrity" and "points" (in shapes). Damage is a line, not a Failure; throws
 /// Failure kCancelled, kDeadlineExceeded, or when it cannot read.
-std::vector<std::string> checkDatabase(Connection& connection, const ValueRules& values,
+std::vector<std::string> checkDatabase(SqliteConnection& connection, const ValueRules& values,
                                        const RunContext& context);
 
 }  // namespace shapedb::store

@@ -9,6 +9,8 @@
 
 #include <sqlite3.h>
 
+#include "server/store/sql/sql.h"
+
 namespace shapedb::store {
 
 namespace {
@@ -18,6 +20,29 @@ constexpr char kBeginRead[] = "BEGIN";
 constexpr char kBeginWrite[] = "BEGIN IMMEDIATE";
 constexpr char kCommit[] = "COMMIT";
 constexpr char kRollback[] = "ROLLBACK";
+constexpr char kInsertPoints[] =
+    "INSERT INTO shape_points (shape_id, point_bytes, stored_bytes, points) VALUES (?1, ?2, ?3, ?4)";
+// Takes no memory for the blob.
+constexpr char kInsertZeros[] =
+    "INSERT INTO shape_points (shape_id, point_bytes, stored_bytes, points) VALUES (?1, ?2, ?3, "
+    "zeroblob(?3))";
+
+// Slow, and right while the tables can be read: what a damaged index holds is in its table, too.
+constexpr char kShapeWithoutIndex[] = "SELECT " SHAPEDB_SHAPE_COLUMNS
+                                      " FROM shape s NOT INDEXED LEFT JOIN shape_metadata m ON m.shape_id = "
+                                      "s.id WHERE s.collection_id = ?1 AND s.key = ?2";
+constexpr char kSignatureWithoutIndex[] =
+    "SELECT s.key, s.state, s.failure_message, g.points_version, g.generation, g.digest, g.bytes, g.views "
+    "FROM shape s NOT INDEXED JOIN collection c ON c.id = s.collection_id LEFT JOIN signature g NOT INDEXED "
+    "ON "
+    "g.shape_id = s.id AND g.generation = c.generation WHERE s.id = ?1";
+// Searches tell how many shapes are pending: a damaged index must not stop them.
+constexpr char kCountWithoutIndex[] = "SELECT count(*) FROM shape NOT INDEXED WHERE collection_id = ?1";
+constexpr char kCountInStateWithoutIndex[] =
+    "SELECT count(*) FROM shape NOT INDEXED WHERE collection_id = ?1 AND state = ?2";
+constexpr char kCountWaitingOneByOne[] =
+    "SELECT count(*) FROM shape s NOT INDEXED WHERE s.collection_id = ?1 AND s.state = 0 AND NOT EXISTS "
+    "(SELECT 1 FROM signature g WHERE g.shape_id = s.id)";
 // What a statement cannot be prepared without.
 constexpr char kSchema[] = "FROM sqlite_schema";
 
@@ -112,11 +137,11 @@ std::string textOf(sqlite3* database, sqlite3_stmt* statement, int column) {
 
 }  // namespace
 
-void Connection::StatementCloser::operator()(sqlite3_stmt* statement) const noexcept {
+void SqliteConnection::StatementCloser::operator()(sqlite3_stmt* statement) const noexcept {
     sqlite3_finalize(statement);
 }
 
-Connection::Connection(const std::string& path, OpenMode mode, int busyTimeoutMs)
+SqliteConnection::SqliteConnection(const std::string& path, OpenMode mode, int busyTimeoutMs)
     : busyTimeoutMs_(busyTimeoutMs) {
     // SQLite would read "file:..." as a URI with options.
     const std::string plain = path.rfind("file:", 0) == 0 ? "./" + path : path;
@@ -141,15 +166,15 @@ Connection::Connection(const std::string& path, OpenMode mode, int busyTimeoutMs
     }
 }
 
-Connection::~Connection() { closeAll(); }
+SqliteConnection::~SqliteConnection() { closeAll(); }
 
-void Connection::closeAll() noexcept {
+void SqliteConnection::closeAll() noexcept {
     statements_.clear();
     rollback_.reset();
     sqlite3_close(db_);
 }
 
-void Connection::raiseLast(int code, const char* sql) const {
+void SqliteConnection::raiseLast(int code, const char* sql) const {
     if (db_ == nullptr) throw std::bad_alloc();
     const bool full =
         isFull(sqlite3_system_errno(db_)) || ((code & 0xff) == SQLITE_IOERR && filesAreFull(db_));
@@ -164,17 +189,17 @@ void Connection::raiseLast(int code, const char* sql) const {
     throw Failure(mapped, std::move(message), true);
 }
 
-void Connection::execute(const std::string& sql) {
+void SqliteConnection::execute(const std::string& sql) {
     const int code = sqlite3_exec(db_, sql.c_str(), nullptr, nullptr, nullptr);
     if (code != SQLITE_OK) raiseLast(code, sql.rfind("PRAGMA", 0) == 0 ? kSchema : sql.c_str());
 }
 
-std::int64_t Connection::integer(const std::string& sql) {
+std::int64_t SqliteConnection::integer(const std::string& sql) {
     const std::string value = text(sql);
     return value.empty() ? 0 : std::strtoll(value.c_str(), nullptr, 10);
 }
 
-std::string Connection::text(const std::string& sql) {
+std::string SqliteConnection::text(const std::string& sql) {
     sqlite3_stmt* raw = nullptr;
     int code = sqlite3_prepare_v2(db_, sql.c_str(), -1, &raw, nullptr);
     const StatementPtr statement(raw);
@@ -185,20 +210,20 @@ std::string Connection::text(const std::string& sql) {
     return textOf(db_, raw, 0);
 }
 
-void Connection::rollback() noexcept {
+void SqliteConnection::rollback() noexcept {
     // After some failures (disk full, I/O error) SQLite has rolled back already.
     if (sqlite3_get_autocommit(db_) != 0) return;
     sqlite3_step(rollback_.get());
     sqlite3_reset(rollback_.get());
 }
 
-std::int64_t Connection::changes() const noexcept { return sqlite3_changes64(db_); }
+std::int64_t SqliteConnection::changes() const noexcept { return sqlite3_changes64(db_); }
 
-std::int64_t Connection::totalChanges() const noexcept { return sqlite3_total_changes64(db_); }
+std::int64_t SqliteConnection::totalChanges() const noexcept { return sqlite3_total_changes64(db_); }
 
-std::int64_t Connection::lastInsertId() const noexcept { return sqlite3_last_insert_rowid(db_); }
+std::int64_t SqliteConnection::lastInsertId() const noexcept { return sqlite3_last_insert_rowid(db_); }
 
-bool Connection::truncateWal(int waitMs) {
+bool SqliteConnection::truncateWal(int waitMs) {
     sqlite3_busy_timeout(db_, waitMs);
     const int code = sqlite3_wal_checkpoint_v2(db_, "main", SQLITE_CHECKPOINT_TRUNCATE, nullptr, nullptr);
     sqlite3_busy_timeout(db_, busyTimeoutMs_);
@@ -207,7 +232,7 @@ bool Connection::truncateWal(int waitMs) {
     return true;
 }
 
-void Connection::rewriteWal() {
+void SqliteConnection::rewriteWal() {
     sqlite3_file* log = nullptr;
     sqlite3_file_control(db_, "main", SQLITE_FCNTL_JOURNAL_POINTER, &log);
     if (log == nullptr || log->pMethods == nullptr) return;
@@ -226,114 +251,138 @@ void Connection::rewriteWal() {
                       "the log cannot be written again (SQLite code " + std::to_string(code) + ")", true);
 }
 
-sqlite3_stmt* Connection::prepared(const char* sql) {
+class SqliteConnection::CachedStatement final : public PreparedStatement {
+  public:
+    CachedStatement(const SqliteConnection& connection, StatementPtr statement)
+        : connection_(connection), statement_(std::move(statement)) {}
+
+    void bindInteger(int position, std::int64_t value) override {
+        check(sqlite3_bind_int64(statement_.get(), position, value));
+    }
+    void bindReal(int position, double value) override {
+        check(sqlite3_bind_double(statement_.get(), position, value));
+    }
+    void bindText(int position, const std::string& value) override {
+        // SQLite copies it (TRANSIENT): it may be a temporary of the caller.
+        check(sqlite3_bind_text64(statement_.get(), position, value.data(), value.size(), SQLITE_TRANSIENT,
+                                  SQLITE_UTF8));
+    }
+    void bindBlob(int position, BlobView value) override {
+        // A null pointer would bind NULL instead of an empty blob.
+        const void* data = value.data != nullptr ? value.data : "";
+        check(sqlite3_bind_blob64(statement_.get(), position, data, value.size, SQLITE_STATIC));
+    }
+    void bindNull(int position) override { check(sqlite3_bind_null(statement_.get(), position)); }
+
+    bool step() override {
+        const int code = sqlite3_step(statement_.get());
+        if (code == SQLITE_ROW) return true;
+        if (code == SQLITE_DONE) return false;
+        connection_.raiseLast(code, sqlite3_sql(statement_.get()));
+    }
+
+    std::int64_t integer(int column) const override { return sqlite3_column_int64(statement_.get(), column); }
+    double real(int column) const override { return sqlite3_column_double(statement_.get(), column); }
+    bool isNull(int column) const override {
+        return sqlite3_column_type(statement_.get(), column) == SQLITE_NULL;
+    }
+    std::string text(int column) const override { return textOf(connection_.db_, statement_.get(), column); }
+    BlobView blob(int column) const override {
+        const void* data = sqlite3_column_blob(statement_.get(), column);
+        const int size = sqlite3_column_bytes(statement_.get(), column);
+        if (data == nullptr && sqlite3_errcode(connection_.db_) == SQLITE_NOMEM) throw std::bad_alloc();
+        return {data, data == nullptr ? 0 : static_cast<std::size_t>(size)};
+    }
+
+    void reset() noexcept override {
+        // A statement left before its last row would keep its read open.
+        sqlite3_reset(statement_.get());
+        sqlite3_clear_bindings(statement_.get());
+    }
+
+  private:
+    void check(int code) const {
+        if (code != SQLITE_OK) connection_.raiseLast(code);
+    }
+
+    const SqliteConnection& connection_;
+    StatementPtr statement_;
+};
+
+PreparedStatement& SqliteConnection::prepared(const char* sql) {
     const auto found = statements_.find(sql);
-    if (found != statements_.end()) return found->second.get();
+    if (found != statements_.end()) return *found->second;
     sqlite3_stmt* raw = nullptr;
     const int code = sqlite3_prepare_v3(db_, sql, -1, SQLITE_PREPARE_PERSISTENT, &raw, nullptr);
     StatementPtr statement(raw);
     if (code != SQLITE_OK) raiseLast(code, kSchema);
-    statements_.emplace(sql, std::move(statement));
-    return raw;
+    auto cached = std::make_unique<CachedStatement>(*this, std::move(statement));
+    return *statements_.emplace(sql, std::move(cached)).first->second;
 }
 
-Query::Query(Connection& connection, const char* sql)
-    : connection_(connection), statement_(connection.prepared(sql)) {}
+void SqliteConnection::beginRead() { Query(*this, kBeginRead).run(); }
 
-Query::~Query() {
-    // A statement left before its last row would keep its read open.
-    sqlite3_reset(statement_);
-    sqlite3_clear_bindings(statement_);
-}
+void SqliteConnection::beginWrite() { Query(*this, kBeginWrite).run(); }
 
-void Query::check(int code) const {
-    if (code != SQLITE_OK) connection_.raiseLast(code);
-}
+void SqliteConnection::commit() { Query(*this, kCommit).run(); }
 
-void Query::bind(int position, const std::string& value) {
-    // SQLite copies it (TRANSIENT): it may be a temporary of the caller.
-    check(
-        sqlite3_bind_text64(statement_, position, value.data(), value.size(), SQLITE_TRANSIENT, SQLITE_UTF8));
-}
+namespace {
 
-void Query::bind(int position, BlobView value) {
-    // A null pointer would bind NULL instead of an empty blob.
-    const void* data = value.data != nullptr ? value.data : "";
-    check(sqlite3_bind_blob64(statement_, position, data, value.size, SQLITE_STATIC));
-}
-
-void Query::bind(int position, ZeroBlob value) {
-    check(sqlite3_bind_zeroblob64(statement_, position, value.size));
-}
-
-void Query::bind(int position, double value) { check(sqlite3_bind_double(statement_, position, value)); }
-
-void Query::bindInteger(int position, std::int64_t value) {
-    check(sqlite3_bind_int64(statement_, position, value));
-}
-
-bool Query::step() {
-    const int code = sqlite3_step(statement_);
-    if (code == SQLITE_ROW) return true;
-    if (code == SQLITE_DONE) return false;
-    connection_.raiseLast(code, sqlite3_sql(statement_));
-}
-
-void Query::run() {
-    while (step()) {
+/// Fills a blob of zeros from start to end, so that SQLite never holds it whole. Use it inside the
+/// transaction that inserted the blob.
+class BlobWriter {
+  public:
+    /// The names must outlive this.
+    BlobWriter(const SqliteConnection& connection, const char* table, const char* column, std::int64_t rowId)
+        : connection_(connection) {
+        constexpr int kForWriting = 1;
+        const int code =
+            sqlite3_blob_open(connection.handle(), "main", table, column, rowId, kForWriting, &blob_);
+        if (code != SQLITE_OK) connection.raiseLast(code);
     }
+    ~BlobWriter() { sqlite3_blob_close(blob_); }
+    BlobWriter(const BlobWriter&) = delete;
+    BlobWriter& operator=(const BlobWriter&) = delete;
+
+    /// Throws Failure also when the blob is full.
+    void append(const void* data, std::size_t size) {
+        // SQLite holds no blob of 2^31 bytes and refuses to write past the end of one.
+        if (size > static_cast<std::size_t>(std::numeric_limits<int>::max() - at_))
+            raise(ErrorCode::kInternal, "a blob is written past its end");
+        const int code = sqlite3_blob_write(blob_, data, static_cast<int>(size), at_);
+        if (code != SQLITE_OK) connection_.raiseLast(code);
+        at_ += static_cast<int>(size);
+    }
+
+  private:
+    const SqliteConnection& connection_;
+    sqlite3_blob* blob_ = nullptr;
+    int at_ = 0;
+};
+
+}  // namespace
+
+void SqliteConnection::insertPoints(std::int64_t shapeId, std::uint64_t pointBytes, const BlobSource& blob) {
+    if (blob.whole != nullptr) {
+        Query(*this, kInsertPoints, shapeId, pointBytes, blob.size, viewOf(*blob.whole)).run();
+        return;
+    }
+    Query(*this, kInsertZeros, shapeId, pointBytes, blob.size).run();
+    BlobWriter writer(*this, "shape_points", "points", shapeId);
+    blob.write([&](const void* data, std::size_t size) { writer.append(data, size); });
 }
 
-std::int64_t Query::integer(int column) const { return sqlite3_column_int64(statement_, column); }
-
-double Query::real(int column) const { return sqlite3_column_double(statement_, column); }
-
-bool Query::isNull(int column) const { return sqlite3_column_type(statement_, column) == SQLITE_NULL; }
-
-std::string Query::text(int column) const { return textOf(connection_.db_, statement_, column); }
-
-BlobView Query::blob(int column) const {
-    const void* data = sqlite3_column_blob(statement_, column);
-    const int size = sqlite3_column_bytes(statement_, column);
-    if (data == nullptr && sqlite3_errcode(connection_.db_) == SQLITE_NOMEM) throw std::bad_alloc();
-    return {data, data == nullptr ? 0 : static_cast<std::size_t>(size)};
+const char* SqliteConnection::withoutIndices(const char* sql) const noexcept {
+    if (sql == sql::kShapeByKey) return kShapeWithoutIndex;
+    if (sql == sql::kServingSignature) return kSignatureWithoutIndex;
+    if (sql == sql::kCountShapes) return kCountWithoutIndex;
+    if (sql == sql::kCountShapesInState) return kCountInStateWithoutIndex;
+    if (sql == sql::kCountWaiting) return kCountWaitingOneByOne;
+    return nullptr;
 }
 
-Transaction::Transaction(Connection& connection, Kind kind) : connection_(connection) {
-    connection.rollback();  // one that could not be ended, as a last resort
-    Query(connection, kind == Kind::kWrite ? kBeginWrite : kBeginRead).run();
-}
-
-Transaction::~Transaction() {
-    if (open_) connection_.rollback();
-}
-
-void Transaction::commit() {
-    // When this throws, the transaction is still open and the destructor rolls it back.
-    Query(connection_, kCommit).run();
-    open_ = false;
-}
-
-BlobWriter::BlobWriter(Connection& connection, const char* table, const char* column, std::int64_t rowId)
+Interruptible::Interruptible(SqliteConnection& connection, const RunContext& context)
     : connection_(connection) {
-    constexpr int kForWriting = 1;
-    const int code =
-        sqlite3_blob_open(connection.handle(), "main", table, column, rowId, kForWriting, &blob_);
-    if (code != SQLITE_OK) connection.raiseLast(code);
-}
-
-BlobWriter::~BlobWriter() { sqlite3_blob_close(blob_); }
-
-void BlobWriter::append(const void* data, std::size_t size) {
-    // SQLite holds no blob of 2^31 bytes and refuses to write past the end of one.
-    if (size > static_cast<std::size_t>(std::numeric_limits<int>::max() - at_))
-        raise(ErrorCode::kInternal, "a blob is written past its end");
-    const int code = sqlite3_blob_write(blob_, data, static_cast<int>(size), at_);
-    if (code != SQLITE_OK) connection_.raiseLast(code);
-    at_ += static_cast<int>(size);
-}
-
-Interruptible::Interruptible(Connection& connection, const RunContext& context) : connection_(connection) {
     sqlite3_progress_handler(
         connection.handle(), kProgressSteps,
         [](void* raw) { return static_cast<const RunContext*>(raw)->checkpoint() ? 0 : 1; },
@@ -342,7 +391,7 @@ Interruptible::Interruptible(Connection& connection, const RunContext& context) 
 
 Interruptible::~Interruptible() { sqlite3_progress_handler(connection_.handle(), 0, nullptr, nullptr); }
 
-PageCopy::PageCopy(Connection& from, Connection& to)
+PageCopy::PageCopy(SqliteConnection& from, SqliteConnection& to)
     : to_(to), backup_(sqlite3_backup_init(to.handle(), "main", from.handle(), "main")) {
     if (backup_ == nullptr) to.raiseLast(sqlite3_extended_errcode(to.handle()));
 }

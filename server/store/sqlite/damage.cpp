@@ -10,7 +10,7 @@
 
 #include <sqlite3.h>
 
-#include "server/store/sqlite/rows.h"
+#include "server/store/sql/rows.h"
 
 namespace shapedb::store {
 
@@ -43,7 +43,7 @@ constexpr char kAliasesByIndex[] =
     "SELECT name, collection_id FROM collection_alias INDEXED BY collection_alias_by_collection";
 
 /// Ids of collections, wherever one is mentioned, with the name if the index over the names tells it.
-std::map<std::int64_t, std::string> mentioned(Connection& connection) {
+std::map<std::int64_t, std::string> mentioned(SqliteConnection& connection) {
     std::map<std::int64_t, std::string> found;
     unlessDamaged([&] {
         Query query(connection, kNamesByIndex);
@@ -67,7 +67,7 @@ std::map<std::int64_t, std::string> mentioned(Connection& connection) {
 }
 
 /// Empty if the table can be read.
-std::optional<std::string> damageOf(Connection& connection, const SmallTable& table) {
+std::optional<std::string> damageOf(SqliteConnection& connection, const SmallTable& table) {
     std::string line;
     try {
         line = connection.text(std::string("PRAGMA quick_check(") + table.name + ")");
@@ -98,7 +98,7 @@ void raiseUnreadable(const std::string& line) {
     }
 }
 
-std::vector<std::string> damagedTables(Connection& connection, std::optional<std::string>& queue) {
+std::vector<std::string> damagedTables(SqliteConnection& connection, std::optional<std::string>& queue) {
     std::vector<std::string> damaged;
     for (const SmallTable& table : kSmallTables) {
         auto line = damageOf(connection, table);
@@ -109,7 +109,7 @@ std::vector<std::string> damagedTables(Connection& connection, std::optional<std
     return damaged;
 }
 
-std::vector<Collection> salvageCollections(Connection& connection, const Error& listing) {
+std::vector<Collection> salvageCollections(SqliteConnection& connection, const Error& listing) {
     std::vector<Collection> all;
     for (const auto& [id, name] : mentioned(connection)) {
         std::optional<Collection> row;
@@ -129,7 +129,7 @@ std::vector<Collection> salvageCollections(Connection& connection, const Error& 
     return all;
 }
 
-std::vector<Alias> salvageAliases(Connection& connection) {
+std::vector<Alias> salvageAliases(SqliteConnection& connection) {
     std::vector<Alias> all;
     Query query(connection, kAliasesByIndex);
     while (query.step()) all.push_back({query.text(0), query.integer(1)});

@@ -25,15 +25,15 @@ void raiseUnreadable(const std::string& line);
 /// Reads the small tables. One line for each that is damaged: its name, what does not work without it, and
 /// what to do. `queue` becomes that of the table of jobs. Throws Failure if they cannot be read for another
 /// reason.
-std::vector<std::string> damagedTables(Connection& connection, std::optional<std::string>& queue);
+std::vector<std::string> damagedTables(SqliteConnection& connection, std::optional<std::string>& queue);
 
 /// The collections, by name, when `listing` them has failed: those that can be read, and with
 /// Collection::damage those of which only the id is known, and the name if an index still tells it. Throws
 /// Failure other than kDataLoss.
-std::vector<Collection> salvageCollections(Connection& connection, const Error& listing);
+std::vector<Collection> salvageCollections(SqliteConnection& connection, const Error& listing);
 
 /// The aliases, by name, from the index over them: when their table cannot be read. Throws Failure.
-std::vector<Alias> salvageAliases(Connection& connection);
+std::vector<Alias> salvageAliases(SqliteConnection& connection);
 
 /// Runs `body`; damage that it meets is left to others to tell of. Returns whether there was none; `damage`,
 /// unless null, becomes what it was.

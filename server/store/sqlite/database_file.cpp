@@ -14,10 +14,11 @@
 #include <unistd.h>
 
 #include "server/store/failpoints.h"
+#include "server/store/sql/collection_copy.h"
+#include "server/store/sql/sql.h"
 #include "server/store/sqlite/check.h"
 #include "server/store/sqlite/migrator.h"
 #include "server/store/sqlite/sequences.h"
-#include "server/store/sqlite/sql.h"
 
 namespace shapedb::store {
 
@@ -118,7 +119,7 @@ void requireDatabase(const std::string& copyPath, const std::string& path, const
 }
 
 /// Migrates the private copy of a backup and checks it.
-void prepareCopy(Connection& copy, const SqliteOptions& options, const RunContext& context) {
+void prepareCopy(SqliteConnection& copy, const SqliteOptions& options, const RunContext& context) {
     if (copy.integer("PRAGMA page_size") != kPageSize) {
         raise(ErrorCode::kDataLoss, "its page size is not " + std::to_string(kPageSize));
     }
@@ -189,23 +190,23 @@ void NewFile::publish() const {
     }
 }
 
-void makeEmptyDatabase(Connection& connection, std::int64_t nowMs) {
+void makeEmptyDatabase(SqliteConnection& connection, std::int64_t nowMs) {
     // Only an empty file takes the page size. A crash loses a file that nobody knows yet.
     connection.execute("PRAGMA page_size=" + std::to_string(kPageSize) +
                        "; PRAGMA synchronous=OFF; PRAGMA journal_mode=MEMORY");
     migrate(connection, embeddedMigrations(), nowMs);
 }
 
-std::unique_ptr<Connection> checkedCopy(const std::string& path, const FileUse& use,
-                                        const std::string& copyPath, const SqliteOptions& options,
-                                        const RunContext& context) {
+std::unique_ptr<SqliteConnection> checkedCopy(const std::string& path, const FileUse& use,
+                                              const std::string& copyPath, const SqliteOptions& options,
+                                              const RunContext& context) {
     requireBackupFile(path, options.path);
     // The file that the user named stays as it is; migrations change the copy.
     copyBytes(path, copyPath, context);
     SHAPEDB_FAILPOINT("restore.copied");
     requireDatabase(copyPath, path, use);
     try {
-        auto copy = std::make_unique<Connection>(copyPath, OpenMode::kReadWrite, options.busyTimeoutMs);
+        auto copy = std::make_unique<SqliteConnection>(copyPath, OpenMode::kReadWrite, options.busyTimeoutMs);
         if (identify(*copy) != FileKind::kOurs) raiseForeign(path, use);
         prepareCopy(*copy, options, context);
         return copy;
@@ -215,13 +216,42 @@ std::unique_ptr<Connection> checkedCopy(const std::string& path, const FileUse& 
     }
 }
 
-void requireSound(Connection& connection, const SqliteOptions& options, const RunContext& context) {
+void requireSound(SqliteConnection& connection, const SqliteOptions& options, const RunContext& context) {
     const std::vector<std::string> problems =
         checkDatabase(connection, {kMostCountedInFiles, options.acceptParameters}, context);
     if (problems.empty()) return;
     raise(ErrorCode::kDataLoss,
           problems.front() +
               (problems.size() > 1 ? " (and " + std::to_string(problems.size() - 1) + " more)" : ""));
+}
+
+namespace {
+
+/// A file that a server wrote as the export of one collection: made at once, with a schema that knows
+/// exports, and never opened by a server, whose first act is a counted change.
+constexpr char kIsExport[] =
+    "SELECT (SELECT commits FROM tally) = 0 AND (SELECT count(*) FROM collection) = 1 "
+    "AND (SELECT count(DISTINCT applied_at) FROM schema_migration WHERE number <= 5) = 1";
+
+}  // namespace
+
+void requireWholeBackup(SqliteConnection& copy, const std::string& path) {
+    if (copy.integer(kIsExport) == 0) return;
+    raise(
+        ErrorCode::kMalformedFile,
+        "'" + path + "' cannot be restored: it is the export of one collection, '" +
+            copy.text("SELECT name FROM collection") +
+            "', and would replace all collections; take it in beside them with 'shapedb collection import'");
+}
+
+void exportToFile(Connection& source, const Collection& collection, const NewFile& file,
+                  const SqliteOptions& options, const RunContext& context) {
+    SqliteConnection target(file.temporaryPath(), OpenMode::kReadWrite, options.busyTimeoutMs);
+    target.execute("PRAGMA synchronous=OFF");  // `publish` makes the file durable
+    makeEmptyDatabase(target, options.now());
+    copyCollection(source, collection, target, options.now(), context);
+    // It is too late to learn of damage when the file is needed.
+    requireSound(target, options, context);
 }
 
 }  // namespace shapedb::store

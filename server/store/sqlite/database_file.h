@@ -47,7 +47,7 @@ class NewFile {
 };
 
 /// Gives an empty file the schema of this program.
-void makeEmptyDatabase(Connection& connection, std::int64_t nowMs);
+void makeEmptyDatabase(SqliteConnection& connection, std::int64_t nowMs);
 
 /// How messages say what a file was to be used for.
 struct FileUse {
@@ -61,12 +61,20 @@ inline constexpr FileUse kImported{"imported", "is no export of ShapeDB"};
 /// `check` finds; an unfinished import is gone. The file itself is left alone. Reports "copy" (bytes),
 /// "integrity" and "points". Throws Failure kFileNotReadable, kMalformedFile, kSchemaTooNew (naming `path`),
 /// kCancelled, kDeadlineExceeded.
-[[nodiscard]] std::unique_ptr<Connection> checkedCopy(const std::string& path, const FileUse& use,
-                                                      const std::string& copyPath,
-                                                      const SqliteOptions& options,
-                                                      const RunContext& context);
+[[nodiscard]] std::unique_ptr<SqliteConnection> checkedCopy(const std::string& path, const FileUse& use,
+                                                            const std::string& copyPath,
+                                                            const SqliteOptions& options,
+                                                            const RunContext& context);
+
+/// Throws Failure kMalformedFile, naming `path`, if the database is the export of one collection.
+void requireWholeBackup(SqliteConnection& copy, const std::string& path);
+
+/// Fills the file with one collection as `source` shows it; no connection to it is left open. Reports the
+/// stages "export" (shapes), "integrity", "points". Throws Failure.
+void exportToFile(Connection& source, const Collection& collection, const NewFile& file,
+                  const SqliteOptions& options, const RunContext& context);
 
 /// Throws Failure kDataLoss, with the first problem that `check` finds in a file.
-void requireSound(Connection& connection, const SqliteOptions& options, const RunContext& context);
+void requireSound(SqliteConnection& connection, const SqliteOptions& options, const RunContext& context);
 
 }  // namespace shapedb::store

@@ -3,11 +3,11 @@
 #include <algorithm>
 
 #include "server/store/failpoints.h"
+#include "server/store/sql/rows.h"
 #include "server/store/sqlite/check.h"
 #include "server/store/sqlite/damage.h"
 #include "server/store/sqlite/database_file.h"
 #include "server/store/sqlite/migrator.h"
-#include "server/store/sqlite/rows.h"
 #include "server/store/sqlite/sequences.h"
 #include "server/store/sqlite/sqlite_store_impl.h"
 
@@ -31,7 +31,7 @@ constexpr std::int64_t kBeyondUnknownIds = std::int64_t{1} << 40;
 /// Returns how many commits the copy counts then.
 ///
 /// A restore is the way out of damage: what cannot be read of the live database must not stop it.
-std::int64_t separateIds(Connection& copy, Connection& live, std::int64_t marked) {
+std::int64_t separateIds(SqliteConnection& copy, SqliteConnection& live, std::int64_t marked) {
     std::int64_t commits = countCommits(copy);
     const auto believe = [&](std::int64_t count) {
         if (count <= kMostCounted) commits = std::max(commits, count);
@@ -58,21 +58,6 @@ std::int64_t separateIds(Connection& copy, Connection& live, std::int64_t marked
     return commits;
 }
 
-/// A file that a server wrote as the export of one collection: made at once, with a schema that knows
-/// exports, and never opened by a server, whose first act is a counted change.
-constexpr char kIsExport[] =
-    "SELECT (SELECT commits FROM tally) = 0 AND (SELECT count(*) FROM collection) = 1 "
-    "AND (SELECT count(DISTINCT applied_at) FROM schema_migration WHERE number <= 5) = 1";
-
-void requireWholeBackup(Connection& copy, const std::string& path) {
-    if (copy.integer(kIsExport) == 0) return;
-    raise(
-        ErrorCode::kMalformedFile,
-        "'" + path + "' cannot be restored: it is the export of one collection, '" +
-            copy.text("SELECT name FROM collection") +
-            "', and would replace all collections; take it in beside them with 'shapedb collection import'");
-}
-
 }  // namespace
 
 Result<void> SqliteStore::backup(const std::string& path, const RunContext& context) {
@@ -81,11 +66,11 @@ Result<void> SqliteStore::backup(const std::string& path, const RunContext& cont
         SHAPEDB_FAILPOINT("backup.file");
         const Counted longRead(longReads_);
         {
-            Connection source(options_.path, OpenMode::kReadOnly, options_.busyTimeoutMs);
+            SqliteConnection source(options_.path, OpenMode::kReadOnly, options_.busyTimeoutMs);
             // Without an open snapshot every write would make SQLite restart the copy.
             const Transaction snapshot(source, Transaction::Kind::kRead);
             static_cast<void>(source.integer("SELECT count(*) FROM sqlite_schema"));
-            Connection target(file.temporaryPath(), OpenMode::kReadWrite, options_.busyTimeoutMs);
+            SqliteConnection target(file.temporaryPath(), OpenMode::kReadWrite, options_.busyTimeoutMs);
             target.execute("PRAGMA synchronous=OFF");  // `publish` makes the file durable
             copyDatabase(source, target, kStepPages, [&](std::uint64_t done, std::uint64_t total) {
                 context.report("backup", done, total);
@@ -137,7 +122,7 @@ Result<void> SqliteStore::restore(const std::string& path, const RunContext& con
 Result<std::vector<std::string>> SqliteStore::check(const RunContext& context) {
     return guarded("check the database", [&] {
         const Counted longRead(longReads_);
-        Connection connection(options_.path, OpenMode::kReadOnly, options_.busyTimeoutMs);
+        SqliteConnection connection(options_.path, OpenMode::kReadOnly, options_.busyTimeoutMs);
         std::vector<std::string> problems = findings();
         for (std::string& problem :
              checkDatabase(connection, {kMostCounted, options_.acceptParameters}, context))

@@ -2,9 +2,7 @@
 #include "server/store/sqlite/migrator.h"
 
 #include <map>
-#include <string_view>
 
-#include "common/sha256.h"
 #include "server/store/failpoints.h"
 
 namespace shapedb::store {
@@ -15,46 +13,9 @@ constexpr char kCreateRecord[] =
     "CREATE TABLE IF NOT EXISTS schema_migration ("
     "number INTEGER PRIMARY KEY, name TEXT NOT NULL, sha256 TEXT NOT NULL, applied_at INTEGER NOT NULL) "
     "STRICT";
-constexpr char kReadRecord[] = "SELECT number, name, sha256 FROM schema_migration ORDER BY number";
-constexpr char kWriteRecord[] = "INSERT INTO schema_migration VALUES (?1, ?2, ?3, ?4)";
 constexpr char kReadSchema[] = "SELECT type || ' ' || name, coalesce(sql, '') FROM sqlite_schema";
 
-std::string fingerprint(const Migration& migration) {
-    const std::string_view text(migration.sql);
-    return toHex(sha256(text.data(), text.size()));
-}
-
-/// Compares the record with the migrations of this program; returns how many are applied.
-std::size_t verifyRecord(Connection& connection, const std::vector<Migration>& migrations) {
-    std::size_t applied = 0;
-    Query record(connection, kReadRecord);
-    while (record.step()) {
-        const std::int64_t number = record.integer(0);
-        const std::string name = record.text(1);
-        if (applied == migrations.size()) {
-            raise(ErrorCode::kSchemaTooNew, "the database has migration " + std::to_string(number) + " (" +
-                                                name + "), this program knows " +
-                                                std::to_string(migrations.size()) +
-                                                "; use the newer program");
-        }
-        const Migration& known = migrations[applied];
-        if (number != known.number) {
-            raise(ErrorCode::kDataLoss, "the record of applied migrations is damaged: expected number " +
-                                            std::to_string(known.number) + ", found " +
-                                            std::to_string(number));
-        }
-        if (record.text(2) != fingerprint(known)) {
-            raise(ErrorCode::kDataLoss,
-                  "migration " + std::to_string(number) + " (" + name +
-                      ") was applied with another text than this program has; migrations "
-                      "are never edited, use the program that wrote the database");
-        }
-        ++applied;
-    }
-    return applied;
-}
-
-void apply(Connection& connection, const Migration& migration, std::int64_t nowMs) {
+void apply(SqliteConnection& connection, const Migration& migration, std::int64_t nowMs) {
     Transaction transaction(connection, Transaction::Kind::kWrite);
     if (migration.number == 1) {
         connection.execute("PRAGMA application_id=" + std::to_string(kApplicationId));
@@ -63,9 +24,7 @@ void apply(Connection& connection, const Migration& migration, std::int64_t nowM
     SHAPEDB_FAILPOINT("migration.begun");
     connection.execute(migration.sql);
     SHAPEDB_FAILPOINT("migration.applied");
-    Query(connection, kWriteRecord, migration.number, std::string(migration.name), fingerprint(migration),
-          nowMs)
-        .run();
+    recordMigration(connection, migration, nowMs);
     // Part of the transaction, like the rest.
     connection.execute("PRAGMA user_version=" + std::to_string(migration.number));
     SHAPEDB_FAILPOINT("migration.recorded");
@@ -73,7 +32,7 @@ void apply(Connection& connection, const Migration& migration, std::int64_t nowM
     SHAPEDB_FAILPOINT("migration.committed");
 }
 
-std::map<std::string, std::string> schemaOf(Connection& connection) {
+std::map<std::string, std::string> schemaOf(SqliteConnection& connection) {
     std::map<std::string, std::string> schema;
     Query rows(connection, kReadSchema);
     while (rows.step()) {
@@ -86,8 +45,8 @@ std::map<std::string, std::string> schemaOf(Connection& connection) {
 
 /// A file with our marks may still have other tables, or triggers of its own: refuse it before the store uses
 /// it.
-void verifySchema(Connection& connection, const std::vector<Migration>& migrations) {
-    Connection reference(":memory:", OpenMode::kReadWriteCreate, 0);
+void verifySchema(SqliteConnection& connection, const std::vector<Migration>& migrations) {
+    SqliteConnection reference(":memory:", OpenMode::kReadWriteCreate, 0);
     for (const Migration& migration : migrations) apply(reference, migration, 0);
     const auto expected = schemaOf(reference);
     const auto actual = schemaOf(connection);
@@ -106,7 +65,7 @@ void verifySchema(Connection& connection, const std::vector<Migration>& migratio
 
 }  // namespace
 
-FileKind identify(Connection& connection) {
+FileKind identify(SqliteConnection& connection) {
     const std::int64_t id = connection.integer("PRAGMA application_id");
     const std::int64_t version = connection.integer("PRAGMA user_version");
     const std::int64_t objects = connection.integer("SELECT count(*) FROM sqlite_schema");
@@ -114,18 +73,18 @@ FileKind identify(Connection& connection) {
     return id == kApplicationId && version > 0 ? FileKind::kOurs : FileKind::kForeign;
 }
 
-int schemaVersion(Connection& connection) {
+int schemaVersion(SqliteConnection& connection) {
     return static_cast<int>(connection.integer("PRAGMA user_version"));
 }
 
-void migrate(Connection& connection, const std::vector<Migration>& migrations, std::int64_t nowMs) {
+void migrate(SqliteConnection& connection, const std::vector<Migration>& migrations, std::int64_t nowMs) {
     const int version = schemaVersion(connection);
     if (version < 0 || static_cast<std::size_t>(version) > migrations.size()) {
         raise(ErrorCode::kSchemaTooNew, "the database has schema version " + std::to_string(version) +
                                             ", this program knows " + std::to_string(migrations.size()) +
                                             "; use the newer program");
     }
-    const std::size_t applied = version == 0 ? 0 : verifyRecord(connection, migrations);
+    const std::size_t applied = version == 0 ? 0 : verifyMigrations(connection, migrations);
     if (applied != static_cast<std::size_t>(version)) {
         raise(ErrorCode::kDataLoss, "the database claims to have schema version " + std::to_string(version) +
                                         " but records " + std::to_string(applied) + " migrations");

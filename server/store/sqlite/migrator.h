@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Brings a database to the schema of this program.
 //
-// Migrations are the numbered files of migrations/, compiled in. They only go forward, each in
-// its own transaction, and are never edited after release: the database records the SHA-256 of each
-// one it has applied.
+// Each migration is applied in its own transaction.
 #pragma once
 
 #include <cstdint>
 #include <string>
 #include <vector>
 
+#include "server/store/sql/migration.h"
 #include "server/store/sqlite/connection.h"
 
 namespace shapedb::store {
@@ -18,12 +17,6 @@ namespace shapedb::store {
 constexpr std::int64_t kApplicationId = 0x53684442;
 /// PRAGMA page_size. Persisted: restore copies pages, so that all files must agree.
 constexpr std::int64_t kPageSize = 4096;
-
-struct Migration {
-    int number;        ///< 1, 2, 3, ...
-    const char* name;  ///< file name without extension
-    const char* sql;
-};
 
 /// Those of the database. In ascending order of number, without gaps.
 const std::vector<Migration>& embeddedMigrations();
@@ -37,16 +30,16 @@ enum class FileKind {
 };
 
 /// Writes nothing. Throws Failure kDataLoss when the file is no SQLite database.
-FileKind identify(Connection& connection);
+FileKind identify(SqliteConnection& connection);
 
 /// PRAGMA user_version: the number of the last migration applied.
-int schemaVersion(Connection& connection);
+int schemaVersion(SqliteConnection& connection);
 
 /// Applies missing migrations. Throws Failure:
 /// - kSchemaTooNew: the database has a migration that `migrations` lacks;
 /// - kDataLoss: a migration was edited after it was applied, the record has a gap, or the schema is
 ///   not what the migrations make.
 /// Migrations before a failed one stay applied.
-void migrate(Connection& connection, const std::vector<Migration>& migrations, std::int64_t nowMs);
+void migrate(SqliteConnection& connection, const std::vector<Migration>& migrations, std::int64_t nowMs);
 
 }  // namespace shapedb::store

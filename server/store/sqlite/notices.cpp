@@ -3,8 +3,9 @@
 #include <algorithm>
 
 #include "server/store/failpoints.h"
-#include "server/store/sqlite/rows.h"
+#include "server/store/sql/rows.h"
 #include "server/store/sqlite/sequences.h"
+#include "server/store/sqlite/sqlite_sql.h"
 #include "server/store/sqlite/sqlite_store_impl.h"
 #include "server/store/sqlite/value_rules.h"
 
@@ -59,8 +60,8 @@ void SqliteStore::compareCommits() {
 
 void SqliteStore::addNotice(std::int64_t missing, const std::string& message) {
     Transaction transaction(*writer_, Transaction::Kind::kWrite);
-    Query(*writer_, sql::kAddNotice, now(), missing, message).run();
-    Query(*writer_, sql::kForgetNotices, writer_->lastInsertId() - kMostNotices).run();
+    Query(*writer_, sqlite_sql::kAddNotice, now(), missing, message).run();
+    Query(*writer_, sqlite_sql::kForgetNotices, writer_->lastInsertId() - kMostNotices).run();
     // Counted as any change: it is noticed if this one is lost.
     addCommit(*writer_);
     SHAPEDB_FAILPOINT("open.noticed");
@@ -71,7 +72,7 @@ void SqliteStore::readNotices() {
     const std::lock_guard<std::mutex> lock(findingsMutex_);
     missingCommits_ = 0;
     notices_.clear();
-    Query query(*writer_, sql::kListNotices);
+    Query query(*writer_, sqlite_sql::kListNotices);
     while (query.step()) {
         missingCommits_ += query.integer(0);
         notices_.push_back(query.text(1) + kHowToAcknowledge);
@@ -98,8 +99,9 @@ std::size_t SqliteStore::notices() const {
 }
 
 Result<std::vector<std::string>> SqliteStore::acknowledge() {
-    const auto done = write("acknowledge what was found",
-                            [](Connection& connection) { Query(connection, sql::kAcknowledge).run(); });
+    const auto done = write("acknowledge what was found", [](Connection& connection) {
+        Query(connection, sqlite_sql::kAcknowledge).run();
+    });
     if (!done) return fail(done.error());
     const std::lock_guard<std::mutex> lock(findingsMutex_);
     missingCommits_ = 0;

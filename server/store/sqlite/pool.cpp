@@ -6,7 +6,7 @@ namespace shapedb::store {
 ReaderPool::ReaderPool(const std::string& path, int count, int busyTimeoutMs) {
     free_.reserve(static_cast<std::size_t>(count));
     for (int i = 0; i < count; ++i) {
-        free_.push_back(std::make_unique<Connection>(path, OpenMode::kReadOnly, busyTimeoutMs));
+        free_.push_back(std::make_unique<SqliteConnection>(path, OpenMode::kReadOnly, busyTimeoutMs));
     }
 }
 
@@ -14,12 +14,12 @@ ReaderPool::Lease ReaderPool::acquire() {
     std::unique_lock<std::mutex> lock(mutex_);
     freed_.wait(lock, [this] { return !free_.empty(); });
     // The last one returned has the warmest page cache.
-    std::unique_ptr<Connection> connection = std::move(free_.back());
+    std::unique_ptr<SqliteConnection> connection = std::move(free_.back());
     free_.pop_back();
     return {*this, std::move(connection)};
 }
 
-void ReaderPool::giveBack(std::unique_ptr<Connection> connection) {
+void ReaderPool::giveBack(std::unique_ptr<SqliteConnection> connection) {
     {
         const std::lock_guard<std::mutex> lock(mutex_);
         free_.push_back(std::move(connection));  // never allocates: reserved for all

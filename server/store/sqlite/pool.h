@@ -20,27 +20,27 @@ class ReaderPool {
 
     class Lease {
       public:
-        Lease(ReaderPool& pool, std::unique_ptr<Connection> connection)
+        Lease(ReaderPool& pool, std::unique_ptr<SqliteConnection> connection)
             : pool_(pool), connection_(std::move(connection)) {}
         ~Lease() { pool_.giveBack(std::move(connection_)); }
         Lease(const Lease&) = delete;
         Lease& operator=(const Lease&) = delete;
-        Connection& operator*() const { return *connection_; }
+        SqliteConnection& operator*() const { return *connection_; }
 
       private:
         ReaderPool& pool_;
-        std::unique_ptr<Connection> connection_;
+        std::unique_ptr<SqliteConnection> connection_;
     };
 
     /// Waits until one is free.
     Lease acquire();
 
   private:
-    void giveBack(std::unique_ptr<Connection> connection);
+    void giveBack(std::unique_ptr<SqliteConnection> connection);
 
     std::mutex mutex_;
     std::condition_variable freed_;
-    std::vector<std::unique_ptr<Connection>> free_;
+    std::vector<std::unique_ptr<SqliteConnection>> free_;
 };
 
 }  // namespace shapedb::store

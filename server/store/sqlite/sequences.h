@@ -19,14 +19,19 @@ constexpr std::int64_t kMostCountedInFiles = std::int64_t{1} << 60;
 
 /// The last id given out; 0 before the first. One beyond kMostCounted is not believed: then the largest id in
 /// use.
-std::int64_t lastId(Connection& connection, const std::string& table);
-void setLastId(Connection& connection, const std::string& table, std::int64_t id);
+std::int64_t lastId(SqliteConnection& connection, const std::string& table);
+void setLastId(SqliteConnection& connection, const std::string& table, std::int64_t id);
 /// Gives the rows of `table` the ids from `last` + 1 on, in the order of those that they had, which must all
 /// be smaller.
-void renumber(Connection& connection, const std::string& table, std::int64_t last);
+void renumber(SqliteConnection& connection, const std::string& table, std::int64_t last);
 
 /// Sets sequences beyond kMostCounted back to the largest id in use. Returns what was mended, one line each.
 /// Throws Failure.
-std::vector<std::string> mendSequences(Connection& connection);
+std::vector<std::string> mendSequences(SqliteConnection& connection);
+
+/// Transactions that changed something, since the database was made. Throws Failure kDataLoss.
+std::int64_t countCommits(SqliteConnection& connection);
+/// Counts one more and returns how many there are with it. Throws Failure kDataLoss.
+std::int64_t addCommit(SqliteConnection& connection);
 
 }  // namespace shapedb::store

@@ -198,8 +198,8 @@ class SqliteKeyStore final : public security::KeyStore {
         if (::stat(path_.c_str(), &status) != 0) raiseGone();
         inode_ = status.st_ino;
         device_ = status.st_dev;
-        connection_ = std::make_unique<Connection>(path_, OpenMode::kReadWrite, kBusyTimeoutMs);
-        watch_ = std::make_unique<Connection>(path_, OpenMode::kReadOnly, 0);
+        connection_ = std::make_unique<SqliteConnection>(path_, OpenMode::kReadWrite, kBusyTimeoutMs);
+        watch_ = std::make_unique<SqliteConnection>(path_, OpenMode::kReadOnly, 0);
     }
 
     /// An operator may put another file in its place, a copy that was saved for instance.
@@ -217,8 +217,8 @@ class SqliteKeyStore final : public security::KeyStore {
 
     const std::string path_;
     std::mutex mutex_;
-    std::unique_ptr<Connection> connection_;
-    std::unique_ptr<Connection> watch_;  ///< waits for nobody
+    std::unique_ptr<SqliteConnection> connection_;
+    std::unique_ptr<SqliteConnection> watch_;  ///< waits for nobody
     ino_t inode_ = 0;
     dev_t device_ = 0;
     std::int64_t watched_ = 0;  ///< SQLite's number for the changes of others

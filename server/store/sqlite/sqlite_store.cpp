@@ -14,10 +14,10 @@
 #include <unistd.h>
 
 #include "server/store/failpoints.h"
+#include "server/store/sql/rows.h"
 #include "server/store/sqlite/damage.h"
 #include "server/store/sqlite/database_file.h"
 #include "server/store/sqlite/migrator.h"
-#include "server/store/sqlite/rows.h"
 #include "server/store/sqlite/sequences.h"
 #include "server/store/sqlite/sqlite_store_impl.h"
 
@@ -88,7 +88,7 @@ void createDatabase(const SqliteOptions& options) {
     close(descriptor);
     SHAPEDB_FAILPOINT("create.file");
     {
-        Connection connection(fresh, OpenMode::kReadWrite, options.busyTimeoutMs);
+        SqliteConnection connection(fresh, OpenMode::kReadWrite, options.busyTimeoutMs);
         makeEmptyDatabase(connection, options.now());
     }
     SHAPEDB_FAILPOINT("create.filled");
@@ -127,7 +127,7 @@ void requireUsableFile(const SqliteOptions& options) {
 /// What another process left in the log may be in the system's memory only: after a sync that failed, Linux
 /// takes the pages for written. They would be missing after a loss of power, and with them all that follows
 /// in the log.
-void rewriteOldWal(Connection& writer) {
+void rewriteOldWal(SqliteConnection& writer) {
     try {
         writer.rewriteWal();
     } catch (const Failure& failure) {
@@ -138,14 +138,15 @@ void rewriteOldWal(Connection& writer) {
 
 /// While a server has it open, the file itself says so: it has a write-ahead log. One that was closed cleanly
 /// is complete without any file beside it, like a backup.
-bool isOpenInFile(Connection& connection) { return connection.text("PRAGMA journal_mode") == "wal"; }
+bool isOpenInFile(SqliteConnection& connection) { return connection.text("PRAGMA journal_mode") == "wal"; }
 
 /// Opens the database, checks that it is ours before writing a byte, and migrates it. `wasOpen`: its last
 /// server did not close it, and counted its commits.
-std::unique_ptr<Connection> openWriter(const SqliteOptions& options, const CommitMark& mark,
-                                       const ProcessLock& lock, bool* wasOpen) {
+std::unique_ptr<SqliteConnection> openWriter(const SqliteOptions& options, const CommitMark& mark,
+                                             const ProcessLock& lock, bool* wasOpen) {
     requireUsableFile(options);
-    auto writer = std::make_unique<Connection>(options.path, OpenMode::kReadWrite, options.busyTimeoutMs);
+    auto writer =
+        std::make_unique<SqliteConnection>(options.path, OpenMode::kReadWrite, options.busyTimeoutMs);
     if (identify(*writer) != FileKind::kOurs) {
         raise(ErrorCode::kDataLoss, "'" + options.path + "' is not a ShapeDB database");
     }
@@ -214,6 +215,61 @@ SqliteStore::~SqliteStore() {
     }));
 }
 
+void SqliteStore::writeOnce(const Work& work) {
+    const std::lock_guard<std::mutex> lock(writerMutex_);
+    Transaction transaction(*writer_, Transaction::Kind::kWrite);
+    const std::int64_t before = writer_->totalChanges();
+    work(*writer_);
+    commit(transaction, before);
+}
+
+// On a full disk a second time: what frees space, and what fits into free pages of the database. The log gets
+// the space of the reserve, and gives it back when it has been written back: what is written must not let the
+// database grow.
+void SqliteStore::inWriteTransaction(Space space, const Work& work) {
+    std::optional<Failure> full;
+    try {
+        return writeOnce(work);
+    } catch (const Failure& failure) {
+        if (failure.error.code != ErrorCode::kStorageFull || space == Space::kTakesOnce) throw;
+        full = failure;
+    }
+    if (space == Space::kTakes && !hasFreePages()) throw *full;
+    const SpaceReserve::Loan loan(reserve_);
+    try {
+        writeOnce(work);
+    } catch (...) {
+        emptyLog();
+        throw;
+    }
+    emptyLog();
+}
+
+void SqliteStore::inReadTransaction(const Work& work) {
+    const ReaderPool::Lease lease = readers_->acquire();
+    const Transaction snapshot(*lease, Transaction::Kind::kRead);
+    work(*lease);
+}
+
+std::vector<Collection> SqliteStore::salvageCollections(Connection& connection, const Failure& damage) {
+    if (damage.error.code != ErrorCode::kDataLoss) throw damage;
+    return store::salvageCollections(ours(connection), damage.error);
+}
+
+std::vector<Alias> SqliteStore::salvageAliases(Connection& connection, const Failure& damage) {
+    if (damage.error.code != ErrorCode::kDataLoss) throw damage;
+    return store::salvageAliases(ours(connection));
+}
+
+Result<std::vector<Shape>> SqliteStore::recoverJobs(int maxAttempts, const std::vector<Crash>& crashes) {
+    {
+        // It may go unnoticed until the first job is queued.
+        const std::lock_guard<std::mutex> lock(findingsMutex_);
+        if (queueDamage_) return fail(ErrorCode::kDataLoss, *queueDamage_);
+    }
+    return SqlStore::recoverJobs(maxAttempts, crashes);
+}
+
 void SqliteStore::commit(Transaction& transaction, std::int64_t changesBefore) {
     if (writer_->totalChanges() == changesBefore) {
         transaction.commit();
@@ -248,30 +304,10 @@ void SqliteStore::boundWal() noexcept {
 
 Result<StoreStats> SqliteStore::stats() {
     return read("read the statistics", [&](Connection& connection) {
-        StoreStats stats;
-        const auto count = [&](const char* statement) {
-            Query query(connection, statement);
-            return query.step() ? static_cast<std::uint64_t>(query.integer(0)) : 0;
-        };
-        stats.collections = count(sql::kCountCollections);
-        stats.signatures = count(sql::kCountSignatures);
-        Query states(connection, sql::kCountStates);
-        while (states.step()) {
-            const auto shapes = static_cast<std::uint64_t>(states.integer(1));
-            switch (static_cast<ShapeState>(states.integer(0))) {
-                case ShapeState::kPending: stats.shapesPending = shapes; break;
-                case ShapeState::kReady: stats.shapesReady = shapes; break;
-                case ShapeState::kFailed: stats.shapesFailed = shapes; break;
-            }
-        }
-        Query tally(connection, sql::kTally);
-        if (tally.step()) {
-            stats.pointBytes = static_cast<std::uint64_t>(tally.integer(2));
-            stats.storedPointBytes = static_cast<std::uint64_t>(tally.integer(3));
-        }
+        StoreStats stats = readStats(connection);
         stats.databaseBytes = fileSize(options_.path);
         stats.walBytes = fileSize(walPath_);
-        stats.schemaVersion = schemaVersion(connection);
+        stats.schemaVersion = schemaVersion(ours(connection));
         const std::lock_guard<std::mutex> lock(findingsMutex_);
         stats.missingCommits = static_cast<std::uint64_t>(missingCommits_);
         stats.notices = notices_.size();

@@ -7,8 +7,8 @@
 
 #include "common/safe_text.h"
 #include "server/store/key_rules.h"
+#include "server/store/sql/sql.h"
 #include "server/store/sqlite/sequences.h"
-#include "server/store/sqlite/sql.h"
 
 namespace shapedb::store {
 
@@ -178,7 +178,7 @@ std::optional<std::string> problemOf(const Query& row, int at, const Column& col
 
 }  // namespace
 
-void checkValues(Connection& connection, std::size_t table, const ValueRules& rules,
+void checkValues(SqliteConnection& connection, std::size_t table, const ValueRules& rules,
                  const RunContext& context, const ReportProblem& report) {
     const ValueTable& wanted = kEachTable[table];
     Query row(connection, wanted.sql);

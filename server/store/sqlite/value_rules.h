@@ -28,7 +28,7 @@ inline constexpr std::size_t kSmallValueTables = 6;
 
 /// Reads one of these tables and reports each value that breaks a rule, with its table, row and column. Names
 /// and texts have the rules of key_rules.h. Throws Failure.
-void checkValues(Connection& connection, std::size_t table, const ValueRules& rules,
+void checkValues(SqliteConnection& connection, std::size_t table, const ValueRules& rules,
                  const RunContext& context, const ReportProblem& report);
 
 /// "2^60" for a power of two.

@@ -4,7 +4,7 @@
 
 #include <sstream>
 
-#include "tests/server/store/sqlite/store_fixture.h"
+#include "tests/server/store/store_fixture.h"
 
 namespace shapedb::store {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "server/store/sqlite/connection.h"
-#include "tests/server/store/sqlite/store_fixture.h"
+#include "tests/server/store/store_fixture.h"
 
 namespace shapedb::store {
 namespace {
@@ -13,7 +13,7 @@ TEST_F(SqliteCheckTest, SaysThatThereAreMoreProblemsOnlyWhenThereAre) {
     // Each pending shape without a job is a problem.
     const auto loseJobs = [&] {
         store_.reset();
-        Connection(options().path, OpenMode::kReadWrite, 0).execute("DELETE FROM job");
+        SqliteConnection(options().path, OpenMode::kReadWrite, 0).execute("DELETE FROM job");
         open();
     };
     loseJobs();

@@ -8,7 +8,7 @@
 
 #include <sys/wait.h>
 
-#include "tests/server/store/sqlite/store_fixture.h"
+#include "tests/server/store/store_fixture.h"
 
 namespace shapedb::store {
 namespace {

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Deletions: in pieces when there is much to delete, and repeated when their reply was lost.
+// Deletions of collections: in pieces when there is much to delete.
 #include <atomic>
 #include <thread>
 
 #include "server/store/sqlite/connection.h"
 #include "server/store/sqlite/migrator.h"
-#include "tests/server/store/sqlite/store_fixture.h"
+#include "tests/server/store/store_fixture.h"
 
 namespace shapedb::store {
 namespace {
 
-class DeletionTest : public StoreTest {
+class SqliteDeletionTest : public StoreTest {
   protected:
     /// More than one transaction deletes; pending.
     Collection large(const std::string& name, int shapes = 600) {
@@ -19,18 +19,18 @@ class DeletionTest : public StoreTest {
         return made;
     }
     std::int64_t rows(const std::string& table) {
-        return Connection(options().path, OpenMode::kReadOnly, 1'000)
+        return SqliteConnection(options().path, OpenMode::kReadOnly, 1'000)
             .integer("SELECT count(*) FROM " + table);
     }
 };
 
-TEST_F(DeletionTest, OfALargeCollectionLeavesNothing) {
+TEST_F(SqliteDeletionTest, OfALargeCollectionLeavesNothing) {
     const Collection gone = large("gone");
     ASSERT_TRUE(store_->setAlias("other-name", gone.id));
     const Collection kept = collection("kept");
     put(kept.id, "a", 1);
     const std::int64_t pages =
-        Connection(options().path, OpenMode::kReadOnly, 1'000).integer("PRAGMA page_count");
+        SqliteConnection(options().path, OpenMode::kReadOnly, 1'000).integer("PRAGMA page_count");
     bool called = false;
     ASSERT_TRUE(store_->deleteCollection(gone.id, [&] { called = true; }));
     EXPECT_TRUE(called);
@@ -44,12 +44,12 @@ TEST_F(DeletionTest, OfALargeCollectionLeavesNothing) {
 }
 
 // Nobody meets a half of it.
-TEST_F(DeletionTest, IsSeenAtOnce) {
+TEST_F(SqliteDeletionTest, IsSeenAtOnce) {
     const Collection gone = large("gone");
     ASSERT_TRUE(store_->startRebuild(gone.id, "others"));
     ASSERT_TRUE(store_->deleteCollection(gone.id, [&] {
         // Another connection, in the middle of it.
-        Connection others(options().path, OpenMode::kReadOnly, 1'000);
+        SqliteConnection others(options().path, OpenMode::kReadOnly, 1'000);
         EXPECT_GT(others.integer("SELECT count(*) FROM shape"), 0) << "rows are left";
         EXPECT_EQ(others.integer("SELECT count(*) FROM collection WHERE name = 'gone'"), 0);
         EXPECT_EQ(others.integer("SELECT count(*) FROM rebuild WHERE state = 0"), 0);
@@ -64,7 +64,7 @@ TEST_F(DeletionTest, IsSeenAtOnce) {
     expectSound();
 }
 
-TEST_F(DeletionTest, IsCompletedAtTheNextStartAndLeftOutOfRestores) {
+TEST_F(SqliteDeletionTest, IsCompletedAtTheNextStartAndLeftOutOfRestores) {
     const Collection gone = large("gone");
     std::string database;
     std::string log;
@@ -92,7 +92,7 @@ TEST_F(DeletionTest, IsCompletedAtTheNextStartAndLeftOutOfRestores) {
     expectSound();
 }
 
-TEST_F(DeletionTest, NoTransactionOfItOutgrowsTheReserve) {
+TEST_F(SqliteDeletionTest, NoTransactionOfItOutgrowsTheReserve) {
     const Collection gone = large("gone", 3'000);
     ASSERT_TRUE(store_->checkpoint());
     std::atomic<bool> done{false};
@@ -105,50 +105,6 @@ TEST_F(DeletionTest, NoTransactionOfItOutgrowsTheReserve) {
     done = true;
     watching.join();
     EXPECT_LT(largest, std::uintmax_t{16} << 20);
-}
-
-TEST_F(DeletionTest, OfAShapeCanBeRepeated) {
-    const Collection parts = collection();
-    const Shape before = put(parts.id, "a", 1, {{"label", "cup"}, {"n", "1"}});
-    const Shape deleted = store_->deleteShape(parts.id, "a", 1).value();
-    EXPECT_EQ(deleted, before);
-    for (int i = 0; i < 2; ++i) {
-        const auto again = store_->deleteShape(parts.id, "a", 1);
-        ASSERT_TRUE(again) << again.error().message;
-        EXPECT_EQ(*again, before);
-        open();  // the reply may have been lost with the server
-    }
-    EXPECT_FAILS(store_->deleteShape(parts.id, "a", 2), ErrorCode::kNotFound);
-    EXPECT_FAILS(store_->deleteShape(parts.id, "a", std::nullopt), ErrorCode::kNotFound);
-    EXPECT_FAILS(store_->deleteShape(parts.id, "b", 1), ErrorCode::kNotFound);
-    EXPECT_FAILS(store_->deleteShape(collection("other").id, "a", 1), ErrorCode::kNotFound);
-    // Another shape has the key now, and is not meant.
-    const Shape next = put(parts.id, "a", 2);
-    ASSERT_TRUE(store_->putShape(request(parts.id, "a", cloud(3))));
-    EXPECT_FAILS(store_->deleteShape(parts.id, "a", 1), ErrorCode::kVersionConflict);
-    EXPECT_TRUE(store_->getShapeById(next.id));
-    expectSound();
-}
-
-TEST_F(DeletionTest, OfAFailedShapeIsRepeatedWithItsReason) {
-    const Collection parts = collection();
-    put(parts.id, "a", 1);
-    ASSERT_TRUE(store_->failJob(claim(), {ErrorCode::kNoInterior, "no closed interior"}));
-    const Shape deleted = store_->deleteShape(parts.id, "a", 1).value();
-    EXPECT_EQ(store_->deleteShape(parts.id, "a", 1).value(), deleted);
-    ASSERT_TRUE(deleted.failure);
-}
-
-TEST_F(DeletionTest, OnlyTheLastAreRemembered) {
-    const Collection parts = collection();
-    for (std::int64_t i = 0; i < kDeletionsRemembered + 20; ++i) {
-        put(parts.id, std::to_string(i), 1);
-        ASSERT_TRUE(store_->deleteShape(parts.id, std::to_string(i), 1));
-    }
-    EXPECT_EQ(rows("deleted_shape"), kDeletionsRemembered);
-    EXPECT_FAILS(store_->deleteShape(parts.id, "19", 1), ErrorCode::kNotFound);
-    EXPECT_TRUE(store_->deleteShape(parts.id, "20", 1));
-    EXPECT_TRUE(store_->deleteShape(parts.id, std::to_string(kDeletionsRemembered + 19), 1));
 }
 
 }  // namespace

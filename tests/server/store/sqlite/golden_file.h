@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 #include <zstd.h>
 
-#include "tests/server/store/sqlite/store_fixture.h"
+#include "tests/server/store/store_fixture.h"
 
 namespace shapedb::store {
 

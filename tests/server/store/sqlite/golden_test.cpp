@@ -72,7 +72,7 @@ TEST_F(GoldenTest, CanBeWritten) {
 TEST_P(EachGoldenTest, IsMigratedWhenItsCollectionIsImported) {
     const std::string path = folder_.file("old.db");
     spill(path, golden(GetParam()));
-    Connection(path, OpenMode::kReadWrite, 0).execute("DELETE FROM collection WHERE name = 'empty'");
+    SqliteConnection(path, OpenMode::kReadWrite, 0).execute("DELETE FROM collection WHERE name = 'empty'");
     const std::string before = slurp(path);
     const auto imported = store_->importCollection(path, {}, {});
     ASSERT_TRUE(imported) << imported.error().message;
@@ -157,7 +157,7 @@ using OffsetMigration = GoldenTest;
 void openWithOffset(const std::string& path, const std::string& offset) {
     spill(path, golden(5));
     forgetTheOneBefore(path);
-    Connection connection(path, OpenMode::kReadWrite, 0);
+    SqliteConnection connection(path, OpenMode::kReadWrite, 0);
     connection.execute("INSERT INTO shape_metadata SELECT id, 'shapedb.offset', '" + offset + "' FROM shape");
 }
 
@@ -225,7 +225,7 @@ TEST_F(OffsetMigration, OtherTextUnderThatKeyIsLeftAlone) {
 TEST_F(OffsetMigration, ExportsOfEarlierVersionsAreImportedWithTheirOrigins) {
     const std::string path = folder_.file("old.db");
     openWithOffset(path, "4500000 0 -3");
-    Connection(path, OpenMode::kReadWrite, 0).execute("DELETE FROM collection WHERE name = 'empty'");
+    SqliteConnection(path, OpenMode::kReadWrite, 0).execute("DELETE FROM collection WHERE name = 'empty'");
     const auto imported = store_->importCollection(path, {}, {});
     ASSERT_TRUE(imported) << imported.error().message;
     const Shape shape = store_->getShape(imported->id, "ready").value();
@@ -242,7 +242,7 @@ TEST_F(OffsetMigration, AnOriginThatNoClientCouldSendIsDamage) {
     finishAll();
     store_.reset();
     {
-        Connection connection(options().path, OpenMode::kReadWrite, 0);
+        SqliteConnection connection(options().path, OpenMode::kReadWrite, 0);
         EXPECT_THROW(connection.execute("UPDATE shape SET origin_x = 3.5e38"), Failure);
         EXPECT_THROW(connection.execute("UPDATE shape SET origin_y = 9e999"), Failure);
         EXPECT_THROW(connection.execute("UPDATE shape SET origin_z = NULL"), Failure);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "server/store/sqlite/migrator.h"
 
-#include "tests/server/store/sqlite/store_fixture.h"
+#include "tests/server/store/store_fixture.h"
 
 namespace shapedb::store {
 namespace {
@@ -24,8 +24,8 @@ class MigratorTest : public ::testing::Test {
     }
 
     Folder folder_;
-    std::unique_ptr<Connection> connection_ =
-        std::make_unique<Connection>(folder_.file("m.db"), OpenMode::kReadWriteCreate, 0);
+    std::unique_ptr<SqliteConnection> connection_ =
+        std::make_unique<SqliteConnection>(folder_.file("m.db"), OpenMode::kReadWriteCreate, 0);
     std::string message_;
 };
 

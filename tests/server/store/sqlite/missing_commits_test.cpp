@@ -3,7 +3,7 @@
 #include <filesystem>
 
 #include "server/store/sqlite/commit_mark.h"
-#include "tests/server/store/sqlite/store_fixture.h"
+#include "tests/server/store/store_fixture.h"
 
 namespace shapedb::store {
 namespace {

@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "server/store/sqlite/connection.h"
-#include "tests/server/store/sqlite/store_fixture.h"
+#include "tests/server/store/store_fixture.h"
 
 namespace shapedb::store {
 namespace {
@@ -13,7 +13,7 @@ namespace {
 class SequencesTest : public StoreTest {
   protected:
     void change(const std::string& path, const std::string& sql) const {
-        Connection connection(path, OpenMode::kReadWrite, 1'000);
+        SqliteConnection connection(path, OpenMode::kReadWrite, 1'000);
         connection.execute(sql);
     }
     static std::string endOf(const std::string& table) {

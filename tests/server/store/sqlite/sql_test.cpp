@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Query plans: what has to be logarithmic uses an index.
-#include "server/store/sqlite/sql.h"
-
 #include <list>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "server/store/sqlite/migrator.h"
-#include "tests/server/store/sqlite/store_fixture.h"
+#include "server/store/sqlite/sqlite_sql.h"
+#include "tests/server/store/store_fixture.h"
 
 namespace shapedb::store {
 namespace {
@@ -25,7 +25,7 @@ class SqlitePlanTest : public ::testing::Test {
     }
 
     std::list<std::string> texts_;  ///< kept: the address of a text is its key among prepared statements
-    Connection connection_{":memory:", OpenMode::kReadWriteCreate, 0};
+    SqliteConnection connection_{":memory:", OpenMode::kReadWriteCreate, 0};
 };
 
 /// Few rows, or a total that nobody asks for often.
@@ -37,7 +37,9 @@ bool mayReadAWholeTable(const std::string& name) {
 }
 
 TEST_F(SqlitePlanTest, OnlyNamedStatementsReadWholeTablesOrSort) {
-    for (const sql::Statement& statement : sql::kStatements) {
+    std::vector<sql::Statement> all(std::begin(sql::kStatements), std::end(sql::kStatements));
+    all.insert(all.end(), std::begin(sqlite_sql::kStatements), std::end(sqlite_sql::kStatements));
+    for (const sql::Statement& statement : all) {
         const std::string lines = plan(statement.text);
         const bool scans = lines.find("SCAN") != std::string::npos;
         const bool sorts = lines.find("TEMP B-TREE") != std::string::npos;
@@ -62,6 +64,9 @@ TEST_F(SqlitePlanTest, PagesStartAtTheirCursor) {
         EXPECT_NE(plan(byKey).find("sqlite_autoindex_shape_1 (collection_id=? AND key"), std::string::npos)
             << plan(byKey);
     }
+    EXPECT_NE(plan(sql::kListShapesFromLastKey).find("sqlite_autoindex_shape_1 (collection_id=?)"),
+              std::string::npos)
+        << plan(sql::kListShapesFromLastKey);
     for (const char* byChange : {sql::kListShapesByChange, sql::kListShapesByChangeBackwards}) {
         EXPECT_NE(plan(byChange).find("shape_by_change (collection_id=? AND updated_at"), std::string::npos)
             << plan(byChange);

@@ -110,7 +110,7 @@ TEST_F(SqliteKeyStoreTest, FollowsAFileThatIsPutInItsPlace) {
 
 TEST_F(SqliteKeyStoreTest, TheVersionWaitsForNobody) {
     const auto store = open();
-    Connection other(path_, OpenMode::kReadWrite, 0);
+    SqliteConnection other(path_, OpenMode::kReadWrite, 0);
     other.execute("BEGIN EXCLUSIVE");
     const auto began = std::chrono::steady_clock::now();
     EXPECT_TRUE(store->version());

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "server/store/sqlite/sqlite_store.h"
 
+#include <chrono>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -8,7 +9,7 @@
 #include <sys/resource.h>
 
 #include "server/store/sqlite/migrator.h"
-#include "tests/server/store/sqlite/store_fixture.h"
+#include "tests/server/store/store_fixture.h"
 
 namespace shapedb::store {
 namespace {
@@ -229,6 +230,25 @@ TEST_F(SqliteStoreTest, FilesAreForTheOwnerOnly) {
                   std::filesystem::perms::none)
             << name;
     }
+}
+
+TEST_F(SqliteStoreTest, WaitingShapesCostNothingHoweverManyThereAre) {
+    const Collection parts = collection();
+    put(parts.id, "first", 1);
+    store_.reset();
+    execute(
+        "BEGIN; WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < 100000) INSERT "
+        "INTO "
+        "shape (collection_id, key, version, points_version, state, point_count, checksum, created_at, "
+        "updated_at, origin_x, origin_y, origin_z) SELECT s.collection_id, 'n' || i, 1, 1, 0, 8, s.checksum, "
+        "1, 1, 0.0, 0.0, 0.0 FROM n, shape s "
+        "WHERE s.id "
+        "= 1; COMMIT");
+    open();
+    const auto began = std::chrono::steady_clock::now();
+    for (int i = 0; i < 100; ++i) ASSERT_EQ(store_->countWaiting(parts.id).value(), 100'001u);
+    const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - began;
+    EXPECT_LT(taken.count(), 0.5) << "a hundred times";
 }
 
 }  // namespace

@@ -9,7 +9,7 @@
 #include "server/store/sqlite/check.h"
 #include "server/store/sqlite/connection.h"
 #include "server/store/sqlite/sequences.h"
-#include "tests/server/store/sqlite/store_fixture.h"
+#include "tests/server/store/store_fixture.h"
 
 namespace shapedb::store {
 namespace {
@@ -128,7 +128,7 @@ class ValueRulesTest : public StoreTest {
     }
 
     void change(const std::string& path, const std::string& sql) const {
-        Connection(path, OpenMode::kReadWrite, 1'000).execute(sql);
+        SqliteConnection(path, OpenMode::kReadWrite, 1'000).execute(sql);
     }
 };
 
@@ -211,7 +211,7 @@ TEST_F(ValueRulesTest, EveryColumnHasOne) {
     change(options().path, "INSERT INTO notice VALUES (1, 1, 1, 'found')");
     std::vector<std::array<std::string, 3>> columns;
     {
-        Connection connection(options().path, OpenMode::kReadOnly, 1'000);
+        SqliteConnection connection(options().path, OpenMode::kReadOnly, 1'000);
         Query query(
             connection,
             "SELECT t.name, c.name, c.type FROM sqlite_schema t JOIN pragma_table_info(t.name) c WHERE "
@@ -234,7 +234,7 @@ TEST_F(ValueRulesTest, EveryColumnHasOne) {
             } catch (const Failure&) {
                 continue;  // SQLite's types refuse it
             }
-            Connection connection(path, OpenMode::kReadOnly, 1'000);
+            SqliteConnection connection(path, OpenMode::kReadOnly, 1'000);
             const auto problems =
                 checkDatabase(connection, {kMostCounted, withParameters().acceptParameters}, {});
             refused += problems.empty() ? 0 : 1;

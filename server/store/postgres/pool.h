@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Connections to the database, each lent to one thread at a time.
+#pragma once
+
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "server/store/postgres/connection.h"
+
+namespace shapedb::store {
+
+/// Thread-safe. Must outlive its leases.
+class PostgresPool {
+  public:
+    /// Opens connections when they are needed, at most `most` of them.
+    PostgresPool(const PostgresAddress& address, const StatementTexts& texts, int most)
+        : address_(address), texts_(texts), left_(most) {}
+
+    class Lease {
+      public:
+        Lease(PostgresPool& pool, std::unique_ptr<PostgresConnection> connection)
+            : pool_(pool), connection_(std::move(connection)) {}
+        ~Lease() { pool_.giveBack(std::move(connection_)); }
+        Lease(const Lease&) = delete;
+        Lease& operator=(const Lease&) = delete;
+        PostgresConnection& operator*() const { return *connection_; }
+        PostgresConnection* operator->() const { return connection_.get(); }
+
+      private:
+        PostgresPool& pool_;
+        std::unique_ptr<PostgresConnection> connection_;
+    };
+
+    /// Waits until one is free, or there may be another. Throws Failure kUnavailable.
+    Lease acquire();
+    /// Closes those that nobody has: after one was found broken the others are, too.
+    void closeIdle();
+
+  private:
+    void giveBack(std::unique_ptr<PostgresConnection> connection) noexcept;
+
+    PostgresAddress address_;
+    const StatementTexts& texts_;
+    std::mutex mutex_;
+    std::condition_variable freed_;
+    int left_;  ///< connections that may still be opened
+    std::vector<std::unique_ptr<PostgresConnection>> free_;
+};
+
+}  // namespace shapedb::store

@@ -1,0 +1,276 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "server/store/postgres/postgres_store.h"
+
+#include <algorithm>
+#include <set>
+
+#include "core/base/return_if_error.h"
+#include "server/store/postgres/postgres_store_impl.h"
+#include "server/store/postgres/statements.h"
+#include "server/store/sql/migration.h"
+#include "server/store/sql/rows.h"
+
+namespace shapedb::store {
+
+const std::vector<Migration>& embeddedPostgresMigrations();
+
+namespace {
+
+// Keys of advisory locks: nobody else uses this database.
+constexpr char kLockMigration[] = "SELECT pg_advisory_xact_lock(1399350340)";
+// Who changes names locks the row of the directory, and counts.
+constexpr char kLockNames[] = "UPDATE directory SET last_change = last_change + 1";
+constexpr char kLockCollection[] = "SELECT id FROM collection WHERE id = ?1 FOR NO KEY UPDATE";
+constexpr char kCollectionOfShape[] = "SELECT collection_id FROM shape WHERE id = ?1";
+// Its row is locked: numbers appear in the order in which they are given out.
+constexpr char kLogChange[] =
+    "WITH next AS (UPDATE collection SET last_change = last_change + 1 WHERE id = ?1 RETURNING id, "
+    "last_change) "
+    "INSERT INTO change (collection_id, number, shape_id) SELECT id, last_change, CAST(?2 AS BIGINT) FROM "
+    "next RETURNING number";
+constexpr char kLogAll[] =
+    "WITH next AS (UPDATE collection SET last_change = last_change + 1 WHERE id = ?1 RETURNING id, "
+    "last_change) "
+    "INSERT INTO change (collection_id, number) SELECT id, last_change FROM next";
+constexpr char kForgetChanges[] =
+    "DELETE FROM change WHERE collection_id = ?1 AND number <= (SELECT last_change FROM collection WHERE id "
+    "= ?1) - ?2";
+constexpr char kDirectory[] = "SELECT last_change FROM directory";
+constexpr char kLastChanges[] = "SELECT id, last_change FROM collection";
+constexpr char kChangesAfter[] =
+    "SELECT number, shape_id FROM change WHERE collection_id = ?1 AND number > ?2 ORDER BY number LIMIT ?3";
+constexpr char kDatabaseBytes[] = "SELECT pg_database_size(current_database())";
+constexpr char kSchemaVersion[] = "SELECT max(number) FROM schema_migration";
+constexpr char kCreateRecord[] =
+    "CREATE TABLE IF NOT EXISTS schema_migration (number bigint PRIMARY KEY, name text NOT NULL, sha256 text "
+    "NOT "
+    "NULL, applied_at bigint NOT NULL)";
+
+/// Of a collection. A server that is further behind loads it again.
+constexpr std::int64_t kChangesKept = 10'000;
+/// Changes after which the oldest are forgotten.
+constexpr std::int64_t kForgetEvery = 256;
+
+/// Times that a write which met another one is done again.
+constexpr int kMostConflicts = 10;
+constexpr int kOldestServer = 150'000;
+constexpr std::size_t kMostServerName = 63;
+
+PostgresOptions completed(PostgresOptions options) {
+    if (options.uri.empty()) raise(ErrorCode::kInvalidArgument, "the URI of the database is empty");
+    if (options.serverName.empty() || options.serverName.size() > kMostServerName) {
+        raise(ErrorCode::kInvalidArgument, "the name of the server must have 1 to 63 bytes");
+    }
+    if (options.connections < 2 || options.connections > 1'000) {
+        raise(ErrorCode::kInvalidArgument,
+              "connections must be 2 to 1,000, not " + std::to_string(options.connections));
+    }
+    if (options.pointCompressionLevel < 1 || options.pointCompressionLevel > 19) {
+        raise(ErrorCode::kInvalidArgument,
+              "the compression level must be 1 to 19, not " + std::to_string(options.pointCompressionLevel));
+    }
+    if (options.jobLease < std::chrono::milliseconds(100)) {
+        raise(ErrorCode::kInvalidArgument, "the lease of a job must be at least 100 ms");
+    }
+    if (!options.now) {
+        options.now = [] {
+            using std::chrono::duration_cast;
+            const auto since = std::chrono::system_clock::now().time_since_epoch();
+            return static_cast<TimestampMs>(duration_cast<std::chrono::milliseconds>(since).count());
+        };
+    }
+    return options;
+}
+
+std::string joined(const std::vector<std::int64_t>& ids) {
+    std::string text;
+    for (const std::int64_t id : ids) text += (text.empty() ? "" : ",") + std::to_string(id);
+    return text;
+}
+
+}  // namespace
+
+PostgresStore::PostgresStore(const PostgresOptions& options)
+    : options_(completed(options)),
+      texts_(postgresStatements(options_.serverName, options_.jobLease)),
+      pool_(address(options_.patience), texts_, options_.connections) {
+    migrateDatabase();
+    leases_ = std::make_unique<JobLeases>(options_.jobLease,
+                                          [this](const std::vector<std::int64_t>& jobIds) { renew(jobIds); });
+    // What a server that has died left: no client sees it. Another server may be importing.
+    static_cast<void>(dropDeleted());
+}
+
+PostgresAddress PostgresStore::address(std::chrono::milliseconds patience) const {
+    return {options_.uri, options_.password, patience, options_.serverName};
+}
+
+void PostgresStore::migrateDatabase() {
+    const PostgresPool::Lease connection = pool_.acquire();
+    const std::string version = connection->text("SHOW server_version_num");
+    if (std::stoi(version) < kOldestServer) {
+        raise(ErrorCode::kStorage, "the database server has version " + version + "; 15 or newer is needed");
+    }
+    const std::string encoding = connection->text("SHOW server_encoding");
+    if (encoding != "UTF8") {
+        raise(ErrorCode::kStorage,
+              "the database has the encoding " + encoding + "; create one with ENCODING 'UTF8'");
+    }
+    Transaction transaction(*connection, Transaction::Kind::kWrite);
+    Query(*connection, kLockMigration).run();
+    connection->execute(kCreateRecord);
+    const auto& migrations = embeddedPostgresMigrations();
+    for (std::size_t i = verifyMigrations(*connection, migrations); i < migrations.size(); ++i) {
+        connection->execute(migrations[i].sql);
+        recordMigration(*connection, migrations[i], now());
+    }
+    transaction.commit();
+}
+
+// Transactions -------------------------------------------------------------------------------
+
+void PostgresStore::inWriteTransaction(Space space, const Work& work) {
+    for (int tries = 1;; ++tries) {
+        const PostgresPool::Lease connection = pool_.acquire();
+        bool mayBeStored = false;
+        try {
+            Transaction transaction(*connection, Transaction::Kind::kWrite);
+            work(*connection);
+            mayBeStored = true;
+            transaction.commit();
+            return;
+        } catch (const Failure& failure) {
+            if (space == Space::kTakesOnce) throw;
+            // A connection that broke while nobody used it is found by the next one who does.
+            const bool isStale = !mayBeStored && tries == 1 && connection->isBroken();
+            if (isStale) pool_.closeIdle();
+            if (!isStale && !(isConflict(failure) && tries < kMostConflicts)) throw;
+        }
+    }
+}
+
+void PostgresStore::inReadTransaction(const Work& work) {
+    for (int tries = 1;; ++tries) {
+        const PostgresPool::Lease connection = pool_.acquire();
+        try {
+            const Transaction snapshot(*connection, Transaction::Kind::kRead);
+            return work(*connection);
+        } catch (const Failure&) {
+            if (tries > 1 || !connection->isBroken()) throw;
+            pool_.closeIdle();
+        }
+    }
+}
+
+void PostgresStore::lockNames(Connection& connection) { Query(connection, kLockNames).run(); }
+
+void PostgresStore::lockCollection(Connection& connection, std::int64_t collectionId) {
+    Query(connection, kLockCollection, collectionId).run();
+}
+
+void PostgresStore::lockCollectionsOf(Connection& connection, const std::vector<std::int64_t>& shapeIds) {
+    std::set<std::int64_t> collections;
+    for (const std::int64_t id : shapeIds) {
+        collections.insert(numberOf(Query(connection, kCollectionOfShape, id)));
+    }
+    for (const std::int64_t id : collections) lockCollection(connection, id);
+}
+
+void PostgresStore::logChange(Connection& connection, std::int64_t collectionId, std::int64_t shapeId) {
+    const std::int64_t number = numberOf(Query(connection, kLogChange, collectionId, shapeId));
+    if (number % kForgetEvery == 0) Query(connection, kForgetChanges, collectionId, kChangesKept).run();
+}
+
+void PostgresStore::logAll(Connection& connection, std::int64_t collectionId) {
+    Query(connection, kLogAll, collectionId).run();
+}
+
+Result<ChangeLogs> PostgresStore::changeLogs() {
+    return read("read how far the logs of changes go", [](Connection& connection) {
+        ChangeLogs logs;
+        logs.directory = numberOf(Query(connection, kDirectory));
+        Query query(connection, kLastChanges);
+        while (query.step()) logs.last.emplace(query.integer(0), query.integer(1));
+        return logs;
+    });
+}
+
+Result<std::vector<Change>> PostgresStore::changesAfter(std::int64_t collectionId, std::int64_t number,
+                                                        std::size_t limit) {
+    return read("read the log of changes", [&](Connection& connection) {
+        std::vector<Change> changes;
+        Query query(connection, kChangesAfter, collectionId, number, limit);
+        while (query.step()) {
+            Change& change = changes.emplace_back();
+            change.number = query.integer(0);
+            if (!query.isNull(1)) change.shapeId = query.integer(1);
+        }
+        return changes;
+    });
+}
+
+// Jobs ---------------------------------------------------------------------------------------
+
+Result<std::optional<Job>> PostgresStore::claimJob() {
+    while (true) {
+        auto job = SqlStore::claimJob();
+        if (!job || !*job) return job;
+        leases_->add((*job)->id);
+        // Its workers have lost it so often that it may be what stops them.
+        const int most = maxAttempts_;
+        const Deaths deaths{(*job)->attempts - 1, (*job)->stops};
+        if (most == 0 || !isQuarantined(deaths, most)) return job;
+        RETURN_IF_ERROR(failJob(**job, quarantineError(deaths)));
+    }
+}
+
+Result<std::optional<Shape>> PostgresStore::finishJob(const Job& job, const SignatureRow& signature) {
+    auto done = SqlStore::finishJob(job, signature);
+    leases_->remove(job.id);
+    return done;
+}
+
+Result<std::optional<Shape>> PostgresStore::failJob(const Job& job, const Error& why) {
+    auto done = SqlStore::failJob(job, why);
+    leases_->remove(job.id);
+    return done;
+}
+
+Result<void> PostgresStore::releaseJob(const Job& job) {
+    auto done = SqlStore::releaseJob(job);
+    leases_->remove(job.id);
+    return done;
+}
+
+Result<std::vector<Shape>> PostgresStore::recoverJobs(int maxAttempts, const std::vector<Crash>& crashes) {
+    maxAttempts_ = maxAttempts;
+    return SqlStore::recoverJobs(maxAttempts, crashes);
+}
+
+void PostgresStore::renew(const std::vector<std::int64_t>& jobIds) {
+    static_cast<void>(guarded("renew the claims of jobs", [&] {
+        const PostgresPool::Lease connection = pool_.acquire();
+        connection->execute("UPDATE job SET lease_end = clock_timestamp() + interval '" +
+                            std::to_string(options_.jobLease.count()) +
+                            " milliseconds' WHERE state = 1 AND owner = " + sqlLiteral(options_.serverName) +
+                            " AND id IN (" + joined(jobIds) + ")");
+    }));
+}
+
+// Statistics ---------------------------------------------------------------------------------
+
+Result<StoreStats> PostgresStore::stats() {
+    return read("read the statistics", [&](Connection& connection) {
+        StoreStats stats = readStats(connection);
+        stats.databaseBytes = static_cast<std::uint64_t>(numberOf(Query(connection, kDatabaseBytes)));
+        stats.schemaVersion = static_cast<int>(numberOf(Query(connection, kSchemaVersion)));
+        return stats;
+    });
+}
+
+Result<std::unique_ptr<Store>> openPostgresStore(const PostgresOptions& options) {
+    return guarded("open the database",
+                   [&]() -> std::unique_ptr<Store> { return std::make_unique<PostgresStore>(options); });
+}
+
+}  // namespace shapedb::store
