@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "server/daemon.h"
 
+#include <array>
 #include <chrono>
+#include <fstream>
 #include <utility>
+
+#include <unistd.h>
 
 #include "core/base/return_if_error.h"
 #include "server/catalog/catalog.h"
@@ -18,6 +22,7 @@
 #include "server/security/usage_saver.h"
 #include "server/server_samples.h"
 #include "server/store/parameters_codec.h"
+#include "server/store/postgres/postgres_store.h"
 #include "server/store/sqlite/sqlite_key_store.h"
 #include "server/store/sqlite/sqlite_store.h"
 #include "server/telemetry/audit_log.h"
@@ -30,17 +35,53 @@ constexpr const char* kRebuildJournal = "rebuild.journal";
 constexpr const char* kCrashMarker = "crash.marker";
 constexpr const char* kAuditFile = "audit.log";
 
+Result<void> acceptParameters(const std::string& text) {
+    const auto parameters = store::decodeParameters(text);
+    RETURN_IF_ERROR(parameters);
+    return {};
+}
+
+/// The first line of the file. Errors: kFileNotReadable.
+Result<std::string> readPassword(const std::string& path) {
+    std::ifstream file(path);
+    std::string password;
+    if (std::getline(file, password) && !password.empty()) return password;
+    return fail(ErrorCode::kFileNotReadable,
+                "postgres.password_file: '" + path + "' cannot be read, or its first line is empty");
+}
+
+std::string hostName() {
+    std::array<char, 64> name{};
+    return ::gethostname(name.data(), name.size() - 1) == 0 ? std::string(name.data()) : std::string();
+}
+
+Result<std::unique_ptr<store::Store>> openPostgres(const config::ServerConfig& config) {
+    store::PostgresOptions options;
+    options.uri = config.postgres.uri;
+    if (!config.postgres.passwordFile.empty()) {
+        auto password = readPassword(config.postgres.passwordFile);
+        RETURN_IF_ERROR(password);
+        options.password = std::move(*password);
+    }
+    options.serverName = config.postgres.serverName.empty() ? hostName() : config.postgres.serverName;
+    options.connections = config.postgres.connections;
+    options.pointCompressionLevel = config.store.compressionLevel;
+    options.jobLease = std::chrono::seconds(config.postgres.jobLeaseSeconds);
+    options.patience = std::chrono::seconds(config.postgres.timeoutSeconds);
+    options.lockPath = config.data + "/" + files::kDatabaseName;
+    options.temporaryFolder = config.data + "/" + kTemporaryFolder;
+    options.acceptParameters = acceptParameters;
+    return store::openPostgresStore(options);
+}
+
 Result<std::unique_ptr<store::Store>> openStore(const config::ServerConfig& config) {
     RETURN_IF_ERROR(files::prepareDataDirectory(config.data));
+    if (config.store.engine == "postgres") return openPostgres(config);
     store::SqliteOptions options;
     options.path = config.data + "/" + files::kDatabaseName;
     options.readers = config.store.readers;
     options.pointCompressionLevel = config.store.compressionLevel;
-    options.acceptParameters = [](const std::string& text) -> Result<void> {
-        const auto parameters = store::decodeParameters(text);
-        RETURN_IF_ERROR(parameters);
-        return {};
-    };
+    options.acceptParameters = acceptParameters;
     return store::openSqliteStore(options);
 }
 

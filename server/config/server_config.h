@@ -59,9 +59,19 @@ struct ServerConfig {
     } limits;
 
     struct Store {
-        int readers = 4;           ///< pooled read connections
-        int compressionLevel = 1;  ///< zstd level of stored points
+        std::string engine = "sqlite";  ///< "sqlite": a file in `data`; "postgres"
+        int readers = 4;                ///< pooled read connections; sqlite only
+        int compressionLevel = 1;       ///< zstd level of stored points
     } store;
+
+    struct Postgres {
+        std::string uri;           ///< of libpq, without a password; must be set for the engine postgres
+        std::string passwordFile;  ///< empty: as libpq finds one (PGPASSWORD, ~/.pgpass)
+        std::string serverName;  ///< unique among the servers that share the database; empty: the host's name
+        int connections = 8;     ///< at most
+        int jobLeaseSeconds = 60;  ///< how long the scans of a server that has died wait for another
+        int timeoutSeconds = 30;   ///< for a connection, and for each statement
+    } postgres;
 
     struct Search {
         int threads = 0;  ///< shared by all searches; 0: one per processor

@@ -198,17 +198,25 @@ Setting dataSetting() {
     return setting;
 }
 
-/// A path that may be empty.
+/// A text that may be empty; `what` as in "a path".
 template <typename Field>
-Setting optionalPath(const std::string& key, Field field, std::string help) {
-    Setting setting = named(key, SettingKind::kText, "a path or empty", std::move(help));
+Setting optionalText(const std::string& key, const std::string& what, Field field, std::string help) {
+    Setting setting = named(key, SettingKind::kText, what + " or empty", std::move(help));
     setting.assign = [=](ServerConfig& config, const std::string& text) -> Result<void> {
-        if (!printable(text)) return fail(ErrorCode::kInvalidArgument, "the path has a control character");
+        if (!printable(text)) {
+            return fail(ErrorCode::kInvalidArgument,
+                        "the " + what.substr(what.find(' ') + 1) + " has a control character");
+        }
         field(config) = text;
         return {};
     };
     setting.show = [=](const ServerConfig& config) { return field(const_cast<ServerConfig&>(config)); };
     return setting;
+}
+
+template <typename Field>
+Setting optionalPath(const std::string& key, Field field, std::string help) {
+    return optionalText(key, "a path", field, std::move(help));
 }
 
 /// Long on purpose: nobody should set it by accident or without knowing what it means.
@@ -242,6 +250,17 @@ Result<void> validateMetrics(const ServerConfig& config) {
                     " is beyond this machine, and metrics are served without TLS and without a key; let a "
                     "proxy with both stand before it, or, for a network where anybody may read them, set " +
                     kMetricsForAnyone + " = yes");
+}
+
+Result<void> validateStore(const ServerConfig& config) {
+    const bool postgres = config.store.engine == "postgres";
+    if (postgres && config.postgres.uri.empty()) {
+        return fail(ErrorCode::kInvalidArgument, "store.engine = postgres takes postgres.uri");
+    }
+    if (!postgres && !config.postgres.uri.empty()) {
+        return fail(ErrorCode::kInvalidArgument, "postgres.uri takes store.engine = postgres");
+    }
+    return {};
 }
 
 /// What must not be reachable beyond this machine without TLS.
@@ -346,12 +365,39 @@ std::vector<Setting> makeSettings() {
         number(
             "limits.idle_seconds", kInteger, 1, 86'400, [](C& c) -> int& { return c.limits.idleSeconds; },
             "A connection without calls is closed after this many seconds."),
+        choice(
+            "store.engine", {"sqlite", "postgres"}, [](C& c) -> std::string& { return c.store.engine; },
+            "Where shapes are kept: in a file of the data directory, or on a PostgreSQL server, which "
+            "several "
+            "servers may share."),
         number(
             "store.readers", kInteger, 1, 64, [](C& c) -> int& { return c.store.readers; },
             "Pooled read connections to the database."),
         number(
             "store.compression_level", kInteger, 1, 19, [](C& c) -> int& { return c.store.compressionLevel; },
             "zstd level of stored points. Higher: smaller and slower."),
+        optionalText(
+            "postgres.uri", "a URI", [](C& c) -> std::string& { return c.postgres.uri; },
+            "The database, as libpq takes it and without a password: postgresql://user@host/database."),
+        optionalPath(
+            "postgres.password_file", [](C& c) -> std::string& { return c.postgres.passwordFile; },
+            "File whose first line is the password. Empty: PGPASSWORD or ~/.pgpass, if one is needed."),
+        optionalText(
+            "postgres.server_name", "a name", [](C& c) -> std::string& { return c.postgres.serverName; },
+            "Unique among the servers that share the database, and the same after a restart. Empty: the name "
+            "of the "
+            "host."),
+        number(
+            "postgres.connections", kInteger, 2, 1'000, [](C& c) -> int& { return c.postgres.connections; },
+            "Most connections to the database at a time."),
+        number(
+            "postgres.job_lease_seconds", kInteger, 1, 3'600,
+            [](C& c) -> int& { return c.postgres.jobLeaseSeconds; },
+            "How long a scan that a server was segmenting when it died waits for another server."),
+        number(
+            "postgres.timeout_seconds", kInteger, 1, 3'600,
+            [](C& c) -> int& { return c.postgres.timeoutSeconds; },
+            "How long the database may take to answer a statement."),
         number(
             "search.threads", kInteger, 0, 256, [](C& c) -> int& { return c.search.threads; },
             "Processors shared by all searches, and query scans segmented at once. 0: all."),
@@ -419,6 +465,7 @@ std::vector<std::string> splitNames(const std::string& names) {
 
 Result<void> validateTogether(const ServerConfig& config) {
     RETURN_IF_ERROR(validateSecurity(config));
+    RETURN_IF_ERROR(validateStore(config));
     const std::uint64_t scan = config.limits.maxPoints * 12;
     const auto tooSmall = [&](const char* key) {
         return fail(ErrorCode::kInvalidArgument,

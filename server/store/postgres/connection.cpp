@@ -442,4 +442,25 @@ void PostgresConnection::insertPoints(std::int64_t shapeId, std::uint64_t pointB
     insert(pending.data(), pending.size());
 }
 
+Result<void> checkUri(const std::string& uri) {
+    char* why = nullptr;
+    const std::unique_ptr<PQconninfoOption, void (*)(PQconninfoOption*)> parsed(
+        PQconninfoParse(uri.c_str(), &why), PQconninfoFree);
+    const std::unique_ptr<char, void (*)(void*)> message(why, PQfreemem);
+    if (parsed == nullptr) {
+        return fail(ErrorCode::kInvalidArgument, "the URI of the database cannot be read");
+    }
+    for (const PQconninfoOption* option = parsed.get(); option->keyword != nullptr; ++option) {
+        const std::string keyword = option->keyword;
+        const bool isSecret = keyword == "password" || keyword == "sslpassword";
+        if (isSecret && option->val != nullptr && *option->val != '\0') {
+            return fail(
+                ErrorCode::kInvalidArgument,
+                "the URI of the database holds a password: put it into a file (postgres.password_file), or "
+                "into PGPASSWORD");
+        }
+    }
+    return {};
+}
+
 }  // namespace shapedb::store

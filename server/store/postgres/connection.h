@@ -77,6 +77,10 @@ class PostgresConnection final : public Connection {
     std::unordered_map<const char*, std::unique_ptr<CachedStatement>> statements_;
 };
 
+/// Errors: kInvalidArgument: libpq cannot read the URI, or it holds a password, which would be seen in lists
+/// of processes and in files that are meant for all.
+[[nodiscard]] Result<void> checkUri(const std::string& uri);
+
 /// Whether the database undid the transaction because of another one: the work can be done again.
 [[nodiscard]] bool isConflict(const Failure& failure) noexcept;
 

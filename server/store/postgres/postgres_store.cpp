@@ -58,6 +58,7 @@ constexpr std::size_t kMostServerName = 63;
 
 PostgresOptions completed(PostgresOptions options) {
     if (options.uri.empty()) raise(ErrorCode::kInvalidArgument, "the URI of the database is empty");
+    orRaise(checkUri(options.uri));
     if (options.serverName.empty() || options.serverName.size() > kMostServerName) {
         raise(ErrorCode::kInvalidArgument, "the name of the server must have 1 to 63 bytes");
     }
@@ -92,6 +93,7 @@ std::string joined(const std::vector<std::int64_t>& ids) {
 
 PostgresStore::PostgresStore(const PostgresOptions& options)
     : options_(completed(options)),
+      lock_(options_.lockPath),
       texts_(postgresStatements(options_.serverName, options_.jobLease)),
       pool_(address(options_.patience), texts_, options_.connections) {
     migrateDatabase();

@@ -29,6 +29,8 @@ struct PostgresOptions {
     /// How long a job stays with a server that no longer renews its claim. At least 100 ms.
     std::chrono::milliseconds jobLease{60'000};
     std::chrono::milliseconds patience{30'000};  ///< with the database: for a connection, for a statement
+    /// An flock on this path with ".lock" is held: one server for each name and data directory.
+    std::string lockPath;
     /// A folder for the files that backups, imports, and checks need meanwhile.
     std::string temporaryFolder;
     /// As SqliteOptions.

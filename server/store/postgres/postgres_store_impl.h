@@ -12,6 +12,7 @@
 #include "server/store/postgres/pool.h"
 #include "server/store/postgres/postgres_store.h"
 #include "server/store/sql/sql_store.h"
+#include "server/store/sqlite/process_lock.h"
 #include "server/store/sqlite/sqlite_store.h"
 
 namespace shapedb::store {
@@ -70,6 +71,7 @@ class PostgresStore final : public SqlStore {
     void copyToFile(const std::string& path, const char* stage, const RunContext& context);
 
     PostgresOptions options_;
+    ProcessLock lock_;
     StatementTexts texts_;
     PostgresPool pool_;
     std::atomic<int> maxAttempts_{0};      ///< of recoverJobs; 0: not known yet

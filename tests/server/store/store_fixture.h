@@ -118,6 +118,7 @@ class StoreTest : public ::testing::Test {
         options.uri = uri;
         options.serverName = "test";
         options.connections = 4;
+        options.lockPath = folder_.file(uri.substr(uri.rfind('=') + 1));
         options.temporaryFolder = folder_.file("");
         options.now = [this] { return ++*clock_; };
         return options;
