@@ -28,7 +28,6 @@ void JobLeases::remove(std::int64_t jobId) {
 void JobLeases::run(std::chrono::milliseconds pause) {
     std::unique_lock<std::mutex> lock(mutex_);
     while (!stopped_.wait_for(lock, pause, [this] { return stop_; })) {
-        if (held_.empty()) continue;
         const std::vector<std::int64_t> jobs(held_.begin(), held_.end());
         lock.unlock();
         renew_(jobs);

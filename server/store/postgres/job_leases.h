@@ -18,7 +18,8 @@ namespace shapedb::store {
 /// Thread-safe.
 class JobLeases {
   public:
-    /// Extends the leases of these jobs; what fails is tried again.
+    /// Extends the leases of these jobs, of which there may be none, and queues again those of any server
+    /// whose lease has ended. What fails is tried again.
     using Renew = std::function<void(const std::vector<std::int64_t>& jobIds)>;
 
     /// Renews at a third of `lease`, on a thread of its own.

@@ -39,6 +39,11 @@ constexpr char kDirectory[] = "SELECT last_change FROM directory";
 constexpr char kLastChanges[] = "SELECT id, last_change FROM collection";
 constexpr char kChangesAfter[] =
     "SELECT number, shape_id FROM change WHERE collection_id = ?1 AND number > ?2 ORDER BY number LIMIT ?3";
+// As what recoverJobs does with those of a process that was stopped: they run after all other jobs.
+constexpr char kQueueLostJobs[] =
+    "UPDATE job SET state = 0, attempts = attempts - 1, stops = stops + 1, owner = NULL, lease_end = NULL "
+    "WHERE id IN "
+    "(SELECT id FROM job WHERE state = 1 AND lease_end < clock_timestamp() FOR UPDATE SKIP LOCKED)";
 constexpr char kDatabaseBytes[] = "SELECT pg_database_size(current_database())";
 constexpr char kSchemaVersion[] = "SELECT max(number) FROM schema_migration";
 constexpr char kCreateRecord[] =
@@ -218,7 +223,7 @@ Result<std::optional<Job>> PostgresStore::claimJob() {
         auto job = SqlStore::claimJob();
         if (!job || !*job) return job;
         leases_->add((*job)->id);
-        // Its workers have lost it so often that it may be what stops them.
+        // It may be what stops its workers, which nobody may have started again.
         const int most = maxAttempts_;
         const Deaths deaths{(*job)->attempts - 1, (*job)->stops};
         if (most == 0 || !isQuarantined(deaths, most)) return job;
@@ -252,6 +257,8 @@ Result<std::vector<Shape>> PostgresStore::recoverJobs(int maxAttempts, const std
 void PostgresStore::renew(const std::vector<std::int64_t>& jobIds) {
     static_cast<void>(guarded("renew the claims of jobs", [&] {
         const PostgresPool::Lease connection = pool_.acquire();
+        Query(*connection, kQueueLostJobs).run();
+        if (jobIds.empty()) return;
         connection->execute("UPDATE job SET lease_end = clock_timestamp() + interval '" +
                             std::to_string(options_.jobLease.count()) +
                             " milliseconds' WHERE state = 1 AND owner = " + sqlLiteral(options_.serverName) +

@@ -12,16 +12,13 @@ namespace {
     "(SELECT string_agg(c.bytes, ''::bytea ORDER BY c.number) FROM point_chunk c WHERE c.shape_id = " \
     "p.shape_id)"
 
-// A job that waits, of those that were stopped least often the oldest; if there is none, one whose worker has
-// not renewed its lease. Rows that another server is about to claim are passed over.
+// Rows that another server is about to claim are passed over.
 constexpr char kNextJob[] =
-    "SELECT j.id, j.shape_id, s.collection_id, j.points_version, j.attempts, j.point_bytes, c.generation, j.stops "
-    "FROM job j JOIN shape s ON s.id = j.shape_id JOIN collection c ON c.id = s.collection_id WHERE j.id = coalesce("
-    "(SELECT q.id FROM job q JOIN shape t ON t.id = q.shape_id JOIN collection d ON d.id = t.collection_id WHERE "
-    "q.state = 0 AND NOT " SHAPEDB_HIDDEN("d.name") " ORDER BY q.stops, q.id LIMIT 1 FOR UPDATE OF q SKIP LOCKED), "
-    "(SELECT q.id FROM job q JOIN shape t ON t.id = q.shape_id JOIN collection d ON d.id = t.collection_id WHERE "
-    "q.state = 1 AND q.lease_end < clock_timestamp() AND NOT " SHAPEDB_HIDDEN("d.name") " ORDER BY q.lease_end "
-    "LIMIT 1 FOR UPDATE OF q SKIP LOCKED))";
+    "SELECT j.id, j.shape_id, s.collection_id, j.points_version, j.attempts, j.point_bytes, c.generation, "
+    "j.stops "
+    "FROM job j JOIN shape s ON s.id = j.shape_id JOIN collection c ON c.id = s.collection_id WHERE j.state "
+    "= 0 AND "
+    "NOT " SHAPEDB_HIDDEN("c.name") " ORDER BY j.stops, j.id LIMIT 1 FOR UPDATE OF j SKIP LOCKED";
 
 constexpr char kRememberDeletion[] =
     "INSERT INTO deleted_shape (collection_id, key, shape_id, version, points_version, state, point_count, "
@@ -71,7 +68,8 @@ StatementTexts postgresStatements(const std::string& serverName, std::chrono::mi
         {sql::kReleaseJob,
          "UPDATE job SET state = 0, attempts = attempts - 1, owner = NULL, lease_end = NULL WHERE id = ?1 "
          "AND state "
-         "= 1 AND attempts = ?2"},
+         "= 1 AND attempts = ?2 AND owner = " +
+             owner},
         {sql::kRequeueJob,
          "UPDATE job SET state = 0, attempts = ?2, stops = ?3, owner = NULL, lease_end = NULL WHERE shape_id "
          "= ?1"},
