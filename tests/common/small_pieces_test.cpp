@@ -2,7 +2,6 @@
 #include <atomic>
 #include <chrono>
 #include <fstream>
-#include <thread>
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -23,8 +22,10 @@ TEST(RepeatingThread, WorksAgainAndAgainUntilItEnds) {
         EXPECT_TRUE(testing::eventually([&] { return calls >= 3; }));
     }
     const int ended = calls;
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    EXPECT_EQ(calls, ended);
+    std::atomic<int> callsOfAnother{0};
+    const RepeatingThread another(std::chrono::milliseconds(1), [&] { ++callsOfAnother; });
+    ASSERT_TRUE(testing::eventually([&] { return callsOfAnother >= 20; }));
+    EXPECT_EQ(calls, ended) << "one that lives has worked twenty times meanwhile";
 }
 
 TEST(RepeatingThread, EndsWithoutWaitingForItsInterval) {

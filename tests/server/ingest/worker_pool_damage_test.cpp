@@ -4,7 +4,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <thread>
 
 #include <gtest/gtest.h>
 
@@ -18,6 +17,30 @@ namespace {
 using namespace shapedb::testing;
 using namespace std::chrono_literals;
 
+WorkerOptions quickOptions() {
+    WorkerOptions options;
+    options.backOff = 1ms;
+    return options;
+}
+
+/// Until a pool that does ask again, since its store fails for other reasons, has done so this often.
+void waitForBackOffs(int times) {
+    MemoryStore failing;
+    std::atomic<int> asked{0};
+    failing.fault = [&](const std::string& function) -> std::optional<Error> {
+        if (function != "claimJob") return std::nullopt;
+        ++asked;
+        return Error{ErrorCode::kStorage, "the disk is busy"};
+    };
+    const auto log = std::make_shared<RecordingLogger>();
+    index::CollectionIndex index(failing, log);
+    ProgressBoard board;
+    CrashIsolation isolation;
+    WorkerPool another(failing, index, board, isolation, quickDescribe, log, quickOptions());
+    ASSERT_TRUE(another.start());
+    ASSERT_TRUE(eventually([&] { return asked >= times; }));
+}
+
 class PoolOfDamage : public ::testing::Test {
   protected:
     PoolOfDamage() : log(std::make_shared<RecordingLogger>()), index(store, log) {
@@ -26,9 +49,8 @@ class PoolOfDamage : public ::testing::Test {
     }
 
     void start() {
-        WorkerOptions options;
-        options.backOff = 1ms;
-        pool = std::make_unique<WorkerPool>(store, index, board, isolation, quickDescribe, log, options);
+        pool =
+            std::make_unique<WorkerPool>(store, index, board, isolation, quickDescribe, log, quickOptions());
         EXPECT_TRUE(pool->start());
     }
     void put(const std::string& key, float tag) {
@@ -59,7 +81,7 @@ TEST_F(PoolOfDamage, ADamagedQueueTakesTheWorkersOutOfServiceUntilARestore) {
     start();
     ASSERT_TRUE(pool->trouble());
     EXPECT_NE(pool->trouble()->message.find("table job"), std::string::npos) << pool->trouble()->message;
-    std::this_thread::sleep_for(50ms);
+    waitForBackOffs(20);
     EXPECT_EQ(asked, 0) << "it does not try again and again";
     pool->pause();
     damaged = false;
@@ -78,7 +100,7 @@ TEST_F(PoolOfDamage, DamageFoundLaterTakesThemOutOfServiceToo) {
     start();
     EXPECT_TRUE(eventually([&] { return pool->trouble().has_value(); }));
     const int before = asked;
-    std::this_thread::sleep_for(50ms);
+    waitForBackOffs(20);
     EXPECT_EQ(asked, before);
 }
 
