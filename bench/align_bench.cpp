@@ -10,13 +10,11 @@
 #include <CLI/CLI.hpp>
 
 #include "bench/align.h"
-#include "bench/environment.h"
+#include "bench/measuring.h"
 #include "bench/models.h"
 #include "bench/operations.h"
 #include "bench/output.h"
-#include "bench/quantiles.h"
-#include "bench/stopwatch.h"
-#include "client/cli/exit_code.h"
+#include "client/cli/console.h"
 #include "client/cli/retrieval_task.h"
 #include "client/cli/scan_source.h"
 #include "client/io/scan_reader.h"
@@ -26,8 +24,7 @@
 #include "core/geometry/box.h"
 #include "core/geometry/motion.h"
 #include "core/geometry/neighbours.h"
-#include "core/synthetic/noise.h"
-#include "core/synthetic/partial.h"
+#include "core/synthetic/degrade.h"
 
 namespace shapedb::bench {
 

@@ -8,7 +8,7 @@
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <boost/iterator/transform_iterator.hpp>
 
-#include "bench/stopwatch.h"
+#include "bench/measuring.h"
 
 namespace shapedb::bench {
 

@@ -17,7 +17,7 @@
 #include "bench/operations.h"
 #include "bench/work_loop.h"
 #include "client/api/client.h"
-#include "client/cli/exit_code.h"
+#include "client/cli/console.h"
 #include "core/base/return_if_error.h"
 
 namespace shapedb::bench {

@@ -2,7 +2,7 @@
 #include <faiss/Index.h>
 #include <faiss/IndexFlat.h>
 
-#include "bench/vector_scan.h"
+#include "bench/peers.h"
 
 namespace shapedb::bench {
 

@@ -12,14 +12,13 @@
 #include <nlohmann/json.hpp>
 #include <tbb/task_arena.h>
 
-#include "bench/environment.h"
+#include "bench/measuring.h"
 #include "bench/operations.h"
 #include "bench/output.h"
-#include "bench/quantiles.h"
 #include "bench/signature_generator.h"
 #include "bench/simulated_searches.h"
+#include "client/cli/console.h"
 #include "client/cli/evaluation_run.h"
-#include "client/cli/exit_code.h"
 #include "core/base/return_if_error.h"
 #include "core/search/top_k.h"
 #include "core/search/verify.h"

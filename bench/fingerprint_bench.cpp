@@ -13,8 +13,8 @@
 #include <tbb/parallel_for.h>
 
 #include "bench/operations.h"
+#include "client/cli/console.h"
 #include "client/cli/evaluation_run.h"
-#include "client/cli/exit_code.h"
 #include "client/io/scan_reader.h"
 #include "common/sha256.h"
 #include "core/base/return_if_error.h"

@@ -13,8 +13,8 @@
 #include <nlohmann/json.hpp>
 #include <sys/wait.h>
 
-#include "bench/environment.h"
 #include "bench/jobs.h"
+#include "bench/output.h"
 #include "client/cli/console.h"
 #include "client/cli/text.h"
 

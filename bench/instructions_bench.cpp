@@ -13,8 +13,8 @@
 #include "bench/operations.h"
 #include "bench/output.h"
 #include "bench/server_process.h"
+#include "client/cli/console.h"
 #include "client/cli/evaluation_run.h"
-#include "client/cli/exit_code.h"
 #include "core/base/return_if_error.h"
 
 namespace shapedb::bench {

@@ -9,10 +9,9 @@
 
 #include <CLI/CLI.hpp>
 
-#include "bench/environment.h"
 #include "bench/operations.h"
 #include "bench/output.h"
-#include "client/cli/exit_code.h"
+#include "client/cli/console.h"
 #include "client/cli/retrieval_task.h"
 #include "client/io/scan_reader.h"
 #include "core/base/math.h"
@@ -23,7 +22,7 @@
 #include "core/geometry/motion.h"
 #include "core/pipeline.h"
 #include "core/segmentation/segmentation.h"
-#include "core/synthetic/noise.h"
+#include "core/synthetic/degrade.h"
 
 namespace shapedb::bench {
 

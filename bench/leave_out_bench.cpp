@@ -13,17 +13,16 @@
 
 #include <CLI/CLI.hpp>
 
-#include "bench/environment.h"
 #include "bench/operations.h"
 #include "bench/output.h"
 #include "bench/simulated_searches.h"
+#include "client/cli/console.h"
 #include "client/cli/evaluation_run.h"
-#include "client/cli/exit_code.h"
 #include "core/base/return_if_error.h"
 #include "core/evaluation/metrics.h"
 #include "core/search/top_k.h"
 #include "core/search/verify.h"
-#include "core/synthetic/noise.h"
+#include "core/synthetic/degrade.h"
 
 namespace shapedb::bench {
 

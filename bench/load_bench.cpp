@@ -9,12 +9,11 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "bench/environment.h"
 #include "bench/load_run.h"
 #include "bench/operations.h"
 #include "bench/output.h"
+#include "client/cli/console.h"
 #include "client/cli/evaluation_run.h"
-#include "client/cli/exit_code.h"
 #include "client/cli/text.h"
 #include "core/base/return_if_error.h"
 

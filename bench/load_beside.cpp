@@ -10,7 +10,7 @@
 
 #include "bench/batch_clients.h"
 #include "bench/load_parts.h"
-#include "bench/quantiles.h"
+#include "bench/measuring.h"
 #include "bench/stored_shapes.h"
 #include "bench/work_loop.h"
 #include "core/base/return_if_error.h"

@@ -3,7 +3,7 @@
 
 #include <utility>
 
-#include "bench/quantiles.h"
+#include "bench/measuring.h"
 #include "bench/stored_shapes.h"
 #include "core/base/return_if_error.h"
 #include "core/signature/signature_codec.h"

@@ -11,7 +11,7 @@
 #include <sys/resource.h>
 
 #include "bench/load_parts.h"
-#include "bench/quantiles.h"
+#include "bench/measuring.h"
 #include "bench/server_process.h"
 #include "bench/stored_shapes.h"
 #include "bench/work_loop.h"

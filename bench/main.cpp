@@ -4,7 +4,7 @@
 
 #include <unistd.h>
 
-#include "bench/program.h"
+#include "bench/operations.h"
 #include "client/cli/console.h"
 #include "common/stop_signals.h"
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "bench/d2_histogram.h"
+#include "bench/histogram.h"
 #include "bench/peers.h"
 #include "core/base/return_if_error.h"
 #include "core/matching/score.h"

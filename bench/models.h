@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/run_context.h"
 #include "core/geometry/point.h"
 
 namespace shapedb::bench {
@@ -26,5 +27,24 @@ struct FamilyScan {
 
 /// Every other point, from the first (0) or the second (1) on.
 [[nodiscard]] PointCloud halfOf(const PointCloud& points, std::size_t which);
+
+// Scans of one side as cameras make them, simulated from models.
+
+struct OneSidedSettings {
+    double noise = 0.003;  ///< standard deviation as a share of the box diagonal of the model
+    double grazing =
+        0.35;            ///< surface is lost below half of this cosine to the view, more and more up to 1.5
+    double hole = 0.08;  ///< radius of the largest of up to two holes, as a share of the diagonal
+    std::uint64_t least = 1000;  ///< points left, at random between these
+    std::uint64_t most = 20000;
+};
+
+/// What a far camera sees of the model from a random direction (core/synthetic/degrade.h), without what
+/// grazes the view, with holes, thinned out, and noisy. All random numbers come from `seed`. Where the
+/// model gives no normals nothing is taken to graze.
+///
+/// Errors: kCancelled, kDeadlineExceeded.
+[[nodiscard]] Result<PointCloud> oneSidedScan(const PointCloud& model, const OneSidedSettings& settings,
+                                              std::uint64_t seed, const RunContext& context);
 
 }  // namespace shapedb::bench

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The operations of shapedb-bench. To add one, write a source file, declare its function here and call it in
-// program.cpp.
+// operations.cpp.
 #pragma once
 
 #include <atomic>
@@ -50,5 +50,14 @@ void addVerdictsOperation(CLI::App& app, Bench& bench);
 void addFindOperation(CLI::App& app, Bench& bench);
 void addLeaveOutOperation(CLI::App& app, Bench& bench);
 void addFingerprintOperation(CLI::App& app, Bench& bench);
+
+// The program: reads the command line and runs the operation the user chose.
+
+inline constexpr const char* kProgramName = "shapedb-bench";
+
+/// The whole program except the signal handler: prints the operation's result or error and returns the
+/// exit code (those of the `shapedb` command, client/cli/console.h). Never throws.
+[[nodiscard]] int run(int argc, const char* const* argv, cli::Console& console,
+                      const std::atomic<bool>& cancel);
 
 }  // namespace shapedb::bench

@@ -6,15 +6,14 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "bench/environment.h"
 #include "bench/operations.h"
 #include "bench/output.h"
 #include "bench/peers.h"
 #include "bench/retrieval_report.h"
 #include "bench/retrieval_run.h"
 #include "client/cli/checks.h"
+#include "client/cli/console.h"
 #include "client/cli/evaluation_run.h"
-#include "client/cli/exit_code.h"
 #include "core/base/return_if_error.h"
 
 namespace shapedb::bench {

@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bench/chart.h"
-#include "bench/precision_recall.h"
+#include "bench/retrieval_run.h"
 #include "client/cli/text.h"
 
 namespace shapedb::bench {

@@ -7,7 +7,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "bench/environment.h"
+#include "bench/output.h"
 #include "bench/retrieval_run.h"
 
 namespace shapedb::bench {

@@ -14,13 +14,10 @@
 #include <tbb/global_control.h>
 
 #include "bench/bare_delaunay.h"
-#include "bench/environment.h"
+#include "bench/measuring.h"
 #include "bench/operations.h"
 #include "bench/output.h"
-#include "bench/peak_memory.h"
-#include "bench/quantiles.h"
-#include "bench/stopwatch.h"
-#include "client/cli/exit_code.h"
+#include "client/cli/console.h"
 #include "client/io/scan_reader.h"
 #include "core/base/return_if_error.h"
 #include "core/delaunay/delaunay.h"

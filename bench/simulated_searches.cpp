@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "bench/models.h"
-#include "bench/one_sided.h"
 #include "client/cli/evaluation_run.h"
 #include "client/cli/retrieval_task.h"
 #include "client/io/scan_reader.h"
@@ -14,8 +13,7 @@
 #include "core/pipeline.h"
 #include "core/preparation/scene.h"
 #include "core/synthetic/bend.h"
-#include "core/synthetic/noise.h"
-#include "core/synthetic/partial.h"
+#include "core/synthetic/degrade.h"
 #include "core/views/views.h"
 
 namespace shapedb::bench {

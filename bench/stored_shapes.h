@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Large databases, made without uploading.
+// Large databases, made without uploading, for measurements at sizes that would take days to upload.
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,7 @@
 #include "core/base/error.h"
 #include "core/base/run_context.h"
 #include "core/geometry/point.h"
+#include "server/store/sqlite/sqlite_store.h"
 
 namespace shapedb::bench {
 
@@ -23,5 +25,23 @@ namespace shapedb::bench {
 /// the collection "default": key, one label and signature each. Errors: those of fillDatabase.
 [[nodiscard]] Result<void> fillDataDirectory(const std::string& data, const SignatureGenerator& generator,
                                              std::uint64_t count, const RunContext& context);
+
+struct FillShape {
+    std::string key;  ///< unique
+    Metadata metadata;
+    std::string signature;  ///< as core/signature/signature_codec.h encodes it; not checked
+};
+
+/// Creates the database at `options.path`, or opens it as openSqliteStore does, makes the collection and
+/// puts `count` READY shapes into it, `make(0)`, `make(1)`, ... Each has the same four points, so that
+/// the database passes `check` (but a rebuild would replace all signatures by that of a tetrahedron).
+/// Commits in batches: after an error some rows are already stored.
+///
+/// Errors: those of openSqliteStore; kAlreadyExists (collection, or a key); kCancelled,
+/// kDeadlineExceeded. Not thread-safe.
+[[nodiscard]] Result<void> fillDatabase(const store::SqliteOptions& options, const std::string& collection,
+                                        const std::string& parameters, std::uint64_t count,
+                                        const std::function<FillShape(std::uint64_t)>& make,
+                                        const RunContext& context = {});
 
 }  // namespace shapedb::bench

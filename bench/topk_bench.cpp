@@ -16,13 +16,12 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
-#include "bench/environment.h"
+#include "bench/measuring.h"
 #include "bench/operations.h"
 #include "bench/output.h"
-#include "bench/quantiles.h"
+#include "bench/peers.h"
 #include "bench/signature_generator.h"
-#include "bench/vector_scan.h"
-#include "client/cli/exit_code.h"
+#include "client/cli/console.h"
 #include "core/base/random.h"
 #include "core/base/return_if_error.h"
 #include "core/matching/attributed/statistics_bound.h"

@@ -8,12 +8,11 @@
 
 #include <CLI/CLI.hpp>
 
-#include "bench/environment.h"
+#include "bench/measuring.h"
 #include "bench/operations.h"
 #include "bench/output.h"
-#include "bench/quantiles.h"
 #include "bench/typical.h"
-#include "client/cli/exit_code.h"
+#include "client/cli/console.h"
 #include "client/cli/scan_source.h"
 #include "core/base/return_if_error.h"
 #include "core/fit/fit.h"

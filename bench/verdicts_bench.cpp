@@ -11,15 +11,14 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "bench/environment.h"
+#include "bench/measuring.h"
 #include "bench/operations.h"
 #include "bench/output.h"
-#include "bench/quantiles.h"
 #include "bench/simulated_searches.h"
+#include "client/cli/console.h"
 #include "client/cli/evaluation_run.h"
-#include "client/cli/exit_code.h"
 #include "core/base/return_if_error.h"
-#include "core/matching/score_scale.h"
+#include "core/matching/score.h"
 #include "core/search/verify.h"
 
 namespace shapedb::bench {

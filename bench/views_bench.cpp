@@ -12,22 +12,19 @@
 
 #include <CLI/CLI.hpp>
 
-#include "bench/environment.h"
+#include "bench/measuring.h"
 #include "bench/models.h"
-#include "bench/one_sided.h"
 #include "bench/operations.h"
 #include "bench/output.h"
-#include "bench/quantiles.h"
-#include "bench/stopwatch.h"
+#include "client/cli/console.h"
 #include "client/cli/evaluation_run.h"
-#include "client/cli/exit_code.h"
 #include "client/cli/retrieval_task.h"
 #include "client/io/scan_reader.h"
 #include "core/base/return_if_error.h"
 #include "core/fit/surface_points.h"
 #include "core/matching/scorer.h"
 #include "core/pipeline.h"
-#include "core/synthetic/noise.h"
+#include "core/synthetic/degrade.h"
 #include "core/views/view_distance.h"
 #include "core/views/views.h"
 
@@ -61,7 +58,7 @@ struct Model {
 };
 
 // What each way of comparing keeps of a shape of the gallery or of a query.
-struct Described {
+struct DescribedViews {
     std::string name;
     std::vector<std::size_t> right;  // of a query
     std::optional<ViewSet> set;
@@ -104,7 +101,7 @@ PointCloud half(const PointCloud& points, std::size_t which) {
 }
 
 std::optional<Error> describeShape(const PointCloud& points, const ViewsFlags& flags, bool whole,
-                                   Described& shape, const RunContext& context) {
+                                   DescribedViews& shape, const RunContext& context) {
     const auto surface = makeSurfacePoints(points, context);
     if (!surface && stops(surface.error())) return surface.error();
     if (surface) {
@@ -164,8 +161,8 @@ struct Ranks {
     std::size_t sum = 0;
 };
 
-Ranks ranksOf(const Described& query, const std::vector<Described>& gallery, const ViewsFlags& flags,
-              std::vector<double>* unrelated) {
+Ranks ranksOf(const DescribedViews& query, const std::vector<DescribedViews>& gallery,
+              const ViewsFlags& flags, std::vector<double>* unrelated) {
     std::vector<bool> right(gallery.size(), false);
     for (const std::size_t g : query.right) right[g] = true;
     std::vector<double> byView(gallery.size(), INFINITY);
@@ -203,9 +200,9 @@ std::string line(const char* name, const std::vector<std::size_t>& ranks) {
            within(32) + within(64) + " |\n";
 }
 
-Result<std::vector<Described>> describeGallery(const std::vector<Model>& models, const ViewsFlags& flags,
-                                               bool halved, const RunContext& context) {
-    std::vector<Described> gallery(models.size());
+Result<std::vector<DescribedViews>> describeGallery(const std::vector<Model>& models, const ViewsFlags& flags,
+                                                    bool halved, const RunContext& context) {
+    std::vector<DescribedViews> gallery(models.size());
     const auto run = cli::forEachItem(models.size(), flags.threads, context, [&](std::size_t i) {
         gallery[i].name = models[i].name;
         const PointCloud points = halved ? half(models[i].points, 0) : models[i].points;
@@ -215,9 +212,9 @@ Result<std::vector<Described>> describeGallery(const std::vector<Model>& models,
     return gallery;
 }
 
-Result<std::vector<Described>> simulatedQueries(const std::vector<Model>& models, const ViewsFlags& flags,
-                                                const RunContext& context) {
-    std::vector<Described> queries(models.size() * flags.perShape);
+Result<std::vector<DescribedViews>> simulatedQueries(const std::vector<Model>& models,
+                                                     const ViewsFlags& flags, const RunContext& context) {
+    std::vector<DescribedViews> queries(models.size() * flags.perShape);
     const auto run =
         cli::forEachItem(queries.size(), flags.threads, context, [&](std::size_t q) -> std::optional<Error> {
             const std::size_t m = q / flags.perShape;
@@ -232,14 +229,14 @@ Result<std::vector<Described>> simulatedQueries(const std::vector<Model>& models
     return queries;
 }
 
-Result<std::vector<Described>> readQueries(const std::vector<Model>& gallery, const ViewsFlags& flags,
-                                           const RunContext& context) {
+Result<std::vector<DescribedViews>> readQueries(const std::vector<Model>& gallery, const ViewsFlags& flags,
+                                                const RunContext& context) {
     const auto models = readModels(flags.queries, context);
     RETURN_IF_ERROR(models);
-    std::vector<Described> queries;
+    std::vector<DescribedViews> queries;
     std::vector<const PointCloud*> points;
     for (const Model& model : *models) {
-        Described query;
+        DescribedViews query;
         query.name = model.name;
         for (std::size_t g = 0; g < gallery.size(); ++g) {
             if (gallery[g].stem == model.stem) query.right.push_back(g);
@@ -255,9 +252,9 @@ Result<std::vector<Described>> readQueries(const std::vector<Model>& gallery, co
     return queries;
 }
 
-std::string qualityText(const char* of, const std::vector<Described>& shapes) {
+std::string qualityText(const char* of, const std::vector<DescribedViews>& shapes) {
     std::vector<double> qualities;
-    for (const Described& shape : shapes) {
+    for (const DescribedViews& shape : shapes) {
         if (!shape.signature || !shape.signature->attributes) continue;
         qualities.push_back(shape.signature->attributes->quality / 255.0);
     }
@@ -289,7 +286,7 @@ Result<int> runViews(const ViewsFlags& flags, Bench& bench) {
     std::vector<std::size_t> sum;
     std::vector<double> unrelated;
     std::string listed;
-    for (const Described& query : *queries) {
+    for (const DescribedViews& query : *queries) {
         const Ranks ranks = ranksOf(query, *gallery, flags, &unrelated);
         views.push_back(ranks.views);
         profile.push_back(ranks.profile);
@@ -302,7 +299,7 @@ Result<int> runViews(const ViewsFlags& flags, Bench& bench) {
         }
     }
     double seconds = 0.0;
-    for (const Described& shape : *gallery) seconds += shape.seconds;
+    for (const DescribedViews& shape : *gallery) seconds += shape.seconds;
     std::string text = describe(environment()) + "\n\n" + std::to_string(queries->size()) + " queries, " +
                        std::to_string(gallery->size()) + " shapes; " +
                        numberText("%.1f", 1e3 * seconds / static_cast<double>(gallery->size())) +

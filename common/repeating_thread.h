@@ -7,6 +7,7 @@
 #include <functional>
 #include <mutex>
 #include <thread>
+#include <utility>
 
 namespace shapedb {
 
@@ -14,8 +15,23 @@ namespace shapedb {
 /// that runs. `work` must not throw.
 class RepeatingThread {
   public:
-    RepeatingThread(std::chrono::milliseconds interval, std::function<void()> work);
-    ~RepeatingThread();
+    RepeatingThread(std::chrono::milliseconds interval, std::function<void()> work)
+        : thread_([this, interval, work = std::move(work)] {
+              std::unique_lock<std::mutex> lock(mutex_);
+              while (!wake_.wait_for(lock, interval, [this] { return ending_; })) {
+                  lock.unlock();
+                  work();
+                  lock.lock();
+              }
+          }) {}
+    ~RepeatingThread() {
+        {
+            const std::lock_guard<std::mutex> lock(mutex_);
+            ending_ = true;
+        }
+        wake_.notify_all();
+        thread_.join();
+    }
     RepeatingThread(const RepeatingThread&) = delete;
     RepeatingThread& operator=(const RepeatingThread&) = delete;
 

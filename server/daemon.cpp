@@ -19,7 +19,7 @@
 #include "server/ingest/crash_marker.h"
 #include "server/rpc/grpc_server.h"
 #include "server/security/authorization.h"
-#include "server/security/usage_saver.h"
+#include "server/security/keyring.h"
 #include "server/server_samples.h"
 #include "server/store/parameters_codec.h"
 #include "server/store/postgres/postgres_store.h"

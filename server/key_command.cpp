@@ -11,7 +11,7 @@
 
 #include "common/utc_text.h"
 #include "core/base/return_if_error.h"
-#include "server/config/command_line_error.h"
+#include "server/config/command_line.h"
 #include "server/config/load.h"
 #include "server/daemon.h"
 #include "server/security/key.h"

@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 
+#include <google/protobuf/message.h>
 #include <grpcpp/grpcpp.h>
 
 #include "client/api/client.h"
@@ -69,5 +70,9 @@ template <typename Stub, typename Request, typename Response>
     RETURN_IF_ERROR(made);
     return response;
 }
+
+/// Refuses text that is not UTF-8: protobuf would only complain on standard error and send it all the same.
+/// Errors: kInvalidArgument naming the field of the request, at any depth, that is not UTF-8.
+[[nodiscard]] Result<void> requireUtf8(const google::protobuf::Message& request);
 
 }  // namespace shapedb::client

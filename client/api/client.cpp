@@ -5,10 +5,9 @@
 
 #include <grpcpp/grpcpp.h>
 
-#include "client/api/address.h"
 #include "client/api/call.h"
-#include "client/api/credentials.h"
-#include "client/api/retry.h"
+#include "client/api/call_failure.h"
+#include "client/api/channel.h"
 #include "core/base/return_if_error.h"
 
 namespace shapedb::client {

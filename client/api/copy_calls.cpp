@@ -9,7 +9,6 @@
 #include "client/backup/backup_chain.h"
 #include "client/backup/backup_file.h"
 #include "client/backup/increment_file.h"
-#include "client/backup/source_file.h"
 #include "common/backup_manifest.h"
 #include "common/sha256.h"
 #include "core/base/return_if_error.h"

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <string>
 
-#include "common/point_stream.h"
+#include "common/protocol.h"
 #include "common/wire_vector.h"
 #include "core/base/error.h"
 #include "core/base/run_context.h"

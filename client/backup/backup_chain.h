@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "client/backup/backup_file.h"
 #include "client/backup/increment_file.h"
-#include "client/backup/source_file.h"
 #include "common/backup_manifest.h"
 #include "core/base/error.h"
 #include "core/base/run_context.h"

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "client/backup/source_file.h"
+#include "client/backup/backup_file.h"
 #include "common/backup_increment.h"
 #include "core/base/error.h"
 

@@ -14,7 +14,7 @@
 #include "client/api/packing.h"
 #include "client/cli/checks.h"
 #include "client/cli/connection.h"
-#include "client/cli/exit_code.h"
+#include "client/cli/console.h"
 #include "client/cli/failures.h"
 #include "client/cli/parameters.h"
 #include "client/cli/scan_source.h"

@@ -7,7 +7,7 @@
 
 #include "client/cli/checks.h"
 #include "client/cli/connection.h"
-#include "client/cli/exit_code.h"
+#include "client/cli/console.h"
 #include "client/cli/fit_output.h"
 #include "client/cli/local_result.h"
 #include "client/cli/parameters.h"
@@ -15,8 +15,8 @@
 #include "client/cli/session.h"
 #include "client/cli/text.h"
 #include "client/cli/units.h"
+#include "client/io/output_file.h"
 #include "client/io/ply_writer.h"
-#include "client/io/text_file.h"
 #include "core/base/return_if_error.h"
 #include "core/fit/fit.h"
 

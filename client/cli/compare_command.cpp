@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/cli/connection.h"
-#include "client/cli/exit_code.h"
+#include "client/cli/console.h"
 #include "client/cli/fit_output.h"
 #include "client/cli/local_result.h"
 #include "client/cli/parameters.h"

@@ -6,8 +6,8 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "client/cli/console.h"
 #include "client/cli/evaluation_run.h"
-#include "client/cli/exit_code.h"
 #include "client/cli/figure.h"
 #include "client/cli/parameters.h"
 #include "client/cli/retrieval_task.h"

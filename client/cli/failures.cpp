@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <map>
 
-#include "client/cli/exit_code.h"
+#include "client/cli/console.h"
 #include "client/cli/text.h"
 
 namespace shapedb::cli {

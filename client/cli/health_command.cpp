@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/cli/connection.h"
-#include "client/cli/exit_code.h"
+#include "client/cli/console.h"
 #include "client/cli/session.h"
 #include "core/base/return_if_error.h"
 

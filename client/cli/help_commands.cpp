@@ -8,8 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/cli/completion.h"
-#include "client/cli/exit_code.h"
-#include "client/cli/manual.h"
+#include "client/cli/console.h"
 #include "client/cli/session.h"
 #include "client/cli/usage.h"
 #include "common/nearest_name.h"

@@ -7,16 +7,15 @@
 #include <nlohmann/json.hpp>
 
 #include "client/cli/checks.h"
-#include "client/cli/csv.h"
+#include "client/cli/console.h"
 #include "client/cli/evaluation_run.h"
-#include "client/cli/exit_code.h"
 #include "client/cli/failures.h"
 #include "client/cli/fit_output.h"
 #include "client/cli/parameters.h"
 #include "client/cli/session.h"
 #include "client/cli/text.h"
 #include "client/cli/units.h"
-#include "client/io/text_file.h"
+#include "client/io/output_file.h"
 #include "core/base/return_if_error.h"
 
 namespace shapedb::cli {

@@ -10,7 +10,7 @@
 
 #include "client/api/types.h"
 #include "core/base/error.h"
-#include "core/matching/score_options.h"
+#include "core/matching/score.h"
 #include "core/pipeline.h"
 #include "core/search/verify.h"
 

@@ -9,18 +9,17 @@
 
 #include "client/cli/checks.h"
 #include "client/cli/connection.h"
-#include "client/cli/exit_code.h"
+#include "client/cli/console.h"
 #include "client/cli/fit_output.h"
-#include "client/cli/query_output.h"
 #include "client/cli/report_page.h"
 #include "client/cli/search_run.h"
 #include "client/cli/session.h"
 #include "client/cli/shape_output.h"
 #include "client/cli/text.h"
 #include "client/cli/units.h"
-#include "client/io/text_file.h"
+#include "client/io/output_file.h"
 #include "core/base/return_if_error.h"
-#include "core/matching/score_scale.h"
+#include "core/matching/score.h"
 
 namespace shapedb::cli {
 

@@ -8,7 +8,7 @@
 #include "client/cli/text.h"
 #include "common/safe_text.h"
 #include "core/geometry/box.h"
-#include "core/synthetic/noise.h"
+#include "core/synthetic/degrade.h"
 
 namespace shapedb::cli {
 

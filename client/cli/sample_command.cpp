@@ -9,7 +9,7 @@
 #include <tbb/parallel_for.h>
 
 #include "client/cli/checks.h"
-#include "client/cli/exit_code.h"
+#include "client/cli/console.h"
 #include "client/cli/scan_source.h"
 #include "client/cli/session.h"
 #include "client/cli/text.h"

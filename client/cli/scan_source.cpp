@@ -11,7 +11,7 @@
 #include "client/cli/text.h"
 #include "core/base/random.h"
 #include "core/base/return_if_error.h"
-#include "core/synthetic/noise.h"
+#include "core/synthetic/degrade.h"
 
 namespace shapedb::cli {
 

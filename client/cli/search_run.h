@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A search with a scan file or a stored shape, as `query` and `report` make it.
+// A search with a scan file or a stored shape, as `query` and `report` make it, and its answer as text, as
+// JSON and as rows of a table.
 #pragma once
 
 #include <optional>
 #include <string>
+
+#include <nlohmann/json_fwd.hpp>
 
 #include "client/api/client.h"
 #include "client/cli/parameters.h"
@@ -62,5 +65,16 @@ struct Searcher {
 
 /// From coordinates of the hit to those of the query: that of its fit, or else of its explanation.
 [[nodiscard]] std::optional<Motion> motionOf(const client::Hit& hit);
+
+/// Which hits the text explains.
+enum class Explained { kNone, kFirst, kAll };
+
+[[nodiscard]] nlohmann::json answerJson(const SearchFlags& flags, const Answer& answer);
+[[nodiscard]] std::string answerText(const SearchFlags& flags, const Answer& answer, Explained explained);
+
+/// The first line of a CSV file of hits.
+[[nodiscard]] std::string hitsCsvHeader();
+/// A line for each hit.
+[[nodiscard]] std::string hitsCsv(const Answer& answer);
 
 }  // namespace shapedb::cli

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/cli/checks.h"
-#include "client/cli/exit_code.h"
+#include "client/cli/console.h"
 #include "client/cli/local_result.h"
 #include "client/cli/parameters.h"
 #include "client/cli/scan_source.h"

@@ -11,7 +11,7 @@
 
 #include "client/cli/checks.h"
 #include "client/cli/completion.h"
-#include "client/cli/exit_code.h"
+#include "client/cli/console.h"
 #include "client/cli/usage.h"
 
 namespace shapedb::cli {

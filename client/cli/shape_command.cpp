@@ -8,7 +8,7 @@
 
 #include "client/cli/checks.h"
 #include "client/cli/connection.h"
-#include "client/cli/exit_code.h"
+#include "client/cli/console.h"
 #include "client/cli/session.h"
 #include "client/cli/shape_output.h"
 #include "client/cli/text.h"

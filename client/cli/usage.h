@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Messages about a wrong command line, in terms of commands and flags.
+// What the command line says of itself: messages about a wrong one, in terms of commands and flags, and
+// manual pages.
 #pragma once
 
 #include <string>
@@ -30,5 +31,11 @@ namespace shapedb::cli {
 /// Those that are shown in --help; options also of its groups, positional ones too.
 [[nodiscard]] std::vector<const CLI::Option*> optionsOf(const CLI::App& command);
 [[nodiscard]] std::vector<const CLI::App*> shownCommands(const CLI::App& app);
+
+/// "shapedb-admin-key" for `shapedb admin key`.
+[[nodiscard]] std::string manualName(const CLI::App& command);
+
+/// The page of a command, in roff, for section 1. `version`: what --version prints.
+[[nodiscard]] std::string manualPage(const CLI::App& command, const std::string& version);
 
 }  // namespace shapedb::cli

@@ -38,4 +38,26 @@ std::unique_ptr<ByteSource> putBack(std::string bytes, std::unique_ptr<ByteSourc
 std::unique_ptr<ByteSource> makeUtf16Source(std::string path, std::unique_ptr<ByteSource> text,
                                             bool bigEndian);
 
+/// What a gzip file holds. Several members one after the other are one file, as gzip has it; zero bytes may
+/// follow. Read as it unpacks: nothing is kept but a window of 32 KiB. Errors: kMalformedFile for damaged
+/// data and for a bomb: more than 64 MiB that are more than 200 times their compressed size. `path` is for
+/// messages.
+std::unique_ptr<ByteSource> makeGzipSource(std::string path, std::unique_ptr<ByteSource> packed);
+
+// How much packed data may unpack to.
+
+/// Scans as text shrink to a third, those of few different numbers to a twentieth.
+constexpr std::uint64_t kGreatestPackingRatio = 200;
+constexpr std::uint64_t kAlwaysUnpackedBytes = std::uint64_t{64} << 20;
+
+inline bool isBomb(std::uint64_t unpacked, std::uint64_t packed) {
+    return unpacked > kAlwaysUnpackedBytes && unpacked / kGreatestPackingRatio > packed;
+}
+
+inline std::string bombText() {
+    return "more than " + std::to_string(kGreatestPackingRatio) +
+           " times as large when unpacked, which is not read from packed files; if it is meant to be, unpack "
+           "it first, e.g. with gunzip";
+}
+
 }  // namespace shapedb::io

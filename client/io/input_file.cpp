@@ -10,7 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "client/io/gzip_source.h"
+#include "client/io/byte_source.h"
 #include "client/io/text.h"
 
 namespace shapedb::io {

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <string_view>
 
 namespace shapedb::io {
@@ -23,5 +24,9 @@ bool hasTextForBinary(std::string_view head);
 
 /// For messages, of such an ending: "a PLY file".
 std::string_view kindName(std::string_view ending);
+
+/// How to get a file that we do not read into a format that we do. For an ending in lower case with its dot:
+/// what its format is and which program converts it; empty for an ending that says nothing.
+std::string conversionAdvice(std::string_view ending);
 
 }  // namespace shapedb::io

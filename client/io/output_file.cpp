@@ -4,6 +4,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <filesystem>
+#include <new>
 #include <random>
 #include <system_error>
 #include <utility>
@@ -107,3 +108,20 @@ Result<void> OutputFile::commit() {
 Error OutputFile::failed(int number) const { return notWritable(path_, number); }
 
 }  // namespace shapedb::io
+
+namespace shapedb {
+
+Result<void> writeTextFile(const std::string& path, const std::string& text) {
+    try {
+        auto file = io::OutputFile::create(path);
+        RETURN_IF_ERROR(file);
+        RETURN_IF_ERROR(file->write(text));
+        return file->commit();
+    } catch (const std::bad_alloc&) {
+        return fail(ErrorCode::kOutOfMemory, path + ": not enough memory to write the file");
+    } catch (const std::exception& e) {
+        return fail(ErrorCode::kFileNotWritable, path + ": cannot be written: " + e.what());
+    }
+}
+
+}  // namespace shapedb

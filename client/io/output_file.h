@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A file that appears complete or not at all. Private to client/io.
+// Files that appear complete or not at all.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +11,8 @@
 
 namespace shapedb::io {
 
-/// The destructor removes what was not committed. Errors: kFileNotWritable. Not thread-safe.
+/// Private to client/io. The destructor removes what was not committed. Errors: kFileNotWritable. Not
+/// thread-safe.
 class OutputFile {
   public:
     static Result<OutputFile> create(const std::string& path);
@@ -40,3 +41,10 @@ class OutputFile {
 };
 
 }  // namespace shapedb::io
+
+namespace shapedb {
+
+/// Writes a file of text. Errors: kFileNotWritable, naming the path; kOutOfMemory.
+[[nodiscard]] Result<void> writeTextFile(const std::string& path, const std::string& text);
+
+}  // namespace shapedb

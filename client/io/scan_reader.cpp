@@ -12,7 +12,6 @@
 #include <system_error>
 #include <utility>
 
-#include "client/io/conversion.h"
 #include "client/io/formats.h"
 #include "client/io/input_file.h"
 #include "client/io/kind_of_content.h"

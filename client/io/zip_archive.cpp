@@ -7,8 +7,8 @@
 
 #include <zip.h>
 
+#include "client/io/byte_source.h"
 #include "client/io/text.h"
-#include "client/io/unpacked_limit.h"
 #include "core/base/return_if_error.h"
 
 namespace shapedb::io {

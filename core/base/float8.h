@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <cstring>
 
-#include "core/base/wide.h"
+#include "core/base/processor.h"
 
 namespace shapedb {
 

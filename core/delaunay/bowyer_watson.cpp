@@ -14,7 +14,7 @@
 // alone, everything is.
 #include "core/delaunay/bowyer_watson.h"
 
-#include "core/base/prefetch.h"
+#include "core/base/processor.h"
 
 namespace shapedb {
 

@@ -2,6 +2,7 @@
 // Memory for the cells of a triangulation and their cached balls.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -21,9 +22,25 @@ namespace shapedb {
 class CellStore {
   public:
     /// Makes room for at least `capacity` cells, keeping those in use. Throws std::bad_alloc.
-    void reserve(std::size_t capacity);
+    void reserve(std::size_t capacity) {
+        if (capacity <= capacity_) return;
+        LargeBlock<Cell> cells = allocateLarge<Cell>(capacity);
+        LargeBlock<DelaunayBall> balls = allocateLarge<DelaunayBall>(capacity);
+        std::copy_n(cells_.get(), used(), cells.get());
+        std::copy_n(balls_.get(), used(), balls.get());
+        cells_ = std::move(cells);
+        balls_ = std::move(balls);
+        capacity_ = capacity;
+    }
     /// The first of `count` consecutive cells, uninitialised; kNoCell when there is no room.
-    std::uint32_t take(std::uint32_t count);
+    std::uint32_t take(std::uint32_t count) {
+        const std::size_t first = used_.fetch_add(count, std::memory_order_relaxed);
+        if (first + count <= capacity_) return static_cast<std::uint32_t>(first);
+        // Until this is undone, other claims may fail although there is room, which only postpones their
+        // points. No cell is given out twice: a claim that fails leaves the count above the capacity.
+        used_.fetch_sub(count, std::memory_order_relaxed);
+        return kNoCell;
+    }
 
     Cell& operator[](std::uint32_t i) { return cells_[i]; }
     const Cell& operator[](std::uint32_t i) const { return cells_[i]; }

@@ -10,7 +10,7 @@
 #include <string>
 
 #include "core/base/parallel.h"
-#include "core/base/prefetch.h"
+#include "core/base/processor.h"
 #include "core/base/return_if_error.h"
 #include "core/delaunay/bowyer_watson.h"
 #include "core/delaunay/flat_delaunay.h"

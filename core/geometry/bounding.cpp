@@ -14,7 +14,6 @@
 #include "core/base/random.h"
 #include "core/base/return_if_error.h"
 #include "core/geometry/convex_hull.h"
-#include "core/geometry/cull_hull_interior.h"
 #include "core/geometry/motion.h"
 #include "core/geometry/vec3x2.h"
 

@@ -18,4 +18,9 @@ namespace shapedb {
 /// one plane. Throws as above.
 [[nodiscard]] std::vector<TriangleCorners> convexHullFaces(const PointCloud& points);
 
+/// Drops points that cannot lie on the convex hull, in linear time: returns the points, in order, without
+/// those that certainly lie inside the convex hull of the rest. Every hull vertex stays; of a scan usually
+/// only a small share does.
+[[nodiscard]] PointCloud cullHullInterior(const PointCloud& points);
+
 }  // namespace shapedb

@@ -6,7 +6,7 @@
 #include <numeric>
 
 #include "core/base/large_block.h"
-#include "core/base/prefetch.h"
+#include "core/base/processor.h"
 #include "core/geometry/box.h"
 
 namespace shapedb {

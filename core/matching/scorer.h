@@ -18,7 +18,7 @@
 
 #include "core/base/error.h"
 #include "core/matching/explanation.h"
-#include "core/matching/score_options.h"
+#include "core/matching/score.h"
 #include "core/matching/shape_row.h"
 #include "core/signature/signature.h"
 #include "core/signature/statistics.h"

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "core/base/parallel.h"
-#include "core/base/prefetch.h"
+#include "core/base/processor.h"
 #include "core/base/radix_sort.h"
 #include "core/base/return_if_error.h"
 #include "core/base/spread_key.h"

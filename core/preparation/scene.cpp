@@ -11,7 +11,6 @@
 
 #include "core/base/math.h"
 #include "core/base/random.h"
-#include "core/base/random_subset.h"
 #include "core/base/return_if_error.h"
 #include "core/geometry/box.h"
 #include "core/geometry/motion.h"

@@ -22,8 +22,16 @@ struct Grouping {
 using GroupValue = const std::string*;
 
 /// The group of a row, or of the shape with this id, which must be in the set.
-[[nodiscard]] GroupValue groupOf(const SignatureBlock& block, std::size_t row, const std::string& key);
-[[nodiscard]] GroupValue groupOf(const SignatureSet& set, std::int64_t id, const std::string& key);
+[[nodiscard]] inline GroupValue groupOf(const SignatureBlock& block, std::size_t row,
+                                        const std::string& key) {
+    const Metadata& metadata = block.metadata(row);
+    const auto found = metadata.find(key);
+    return found == metadata.end() ? nullptr : &found->second;
+}
+[[nodiscard]] inline GroupValue groupOf(const SignatureSet& set, std::int64_t id, const std::string& key) {
+    const SignatureSet::Place place = set.find(id);
+    return groupOf(*place.block, place.row, key);
+}
 
 /// A value for each of some groups.
 template <typename Value>

@@ -6,12 +6,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "core/base/metadata.h"
 #include "core/matching/shape_row.h"
+#include "core/search/filter.h"
 #include "core/signature/signature.h"
 #include "core/views/view_distance.h"
 
@@ -96,5 +98,12 @@ class SignatureBlock {
     std::vector<Metadata> metadata_;
     std::size_t attributedCount_ = 0;
 };
+
+// Which rows of a block a search looks at. For the sources of this folder.
+
+/// 1 for each row of a block, which must have one, that passes the filter and is not excluded, otherwise 0.
+/// Empty: all do.
+[[nodiscard]] std::vector<std::uint8_t> wantedRows(const SignatureBlock& block, const Filter& filter,
+                                                   std::optional<std::int64_t> excludeId);
 
 }  // namespace shapedb

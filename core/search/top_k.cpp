@@ -16,7 +16,7 @@
 
 #include "core/base/number_text.h"
 #include "core/base/return_if_error.h"
-#include "core/search/wanted_rows.h"
+#include "core/search/signature_block.h"
 
 namespace shapedb {
 

@@ -10,7 +10,6 @@
 #include "core/base/return_if_error.h"
 #include "core/matching/kernel.h"
 #include "core/matching/score.h"
-#include "core/matching/score_scale.h"
 #include "core/search/view_search.h"
 #include "core/views/views.h"
 

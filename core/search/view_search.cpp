@@ -7,7 +7,7 @@
 
 #include "core/base/parallel.h"
 #include "core/base/return_if_error.h"
-#include "core/search/wanted_rows.h"
+#include "core/search/signature_block.h"
 
 namespace shapedb {
 

@@ -14,7 +14,6 @@
 #include "core/segmentation/bottleneck_angle.h"
 #include "core/segmentation/inside_potential.h"
 #include "core/segmentation/interior_cost.h"
-#include "core/segmentation/widest_way.h"
 
 namespace shapedb {
 

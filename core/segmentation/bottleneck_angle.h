@@ -27,4 +27,13 @@ namespace shapedb {
                                                            const std::vector<std::uint8_t>& big,
                                                            const RunContext& context = {});
 
+// How webs are peeled off an interior: by the widest way that leads to each tetrahedron from outside.
+
+/// For each tetrahedron of `inside`: of all ways to it from outside, the one whose narrowest facet is widest
+/// (a maximin path), and the width of that facet in spacings. Peeling through facets wider than w removes
+/// exactly the tetrahedra with a value above w. Minus infinity for all others.
+[[nodiscard]] std::vector<double> widestWays(const PointCloud& points, const Tetrahedra& tetrahedra,
+                                             const std::vector<double>& spacings,
+                                             const std::vector<std::uint8_t>& inside);
+
 }  // namespace shapedb

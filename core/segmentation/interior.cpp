@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "core/base/math.h"
-#include "core/base/prefetch.h"
+#include "core/base/processor.h"
 #include "core/base/return_if_error.h"
 #include "core/geometry/tetrahedron.h"
 

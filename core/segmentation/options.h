@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "core/base/error.h"
-#include "core/preparation/options.h"
+#include "core/preparation/prepare_points.h"
 #include "core/segmentation/interior_kinds.h"
 
 namespace shapedb {

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "core/base/disjoint_sets.h"
-#include "core/base/prefetch.h"
+#include "core/base/processor.h"
 #include "core/base/radix_sort.h"
 #include "core/base/return_if_error.h"
 #include "core/geometry/tetrahedron.h"

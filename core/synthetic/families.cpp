@@ -8,7 +8,7 @@
 #include "core/base/random.h"
 #include "core/base/return_if_error.h"
 #include "core/geometry/motion.h"
-#include "core/synthetic/noise.h"
+#include "core/synthetic/degrade.h"
 #include "core/synthetic/parts.h"
 
 namespace shapedb {

@@ -7,7 +7,7 @@
 
 #include "core/base/return_if_error.h"
 #include "core/geometry/principal_axes.h"
-#include "core/views/visible_points.h"
+#include "core/views/view_signature.h"
 
 namespace shapedb {
 

@@ -7,6 +7,7 @@
 #include "server/catalog/limits.h"
 
 namespace shapedb::catalog {
+
 namespace {
 
 bool isAdmin(security::CallClass kind) {
@@ -120,5 +121,17 @@ Admission::Admission(std::uint64_t uploadBytes, int uploadCalls)
       requests(kMaxRequestsBytes, "bytes that large messages may become in memory"),
       answers(kMaxAnswersBytes, "bytes that large answers may take together"),
       copies(kMaxCopies, "places for a backup or restore in transit") {}
+
+Result<void> AnswerRoom::take(std::size_t bytes) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (bytes > left_) {
+        return fail(ErrorCode::kInvalidArgument,
+                    "the answer would exceed " + std::to_string(kMaxAnswerBytes) +
+                        " bytes; ask for fewer shapes, hits or queries, or for no explanations");
+    }
+    RETURN_IF_ERROR(share_.take(bytes));
+    left_ -= bytes;
+    return {};
+}
 
 }  // namespace shapedb::catalog

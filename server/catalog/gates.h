@@ -5,12 +5,14 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <cstddef>
 #include <cstdint>
 #include <mutex>
 #include <shared_mutex>
 
 #include "core/base/error.h"
 #include "core/base/run_context.h"
+#include "server/catalog/limits.h"
 #include "server/security/operation.h"
 
 namespace shapedb::catalog {
@@ -162,6 +164,22 @@ struct Admission {
     Budget requests;   ///< bytes that large messages may become when they are decoded
     Budget answers;    ///< bytes of large answers, as encoded, until they are written
     Budget copies;     ///< copies of the database on their way to or from a client
+};
+
+/// How many bytes an answer may still grow by. One for each request, kept until the answer is written: a
+/// client that does not read keeps it in memory. Thread-safe.
+class AnswerRoom {
+  public:
+    /// `all`: what the answers of all calls may take together; must outlive this.
+    explicit AnswerRoom(Budget& all) : share_(all) {}
+
+    /// Errors: kInvalidArgument, saying how to ask for less; kQueueFull (the answers of other calls).
+    [[nodiscard]] Result<void> take(std::size_t bytes);
+
+  private:
+    std::mutex mutex_;
+    std::size_t left_ = kMaxAnswerBytes;
+    Budget::Share share_;
 };
 
 }  // namespace shapedb::catalog

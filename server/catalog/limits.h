@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "common/point_stream.h"
+#include "common/protocol.h"
 #include "server/store/key_rules.h"
 
 namespace shapedb::catalog {

@@ -15,7 +15,7 @@
 
 #include "common/nearest_name.h"
 #include "core/base/return_if_error.h"
-#include "server/config/command_line_error.h"
+#include "server/config/command_line.h"
 #include "server/config/settings.h"
 
 namespace shapedb::config {

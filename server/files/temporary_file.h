@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A file that lives as long as the call that made it.
+// A file that lives as long as the call that made it, and whether the disk has room for it.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <utility>
 
@@ -30,5 +31,13 @@ class TemporaryFile {
 
     std::string folder_;  ///< empty when moved from
 };
+
+/// Room that temporary files leave to the database, which shares the disk.
+constexpr std::uint64_t kLeftToDatabase = std::uint64_t{256} << 20;
+
+/// Errors: kStorageFull: the file system of `directory` has not `bytes` free beside kLeftToDatabase; `what`
+/// begins the message, as "the backup". One whose free space cannot be told has room.
+[[nodiscard]] Result<void> requireFreeSpace(const std::string& directory, std::uint64_t bytes,
+                                            const std::string& what);
 
 }  // namespace shapedb::files

@@ -3,9 +3,9 @@
 
 #include <utility>
 
-#include "common/cut_off.h"
+#include "common/protocol.h"
 #include "core/base/return_if_error.h"
-#include "server/rpc/message_limits.h"
+#include "server/rpc/limit_table.h"
 
 namespace shapedb::http {
 namespace {

@@ -6,7 +6,7 @@
 
 #include <boost/asio/post.hpp>
 
-#include "server/rpc/message_limits.h"
+#include "server/rpc/limit_table.h"
 
 namespace shapedb::http {
 namespace {

@@ -24,9 +24,9 @@
 #include "server/config/settings.h"
 #include "server/http/connection.h"
 #include "server/http/tls_context.h"
-#include "server/net/descriptor_limit.h"
+#include "server/net/connections.h"
 #include "server/net/listener.h"
-#include "server/rpc/message_limits.h"
+#include "server/rpc/limit_table.h"
 
 namespace shapedb::http {
 namespace {

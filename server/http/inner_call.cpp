@@ -7,7 +7,7 @@
 #include <grpcpp/channel.h>
 #include <grpcpp/support/slice.h>
 
-#include "common/cut_off.h"
+#include "common/protocol.h"
 #include "server/rpc/status.h"
 
 namespace shapedb::http {

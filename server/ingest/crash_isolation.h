@@ -10,6 +10,9 @@
 #include <condition_variable>
 #include <mutex>
 
+#include "server/store/store.h"
+#include "server/telemetry/logger.h"
+
 namespace shapedb::ingest {
 
 /// Admits either any number of ordinary scans, or one suspect. A waiting suspect keeps new ordinary
@@ -49,5 +52,11 @@ class CrashIsolation {
     int waitingOrdinary_ = 0;  ///< outside
     bool suspectInside_ = false;
 };
+
+/// The log line of a quarantined scan, the same from workers and from rebuilds.
+inline void logQuarantine(telemetry::Logger& log, const store::Shape& shape, const Error& why) {
+    log.error("scan set aside: the server died each time it was segmented",
+              {{"shape", shape.id}, {"key", shape.key}, {"reason", why.message}});
+}
 
 }  // namespace shapedb::ingest

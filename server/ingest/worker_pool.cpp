@@ -7,8 +7,8 @@
 
 #include "core/base/return_if_error.h"
 #include "server/ingest/background_thread.h"
+#include "server/ingest/crash_isolation.h"
 #include "server/ingest/crash_marker.h"
-#include "server/ingest/quarantine_log.h"
 #include "server/store/failpoints.h"
 #include "server/store/quarantine.h"
 

@@ -28,7 +28,15 @@ Pace paceOf(const PaceLimits& limits, Duration now, Duration altogether, std::ui
 }
 
 /// "the client neither sent nor read anything for 60 seconds", and so on. `pace` is not kGood.
-[[nodiscard]] std::string reasonOf(Pace pace, const PaceLimits& limits);
+[[nodiscard]] inline std::string reasonOf(Pace pace, const PaceLimits& limits) {
+    if (pace == Pace::kStalled) {
+        const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(limits.stall);
+        return "the client neither sent nor read anything for " + std::to_string(seconds.count()) +
+               " seconds (limits.stall_seconds)";
+    }
+    return "the client sent or read less than " + std::to_string(limits.leastRate) +
+           " bytes per second (limits.min_bytes_per_second)";
+}
 
 /// Measures the waiting of one direction of a connection. Used by one thread.
 class PaceMeter {

@@ -12,7 +12,6 @@
 #include "common/backup_manifest.h"
 #include "common/sha256.h"
 #include "core/base/return_if_error.h"
-#include "server/files/free_space.h"
 #include "server/files/temporary_file.h"
 #include "server/rpc/admin_service.h"
 #include "server/rpc/backup_stream.h"

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cstddef>
 #include <iterator>
 #include <optional>
 #include <string_view>
@@ -16,10 +17,10 @@
 #include "server/catalog/request_checks.h"
 #include "server/rpc/inside.h"
 #include "server/rpc/status.h"
-#include "server/rpc/trace_parent.h"
 #include "server/security/key.h"
 
 namespace shapedb::rpc {
+
 namespace {
 
 RunContext::Clock::time_point steadyDeadline(const grpc::ServerContext& context) {
@@ -198,6 +199,28 @@ void Call::logLine(const grpc::Status& status, const Error* error) {
     } else if (operation_.role == security::Role::kAdmin) {
         services_.audit.recordAdministration(fields);
     }
+}
+
+std::optional<std::string> traceIdOf(std::string_view traceparent) {
+    constexpr std::size_t kTraceAt = 3, kTraceDigits = 32, kParentAt = 36, kParentDigits = 16, kBytes = 55;
+    if (traceparent.size() < kBytes) return std::nullopt;
+    for (std::size_t i = 0; i < kBytes; ++i) {
+        const bool dash = i == kTraceAt - 1 || i == kParentAt - 1 || i == kParentAt + kParentDigits;
+        const bool digit =
+            std::string_view("0123456789abcdef").find(traceparent[i]) != std::string_view::npos;
+        if (dash ? traceparent[i] != '-' : !digit) return std::nullopt;
+    }
+    const std::string_view version = traceparent.substr(0, kTraceAt - 1);
+    const bool ends = traceparent.size() == kBytes;
+    if (version == "ff" || (version == "00" && !ends) || (!ends && traceparent[kBytes] != '-'))
+        return std::nullopt;
+    const std::string_view trace = traceparent.substr(kTraceAt, kTraceDigits);
+    const std::string_view parent = traceparent.substr(kParentAt, kParentDigits);
+    const auto allZero = [](std::string_view text) {
+        return text.find_first_not_of('0') == std::string_view::npos;
+    };
+    if (allZero(trace) || allZero(parent)) return std::nullopt;
+    return std::string(trace);
 }
 
 }  // namespace shapedb::rpc

@@ -5,7 +5,9 @@
 
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -125,6 +127,36 @@ grpc::Status handle(const Services& services, grpc::ServerContext* context,
         return body(call);
     });
     return call.finish(std::move(result));
+}
+
+/// W3C Trace Context, the header in which a client names the trace that a call belongs to: the trace id, 32
+/// hexadecimal digits, of a `traceparent` (version-trace-parent-flags); nothing if it is not valid. Version
+/// 00 ends there; later ones may go on after another dash, ff is none.
+[[nodiscard]] std::optional<std::string> traceIdOf(std::string_view traceparent);
+
+/// Between two reports of one stage.
+constexpr std::chrono::milliseconds kBetweenStageReports{100};
+
+/// The context of `call`; if `wanted`, its progress is written as `stage` of a `Message`: at once as a stage
+/// begins, from time to time inside one. That the client has gone ends the work, not the writing. `call` and
+/// `writer` must outlive it.
+template <typename Message, typename Writer>
+RunContext tellingStages(Call& call, Writer& writer, bool wanted) {
+    RunContext context = call.run();
+    if (!wanted) return context;
+    context.progress = [&call, &writer, last = std::string_view(), next = RunContext::Clock::time_point()](
+                           const char* stage, std::uint64_t done, std::uint64_t total) mutable {
+        const auto now = RunContext::Clock::now();
+        if (stage == last && now < next) return;
+        last = stage;
+        next = now + kBetweenStageReports;
+        Message message;
+        message.mutable_stage()->set_stage(stage);
+        message.mutable_stage()->set_done(done);
+        message.mutable_stage()->set_total(total);
+        static_cast<void>(call.write(writer, message));
+    };
+    return context;
 }
 
 }  // namespace shapedb::rpc

@@ -6,7 +6,7 @@
 
 #include <grpc/grpc.h>
 
-#include "common/cut_off.h"
+#include "common/protocol.h"
 #include "server/catalog/limits.h"
 #include "server/rpc/status.h"
 

@@ -3,7 +3,6 @@
 
 #include "core/base/error.h"
 #include "server/catalog/limits.h"
-#include "server/rpc/message_limits.h"
 #include "server/security/key.h"
 
 namespace shapedb::rpc {

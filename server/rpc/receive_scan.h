@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "common/point_stream.h"
+#include "common/protocol.h"
 #include "common/wire_vector.h"
 #include "core/base/return_if_error.h"
 #include "server/catalog/scan_upload.h"

@@ -17,10 +17,9 @@
 #include <grpcpp/support/sync_stream.h>
 
 #include "core/base/return_if_error.h"
-#include "server/catalog/answer_room.h"
 #include "server/catalog/gates.h"
 #include "server/rpc/call.h"
-#include "server/rpc/plain_message.h"
+#include "server/rpc/message_bytes.h"
 
 namespace shapedb::rpc {
 

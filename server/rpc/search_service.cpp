@@ -8,11 +8,10 @@
 #include "server/catalog/request_checks.h"
 #include "server/catalog/scan_upload.h"
 #include "server/catalog/searches.h"
-#include "server/rpc/batch_answer.h"
 #include "server/rpc/call.h"
 #include "server/rpc/convert.h"
+#include "server/rpc/message_bytes.h"
 #include "server/rpc/receive_scan.h"
-#include "server/rpc/stage_reports.h"
 
 namespace shapedb::rpc {
 namespace {

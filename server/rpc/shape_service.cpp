@@ -14,9 +14,8 @@
 #include "server/catalog/shape_addition.h"
 #include "server/rpc/call.h"
 #include "server/rpc/convert.h"
-#include "server/rpc/message_limits.h"
+#include "server/rpc/limit_table.h"
 #include "server/rpc/receive_scan.h"
-#include "server/rpc/stage_reports.h"
 
 namespace shapedb::rpc {
 namespace {

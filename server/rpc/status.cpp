@@ -3,7 +3,7 @@
 
 #include "common/api_key_text.h"
 #include "common/safe_text.h"
-#include "server/rpc/message_limits.h"
+#include "server/rpc/limit_table.h"
 
 namespace shapedb::rpc {
 

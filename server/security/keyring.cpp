@@ -2,6 +2,7 @@
 #include "server/security/keyring.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -9,6 +10,7 @@
 #include "core/base/return_if_error.h"
 
 namespace shapedb::security {
+
 namespace {
 
 using std::chrono::milliseconds;
@@ -268,6 +270,28 @@ Result<void> Keyring::saveUsage() {
     RETURN_IF_ERROR(store_->saveUsage(changed));
     for (const auto& [id, usage] : changed) saved_[id] = usage;
     return {};
+}
+
+namespace {
+
+constexpr std::chrono::seconds kSaveEvery{10};
+
+}  // namespace
+
+UsageSaver::UsageSaver(Keyring& keyring, telemetry::LoggerPtr log)
+    : keyring_(keyring), log_(std::move(log)), thread_(std::in_place, kSaveEvery, [this] { save(); }) {}
+
+UsageSaver::~UsageSaver() {
+    thread_.reset();
+    save();
+}
+
+void UsageSaver::save() {
+    const auto saved = keyring_.saveUsage();
+    if (!saved && !failing_) {
+        log_->error("what API keys have used cannot be stored", telemetry::fieldsOf(saved.error()));
+    }
+    failing_ = !saved;
 }
 
 }  // namespace shapedb::security

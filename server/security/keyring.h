@@ -9,12 +9,15 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "common/repeating_thread.h"
 #include "core/base/error.h"
 #include "server/security/key.h"
 #include "server/security/key_store.h"
+#include "server/telemetry/logger.h"
 
 namespace shapedb::security {
 
@@ -121,6 +124,25 @@ class Keyring {
     std::chrono::milliseconds looked_{0};
     const OnProblem onProblem_;
     bool inTrouble_ = false;
+};
+
+/// Writes what API keys have used: saves every ten seconds while it lives, and once more when it is
+/// destroyed.
+class UsageSaver {
+  public:
+    /// `keyring` must outlive this.
+    UsageSaver(Keyring& keyring, telemetry::LoggerPtr log);
+    ~UsageSaver();
+    UsageSaver(const UsageSaver&) = delete;
+    UsageSaver& operator=(const UsageSaver&) = delete;
+
+  private:
+    void save();
+
+    Keyring& keyring_;
+    const telemetry::LoggerPtr log_;
+    bool failing_ = false;  ///< reported once
+    std::optional<RepeatingThread> thread_;
 };
 
 }  // namespace shapedb::security

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <sstream>
 
-#include "client/cli/exit_code.h"
+#include "client/cli/console.h"
 #include "tests/bench/run_bench.h"
 
 namespace shapedb::bench {

@@ -4,7 +4,7 @@
 #include <filesystem>
 
 #include "bench/jobs.h"
-#include "client/cli/exit_code.h"
+#include "client/cli/console.h"
 #include "tests/bench/run_bench.h"
 
 namespace shapedb::bench {

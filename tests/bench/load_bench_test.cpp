@@ -4,9 +4,9 @@
 #include <map>
 
 #include "bench/load_run.h"
-#include "bench/quantiles.h"
+#include "bench/measuring.h"
 #include "bench/stored_shapes.h"
-#include "client/cli/exit_code.h"
+#include "client/cli/console.h"
 #include "core/signature/signature_codec.h"
 #include "tests/bench/run_bench.h"
 

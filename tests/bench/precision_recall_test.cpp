@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "bench/precision_recall.h"
-
 #include <limits>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "bench/retrieval_run.h"
 #include "core/base/random.h"
 
 namespace shapedb::bench {

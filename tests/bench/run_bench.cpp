@@ -10,7 +10,7 @@
 
 #include <unistd.h>
 
-#include "bench/program.h"
+#include "bench/operations.h"
 #include "client/cli/console.h"
 #include "core/base/random.h"
 

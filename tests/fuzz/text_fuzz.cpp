@@ -3,7 +3,7 @@
 // them. The first byte chooses which.
 #include "common/safe_text.h"
 #include "core/search/filter.h"
-#include "server/catalog/cursor.h"
+#include "server/catalog/listing.h"
 #include "server/catalog/request_checks.h"
 #include "server/config/settings.h"
 #include "server/security/key.h"

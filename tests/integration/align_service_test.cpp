@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "core/geometry/motion.h"
-#include "core/synthetic/noise.h"
+#include "core/synthetic/degrade.h"
 #include "tests/integration/support/live_test.h"
 
 namespace shapedb::testing {

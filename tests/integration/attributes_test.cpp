@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The default profile on a live server: quality of the interior, attributes, terms of a score.
 #include "core/matching/score.h"
-#include "core/matching/score_scale.h"
 #include "core/pipeline.h"
 #include "core/signature/signature_codec.h"
 #include "tests/integration/support/live_test.h"

@@ -12,7 +12,6 @@
 #include "server/ingest/crash_isolation.h"
 #include "server/ingest/rebuild_driver.h"
 #include "server/ingest/worker_pool.h"
-#include "tests/reliability/support/dump.h"
 #include "tests/reliability/support/failpoints.h"
 #include "tests/reliability/support/files.h"
 #include "tests/reliability/support/moments.h"

@@ -3,7 +3,6 @@
 // store works on.
 #include <gtest/gtest.h>
 
-#include "tests/reliability/support/fault_vfs.h"
 #include "tests/reliability/support/faults.h"
 #include "tests/reliability/support/moments.h"
 #include "tests/support/scale.h"

@@ -6,8 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/reliability/support/disk.h"
-#include "tests/reliability/support/dump.h"
-#include "tests/reliability/support/fault_vfs.h"
+#include "tests/reliability/support/faults.h"
 #include "tests/reliability/support/files.h"
 #include "tests/reliability/support/script.h"
 #include "tests/support/scale.h"

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/matching/score_scale.h"
+#include "core/matching/score.h"
 
 namespace shapedb {
 

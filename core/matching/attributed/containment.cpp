@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "core/matching/attributed/tripod.h"
+#include "core/matching/attributed/segment_match.h"
 #include "core/matching/kernel.h"
 
 namespace shapedb {

@@ -4,7 +4,7 @@
 
 #include "core/matching/attributed/segment_match.h"
 #include "core/matching/attributed/segment_span.h"
-#include "core/matching/score_options.h"
+#include "core/matching/score.h"
 
 namespace shapedb {
 

@@ -11,7 +11,7 @@
 #define SHAPEDB_HAS_AVX2 0
 #endif
 
-#include "core/base/wide.h"
+#include "core/base/processor.h"
 
 namespace shapedb {
 

@@ -6,8 +6,10 @@
 #include <array>
 #include <cstdint>
 
+#include "core/geometry/motion.h"
+#include "core/geometry/point.h"
 #include "core/matching/attributed/segment_span.h"
-#include "core/matching/score_options.h"
+#include "core/matching/score.h"
 
 namespace shapedb {
 
@@ -78,5 +80,20 @@ class SegmentComparison {
     std::array<Row, kMaxSignaturePoints> radially_;  // kernel of the difference of radii
     double most_;                                    // bound of the agreement, before it is cut off at 1
 };
+
+// Frames from two directions, and the orthogonal map between two of them.
+
+/// Right-handed, orthonormal.
+using Tripod = std::array<Point3, 3>;
+
+/// A vector shorter than this, in units of a body's size, has no reliable direction.
+constexpr double kShortestDirection = 1e-3;
+
+/// First axis along `first`, second in the half plane of `second`. False, and `out` undefined, when
+/// `first`, or the component of `second` across it, is shorter than kShortestDirection.
+[[nodiscard]] bool tripod(const Point3& first, const Point3& second, Tripod& out);
+
+/// Maps each axis of `from` to that of `to`; reflected: the third axis to the opposite.
+[[nodiscard]] Matrix3 tripodMap(const Tripod& from, const Tripod& to, bool reflected);
 
 }  // namespace shapedb

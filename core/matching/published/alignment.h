@@ -12,7 +12,7 @@
 #include <cstdint>
 
 #include "core/geometry/motion.h"
-#include "core/matching/score_options.h"
+#include "core/matching/score.h"
 #include "core/matching/shape_row.h"
 
 namespace shapedb {

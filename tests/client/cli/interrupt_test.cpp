@@ -5,7 +5,6 @@
 #include <sstream>
 
 #include "client/cli/console.h"
-#include "client/cli/exit_code.h"
 #include "client/cli/session.h"
 #include "tests/client/cli/run_command.h"
 

@@ -2,7 +2,7 @@
 // API keys and TLS, as a user of the command meets them; against a real shapedbd.
 #include <fstream>
 
-#include "client/cli/exit_code.h"
+#include "client/cli/console.h"
 #include "tests/client/cli/run_command.h"
 #include "tests/integration/support/server_process.h"
 #include "tests/support/eventually.h"

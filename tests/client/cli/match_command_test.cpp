@@ -4,7 +4,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "client/cli/exit_code.h"
+#include "client/cli/console.h"
 #include "tests/client/cli/run_command.h"
 
 namespace shapedb::cli {

@@ -12,7 +12,7 @@
 #include <sys/wait.h>
 
 #include "client/api/client.h"
-#include "client/cli/exit_code.h"
+#include "client/cli/console.h"
 #include "client/io/scan_reader.h"
 #include "core/geometry/point.h"
 #include "tests/client/cli/online_fixture.h"

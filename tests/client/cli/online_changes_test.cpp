@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "client/cli/exit_code.h"
+#include "client/cli/console.h"
 #include "client/io/scan_reader.h"
 #include "tests/client/cli/online_fixture.h"
 

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <set>
 
+#include "client/cli/console.h"
 #include "client/cli/duplicate_search.h"
-#include "client/cli/exit_code.h"
 #include "tests/client/cli/online_fixture.h"
 
 namespace shapedb::cli {

@@ -8,7 +8,7 @@
 
 #include <sys/stat.h>
 
-#include "client/cli/exit_code.h"
+#include "client/cli/console.h"
 #include "client/io/scan_reader.h"
 #include "core/base/random.h"
 #include "core/geometry/motion.h"

@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "client/cli/exit_code.h"
+#include "client/cli/console.h"
 #include "client/io/scan_reader.h"
 #include "core/base/random.h"
 #include "core/geometry/motion.h"

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <set>
 
-#include "core/synthetic/noise.h"
+#include "core/synthetic/degrade.h"
 #include "tests/client/cli/run_command.h"
 
 namespace shapedb::cli {

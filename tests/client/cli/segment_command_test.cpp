@@ -8,7 +8,7 @@
 #include "client/io/scan_reader.h"
 #include "core/base/math.h"
 #include "core/pipeline.h"
-#include "core/synthetic/noise.h"
+#include "core/synthetic/degrade.h"
 #include "tests/client/cli/run_command.h"
 
 namespace shapedb::cli {

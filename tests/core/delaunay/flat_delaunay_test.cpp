@@ -19,8 +19,8 @@
 #include "core/delaunay/delaunay.h"
 #include "core/delaunay/hilbert_order.h"
 #include "core/preparation/sanitise.h"
+#include "core/synthetic/degrade.h"
 #include "core/synthetic/named_shapes.h"
-#include "core/synthetic/noise.h"
 #include "tests/core/segmentation/small_clouds.h"
 
 namespace shapedb {

@@ -15,10 +15,9 @@
 #include "core/fit/surface_points_codec.h"
 #include "core/geometry/box.h"
 #include "core/geometry/neighbours.h"
+#include "core/synthetic/degrade.h"
 #include "core/synthetic/families.h"
 #include "core/synthetic/named_shapes.h"
-#include "core/synthetic/noise.h"
-#include "core/synthetic/partial.h"
 #include "tests/core/signature/moved_scans.h"
 
 namespace shapedb {

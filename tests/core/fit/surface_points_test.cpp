@@ -12,9 +12,9 @@
 
 #include "core/base/random.h"
 #include "core/geometry/motion.h"
+#include "core/synthetic/degrade.h"
 #include "core/synthetic/families.h"
 #include "core/synthetic/named_shapes.h"
-#include "core/synthetic/noise.h"
 #include "tests/core/signature/moved_scans.h"
 
 namespace shapedb {

@@ -6,7 +6,7 @@
 #include <functional>
 #include <string>
 
-#include "core/matching/score_options.h"
+#include "core/matching/score.h"
 #include "core/signature/signature.h"
 
 namespace shapedb::testing_support {

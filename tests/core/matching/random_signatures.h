@@ -8,7 +8,7 @@
 
 #include "core/base/random.h"
 #include "core/geometry/motion.h"
-#include "core/matching/score_options.h"
+#include "core/matching/score.h"
 #include "core/signature/signature.h"
 
 namespace shapedb::testing_support {

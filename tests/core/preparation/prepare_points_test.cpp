@@ -9,8 +9,8 @@
 
 #include "core/base/random.h"
 #include "core/preparation/sanitise.h"
+#include "core/synthetic/degrade.h"
 #include "core/synthetic/named_shapes.h"
-#include "core/synthetic/noise.h"
 
 namespace shapedb {
 namespace {

@@ -9,10 +9,9 @@
 #include "core/base/random.h"
 #include "core/geometry/box.h"
 #include "core/geometry/motion.h"
+#include "core/synthetic/degrade.h"
 #include "core/synthetic/families.h"
 #include "core/synthetic/named_shapes.h"
-#include "core/synthetic/noise.h"
-#include "core/synthetic/partial.h"
 #include "core/synthetic/solid.h"
 
 namespace shapedb {

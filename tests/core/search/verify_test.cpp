@@ -12,10 +12,10 @@
 #include <tbb/task_arena.h>
 
 #include "core/geometry/motion.h"
-#include "core/matching/score_scale.h"
+#include "core/matching/score.h"
 #include "core/pipeline.h"
+#include "core/synthetic/degrade.h"
 #include "core/synthetic/families.h"
-#include "core/synthetic/partial.h"
 #include "core/views/views.h"
 
 namespace shapedb {

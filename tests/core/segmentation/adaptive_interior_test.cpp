@@ -12,8 +12,8 @@
 #include "core/geometry/bounding.h"
 #include "core/geometry/motion.h"
 #include "core/segmentation/segmentation.h"
+#include "core/synthetic/degrade.h"
 #include "core/synthetic/named_shapes.h"
-#include "core/synthetic/noise.h"
 
 namespace shapedb {
 namespace {

@@ -16,8 +16,8 @@
 #include "core/base/random.h"
 #include "core/segmentation/flow.h"
 #include "core/segmentation/segmentation.h"
+#include "core/synthetic/degrade.h"
 #include "core/synthetic/named_shapes.h"
-#include "core/synthetic/noise.h"
 #include "tests/core/segmentation/small_clouds.h"
 
 namespace shapedb {

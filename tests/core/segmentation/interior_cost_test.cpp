@@ -15,7 +15,6 @@
 #include "core/geometry/neighbours.h"
 #include "core/segmentation/bottleneck_angle.h"
 #include "core/segmentation/interior.h"
-#include "core/segmentation/widest_way.h"
 #include "tests/core/segmentation/small_clouds.h"
 
 namespace shapedb {

@@ -7,9 +7,9 @@
 #include "core/base/math.h"
 #include "core/base/random.h"
 #include "core/pipeline.h"
+#include "core/synthetic/degrade.h"
 #include "core/synthetic/families.h"
 #include "core/synthetic/named_shapes.h"
-#include "core/synthetic/noise.h"
 
 namespace shapedb {
 namespace {

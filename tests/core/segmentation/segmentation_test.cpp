@@ -16,8 +16,8 @@
 #include "core/geometry/neighbours.h"
 #include "core/pipeline.h"
 #include "core/segmentation/interior.h"
+#include "core/synthetic/degrade.h"
 #include "core/synthetic/named_shapes.h"
-#include "core/synthetic/noise.h"
 
 namespace shapedb {
 namespace {

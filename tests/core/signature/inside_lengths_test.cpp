@@ -10,8 +10,8 @@
 #include "core/base/random.h"
 #include "core/pipeline.h"
 #include "core/signature/inner_distances.h"
+#include "core/synthetic/degrade.h"
 #include "core/synthetic/named_shapes.h"
-#include "core/synthetic/noise.h"
 
 namespace shapedb {
 namespace {

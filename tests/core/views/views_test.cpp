@@ -9,8 +9,8 @@
 
 #include "core/base/random.h"
 #include "core/geometry/motion.h"
+#include "core/synthetic/degrade.h"
 #include "core/synthetic/families.h"
-#include "core/synthetic/partial.h"
 #include "core/views/view_distance.h"
 
 namespace shapedb {

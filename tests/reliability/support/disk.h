@@ -24,7 +24,7 @@ enum class Loss {
 /// Files of a folder by name.
 using Image = std::map<std::string, std::string>;
 
-/// Sees the changes through the VFS (fault_vfs.h) and the C library (interpose.cpp) while it lives; one at a
+/// Sees the changes through the VFS (faults.h) and the C library (interpose.cpp) while it lives; one at a
 /// time.
 class Disk {
   public:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Input and output that fail at a chosen call.
+// Input and output that fail at a chosen call, and the VFS that makes them fail.
 #pragma once
 
 #include <cstdint>
@@ -33,6 +33,18 @@ class Faults {
     static std::optional<FaultKind> next(Call call);
     /// The errno of the fault.
     static int systemError(FaultKind kind);
+};
+
+// A VFS of SQLite around the default one: tells the disk (disk.h) what is written, and lets calls fail
+// (faults.h).
+
+/// The default VFS while it lives, for connections opened meanwhile. One at a time.
+class FaultVfs {
+  public:
+    FaultVfs();
+    ~FaultVfs();
+    FaultVfs(const FaultVfs&) = delete;
+    FaultVfs& operator=(const FaultVfs&) = delete;
 };
 
 }  // namespace shapedb::reliability

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Whole files, read and written at once.
+// Whole files, read and written at once, and databases as text.
 #pragma once
 
 #include <filesystem>
@@ -20,5 +20,12 @@ inline std::string readFile(const std::string& path) {
 inline void writeFile(const std::string& path, const std::string& bytes) {
     std::ofstream(path, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
 }
+
+/// All rows of all tables of the file, in order, long values as hashes; "cannot read: ..." when it cannot be
+/// read. The file may be open.
+[[nodiscard]] std::string dumpDatabase(const std::string& path);
+
+/// The first line in which two dumps differ, for messages.
+[[nodiscard]] std::string differenceOf(const std::string& actual, const std::string& expected);
 
 }  // namespace shapedb::reliability

@@ -9,7 +9,6 @@
 #include <sqlite3.h>
 #include <zstd.h>
 
-#include "tests/reliability/support/dump.h"
 #include "tests/reliability/support/files.h"
 #include "tests/support/temporary_directory.h"
 

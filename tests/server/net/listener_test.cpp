@@ -18,7 +18,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-#include "server/net/descriptor_limit.h"
+#include "server/net/connections.h"
 #include "tests/support/eventually.h"
 #include "tests/support/temporary_directory.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files packed by gzip (RFC 1952), as client/io/gzip_source.cpp unpacks them.
+// Files packed by gzip (RFC 1952), as client/io/byte_source.cpp unpacks them.
 import { FileFault } from './fault';
 import { inflate, InflateFault, Unpacked } from './inflate';
 

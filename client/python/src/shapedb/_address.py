@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The address of a server, checked before anybody connects; client/api/address.cpp has the same rules."""
+"""The address of a server, checked before anybody connects; client/api/credentials.cpp has the same rules."""
 
 from __future__ import annotations
 

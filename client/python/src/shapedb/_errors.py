@@ -83,7 +83,7 @@ _PORT = "is it the right port? (that of the web page is another)"
 _NO_WAY = "cannot reach a server at {}: no way leads there from this machine"
 _NO_HOST = "cannot reach a server at {}: this machine knows no host of that name"
 
-# What gRPC and OpenSSL say when there is no connection, and what a user needs to hear; as in client/api/status.cpp.
+# What gRPC and OpenSSL say when there is no connection, and what a user needs to hear; as in client/api/retry.cpp.
 _TRANSLATIONS: Tuple[Tuple[str, str], ...] = (
     ("DNS resolution failed", _NO_HOST),
     ("C-ares", _NO_HOST),

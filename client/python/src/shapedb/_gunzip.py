@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files packed by gzip, as client/io/gzip_source.cpp unpacks them."""
+"""Files packed by gzip, as client/io/byte_source.cpp unpacks them."""
 
 from __future__ import annotations
 

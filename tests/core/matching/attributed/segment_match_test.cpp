@@ -12,7 +12,6 @@
 
 #include <gtest/gtest.h>
 
-#include "core/matching/attributed/tripod.h"
 #include "tests/core/matching/attributed_signatures.h"
 #include "tests/core/matching/random_signatures.h"
 
