@@ -45,4 +45,9 @@ std::string didYouMean(const std::string& name) {
     return name.empty() ? "" : ": did you mean '" + name + "'?";
 }
 
+std::string unknownOption(const std::string& word, const std::vector<std::string>& flags) {
+    const std::string flag = word.substr(0, word.find('='));
+    return "unknown option '" + flag + "'" + didYouMean(nearestName(flag, flags));
+}
+
 }  // namespace shapedb

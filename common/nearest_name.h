@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which name was meant by a mistyped one.
+// Which name was meant by a mistyped one, of a command, a flag or a setting.
 #pragma once
 
 #include <string>
@@ -12,5 +12,19 @@ namespace shapedb {
 
 /// ": did you mean 'NAME'?"; empty for an empty name.
 [[nodiscard]] std::string didYouMean(const std::string& name);
+
+/// "--threshold" for each long name of the options, pointers to CLI::Option, which this header does not know.
+template <typename Options>
+[[nodiscard]] std::vector<std::string> longFlags(const Options& options) {
+    std::vector<std::string> flags;
+    for (const auto* option : options) {
+        for (const std::string& name : option->get_lnames()) flags.push_back("--" + name);
+    }
+    return flags;
+}
+
+/// "unknown option '--thresold': did you mean '--threshold'?" for a word that no flag takes, perhaps with
+/// "=VALUE". `flags`: those that there are.
+[[nodiscard]] std::string unknownOption(const std::string& word, const std::vector<std::string>& flags);
 
 }  // namespace shapedb

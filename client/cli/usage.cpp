@@ -20,9 +20,8 @@ bool isFlag(const std::string& word) { return word.size() > 1 && word.front() ==
 std::vector<std::string> flagsOf(const CLI::App& command) {
     std::vector<std::string> flags;
     for (const CLI::App* app = &command; app != nullptr; app = app->get_parent()) {
-        for (const CLI::Option* option : optionsOf(*app)) {
-            for (const std::string& name : option->get_lnames()) flags.push_back("--" + name);
-        }
+        const std::vector<std::string> more = longFlags(optionsOf(*app));
+        flags.insert(flags.end(), more.begin(), more.end());
     }
     return flags;
 }
@@ -109,10 +108,7 @@ std::string inPlainWords(const std::string& message, const CLI::App& command) {
 std::string complaint(const CLI::App& app, const CLI::App& command, const CLI::ParseError& error) {
     const std::vector<std::string> unknown = app.remaining(true);
     const std::string first = unknown.empty() ? std::string() : unknown.front();
-    if (isFlag(first)) {
-        const std::string flag = first.substr(0, first.find('='));
-        return "unknown option '" + flag + "'" + didYouMean(nearestName(flag, flagsOf(command)));
-    }
+    if (isFlag(first)) return unknownOption(first, flagsOf(command));
     if (!first.empty() && !shownCommands(command).empty()) {
         return "unknown command '" + first + "'" + didYouMean(meantCommand(command, first));
     }

@@ -25,7 +25,7 @@ struct CommandLine {
     std::map<std::string, std::string> flags;  ///< key of the setting -> text
 };
 
-/// Errors: kInvalidArgument (unknown flag, missing value; named).
+/// Errors: kInvalidArgument (unknown option, missing value; named).
 [[nodiscard]] Result<CommandLine> parseCommandLine(int argc, const char* const* argv);
 
 struct Loaded {

@@ -175,11 +175,11 @@ TEST_F(Load, UnknownKeysAreRefusedWithTheirLine) {
 
 TEST_F(Load, WhatWasProbablyMeantIsTold) {
     expectRefused(loadWith({"--lisen", "a:1"}), ErrorCode::kInvalidArgument,
-                  {"unknown flag --lisen: did you mean '--listen'? shapedbd --help"});
+                  {"unknown option '--lisen': did you mean '--listen'? shapedbd --help"});
     expectRefused(loadWith({"--tls-certifcate=x"}), ErrorCode::kInvalidArgument,
-                  {"unknown flag --tls-certifcate: did you mean '--tls-certificate'?"});
+                  {"unknown option '--tls-certifcate': did you mean '--tls-certificate'?"});
     expectRefused(loadWith({"--zzzzzzzz"}), ErrorCode::kInvalidArgument,
-                  {"unknown flag --zzzzzzzz; shapedbd --help"});
+                  {"unknown option '--zzzzzzzz'; shapedbd --help"});
     expectRefused(loadWith({}, {"SHAPEDB_LISEN=a:1"}), ErrorCode::kInvalidArgument,
                   {"SHAPEDB_LISEN: did you mean 'SHAPEDB_LISTEN'? If not, unset it"});
     expectRefused(loadWith({}, {"SHAPEDB_ZZZZZZZZZZZZ=1"}), ErrorCode::kInvalidArgument,
