@@ -17,7 +17,7 @@ constexpr double kSmallestSize = -10.0;  // log2(kSmallestLength)
 static_assert(kSmallestLength == 1.0 / 1024.0, "kSmallestSize is its logarithm");
 
 // In steps of a stored share; allows for the float's rounding.
-constexpr double kFloatSlack = 0.01;
+constexpr double kShareSlack = 0.01;
 
 float logLength(double length) { return static_cast<float>(std::log2(std::max(length, kSmallestLength))); }
 
@@ -83,7 +83,7 @@ PackedSegmentDescriptor packed(const SegmentDescriptor& segment) noexcept {
     }
     // Rounded down, so that shares do not add up to more than the whole.
     result.share =
-        nearest<std::uint16_t>(std::floor(segment.share * kShareSteps + kFloatSlack), 1.0, kShareSteps);
+        nearest<std::uint16_t>(std::floor(segment.share * kShareSteps + kShareSlack), 1.0, kShareSteps);
     for (std::size_t i = 0; i < 4; ++i) {
         result.size[i] = nearest<std::uint8_t>((segment.size[i] - kSmallestSize) * kSizeSteps, 0.0, 255.0);
     }
