@@ -107,17 +107,14 @@ struct Scan {
 
 void insertReady(SqliteConnection& connection, std::int64_t collectionId, const FillShape& shape,
                  const Scan& scan, TimestampMs now) {
-    Query(connection, sql::kInsertShape, collectionId, shape.key, scan.points.size() / 3,
-          BlobView{scan.checksum.data(), scan.checksum.size()}, now, 0.0, 0.0, 0.0)
-        .run();
-    const std::int64_t id = connection.lastInsertId();
+    const std::int64_t id =
+        numberOf(Query(connection, sql::kInsertShape, collectionId, shape.key, scan.points.size() / 3,
+                       BlobView{scan.checksum.data(), scan.checksum.size()}, now, 0.0, 0.0, 0.0));
     for (const auto& [name, value] : shape.metadata)
         Query(connection, sql::kInsertMetadata, id, name, value).run();
-    Query(connection, sql::kInsertPoints, id, scan.points.size() * sizeof(float), scan.blob.size(),
-          BlobView{scan.blob.data(), scan.blob.size()})
-        .run();
+    connection.insertPoints(id, scan.points.size() * sizeof(float), {scan.blob.size(), &scan.blob});
     Query(connection, sql::kPutSignature, id, kFirstGeneration, 1, digestOf(shape.signature),
-          BlobView{shape.signature.data(), shape.signature.size()})
+          viewOf(shape.signature), BlobOrNull{})
         .run();
     Query(connection, sql::kSetReady, id, now).run();
 }
