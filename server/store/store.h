@@ -438,8 +438,9 @@ class Store {
     // Maintenance --------------------------------------------------------------------
 
     /// Copies the whole database, as it is now, to a new file while others read and write. The file
-    /// appears under its name when it is complete. Reports the stage "backup" in pages.
-    /// Errors: kAlreadyExists (the file), kFileNotWritable, kCancelled, kDeadlineExceeded.
+    /// appears under its name when it is complete. Of a database that is known to be damaged the tables are
+    /// copied, and new indices made, if the tables can be read. Reports the stage "backup" in pages or
+    /// tables. Errors: kAlreadyExists (the file), kFileNotWritable, kCancelled, kDeadlineExceeded.
     [[nodiscard]] virtual Result<void> backup(const std::string& path, const RunContext& context) = 0;
     /// Replaces the whole content by that of a backup file, atomically. A private copy of the file is
     /// migrated if it is older, and must pass `check` first; the file itself is left alone. On any

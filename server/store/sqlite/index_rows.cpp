@@ -50,8 +50,12 @@ Result<std::vector<IndexRow>> SqliteStore::loadIndex(std::int64_t collectionId, 
 }
 
 void SqliteStore::noteDamagedIndex(const std::string& damage) {
+    damaged_ = true;
     const std::string line =
-        "an index of the database is damaged; searches are answered from the tables alone (" + damage + ")";
+        "an index of the database is damaged; searches are answered from the tables alone; to mend it, make "
+        "a "
+        "backup now, which is then copied from the tables, and restore it (" +
+        damage + ")";
     const std::lock_guard<std::mutex> lock(findingsMutex_);
     if (std::find(findings_.begin(), findings_.end(), line) == findings_.end()) findings_.push_back(line);
 }

@@ -8,6 +8,7 @@
 #include "server/store/sqlite/damage.h"
 #include "server/store/sqlite/database_file.h"
 #include "server/store/sqlite/migrator.h"
+#include "server/store/sqlite/row_copy.h"
 #include "server/store/sqlite/sequences.h"
 #include "server/store/sqlite/sqlite_store_impl.h"
 
@@ -65,27 +66,30 @@ Result<void> SqliteStore::backup(const std::string& path, const RunContext& cont
         const NewFile file(path);
         SHAPEDB_FAILPOINT("backup.file");
         const Counted longRead(longReads_);
-        {
-            SqliteConnection source(options_.path, OpenMode::kReadOnly, options_.busyTimeoutMs);
-            // Without an open snapshot every write would make SQLite restart the copy.
-            const Transaction snapshot(source, Transaction::Kind::kRead);
-            static_cast<void>(source.integer("SELECT count(*) FROM sqlite_schema"));
-            SqliteConnection target(file.temporaryPath(), OpenMode::kReadWrite, options_.busyTimeoutMs);
-            target.execute("PRAGMA synchronous=OFF");  // `publish` makes the file durable
-            copyDatabase(source, target, kStepPages, [&](std::uint64_t done, std::uint64_t total) {
-                context.report("backup", done, total);
-                orRaise(context.checkpoint());
-            });
-            SHAPEDB_FAILPOINT("backup.copied");
-            // Without a log beside it, the file can be read from a folder that is not writable.
-            if (target.text("PRAGMA journal_mode=DELETE") != "delete") {
-                raise(ErrorCode::kStorage, "cannot turn the backup into a single file");
-            }
-        }
+        if (!damaged_ || !copyRows(options_.path, file.temporaryPath(), options_, context))
+            copyPages(file.temporaryPath(), context);
         SHAPEDB_FAILPOINT("backup.closed");
         file.publish();
         SHAPEDB_FAILPOINT("backup.durable");
     });
+}
+
+void SqliteStore::copyPages(const std::string& path, const RunContext& context) const {
+    SqliteConnection source(options_.path, OpenMode::kReadOnly, options_.busyTimeoutMs);
+    // Without an open snapshot every write would make SQLite restart the copy.
+    const Transaction snapshot(source, Transaction::Kind::kRead);
+    static_cast<void>(source.integer("SELECT count(*) FROM sqlite_schema"));
+    SqliteConnection target(path, OpenMode::kReadWrite, options_.busyTimeoutMs);
+    target.execute("PRAGMA synchronous=OFF");  // the file is made durable when it gets its name
+    copyDatabase(source, target, kStepPages, [&](std::uint64_t done, std::uint64_t total) {
+        context.report("backup", done, total);
+        orRaise(context.checkpoint());
+    });
+    SHAPEDB_FAILPOINT("backup.copied");
+    // Without a log beside it, the file can be read from a folder that is not writable.
+    if (target.text("PRAGMA journal_mode=DELETE") != "delete") {
+        raise(ErrorCode::kStorage, "cannot turn the backup into a single file");
+    }
 }
 
 Result<void> SqliteStore::restore(const std::string& path, const RunContext& context,
@@ -115,6 +119,7 @@ Result<void> SqliteStore::restore(const std::string& path, const RunContext& con
             notices_.clear();
             queueDamage_.reset();
         }
+        damaged_ = false;
         boundWal();
     });
 }
@@ -124,8 +129,10 @@ Result<std::vector<std::string>> SqliteStore::check(const RunContext& context) {
         const Counted longRead(longReads_);
         SqliteConnection connection(options_.path, OpenMode::kReadOnly, options_.busyTimeoutMs);
         std::vector<std::string> problems = findings();
-        for (std::string& problem :
-             checkDatabase(connection, {kMostCounted, options_.acceptParameters}, context))
+        std::vector<std::string> found =
+            checkDatabase(connection, {kMostCounted, options_.acceptParameters}, context);
+        if (!found.empty()) damaged_ = true;
+        for (std::string& problem : found)
             if (!contains(problems, problem)) problems.push_back(std::move(problem));
         return problems;
     });

@@ -192,6 +192,7 @@ SqliteStore::SqliteStore(const SqliteOptions& options)
     // Without it deletions may be refused on a full disk; uploads ask again.
     static_cast<void>(reserve_.hold());
     findings_ = damagedTables(*writer_, queueDamage_);
+    damaged_ = !findings_.empty();
     unlessDamaged([&] {
         for (std::string& mended : mendSequences(*writer_)) findings_.push_back(std::move(mended));
     });

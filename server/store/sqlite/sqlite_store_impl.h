@@ -86,6 +86,8 @@ class SqliteStore final : public SqlStore {
     /// Commits, counts the commit if anything changed since `changesBefore`, and leaves the mark.
     void commit(Transaction& transaction, std::int64_t changesBefore);
 
+    /// A backup as it is, page by page. Throws Failure.
+    void copyPages(const std::string& path, const RunContext& context) const;
     /// Adds it to the findings, once.
     void noteDamagedIndex(const std::string& damage);
 
@@ -110,6 +112,8 @@ class SqliteStore final : public SqlStore {
     std::vector<std::string> notices_;        ///< what waits for `acknowledge`
     std::optional<std::string> queueDamage_;  ///< of the table of jobs, found when the database was opened
     mutable std::mutex findingsMutex_;
+    /// Whether damage of the file is known, of an index perhaps: then backups are copied from the tables.
+    std::atomic<bool> damaged_{false};
     std::uint64_t walAttemptAt_;  ///< log size at which to wait for readers; under writerMutex_
     /// Backups, exports and checks, which hold a snapshot too long to wait for.
     std::atomic<int> longReads_{0};
