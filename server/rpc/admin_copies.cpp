@@ -100,7 +100,7 @@ Result<std::string> receiveExport(const Services& services, Call& call, catalog:
         }
         return copy.take(1);
     };
-    RETURN_IF_ERROR(receiveMessages(services, messages, call, take));
+    RETURN_IF_ERROR(receiveHeaderAndChunks(services, messages, call, take));
     if (!name) return fail(ErrorCode::kMalformedStream, "the stream ended before the header");
     RETURN_IF_ERROR(file.finish(call));
     return *name;
@@ -137,15 +137,8 @@ grpc::Status AdminServiceHandler::restore(grpc::ServerContext* context, Upload<v
         RETURN_IF_ERROR(copy.take(1));
         auto file = ReceivedFile::create(services_.temporaryDirectory, "the restore");
         RETURN_IF_ERROR(file);
-        for (;;) {
-            const auto chunk = chunks.next(call, services_.admission.requests);
-            RETURN_IF_ERROR(chunk);
-            if (*chunk == nullptr) break;
-            RETURN_IF_ERROR(call.run().checkpoint());
-            RETURN_IF_ERROR(call.authorization().requireStill());
-            RETURN_IF_ERROR(file->add(**chunk));
-        }
-        if (call.clientGone()) return fail(ErrorCode::kCancelled, "the client cancelled the restore");
+        RETURN_IF_ERROR(receiveMessages(services_, chunks, call,
+                                        [&](const v1::BackupChunk& chunk) { return file->add(chunk); }));
         RETURN_IF_ERROR(file->finish(call));
 
         const auto mayReplace = [&] { return call.authorization().requireStill(); };

@@ -94,7 +94,7 @@ grpc::Status AlignServiceHandler::align(grpc::ServerContext* context, Upload<v1:
     return handle(services_, context, operations::kAlign, [&](Call& call) -> Result<void> {
         Uploads uploads(services_, call);
         const auto take = [&](const v1::AlignRequest& message) { return uploads.take(message); };
-        RETURN_IF_ERROR(receiveMessages(services_, messages, call, take));
+        RETURN_IF_ERROR(receiveHeaderAndChunks(services_, messages, call, take));
         const auto query = uploads.query();
         RETURN_IF_ERROR(query);
         const v1::AlignHeader& header = uploads.header();

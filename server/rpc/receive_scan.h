@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reads uploads from a gRPC stream: AddShape, SearchByScan, Segment and Align share it.
+// Reads uploads from a gRPC stream: all calls with one share it.
 #pragma once
 
 #include <string>
@@ -12,9 +12,9 @@
 
 namespace shapedb::rpc {
 
-/// Calls `take(message)` with each message of an upload, which has a header or a chunk, until the client has
-/// sent all. Errors: those of `take` and of Upload::next; kMalformedStream (neither of the two);
-/// kUnauthenticated (the key was revoked meanwhile); kCancelled, kDeadlineExceeded.
+/// Calls `take(message)` with each message of an upload until the client has sent all. Errors: those of
+/// `take` and of Upload::next; kUnauthenticated (the key was revoked meanwhile); kCancelled,
+/// kDeadlineExceeded.
 template <typename Message, typename Take>
 Result<void> receiveMessages(const Services& services, Upload<Message>& messages, Call& call, Take&& take) {
     for (;;) {
@@ -23,14 +23,21 @@ Result<void> receiveMessages(const Services& services, Upload<Message>& messages
         if (*message == nullptr) break;
         RETURN_IF_ERROR(call.run().checkpoint());
         RETURN_IF_ERROR(call.authorization().requireStill());
-        if (!(*message)->has_header() && !(*message)->has_chunk()) {
-            return fail(ErrorCode::kMalformedStream, "message with neither header nor chunk");
-        }
         RETURN_IF_ERROR(take(**message));
     }
     // They also end when the client has gone: then the upload is not complete.
     if (call.clientGone()) return fail(ErrorCode::kCancelled, "the client cancelled the upload");
     return call.authorization().requireStill();
+}
+
+/// The same with messages that have a header or a chunk. Errors: kMalformedStream (neither of the two), too.
+template <typename Message, typename Take>
+Result<void> receiveHeaderAndChunks(const Services& services, Upload<Message>& messages, Call& call,
+                                    Take&& take) {
+    return receiveMessages(services, messages, call, [&](const Message& message) -> Result<void> {
+        if (message.has_header() || message.has_chunk()) return take(message);
+        return fail(ErrorCode::kMalformedStream, "message with neither header nor chunk");
+    });
 }
 
 /// One chunk of an upload. Errors: those of ScanUpload::add.
@@ -61,7 +68,7 @@ Result<store::VerifiedScan> receiveScan(const Services& services, Upload<Message
         isolation = isolationFrom(header.isolation());
         return call.useScan(header.point_count());
     };
-    RETURN_IF_ERROR(receiveMessages(services, messages, call, take));
+    RETURN_IF_ERROR(receiveHeaderAndChunks(services, messages, call, take));
     auto scan = upload.finish();
     RETURN_IF_ERROR(scan);
     auto isolated = catalog::isolated(std::move(*scan), isolation, call.run());
