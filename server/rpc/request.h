@@ -35,9 +35,22 @@ Result<void> decode(grpc::ByteBuffer& bytes, Message& message) {
     return fail(ErrorCode::kInvalidArgument, "the message is not a " + Message::descriptor()->full_name());
 }
 
+/// What was received of a call, which lives until its answer was written.
+class Received {
+  public:
+    /// For the answer, held until this is destroyed. Once for a call.
+    [[nodiscard]] catalog::AnswerRoom& answerRoom(catalog::Budget& answers) {
+        answer_ = std::make_unique<catalog::AnswerRoom>(answers);
+        return *answer_;
+    }
+
+  private:
+    std::unique_ptr<catalog::AnswerRoom> answer_;
+};
+
 /// Used by the thread of its call. `stream`, given at construction, must outlive it.
 template <typename Message>
-class Request {
+class Request : public Received {
   public:
     template <typename Stream>
     explicit Request(Stream& stream)
@@ -59,12 +72,6 @@ class Request {
         return share_->take(message_.SpaceUsedLong());
     }
 
-    /// For the answer, held until this is destroyed, which is after the answer was written. Once for a call.
-    [[nodiscard]] catalog::AnswerRoom& answerRoom(catalog::Budget& answers) {
-        answer_ = std::make_unique<catalog::AnswerRoom>(answers);
-        return *answer_;
-    }
-
     /// After `receive`.
     const Message& operator*() const { return message_; }
     const Message* operator->() const { return &message_; }
@@ -72,14 +79,13 @@ class Request {
   private:
     std::function<bool(Call&, grpc::ByteBuffer*)> read_;
     std::unique_ptr<catalog::Budget::Share> share_;
-    std::unique_ptr<catalog::AnswerRoom> answer_;
     Message message_;
 };
 
 /// The messages of an upload, one after the other. Used by the thread of its call. `stream`, given at
 /// construction, must outlive it.
 template <typename Message>
-class Upload {
+class Upload : public Received {
   public:
     template <typename Stream>
     explicit Upload(Stream& stream)
@@ -126,6 +132,16 @@ grpc::Status handle(const Services& services, grpc::ServerContext* context,
     });
 }
 
+/// Runs `answer(&response)` and writes the one message of the answer.
+template <typename Response, typename Stream, typename Answer>
+grpc::Status writeAnswer(Stream& stream, Answer&& answer) {
+    Response response;
+    const grpc::Status status = answer(&response);
+    // A client that has gone needs no answer.
+    if (status.ok()) static_cast<void>(stream.Write(response));
+    return status;
+}
+
 /// For grpc::Service::MarkMethodStreamed: runs `method` of `handler`, which answers with one message.
 template <typename Handler, typename Message, typename Response>
 grpc::internal::MethodHandler* methodHandler(Handler* handler,
@@ -135,11 +151,8 @@ grpc::internal::MethodHandler* methodHandler(Handler* handler,
     return new grpc::internal::StreamedUnaryHandler<grpc::ByteBuffer, Response>(
         [handler, method](grpc::ServerContext* context, Stream* stream) {
             Request<Message> request(*stream);
-            Response response;
-            const grpc::Status status = (handler->*method)(context, request, &response);
-            // A client that has gone needs no answer.
-            if (status.ok()) static_cast<void>(stream->Write(response));
-            return status;
+            return writeAnswer<Response>(
+                *stream, [&](Response* response) { return (handler->*method)(context, request, response); });
         });
 }
 
@@ -156,16 +169,17 @@ grpc::internal::MethodHandler* methodHandler(Handler* handler,
         });
 }
 
-/// For the same: an upload that is answered with one message.
+/// For the same: an upload that is answered with one message. Written here: gRPC's handler for such calls
+/// would write it when the room that it holds has been given back.
 template <typename Handler, typename Message, typename Response>
 grpc::internal::MethodHandler* methodHandler(Handler* handler,
                                              grpc::Status (Handler::*method)(grpc::ServerContext*,
                                                                              Upload<Message>&, Response*)) {
-    return new grpc::internal::ClientStreamingHandler<Handler, grpc::ByteBuffer, Response>(
-        [method](Handler* self, grpc::ServerContext* context, grpc::ServerReader<grpc::ByteBuffer>* reader,
-                 Response* response) {
-            Upload<Message> upload(*reader);
-            return (self->*method)(context, upload, response);
+    return new grpc::internal::BidiStreamingHandler<Handler, grpc::ByteBuffer, Response>(
+        [method](Handler* self, grpc::ServerContext* context, UploadReplies<Response>* stream) {
+            Upload<Message> upload(*stream);
+            return writeAnswer<Response>(
+                *stream, [&](Response* response) { return (self->*method)(context, upload, response); });
         },
         handler);
 }
@@ -189,10 +203,10 @@ template <typename Service>
 class ReadsRequests : public Service::Service {
   protected:
     /// In the constructor, for each of them: `rpc` is its name in the API, `method` one of `handler`, this.
-    /// `Received`: Request or Upload.
-    template <typename Handler, template <typename> class Received, typename Message, typename Reply>
+    /// `Messages`: Request or Upload.
+    template <typename Handler, template <typename> class Messages, typename Message, typename Reply>
     void serve(const char* rpc, Handler* handler,
-               grpc::Status (Handler::*method)(grpc::ServerContext*, Received<Message>&, Reply*)) {
+               grpc::Status (Handler::*method)(grpc::ServerContext*, Messages<Message>&, Reply*)) {
         const auto* service =
             Message::descriptor()->file()->pool()->FindServiceByName(Service::service_full_name());
         this->MarkMethodStreamed(service->FindMethodByName(rpc)->index(), methodHandler(handler, method));

@@ -179,8 +179,8 @@ Result<void> SearchServiceHandler::receiveAndSearch(Call& call, Upload<v1::Searc
     const Description& description = searched->description;
     toProto(description.segmentation, response.mutable_report());
     response.set_seconds_segment(description.segmentation.totalSeconds);
-    catalog::AnswerRoom room(services_.admission.answers);
-    return answer(services_, prepared, description.signature, searched->found, room, &response);
+    return answer(services_, prepared, description.signature, searched->found,
+                  messages.answerRoom(services_.admission.answers), &response);
 }
 
 grpc::Status SearchServiceHandler::searchBySignature(grpc::ServerContext* context,
