@@ -131,7 +131,7 @@ grpc::Status AdminServiceHandler::backup(grpc::ServerContext* context, Request<v
 
 grpc::Status AdminServiceHandler::restore(grpc::ServerContext* context, Upload<v1::BackupChunk>& chunks,
                                           v1::RestoreResponse* response) {
-    return handle(services_, context, operations::kRestore, [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kRestore, chunks, [&](Call& call) -> Result<void> {
         call.frame().expectRestore();
         catalog::Budget::Share copy(services_.admission.copies);
         RETURN_IF_ERROR(copy.take(1));
@@ -172,27 +172,28 @@ grpc::Status AdminServiceHandler::exportCollection(grpc::ServerContext* context,
 grpc::Status AdminServiceHandler::importCollection(grpc::ServerContext* context,
                                                    Upload<v1::ImportCollectionRequest>& messages,
                                                    v1::ImportCollectionResponse* response) {
-    return handle(services_, context, operations::kImportCollection, [&](Call& call) -> Result<void> {
-        catalog::Budget::Share copy(services_.admission.copies);
-        auto file = ReceivedFile::create(services_.temporaryDirectory, "the import");
-        RETURN_IF_ERROR(file);
-        const auto name = receiveExport(services_, call, copy, messages, *file);
-        RETURN_IF_ERROR(name);
-        const auto mayUse = [&](const std::string& wanted) -> Result<void> {
-            RETURN_IF_ERROR(call.useCollection(wanted));
-            return call.authorization().requireStill();
-        };
-        const auto imported = services_.catalog.importCollection(file->path(), *name, mayUse, call.run());
-        RETURN_IF_ERROR(imported);
-        const auto counts = services_.catalog.countShapes(**imported);
-        RETURN_IF_ERROR(counts);
-        response->set_collection((*imported)->collection.name);
-        response->set_shapes(counts->all);
-        response->set_shapes_pending(counts->all - counts->ready - counts->failed);
-        call.info("collection imported",
-                  {{"collection", response->collection()}, {"shapes", response->shapes()}});
-        return {};
-    });
+    return handle(
+        services_, context, operations::kImportCollection, messages, [&](Call& call) -> Result<void> {
+            catalog::Budget::Share copy(services_.admission.copies);
+            auto file = ReceivedFile::create(services_.temporaryDirectory, "the import");
+            RETURN_IF_ERROR(file);
+            const auto name = receiveExport(services_, call, copy, messages, *file);
+            RETURN_IF_ERROR(name);
+            const auto mayUse = [&](const std::string& wanted) -> Result<void> {
+                RETURN_IF_ERROR(call.useCollection(wanted));
+                return call.authorization().requireStill();
+            };
+            const auto imported = services_.catalog.importCollection(file->path(), *name, mayUse, call.run());
+            RETURN_IF_ERROR(imported);
+            const auto counts = services_.catalog.countShapes(**imported);
+            RETURN_IF_ERROR(counts);
+            response->set_collection((*imported)->collection.name);
+            response->set_shapes(counts->all);
+            response->set_shapes_pending(counts->all - counts->ready - counts->failed);
+            call.info("collection imported",
+                      {{"collection", response->collection()}, {"shapes", response->shapes()}});
+            return {};
+        });
 }
 
 }  // namespace shapedb::rpc

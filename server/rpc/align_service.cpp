@@ -91,7 +91,7 @@ AlignServiceHandler::AlignServiceHandler(const Services& services) : services_(s
 
 grpc::Status AlignServiceHandler::align(grpc::ServerContext* context, Upload<v1::AlignRequest>& messages,
                                         v1::AlignResponse* response) {
-    return handle(services_, context, operations::kAlign, [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kAlign, messages, [&](Call& call) -> Result<void> {
         Uploads uploads(services_, call);
         const auto take = [&](const v1::AlignRequest& message) { return uploads.take(message); };
         RETURN_IF_ERROR(receiveHeaderAndChunks(services_, messages, call, take));

@@ -89,8 +89,14 @@ class Call {
         bytes_ += bytes;
     }
 
-    /// Makes the status and writes the log line. Call once, last.
+    /// Makes the status and writes the log line. Call once, last but for the next.
     [[nodiscard]] grpc::Status finish(Result<void> result);
+    /// Before the one message of the answer is written: a client that does not read it is cut off. Until this
+    /// is destroyed the call keeps its place among those that run, for it keeps its thread.
+    template <typename Message>
+    void beginAnswer(const Message& message) {
+        cancellation_.beginAnswer(sizeOf(message));
+    }
 
   private:
     template <typename Message>
@@ -117,11 +123,9 @@ class Call {
     std::uint64_t bytes_ = 0;
 };
 
-/// Runs `body(call)`, which returns Result<void>, as the handler of one call.
+/// Runs `body(call)`, which returns Result<void>, from the beginning of a call to its end.
 template <typename Body>
-grpc::Status handle(const Services& services, grpc::ServerContext* context,
-                    const security::Operation& operation, Body&& body) {
-    Call call(services, *context, operation);
+grpc::Status runCall(Call& call, Body&& body) {
     Result<void> result = catalog::guarded([&]() -> Result<void> {
         RETURN_IF_ERROR(call.begin());
         return body(call);

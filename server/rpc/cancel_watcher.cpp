@@ -88,9 +88,21 @@ std::optional<Error> CancelWatcher::Registration::end() {
 
 CancelWatcher::Registration::Registration(CancelWatcher& watcher, grpc::ServerContext& context)
     : watcher_(watcher), context_(context) {
+    join();
+}
+
+void CancelWatcher::Registration::join() {
     const std::lock_guard<std::mutex> lock(watcher_.mutex_);
     watcher_.calls_.insert(this);
     if (watcher_.calls_.size() == 1) watcher_.changed_.notify_all();
+}
+
+void CancelWatcher::Registration::beginAnswer(std::size_t bytes) {
+    const auto chunks = static_cast<std::int64_t>(bytes / catalog::kMaxChunkBytes);
+    blocked_ = 0;
+    bytes_ = 0;
+    blockedSince_ = (Clock::now() + chunks * watcher_.limits_.stall).time_since_epoch().count();
+    join();
 }
 
 CancelWatcher::Registration::~Registration() {

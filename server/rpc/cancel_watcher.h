@@ -63,9 +63,13 @@ class CancelWatcher {
         /// Once the outcome of the call is known: it is not cut off any more, or a client would be told so of
         /// what was done. Why it was cut off before, if it was: what its client has been told.
         [[nodiscard]] std::optional<Error> end();
+        /// After `end`, before an answer of so many bytes is written at once: from now on the call is cut off
+        /// again. For each chunk of it (kMaxChunkBytes) the client may be silent as long as for one message.
+        void beginAnswer(std::size_t bytes);
 
       private:
         friend class CancelWatcher;
+        void join();
 
         CancelWatcher& watcher_;
         grpc::ServerContext& context_;

@@ -35,16 +35,30 @@ Result<void> decode(grpc::ByteBuffer& bytes, Message& message) {
     return fail(ErrorCode::kInvalidArgument, "the message is not a " + Message::descriptor()->full_name());
 }
 
-/// What was received of a call, which lives until its answer was written.
+/// What was received of a call, and the call itself: they live until its answer was written.
 class Received {
   public:
+    [[nodiscard]] Call& beginCall(const Services& services, grpc::ServerContext& context,
+                                  const security::Operation& operation) {
+        call_ = std::make_unique<Call>(services, context, operation);
+        return *call_;
+    }
     /// For the answer, held until this is destroyed. Once for a call.
     [[nodiscard]] catalog::AnswerRoom& answerRoom(catalog::Budget& answers) {
         answer_ = std::make_unique<catalog::AnswerRoom>(answers);
         return *answer_;
     }
 
+    /// Writes the one message of the answer.
+    template <typename Stream, typename Response>
+    void write(Stream& stream, const Response& response) {
+        if (call_) call_->beginAnswer(response);
+        // A client that has gone needs no answer.
+        static_cast<void>(stream.Write(response));
+    }
+
   private:
+    std::unique_ptr<Call> call_;
     std::unique_ptr<catalog::AnswerRoom> answer_;
 };
 
@@ -122,23 +136,30 @@ using Replies = grpc::ServerSplitStreamer<grpc::ByteBuffer, Response>;
 template <typename Response>
 using UploadReplies = grpc::ServerReaderWriter<Response, grpc::ByteBuffer>;
 
-/// As `handle` (call.h) of a call with one message, which is received before `body` runs.
+/// Runs `body(call)`, which returns Result<void>, as the handler of a call with one message, which is
+/// received before.
 template <typename Message, typename Body>
 grpc::Status handle(const Services& services, grpc::ServerContext* context,
                     const security::Operation& operation, Request<Message>& request, Body&& body) {
-    return handle(services, context, operation, [&](Call& call) -> Result<void> {
+    return runCall(request.beginCall(services, *context, operation), [&](Call& call) -> Result<void> {
         RETURN_IF_ERROR(request.receive(call, services.admission.requests));
         return body(call);
     });
 }
 
-/// Runs `answer(&response)` and writes the one message of the answer.
+/// The same of an upload, whose messages `body` receives.
+template <typename Message, typename Body>
+grpc::Status handle(const Services& services, grpc::ServerContext* context,
+                    const security::Operation& operation, Upload<Message>& messages, Body&& body) {
+    return runCall(messages.beginCall(services, *context, operation), body);
+}
+
+/// Runs `answer(&response)` and writes the one message of the answer to what was received.
 template <typename Response, typename Stream, typename Answer>
-grpc::Status writeAnswer(Stream& stream, Answer&& answer) {
+grpc::Status writeAnswer(Received& received, Stream& stream, Answer&& answer) {
     Response response;
     const grpc::Status status = answer(&response);
-    // A client that has gone needs no answer.
-    if (status.ok()) static_cast<void>(stream.Write(response));
+    if (status.ok()) received.write(stream, response);
     return status;
 }
 
@@ -151,8 +172,9 @@ grpc::internal::MethodHandler* methodHandler(Handler* handler,
     return new grpc::internal::StreamedUnaryHandler<grpc::ByteBuffer, Response>(
         [handler, method](grpc::ServerContext* context, Stream* stream) {
             Request<Message> request(*stream);
-            return writeAnswer<Response>(
-                *stream, [&](Response* response) { return (handler->*method)(context, request, response); });
+            return writeAnswer<Response>(request, *stream, [&](Response* response) {
+                return (handler->*method)(context, request, response);
+            });
         });
 }
 
@@ -178,8 +200,9 @@ grpc::internal::MethodHandler* methodHandler(Handler* handler,
     return new grpc::internal::BidiStreamingHandler<Handler, grpc::ByteBuffer, Response>(
         [method](Handler* self, grpc::ServerContext* context, UploadReplies<Response>* stream) {
             Upload<Message> upload(*stream);
-            return writeAnswer<Response>(
-                *stream, [&](Response* response) { return (self->*method)(context, upload, response); });
+            return writeAnswer<Response>(upload, *stream, [&](Response* response) {
+                return (self->*method)(context, upload, response);
+            });
         },
         handler);
 }

@@ -145,20 +145,21 @@ grpc::Status SearchServiceHandler::searchByKey(grpc::ServerContext* context,
 grpc::Status SearchServiceHandler::searchByScan(grpc::ServerContext* context,
                                                 Upload<v1::SearchByScanRequest>& messages,
                                                 v1::SearchResponse* response) {
-    return handle(services_, context, operations::kSearchByScan,
+    return handle(services_, context, operations::kSearchByScan, messages,
                   [&](Call& call) { return receiveAndSearch(call, messages, call.run(), *response); });
 }
 
 grpc::Status SearchServiceHandler::searchByScanInStages(grpc::ServerContext* context,
                                                         Upload<v1::SearchByScanRequest>& messages,
                                                         UploadReplies<v1::SearchByScanEvent>* writer) {
-    return handle(services_, context, operations::kSearchByScanInStages, [&](Call& call) -> Result<void> {
-        v1::SearchByScanEvent last;
-        RETURN_IF_ERROR(receiveAndSearch(call, messages,
-                                         tellingStages<v1::SearchByScanEvent>(call, *writer, true),
-                                         *last.mutable_response()));
-        return call.write(*writer, last);
-    });
+    return handle(
+        services_, context, operations::kSearchByScanInStages, messages, [&](Call& call) -> Result<void> {
+            v1::SearchByScanEvent last;
+            RETURN_IF_ERROR(receiveAndSearch(call, messages,
+                                             tellingStages<v1::SearchByScanEvent>(call, *writer, true),
+                                             *last.mutable_response()));
+            return call.write(*writer, last);
+        });
 }
 
 Result<void> SearchServiceHandler::receiveAndSearch(Call& call, Upload<v1::SearchByScanRequest>& messages,

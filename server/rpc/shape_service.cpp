@@ -144,7 +144,7 @@ ShapeServiceHandler::ShapeServiceHandler(const Services& services) : services_(s
 grpc::Status ShapeServiceHandler::addShape(grpc::ServerContext* context,
                                            Upload<v1::AddShapeRequest>& messages,
                                            v1::AddShapeResponse* response) {
-    return handle(services_, context, operations::kAddShape,
+    return handle(services_, context, operations::kAddShape, messages,
                   [&](Call& call) { return add(call, messages, *response); });
 }
 
@@ -469,7 +469,7 @@ grpc::Status ShapeServiceHandler::getSegments(grpc::ServerContext* context,
 
 grpc::Status ShapeServiceHandler::segment(grpc::ServerContext* context, Upload<v1::SegmentRequest>& messages,
                                           UploadReplies<v1::SegmentedPoints>* writer) {
-    return handle(services_, context, operations::kSegment, [&](Call& call) -> Result<void> {
+    return handle(services_, context, operations::kSegment, messages, [&](Call& call) -> Result<void> {
         catalog::ScanUpload upload(services_.config.limits.maxPoints, services_.admission.uploads);
         ShapeParameters parameters;
         bool summaryOnly = false;

@@ -355,6 +355,24 @@ class CutOffCalls(unittest.TestCase):
             self.assert_cut_off("GetPoints", lambda: list(points), grpc.StatusCode.DEADLINE_EXCEEDED,
                                 "the client neither sent nor read anything for 1 seconds (limits.stall_seconds)")
 
+    def test_unread_answers(self):
+        """Of a call with one message. It is written at once: who does not read it has a thread until it is cut off."""
+        with Server("--limits-stall-seconds", "1", "--metrics-listen", "127.0.0.1:0") as server, \
+                server.connect() as client:
+            metadata = {f"note {n}": "n" * 1000 for n in range(60)}
+            for i in range(40):
+                client.add(f"ball {i}", ball(100), metadata=metadata, wait=False)
+            # As a stream, of which grpcio takes nothing before it is asked.
+            unread = client.channel.unary_stream("/shapedb.v1.ShapeService/ListShapes",
+                                                 request_serializer=shapes.ListShapesRequest.SerializeToString,
+                                                 response_deserializer=shapes.ListShapesResponse.FromString)
+            calls = [unread(shapes.ListShapesRequest(), timeout=60) for _ in range(5)]
+            self.assertTrue(eventually(lambda: server.begun("ordinary") == len(calls)), "they keep their places")
+            self.assertTrue(eventually(lambda: server.begun("ordinary") == 0, 30), "and give them back")
+            for call in calls:
+                self.assert_cut_off("ListShapes", lambda call=call: list(call), grpc.StatusCode.DEADLINE_EXCEEDED,
+                                    "the client neither sent nor read anything for 1 seconds (limits.stall_seconds)")
+
     def test_uploads_that_outlast_the_server(self):
         with Server("--shutdown-drain-seconds", "1", "--metrics-listen", "127.0.0.1:0") as server, server.connect() as client:
             stop = threading.Event()
