@@ -166,6 +166,13 @@ grpc::Status Call::finish(Result<void> result) {
     return status;
 }
 
+void Call::noteUnreadAnswer() {
+    const auto why = cancellation_.end();
+    if (!why) return;
+    info("the answer of a call was not read",
+         {{"rpc", std::string(operation_.name)}, {"peer", peer_}, {"reason", why->message}});
+}
+
 void Call::info(const std::string& message, std::vector<telemetry::Field> fields) const {
     if (const auto trace = traceOf(context_)) fields.push_back({"trace", *trace});
     services_.log->info(message, fields);

@@ -97,6 +97,8 @@ class Call {
     void beginAnswer(const Message& message) {
         cancellation_.beginAnswer(sizeOf(message));
     }
+    /// When it could not be written: a log line, if its client was cut off.
+    void noteUnreadAnswer();
 
   private:
     template <typename Message>

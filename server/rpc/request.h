@@ -54,7 +54,7 @@ class Received {
     void write(Stream& stream, const Response& response) {
         if (call_) call_->beginAnswer(response);
         // A client that has gone needs no answer.
-        static_cast<void>(stream.Write(response));
+        if (!stream.Write(response) && call_) call_->noteUnreadAnswer();
     }
 
   private:

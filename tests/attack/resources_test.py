@@ -369,6 +369,7 @@ class CutOffCalls(unittest.TestCase):
             calls = [unread(shapes.ListShapesRequest(), timeout=60) for _ in range(5)]
             self.assertTrue(eventually(lambda: server.begun("ordinary") == len(calls)), "they keep their places")
             self.assertTrue(eventually(lambda: server.begun("ordinary") == 0, 30), "and give them back")
+            self.assertIn("the answer of a call was not read", server.log())
             for call in calls:
                 self.assert_cut_off("ListShapes", lambda call=call: list(call), grpc.StatusCode.DEADLINE_EXCEEDED,
                                     "the client neither sent nor read anything for 1 seconds (limits.stall_seconds)")
