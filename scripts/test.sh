@@ -10,7 +10,7 @@ cd "$(dirname "$0")/.."
 scripts/install-deps.sh
 scripts/install-deps.sh --postgres
 # Here a missing PostgreSQL is a failure, not a reason to skip.
-export SHAPEDB_REQUIRE_POSTGRES=1
+export REQUIRE_POSTGRES=1
 scripts/ci/lint.sh
 scripts/build.sh dev
 [ $# -gt 0 ] || scripts/ci/fuzz.sh 5

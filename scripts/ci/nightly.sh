@@ -25,13 +25,14 @@ attack() {
 
 # The long counts of docs/reliability.md. Not by ctest, whose limits of time are those of the short ones.
 reliability() {
-  scripts/install-deps.sh && scripts/build.sh dev || return 1
+  scripts/install-deps.sh && scripts/install-deps.sh --postgres && scripts/build.sh dev || return 1
   scaled 40 shapedb_reliability_test '*PowerLoss*' || return 1
   scaled 40 shapedb_reliability_test '*IoError*' || return 1
   scaled 40 shapedb_reliability_test '*OutOfMemory*' || return 1
   scaled 20 shapedb_reliability_test '*Failpoint*' || return 1
   scaled 20 shapedb_server_test '*ModelTest*' || return 1
   attack 10 kill || return 1
+  attack 20 shared_kill || return 1
   attack 240 soak
 }
 

@@ -326,6 +326,7 @@ class Catalog {
     // The whole database -----------------------------------------------------------
 
     /// As store::Store.
+    [[nodiscard]] Result<std::uint64_t> backupBytes() { return store_->backupBytes(); }
     [[nodiscard]] Result<void> backup(const std::string& path, const RunContext& context);
     [[nodiscard]] Result<std::vector<std::string>> check(const RunContext& context);
     /// As store::Store; logs what it reports.

@@ -120,10 +120,10 @@ grpc::Status AdminServiceHandler::backup(grpc::ServerContext* context, Request<v
         }
         catalog::Budget::Share copy(services_.admission.copies);
         RETURN_IF_ERROR(copy.take(1));
-        const auto stats = services_.catalog.stats();
-        RETURN_IF_ERROR(stats);
+        const auto bytes = services_.catalog.backupBytes();
+        RETURN_IF_ERROR(bytes);
         return sendCopy(
-            services_, call, *writer, "the backup", stats->store.databaseBytes,
+            services_, call, *writer, "the backup", *bytes,
             [&](const std::string& path) { return services_.catalog.backup(path, call.run()); },
             std::move(since));
     });

@@ -442,6 +442,8 @@ class Store {
     /// copied, and new indices made, if the tables can be read. Reports the stage "backup" in pages or
     /// tables. Errors: kAlreadyExists (the file), kFileNotWritable, kCancelled, kDeadlineExceeded.
     [[nodiscard]] virtual Result<void> backup(const std::string& path, const RunContext& context) = 0;
+    /// About how many bytes a backup writes. Reads no row: it is asked when tables are damaged.
+    [[nodiscard]] virtual Result<std::uint64_t> backupBytes() = 0;
     /// Replaces the whole content by that of a backup file, atomically. A private copy of the file is
     /// migrated if it is older, and must pass `check` first; the file itself is left alone. On any
     /// error the content stays as it was.

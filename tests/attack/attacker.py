@@ -147,9 +147,9 @@ class Bearer(grpc.UnaryUnaryClientInterceptor, grpc.UnaryStreamClientInterceptor
 
 
 class Client:
-    def __init__(self, address, compression=None, key=None, credentials=None):
+    def __init__(self, address, compression=None, key=None, credentials=None, options=()):
         # A channel of its own connection: by default channels to one address share one.
-        options = [("grpc.use_local_subchannel_pool", 1), ("grpc.max_send_message_length", -1)]
+        options = [("grpc.use_local_subchannel_pool", 1), ("grpc.max_send_message_length", -1), *options]
         if credentials is None:
             self._connection = grpc.insecure_channel(address, options=options, compression=compression)
         else:

@@ -156,7 +156,7 @@ class Damage(unittest.TestCase):
         self.assertEqual(self.check(client), [])
         # Nothing is lost, not even what came after the other backup.
         for i in range(3):
-            ref = types.ShapeRef(collection="second", key=f"big {i}")
+            ref = shapes.ShapeRef(collection="second", key=f"big {i}")
             client.shapes.GetShape(shapes.GetShapeRequest(shape=ref), timeout=10)
         self.assertEqual(self.served(client), ["first", "second"])
 

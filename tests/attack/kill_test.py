@@ -14,7 +14,8 @@ import unittest
 from attacker import Server, admin, ball, collections, eventually, grpc, main, pack, shapes, types
 
 # Taken away, since the server refuses variables of this kind that it does not know.
-KILLS = 20 * max(1, int(os.environ.pop("SHAPEDB_TEST_SCALE", "1")))
+SCALE = max(1, int(os.environ.pop("SHAPEDB_TEST_SCALE", "1")))
+KILLS = 20 * SCALE
 SEED = int(os.environ.pop("SHAPEDB_TEST_SEED", "1"))
 WRITERS = 3
 KEYS = 8  # of each writer

@@ -327,6 +327,10 @@ def stalled_uploads(client, stop):
             yield name, method.future(then_nothing(*messages), timeout=60).result
 
 
+# A client that takes no more of an answer than it has asked for.
+NARROW = [("grpc.http2.bdp_probe", 0), ("grpc.http2.lookahead_bytes", 65_536)]
+
+
 class CutOffCalls(unittest.TestCase):
     """A client that is cut off learns why, from the status alone."""
 
@@ -358,8 +362,8 @@ class CutOffCalls(unittest.TestCase):
     def test_unread_answers(self):
         """Of a call with one message. It is written at once: who does not read it has a thread until it is cut off."""
         with Server("--limits-stall-seconds", "1", "--metrics-listen", "127.0.0.1:0") as server, \
-                server.connect() as client:
-            metadata = {f"note {n}": "n" * 1000 for n in range(60)}
+                server.connect(options=NARROW) as client:
+            metadata = {f"note-{n}": "n" * 1000 for n in range(60)}
             for i in range(40):
                 client.add(f"ball {i}", ball(100), metadata=metadata, wait=False)
             # As a stream, of which grpcio takes nothing before it is asked.

@@ -277,6 +277,12 @@ Result<StoreStats> PostgresStore::stats() {
     });
 }
 
+Result<std::uint64_t> PostgresStore::backupBytes() {
+    return read("read the size of the database", [](Connection& connection) {
+        return static_cast<std::uint64_t>(numberOf(Query(connection, kDatabaseBytes)));
+    });
+}
+
 Result<std::unique_ptr<Store>> openPostgresStore(const PostgresOptions& options) {
     return guarded("open the database",
                    [&]() -> std::unique_ptr<Store> { return std::make_unique<PostgresStore>(options); });

@@ -316,6 +316,8 @@ Result<StoreStats> SqliteStore::stats() {
     });
 }
 
+Result<std::uint64_t> SqliteStore::backupBytes() { return fileSize(options_.path); }
+
 Result<void> SqliteStore::checkpoint() {
     return guarded("write back the log", [&] {
         const std::lock_guard<std::mutex> lock(writerMutex_);

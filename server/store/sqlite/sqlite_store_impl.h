@@ -51,6 +51,7 @@ class SqliteStore final : public SqlStore {
                                             std::size_t limit) override;
 
     Result<void> backup(const std::string& path, const RunContext& context) override;
+    Result<std::uint64_t> backupBytes() override;
     Result<void> restore(const std::string& path, const RunContext& context,
                          const std::function<Result<void>()>& replacing) override;
     Result<void> exportCollection(std::int64_t collectionId, const std::string& path,

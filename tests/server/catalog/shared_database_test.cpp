@@ -53,7 +53,7 @@ class SharedDatabaseTest : public ::testing::Test {
     void SetUp() override {
         const auto cluster = PostgresCluster::shared();
         if (!cluster) {
-            if (std::getenv("SHAPEDB_REQUIRE_POSTGRES") != nullptr) FAIL() << cluster.error().message;
+            if (std::getenv("REQUIRE_POSTGRES") != nullptr) FAIL() << cluster.error().message;
             GTEST_SKIP() << cluster.error().message;
         }
         cluster_ = *cluster;

@@ -90,7 +90,7 @@ class StoreTest : public ::testing::Test {
         if (engine() == Engine::kPostgres) {
             const auto cluster = shapedb::testing::PostgresCluster::shared();
             if (!cluster) {
-                if (std::getenv("SHAPEDB_REQUIRE_POSTGRES") != nullptr) FAIL() << cluster.error().message;
+                if (std::getenv("REQUIRE_POSTGRES") != nullptr) FAIL() << cluster.error().message;
                 GTEST_SKIP() << cluster.error().message;
             }
             cluster_ = *cluster;

@@ -85,6 +85,7 @@ class MemoryStore : public store::Store {
     Result<void> backup(const std::string& path, const RunContext& context) override;
     Result<void> restore(const std::string& path, const RunContext& context,
                          const std::function<Result<void>()>& replacing) override;
+    Result<std::uint64_t> backupBytes() override { return std::uint64_t{0}; }
     Result<std::uint64_t> exportBytes(std::int64_t collectionId) override;
     Result<void> exportCollection(std::int64_t collectionId, const std::string& path,
                                   const RunContext& context) override;
