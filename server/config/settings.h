@@ -30,6 +30,12 @@ struct Setting {
     std::function<std::string(const ServerConfig&)> show;
 };
 
+/// Long on purpose: nobody should set it by accident or without knowing what it means.
+inline constexpr const char* kAnyoneMayDoAll =
+    "security.anyone_on_the_network_may_read_change_and_delete_everything";
+
+inline constexpr const char* kMetricsForAnyone = "metrics.anyone_on_the_network_may_read";
+
 /// All settings, in the order of the documentation.
 [[nodiscard]] const std::vector<Setting>& settings();
 

@@ -6,7 +6,6 @@
 #include <thread>
 #include <vector>
 
-
 #include "tests/server/store/transfer_fixture.h"
 
 namespace shapedb::store {
