@@ -71,20 +71,11 @@ PostgresOptions completed(PostgresOptions options) {
         raise(ErrorCode::kInvalidArgument,
               "connections must be 2 to 1,000, not " + std::to_string(options.connections));
     }
-    if (options.pointCompressionLevel < 1 || options.pointCompressionLevel > 19) {
-        raise(ErrorCode::kInvalidArgument,
-              "the compression level must be 1 to 19, not " + std::to_string(options.pointCompressionLevel));
-    }
+    requireCompressionLevel(options.pointCompressionLevel);
     if (options.jobLease < std::chrono::milliseconds(100)) {
         raise(ErrorCode::kInvalidArgument, "the lease of a job must be at least 100 ms");
     }
-    if (!options.now) {
-        options.now = [] {
-            using std::chrono::duration_cast;
-            const auto since = std::chrono::system_clock::now().time_since_epoch();
-            return static_cast<TimestampMs>(duration_cast<std::chrono::milliseconds>(since).count());
-        };
-    }
+    if (!options.now) options.now = systemNow;
     return options;
 }
 

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Collections and their aliases.
+#include <chrono>
+
 #include "core/base/return_if_error.h"
 #include "server/store/failpoints.h"
 #include "server/store/sql/collection_copy.h"
@@ -21,6 +23,17 @@ std::optional<std::int64_t> firstId(Connection& connection, const char* statemen
 }
 
 }  // namespace
+
+TimestampMs systemNow() {
+    using std::chrono::duration_cast;
+    return duration_cast<std::chrono::milliseconds>(std::chrono::system_clock::now().time_since_epoch())
+        .count();
+}
+
+void requireCompressionLevel(int level) {
+    if (level >= 1 && level <= 19) return;
+    raise(ErrorCode::kInvalidArgument, "the compression level must be 1 to 19, not " + std::to_string(level));
+}
 
 void requireFreeName(Connection& connection, const std::string& name) {
     if (findCollection(connection, name)) {

@@ -19,6 +19,11 @@
 
 namespace shapedb::store {
 
+/// The source of timestamps where options name none.
+[[nodiscard]] TimestampMs systemNow();
+/// 1 to 19, else throws Failure kInvalidArgument.
+void requireCompressionLevel(int level);
+
 class SqlStore : public Store {
   public:
     Result<Collection> createCollection(const std::string& name, const std::string& description,

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <chrono>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
@@ -42,12 +41,6 @@ std::uint64_t fileSize(const std::string& path) noexcept {
     return ::stat(path.c_str(), &status) == 0 ? static_cast<std::uint64_t>(status.st_size) : 0;
 }
 
-TimestampMs systemNow() {
-    using std::chrono::duration_cast;
-    return duration_cast<std::chrono::milliseconds>(std::chrono::system_clock::now().time_since_epoch())
-        .count();
-}
-
 SqliteOptions completed(SqliteOptions options) {
     if (options.path.empty()) raise(ErrorCode::kInvalidArgument, "the database path is empty");
     if (options.readers < 1 || options.readers > 64) {
@@ -56,10 +49,7 @@ SqliteOptions completed(SqliteOptions options) {
     if (options.busyTimeoutMs < 0) {
         raise(ErrorCode::kInvalidArgument, "the busy timeout must not be negative");
     }
-    if (options.pointCompressionLevel < 1 || options.pointCompressionLevel > 19) {
-        raise(ErrorCode::kInvalidArgument,
-              "the compression level must be 1 to 19, not " + std::to_string(options.pointCompressionLevel));
-    }
+    requireCompressionLevel(options.pointCompressionLevel);
     if (!options.now) options.now = systemNow;
     options.path = std::filesystem::absolute(options.path).lexically_normal().string();
     return options;
