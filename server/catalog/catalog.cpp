@@ -302,7 +302,8 @@ Result<void> Catalog::replaceContent(const std::string& path, const RunContext& 
 }
 
 Condition Catalog::condition() const {
-    return {!restores_.apart(), !workers_.trouble(), index_.damaged(), store_->notices() == 0};
+    return {!restores_.apart() && follower_.isFollowing(), !workers_.trouble(), index_.damaged(),
+            store_->notices() == 0};
 }
 
 Result<CatalogStats> Catalog::stats() {

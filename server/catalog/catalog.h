@@ -90,7 +90,9 @@ struct CatalogStats {
 
 /// What of the server is in service.
 struct Condition {
-    bool content = true;  ///< collections can be looked up: no restore is replacing them, and none failed
+    /// Collections can be looked up: no restore is replacing them, none failed, and a shared database can be
+    /// reached.
+    bool content = true;
     bool segmentation = true;            ///< scans are taken in and segmented
     std::size_t damagedCollections = 0;  ///< as CollectionIndex::damaged
     bool complete = true;                ///< no change is missing that was not acknowledged as such

@@ -47,18 +47,17 @@ void ChangeFollower::stop() {
 }
 
 void ChangeFollower::run() {
-    bool failing = false;
     std::unique_lock<std::mutex> lock(mutex_);
     while (!stopped_.wait_for(lock, kPause, [this] { return stop_; })) {
         lock.unlock();
         const auto followed = follow();
         // Told once for each time that it stops working.
-        if (!followed && !failing) {
+        if (!followed && following_) {
             parts_.log->error("changes of other servers cannot be read: searches may miss them",
                               telemetry::fieldsOf(followed.error()));
         }
-        if (followed && failing) parts_.log->info("changes of other servers are read again");
-        failing = !followed;
+        if (followed && !following_) parts_.log->info("changes of other servers are read again");
+        following_ = followed.has_value();
         lock.lock();
     }
 }

@@ -5,6 +5,7 @@
 // collection is loaded again and replaced as a whole, so that no search mixes two generations.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
@@ -46,6 +47,8 @@ class ChangeFollower {
     /// Follows on a thread of its own until `stop`.
     void start();
     void stop();
+    /// Whether the last pass could read the logs.
+    [[nodiscard]] bool isFollowing() const { return following_.load(); }
     /// One pass: applies what is in the logs now. Thread-safe.
     [[nodiscard]] Result<void> follow();
 
@@ -55,6 +58,7 @@ class ChangeFollower {
     Result<void> followDirectory();
 
     Parts parts_;
+    std::atomic<bool> following_{true};
     std::mutex pass_;  ///< guards the next two
     std::int64_t directory_ = 0;
     std::map<std::int64_t, std::int64_t> known_;  ///< last change applied, by collection

@@ -83,7 +83,7 @@ class SharedKills(unittest.TestCase):
                     load.start()
                     time.sleep(dice.uniform(0.3, 2))
                     load.killed.set()
-                    self.kill_and_start(dice.choice([one, two, database]))
+                    self.kill_and_start(dice.choice([one, two, database]), [one, two])
                     load.join()
                     self.assertEqual(load.unexpected, [], f"kill {kill}")
                     self.compare([one, two], load, kill)
@@ -94,9 +94,12 @@ class SharedKills(unittest.TestCase):
                 self.assertEqual(one.stop(), 0)
                 self.assertEqual(two.stop(), 0)
 
-    def kill_and_start(self, victim):
+    def kill_and_start(self, victim, servers):
         if isinstance(victim, Postgres):
             victim.kill()
+            for server in servers:
+                with server.connect() as client:
+                    self.assertTrue(eventually(lambda: not client.serving(), 10), "health notices")
             victim.start()
             return
         victim.process.kill()

@@ -54,7 +54,7 @@ ErrorCode codeOf(const std::string& state) {
 std::string trimmed(const char* message) {
     std::string text = message != nullptr ? message : "";
     while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back())) != 0) text.pop_back();
-    std::replace(text.begin(), text.end(), '\n', ' ');
+    for (const char blank : {'\n', '\t'}) std::replace(text.begin(), text.end(), blank, ' ');
     return text;
 }
 
