@@ -14,11 +14,15 @@ namespace {
 
 std::atomic<std::size_t> largestAllocation{0};
 
-void* countedAllocation(std::size_t size) {
+void* countedOrNull(std::size_t size) noexcept {
     std::size_t seen = largestAllocation.load();
     while (size > seen && !largestAllocation.compare_exchange_weak(seen, size)) {
     }
-    void* memory = std::malloc(size == 0 ? 1 : size);
+    return std::malloc(size == 0 ? 1 : size);
+}
+
+void* countedAllocation(std::size_t size) {
+    void* memory = countedOrNull(size);
     if (memory == nullptr) throw std::bad_alloc();
     return memory;
 }
@@ -27,6 +31,8 @@ void* countedAllocation(std::size_t size) {
 
 void* operator new(std::size_t size) { return countedAllocation(size); }
 void* operator new[](std::size_t size) { return countedAllocation(size); }
+void* operator new(std::size_t size, const std::nothrow_t&) noexcept { return countedOrNull(size); }
+void* operator new[](std::size_t size, const std::nothrow_t&) noexcept { return countedOrNull(size); }
 void operator delete(void* memory) noexcept { std::free(memory); }
 void operator delete[](void* memory) noexcept { std::free(memory); }
 void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }

@@ -51,7 +51,8 @@ class WaitingTest : public EachStoreTest {
 
     void rebuildSome(std::int64_t id, Random& random, std::optional<Rebuild>& rebuild) {
         if (!rebuild) rebuild = store_->startRebuild(id, "others").value();
-        for (const Shape& shape : store_->rebuildBatch(rebuild->id, 0, 2).value()) {
+        const auto batch = store_->rebuildBatch(rebuild->id, 0, 2).value();
+        for (const Shape& shape : batch) {
             const auto signature = signatureFor(shape.id, shape.pointsVersion, rebuild->targetGeneration);
             const bool failed = random.below(3) == 0;
             const auto done =
