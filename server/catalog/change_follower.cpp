@@ -68,8 +68,9 @@ Result<void> ChangeFollower::follow() {
     const auto logs = parts_.store.changeLogs();
     RETURN_IF_ERROR(logs);
     if (logs->directory != directory_) {
-        // Those that are loaded now have all changes up to here at least.
-        for (const auto& [id, last] : logs->last) known_.emplace(id, last);
+        // Those that are loaded now have all changes up to here at least. What this server has made itself
+        // may lack those of others, from the first one on.
+        for (const auto& [id, last] : logs->last) known_.emplace(id, parts_.index.byId(id) ? 0 : last);
         RETURN_IF_ERROR(followDirectory());
         directory_ = logs->directory;
     }

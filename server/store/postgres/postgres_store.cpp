@@ -95,7 +95,8 @@ PostgresStore::PostgresStore(const PostgresOptions& options)
     migrateDatabase();
     leases_ = std::make_unique<JobLeases>(options_.jobLease,
                                           [this](const std::vector<std::int64_t>& jobIds) { renew(jobIds); });
-    // What a server that has died left: no client sees it. Another server may be importing.
+    // What this server left when it died, and what any server has deleted: no client sees it.
+    static_cast<void>(dropImport());
     static_cast<void>(dropDeleted());
 }
 

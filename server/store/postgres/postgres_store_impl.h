@@ -53,6 +53,8 @@ class PostgresStore final : public SqlStore {
     void inWriteTransaction(Space space, const Work& work) override;
     void inReadTransaction(const Work& work) override;
     TimestampMs now() const override { return options_.now(); }
+    /// Other servers may import at the same time.
+    std::string importName() const override { return ".import-" + options_.serverName; }
     int pointCompressionLevel() const noexcept override { return options_.pointCompressionLevel; }
     void lockNames(Connection& connection) override;
     void lockCollection(Connection& connection, std::int64_t collectionId) override;

@@ -16,8 +16,10 @@ bool isAlias(Connection& connection, const std::string& name) {
     return Query(connection, sql::kAliasByName, name).step();
 }
 
-std::optional<std::int64_t> firstId(Connection& connection, const char* statement) {
+std::optional<std::int64_t> firstId(Connection& connection, const char* statement,
+                                    const std::optional<std::string>& name) {
     Query query(connection, statement);
+    if (name) query.bindAll(*name);
     if (!query.step()) return std::nullopt;
     return query.integer(0);
 }
@@ -141,22 +143,25 @@ Result<std::vector<Alias>> SqlStore::listAliases() {
     });
 }
 
+std::string SqlStore::importName() const { return sql::kImporting; }
+
 std::vector<Collection> SqlStore::salvageCollections(Connection&, const Failure& damage) { throw damage; }
 
 std::vector<Alias> SqlStore::salvageAliases(Connection&, const Failure& damage) { throw damage; }
 
 Result<void> SqlStore::dropDeleted() noexcept {
-    return dropHidden("remove what was deleted", sql::kSomeDeletedCollection);
+    return dropHidden("remove what was deleted", sql::kSomeDeletedCollection, std::nullopt);
 }
 
-Result<void> SqlStore::dropHidden(const char* operation, const char* statement) noexcept {
-    const auto there =
-        read(operation, [&](Connection& connection) { return firstId(connection, statement).has_value(); });
+Result<void> SqlStore::dropHidden(const char* operation, const char* statement,
+                                  const std::optional<std::string>& name) noexcept {
+    const auto there = read(
+        operation, [&](Connection& connection) { return firstId(connection, statement, name).has_value(); });
     RETURN_IF_ERROR(there);
     if (!*there) return {};
     while (true) {
         const auto more = remove(operation, [&](Connection& connection) {
-            const auto found = firstId(connection, statement);
+            const auto found = firstId(connection, statement, name);
             if (!found) return false;
             lockCollection(connection, *found);
             deleteSome(connection, *found);

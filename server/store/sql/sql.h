@@ -17,16 +17,15 @@ namespace shapedb::store::sql {
     "s.origin_z, m.name, m.value"
 #define SHAPEDB_FROM_SHAPE " FROM shape s LEFT JOIN shape_metadata m ON m.shape_id = s.id "
 
-/// The name, as an SQL text, of a collection that is being imported. No client can give it or ask for it.
-#define SHAPEDB_IMPORTING "'.import'"
-/// The same outside SQL.
+/// The name of a collection that is being imported begins so. No client can give it or ask for it.
 inline constexpr char kImporting[] = ".import";
 /// The names of collections that were deleted and of which rows are left begin so; the id follows.
 inline constexpr char kDeletedPrefix[] = ".deleted-";
 /// Whether a collection with the name in `column` is one of these, which are not there for clients.
-#define SHAPEDB_HIDDEN(column) "(" column " = '.import' OR substr(" column ", 1, 9) = '.deleted-')"
+#define SHAPEDB_HIDDEN(column) \
+    "(substr(" column ", 1, 7) = '.import' OR substr(" column ", 1, 9) = '.deleted-')"
 inline bool isDeleted(const std::string& name) { return name.rfind(kDeletedPrefix, 0) == 0; }
-inline bool isHidden(const std::string& name) { return name == kImporting || isDeleted(name); }
+inline bool isHidden(const std::string& name) { return name.rfind(kImporting, 0) == 0 || isDeleted(name); }
 
 #define STATEMENT(name, text) inline constexpr char name[] = text;
 #include "server/store/sql/sql_statements.inc"

@@ -99,6 +99,8 @@ class SqlStore : public Store {
     virtual void inWriteTransaction(Space space, const Work& work) = 0;
     virtual void inReadTransaction(const Work& work) = 0;
     virtual TimestampMs now() const = 0;
+    /// Of what this process imports, until it is complete: hidden, as sql.h says.
+    virtual std::string importName() const;
     /// zstd level of stored points, 1 to 19.
     virtual int pointCompressionLevel() const noexcept = 0;
 
@@ -194,8 +196,9 @@ class SqlStore : public Store {
     Collection finishImport(const Collection& imported);
     void importShapes(Connection& file, const Collection& from, const Collection& to,
                       const ImportRequest& request, const RunContext& context);
-    /// Removes the collections that `statement` finds, which are hidden.
-    Result<void> dropHidden(const char* operation, const char* statement) noexcept;
+    /// Removes the collections that `statement` finds, with `name` if it takes one, which are hidden.
+    Result<void> dropHidden(const char* operation, const char* statement,
+                            const std::optional<std::string>& name) noexcept;
 
     std::mutex importMutex_;     ///< one import at a time
     std::mutex largeScanMutex_;  ///< one compressed copy of a large scan at a time, to bound memory

@@ -25,8 +25,8 @@ Collection onlyCollection(Connection& file, const std::string& path) {
 }
 
 /// The content may have been replaced by a restore, and another collection have the id.
-void requireHidden(Connection& connection, const Collection& hidden) {
-    const auto found = findCollection(connection, sql::kImporting);
+void requireHidden(Connection& connection, const Collection& hidden, const std::string& name) {
+    const auto found = findCollection(connection, name);
     if (found && found->id == hidden.id) return;
     raise(ErrorCode::kUnavailable, "the content was replaced during the import: import again");
 }
@@ -75,7 +75,7 @@ Collection SqlStore::beginImport(const Collection& wanted) {
         // Asked again at the end; to be refused here saves the time.
         requireFreeName(connection, wanted.name);
         Collection hidden = wanted;
-        hidden.id = insertCollection(connection, wanted, sql::kImporting);
+        hidden.id = insertCollection(connection, wanted, importName());
         return hidden;
     }));
 }
@@ -96,7 +96,7 @@ void SqlStore::importShapes(Connection& file, const Collection& from, const Coll
         orRaise(requireSpace());
         orRaise(write("import the collection", [&](Connection& connection) {
             lockCollection(connection, to.id);
-            requireHidden(connection, to);
+            requireHidden(connection, to, importName());
             for (const CopiedShape& copied : batch) insertCopy(connection, to.id, copied);
         }));
         afterId = batch.back().shape.id;
@@ -108,7 +108,7 @@ Collection SqlStore::finishImport(const Collection& imported) {
     return orRaise(write("import the collection", [&](Connection& connection) {
         lockNames(connection);
         lockCollection(connection, imported.id);
-        requireHidden(connection, imported);
+        requireHidden(connection, imported, importName());
         requireFreeName(connection, imported.name);
         // However long the queue is: the bounds hold back uploads, whose points are not stored yet.
         Query(connection, sql::kRenameCollection, imported.id, imported.name).run();
@@ -119,7 +119,7 @@ Collection SqlStore::finishImport(const Collection& imported) {
 }
 
 Result<void> SqlStore::dropImport() noexcept {
-    return dropHidden("remove an unfinished import", sql::kImportingCollection);
+    return dropHidden("remove an unfinished import", sql::kCollectionByName, importName());
 }
 
 }  // namespace shapedb::store

@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -99,7 +100,7 @@ class SharedDatabaseTest : public ::testing::Test {
     /// Both servers know the same, and it is what `expected` says.
     void expectBoth(const std::function<bool(const Content&)>& expected, const std::string& what) {
         for (const auto& server : servers_) {
-            EXPECT_TRUE(eventually([&] { return expected(contentOf(*server)); })) << what;
+            ASSERT_TRUE(eventually([&] { return expected(contentOf(*server)); })) << what;
         }
     }
 
@@ -171,6 +172,29 @@ TEST_F(SharedDatabaseTest, ARestoreByOneIsLoadedByTheOther) {
     expectBoth(
         [](const Content& c) { return c.at("default").size() == 1 && c.at("default").count("before") == 1; },
         "the content of the backup");
+}
+
+TEST_F(SharedDatabaseTest, BothImportAtTheSameTime) {
+    for (int i = 0; i < 100; ++i) ASSERT_TRUE(put(*servers_[0], "k" + std::to_string(i), 2.0f));
+    expectBoth([](const Content& content) { return content.at("default").size() == 100; }, "all shapes");
+    const std::string file = folder_.file("export.db");
+    ASSERT_TRUE(servers_[0]->exportCollection("default", file, {}));
+    const auto has = [](const Content& content, const std::string& name, std::size_t shapes) {
+        const auto found = content.find(name);
+        return found != content.end() && found->second.size() == shapes;
+    };
+    const auto mayUse = [](const std::string&) { return Result<void>(); };
+    std::vector<std::thread> importing;
+    for (std::size_t i = 0; i < servers_.size(); ++i) {
+        importing.emplace_back([&, i] {
+            const auto done = servers_[i]->importCollection(file, "copy" + std::to_string(i), mayUse, {});
+            EXPECT_TRUE(done) << done.error().message;
+        });
+    }
+    for (std::thread& thread : importing) thread.join();
+    expectBoth(
+        [&](const Content& content) { return has(content, "copy0", 100) && has(content, "copy1", 100); },
+        "two copies");
 }
 
 TEST_F(SharedDatabaseTest, JobsOfAServerThatHasDiedGoToAnother) {

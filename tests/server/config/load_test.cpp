@@ -84,7 +84,7 @@ TEST_F(Load, ConfigFlagOverridesItsVariable) {
 
 // Round trip of every setting through every source: the value shown is read back as it is.
 TEST_F(Load, EverySettingIsReadFromEverySource) {
-    // A certificate without its key, or the other way round, is refused.
+    // A certificate without its key, or a database without its engine, and the other way round, are refused.
     ServerConfig partners;
     partners.tls = {"c.pem", "k.pem", ""};
     const std::vector<const char*> partnerFlags = {"--tls-certificate", "c.pem", "--tls-key", "k.pem"};
@@ -93,14 +93,18 @@ TEST_F(Load, EverySettingIsReadFromEverySource) {
         if (setting.key == "tls.client_ca") with = partnerFlags;
         if (setting.key == "tls.certificate") with.assign(partnerFlags.begin() + 2, partnerFlags.end());
         if (setting.key == "tls.key") with.assign(partnerFlags.begin(), partnerFlags.begin() + 2);
+        if (setting.key == "store.engine") with = {"--postgres-uri", "host=db"};
+        if (setting.key == "postgres.uri") with = {"--store-engine", "postgres"};
         for (const int source : {0, 1, 2}) {
             ServerConfig probe;
             // A value other than the default, found among a few candidates.
             std::string text;
             for (const char* candidate : {"3", "5", "2MiB", "/some/where", "localhost:1", "warn", "json",
-                                          "200MiB", "8GiB", "always", "yes"}) {
+                                          "200MiB", "8GiB", "always", "yes", "postgres"}) {
                 ServerConfig tried;
                 tried.tls = partners.tls;
+                if (setting.key == "store.engine") tried.postgres.uri = "host=db";
+                if (setting.key == "postgres.uri") tried.store.engine = "postgres";
                 if (setting.assign(tried, candidate) && setting.show(tried) != setting.show(probe) &&
                     validateTogether(tried)) {
                     text = candidate;

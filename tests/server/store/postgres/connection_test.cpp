@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The layer over libpq: values keep every bit, rows come in any number, and a database that is lost is told.
+#include "server/store/postgres/connection.h"
+
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "server/store/postgres/statements.h"
+#include "tests/server/support/postgres_cluster.h"
+
+namespace shapedb::store {
+namespace {
+
+constexpr char kInsert[] = "INSERT INTO t (i, r, s, b) VALUES (?1, ?2, ?3, ?4)";
+constexpr char kAll[] = "SELECT i, r, s, b FROM t ORDER BY n";
+constexpr char kCount[] = "SELECT count(*) FROM t";
+constexpr char kSleep[] = "SELECT pg_sleep(30)";
+constexpr char kFails[] = "INSERT INTO t (n) VALUES (1), (1)";
+constexpr char kLock[] = "SELECT n FROM t WHERE n = ?1 FOR UPDATE";
+
+class PostgresConnectionTest : public ::testing::Test {
+  protected:
+    void SetUp() override {
+        const auto cluster = shapedb::testing::PostgresCluster::shared();
+        if (!cluster) {
+            if (std::getenv("REQUIRE_POSTGRES") != nullptr) FAIL() << cluster.error().message;
+            GTEST_SKIP() << cluster.error().message;
+        }
+        cluster_ = *cluster;
+        uri_ = cluster_->createDatabase();
+        connection_ = connect();
+        connection_->execute(
+            "CREATE TABLE t (n bigint GENERATED ALWAYS AS IDENTITY PRIMARY KEY, i bigint, r double "
+            "precision, s text, "
+            "b bytea)");
+    }
+
+    std::unique_ptr<PostgresConnection> connect(
+        std::chrono::milliseconds patience = std::chrono::seconds(60)) {
+        return std::make_unique<PostgresConnection>(PostgresAddress{uri_, {}, patience, "test"}, none_);
+    }
+    static ErrorCode codeOf(const std::function<void()>& body) {
+        const auto failed = guarded("try", body);
+        EXPECT_FALSE(failed);
+        return failed ? ErrorCode::kInternal : failed.error().code;
+    }
+    void insert(std::int64_t i, double r, const std::string& s, const std::string& b) {
+        Query(*connection_, kInsert, i, r, s, viewOf(b)).run();
+    }
+
+    shapedb::testing::PostgresCluster* cluster_ = nullptr;
+    std::string uri_;
+    StatementTexts none_;
+    std::unique_ptr<PostgresConnection> connection_;
+};
+
+TEST_F(PostgresConnectionTest, ValuesKeepEveryBit) {
+    using Numbers = std::numeric_limits<double>;
+    const std::vector<std::int64_t> integers = {0, -1, INT64_MAX, INT64_MIN, 255, -256};
+    const std::vector<double> reals = {
+        0.1, -0.0, Numbers::denorm_min(), Numbers::max(), Numbers::infinity(), -1e-300};
+    const std::vector<std::string> texts = {"",  "it's", "\xc3\xa4 $1 ?", "a\nb\\c", std::string(70'000, 'x'),
+                                            "\""};
+    const std::vector<std::string> blobs = {
+        "", std::string("\0a\0", 3), "\xff\xfe", std::string(100'000, '\0'), "'", "\\x"};
+    Transaction transaction(*connection_, Transaction::Kind::kWrite);
+    for (std::size_t k = 0; k < integers.size(); ++k) insert(integers[k], reals[k], texts[k], blobs[k]);
+    transaction.commit();
+    const Transaction snapshot(*connection_, Transaction::Kind::kRead);
+    Query query(*connection_, kAll);
+    for (std::size_t k = 0; k < integers.size(); ++k) {
+        ASSERT_TRUE(query.step());
+        EXPECT_EQ(query.integer(0), integers[k]);
+        EXPECT_EQ(query.real(1), reals[k]);
+        EXPECT_EQ(std::signbit(query.real(1)), std::signbit(reals[k]));
+        EXPECT_EQ(query.text(2), texts[k]);
+        EXPECT_EQ(bytesOf(query.blob(3)), blobs[k]);
+        EXPECT_FALSE(query.isNull(3)) << "an empty blob is none of NULL";
+    }
+    EXPECT_FALSE(query.step());
+}
+
+TEST_F(PostgresConnectionTest, NullIsToldFromEmpty) {
+    Transaction transaction(*connection_, Transaction::Kind::kWrite);
+    Query(*connection_, kInsert, 1, 2.0, std::string("s"), BlobOrNull{}).run();
+    Query query(*connection_, kAll);
+    ASSERT_TRUE(query.step());
+    EXPECT_TRUE(query.isNull(3));
+    EXPECT_EQ(query.blob(3).size, 0u);
+}
+
+TEST_F(PostgresConnectionTest, ManyRowsComeInOrderAndMayBeLeft) {
+    connection_->execute("INSERT INTO t (i) SELECT g FROM generate_series(0, 2999) g");
+    for (const int wanted : {3000, 256, 257, 1, 0}) {
+        const Transaction snapshot(*connection_, Transaction::Kind::kRead);
+        {
+            Query query(*connection_, kAll);
+            for (int i = 0; i < wanted; ++i) {
+                ASSERT_TRUE(query.step()) << i;
+                ASSERT_EQ(query.integer(0), i);
+            }
+            if (wanted == 3000) {
+                EXPECT_FALSE(query.step());
+            }
+        }
+        // What was left is closed: another may begin.
+        EXPECT_EQ(numberOf(Query(*connection_, kCount)), 3000);
+    }
+}
+
+TEST_F(PostgresConnectionTest, AFailedTransactionIsNeverTakenForCommitted) {
+    Transaction transaction(*connection_, Transaction::Kind::kWrite);
+    insert(1, 1, "", "");
+    EXPECT_EQ(codeOf([&] { Query(*connection_, kFails).run(); }), ErrorCode::kInternal);
+    EXPECT_EQ(codeOf([&] { transaction.commit(); }), ErrorCode::kInternal);
+    EXPECT_FALSE(connection_->isBroken());
+}
+
+TEST_F(PostgresConnectionTest, WhatIsNotCommittedIsUndone) {
+    {
+        const Transaction transaction(*connection_, Transaction::Kind::kWrite);
+        insert(1, 1, "", "");
+        EXPECT_EQ(numberOf(Query(*connection_, kCount)), 1);
+    }
+    EXPECT_EQ(numberOf(Query(*connection_, kCount)), 0);
+}
+
+TEST_F(PostgresConnectionTest, ADatabaseThatDoesNotAnswerEndsTheCall) {
+    const auto impatient = connect(std::chrono::milliseconds(1'000));
+    EXPECT_EQ(codeOf([&] { Query(*impatient, kSleep).run(); }), ErrorCode::kUnavailable);
+    EXPECT_TRUE(impatient->isBroken());
+}
+
+TEST_F(PostgresConnectionTest, ALostDatabaseIsTold) {
+    cluster_->restart();
+    EXPECT_EQ(codeOf([&] { Query(*connection_, kCount).run(); }), ErrorCode::kUnavailable);
+    EXPECT_TRUE(connection_->isBroken());
+    EXPECT_EQ(numberOf(Query(*connect(), kCount)), 0) << "it is there again";
+    EXPECT_EQ(codeOf([&] {
+                  PostgresConnection({"host=/nowhere dbname=x", {}, std::chrono::seconds(5), "test"}, none_);
+              }),
+              ErrorCode::kUnavailable);
+}
+
+TEST_F(PostgresConnectionTest, AConflictIsToldApart) {
+    connection_->execute("INSERT INTO t (i) VALUES (1), (2)");
+    const auto other = connect();
+    Transaction one(*connection_, Transaction::Kind::kWrite);
+    Transaction two(*other, Transaction::Kind::kWrite);
+    Query(*connection_, kLock, 1).run();
+    Query(*other, kLock, 2).run();
+    bool conflict = false;
+    const auto lock = [&](PostgresConnection& connection, int row) {
+        try {
+            Query(connection, kLock, row).run();
+        } catch (const Failure& failure) {
+            EXPECT_TRUE(isConflict(failure)) << failure.what();
+            conflict = true;
+            connection.rollback();
+        }
+    };
+    std::thread waiting([&] { lock(*other, 1); });
+    lock(*connection_, 2);
+    waiting.join();
+    EXPECT_TRUE(conflict);
+}
+
+TEST(PostgresUri, MayNotHoldAPassword) {
+    EXPECT_TRUE(checkUri("postgresql://me@db.example/shapes?sslmode=verify-full"));
+    EXPECT_TRUE(checkUri("host=/run/postgresql dbname=shapes"));
+    for (const char* uri :
+         {"postgresql://me:secret@db/shapes", "host=db password=secret", "postgresql://[x"}) {
+        const auto refused = checkUri(uri);
+        ASSERT_FALSE(refused) << uri;
+        EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
+        EXPECT_EQ(refused.error().message.find("secret"), std::string::npos) << refused.error().message;
+    }
+}
+
+TEST(SqlLiteral, CannotBeLeft) {
+    EXPECT_EQ(sqlLiteral("a'b"), "'a''b'");
+    EXPECT_EQ(sqlLiteral("'; DROP TABLE shape; --"), "'''; DROP TABLE shape; --'");
+}
+
+}  // namespace
+}  // namespace shapedb::store
