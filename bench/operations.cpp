@@ -58,6 +58,7 @@ int run(int argc, const char* const* argv, cli::Console& console, const std::ato
         addFindOperation(app, bench);
         addLeaveOutOperation(app, bench);
         addFingerprintOperation(app, bench);
+        addWorkersOperation(app, bench);
         try {
             app.parse(argc, argv);
         } catch (const CLI::CallForHelp&) {

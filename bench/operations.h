@@ -50,6 +50,7 @@ void addVerdictsOperation(CLI::App& app, Bench& bench);
 void addFindOperation(CLI::App& app, Bench& bench);
 void addLeaveOutOperation(CLI::App& app, Bench& bench);
 void addFingerprintOperation(CLI::App& app, Bench& bench);
+void addWorkersOperation(CLI::App& app, Bench& bench);
 
 // The program: reads the command line and runs the operation the user chose.
 
