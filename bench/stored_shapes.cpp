@@ -19,6 +19,7 @@
 #include "server/store/point_blob.h"
 #include "server/store/sql/rows.h"
 #include "server/store/sql/sql.h"
+#include "server/store/sqlite/connection.h"
 
 namespace shapedb::bench {
 
