@@ -24,8 +24,21 @@ constexpr const char* kNumbered[] = {"collection", "shape", "job", "rebuild"};
 
 // Nobody else writes from here on; who reads goes on.
 constexpr char kLockAll[] = "LOCK TABLE collection, shape, job, rebuild IN EXCLUSIVE MODE";
-// The sums of a collection are counted once all rows are there: one row that is changed by every other of a
-// transaction becomes slow to find.
+// What the sums of each collection must be.
+#define SHAPEDB_COUNTED                                                                                     \
+    "(SELECT c.id, "                                                                                        \
+    "(SELECT count(*) FROM shape s WHERE s.collection_id = c.id AND s.state = 0 AND NOT EXISTS (SELECT 1 "  \
+    "FROM signature g WHERE g.shape_id = s.id AND g.generation = c.generation)) AS waiting, "               \
+    "(SELECT count(*) FROM job j JOIN shape s ON s.id = j.shape_id WHERE s.collection_id = c.id) AS jobs, " \
+    "(SELECT coalesce(sum(j.point_bytes), 0) FROM job j JOIN shape s ON s.id = j.shape_id WHERE "           \
+    "s.collection_id = c.id) AS job_bytes, "                                                                \
+    "(SELECT coalesce(sum(p.point_bytes), 0) FROM shape_points p JOIN shape s ON s.id = p.shape_id WHERE "  \
+    "s.collection_id = c.id) AS point_bytes, "                                                              \
+    "(SELECT coalesce(sum(p.stored_bytes), 0) FROM shape_points p JOIN shape s ON s.id = p.shape_id WHERE " \
+    "s.collection_id = c.id) AS stored_point_bytes FROM collection c) counted"
+
+// The sums are counted once all rows are there: one row that is changed by every other of a transaction
+// becomes slow to find.
 constexpr char kDeleteAll[] =
     "ALTER TABLE shape DISABLE TRIGGER USER; ALTER TABLE signature DISABLE TRIGGER USER; "
     "ALTER TABLE job DISABLE TRIGGER USER; ALTER TABLE shape_points DISABLE TRIGGER USER; "
@@ -33,31 +46,17 @@ constexpr char kDeleteAll[] =
 constexpr char kCountAgain[] =
     "ALTER TABLE shape ENABLE TRIGGER USER; ALTER TABLE signature ENABLE TRIGGER USER; "
     "ALTER TABLE job ENABLE TRIGGER USER; ALTER TABLE shape_points ENABLE TRIGGER USER; "
-    "UPDATE collection c SET "
-    "waiting = (SELECT count(*) FROM shape s WHERE s.collection_id = c.id AND s.state = 0 AND NOT EXISTS "
-    "(SELECT "
-    "1 FROM signature g WHERE g.shape_id = s.id AND g.generation = c.generation)), "
-    "jobs = (SELECT count(*) FROM job j JOIN shape s ON s.id = j.shape_id WHERE s.collection_id = c.id), "
-    "job_bytes = (SELECT coalesce(sum(j.point_bytes), 0) FROM job j JOIN shape s ON s.id = j.shape_id WHERE "
-    "s.collection_id = c.id), "
-    "(point_bytes, stored_point_bytes) = (SELECT coalesce(sum(p.point_bytes), 0), "
-    "coalesce(sum(p.stored_bytes), 0) "
-    "FROM shape_points p JOIN shape s ON s.id = p.shape_id WHERE s.collection_id = c.id)";
+    "UPDATE collection SET waiting = counted.waiting, jobs = counted.jobs, job_bytes = counted.job_bytes, "
+    "point_bytes = counted.point_bytes, stored_point_bytes = counted.stored_point_bytes FROM " SHAPEDB_COUNTED
+    " WHERE counted.id = collection.id";
+constexpr char kWrongSums[] =
+    "SELECT k.id, k.waiting <> counted.waiting, (k.jobs, k.job_bytes, k.point_bytes, k.stored_point_bytes) "
+    "<> "
+    "(counted.jobs, counted.job_bytes, counted.point_bytes, counted.stored_point_bytes) FROM collection k "
+    "JOIN " SHAPEDB_COUNTED " ON counted.id = k.id ORDER BY k.id";
 /// Other servers load all collections again: no number is one that a collection had before.
 constexpr char kLastOfAllChanges[] = "SELECT coalesce(max(last_change), 0) FROM collection";
 constexpr std::int64_t kBeyondLog = 1'000'000;
-constexpr char kWrongSums[] =
-    "SELECT c.id, c.waiting <> (SELECT count(*) FROM shape s WHERE s.collection_id = c.id AND s.state = 0 "
-    "AND NOT "
-    "EXISTS (SELECT 1 FROM signature g WHERE g.shape_id = s.id AND g.generation = c.generation)), "
-    "c.jobs <> (SELECT count(*) FROM job j JOIN shape s ON s.id = j.shape_id WHERE s.collection_id = c.id) "
-    "OR "
-    "c.job_bytes <> (SELECT coalesce(sum(j.point_bytes), 0) FROM job j JOIN shape s ON s.id = j.shape_id "
-    "WHERE "
-    "s.collection_id = c.id) OR (c.point_bytes, c.stored_point_bytes) <> (SELECT "
-    "coalesce(sum(p.point_bytes), 0), "
-    "coalesce(sum(p.stored_bytes), 0) FROM shape_points p JOIN shape s ON s.id = p.shape_id WHERE "
-    "s.collection_id = c.id) FROM collection c ORDER BY c.id";
 
 std::int64_t lastIdOf(PostgresConnection& connection, const std::string& table) {
     const std::string last =

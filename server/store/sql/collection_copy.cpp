@@ -32,8 +32,7 @@ CopiedShape withContent(Connection& source, Shape shape, std::int64_t generation
             raise(ErrorCode::kDataLoss, "the points of shape " + quoted(copied.shape.key) + " are missing");
         }
         copied.pointBytes = static_cast<std::uint64_t>(points.integer(0));
-        const BlobView blob = points.blob(2);
-        if (blob.size > 0) copied.points.assign(static_cast<const char*>(blob.data), blob.size);
+        copied.points = bytesOf(points.blob(2));
     }
     {
         Query signature(source, sql::kServingSignature, id);
@@ -98,7 +97,7 @@ void insertCopy(Connection& target, std::int64_t collectionId, const CopiedShape
     if (copied.surface) {
         const SurfaceRow& surface = *copied.surface;
         Query(target, sql::kPutSurface, shapeId, surface.pointsVersion, digestOf(surface.bytes),
-              BlobView{surface.bytes.data(), surface.bytes.size()})
+              viewOf(surface.bytes))
             .run();
     }
 }

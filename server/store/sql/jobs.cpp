@@ -124,15 +124,14 @@ Result<std::vector<Shape>> SqlStore::recoverJobs(int maxAttempts, const std::vec
     });
 }
 
-void SqlStore::queueAgain(Connection& connection, std::int64_t shapeId, std::int64_t pointsVersion,
-                          std::uint64_t bytes) {
+void SqlStore::queueAgain(Connection& connection, std::int64_t collectionId, std::int64_t shapeId,
+                          std::int64_t pointsVersion, std::uint64_t bytes) {
     Query(connection, sql::kSetPending, shapeId, now()).run();
     // A running rebuild leaves shapes with a job to the job.
     Query(connection, sql::kDeleteSignatures, shapeId).run();
     Query(connection, sql::kDeleteRebuildFailuresOfShape, shapeId).run();
     Query(connection, sql::kInsertJob, shapeId, pointsVersion, bytes, now()).run();
-    if (const auto shape = findShapeById(connection, shapeId))
-        logChange(connection, shape->collectionId, shapeId);
+    logChange(connection, collectionId, shapeId);
 }
 
 Result<std::uint64_t> SqlStore::retryShapes(const std::vector<std::int64_t>& shapeIds,
@@ -143,16 +142,18 @@ Result<std::uint64_t> SqlStore::retryShapes(const std::vector<std::int64_t>& sha
         for (const std::int64_t shapeId : shapeIds) {
             std::int64_t pointsVersion = 0;
             std::uint64_t bytes = 0;
+            std::int64_t collectionId = 0;
             {
                 Query query(connection, sql::kFailedShape, shapeId);
                 if (!query.step()) continue;
                 pointsVersion = query.integer(0);
                 bytes = static_cast<std::uint64_t>(query.integer(1));
+                collectionId = query.integer(2);
             }
             const auto room = requireRoom(bytes, maxQueuedJobs, maxQueuedBytes, readTally(connection));
             if (!room && queued == 0) throw Failure(room.error());
             if (!room) break;
-            queueAgain(connection, shapeId, pointsVersion, bytes);
+            queueAgain(connection, collectionId, shapeId, pointsVersion, bytes);
             ++queued;
         }
         return queued;

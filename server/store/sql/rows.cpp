@@ -205,8 +205,7 @@ QueueDepth readTally(Connection& connection) {
 StoreStats readStats(Connection& connection) {
     StoreStats stats;
     const auto count = [&](const char* statement) {
-        Query query(connection, statement);
-        return query.step() ? static_cast<std::uint64_t>(query.integer(0)) : 0;
+        return static_cast<std::uint64_t>(numberOf(Query(connection, statement)));
     };
     stats.collections = count(sql::kCountCollections);
     stats.signatures = count(sql::kCountSignatures);

@@ -99,7 +99,7 @@ PutResult SqlStore::retryShape(Connection& connection, const PutRequest& request
     if (existing.metadata != metadata) replaceMetadata(connection, existing, metadata);
     orRaise(requireRoom(request.scan.bytes(), request.maxQueuedJobs, request.maxQueuedBytes,
                         readTally(connection)));
-    queueAgain(connection, existing.id, existing.pointsVersion, request.scan.bytes());
+    queueAgain(connection, existing.collectionId, existing.id, existing.pointsVersion, request.scan.bytes());
     return {PutOutcome::kRetried, *findShapeById(connection, existing.id)};
 }
 

@@ -186,8 +186,8 @@ class SqlStore : public Store {
                   std::int64_t pointsVersion);
     std::optional<Shape> markFailed(Connection& connection, std::int64_t shapeId, const Error& why);
     /// Makes a failed shape pending and queues its job.
-    void queueAgain(Connection& connection, std::int64_t shapeId, std::int64_t pointsVersion,
-                    std::uint64_t bytes);
+    void queueAgain(Connection& connection, std::int64_t collectionId, std::int64_t shapeId,
+                    std::int64_t pointsVersion, std::uint64_t bytes);
     bool jobIsCurrent(Connection& connection, const Job& job, std::int64_t generation);
 
     /// The first part of an import: the collection, with no shapes and a name that nobody else uses.
