@@ -109,6 +109,13 @@ class Query {
         (bind(++position, values), ...);
     }
 
+    /// The same for a single one, where their number is not known before.
+    template <typename Value>
+    void bindAt(int position, const Value& value) {
+        bind(position, value);
+    }
+    void bindNullAt(int position) { statement_.bindNull(position); }
+
     /// True: there is a row. False: finished.
     bool step() { return statement_.step(); }
     /// For statements without rows.

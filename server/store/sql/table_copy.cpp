@@ -60,14 +60,14 @@ constexpr char kRunningJobsAsQueued[] =
 constexpr char kShapesWithPoints[] = "SELECT shape_id FROM shape_points ORDER BY shape_id";
 constexpr char kCountPoints[] = "SELECT count(*) FROM shape_points";
 
-void bindColumn(PreparedStatement& target, const Query& row, int column, char type) {
+void bindColumn(Query& target, const Query& row, int column, char type) {
     const int position = column + 1;
-    if (row.isNull(column)) return target.bindNull(position);
+    if (row.isNull(column)) return target.bindNullAt(position);
     switch (type) {
-        case 'i': return target.bindInteger(position, row.integer(column));
-        case 'r': return target.bindReal(position, row.real(column));
-        case 't': return target.bindText(position, row.text(column));
-        default: return target.bindBlob(position, row.blob(column));
+        case 'i': return target.bindAt(position, row.integer(column));
+        case 'r': return target.bindAt(position, row.real(column));
+        case 't': return target.bindAt(position, row.text(column));
+        default: return target.bindAt(position, row.blob(column));
     }
 }
 
@@ -76,16 +76,11 @@ void copyRows(Connection& source, Connection& target, const char* read, const Ta
     Query row(source, read);
     while (row.step()) {
         orRaise(context.checkpoint());
-        PreparedStatement& insert = target.prepared(table.write);
-        struct Reset {
-            PreparedStatement& statement;
-            ~Reset() { statement.reset(); }
-        } const reset{insert};
+        Query insert(target, table.write);
         for (int column = 0; table.types[column] != '\0'; ++column) {
             bindColumn(insert, row, column, table.types[column]);
         }
-        while (insert.step()) {
-        }
+        insert.run();
     }
 }
 

@@ -52,12 +52,7 @@ Content contentOf(const Catalog& server) {
 class SharedDatabaseTest : public ::testing::Test {
   protected:
     void SetUp() override {
-        const auto cluster = PostgresCluster::shared();
-        if (!cluster) {
-            if (std::getenv("REQUIRE_POSTGRES") != nullptr) FAIL() << cluster.error().message;
-            GTEST_SKIP() << cluster.error().message;
-        }
-        cluster_ = *cluster;
+        SHAPEDB_USE_POSTGRES(cluster_);
         uri_ = cluster_->createDatabase();
         for (const char* name : {"one", "two"}) servers_.push_back(start(name));
     }

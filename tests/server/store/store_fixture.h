@@ -2,7 +2,6 @@
 // Fixtures of the store tests: a private folder with a database, small clouds.
 #pragma once
 
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -88,12 +87,7 @@ class StoreTest : public ::testing::Test {
 
     void SetUp() override {
         if (engine() == Engine::kPostgres) {
-            const auto cluster = shapedb::testing::PostgresCluster::shared();
-            if (!cluster) {
-                if (std::getenv("REQUIRE_POSTGRES") != nullptr) FAIL() << cluster.error().message;
-                GTEST_SKIP() << cluster.error().message;
-            }
-            cluster_ = *cluster;
+            SHAPEDB_USE_POSTGRES(cluster_);
             database_ = cluster_->createDatabase();
         }
         open();

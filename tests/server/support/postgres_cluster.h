@@ -2,8 +2,11 @@
 // A PostgreSQL server of the test's own: in a folder below /tmp, on a Unix socket in it, gone at the end.
 #pragma once
 
+#include <cstdlib>
 #include <memory>
 #include <string>
+
+#include <gtest/gtest.h>
 
 #include "core/base/error.h"
 
@@ -38,3 +41,13 @@ class PostgresCluster {
 };
 
 }  // namespace shapedb::testing
+
+/// In SetUp of a fixture: `place` becomes the cluster of this process. Without PostgreSQL the test is
+/// skipped, or fails where REQUIRE_POSTGRES is set, as in scripts/test.sh.
+#define SHAPEDB_USE_POSTGRES(place)                                                                    \
+    do {                                                                                               \
+        const auto shared_ = shapedb::testing::PostgresCluster::shared();                              \
+        if (!shared_ && std::getenv("REQUIRE_POSTGRES") != nullptr) FAIL() << shared_.error().message; \
+        if (!shared_) GTEST_SKIP() << shared_.error().message;                                         \
+        place = *shared_;                                                                              \
+    } while (false)

@@ -3,7 +3,6 @@
 #include "server/store/postgres/connection.h"
 
 #include <cmath>
-#include <cstdlib>
 #include <limits>
 #include <string>
 #include <thread>
@@ -27,12 +26,7 @@ constexpr char kLock[] = "SELECT n FROM t WHERE n = ?1 FOR UPDATE";
 class PostgresConnectionTest : public ::testing::Test {
   protected:
     void SetUp() override {
-        const auto cluster = shapedb::testing::PostgresCluster::shared();
-        if (!cluster) {
-            if (std::getenv("REQUIRE_POSTGRES") != nullptr) FAIL() << cluster.error().message;
-            GTEST_SKIP() << cluster.error().message;
-        }
-        cluster_ = *cluster;
+        SHAPEDB_USE_POSTGRES(cluster_);
         uri_ = cluster_->createDatabase();
         connection_ = connect();
         connection_->execute(
