@@ -34,7 +34,7 @@ constexpr std::size_t kLargestChunk = 1024;
 constexpr std::size_t kGrain = 4;
 
 // A row that the scan of its block left. Small, for it is sorted.
-struct Candidate {
+struct Contender {
     double bound = 0.0;
     const Survivor* survivor = nullptr;
     const SignatureBlock* block = nullptr;
@@ -58,7 +58,7 @@ bool ranksBefore(const SearchHit& a, const SearchHit& b) {
     return a.score != b.score ? a.score > b.score : a.id < b.id;
 }
 
-bool visitedBefore(const Candidate& a, const Candidate& b) {
+bool visitedBefore(const Contender& a, const Contender& b) {
     return a.bound != b.bound ? a.bound > b.bound : a.id() < b.id();
 }
 
@@ -116,11 +116,11 @@ Result<void> parallelUntilStopped(std::size_t begin, std::size_t end, std::size_
 class Searcher {
   public:
     Searcher(const Scorer& scorer, const SignatureSet& set, const SearchOptions& options,
-             std::size_t perGroup, const std::vector<RankedHit>* only, const RunContext& context)
+             std::size_t perGroup, const std::vector<GroupValue>* only, const RunContext& context)
         : scorer_(scorer), options_(options), context_(context), perGroup_(perGroup) {
         if (only != nullptr) {
             only_.emplace();
-            for (const RankedHit& hit : *only) (*only_)[hit.group] = true;
+            for (const GroupValue group : *only) (*only_)[group] = true;
         }
         result_.counts.candidates = set.size();
         // Each slice is spread evenly over the set: shapes that were added together are often alike.
@@ -202,14 +202,14 @@ class Searcher {
     }
 
     // Counts what the scans of the blocks from `begin` left, and puts it in the order of visiting.
-    std::vector<Candidate> collect(const std::vector<BlockScan>& scans, std::size_t begin) {
+    std::vector<Contender> collect(const std::vector<BlockScan>& scans, std::size_t begin) {
         std::size_t left = 0;
         for (const BlockScan& scan : scans) {
             left += scan.left.size();
             result_.counts.filtered += scan.filtered;
             result_.counts.scans += scan.counts;
         }
-        std::vector<Candidate> all;
+        std::vector<Contender> all;
         all.reserve(left);
         for (std::size_t b = 0; b < scans.size(); ++b) {
             for (const Survivor& survivor : scans[b].left) {
@@ -225,7 +225,7 @@ class Searcher {
     }
 
     // Scores candidates by falling bound until no bound reaches the k-th score.
-    Result<void> visit(const std::vector<Candidate>& candidates) {
+    Result<void> visit(const std::vector<Contender>& candidates) {
         std::size_t chunk = kFirstChunk;
         for (std::size_t begin = 0; begin < candidates.size();) {
             const double least = needed();
@@ -243,7 +243,7 @@ class Searcher {
         return {};
     }
 
-    Result<void> scoreChunk(const std::vector<Candidate>& candidates, std::size_t begin, std::size_t end,
+    Result<void> scoreChunk(const std::vector<Contender>& candidates, std::size_t begin, std::size_t end,
                             double least) {
         std::vector<std::optional<double>> scores(end - begin);
         // Before any is scored: what a candidate needs must not depend on which thread is faster.
@@ -253,7 +253,7 @@ class Searcher {
         }
         // A signature of many points takes milliseconds, so every one is preceded by a look at the context.
         auto done = parallelUntilStopped(begin, end, kGrain, context_, [&](std::size_t i) {
-            const Candidate& candidate = candidates[i];
+            const Contender& candidate = candidates[i];
             const double own = neededOf[i - begin];
             if (candidate.bound < own) return;
             const ShapeRow shape = candidate.block->rows()[candidate.survivor->row];
@@ -301,19 +301,30 @@ class Searcher {
     double leastOfFull_ = 0.0;     // the least of these
 };
 
+// `only`: see Searcher.
 Result<SearchResult> searchFor(const Scorer& scorer, const SignatureSet& set, const SearchOptions& options,
+                               std::size_t perGroup, const std::vector<GroupValue>* only,
                                const RunContext& context) {
-    Searcher first(scorer, set, options, 1, nullptr, context);
-    auto result = first.run();
+    Searcher searcher(scorer, set, options, perGroup, only, context);
+    auto result = searcher.run();
     RETURN_IF_ERROR(result);
-    std::vector<RankedHit> hits = first.hits();
-    if (options.grouping && options.grouping->perGroup > 1 && !hits.empty()) {
-        Searcher more(scorer, set, options, options.grouping->perGroup, &hits, context);
-        RETURN_IF_ERROR(more.run());
-        hits = more.hits();
-        bringGroupsTogether(hits, [](const RankedHit& hit) { return hit.group; });
-    }
-    result->hits.assign(hits.begin(), hits.end());
+    result->hits.assign(searcher.hits().begin(), searcher.hits().end());
+    return result;
+}
+
+Result<SearchResult> searchInGroups(const Scorer& scorer, const SignatureSet& set,
+                                    const SearchOptions& options, const RunContext& context) {
+    auto result = searchFor(scorer, set, options, 1, nullptr, context);
+    RETURN_IF_ERROR(result);
+    const std::size_t perGroup = options.grouping->perGroup;
+    if (perGroup == 1 || result->hits.empty()) return result;
+    const auto groupOfHit = [&](const SearchHit& hit) { return groupOf(set, hit.id, options.grouping->key); };
+    std::vector<GroupValue> groups;
+    for (const SearchHit& hit : result->hits) groups.push_back(groupOfHit(hit));
+    auto more = searchFor(scorer, set, options, perGroup, &groups, context);
+    RETURN_IF_ERROR(more);
+    bringGroupsTogether(more->hits, groupOfHit);
+    result->hits = std::move(more->hits);
     return result;
 }
 
@@ -337,12 +348,15 @@ Result<SearchResult> topK(const Signature& query, const SignatureSet& set, const
     }
 }
 
-Result<SearchResult> topK(const Scorer& scorer, const SignatureSet& set, const SearchOptions& options,
-                          const RunContext& context) {
+namespace {
+
+// Runs a search, times it, and makes errors of what it throws.
+template <typename Search>
+Result<SearchResult> timed(const SignatureSet& set, const SearchOptions& options, const Search& search) {
     RETURN_IF_ERROR(validate(options));
     try {
         const auto began = RunContext::Clock::now();
-        auto result = searchFor(scorer, set, options, context);
+        Result<SearchResult> result = search();
         if (result) result->seconds = std::chrono::duration<double>(RunContext::Clock::now() - began).count();
         return result;
     } catch (const std::bad_alloc&) {
@@ -350,6 +364,30 @@ Result<SearchResult> topK(const Scorer& scorer, const SignatureSet& set, const S
     } catch (const std::exception& e) {
         return fail(ErrorCode::kInternal, std::string("search: ") + e.what());
     }
+}
+
+}  // namespace
+
+Result<SearchResult> topK(const Scorer& scorer, const SignatureSet& set, const SearchOptions& options,
+                          const RunContext& context) {
+    return timed(set, options, [&] {
+        return options.grouping ? searchInGroups(scorer, set, options, context)
+                                : searchFor(scorer, set, options, 1, nullptr, context);
+    });
+}
+
+Result<SearchResult> bestOfGroups(const Scorer& scorer, const SignatureSet& set, const SearchOptions& options,
+                                  const RunContext& context) {
+    return timed(set, options, [&] { return searchFor(scorer, set, options, 1, nullptr, context); });
+}
+
+Result<SearchResult> hitsOfGroups(const Scorer& scorer, const SignatureSet& set, const SearchOptions& options,
+                                  const std::vector<GroupValue>& groups, const RunContext& context) {
+    // As many groups as are asked for, however few hits the search that found them was to have.
+    SearchOptions own = options;
+    own.k = std::max<std::size_t>(1, groups.size());
+    return timed(set, own,
+                 [&] { return searchFor(scorer, set, own, own.grouping->perGroup, &groups, context); });
 }
 
 Error ofQuery(std::size_t i, Error error) {

@@ -64,6 +64,17 @@ struct SearchResult {
 [[nodiscard]] Result<SearchResult> topK(const Scorer& scorer, const SignatureSet& set,
                                         const SearchOptions& options, const RunContext& context = {});
 
+/// The first half of a search with groups (`options.grouping`): the best hit of each of the k groups whose
+/// best hits are best, best first. The sets of several servers are searched so by halves. Errors: as above.
+[[nodiscard]] Result<SearchResult> bestOfGroups(const Scorer& scorer, const SignatureSet& set,
+                                                const SearchOptions& options, const RunContext& context = {});
+/// The second half: of each of `groups` the best hits that it may have, all of them best first. `groups`: no
+/// two alike; what they point to must live meanwhile. Errors: as above.
+[[nodiscard]] Result<SearchResult> hitsOfGroups(const Scorer& scorer, const SignatureSet& set,
+                                                const SearchOptions& options,
+                                                const std::vector<GroupValue>& groups,
+                                                const RunContext& context = {});
+
 struct BatchQuery {
     Signature signature;
     std::optional<std::int64_t> excludeId;  ///< instead of SearchOptions::excludeId

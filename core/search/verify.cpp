@@ -10,7 +10,6 @@
 #include "core/base/return_if_error.h"
 #include "core/matching/kernel.h"
 #include "core/matching/score.h"
-#include "core/search/view_search.h"
 #include "core/views/views.h"
 
 namespace shapedb {
@@ -52,14 +51,9 @@ bool verifiedRanksBefore(const VerifiedHit& a, const VerifiedHit& b) {
 
 class Verifier {
   public:
-    Verifier(FitQuery query, const QueryTraits& traits, const SignatureSet& set, const SearchOptions& options,
-             const SurfaceOf& surfaceOf, const RunContext& context)
-        : query_(std::move(query)),
-          set_(set),
-          share_(misfitShare(traits, options.score)),
-          options_(options),
-          surfaceOf_(surfaceOf),
-          context_(context) {
+    Verifier(const CandidateSource& source, const QueryTraits& traits, const SearchOptions& options,
+             const RunContext& context)
+        : source_(source), share_(misfitShare(traits, options.score)), options_(options), context_(context) {
         fit_.kinds = kindsOfQuery(traits);
         fit_.keepScale = options.score.keepScale;
         fit_.reflection = options.score.reflection;
@@ -67,10 +61,10 @@ class Verifier {
 
     // Verifies `candidates` in their order, at most `most`; `all`: there are no others. A candidate that is
     // not among them has no better signature score than the last of them.
-    Result<VerifiedResult> run(const std::vector<SearchHit>& candidates, std::size_t most, bool all) {
-        for (const SearchHit& candidate : candidates) {
+    Result<VerifiedResult> run(const std::vector<Candidate>& candidates, std::size_t most, bool all) {
+        for (const Candidate& candidate : candidates) {
             hits_.push_back({candidate.id, scoreOf(candidate.score, kUnverifiedMisfit), candidate.score,
-                             nullptr, Verdict::kNone});
+                             nullptr, Verdict::kNone, candidate.group, candidate.quality});
         }
         const std::size_t limit = std::min(most, hits_.size());
         std::size_t done = 0;
@@ -93,7 +87,7 @@ class Verifier {
                                       [&](const VerifiedHit& hit) { return hit.score < options_.threshold; });
         hits_.erase(end, hits_.end());
         if (options_.grouping) {
-            const auto group = [&](const VerifiedHit& hit) { return groupOfHit(hit); };
+            const auto group = [](const VerifiedHit& hit) { return hit.group.get(); };
             keepBestOfGroups(hits_, options_.k, options_.grouping->perGroup, group);
             bringGroupsTogether(hits_, group);
         } else if (hits_.size() > options_.k) {
@@ -128,71 +122,45 @@ class Verifier {
         GroupMap<std::size_t> better;
         std::size_t full = 0;
         for (auto hit = hits_.begin(); hit != end; ++hit) {
-            if (isBetter(*hit) && ++better[groupOfHit(*hit)] == options_.grouping->perGroup) ++full;
+            if (isBetter(*hit) && ++better[hit->group.get()] == options_.grouping->perGroup) ++full;
         }
         return full < options_.k;
     }
 
-    GroupValue groupOfHit(const VerifiedHit& hit) const {
-        return groupOf(set_, hit.id, options_.grouping->key);
-    }
-
     Result<void> verify(std::size_t begin, std::size_t end) {
-        return forEachHit(begin, end, [&](VerifiedHit& hit) -> Result<void> {
-            return withSurface(
-                hit, [&](const SurfacePoints& surface, const RunContext& quiet) -> Result<void> {
-                    auto fitted = fit(query_, surface, fit_, quiet);
-                    RETURN_IF_ERROR(fitted);
-                    hit.score = scoreOf(hit.signatureScore, fitted->misfit);
-                    hit.verdict = verdictOf(distanceOfScore(hit.signatureScore), *fitted, fit_.reflection);
-                    hit.fit = std::make_shared<const FitResult>(std::move(*fitted));
-                    return {};
-                });
-        });
+        std::vector<std::int64_t> ids;
+        for (std::size_t i = begin; i < end; ++i) ids.push_back(hits_[i].id);
+        auto fits = source_.fitAll(ids, fit_, context_);
+        RETURN_IF_ERROR(fits);
+        for (std::size_t i = begin; i < end; ++i) {
+            VerifiedHit& hit = hits_[i];
+            hit.fit = std::move((*fits)[i - begin]);
+            if (!hit.fit) continue;
+            hit.score = scoreOf(hit.signatureScore, hit.fit->misfit);
+            hit.verdict = verdictOf(distanceOfScore(hit.signatureScore), *hit.fit, fit_.reflection);
+        }
+        return {};
     }
 
     // No hit is shown mirrored that need not be. Their scores stay.
     Result<void> settleHands() {
-        return forEachHit(0, hits_.size(), [&](VerifiedHit& hit) -> Result<void> {
-            if (!hit.fit || !hit.fit->best.motion.reflected) return {};
-            return withSurface(hit,
-                               [&](const SurfacePoints& surface, const RunContext& quiet) -> Result<void> {
-                                   auto settled = preferUnmirrored(*hit.fit, query_, surface, fit_, quiet);
-                                   RETURN_IF_ERROR(settled);
-                                   hit.fit = std::make_shared<const FitResult>(std::move(*settled));
-                                   return {};
-                               });
-        });
-    }
-
-    // In parallel. Errors: the first in the order of the hits.
-    template <typename Body>
-    Result<void> forEachHit(std::size_t begin, std::size_t end, const Body& body) {
-        std::vector<Result<void>> outcomes(end - begin);
-        RETURN_IF_ERROR(parallelFor(end - begin, 1, context_, [&](std::size_t i, std::size_t) {
-            outcomes[i] = body(hits_[begin + i]);
-        }));
-        for (Result<void>& outcome : outcomes) RETURN_IF_ERROR(outcome);
+        std::vector<VerifiedHit*> mirrored;
+        std::vector<FittedShape> shapes;
+        for (VerifiedHit& hit : hits_) {
+            if (!hit.fit || !hit.fit->best.motion.reflected) continue;
+            mirrored.push_back(&hit);
+            shapes.push_back({hit.id, hit.fit});
+        }
+        if (shapes.empty()) return {};
+        auto settled = source_.preferUnmirroredAll(shapes, fit_, context_);
+        RETURN_IF_ERROR(settled);
+        for (std::size_t i = 0; i < mirrored.size(); ++i) mirrored[i]->fit = std::move((*settled)[i]);
         return {};
     }
 
-    // Does nothing for a hit without surface points.
-    template <typename Body>
-    Result<void> withSurface(const VerifiedHit& hit, const Body& body) const {
-        const auto surface = surfaceOf_(hit.id);
-        RETURN_IF_ERROR(surface);
-        if (*surface == nullptr) return {};
-        // Its own progress would run backwards beside that of the others.
-        RunContext quiet = context_;
-        quiet.progress = nullptr;
-        return body(**surface, quiet);
-    }
-
-    const FitQuery query_;
-    const SignatureSet& set_;
+    const CandidateSource& source_;
     const double share_;
     const SearchOptions& options_;
-    const SurfaceOf& surfaceOf_;
     const RunContext& context_;
     FitOptions fit_;
     std::vector<VerifiedHit> hits_;
@@ -231,17 +199,6 @@ std::size_t candidatesFor(const QueryTraits& traits) noexcept {
     return traits.reliable ? kCandidates : kCandidatesUnsure;
 }
 
-VerifiedResult unverified(SearchResult found) {
-    VerifiedResult result;
-    for (const SearchHit& hit : found.hits)
-        result.hits.push_back({hit.id, hit.score, hit.score, nullptr, Verdict::kNone});
-    result.exact = true;
-    result.counts = found.counts;
-    result.seconds = found.seconds;
-    result.scorer = std::move(found.scorer);
-    return result;
-}
-
 double verifiedScore(double signatureScore, double misfit, double share) {
     if (signatureScore >= 1.0) return 1.0;
     return belowOne(scoreOfDistance((1.0 - share) * distanceOfScore(signatureScore) + share * misfit));
@@ -278,38 +235,32 @@ Result<VerifiedExplanation> explainVerified(const Signature& query, const Surfac
 
 namespace {
 
-// Those that views rank first before the others, after a few that signatures rank first.
-Result<std::vector<SearchHit>> withViewsFirst(const SearchResult& found, const SurfacePoints& surface,
-                                              const SignatureSet& set, const SearchOptions& options,
-                                              const VerifyOptions& verify, std::size_t most,
-                                              const RunContext& context) {
+// What of a search for candidates a query of one side needs besides.
+Result<ViewSearch> viewSearch(const SurfacePoints& surface, const SearchOptions& options,
+                              const VerifyOptions& verify, std::size_t most) {
     const Point3 towards = verify.viewpoint ? *verify.viewpoint - surface.centre : Point3{};
     const auto view = makeViewOfScan(surface, towards);
     RETURN_IF_ERROR(view);
-    const ViewOptions compared{options.score.reflection, options.score.keepScale,
-                               verify.viewpoint.has_value()};
+    return ViewSearch{
+        *view, {options.score.reflection, options.score.keepScale, verify.viewpoint.has_value()}, most};
+}
+
+// Those that views rank first before the others, after a few that signatures rank first.
+std::vector<Candidate> withViewsFirst(const std::vector<Candidate>& best,
+                                      const std::vector<ViewCandidate>& byViews, std::size_t most) {
     // Some are among those of the signatures: then further ones take their places.
-    const auto byViews =
-        nearestByViews(ViewQuery(*view, compared), set, most, options.filter, options.excludeId, context);
-    RETURN_IF_ERROR(byViews);
     const auto ofViews = static_cast<std::size_t>(kShareOfViews * static_cast<double>(most));
-    const auto ofSignatures = std::min(found.hits.size(), most - ofViews);
-    std::vector<SearchHit> order(found.hits.begin(),
-                                 found.hits.begin() + static_cast<std::ptrdiff_t>(ofSignatures));
+    const auto ofSignatures = std::min(best.size(), most - ofViews);
+    std::vector<Candidate> order(best.begin(), best.begin() + static_cast<std::ptrdiff_t>(ofSignatures));
     const auto isTaken = [&](std::int64_t id) {
-        return std::any_of(order.begin(), order.end(), [&](const SearchHit& hit) { return hit.id == id; });
+        return std::any_of(order.begin(), order.end(), [&](const Candidate& one) { return one.id == id; });
     };
-    for (const ViewHit& hit : *byViews) {
+    for (const ViewCandidate& near : byViews) {
         if (order.size() >= most) break;
-        const SignatureSet::Place place = set.find(hit.id);
-        const ShapeRow row = place.block->rows()[place.row];
-        if (!isTaken(hit.id) && found.scorer->compares(row)) {
-            order.push_back({hit.id, found.scorer->score(row)});
-        }
+        if (near.comparable && !isTaken(near.shape.id)) order.push_back(near.shape);
     }
-    for (auto hit = found.hits.begin() + static_cast<std::ptrdiff_t>(ofSignatures); hit != found.hits.end();
-         ++hit) {
-        if (!isTaken(hit->id)) order.push_back(*hit);
+    for (auto one = best.begin() + static_cast<std::ptrdiff_t>(ofSignatures); one != best.end(); ++one) {
+        if (!isTaken(one->id)) order.push_back(*one);
     }
     return order;
 }
@@ -317,68 +268,129 @@ Result<std::vector<SearchHit>> withViewsFirst(const SearchResult& found, const S
 // Of candidates in groups half are the first of `order`, whatever their groups, and half the first of
 // `ofGroups`: so the best shape of a group is found though another has the better signature, and many shapes
 // of one group do not keep the others from being verified.
-std::vector<SearchHit> withGroups(const std::vector<SearchHit>& order, std::vector<SearchHit> ofGroups,
+std::vector<Candidate> withGroups(const std::vector<Candidate>& order, std::vector<Candidate> ofGroups,
                                   std::size_t most) {
-    std::sort(ofGroups.begin(), ofGroups.end(), [](const SearchHit& a, const SearchHit& b) {
+    const std::size_t all = order.size() + ofGroups.size();
+    std::sort(ofGroups.begin(), ofGroups.end(), [](const Candidate& a, const Candidate& b) {
         return a.score != b.score ? a.score > b.score : a.id < b.id;
     });
-    std::vector<SearchHit> mixed;
+    std::vector<Candidate> mixed;
     std::unordered_set<std::int64_t> taken;
-    const auto take = [&](const std::vector<SearchHit>& from, std::size_t size) {
-        for (auto hit = from.begin(); hit != from.end() && mixed.size() < size; ++hit) {
-            if (taken.insert(hit->id).second) mixed.push_back(*hit);
+    const auto take = [&](const std::vector<Candidate>& from, std::size_t size) {
+        for (auto one = from.begin(); one != from.end() && mixed.size() < size; ++one) {
+            if (taken.insert(one->id).second) mixed.push_back(*one);
         }
     };
     take(order, most / 2);
     take(ofGroups, most);
-    take(order, order.size() + ofGroups.size());
-    take(ofGroups, order.size() + ofGroups.size());
+    take(order, all);
+    take(ofGroups, all);
     return mixed;
 }
 
+// The best hits of each of the groups whose best hits `first` are, group after group.
+Result<std::vector<Candidate>> allOfGroups(const CandidateSource& source, const SearchOptions& options,
+                                           std::vector<Candidate> first, const RunContext& context) {
+    if (options.grouping->perGroup == 1 || first.empty()) return first;
+    std::vector<OwnGroup> groups;
+    for (const Candidate& candidate : first) groups.push_back(candidate.group);
+    auto all = source.findOfGroups(options, groups, context);
+    RETURN_IF_ERROR(all);
+    bringGroupsTogether(*all, [](const Candidate& candidate) { return candidate.group.get(); });
+    return all;
+}
+
+// Runs a search, times it, and makes an error of a failed allocation.
+template <typename Search>
+Result<VerifiedResult> timed(const CandidateSource& source, const SearchOptions& options,
+                             const Search& search) {
+    RETURN_IF_ERROR(validate(options));
+    const auto began = RunContext::Clock::now();
+    try {
+        Result<VerifiedResult> result = search();
+        RETURN_IF_ERROR(result);
+        result->scorer = source.scorer();
+        result->seconds = std::chrono::duration<double>(RunContext::Clock::now() - began).count();
+        return result;
+    } catch (const std::bad_alloc&) {
+        return fail(ErrorCode::kOutOfMemory, "not enough memory to verify the hits of a search");
+    }
+}
+
+Result<VerifiedResult> verified(const Signature& query, const SurfacePoints& surface,
+                                const CandidateSource& source, const SearchOptions& options,
+                                const VerifyOptions& verify, const RunContext& context) {
+    const auto traits = traitsOf(query, surface, options.score, verify.viewpoint ? true : verify.oneSided);
+    RETURN_IF_ERROR(traits);
+    const std::size_t most = verify.mostCandidates > 0 ? verify.mostCandidates : candidatesFor(*traits);
+    CandidateSearch wide{options};
+    // One more than are verified, to see whether it could reach the hits.
+    wide.options.k = std::max(options.k, most + 1);
+    // Candidates below the threshold may reach it by fitting well.
+    wide.options.threshold = 0.0;
+    wide.groups = options.grouping.has_value();
+    if (traits->ofOneSide) {
+        auto views = viewSearch(surface, options, verify, most);
+        RETURN_IF_ERROR(views);
+        wide.views = std::move(*views);
+    }
+    auto found = source.find(wide, context);
+    RETURN_IF_ERROR(found);
+    const bool all = found->best.size() < wide.options.k;
+    std::vector<Candidate> order = std::move(found->best);
+    if (traits->ofOneSide) order = withViewsFirst(order, found->byViews, most);
+    if (options.grouping) {
+        auto ofGroups = allOfGroups(source, wide.options, std::move(found->ofGroups), context);
+        RETURN_IF_ERROR(ofGroups);
+        order = withGroups(order, std::move(*ofGroups), most);
+    }
+    auto result = Verifier(source, *traits, options, context).run(order, most, all);
+    RETURN_IF_ERROR(result);
+    result->counts = found->counts;
+    return result;
+}
+
 }  // namespace
+
+Result<VerifiedResult> topKVerified(const Signature& query, const SurfacePoints& surface,
+                                    const CandidateSource& source, const SearchOptions& options,
+                                    const VerifyOptions& verify, const RunContext& context) {
+    return timed(source, options, [&] { return verified(query, surface, source, options, verify, context); });
+}
 
 Result<VerifiedResult> topKVerified(const Signature& query, const SurfacePoints& surface,
                                     const SignatureSet& set, const SearchOptions& options,
                                     const VerifyOptions& verify, const SurfaceOf& surfaceOf,
                                     const RunContext& context) {
     RETURN_IF_ERROR(validate(options));
-    const auto began = RunContext::Clock::now();
-    try {
-        const auto traits =
-            traitsOf(query, surface, options.score, verify.viewpoint ? true : verify.oneSided);
-        RETURN_IF_ERROR(traits);
-        const std::size_t most = verify.mostCandidates > 0 ? verify.mostCandidates : candidatesFor(*traits);
-        SearchOptions wide = options;
-        // One more than are verified, to see whether it could reach the hits.
-        wide.k = std::max(options.k, most + 1);
-        // Candidates below the threshold may reach it by fitting well.
-        wide.threshold = 0.0;
-        wide.grouping.reset();
-        auto found = topK(query, set, wide, context);
+    const auto source = SetCandidates::make(query, &surface, options.score, set, surfaceOf);
+    RETURN_IF_ERROR(source);
+    return topKVerified(query, surface, *source, options, verify, context);
+}
+
+Result<VerifiedResult> topKUnverified(const CandidateSource& source, const SearchOptions& options,
+                                      const RunContext& context) {
+    return timed(source, options, [&]() -> Result<VerifiedResult> {
+        CandidateSearch search{options};
+        search.groups = options.grouping.has_value();
+        search.best = !search.groups;
+        auto found = source.find(search, context);
         RETURN_IF_ERROR(found);
-        const bool all = found->hits.size() < wide.k;
-        if (traits->ofOneSide) {
-            auto ordered = withViewsFirst(*found, surface, set, options, verify, most, context);
-            RETURN_IF_ERROR(ordered);
-            found->hits = std::move(*ordered);
-        }
+        std::vector<Candidate> hits = std::move(found->best);
         if (options.grouping) {
-            wide.grouping = options.grouping;
-            const auto ofGroups = topK(*found->scorer, set, wide, context);
+            auto ofGroups = allOfGroups(source, options, std::move(found->ofGroups), context);
             RETURN_IF_ERROR(ofGroups);
-            found->hits = withGroups(found->hits, ofGroups->hits, most);
+            hits = std::move(*ofGroups);
         }
-        auto result = Verifier(FitQuery(surface), *traits, set, options, surfaceOf, context)
-                          .run(found->hits, most, all);
-        RETURN_IF_ERROR(result);
-        result->counts = found->counts;
-        result->scorer = std::move(found->scorer);
-        result->seconds = std::chrono::duration<double>(RunContext::Clock::now() - began).count();
+        VerifiedResult result;
+        for (Candidate& hit : hits) {
+            result.hits.push_back(
+                {hit.id, hit.score, hit.score, nullptr, Verdict::kNone, std::move(hit.group), hit.quality});
+        }
+        result.exact = true;
+        result.counts = found->counts;
         return result;
-    } catch (const std::bad_alloc&) {
-        return fail(ErrorCode::kOutOfMemory, "not enough memory to verify the hits of a search");
-    }
+    });
 }
 
 }  // namespace shapedb

@@ -8,7 +8,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -18,6 +17,7 @@
 #include "core/fit/fit.h"
 #include "core/fit/verdict.h"
 #include "core/geometry/point.h"
+#include "core/search/candidates.h"
 #include "core/search/top_k.h"
 
 namespace shapedb {
@@ -36,10 +36,6 @@ struct VerifyOptions {
     std::optional<Point3> viewpoint{};
 };
 
-/// The surface points of a shape; null for one that has none (yet). Called from several threads at once.
-/// Errors end the search.
-using SurfaceOf = std::function<Result<std::shared_ptr<const SurfacePoints>>(std::int64_t id)>;
-
 struct VerifiedHit {
     std::int64_t id = 0;
     /// In [0, 1]: from the distance of the signatures and the misfit. A candidate that was not verified
@@ -48,6 +44,8 @@ struct VerifiedHit {
     double signatureScore = 0.0;           ///< as topK gives it
     std::shared_ptr<const FitResult> fit;  ///< null if it was not verified
     Verdict verdict = Verdict::kNone;
+    OwnGroup group{};                 ///< as Candidate
+    std::optional<double> quality{};  ///< as Candidate
 };
 
 struct VerifiedResult {
@@ -65,9 +63,6 @@ struct VerifiedResult {
 struct VerifiableQuery : BatchQuery {
     std::shared_ptr<const SurfacePoints> surface = nullptr;  ///< null: it cannot be verified
 };
-
-/// What topK found, as hits that were not verified: their scores are those of the signatures.
-[[nodiscard]] VerifiedResult unverified(SearchResult found);
 
 /// What is known of a query before it is laid on anything.
 struct QueryTraits {
@@ -137,5 +132,15 @@ void addFit(const FitResult& fit, double share, Explanation& explanation);
                                                   const SignatureSet& set, const SearchOptions& options,
                                                   const VerifyOptions& verify, const SurfaceOf& surfaceOf,
                                                   const RunContext& context = {});
+/// The same among the shapes of `source`, which must be of this query and surface.
+[[nodiscard]] Result<VerifiedResult> topKVerified(const Signature& query, const SurfacePoints& surface,
+                                                  const CandidateSource& source, const SearchOptions& options,
+                                                  const VerifyOptions& verify,
+                                                  const RunContext& context = {});
+
+/// As topK, among the shapes of `source`: hits that were not verified, with the scores of their signatures.
+[[nodiscard]] Result<VerifiedResult> topKUnverified(const CandidateSource& source,
+                                                    const SearchOptions& options,
+                                                    const RunContext& context = {});
 
 }  // namespace shapedb

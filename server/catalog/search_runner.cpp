@@ -18,9 +18,10 @@ Result<VerifiedResult> search(const VerifiableQuery& query, const SignatureSet& 
     if (verify && query.surface) {
         return topKVerified(query.signature, *query.surface, set, own, *verify, surfaceOf, context);
     }
-    auto found = topK(query.signature, set, own, context);
-    RETURN_IF_ERROR(found);
-    return unverified(std::move(*found));
+    RETURN_IF_ERROR(validate(own));
+    const auto source = SetCandidates::make(query.signature, nullptr, own.score, set, surfaceOf);
+    RETURN_IF_ERROR(source);
+    return topKUnverified(*source, own, context);
 }
 
 }  // namespace
