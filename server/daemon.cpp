@@ -13,6 +13,7 @@
 #include "server/catalog/gates.h"
 #include "server/catalog/search_runner.h"
 #include "server/catalog/searches.h"
+#include "server/cluster_member.h"
 #include "server/config/settings.h"
 #include "server/files/data_directory.h"
 #include "server/http/http_server.h"
@@ -123,6 +124,9 @@ catalog::CatalogOptions catalogOptions(const config::ServerConfig& config,
     options.maxQueuedBytes = config.ingest.maxQueuedBytes;
     options.maxPoints = config.limits.maxPoints;
     options.segmentations = config::threadsOrProcessors(config.search.threads);
+    const bool elsewhere = config.cluster.replicas > 0 || config.role == "worker";
+    options.signatures = elsewhere ? index::Signatures::kElsewhere : index::Signatures::kHere;
+    options.segments = config.role != "serve";
     options.workers.threads = config::threadsOrProcessors(config.ingest.threads);
     options.workers.maxAttempts = config.ingest.maxAttempts;
     options.rebuilds.threads = config::threadsOrProcessors(config.rebuild.threads);
@@ -156,7 +160,7 @@ struct Daemon::Parts {
     Parts(const config::ServerConfig& configuration, telemetry::LoggerPtr logger,
           ingest::SignaturePipeline pipeline, std::unique_ptr<store::Store> store,
           const std::vector<store::Crash>& crashes, std::unique_ptr<security::Keyring> keys,
-          std::unique_ptr<telemetry::AuditLog> auditLog)
+          std::unique_ptr<telemetry::AuditLog> auditLog, std::unique_ptr<ClusterEntrance> entrance)
         : config(configuration),
           log(std::move(logger)),
           audit(std::move(auditLog)),
@@ -166,10 +170,17 @@ struct Daemon::Parts {
           catalog(std::move(store), std::move(pipeline), log, catalogOptions(config, crashes)),
           admission(config.limits.maxUploadBytes, config.limits.maxUploads),
           runner(config::threadsOrProcessors(config.search.threads)),
-          searches(catalog, runner, config.limits.maxK),
+          member(entrance == nullptr
+                     ? nullptr
+                     : std::make_unique<ClusterMember>(std::move(entrance), config, catalog, runner, log)),
+          searches(catalog, runner, config.limits.maxK,
+                   member == nullptr ? std::nullopt : std::make_optional(member->shards())),
           http(config, log),
           grpc({config, catalog, admission, searches, access, *audit, metrics, log, temporaryDirectory(),
-                [this](const security::TlsIdentity& identity) { return http.useTls(identity); }}) {}
+                [this](const security::TlsIdentity& identity) { return http.useTls(identity); },
+                [this] { return canSearch(); }}) {}
+
+    bool canSearch() const { return member ? member->canSearch() : catalog.holdsSignatures(); }
 
     std::string temporaryDirectory() const { return config.data + "/" + kTemporaryFolder; }
     Result<void> serve();
@@ -187,6 +198,7 @@ struct Daemon::Parts {
     catalog::Catalog catalog;
     catalog::Admission admission;
     catalog::SearchRunner runner;
+    const std::unique_ptr<ClusterMember> member;  ///< null: it is none of a cluster
     catalog::Searches searches;
     http::HttpServer http;  // before gRPC, whose watcher of the TLS files tells it of new ones
     rpc::GrpcServer grpc;
@@ -196,6 +208,7 @@ struct Daemon::Parts {
 Result<void> Daemon::Parts::serve() {
     RETURN_IF_ERROR(files::prepareTemporaryDirectory(temporaryDirectory()));
     RETURN_IF_ERROR(catalog.start());
+    if (member) RETURN_IF_ERROR(member->start());
     RETURN_IF_ERROR(grpc.listen());
     RETURN_IF_ERROR(serveHttp());
     return serveMetrics();
@@ -214,7 +227,9 @@ Result<void> Daemon::Parts::serveMetrics() {
     if (config.metrics.listen.empty()) return {};
     const auto started = std::chrono::system_clock::now();
     metrics.setSampler([this, started] {
-        return sampleServer({catalog, admission, runner, grpc, http, config.data, started});
+        std::optional<cluster::Member::State> state;
+        if (member) state = member->state();
+        return sampleServer({catalog, admission, runner, grpc, http, config.data, started, state});
     });
     const auto port = metrics.serve(config.metrics.listen);
     RETURN_IF_ERROR(port);
@@ -226,6 +241,8 @@ Result<void> Daemon::Parts::drain() {
     if (std::exchange(drained, true)) return {};
     const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(config.shutdown.drainSeconds);
     grpc.reportNotServing();
+    // Others ask for its shards until they have them.
+    if (member) member->leave();
     http.drain();
     admission.calls.drain();
     const bool empty = admission.calls.waitUntilEmpty(until);
@@ -233,6 +250,7 @@ Result<void> Daemon::Parts::drain() {
     if (!empty) log->warn("drain time has run out: cancelling the calls still running");
     http.shutDown();
     grpc.shutDown();
+    if (member) member->stop();
     return catalog.stop();
 }
 
@@ -258,8 +276,14 @@ Result<std::unique_ptr<Daemon>> Daemon::start(const config::ServerConfig& config
     RETURN_IF_ERROR(keys);
     auto audit = openAudit(config, log);
     RETURN_IF_ERROR(audit);
+    std::unique_ptr<ClusterEntrance> entrance;
+    if (isMember(config)) {
+        auto open = openEntrance(config, **opened);
+        RETURN_IF_ERROR(open);
+        entrance = std::move(*open);
+    }
     auto parts = std::make_unique<Parts>(config, std::move(log), std::move(pipeline), std::move(*opened),
-                                         *crashes, std::move(*keys), std::move(*audit));
+                                         *crashes, std::move(*keys), std::move(*audit), std::move(entrance));
     std::unique_ptr<Daemon> daemon(new Daemon(std::move(parts)));
     RETURN_IF_ERROR(daemon->parts_->serve());
     return daemon;

@@ -18,9 +18,10 @@ void append(std::vector<Sample>& samples, std::vector<Sample> more) {
     samples.insert(samples.end(), more.begin(), more.end());
 }
 
-std::vector<Sample> sampleContent(catalog::Catalog& catalog) {
-    const auto stats = catalog.stats();
+std::vector<Sample> sampleContent(const SampleSources& sources) {
+    auto stats = sources.catalog.stats();
     if (!stats) return {};
+    if (sources.shards) stats->index = {sources.shards->signatures, sources.shards->bytes};
     const store::StoreStats& stored = stats->store;
     const char* shapes = "Shapes, by state.";
     return {
@@ -92,6 +93,17 @@ std::vector<Sample> sampleCalls(const SampleSources& sources) {
     return samples;
 }
 
+std::vector<Sample> sampleShards(const cluster::Member::State& state) {
+    const char* shards = "Shards of the cluster: held by this server, to be held by it, held by none.";
+    return {
+        {"shapedb_shards", shards, kGauge, number(state.held), {{"state", "held"}}},
+        {"shapedb_shards", shards, kGauge, number(state.wanted), {{"state", "wanted"}}},
+        {"shapedb_shards", shards, kGauge, number(state.uncovered), {{"state", "uncovered"}}},
+        {"shapedb_shards_follow_changes", "1, or 0 while the database cannot be read.", kGauge,
+         state.following ? 1.0 : 0.0},
+    };
+}
+
 std::vector<Sample> sampleDisk(const std::string& directory) {
     struct statvfs status {};
     if (::statvfs(directory.c_str(), &status) != 0) return {};
@@ -102,7 +114,8 @@ std::vector<Sample> sampleDisk(const std::string& directory) {
 }  // namespace
 
 std::vector<Sample> sampleServer(const SampleSources& sources) {
-    std::vector<Sample> samples = sampleContent(sources.catalog);
+    std::vector<Sample> samples = sampleContent(sources);
+    if (sources.shards) append(samples, sampleShards(*sources.shards));
     append(samples, sampleCondition(sources.catalog));
     append(samples, sampleCalls(sources));
     append(samples, sampleDisk(sources.dataDirectory));

@@ -3,12 +3,14 @@
 #pragma once
 
 #include <chrono>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "server/catalog/catalog.h"
 #include "server/catalog/gates.h"
 #include "server/catalog/search_runner.h"
+#include "server/cluster/member.h"
 #include "server/http/http_server.h"
 #include "server/rpc/grpc_server.h"
 #include "server/telemetry/metrics.h"
@@ -24,6 +26,7 @@ struct SampleSources {
     const http::HttpServer& http;
     const std::string& dataDirectory;
     std::chrono::system_clock::time_point started;
+    std::optional<cluster::Member::State> shards{};  ///< of a member of a cluster
 };
 
 /// What cannot be told at the moment, as while the database is replaced, is left out; samples of one name

@@ -167,7 +167,11 @@ class FilterParser {
     std::size_t at_ = 0;
 };
 
-Result<Filter> Filter::parse(const std::string& text) { return FilterParser(text).parse(); }
+Result<Filter> Filter::parse(const std::string& text) {
+    auto filter = FilterParser(text).parse();
+    if (filter) filter->text_ = text;
+    return filter;
+}
 
 bool Filter::matches(const std::map<std::string, std::string>& metadata, std::string_view shapeKey) const {
     const auto holds = [&](const Term& term) {

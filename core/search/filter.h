@@ -33,6 +33,8 @@ class Filter {
     [[nodiscard]] bool matches(const std::map<std::string, std::string>& metadata,
                                std::string_view shapeKey = {}) const;
     [[nodiscard]] bool acceptsAll() const { return conditions_.empty(); }
+    /// As it was parsed.
+    [[nodiscard]] const std::string& text() const { return text_; }
     /// False: shapes with equal metadata pass alike.
     [[nodiscard]] bool asksForKeys() const { return asksForKeys_; }
 
@@ -61,6 +63,7 @@ class Filter {
     /// `value`: null if there is none.
     static bool passes(const Term& term, const std::string_view* value);
 
+    std::string text_;
     std::vector<Condition> conditions_;
     bool asksForKeys_ = false;
 

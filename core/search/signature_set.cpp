@@ -66,6 +66,17 @@ SignatureSet SignatureSet::ofBlocks(const std::vector<BlockPtr>& blocks) {
     return set;
 }
 
+SignatureSet SignatureSet::ofParts(const std::vector<SignatureSet>& parts) {
+    SignatureSet set;
+    for (const SignatureSet& part : parts) {
+        if (part.size() == 0) continue;
+        set.size_ += part.size();
+        set.blocks_.insert(set.blocks_.end(), part.blocks_.begin(), part.blocks_.end());
+        set.partEnds_.push_back(set.blocks_.size());
+    }
+    return set;
+}
+
 SignatureSet SignatureSet::with(const std::vector<IndexEntry>& updates,
                                 std::vector<std::int64_t> removedIds) const {
     Updates sorted;
@@ -125,9 +136,21 @@ std::size_t SignatureSet::attributedCount() const {
 }
 
 SignatureSet::Place SignatureSet::find(std::int64_t id) const {
-    auto block = std::upper_bound(blocks_.begin(), blocks_.end(), id,
+    if (partEnds_.empty()) return findIn(blocks_.begin(), blocks_.end(), id);
+    auto begin = blocks_.begin();
+    for (const std::size_t partEnd : partEnds_) {
+        const auto end = blocks_.begin() + static_cast<std::ptrdiff_t>(partEnd);
+        if (const Place place = findIn(begin, end, id)) return place;
+        begin = end;
+    }
+    return {};
+}
+
+SignatureSet::Place SignatureSet::findIn(Blocks::const_iterator begin, Blocks::const_iterator end,
+                                         std::int64_t id) {
+    auto block = std::upper_bound(begin, end, id,
                                   [](std::int64_t wanted, const BlockPtr& b) { return wanted < b->id(0); });
-    if (block == blocks_.begin()) return {};
+    if (block == begin) return {};
     --block;
     std::size_t low = 0;
     std::size_t high = (*block)->size();

@@ -25,6 +25,10 @@ class SignatureSet {
     [[nodiscard]] static SignatureSet ofBlocks(
         const std::vector<std::shared_ptr<const SignatureBlock>>& blocks);
 
+    /// All entries of sets that have no id in common, as a set to be searched: it shares their blocks, and
+    /// `with` must not be called. Its blocks are in ascending order of id within each part alone.
+    [[nodiscard]] static SignatureSet ofParts(const std::vector<SignatureSet>& parts);
+
     /// This set with the entries of `updates` inserted or replaced (by id) and without those of
     /// `removedIds` (unknown ids are ignored). In any order; an id must not be in both, nor twice in
     /// `updates`.
@@ -46,12 +50,16 @@ class SignatureSet {
     /// Approximate bytes held.
     [[nodiscard]] std::size_t memoryBytes() const;
 
-    /// Blocks of 1 to kBlockSize entries in ascending order of id.
+    /// Blocks of 1 to kBlockSize entries in ascending order of id (see ofParts).
     static constexpr std::size_t kBlockSize = SignatureBlock::kMostRows;
     [[nodiscard]] const std::vector<std::shared_ptr<const SignatureBlock>>& blocks() const { return blocks_; }
 
   private:
-    std::vector<std::shared_ptr<const SignatureBlock>> blocks_;
+    using Blocks = std::vector<std::shared_ptr<const SignatureBlock>>;
+    static Place findIn(Blocks::const_iterator begin, Blocks::const_iterator end, std::int64_t id);
+
+    Blocks blocks_;
+    std::vector<std::size_t> partEnds_;  ///< in blocks_; empty: there is one part
     std::size_t size_ = 0;
 };
 

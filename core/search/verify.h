@@ -54,6 +54,7 @@ struct VerifiedResult {
     double misfitShare = 0.0;       ///< weight of the misfit in the scores; 0 of an unverified search
     /// Whether verifying more candidates could change no hit.
     bool exact = false;
+    double covered = 1.0;  ///< share of the collection that was searched (server/cluster)
     SearchCounts counts;   ///< of the search for candidates
     double seconds = 0.0;  ///< taken, by both
     std::shared_ptr<const Scorer> scorer;

@@ -33,7 +33,7 @@ Catalog::Catalog(std::unique_ptr<store::Store> store, ingest::SignaturePipeline 
       options_(std::move(options)),
       store_(std::move(store)),
       pipeline_(std::move(pipeline)),
-      index_(*store_, log_),
+      index_(*store_, log_, options_.signatures),
       workers_(*store_, index_, board_, isolation_, pipeline_, log_, options_.workers),
       rebuilds_(*store_, index_, workers_, isolation_, pipeline_, log_, options_.rebuilds),
       slots_(options_.segmentations),
@@ -62,9 +62,9 @@ Result<void> Catalog::start() {
         {{"signatures", totals.signatures},
          {"bytes", totals.bytes},
          {"seconds", std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count()}});
-    RETURN_IF_ERROR(workers_.start());
+    if (options_.segments) RETURN_IF_ERROR(workers_.start());
     if (store_->isShared()) follower_.start();
-    return rebuilds_.start();
+    return options_.segments ? rebuilds_.start() : Result<void>();
 }
 
 Result<void> Catalog::stop() {
@@ -223,6 +223,37 @@ Result<index::SnapshotPtr> Catalog::reload(const std::string& name) {
     return index_.byId(id);
 }
 
+// What other servers change ----------------------------------------------------------------
+
+Result<std::int64_t> Catalog::lastChange(std::int64_t collectionId) {
+    const auto at = store_->position(collectionId);
+    RETURN_IF_ERROR(at);
+    return at->lastChange;
+}
+
+Result<index::SnapshotPtr> Catalog::withChange(const index::SnapshotPtr& collection, std::int64_t atLeast) {
+    if (atLeast <= 0 || !store_->isShared()) return collection;
+    RETURN_IF_ERROR(follower_.followTo(collection->collection.id, atLeast));
+    return index_.byId(collection->collection.id);
+}
+
+Result<Catalog::Current> Catalog::current(const index::SnapshotPtr& collection) {
+    const std::int64_t id = collection->collection.id;
+    const auto at = store_->position(id);
+    RETURN_IF_ERROR(at);
+    if (at->generation <= collection->collection.generation) return Current{collection, at->lastChange};
+    RETURN_IF_ERROR(follower_.follow());
+    auto now = index_.byId(id);
+    RETURN_IF_ERROR(now);
+    return Current{std::move(*now), at->lastChange};
+}
+
+std::vector<std::int64_t> Catalog::collectionIds() const {
+    std::vector<std::int64_t> ids;
+    for (const index::SnapshotPtr& snapshot : index_.all()) ids.push_back(snapshot->collection.id);
+    return ids;
+}
+
 // The whole database ---------------------------------------------------------------------
 
 Result<void> Catalog::backup(const std::string& path, const RunContext& context) {
@@ -302,7 +333,7 @@ Result<void> Catalog::replaceContent(const std::string& path, const RunContext& 
 }
 
 Condition Catalog::condition() const {
-    return {!restores_.apart() && follower_.isFollowing(), !workers_.trouble(), index_.damaged(),
+    return {!restores_.apart() && follower_.isFollowing(), !workers_.trouble(), index_.damaged(), true,
             store_->notices() == 0};
 }
 

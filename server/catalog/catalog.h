@@ -39,6 +39,8 @@ struct CatalogOptions {
     std::uint64_t maxQueuedBytes = 0;  ///< as store::PutRequest
     std::uint64_t maxPoints = 0;       ///< of a scan that is imported; 0: any
     int segmentations = 1;             ///< for callers, at a time
+    index::Signatures signatures = index::Signatures::kHere;
+    bool segments = true;  ///< takes part in segmenting what was uploaded, and in rebuilds
     ingest::WorkerOptions workers;
     ingest::RebuildOptions rebuilds;
 };
@@ -47,9 +49,7 @@ struct CatalogOptions {
 struct FoundShape {
     index::SnapshotPtr collection;
     store::Shape shape;
-
-    /// As `qualityIn` its collection.
-    [[nodiscard]] std::optional<double> quality() const;
+    std::optional<double> quality{};  ///< of deleteShape alone: as Catalog::quality before
 };
 
 /// What a client says about a scan it adds.
@@ -95,12 +95,9 @@ struct Condition {
     bool content = true;
     bool segmentation = true;            ///< scans are taken in and segmented
     std::size_t damagedCollections = 0;  ///< as CollectionIndex::damaged
+    bool searches = true;                ///< no part of the signatures is without a server
     bool complete = true;                ///< no change is missing that was not acknowledged as such
 };
-
-/// How well the interior of a shape was determined, in [0, 1]; empty when searches do not find the
-/// shape or its profile does not rate interiors.
-[[nodiscard]] std::optional<double> qualityIn(const SignatureSet& signatures, std::int64_t shapeId);
 
 struct RebuildRequest {
     std::string collection;                    ///< empty: all
@@ -206,6 +203,29 @@ class Catalog {
     /// Reads the stored signatures again; nothing is segmented. Errors: kNotFound.
     [[nodiscard]] Result<index::SnapshotPtr> reload(const std::string& name);
 
+    // What other servers change ------------------------------------------------------
+
+    /// The number of the last change of a collection; 0 where this server has the database alone, which shows
+    /// every change at once.
+    [[nodiscard]] Result<std::int64_t> lastChange(std::int64_t collectionId);
+    /// The collection as it is searched now, with this change of it at least. Errors: kNotFound; kUnavailable
+    /// (the change is not known).
+    [[nodiscard]] Result<index::SnapshotPtr> withChange(const index::SnapshotPtr& collection,
+                                                        std::int64_t atLeast);
+    /// The collection with the parameters and the generation that it has now, and the number of its last
+    /// change. Errors: kNotFound.
+    struct Current {
+        index::SnapshotPtr collection;
+        std::int64_t lastChange = 0;
+    };
+    [[nodiscard]] Result<Current> current(const index::SnapshotPtr& collection);
+    [[nodiscard]] bool holdsSignatures() const { return index_.where() == index::Signatures::kHere; }
+    /// The ids of all collections.
+    [[nodiscard]] std::vector<std::int64_t> collectionIds() const;
+    /// Surface points that are kept of these shapes may be old.
+    void forgetSurfaces(const std::vector<std::int64_t>& shapeIds) { index_.forgetSurfaces(shapeIds); }
+    [[nodiscard]] store::Store& store() { return *store_; }
+
     // Shapes -----------------------------------------------------------------------
 
     /// Errors: kInvalidArgument (key), kNotFound.
@@ -288,7 +308,15 @@ class Catalog {
     [[nodiscard]] Result<std::uint64_t> unsearchedShapes(const index::Snapshot& collection) {
         return store_->countWaiting(collection.collection.id);
     }
-    /// `qualityIn` the shape's collection as it is searched now.
+    /// How well the interior of a shape was determined, in [0, 1]; empty when searches do not find the shape
+    /// or its profile does not rate interiors.
+    [[nodiscard]] std::optional<double> quality(const index::Snapshot& collection,
+                                                std::int64_t shapeId) const {
+        return qualities(collection, {shapeId}).front();
+    }
+    [[nodiscard]] std::vector<std::optional<double>> qualities(
+        const index::Snapshot& collection, const std::vector<std::int64_t>& shapeIds) const;
+    /// `quality` in the shape's collection as it is searched now.
     [[nodiscard]] std::optional<double> servingQuality(const store::Shape& shape) const;
 
     // Segmentation for callers -----------------------------------------------------
@@ -348,6 +376,7 @@ class Catalog {
     [[nodiscard]] Condition condition() const;
 
   private:
+    Result<index::SnapshotPtr> followed(const store::Collection& collection);
     /// Errors: kUnavailable.
     Result<void> requireContent() const;
     /// Before a scan is taken in. Errors: kDataLoss (its parameters could not be read; WorkerPool::trouble).

@@ -79,6 +79,19 @@ Result<void> ChangeFollower::follow() {
     return {};
 }
 
+Result<void> ChangeFollower::followTo(std::int64_t collectionId, std::int64_t number) {
+    const auto isKnown = [&] {
+        const std::lock_guard<std::mutex> lock(pass_);
+        const auto known = known_.find(collectionId);
+        return known != known_.end() && known->second >= number;
+    };
+    if (isKnown()) return {};
+    RETURN_IF_ERROR(follow());
+    if (isKnown()) return {};
+    return fail(ErrorCode::kUnavailable, "at_least: change " + std::to_string(number) +
+                                             " of the collection is not known to this server");
+}
+
 Result<void> ChangeFollower::followCollection(std::int64_t id, std::int64_t last) {
     const auto found = known_.find(id);
     if (found == known_.end()) return {};  // came since the directory was read

@@ -51,6 +51,9 @@ class ChangeFollower {
     [[nodiscard]] bool isFollowing() const { return following_.load(); }
     /// One pass: applies what is in the logs now. Thread-safe.
     [[nodiscard]] Result<void> follow();
+    /// The same, unless this change of the collection was applied before. Errors: kUnavailable (there is no
+    /// such change).
+    [[nodiscard]] Result<void> followTo(std::int64_t collectionId, std::int64_t number);
 
   private:
     void run();

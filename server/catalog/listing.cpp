@@ -62,11 +62,13 @@ Result<std::string> listPage(
     const auto shapes = catalog.listShapes(
         listing.collectionId, {request.order, request.descending, std::move(*after)}, pageSize + 1, *filter);
     RETURN_IF_ERROR(shapes);
+    std::vector<std::int64_t> ids;
+    for (const store::Shape& shape : *shapes) ids.push_back(shape.id);
+    const auto qualities = catalog.qualities(collection, ids);
     std::size_t bytes = 0;
     std::size_t sent = 0;
     for (; sent < std::min(pageSize, shapes->size()) && bytes < kMaxPageBytes; ++sent) {
-        const store::Shape& shape = (*shapes)[sent];
-        bytes += visit(shape, qualityIn(collection.signatures, shape.id));
+        bytes += visit((*shapes)[sent], qualities[sent]);
     }
     if (sent == shapes->size()) return std::string();
     const store::Shape& last = (*shapes)[sent - 1];
@@ -80,14 +82,19 @@ Result<std::vector<std::string>> visitShapes(
     RETURN_IF_ERROR(checkKeys(keys));
     const auto found = catalog.getShapes(collection.collection.id, keys);
     RETURN_IF_ERROR(found);
+    std::vector<std::int64_t> ids;
+    for (const auto& shape : *found) {
+        if (shape) ids.push_back(shape->id);
+    }
+    const auto qualities = catalog.qualities(collection, ids);
     std::vector<std::string> missing;
-    for (std::size_t i = 0; i < keys.size(); ++i) {
+    for (std::size_t i = 0, next = 0; i < keys.size(); ++i) {
         const std::optional<store::Shape>& shape = (*found)[i];
         if (!shape) {
             missing.push_back(keys[i]);
             continue;
         }
-        RETURN_IF_ERROR(room.take(visit(*shape, qualityIn(collection.signatures, shape->id))));
+        RETURN_IF_ERROR(room.take(visit(*shape, qualities[next++])));
     }
     return missing;
 }

@@ -10,18 +10,25 @@
 namespace shapedb::catalog {
 namespace {
 
-Result<VerifiedResult> search(const VerifiableQuery& query, const SignatureSet& set,
-                              const SearchOptions& options, const std::optional<VerifyOptions>& verify,
-                              const SurfaceOf& surfaceOf, const RunContext& context) {
+Result<VerifiedResult> searchIn(const CandidateSource& source, const VerifiableQuery& query,
+                                const SearchOptions& options, const std::optional<VerifyOptions>& verify,
+                                const RunContext& context) {
     SearchOptions own = options;
     own.excludeId = query.excludeId;
     if (verify && query.surface) {
-        return topKVerified(query.signature, *query.surface, set, own, *verify, surfaceOf, context);
+        return topKVerified(query.signature, *query.surface, source, own, *verify, context);
     }
-    RETURN_IF_ERROR(validate(own));
-    const auto source = SetCandidates::make(query.signature, nullptr, own.score, set, surfaceOf);
+    return topKUnverified(source, own, context);
+}
+
+Result<VerifiedResult> search(const VerifiableQuery& query, const SignatureSet& set,
+                              const SearchOptions& options, const std::optional<VerifyOptions>& verify,
+                              const SurfaceOf& surfaceOf, const RunContext& context) {
+    RETURN_IF_ERROR(validate(options));
+    const SurfacePoints* laidOn = verify ? query.surface.get() : nullptr;
+    const auto source = SetCandidates::make(query.signature, laidOn, options.score, set, surfaceOf);
     RETURN_IF_ERROR(source);
-    return topKUnverified(*source, own, context);
+    return searchIn(*source, query, options, verify, context);
 }
 
 }  // namespace
@@ -55,6 +62,19 @@ Result<void> SearchRunner::runBatch(const std::vector<VerifiableQuery>& queries,
         count_.fetch_add(1);
         return onFound(i, std::move(*found));
     });
+}
+
+Result<VerifiedResult> SearchRunner::runFrom(const CandidateSource& source, const VerifiableQuery& query,
+                                             const SearchOptions& options,
+                                             const std::optional<VerifyOptions>& verify,
+                                             const RunContext& context) {
+    auto result = searchIn(source, query, options, verify, context);
+    if (result) count_.fetch_add(1);
+    return result;
+}
+
+Result<void> SearchRunner::inForeground(const std::function<Result<void>()>& work) {
+    return arena_->tasks.execute(work);
 }
 
 Result<void> SearchRunner::inBackground(const std::function<Result<void>()>& work) {

@@ -42,6 +42,15 @@ class SearchRunner {
                                         const OnFound& onFound);
     /// Runs `work` with the priority of batches; it may throw. Errors: those of `work`.
     [[nodiscard]] Result<void> inBackground(const std::function<Result<void>()>& work);
+    /// Runs `work` with that of single searches.
+    [[nodiscard]] Result<void> inForeground(const std::function<Result<void>()>& work);
+
+    /// The same searches where other servers hold the signatures: on the thread of the caller, who waits for
+    /// them. `source` must be of this query.
+    [[nodiscard]] Result<VerifiedResult> runFrom(const CandidateSource& source, const VerifiableQuery& query,
+                                                 const SearchOptions& options,
+                                                 const std::optional<VerifyOptions>& verify,
+                                                 const RunContext& context);
 
     /// Successful searches since start.
     [[nodiscard]] std::uint64_t count() const { return count_.load(); }

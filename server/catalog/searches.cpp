@@ -2,12 +2,15 @@
 #include "server/catalog/searches.h"
 
 #include <algorithm>
+#include <mutex>
+#include <thread>
 #include <utility>
 
 #include "core/base/return_if_error.h"
 #include "core/matching/score.h"
 #include "core/matching/scorer.h"
 #include "core/signature/signature_codec.h"
+#include "server/catalog/call_frame.h"
 #include "server/catalog/request_checks.h"
 
 namespace shapedb::catalog {
@@ -17,6 +20,9 @@ namespace {
 // Rows read together. Each read takes locks of SQLite that all connections share, and a thread of low
 // priority that is held up inside one holds up all the others: so there are few reads, each of little memory.
 constexpr std::size_t kHitsAtOnce = 64;
+
+// Queries of one batch that wait for other servers at a time.
+constexpr std::size_t kQueriesAtOnce = 4;
 
 // Whether sizes are compared, of shapes in collections with this unit.
 Result<bool> sizesCount(bool keepScale, bool freeScale, LengthUnit unit) {
@@ -35,16 +41,17 @@ Result<PreparedSearch> Searches::prepare(index::SnapshotPtr collection, const Se
     RETURN_IF_ERROR(checkFilterLength(request.filter));
     RETURN_IF_ERROR(checkVerifyOptions(request.verifyOptions));
     RETURN_IF_ERROR(checkGrouping(request.groupBy, request.perGroup, request.k, maxK_));
-    const auto keepScale =
-        sizesCount(request.score.keepScale, request.freeScale, collection->parameters.unit);
-    RETURN_IF_ERROR(keepScale);
     Result<Filter> filter = Filter::parse(request.filter);
     RETURN_IF_ERROR(filter);
-    const auto pending = catalog_.unsearchedShapes(*collection);
-    RETURN_IF_ERROR(pending);
     PreparedSearch prepared;
-    prepared.pending = *pending;
     prepared.collection = std::move(collection);
+    RETURN_IF_ERROR(requireChanges(request, prepared));
+    const auto keepScale =
+        sizesCount(request.score.keepScale, request.freeScale, prepared.collection->parameters.unit);
+    RETURN_IF_ERROR(keepScale);
+    const auto pending = catalog_.unsearchedShapes(*prepared.collection);
+    RETURN_IF_ERROR(pending);
+    prepared.pending = *pending;
     prepared.options.k = request.k;
     prepared.options.threshold = request.threshold;
     prepared.options.filter = std::move(*filter);
@@ -58,6 +65,31 @@ Result<PreparedSearch> Searches::prepare(index::SnapshotPtr collection, const Se
         prepared.verify = request.verifyOptions;
     }
     return prepared;
+}
+
+/// What the answer must know. In shards all that was committed by now: their servers look it up as they are
+/// asked, so that a search finds what any server has acknowledged before.
+Result<void> Searches::requireChanges(const SearchRequest& request, PreparedSearch& prepared) const {
+    if (!shards_ && !catalog_.holdsSignatures()) {
+        return fail(ErrorCode::kUnavailable, "this server only segments (role = worker): ask another one");
+    }
+    if (!shards_) {
+        auto with = catalog_.withChange(prepared.collection, request.atLeast);
+        RETURN_IF_ERROR(with);
+        prepared.collection = std::move(*with);
+        return {};
+    }
+    auto current = catalog_.current(prepared.collection);
+    RETURN_IF_ERROR(current);
+    if (request.atLeast > current->lastChange) {
+        return fail(ErrorCode::kUnavailable, "at_least: the collection has " +
+                                                 std::to_string(current->lastChange) + " changes, not " +
+                                                 std::to_string(request.atLeast));
+    }
+    prepared.collection = std::move(current->collection);
+    prepared.atLeast = current->lastChange;
+    prepared.allowPartial = request.allowPartial;
+    return {};
 }
 
 Result<VerifiableQuery> Searches::storedQuery(PreparedSearch& search, const std::string& key,
@@ -215,8 +247,53 @@ Result<std::vector<VerifiableQuery>> Searches::queries(PreparedSearch& search,
 
 Result<VerifiedResult> Searches::run(const PreparedSearch& search, const VerifiableQuery& query,
                                      const RunContext& context) const {
+    if (shards_) return runInShards(search, query, false, context);
     return runner_.run(query, search.collection->signatures, search.options, search.verify, surfaces(),
                        context);
+}
+
+Result<VerifiedResult> Searches::runInShards(const PreparedSearch& search, const VerifiableQuery& query,
+                                             bool background, const RunContext& context) const {
+    RETURN_IF_ERROR(validate(search.options));
+    RETURN_IF_ERROR(validate(search.options.score));
+    const store::Collection& collection = search.collection->collection;
+    const cluster::ShardCandidates source(
+        *shards_, {collection.id, collection.generation, search.atLeast, search.allowPartial, background},
+        query.signature, search.verify ? query.surface.get() : nullptr, search.options.score);
+    auto found = runner_.runFrom(source, query, search.options, search.verify, context);
+    if (source.superseded()) search.superseded->store(true);
+    if (found) found->covered = source.covered();
+    return found;
+}
+
+/// A few at a time, on threads that wait for the servers, which give them the priority of batches.
+Result<void> Searches::runBatchInShards(const PreparedSearch& search,
+                                        const std::vector<VerifiableQuery>& queries,
+                                        const RunContext& context, const OnFound& onFound) const {
+    std::atomic<std::size_t> next{0};
+    std::mutex mutex;
+    std::size_t failedAt = queries.size();
+    std::optional<Error> error;
+    const auto work = [&] {
+        for (std::size_t i = next++; i < queries.size(); i = next++) {
+            const auto done = guarded([&]() -> Result<void> {
+                const auto found = runInShards(search, queries[i], true, context);
+                RETURN_IF_ERROR(found);
+                return onFound(i, queries[i].signature, *found);
+            });
+            if (done) continue;
+            const std::lock_guard<std::mutex> lock(mutex);
+            next = queries.size();
+            if (i >= failedAt) continue;
+            failedAt = i;
+            error = ofQuery(i, done.error());
+        }
+    };
+    std::vector<std::thread> threads;
+    for (std::size_t i = 1; i < std::min(kQueriesAtOnce, queries.size()); ++i) threads.emplace_back(work);
+    work();
+    for (std::thread& thread : threads) thread.join();
+    return error ? Result<void>(fail(*error)) : Result<void>();
 }
 
 Result<ScanSearch> Searches::byScan(const PreparedSearch& search, const store::VerifiedScan& scan,
@@ -257,6 +334,7 @@ Result<void> Searches::runBatch(PreparedSearch& search, const std::vector<QueryS
         return {};
     });
     RETURN_IF_ERROR(read);
+    if (shards_) return runBatchInShards(search, all, context, onFound);
     return runner_.runBatch(all, search.collection->signatures, search.options, search.verify, surfaces(),
                             context, [&](std::size_t i, VerifiedResult found) -> Result<void> {
                                 const auto done = onFound(i, all[i].signature, found);
@@ -290,16 +368,13 @@ Result<FoundHit> Searches::show(const PreparedSearch& search, const Signature& q
                                 store::StoredHit stored) {
     FoundHit out;
     out.shape = std::move(stored.shape);
-    out.quality = qualityIn(search.collection->signatures, hit.id);
+    out.quality = hit.quality;
     out.score = hit.score;
     out.signatureScore = hit.signatureScore;
     out.fit = hit.fit;
     out.verdict = hit.verdict;
-    if (search.options.grouping) {
-        // As it was searched: the shape may have other metadata by now.
-        const GroupValue group = groupOf(search.collection->signatures, hit.id, search.options.grouping->key);
-        if (group != nullptr) out.group = *group;
-    }
+    // As it was searched: the shape may have other metadata by now.
+    if (hit.group) out.group = *hit.group;
     if (search.explain) {
         auto explanation = explain(search, query, found, hit, stored.signature);
         RETURN_IF_ERROR(explanation);

@@ -3,8 +3,10 @@
 // has, which hits an answer holds and how large it may be.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <variant>
@@ -17,6 +19,7 @@
 #include "server/catalog/catalog.h"
 #include "server/catalog/limits.h"
 #include "server/catalog/search_runner.h"
+#include "server/cluster/shard_candidates.h"
 
 namespace shapedb::catalog {
 
@@ -32,6 +35,8 @@ struct SearchRequest {
     VerifyOptions verifyOptions;
     std::string groupBy;         ///< a metadata key; empty: no groups
     std::uint32_t perGroup = 0;  ///< hits of a group at most; 0: 1
+    std::int64_t atLeast = 0;    ///< a change of the collection that the answer must know
+    bool allowPartial = false;   ///< where servers of shards are missing: an answer of the others
 };
 
 /// Checked options, and the snapshot that all queries of the request read.
@@ -41,6 +46,10 @@ struct PreparedSearch {
     bool explain = true;
     std::optional<VerifyOptions> verify;
     std::uint64_t pending = 0;  ///< shapes of the collection without a signature to search, yet
+    std::int64_t atLeast = 0;   ///< of searches in shards
+    bool allowPartial = false;  ///< of searches in shards
+    /// A search failed because a rebuild was put in place since it was prepared: prepare it again.
+    std::shared_ptr<std::atomic<bool>> superseded = std::make_shared<std::atomic<bool>>(false);
 };
 
 /// What a request names as a query: one of the two. Not owned.
@@ -76,7 +85,7 @@ struct Alignment {
 
 struct FoundHit {
     store::Shape shape;
-    std::optional<double> quality;  ///< as `qualityIn` the collection searched
+    std::optional<double> quality;  ///< as Candidate
     double score = 0.0;
     double signatureScore = 0.0;
     std::optional<Explanation> explanation;  ///< its motion is that of `fit`, if there is one
@@ -89,11 +98,15 @@ struct FoundHit {
 /// Thread-safe. The references must outlive it.
 class Searches {
   public:
-    Searches(Catalog& catalog, SearchRunner& runner, std::uint32_t maxK)
-        : catalog_(catalog), runner_(runner), maxK_(maxK) {}
+    /// `shards`: where other servers hold signatures too; nothing: all are in the catalog's index, or, where
+    /// that has none, this server does not search.
+    Searches(Catalog& catalog, SearchRunner& runner, std::uint32_t maxK,
+             std::optional<cluster::ShardCandidates::Parts> shards = std::nullopt)
+        : catalog_(catalog), runner_(runner), maxK_(maxK), shards_(shards) {}
 
     /// Errors: kInvalidArgument (k, threshold, what verifying takes, groups), kMalformedFilter; kDataLoss
-    /// (the collection is damaged: Snapshot::damage); those of the store.
+    /// (the collection is damaged: Snapshot::damage); kUnavailable (SearchRequest::atLeast); those of the
+    /// store.
     [[nodiscard]] Result<PreparedSearch> prepare(index::SnapshotPtr collection,
                                                  const SearchRequest& request) const;
 
@@ -134,7 +147,7 @@ class Searches {
                                          const VerifiedResult& found, const Visit& visit) const;
 
     /// Verified if the request says so and the query has surface points (core/search/verify.h), otherwise as
-    /// `topK`; `query.excludeId` holds.
+    /// `topK`; `query.excludeId` holds. Errors also: those of cluster::ShardCandidates.
     [[nodiscard]] Result<VerifiedResult> run(const PreparedSearch& search, const VerifiableQuery& query,
                                              const RunContext& context) const;
     /// Segments `scan` with the parameters of the collection, holding one of the places for segmentations
@@ -169,10 +182,16 @@ class Searches {
     SurfaceOf surfaces() const;
     static Result<SurfacePoints> surfaceOfScan(const store::VerifiedScan& scan, const RunContext& context);
     Result<std::shared_ptr<const SurfacePoints>> surfaceOf(const ShapeName& name) const;
+    Result<void> requireChanges(const SearchRequest& request, PreparedSearch& prepared) const;
+    Result<VerifiedResult> runInShards(const PreparedSearch& search, const VerifiableQuery& query,
+                                       bool background, const RunContext& context) const;
+    Result<void> runBatchInShards(const PreparedSearch& search, const std::vector<VerifiableQuery>& queries,
+                                  const RunContext& context, const OnFound& onFound) const;
 
     Catalog& catalog_;
     SearchRunner& runner_;
     std::uint32_t maxK_;
+    std::optional<cluster::ShardCandidates::Parts> shards_;
 };
 
 }  // namespace shapedb::catalog

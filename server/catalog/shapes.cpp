@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "core/base/return_if_error.h"
+#include "core/search/candidates.h"
 #include "core/signature/signature_codec.h"
 #include "server/catalog/catalog.h"
 #include "server/catalog/limits.h"
@@ -20,7 +21,7 @@ Result<FoundShape> Catalog::findShape(const index::SnapshotPtr& collection, cons
                     "there is no shape '" + key + "' in collection '" + collection->collection.name + "'");
     }
     RETURN_IF_ERROR(shape);
-    return FoundShape{collection, std::move(*shape)};
+    return FoundShape{collection, std::move(*shape), std::nullopt};
 }
 
 Result<store::Shape> Catalog::shapeById(std::int64_t shapeId) { return store_->getShapeById(shapeId); }
@@ -41,16 +42,19 @@ Result<std::uint64_t> Catalog::countShapes(std::int64_t collectionId, const stor
 }
 
 Result<Signature> Catalog::signature(FoundShape& found) {
-    while (found.collection->signatures.find(found.shape.id)) {
-        auto signature = decoded(*found.collection, store_->getSignature(found.shape.id));
+    const bool here = index_.where() == index::Signatures::kHere;
+    while (!here || found.collection->signatures.find(found.shape.id)) {
+        const auto row = store_->getSignature(found.shape.id);
+        // Only the store knows which shapes have one.
+        if (!here && !row && row.error().code == ErrorCode::kNotReady) break;
+        auto signature = decoded(*found.collection, row);
         if (signature || signature.error().code != ErrorCode::kNotReady) return signature;
         // The store may have switched to the results of a rebuild: once the index has followed, again with
         // them.
         const store::Collection& collection = found.collection->collection;
-        if (index_.whileGeneration(collection.id, collection.generation, [] {})) return signature;
-        const auto now = index_.byId(collection.id);
+        const auto now = followed(collection);
         RETURN_IF_ERROR(now);
-        if ((*now)->collection.generation == collection.generation) return signature;
+        if (!*now) return signature;
         found.collection = *now;
     }
     const std::string name = "shape '" + found.shape.key + "' has no signature";
@@ -58,6 +62,16 @@ Result<Signature> Catalog::signature(FoundShape& found) {
         return fail(ErrorCode::kNotReady, name + ": it cannot be segmented: " + found.shape.failure->message);
     }
     return fail(ErrorCode::kNotReady, name + " yet: wait until it is ready");
+}
+
+/// The collection after a rebuild that was put in place; null if there was none.
+Result<index::SnapshotPtr> Catalog::followed(const store::Collection& collection) {
+    if (store_->isShared()) RETURN_IF_ERROR(follower_.follow());
+    if (index_.whileGeneration(collection.id, collection.generation, [] {})) return index::SnapshotPtr();
+    auto now = index_.byId(collection.id);
+    RETURN_IF_ERROR(now);
+    if ((*now)->collection.generation == collection.generation) return index::SnapshotPtr();
+    return now;
 }
 
 Result<std::vector<std::optional<store::StoredHit>>> Catalog::getHits(
@@ -79,17 +93,29 @@ Result<Signature> Catalog::decoded(const index::Snapshot& searched, const Result
     return signature;
 }
 
-std::optional<double> qualityIn(const SignatureSet& signatures, std::int64_t shapeId) {
-    const SignatureSet::Place place = signatures.find(shapeId);
-    if (!place || !place.block->attributed(place.row)) return std::nullopt;
-    return place.block->quality(place.row) / 255.0;
+std::vector<std::optional<double>> Catalog::qualities(const index::Snapshot& collection,
+                                                      const std::vector<std::int64_t>& shapeIds) const {
+    std::vector<std::optional<double>> all(shapeIds.size());
+    if (index_.where() == index::Signatures::kHere) {
+        for (std::size_t i = 0; i < shapeIds.size(); ++i) {
+            const SignatureSet::Place place = collection.signatures.find(shapeIds[i]);
+            if (place) all[i] = qualityOf(*place.block, place.row);
+        }
+        return all;
+    }
+    const auto stored = store_->getHits(shapeIds, true);
+    if (!stored) return all;
+    for (std::size_t i = 0; i < shapeIds.size(); ++i) {
+        if (!(*stored)[i]) continue;
+        const auto signature = decoded(collection, (*stored)[i]->signature);
+        if (signature && signature->attributes) all[i] = signature->attributes->quality / 255.0;
+    }
+    return all;
 }
-
-std::optional<double> FoundShape::quality() const { return qualityIn(collection->signatures, shape.id); }
 
 std::optional<double> Catalog::servingQuality(const store::Shape& shape) const {
     const auto collection = index_.byId(shape.collectionId);
-    return collection ? qualityIn((*collection)->signatures, shape.id) : std::nullopt;
+    return collection ? quality(**collection, shape.id) : std::nullopt;
 }
 
 // Changing -------------------------------------------------------------------------------
@@ -157,13 +183,20 @@ Result<FoundShape> Catalog::deleteShape(const std::string& collectionName, const
     const auto found = collection(collectionName);
     RETURN_IF_ERROR(found);
     RETURN_IF_ERROR(checkKey(key));
+    const bool here = index_.where() == index::Signatures::kHere;
+    std::optional<double> before;
+    if (!here) {
+        const auto now = store_->getShape((*found)->collection.id, key);
+        if (now) before = quality(**found, now->id);
+    }
     auto shape = store_->deleteShape((*found)->collection.id, key, expectedVersion);
     RETURN_IF_ERROR(shape);
+    if (here) before = quality(**found, shape->id);
     workers_.supersede(shape->id);
     // Wakes those who follow it, to find that it is gone.
     board_.settled(shape->id);
     refreshOrLog(*shape, "deleted shape is still searched");
-    return FoundShape{*found, std::move(*shape)};
+    return FoundShape{*found, std::move(*shape), before};
 }
 
 void Catalog::refreshOrLog(const store::Shape& shape, const char* consequence) {

@@ -15,8 +15,8 @@ RoutesPtr routesOf(const ClusterView& view) {
     return routes;
 }
 
-Gather::Gather(RoutesPtr routes, std::int64_t atLeast, std::uint64_t turn)
-    : routes_(std::move(routes)), atLeast_(atLeast), turn_(turn) {}
+Gather::Gather(RoutesPtr routes, std::int64_t atLeast, std::int64_t leastGeneration, std::uint64_t turn)
+    : routes_(std::move(routes)), atLeast_(atLeast), turn_(turn), generation_(leastGeneration) {}
 
 ShardSet Gather::shardsOf(const Ask& ask) {
     ShardSet shards;

@@ -55,8 +55,9 @@ struct Coverage {
 /// Not thread-safe. Functions that return asks return those to be sent now.
 class Gather {
   public:
-    /// `turn` spreads requests over the replicas of a shard: any number, another one for each request.
-    Gather(RoutesPtr routes, std::int64_t atLeast, std::uint64_t turn);
+    /// Answers of signatures older than `leastGeneration` do not count. `turn` spreads requests over the
+    /// replicas of a shard: any number, another one for each request.
+    Gather(RoutesPtr routes, std::int64_t atLeast, std::int64_t leastGeneration, std::uint64_t turn);
 
     [[nodiscard]] std::vector<Ask> start();
     /// An answer. One to an ask that is unknown, failed or answered already is ignored.
@@ -72,7 +73,7 @@ class Gather {
     /// By the answers accepted so far, whose ids `accepted` tells.
     [[nodiscard]] ShardSet covered() const { return covered_; }
     [[nodiscard]] std::vector<std::uint64_t> accepted() const;
-    /// Of the answers accepted; 0 before the first.
+    /// Of the answers accepted; `leastGeneration` before the first.
     [[nodiscard]] std::int64_t generation() const { return generation_; }
 
   private:

@@ -17,6 +17,8 @@ struct ServerConfig {
     std::string listen = "127.0.0.1:7878";
     /// Directory of the database; created when missing.
     std::string data = "shapedb-data";
+    /// "all"; "serve": leaves the segmentation of what was uploaded to others; "worker": does nothing else.
+    std::string role = "all";
     /// Path of a Unix socket to serve on as well, for administrators of this machine; empty: none.
     std::string unixSocket;
 
@@ -72,6 +74,17 @@ struct ServerConfig {
         int jobLeaseSeconds = 60;  ///< how long the scans of a server that has died wait for another
         int timeoutSeconds = 30;   ///< for a connection, and for each statement
     } postgres;
+
+    /// Shards over several servers; with the engine postgres only.
+    struct Cluster {
+        int replicas = 0;                    ///< of each shard; 0: every server holds all signatures
+        std::string listen = "127.0.0.1:0";  ///< HOST:PORT at which other servers ask this one
+        std::string advertise;               ///< HOST[:PORT] by which they reach it; empty: as `listen`
+        int leaseMilliseconds = 3'000;
+        std::string certificate;  ///< PEM file of this server, for both sides; empty: no TLS
+        std::string key;          ///< PEM file
+        std::string ca;           ///< PEM file: who signs the certificates of the servers
+    } cluster;
 
     struct Search {
         int threads = 0;  ///< shared by all searches; 0: one per processor

@@ -228,6 +228,10 @@ std::vector<Setting> makeSettings() {
     return {
         listenSetting(),
         dataSetting(),
+        choice(
+            "role", {"all", "serve", "worker"}, [](C& c) -> std::string& { return c.role; },
+            "What this server does of those that share a database: serve answers calls and leaves "
+            "segmenting to others, worker only segments. SQLite takes all."),
         optionalPath(
             "unix_socket", [](C& c) -> std::string& { return c.unixSocket; },
             "Unix socket to serve on as well, for the owner of this process and without API key. Empty: "
@@ -332,6 +336,31 @@ std::vector<Setting> makeSettings() {
             "postgres.timeout_seconds", kInteger, 1, 3'600,
             [](C& c) -> int& { return c.postgres.timeoutSeconds; },
             "How long the database may take to answer a statement."),
+        number(
+            "cluster.replicas", kInteger, 0, 16, [](C& c) -> int& { return c.cluster.replicas; },
+            "Servers that hold each part of the signatures, of several that share a database. 0: every "
+            "server "
+            "holds all."),
+        optionalAddress(
+            "cluster.listen", [](C& c) -> std::string& { return c.cluster.listen; },
+            "Address at which the other servers ask this one. Port 0 picks a free port."),
+        optionalText(
+            "cluster.advertise", "HOST or HOST:PORT",
+            [](C& c) -> std::string& { return c.cluster.advertise; },
+            "How they reach it, if not by that address. Without a port: that of cluster.listen."),
+        number(
+            "cluster.lease_milliseconds", kInteger, 300, 600'000,
+            [](C& c) -> int& { return c.cluster.leaseMilliseconds; },
+            "How long the part of a server that has died waits for another server."),
+        optionalPath(
+            "cluster.certificate", [](C& c) -> std::string& { return c.cluster.certificate; },
+            "Certificate of this server towards the others (PEM). Empty: no TLS."),
+        optionalPath(
+            "cluster.key", [](C& c) -> std::string& { return c.cluster.key; },
+            "Private key of that certificate (PEM, without password)."),
+        optionalPath(
+            "cluster.ca", [](C& c) -> std::string& { return c.cluster.ca; },
+            "The other servers need a certificate signed by one of these (PEM)."),
         number(
             "search.threads", kInteger, 0, 256, [](C& c) -> int& { return c.search.threads; },
             "Processors shared by all searches, and query scans segmented at once. 0: all."),

@@ -46,6 +46,31 @@ Result<void> validateStore(const ServerConfig& config) {
     return {};
 }
 
+Result<void> validateCluster(const ServerConfig& config) {
+    const ServerConfig::Cluster& cluster = config.cluster;
+    const bool shared = config.store.engine == "postgres";
+    if (!shared && config.role != "all") {
+        return fail(ErrorCode::kInvalidArgument, "role = " + config.role + " takes store.engine = postgres");
+    }
+    if (!shared && cluster.replicas > 0) {
+        return fail(ErrorCode::kInvalidArgument, "cluster.replicas takes store.engine = postgres");
+    }
+    const bool tls = !cluster.certificate.empty();
+    if (tls != !cluster.key.empty() || tls != !cluster.ca.empty()) {
+        return fail(ErrorCode::kInvalidArgument,
+                    "cluster.certificate, cluster.key and cluster.ca belong together: set all or none");
+    }
+    if (cluster.replicas == 0) return {};
+    if (cluster.listen.empty()) {
+        return fail(ErrorCode::kInvalidArgument, "cluster.replicas takes cluster.listen");
+    }
+    if (tls || !isBeyond(cluster.listen) || config.security.anyoneMayDoAll == "yes") return {};
+    return fail(ErrorCode::kInvalidArgument,
+                "cluster.listen = " + cluster.listen +
+                    " is beyond this machine, and who connects there reads every collection: it takes "
+                    "cluster.certificate, cluster.key and cluster.ca");
+}
+
 /// What must not be reachable beyond this machine without TLS.
 Result<void> validateSecurity(const ServerConfig& config) {
     const bool tls = !config.tls.certificate.empty();
@@ -78,6 +103,7 @@ bool keysRequired(const ServerConfig& config) {
 Result<void> validateTogether(const ServerConfig& config) {
     RETURN_IF_ERROR(validateSecurity(config));
     RETURN_IF_ERROR(validateStore(config));
+    RETURN_IF_ERROR(validateCluster(config));
     const std::uint64_t scan = config.limits.maxPoints * 12;
     const auto tooSmall = [&](const char* key) {
         return fail(ErrorCode::kInvalidArgument,

@@ -11,9 +11,8 @@
 
 #include "core/base/parallel.h"
 #include "core/base/return_if_error.h"
-#include "core/signature/signature_codec.h"
-#include "core/views/views_codec.h"
 #include "server/index/damaged_collection.h"
+#include "server/index/entries.h"
 #include "server/store/parameters_codec.h"
 
 namespace shapedb::index {
@@ -26,44 +25,6 @@ constexpr std::size_t kBatchesWhileServing = 1;
 
 /// Two per processor: one is decoded while the next is waiting.
 std::size_t batchesOfAllProcessors() { return 2 * threadsOfArena(); }
-
-/// Converts a row; `entry` may hold an earlier one. A damaged signature is logged with the shape's key;
-/// then false.
-bool toEntry(store::IndexRow&& row, IndexEntry& entry, store::Store& store, telemetry::Logger& log) {
-    if (const auto decoded = decodeSignature(row.signature.bytes, entry.signature); !decoded) {
-        auto fields = telemetry::fieldsOf(decoded.error());
-        fields.push_back({"shape", row.shapeId});
-        if (const auto shape = store.getShapeById(row.shapeId)) fields.push_back({"key", shape->key});
-        log.error("stored signature is damaged: left out of searches until a rebuild", fields);
-        return false;
-    }
-    entry.id = row.shapeId;
-    entry.key = std::move(row.key);
-    entry.metadata = std::move(row.metadata);
-    entry.views = nullptr;
-    if (row.signature.views.empty()) return true;
-    if (const auto views = decodeViews(row.signature.views)) {
-        entry.views = std::make_shared<const ShapeViews>(*views);
-    } else {
-        auto fields = telemetry::fieldsOf(views.error());
-        fields.push_back({"shape", row.shapeId});
-        log.error("stored views are damaged: scans of one side may not find this shape until a rebuild",
-                  fields);
-    }
-    return true;
-}
-
-std::shared_ptr<const SignatureBlock> toBlock(std::vector<store::IndexRow>&& rows, store::Store& store,
-                                              telemetry::Logger& log) {
-    auto block = std::make_shared<SignatureBlock>();
-    block->reserve(rows.size());
-    IndexEntry entry;  // one for all rows: reuses its memory
-    for (store::IndexRow& row : rows) {
-        if (toEntry(std::move(row), entry, store, log)) block->append(entry);
-    }
-    block->shrink();
-    return block;
-}
 
 Result<ShapeParameters> parametersOf(const store::Collection& collection) {
     Result<ShapeParameters> parameters = store::decodeParameters(collection.parameters);
@@ -125,8 +86,8 @@ struct CollectionIndex::Slot {
     }
 };
 
-CollectionIndex::CollectionIndex(store::Store& store, telemetry::LoggerPtr log)
-    : store_(store), log_(std::move(log)), surfaces_(store) {}
+CollectionIndex::CollectionIndex(store::Store& store, telemetry::LoggerPtr log, Signatures where)
+    : store_(store), log_(std::move(log)), where_(where), surfaces_(store) {}
 
 CollectionIndex::~CollectionIndex() = default;
 
@@ -157,7 +118,7 @@ Result<SignatureSet> CollectionIndex::readSignatures(std::int64_t collectionId, 
         if (!rows->empty()) afterId = rows->back().shapeId;
         return std::make_shared<std::vector<store::IndexRow>>(std::move(*rows));
     };
-    const auto decodeBatch = [&](const Rows& rows) { return toBlock(std::move(*rows), store_, *log_); };
+    const auto decodeBatch = [&](const Rows& rows) { return toBlock(std::move(*rows), *log_); };
     std::vector<Block> blocks;
     const auto append = [&](const Block& block) { blocks.push_back(block); };
     flow::parallel_pipeline(batches,
@@ -172,6 +133,7 @@ Result<SnapshotPtr> CollectionIndex::read(const store::Collection& collection, s
                                           const RunContext& context) const {
     auto snapshot = withoutSignatures(collection);
     RETURN_IF_ERROR(snapshot);
+    if (where_ == Signatures::kElsewhere) return SnapshotPtr(std::move(*snapshot));
 
     auto signatures = readSignatures(collection.id, batches, context);
     RETURN_IF_ERROR(signatures);
@@ -386,9 +348,9 @@ std::vector<std::string> CollectionIndex::aliasesOf(std::int64_t collectionId) c
 }
 
 Result<void> CollectionIndex::refresh(std::int64_t collectionId, const std::vector<std::int64_t>& shapeIds) {
-    for (const std::int64_t shapeId : shapeIds) surfaces_.forget(shapeId);
+    forgetSurfaces(shapeIds);
     const SlotPtr slot = find(collectionId);
-    if (!slot) return {};
+    if (!slot || where_ == Signatures::kElsewhere) return {};
     return guarded([&] {
         // Before waiting for the lock: the next thread that gets it applies all marks at once.
         slot->mark(shapeIds);
@@ -417,7 +379,7 @@ Result<void> CollectionIndex::applyDirty(Slot& slot) {
         // Of another generation: a switch is in progress, and its reload brings this shape.
         if (row && row->generation != before->collection.generation) continue;
         IndexEntry entry;
-        if (row && toEntry({id, shape->key, shape->metadata, std::move(*row)}, entry, store_, *log_)) {
+        if (row && toEntry({id, shape->key, shape->metadata, std::move(*row)}, entry, *log_)) {
             updates.push_back(std::move(entry));
         } else {
             // Deleted, not segmented yet, failed or damaged: not searched.

@@ -30,7 +30,7 @@ namespace shapedb::index {
 struct Snapshot {
     store::Collection collection;
     ShapeParameters parameters;  ///< of collection.parameters
-    SignatureSet signatures;     ///< all of generation collection.generation
+    SignatureSet signatures;     ///< all of generation collection.generation; empty where others hold them
     /// Why signatures are missing: those stored could not be read. The collection must not be searched, since
     /// nobody could tell what was not found.
     std::optional<Error> damage{};
@@ -45,6 +45,12 @@ struct Snapshot {
 
 using SnapshotPtr = std::shared_ptr<const Snapshot>;
 
+/// Where the signatures are that searches read.
+enum class Signatures {
+    kHere,       ///< in this index
+    kElsewhere,  ///< in shards (server/cluster): the index knows collections and their parameters only
+};
+
 /// Thread-safe. Readers (`byName`, `byId`, `all`) only copy a pointer under a short lock and never wait
 /// for updates. Updates of one collection run one after another; those that arrive meanwhile are applied
 /// together by the next.
@@ -53,7 +59,7 @@ using SnapshotPtr = std::shared_ptr<const Snapshot>;
 class CollectionIndex {
   public:
     /// Neither is owned; both must outlive the index.
-    CollectionIndex(store::Store& store, telemetry::LoggerPtr log);
+    CollectionIndex(store::Store& store, telemetry::LoggerPtr log, Signatures where = Signatures::kHere);
     ~CollectionIndex();
 
     /// Reads everything on all processors and replaces the index at the end (start, restore). Damaged
@@ -119,6 +125,11 @@ class CollectionIndex {
     [[nodiscard]] Result<bool> switchGeneration(std::int64_t collectionId,
                                                 const std::function<Result<bool>()>& change);
 
+    [[nodiscard]] Signatures where() const noexcept { return where_; }
+    /// Surface points that are cached may be older than those stored now.
+    void forgetSurfaces(const std::vector<std::int64_t>& shapeIds) {
+        for (const std::int64_t id : shapeIds) surfaces_.forget(id);
+    }
     /// The surface points of a shape, cached (surface_cache.h).
     [[nodiscard]] Result<std::shared_ptr<const SurfacePoints>> surface(std::int64_t shapeId) {
         return surfaces_.get(shapeId);
@@ -154,6 +165,7 @@ class CollectionIndex {
 
     store::Store& store_;
     telemetry::LoggerPtr log_;
+    const Signatures where_;
     SurfaceCache surfaces_;
     mutable std::mutex mutex_;  ///< guards directory_; held only to look up or to replace
     Directory directory_;

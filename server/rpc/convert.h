@@ -24,7 +24,7 @@ namespace pb = shapedb::v1;
 using wire::fromProto;
 using wire::toProto;
 
-/// `quality`: of the serving signature, as catalog::qualityIn.
+/// `quality`: of the serving signature, as Catalog::quality.
 void toProto(const store::Shape& shape, const std::string& collection, std::optional<double> quality,
              pb::Shape* out);
 [[nodiscard]] pb::ShapeState toProto(store::ShapeState state);

@@ -92,6 +92,7 @@ struct GrpcServer::Parts {
                    std::chrono::system_clock::now(),
                    {}},
           alsoUseTls(std::move(given.alsoUseTls)),
+          canSearch(std::move(given.canSearch)),
           shapeService(services),
           searchService(services),
           alignService(services),
@@ -101,6 +102,7 @@ struct GrpcServer::Parts {
     CancelWatcher cancellations;
     Services services;
     const TlsCredentials::AlsoUse alsoUseTls;
+    const std::function<bool()> canSearch;
     ShapeServiceHandler shapeService;
     SearchServiceHandler searchService;
     AlignServiceHandler alignService;
@@ -108,6 +110,11 @@ struct GrpcServer::Parts {
     AdminServiceHandler adminService;
 
     void reportListening(const std::string& problem);
+    catalog::Condition condition() const {
+        catalog::Condition condition = services.catalog.condition();
+        if (canSearch) condition.searches = canSearch();
+        return condition;
+    }
 
     /// One way in: a listener, and what gRPC does with its connections.
     struct Entrance {
@@ -163,9 +170,8 @@ Result<void> GrpcServer::listen() {
     const auto credentials = parts_->credentials();
     RETURN_IF_ERROR(credentials);
     RETURN_IF_ERROR(build(*credentials));
-    parts_->health =
-        std::make_unique<Health>(*parts_->server->GetHealthCheckService(),
-                                 [&catalog = parts_->services.catalog] { return catalog.condition(); });
+    parts_->health = std::make_unique<Health>(*parts_->server->GetHealthCheckService(),
+                                              [&parts = *parts_] { return parts.condition(); });
     startListening();
     return {};
 }

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -37,6 +38,8 @@ class GrpcServer {
         telemetry::LoggerPtr log;
         std::string temporaryDirectory;        ///< must exist: backup and restore put their files there
         TlsCredentials::AlsoUse alsoUseTls{};  ///< of another transport; may be empty
+        /// Whether searches reach all signatures; empty: they always do.
+        std::function<bool()> canSearch{};
     };
     explicit GrpcServer(Surroundings surroundings);
     /// As `shutDown`.

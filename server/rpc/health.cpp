@@ -14,6 +14,7 @@ constexpr std::chrono::milliseconds kLook{100};
 enum class Need {
     kNothing,
     kContent,       ///< collections can be looked up
+    kSearches,      ///< and searched as a whole
     kSegmentation,  ///< and scans are taken in
     kComplete,      ///< no acknowledged change is missing
 };
@@ -27,7 +28,7 @@ struct Name {
 constexpr Name kNames[] = {
     {"", Need::kContent},
     {"shapedb.v1.ShapeService", Need::kContent},
-    {"shapedb.v1.SearchService", Need::kContent},
+    {"shapedb.v1.SearchService", Need::kSearches},
     {"shapedb.v1.CollectionService", Need::kContent},
     {"shapedb.v1.AlignService", Need::kContent},
     {"shapedb.v1.AdminService", Need::kNothing},  // a restore is the way out of lost content
@@ -39,6 +40,7 @@ bool has(const catalog::Condition& condition, Need need) {
     switch (need) {
         case Need::kNothing: return true;
         case Need::kContent: return condition.content;
+        case Need::kSearches: return condition.content && condition.searches;
         case Need::kSegmentation: return condition.content && condition.segmentation;
         case Need::kComplete: return condition.complete;
     }

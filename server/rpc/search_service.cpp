@@ -16,6 +16,9 @@
 namespace shapedb::rpc {
 namespace {
 
+/// Of a search that rebuilds overtake.
+constexpr int kMostTries = 5;
+
 template <typename Message>
 ScoreOptions scoreOptionsFrom(const Message& message) {
     ScoreOptions options;
@@ -43,7 +46,22 @@ Result<catalog::PreparedSearch> prepare(const Services& services, Call& call,
     request.groupBy = options.group_by();
     request.perGroup = options.per_group();
     if (options.has_viewpoint()) request.verifyOptions.viewpoint = fromProto(options.viewpoint());
+    request.atLeast = options.at_least();
+    request.allowPartial = options.allow_partial();
     return services.searches.prepare(*collection, request);
+}
+
+/// Prepares a search and calls `body(prepared)`; once more, with the collection as it is then, if a rebuild
+/// was put in place meanwhile.
+template <typename Body>
+Result<void> searchPrepared(const Services& services, Call& call, const pb::SearchOptions& options,
+                            const Body& body) {
+    for (int tries = 1;; ++tries) {
+        auto prepared = prepare(services, call, options);
+        RETURN_IF_ERROR(prepared);
+        const Result<void> done = body(*prepared);
+        if (done || tries == kMostTries || !prepared->superseded->load()) return done;
+    }
 }
 
 /// Counts a hit to the group before it, or begins the next.
@@ -68,6 +86,7 @@ Result<void> answer(const Services& services, const catalog::PreparedSearch& pre
     response->set_candidates_verified(found.verified);
     response->set_not_exact(!found.exact);
     response->set_pending(prepared.pending);
+    response->set_covered(found.covered);
     response->set_unit(wire::toProto(prepared.collection->parameters.unit));
     response->set_left_right_untold(leftRightUntold(query, prepared.options.score, found.verified > 0));
     toProto(query, response->mutable_query());
@@ -133,12 +152,14 @@ grpc::Status SearchServiceHandler::searchByKey(grpc::ServerContext* context,
                                                v1::SearchResponse* response) {
     return handle(services_, context, operations::kSearchByKey, request, [&](Call& call) -> Result<void> {
         call.noteKey(request->key());
-        auto prepared = prepare(services_, call, request->options());
-        RETURN_IF_ERROR(prepared);
-        const auto query = services_.searches.storedQuery(*prepared, request->key(), request->include_self());
-        RETURN_IF_ERROR(query);
-        return search(services_, call, *prepared, *query, request.answerRoom(services_.admission.answers),
-                      response);
+        const auto run = [&](catalog::PreparedSearch& prepared) -> Result<void> {
+            const auto query =
+                services_.searches.storedQuery(prepared, request->key(), request->include_self());
+            RETURN_IF_ERROR(query);
+            return search(services_, call, prepared, *query, request.answerRoom(services_.admission.answers),
+                          response);
+        };
+        return searchPrepared(services_, call, request->options(), run);
     });
 }
 
@@ -164,24 +185,27 @@ grpc::Status SearchServiceHandler::searchByScanInStages(grpc::ServerContext* con
 
 Result<void> SearchServiceHandler::receiveAndSearch(Call& call, Upload<v1::SearchByScanRequest>& messages,
                                                     const RunContext& running, v1::SearchResponse& response) {
-    catalog::PreparedSearch prepared;
+    pb::SearchOptions options;
     catalog::ScanUpload upload(services_.config.limits.maxPoints, services_.admission.uploads);
     const auto checkSearchHeader = [&](const v1::SearchByScanHeader& header) -> Result<void> {
-        auto checked = prepare(services_, call, header.options());
+        options = header.options();
+        const auto checked = prepare(services_, call, options);
         RETURN_IF_ERROR(checked);
-        prepared = std::move(*checked);
         return {};
     };
     const auto scan = receiveScan(services_, messages, upload, call, checkSearchHeader);
     RETURN_IF_ERROR(scan);
 
-    const auto searched = services_.searches.byScan(prepared, *scan, running);
-    RETURN_IF_ERROR(searched);
-    const Description& description = searched->description;
-    toProto(description.segmentation, response.mutable_report());
-    response.set_seconds_segment(description.segmentation.totalSeconds);
-    return answer(services_, prepared, description.signature, searched->found,
-                  messages.answerRoom(services_.admission.answers), &response);
+    const auto run = [&](const catalog::PreparedSearch& prepared) -> Result<void> {
+        const auto searched = services_.searches.byScan(prepared, *scan, running);
+        RETURN_IF_ERROR(searched);
+        const Description& description = searched->description;
+        toProto(description.segmentation, response.mutable_report());
+        response.set_seconds_segment(description.segmentation.totalSeconds);
+        return answer(services_, prepared, description.signature, searched->found,
+                      messages.answerRoom(services_.admission.answers), &response);
+    };
+    return searchPrepared(services_, call, options, run);
 }
 
 grpc::Status SearchServiceHandler::searchBySignature(grpc::ServerContext* context,
@@ -189,12 +213,13 @@ grpc::Status SearchServiceHandler::searchBySignature(grpc::ServerContext* contex
                                                      v1::SearchResponse* response) {
     return handle(
         services_, context, operations::kSearchBySignature, request, [&](Call& call) -> Result<void> {
-            const auto prepared = prepare(services_, call, request->options());
-            RETURN_IF_ERROR(prepared);
-            auto signature = decodeSignature(request->signature());
-            RETURN_IF_ERROR(signature);
-            return search(services_, call, *prepared, {{std::move(*signature), std::nullopt}, nullptr},
-                          request.answerRoom(services_.admission.answers), response);
+            const auto run = [&](const catalog::PreparedSearch& prepared) -> Result<void> {
+                auto signature = decodeSignature(request->signature());
+                RETURN_IF_ERROR(signature);
+                return search(services_, call, prepared, {{std::move(*signature), std::nullopt}, nullptr},
+                              request.answerRoom(services_.admission.answers), response);
+            };
+            return searchPrepared(services_, call, request->options(), run);
         });
 }
 
@@ -207,13 +232,14 @@ grpc::Status SearchServiceHandler::searchBatch(grpc::ServerContext* context,
         RETURN_IF_ERROR(call.useCollection(request->options().collection()));
         RETURN_IF_ERROR(
             catalog::checkBatchSize(static_cast<std::uint64_t>(count), services_.config.limits.maxBatch));
-        auto prepared = prepare(services_, call, request->options());
-        RETURN_IF_ERROR(prepared);
-        BatchAnswer batch(static_cast<std::size_t>(count));
-        RETURN_IF_ERROR(rpc::searchBatch(services_, call, *prepared, *request,
-                                         request.answerRoom(services_.admission.answers), batch));
-        *response = batch.message();
-        return {};
+        const auto run = [&](catalog::PreparedSearch& prepared) -> Result<void> {
+            BatchAnswer batch(static_cast<std::size_t>(count));
+            RETURN_IF_ERROR(rpc::searchBatch(services_, call, prepared, *request,
+                                             request.answerRoom(services_.admission.answers), batch));
+            *response = batch.message();
+            return {};
+        };
+        return searchPrepared(services_, call, request->options(), run);
     });
 }
 

@@ -165,6 +165,9 @@ Result<void> ShapeServiceHandler::add(Call& call, Upload<v1::AddShapeRequest>& m
     RETURN_IF_ERROR(scan);
     const auto added = addition.finish(std::move(*scan));
     RETURN_IF_ERROR(added);
+    // After it was waited for: then searches that demand it find the shape.
+    const auto change = services_.catalog.lastChange(added->shape.collectionId);
+    if (change) response.set_change(*change);
     response.set_outcome(outcomeOf(added->outcome));
     toProto(added->shape, added->collection, services_.catalog.servingQuality(added->shape),
             response.mutable_shape());
@@ -177,8 +180,10 @@ grpc::Status ShapeServiceHandler::getShape(grpc::ServerContext* context,
     return handle(services_, context, operations::kGetShape, request, [&](Call& call) -> Result<void> {
         const auto found = call.shape(request->shape());
         RETURN_IF_ERROR(found);
-        toProto(found->shape, found->collection->collection.name, found->quality(),
-                response->mutable_shape());
+        const auto change = services_.catalog.lastChange(found->shape.collectionId);
+        if (change) response->set_change(*change);
+        toProto(found->shape, found->collection->collection.name,
+                services_.catalog.quality(*found->collection, found->shape.id), response->mutable_shape());
         return {};
     });
 }
@@ -330,7 +335,9 @@ grpc::Status ShapeServiceHandler::deleteShape(grpc::ServerContext* context,
         if (request->has_expected_version()) expected = request->expected_version();
         const auto deleted = services_.catalog.deleteShape(*collection, ref.key(), expected);
         RETURN_IF_ERROR(deleted);
-        toProto(deleted->shape, deleted->collection->collection.name, deleted->quality(),
+        const auto change = services_.catalog.lastChange(deleted->shape.collectionId);
+        if (change) response->set_change(*change);
+        toProto(deleted->shape, deleted->collection->collection.name, deleted->quality,
                 response->mutable_shape());
         return {};
     });

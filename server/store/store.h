@@ -190,6 +190,12 @@ struct ChangeLogs {
     std::map<std::int64_t, std::int64_t> last;  ///< the number of the last change, by collection
 };
 
+/// Where a collection of a shared database stands.
+struct CollectionPosition {
+    std::int64_t lastChange = 0;  ///< number of the last change; 0 where none are kept
+    std::int64_t generation = 0;  ///< of the signatures that serve; 0: not told
+};
+
 /// What verifying a shape needs.
 struct SurfaceRow {
     std::int64_t pointsVersion = 0;
@@ -391,6 +397,11 @@ class Store {
     /// Whether other servers may change the content. If not, the next two find nothing.
     [[nodiscard]] virtual bool isShared() const noexcept { return false; }
     [[nodiscard]] virtual Result<ChangeLogs> changeLogs() { return ChangeLogs{}; }
+    /// Errors: kNotFound.
+    [[nodiscard]] virtual Result<CollectionPosition> position(std::int64_t collectionId) {
+        static_cast<void>(collectionId);
+        return CollectionPosition{};
+    }
     /// Changes of the collection with a number > `number`, in ascending order, at most `limit`. Old ones are
     /// forgotten: then the first is not `number` + 1.
     [[nodiscard]] virtual Result<std::vector<Change>> changesAfter(std::int64_t collectionId,

@@ -37,6 +37,7 @@ constexpr char kForgetChanges[] =
     "= ?1) - ?2";
 constexpr char kDirectory[] = "SELECT last_change FROM directory";
 constexpr char kLastChanges[] = "SELECT id, last_change FROM collection";
+constexpr char kPosition[] = "SELECT last_change, generation FROM collection WHERE id = ?1";
 constexpr char kChangesAfter[] =
     "SELECT number, shape_id FROM change WHERE collection_id = ?1 AND number > ?2 ORDER BY number LIMIT ?3";
 // As what recoverJobs does with those of a process that was stopped: they run after all other jobs.
@@ -191,6 +192,16 @@ Result<ChangeLogs> PostgresStore::changeLogs() {
         Query query(connection, kLastChanges);
         while (query.step()) logs.last.emplace(query.integer(0), query.integer(1));
         return logs;
+    });
+}
+
+Result<CollectionPosition> PostgresStore::position(std::int64_t collectionId) {
+    return read("read where a collection stands", [&](Connection& connection) {
+        Query query(connection, kPosition, collectionId);
+        if (!query.step()) {
+            raise(ErrorCode::kNotFound, "there is no collection " + std::to_string(collectionId));
+        }
+        return CollectionPosition{query.integer(0), query.integer(1)};
     });
 }
 

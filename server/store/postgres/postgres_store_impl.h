@@ -30,6 +30,7 @@ class PostgresStore final : public SqlStore {
 
     bool isShared() const noexcept override { return true; }
     Result<ChangeLogs> changeLogs() override;
+    Result<CollectionPosition> position(std::int64_t collectionId) override;
     Result<std::vector<Change>> changesAfter(std::int64_t collectionId, std::int64_t number,
                                              std::size_t limit) override;
 

@@ -276,5 +276,23 @@ TEST(SignatureSet, CountsItsMemory) {
     EXPECT_LT(SignatureSet().with(many, {}).memoryBytes(), labelled + 1000u * 120u);
 }
 
+TEST(SignatureSet, PartsAreFoundAsOneSet) {
+    std::vector<SignatureSet> parts(4);  // the third stays empty
+    for (std::int64_t id = 1; id <= 3000; ++id) {
+        const std::size_t part = id % 3 == 2 ? 3 : static_cast<std::size_t>(id % 3);
+        parts[part] = parts[part].with({entryOf(id)}, {});
+    }
+    const SignatureSet all = SignatureSet::ofParts(parts);
+    ASSERT_EQ(all.size(), 3000u);
+    for (std::int64_t id = 1; id <= 3000; ++id) {
+        const SignatureSet::Place place = all.find(id);
+        ASSERT_TRUE(place) << id;
+        expectIs(*place.block, place.row, id, 1);
+    }
+    EXPECT_FALSE(all.find(0));
+    EXPECT_FALSE(all.find(3001));
+    EXPECT_FALSE(SignatureSet::ofParts({}).find(1));
+}
+
 }  // namespace
 }  // namespace shapedb

@@ -35,7 +35,7 @@ std::size_t shardsIn(const std::vector<Ask>& asks) {
 }
 
 TEST(Gather, AsksForEachShardOnceAndSpreadsThemOverReplicas) {
-    Gather gather(heldByAll({"a", "b"}), 0, 7);
+    Gather gather(heldByAll({"a", "b"}), 0, 0, 7);
     const auto asks = gather.start();
     ASSERT_EQ(asks.size(), 2u);
     EXPECT_EQ(asks[0].shards.size(), 128u);
@@ -48,7 +48,7 @@ TEST(Gather, AsksForEachShardOnceAndSpreadsThemOverReplicas) {
 }
 
 TEST(Gather, IgnoresAnAnswerThatComesTwice) {
-    Gather gather(heldByAll({"a"}), 0, 0);
+    Gather gather(heldByAll({"a"}), 0, 0, 0);
     const auto asks = gather.start();
     EXPECT_TRUE(gather.onAnswer(asks[0].id, asAsked(asks[0])).empty());
     EXPECT_TRUE(gather.onAnswer(asks[0].id, asAsked(asks[0])).empty());
@@ -56,7 +56,7 @@ TEST(Gather, IgnoresAnAnswerThatComesTwice) {
 }
 
 TEST(Gather, IgnoresAnAnswerThatComesAfterItsShardsWereAskedOfAnother) {
-    Gather gather(heldByAll({"a", "b"}), 0, 0);
+    Gather gather(heldByAll({"a", "b"}), 0, 0, 0);
     const auto asks = gather.start();
     const auto again = gather.onFailure(asks[0].id);
     ASSERT_EQ(again.size(), 1u);
@@ -68,7 +68,7 @@ TEST(Gather, IgnoresAnAnswerThatComesAfterItsShardsWereAskedOfAnother) {
 
 TEST(Gather, RefusesAnswersThatAreNotWhatWasAsked) {
     const auto refused = [](const std::function<void(Coverage&)>& change) {
-        Gather gather(heldByAll({"a"}), 10, 0);
+        Gather gather(heldByAll({"a"}), 10, 0, 0);
         const auto asks = gather.start();
         Coverage coverage = asAsked(asks[0]);
         change(coverage);
@@ -83,7 +83,7 @@ TEST(Gather, RefusesAnswersThatAreNotWhatWasAsked) {
 }
 
 TEST(Gather, ANewerGenerationTakesThePlaceOfTheOlder) {
-    Gather gather(heldByAll({"a", "b"}), 0, 0);
+    Gather gather(heldByAll({"a", "b"}), 0, 0, 0);
     const auto asks = gather.start();
     EXPECT_TRUE(gather.onAnswer(asks[0].id, asAsked(asks[0], 10, 1)).empty());
     const auto again = gather.onAnswer(asks[1].id, asAsked(asks[1], 11, 2));
@@ -96,7 +96,7 @@ TEST(Gather, ANewerGenerationTakesThePlaceOfTheOlder) {
 }
 
 TEST(Gather, AsksNobodyTwiceUntilThereAreNewRoutes) {
-    Gather gather(heldByAll({"a"}), 0, 0);
+    Gather gather(heldByAll({"a"}), 0, 0, 0);
     const auto asks = gather.start();
     EXPECT_TRUE(gather.onFailure(asks[0].id).empty());
     EXPECT_TRUE(gather.needsRoutes());
@@ -110,7 +110,7 @@ TEST(Gather, TellsWhatIsCoveredWhenShardsHaveNoHolder) {
     view.leases.push_back({5, 0, "a", 1, std::chrono::milliseconds(1'000), {}});
     view.leases.push_back({6, 0, "a", 1, std::chrono::milliseconds(0), {}});     // ended
     view.leases.push_back({7, 0, "", 1, std::chrono::milliseconds(1'000), {}});  // given back
-    Gather gather(routesOf(view), 0, 0);
+    Gather gather(routesOf(view), 0, 0, 0);
     const auto asks = gather.start();
     ASSERT_EQ(shardsIn(asks), 1u);
     EXPECT_TRUE(gather.onAnswer(asks[0].id, asAsked(asks[0])).empty());

@@ -274,7 +274,7 @@ class World {
         search->atLeast = chance(50) ? database_.number() : 0;
         search->started = database_.now;
         search->deadline = database_.now + kPatience;
-        search->gather.emplace(server.routes, search->atLeast, random_());
+        search->gather.emplace(server.routes, search->atLeast, 0, random_());
         dispatch(search, search->gather->start());
     }
 
