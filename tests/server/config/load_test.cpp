@@ -95,14 +95,31 @@ TEST_F(Load, EverySettingIsReadFromEverySource) {
         if (setting.key == "tls.key") with.assign(partnerFlags.begin(), partnerFlags.begin() + 2);
         if (setting.key == "store.engine") with = {"--postgres-uri", "host=db"};
         if (setting.key == "postgres.uri") with = {"--store-engine", "postgres"};
+        const bool needsPostgres = setting.key == "role" || setting.key == "cluster.replicas";
+        if (needsPostgres) with = {"--store-engine", "postgres", "--postgres-uri", "host=db"};
+        const std::vector<const char*> clusterFlags = {"--cluster-certificate", "c", "--cluster-key", "k",
+                                                       "--cluster-ca",          "a"};
+        for (std::size_t i = 0; i < clusterFlags.size(); i += 2) {
+            if (clusterFlags[i] != setting.flag) continue;
+            with = clusterFlags;
+            with.erase(with.begin() + static_cast<std::ptrdiff_t>(i),
+                       with.begin() + static_cast<std::ptrdiff_t>(i) + 2);
+        }
         for (const int source : {0, 1, 2}) {
             ServerConfig probe;
             // A value other than the default, found among a few candidates.
             std::string text;
             for (const char* candidate : {"3", "5", "2MiB", "/some/where", "localhost:1", "warn", "json",
-                                          "200MiB", "8GiB", "always", "yes", "postgres"}) {
+                                          "200MiB", "8GiB", "always", "yes", "postgres", "worker", "500"}) {
                 ServerConfig tried;
                 tried.tls = partners.tls;
+                if (!with.empty() && setting.key.rfind("cluster.", 0) == 0 && !needsPostgres) {
+                    tried.cluster.certificate = tried.cluster.key = tried.cluster.ca = "c";
+                }
+                if (needsPostgres) {
+                    tried.store.engine = "postgres";
+                    tried.postgres.uri = "host=db";
+                }
                 if (setting.key == "store.engine") tried.postgres.uri = "host=db";
                 if (setting.key == "postgres.uri") tried.store.engine = "postgres";
                 if (setting.assign(tried, candidate) && setting.show(tried) != setting.show(probe) &&
