@@ -3,7 +3,6 @@
 // a large upload, each with its limit.
 #include <algorithm>
 #include <array>
-#include <filesystem>
 #include <memory>
 
 #include <CLI/CLI.hpp>
@@ -12,6 +11,7 @@
 #include "bench/load_run.h"
 #include "bench/operations.h"
 #include "bench/output.h"
+#include "bench/server_process.h"
 #include "client/cli/console.h"
 #include "client/cli/evaluation_run.h"
 #include "client/cli/text.h"
@@ -257,13 +257,6 @@ Result<int> runLoad(const LoadFlags& flags, Bench& bench) {
     if (!here.optimised) text += "This program was built without optimisation: times mean nothing.\n";
     bench.console.text(text);
     return cli::kOk;
-}
-
-/// The server that was built with this program.
-std::string serverBeside() {
-    std::error_code error;
-    const auto self = std::filesystem::read_symlink("/proc/self/exe", error);
-    return error ? "shapedbd" : (self.parent_path() / "shapedbd").string();
 }
 
 }  // namespace

@@ -59,6 +59,7 @@ int run(int argc, const char* const* argv, cli::Console& console, const std::ato
         addLeaveOutOperation(app, bench);
         addFingerprintOperation(app, bench);
         addWorkersOperation(app, bench);
+        addShardsOperation(app, bench);
         try {
             app.parse(argc, argv);
         } catch (const CLI::CallForHelp&) {

@@ -51,6 +51,7 @@ void addFindOperation(CLI::App& app, Bench& bench);
 void addLeaveOutOperation(CLI::App& app, Bench& bench);
 void addFingerprintOperation(CLI::App& app, Bench& bench);
 void addWorkersOperation(CLI::App& app, Bench& bench);
+void addShardsOperation(CLI::App& app, Bench& bench);
 
 // The program: reads the command line and runs the operation the user chose.
 

@@ -102,4 +102,10 @@ Result<double> ServerProcess::processorSeconds() const {
     return (user + system) / static_cast<double>(::sysconf(_SC_CLK_TCK));
 }
 
+std::string serverBeside() {
+    std::error_code error;
+    const auto self = std::filesystem::read_symlink("/proc/self/exe", error);
+    return error ? "shapedbd" : (self.parent_path() / "shapedbd").string();
+}
+
 }  // namespace shapedb::bench

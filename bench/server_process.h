@@ -28,6 +28,9 @@ class WorkDirectory {
     std::string path_;
 };
 
+/// The server that was built with this program.
+[[nodiscard]] std::string serverBeside();
+
 /// From /proc.
 struct MemoryUse {
     std::uint64_t resident = 0;  ///< bytes now

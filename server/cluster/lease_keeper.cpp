@@ -104,6 +104,16 @@ std::optional<std::int64_t> LeaseKeeper::epoch(int shard, Instant now) const {
     return own->epoch;
 }
 
+bool LeaseKeeper::isNews(int shard, std::int64_t epoch) const {
+    bool isLater = false;
+    for (const Lease& lease : view_.leases) {
+        if (lease.shard != shard) continue;
+        if (lease.epoch == epoch) return false;
+        isLater |= lease.epoch < epoch;
+    }
+    return isLater;
+}
+
 ShardSet LeaseKeeper::held(Instant now) const {
     ShardSet shards;
     for (int shard = 0; shard < kShards; ++shard) {

@@ -46,6 +46,8 @@ class LeaseKeeper {
 
     /// The epoch under which the server may answer for this shard; nothing: it may not.
     [[nodiscard]] std::optional<std::int64_t> epoch(int shard, Instant now) const;
+    /// Whether it may have got this lease since the last view: who asks has seen the table later.
+    [[nodiscard]] bool isNews(int shard, std::int64_t epoch) const;
     /// The shards that it may answer for.
     [[nodiscard]] ShardSet held(Instant now) const;
     /// The shards to load and to keep: those held, and those that it should hold.

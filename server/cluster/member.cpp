@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "server/cluster/member.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "core/base/return_if_error.h"
@@ -55,6 +56,7 @@ Result<void> Member::beatOnce() {
     keeper_.onView(sentAt, *view);
     routes_ = routesOf(*view);
     wake_ = true;  // it may want other shards
+    ++news_;
     changed_.notify_all();
     return {};
 }
@@ -184,8 +186,14 @@ void Member::noteProgress(const ShardSet& loaded, bool followed) {
     keeper_.setLoaded(loaded);
     contents_.clear();
     for (const auto& [id, one] : replicas_) contents_.emplace(id, one.content);
-    ++passes_;
+    ++news_;
     changed_.notify_all();
+}
+
+/// Under the lock: some of its leases may have come since the last beat.
+bool Member::isNews(const Ask& ask) const {
+    return std::any_of(ask.shards.begin(), ask.shards.end(),
+                       [&](const auto& one) { return keeper_.isNews(one.first, one.second); });
 }
 
 Result<ShownPtr> Member::content(std::int64_t collectionId, const Ask& ask, const RunContext& context) {
@@ -198,16 +206,17 @@ Result<ShownPtr> Member::content(std::int64_t collectionId, const Ask& ask, cons
         if (shown) answer = answerable(ask, shown->content, keeper_, now());
         if (answer == Answerable::kYes) return shown;
         RETURN_IF_ERROR(context.checkpoint());
-        if (answer == Answerable::kNo) {
+        const bool over = stop_ || RunContext::Clock::now() >= until;
+        if (answer == Answerable::kNo && (over || !isNews(ask))) {
             return fail(ErrorCode::kUnavailable,
                         "this server does not hold all shards that it was asked for");
         }
-        if (stop_ || RunContext::Clock::now() >= until) {
+        if (over) {
             return fail(ErrorCode::kUnavailable, "this server does not know the latest changes yet");
         }
-        wake_ = true;
+        (answer == Answerable::kNo ? beatSoon_ : wake_) = true;
         changed_.notify_all();
-        changed_.wait_for(lock, kPause, [this, passes = passes_] { return stop_ || passes_ != passes; });
+        changed_.wait_for(lock, kPause, [this, news = news_] { return stop_ || news_ != news; });
     }
 }
 

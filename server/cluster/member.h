@@ -81,6 +81,7 @@ class Member {
     void followLoop();
     /// One step of each collection. True if there is more to do now.
     bool followOnce(const ShardSet& wanted, bool first);
+    bool isNews(const Ask& ask) const;
     void noteProgress(const ShardSet& loaded, bool followed);
 
     Parts parts_;
@@ -95,7 +96,7 @@ class Member {
     RoutesPtr routes_;
     ShardSet loaded_;
     std::map<std::int64_t, std::shared_ptr<ShardContent>> contents_;
-    std::uint64_t passes_ = 0;  ///< of the thread that follows
+    std::uint64_t news_ = 0;  ///< rises with each beat, and each pass of the thread that follows
     bool following_ = true;
     bool wake_ = false;      ///< the thread that follows should go on at once
     bool beatSoon_ = false;  ///< the thread that beats should
