@@ -261,7 +261,8 @@ PostgresConnection::PostgresConnection(const PostgresAddress& address, const Sta
         {"keepalives_idle", "10"},
         {"keepalives_interval", "5"},
         {"keepalives_count", "3"},
-        {"options", "-c search_path=public -c timezone=UTC -c extra_float_digits=3"},
+        // What is read to an end is not worth compiling, and the first rows of a page still less.
+        {"options", "-c search_path=public -c timezone=UTC -c extra_float_digits=3 -c jit=off"},
     };
     if (!address.password.empty()) options.emplace_back("password", address.password.c_str());
     std::vector<const char*> names;

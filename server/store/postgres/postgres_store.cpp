@@ -80,6 +80,19 @@ PostgresOptions completed(PostgresOptions options) {
     return options;
 }
 
+/// That its version and encoding will do.
+void requireServer(PostgresConnection& connection) {
+    const std::string version = connection.text("SHOW server_version_num");
+    if (std::stoi(version) < kOldestServer) {
+        raise(ErrorCode::kStorage, "the database server has version " + version + "; 15 or newer is needed");
+    }
+    const std::string encoding = connection.text("SHOW server_encoding");
+    if (encoding != "UTF8") {
+        raise(ErrorCode::kStorage,
+              "the database has the encoding " + encoding + "; create one with ENCODING 'UTF8'");
+    }
+}
+
 std::string joined(const std::vector<std::int64_t>& ids) {
     std::string text;
     for (const std::int64_t id : ids) text += (text.empty() ? "" : ",") + std::to_string(id);
@@ -106,16 +119,9 @@ PostgresAddress PostgresStore::address(std::chrono::milliseconds patience) const
 }
 
 void PostgresStore::migrateDatabase() {
-    const PostgresPool::Lease connection = pool_.acquire();
-    const std::string version = connection->text("SHOW server_version_num");
-    if (std::stoi(version) < kOldestServer) {
-        raise(ErrorCode::kStorage, "the database server has version " + version + "; 15 or newer is needed");
-    }
-    const std::string encoding = connection->text("SHOW server_encoding");
-    if (encoding != "UTF8") {
-        raise(ErrorCode::kStorage,
-              "the database has the encoding " + encoding + "; create one with ENCODING 'UTF8'");
-    }
+    requireServer(*pool_.acquire());
+    // One that writes a large table anew takes its time, and so does another server's.
+    const auto connection = patientConnection();
     Transaction transaction(*connection, Transaction::Kind::kWrite);
     Query(*connection, kLockMigration).run();
     connection->execute(kCreateRecord);

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "server/store/postgres/statements.h"
 
-#include "server/store/sql/sql.h"
-
 namespace shapedb::store {
 
 namespace {
@@ -46,6 +44,8 @@ constexpr char kLoadPoints[] = "SELECT s.key, s.point_count, s.checksum, " SHAPE
 constexpr char kStoredPoints[] =
     "SELECT p.point_bytes, p.stored_bytes, " SHAPEDB_ALL_CHUNKS " FROM shape_points p WHERE p.shape_id = ?1";
 
+constexpr char kLoadIndex[] = SHAPEDB_INDEX_PAGE " ORDER BY s.id";
+
 }  // namespace
 
 std::string sqlLiteral(const std::string& text) {
@@ -77,6 +77,7 @@ StatementTexts postgresStatements(const std::string& serverName, std::chrono::mi
          "SELECT shape_id, points_version, attempts, stops FROM job WHERE state = 1 AND owner = " + owner},
         {sql::kRememberDeletion, kRememberDeletion},
         {sql::kRememberedDeletion, kRememberedDeletion},
+        {sql::kLoadIndex, kLoadIndex},
         {sql::kLoadPoints, kLoadPoints},
         {sql::kStoredPoints, kStoredPoints},
     };

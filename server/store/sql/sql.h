@@ -17,6 +17,10 @@ namespace shapedb::store::sql {
     "s.origin_z, m.name, m.value"
 #define SHAPEDB_FROM_SHAPE " FROM shape s LEFT JOIN shape_metadata m ON m.shape_id = s.id "
 
+// Columns 0 to 8 in the order `readIndexRows` (rows.h) expects, in order of s.id: one row per metadata entry.
+#define SHAPEDB_INDEX_COLUMNS \
+    "s.id, m.name, m.value, g.points_version, g.generation, g.digest, g.bytes, g.views, s.key"
+
 /// The name of a collection that is being imported begins so. No client can give it or ask for it.
 inline constexpr char kImporting[] = ".import";
 /// The names of collections that were deleted and of which rows are left begin so; the id follows.
