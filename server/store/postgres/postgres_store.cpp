@@ -2,13 +2,16 @@
 #include "server/store/postgres/postgres_store.h"
 
 #include <algorithm>
+#include <map>
 #include <set>
+#include <utility>
 
 #include "core/base/return_if_error.h"
 #include "server/store/postgres/postgres_store_impl.h"
 #include "server/store/postgres/statements.h"
 #include "server/store/sql/migration.h"
 #include "server/store/sql/rows.h"
+#include "server/store/sql/sql.h"
 
 namespace shapedb::store {
 
@@ -37,6 +40,13 @@ constexpr char kForgetChanges[] =
     "= ?1) - ?2";
 constexpr char kDirectory[] = "SELECT last_change FROM directory";
 constexpr char kLastChanges[] = "SELECT id, last_change FROM collection";
+// Of many shapes at once: each statement is a round trip.
+constexpr char kShapesOfHits[] = "SELECT " SHAPEDB_SHAPE_COLUMNS SHAPEDB_FROM_SHAPE
+                                 "WHERE s.id = ANY(string_to_array(?1, ',')::bigint[]) ORDER BY s.id";
+constexpr char kSignaturesOfHits[] =
+    "SELECT s.id, g.points_version, g.generation, g.digest, g.bytes, g.views FROM shape s JOIN collection c "
+    "ON c.id = s.collection_id JOIN signature g ON g.shape_id = s.id AND g.generation = c.generation WHERE "
+    "s.id = ANY(string_to_array(?1, ',')::bigint[])";
 constexpr char kPosition[] = "SELECT last_change, generation FROM collection WHERE id = ?1";
 constexpr char kChangesAfter[] =
     "SELECT number, shape_id FROM change WHERE collection_id = ?1 AND number > ?2 ORDER BY number LIMIT ?3";
@@ -189,6 +199,40 @@ void PostgresStore::logChange(Connection& connection, std::int64_t collectionId,
 
 void PostgresStore::logAll(Connection& connection, std::int64_t collectionId) {
     Query(connection, kLogAll, collectionId).run();
+}
+
+Result<std::vector<std::optional<StoredHit>>> PostgresStore::getHits(
+    const std::vector<std::int64_t>& shapeIds, bool withSignatures) {
+    std::map<std::int64_t, StoredHit> found;
+    const auto done = read("read the hits", [&](Connection& connection) {
+        found.clear();  // it may be done a second time
+        const std::string ids = joined(shapeIds);
+        Query shapes(connection, kShapesOfHits, ids);
+        forEachShape(shapes, [&](Shape&& shape) {
+            const std::int64_t id = shape.id;
+            found.emplace(id, StoredHit{std::move(shape), fail(ErrorCode::kNotReady, "not asked for")});
+            return true;
+        });
+        if (!withSignatures) return;
+        Query signatures(connection, kSignaturesOfHits, ids);
+        while (signatures.step()) {
+            const std::int64_t id = signatures.integer(0);
+            found.at(id).signature =
+                guarded("read the signature", [&] { return readSignature(connection, signatures, 1, id); });
+        }
+    });
+    RETURN_IF_ERROR(done);
+    std::vector<std::optional<StoredHit>> hits(shapeIds.size());
+    for (std::size_t i = 0; i < hits.size(); ++i) {
+        const auto hit = found.find(shapeIds[i]);
+        if (hit == found.end()) continue;
+        hits[i] = hit->second;
+        const auto& signature = hits[i]->signature;
+        // Why it has none.
+        const bool missing = withSignatures && !signature && signature.error().code == ErrorCode::kNotReady;
+        if (missing) hits[i]->signature = getSignature(shapeIds[i]);
+    }
+    return hits;
 }
 
 Result<ChangeLogs> PostgresStore::changeLogs() {

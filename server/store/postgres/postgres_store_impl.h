@@ -28,6 +28,9 @@ class PostgresStore final : public SqlStore {
     Result<void> releaseJob(const Job& job) override;
     Result<std::vector<Shape>> recoverJobs(int maxAttempts, const std::vector<Crash>& crashes) override;
 
+    Result<std::vector<std::optional<StoredHit>>> getHits(const std::vector<std::int64_t>& shapeIds,
+                                                          bool withSignatures) override;
+
     bool isShared() const noexcept override { return true; }
     Result<ChangeLogs> changeLogs() override;
     Result<CollectionPosition> position(std::int64_t collectionId) override;
