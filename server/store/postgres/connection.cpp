@@ -43,6 +43,7 @@ ErrorCode codeOf(const std::string& state) {
     if (state == "57014") return ErrorCode::kCancelled;
     if (state == "XX001" || state == "XX002") return ErrorCode::kDataLoss;
     if (state == "25006") return ErrorCode::kUnavailable;  // a standby
+    if (state == "25P03") return ErrorCode::kUnavailable;  // its transaction was idle for too long
     const std::string kind = state.substr(0, 2);
     // No connection; too many of them; shut down, or starting.
     if (kind == "08" || kind == "53" || kind == "57" || kind == "40") return ErrorCode::kUnavailable;

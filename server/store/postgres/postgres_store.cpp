@@ -7,8 +7,11 @@
 #include <utility>
 
 #include "core/base/return_if_error.h"
+#include "server/store/postgres/lease_table.h"
 #include "server/store/postgres/postgres_store_impl.h"
+#include "server/store/postgres/replica_source.h"
 #include "server/store/postgres/statements.h"
+#include "server/store/postgres/transactions.h"
 #include "server/store/sql/migration.h"
 #include "server/store/sql/rows.h"
 #include "server/store/sql/sql.h"
@@ -67,8 +70,6 @@ constexpr std::int64_t kChangesKept = 10'000;
 /// Changes after which the oldest are forgotten.
 constexpr std::int64_t kForgetEvery = 256;
 
-/// Times that a write which met another one is done again.
-constexpr int kMostConflicts = 10;
 constexpr int kOldestServer = 150'000;
 constexpr std::size_t kMostServerName = 63;
 
@@ -115,7 +116,7 @@ PostgresStore::PostgresStore(const PostgresOptions& options)
     : options_(completed(options)),
       lock_(options_.lockPath),
       texts_(postgresStatements(options_.serverName, options_.jobLease)),
-      pool_(address(options_.patience), texts_, options_.connections) {
+      pool_(address(), texts_, options_.connections) {
     migrateDatabase();
     leases_ = std::make_unique<JobLeases>(options_.jobLease,
                                           [this](const std::vector<std::int64_t>& jobIds) { renew(jobIds); });
@@ -146,37 +147,10 @@ void PostgresStore::migrateDatabase() {
 // Transactions -------------------------------------------------------------------------------
 
 void PostgresStore::inWriteTransaction(Space space, const Work& work) {
-    for (int tries = 1;; ++tries) {
-        const PostgresPool::Lease connection = pool_.acquire();
-        bool mayBeStored = false;
-        try {
-            Transaction transaction(*connection, Transaction::Kind::kWrite);
-            work(*connection);
-            mayBeStored = true;
-            transaction.commit();
-            return;
-        } catch (const Failure& failure) {
-            if (space == Space::kTakesOnce) throw;
-            // A connection that broke while nobody used it is found by the next one who does.
-            const bool isStale = !mayBeStored && tries == 1 && connection->isBroken();
-            if (isStale) pool_.closeIdle();
-            if (!isStale && !(isConflict(failure) && tries < kMostConflicts)) throw;
-        }
-    }
+    store::inWriteTransaction(pool_, space == Space::kTakesOnce, work);
 }
 
-void PostgresStore::inReadTransaction(const Work& work) {
-    for (int tries = 1;; ++tries) {
-        const PostgresPool::Lease connection = pool_.acquire();
-        try {
-            const Transaction snapshot(*connection, Transaction::Kind::kRead);
-            return work(*connection);
-        } catch (const Failure&) {
-            if (tries > 1 || !connection->isBroken()) throw;
-            pool_.closeIdle();
-        }
-    }
-}
+void PostgresStore::inReadTransaction(const Work& work) { store::inReadTransaction(pool_, work); }
 
 void PostgresStore::lockNames(Connection& connection) { Query(connection, kLockNames).run(); }
 
@@ -339,6 +313,18 @@ Result<std::uint64_t> PostgresStore::backupBytes() {
 Result<std::unique_ptr<Store>> openPostgresStore(const PostgresOptions& options) {
     return guarded("open the database",
                    [&]() -> std::unique_ptr<Store> { return std::make_unique<PostgresStore>(options); });
+}
+
+std::unique_ptr<cluster::LeaseTable> leaseTable(Store& store, int replicas) {
+    const auto* postgres = dynamic_cast<const PostgresStore*>(&store);
+    if (postgres == nullptr) return nullptr;
+    return std::make_unique<PostgresLeaseTable>(postgres->address(), replicas);
+}
+
+std::unique_ptr<cluster::ReplicaSource> replicaSource(Store& store) {
+    auto* postgres = dynamic_cast<PostgresStore*>(&store);
+    if (postgres == nullptr) return nullptr;
+    return std::make_unique<PostgresReplicaSource>(postgres->pool());
 }
 
 }  // namespace shapedb::store

@@ -13,6 +13,8 @@
 #include <memory>
 #include <string>
 
+#include "server/cluster/lease_table.h"
+#include "server/cluster/replica.h"
 #include "server/store/store.h"
 
 namespace shapedb::store {
@@ -41,5 +43,12 @@ struct PostgresOptions {
 /// Applies missing migrations, in one transaction: one server at a time. Errors: kUnavailable, kSchemaTooNew,
 /// kDataLoss (a migration was edited), kInvalidArgument, kStorage (a database that is not UTF-8, or older).
 [[nodiscard]] Result<std::unique_ptr<Store>> openPostgresStore(const PostgresOptions& options);
+
+/// The leases of shards in the database of a store of openPostgresStore, over one more connection; may
+/// outlive it. `replicas`: slots of each shard, at least 1. Null: the store is another.
+[[nodiscard]] std::unique_ptr<cluster::LeaseTable> leaseTable(Store& store, int replicas);
+/// The rows of shards in the same database, over the store's connections; must not outlive it. Null: as
+/// above.
+[[nodiscard]] std::unique_ptr<cluster::ReplicaSource> replicaSource(Store& store);
 
 }  // namespace shapedb::store

@@ -53,6 +53,9 @@ class PostgresStore final : public SqlStore {
     std::size_t notices() const override { return 0; }
     Result<std::vector<std::string>> acknowledge() override { return std::vector<std::string>{}; }
 
+    PostgresAddress address() const { return address(options_.patience); }
+    PostgresPool& pool() { return pool_; }
+
   private:
     void inWriteTransaction(Space space, const Work& work) override;
     void inReadTransaction(const Work& work) override;

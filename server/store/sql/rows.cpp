@@ -142,8 +142,9 @@ SignatureRow readSignature(Connection& connection, const Query& query, int colum
     return row;
 }
 
-void readIndexRows(Connection& connection, Query& query, std::size_t limit, std::vector<IndexRow>& rows) {
-    for (bool more = query.step(); more && rows.size() < limit;) {
+bool readIndexRows(Connection& connection, Query& query, std::size_t limit, std::vector<IndexRow>& rows) {
+    bool more = query.step();
+    while (more && rows.size() < limit) {
         IndexRow& row = rows.emplace_back();
         row.shapeId = query.integer(0);
         row.signature = readSignature(connection, query, 3, row.shapeId);
@@ -153,6 +154,7 @@ void readIndexRows(Connection& connection, Query& query, std::size_t limit, std:
             more = query.step();
         } while (more && query.integer(0) == row.shapeId);
     }
+    return more;
 }
 
 void putSignature(Connection& connection, const SignatureRow& signature) {

@@ -52,9 +52,9 @@ Collection readCollection(const Query& query);
 /// Failure kDataLoss, naming the shape.
 SignatureRow readSignature(Connection& connection, const Query& query, int column, std::int64_t shapeId);
 
-/// Appends shapes of a kLoadIndex statement until there are `limit`. Throws Failure kDataLoss, naming the
-/// shape.
-void readIndexRows(Connection& connection, Query& query, std::size_t limit, std::vector<IndexRow>& rows);
+/// Appends shapes of a SHAPEDB_INDEX_COLUMNS statement until there are `limit`; returns whether it has found
+/// more. Throws Failure kDataLoss, naming the shape.
+bool readIndexRows(Connection& connection, Query& query, std::size_t limit, std::vector<IndexRow>& rows);
 
 /// Replaces the shape's signature of that generation, and its surface points if the row brings some.
 void putSignature(Connection& connection, const SignatureRow& signature);
