@@ -3,8 +3,6 @@
 // of them, can move from one kind to the other and back.
 #include <algorithm>
 
-#include <unistd.h>
-
 #include "server/store/postgres/postgres_store_impl.h"
 #include "server/store/sql/collection_copy.h"
 #include "server/store/sql/rows.h"
@@ -80,9 +78,8 @@ SqliteOptions PostgresStore::fileOptions() const {
     return options;
 }
 
-std::string PostgresStore::temporaryPath(const char* what) {
-    return options_.temporaryFolder + "/" + what + "-" + std::to_string(::getpid()) + "-" +
-           std::to_string(files_++);
+files::TemporaryFile PostgresStore::temporaryFile() const {
+    return orRaise(files::TemporaryFile::create(options_.temporaryFolder));
 }
 
 std::unique_ptr<PostgresConnection> PostgresStore::patientConnection() const {
@@ -117,7 +114,7 @@ Result<void> PostgresStore::backup(const std::string& path, const RunContext& co
 Result<std::vector<std::string>> PostgresStore::check(const RunContext& context) {
     return guarded("check the database", [&] {
         // The database checks its own files; what is in them is checked as a backup is.
-        const TemporaryDatabase copy(temporaryPath("check"));
+        const files::TemporaryFile copy = temporaryFile();
         copyToFile(copy.path(), "integrity", context);
         SqliteConnection connection(copy.path(), OpenMode::kReadOnly, kBusyTimeoutMs);
         auto problems = checkDatabase(connection, {kMostCounted, options_.acceptParameters}, context);
@@ -138,7 +135,7 @@ Result<std::vector<std::string>> PostgresStore::check(const RunContext& context)
 Result<void> PostgresStore::restore(const std::string& path, const RunContext& context,
                                     const std::function<Result<void>()>& replacing) {
     return guarded("restore the backup", [&] {
-        const TemporaryDatabase temporary(temporaryPath("restore"));
+        const files::TemporaryFile temporary = temporaryFile();
         const auto copy = checkedCopy(path, kRestored, temporary.path(), fileOptions(), context);
         requireWholeBackup(*copy, path);
         const auto live = patientConnection();
@@ -184,10 +181,10 @@ Result<void> PostgresStore::exportCollection(std::int64_t collectionId, const st
 
 Result<Collection> PostgresStore::importCollection(const std::string& path, const ImportRequest& request,
                                                    const RunContext& context) {
-    std::optional<TemporaryDatabase> temporary;
+    std::optional<files::TemporaryFile> temporary;
     return importFrom(
         [&]() -> std::unique_ptr<Connection> {
-            temporary.emplace(temporaryPath("import"));
+            temporary.emplace(temporaryFile());
             return checkedCopy(path, kImported, temporary->path(), fileOptions(), context);
         },
         path, request, context);

@@ -33,7 +33,8 @@ struct PostgresOptions {
     std::chrono::milliseconds patience{30'000};  ///< with the database: for a connection, for a statement
     /// An flock on this path with ".lock" is held: one server for each name and data directory.
     std::string lockPath;
-    /// A folder for the files that backups, imports, and checks need meanwhile.
+    /// A folder for the files that restores, imports, and checks need meanwhile: what a server that was
+    /// killed leaves in it, files::prepareTemporaryDirectory removes.
     std::string temporaryFolder;
     /// As SqliteOptions.
     std::function<TimestampMs()> now;

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "server/files/temporary_file.h"
 #include "server/store/postgres/job_leases.h"
 #include "server/store/postgres/pool.h"
 #include "server/store/postgres/postgres_store.h"
@@ -74,7 +75,9 @@ class PostgresStore final : public SqlStore {
     void renew(const std::vector<std::int64_t>& jobIds);
     PostgresAddress address(std::chrono::milliseconds patience) const;
     SqliteOptions fileOptions() const;
-    std::string temporaryPath(const char* what);
+    /// One that is removed with what this returns or, should the server die before, at its next start. Throws
+    /// Failure.
+    files::TemporaryFile temporaryFile() const;
     /// For what takes as long as it takes; `context` ends it between rows.
     std::unique_ptr<PostgresConnection> patientConnection() const;
     /// All content, as it is now, in a new database file. Throws Failure.
@@ -84,9 +87,8 @@ class PostgresStore final : public SqlStore {
     ProcessLock lock_;
     StatementTexts texts_;
     PostgresPool pool_;
-    std::atomic<int> maxAttempts_{0};      ///< of recoverJobs; 0: not known yet
-    std::atomic<std::uint64_t> files_{0};  ///< temporary files so far
-    std::unique_ptr<JobLeases> leases_;    ///< last: its thread uses the pool
+    std::atomic<int> maxAttempts_{0};    ///< of recoverJobs; 0: not known yet
+    std::unique_ptr<JobLeases> leases_;  ///< last: its thread uses the pool
 };
 
 }  // namespace shapedb::store
