@@ -64,6 +64,13 @@ Result<void> validateCluster(const ServerConfig& config) {
     if (cluster.listen.empty()) {
         return fail(ErrorCode::kInvalidArgument, "cluster.replicas takes cluster.listen");
     }
+    const auto endpoint = parseEndpoint(cluster.listen);
+    const bool isAnyAddress = endpoint && (endpoint->host == "0.0.0.0" || endpoint->host == "::");
+    if (isAnyAddress && cluster.advertise.empty()) {
+        return fail(ErrorCode::kInvalidArgument,
+                    "cluster.listen = " + cluster.listen +
+                        " is no address that other servers can ask: name one as cluster.advertise");
+    }
     if (tls || !isBeyond(cluster.listen) || config.security.anyoneMayDoAll == "yes") return {};
     return fail(ErrorCode::kInvalidArgument,
                 "cluster.listen = " + cluster.listen +

@@ -266,6 +266,27 @@ TEST_F(Load, RefusesSettingsThatContradictEachOther) {
     expectRefused(loadWith({"--tls-client-ca", "a"}), ErrorCode::kInvalidArgument, {"tls.client_ca"});
 }
 
+TEST_F(Load, ServersThatHoldPartsNeedADatabaseAndAnAddress) {
+    const auto withDatabase = [&](std::vector<const char*> flags) {
+        flags.insert(flags.end(), {"--store-engine", "postgres", "--postgres-uri", "host=db"});
+        return loadWith(flags);
+    };
+    const auto refused = ErrorCode::kInvalidArgument;
+    expectRefused(loadWith({"--role", "worker"}), refused, {"role = worker", "store.engine"});
+    expectRefused(loadWith({"--cluster-replicas", "1"}), refused, {"cluster.replicas", "store.engine"});
+    expectRefused(withDatabase({"--cluster-replicas", "1", "--cluster-listen", ""}), refused,
+                  {"cluster.listen"});
+    expectRefused(withDatabase({"--cluster-certificate", "c.pem"}), refused, {"cluster.key", "cluster.ca"});
+    expectRefused(withDatabase({"--cluster-replicas", "1", "--cluster-listen", "10.1.2.3:7979"}), refused,
+                  {"10.1.2.3:7979", "cluster.ca"});
+    expectRefused(withDatabase({"--cluster-replicas", "1", "--cluster-listen", "0.0.0.0:7979"}), refused,
+                  {"cluster.advertise"});
+    EXPECT_TRUE(withDatabase({"--cluster-replicas", "1"}));
+    EXPECT_TRUE(
+        withDatabase({"--cluster-replicas", "1", "--cluster-listen", "0.0.0.0:7979", "--cluster-advertise",
+                      "one", "--cluster-certificate", "c", "--cluster-key", "k", "--cluster-ca", "a"}));
+}
+
 TEST_F(Load, BeyondThisMachineTlsIsNeeded) {
     const std::string anyone = "--security-anyone-on-the-network-may-read-change-and-delete-everything";
     for (const char* flag : {"--listen", "--http-listen"}) {
