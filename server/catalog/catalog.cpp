@@ -225,10 +225,9 @@ Result<index::SnapshotPtr> Catalog::reload(const std::string& name) {
 
 // What other servers change ----------------------------------------------------------------
 
-Result<std::int64_t> Catalog::lastChange(std::int64_t collectionId) {
-    const auto at = store_->position(collectionId);
-    RETURN_IF_ERROR(at);
-    return at->lastChange;
+std::int64_t Catalog::changeOf(const store::Shape& shape) {
+    const auto at = store_->position(shape.collectionId);
+    return at ? at->lastChange : 0;
 }
 
 Result<index::SnapshotPtr> Catalog::withChange(const index::SnapshotPtr& collection, std::int64_t atLeast) {

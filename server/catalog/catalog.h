@@ -205,9 +205,10 @@ class Catalog {
 
     // What other servers change ------------------------------------------------------
 
-    /// The number of the last change of a collection; 0 where this server has the database alone, which shows
-    /// every change at once.
-    [[nodiscard]] Result<std::int64_t> lastChange(std::int64_t collectionId);
+    /// The number of the last change of the shape's collection: who demands it knows all that was stored of
+    /// the shape by now. 0 where this server has the database alone, which shows every change at once, and
+    /// where it cannot be read.
+    [[nodiscard]] std::int64_t changeOf(const store::Shape& shape);
     /// The collection as it is searched now, with this change of it at least. Errors: kNotFound; kUnavailable
     /// (the change is not known).
     [[nodiscard]] Result<index::SnapshotPtr> withChange(const index::SnapshotPtr& collection,

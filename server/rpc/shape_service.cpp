@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "core/base/return_if_error.h"
-#include "core/search/filter.h"
 #include "server/catalog/even_sample.h"
 #include "server/catalog/listing.h"
 #include "server/catalog/scan_upload.h"
@@ -61,7 +60,6 @@ Result<void> sendSegments(Call& call, Writer& writer, const Description& descrip
     toProto(description.signature, message.mutable_summary()->mutable_signature());
     if (origin != Point3{}) toProto(origin, message.mutable_summary()->mutable_origin());
     RETURN_IF_ERROR(call.write(writer, message));
-
     const auto& labels = description.segmentation.pointSegment;
     for (std::size_t first = 0; first < sample.size(); first += kLabelledChunkPoints) {
         const std::size_t count = std::min(kLabelledChunkPoints, sample.size() - first);
@@ -165,9 +163,7 @@ Result<void> ShapeServiceHandler::add(Call& call, Upload<v1::AddShapeRequest>& m
     RETURN_IF_ERROR(scan);
     const auto added = addition.finish(std::move(*scan));
     RETURN_IF_ERROR(added);
-    // After it was waited for: then searches that demand it find the shape.
-    const auto change = services_.catalog.lastChange(added->shape.collectionId);
-    if (change) response.set_change(*change);
+    response.set_change(services_.catalog.changeOf(added->shape));
     response.set_outcome(outcomeOf(added->outcome));
     toProto(added->shape, added->collection, services_.catalog.servingQuality(added->shape),
             response.mutable_shape());
@@ -180,10 +176,9 @@ grpc::Status ShapeServiceHandler::getShape(grpc::ServerContext* context,
     return handle(services_, context, operations::kGetShape, request, [&](Call& call) -> Result<void> {
         const auto found = call.shape(request->shape());
         RETURN_IF_ERROR(found);
-        const auto change = services_.catalog.lastChange(found->shape.collectionId);
-        if (change) response->set_change(*change);
-        toProto(found->shape, found->collection->collection.name,
-                services_.catalog.quality(*found->collection, found->shape.id), response->mutable_shape());
+        response->set_change(services_.catalog.changeOf(found->shape));
+        const auto quality = services_.catalog.quality(*found->collection, found->shape.id);
+        toProto(found->shape, found->collection->collection.name, quality, response->mutable_shape());
         return {};
     });
 }
@@ -335,8 +330,7 @@ grpc::Status ShapeServiceHandler::deleteShape(grpc::ServerContext* context,
         if (request->has_expected_version()) expected = request->expected_version();
         const auto deleted = services_.catalog.deleteShape(*collection, ref.key(), expected);
         RETURN_IF_ERROR(deleted);
-        const auto change = services_.catalog.lastChange(deleted->shape.collectionId);
-        if (change) response->set_change(*change);
+        response->set_change(services_.catalog.changeOf(deleted->shape));
         toProto(deleted->shape, deleted->collection->collection.name, deleted->quality,
                 response->mutable_shape());
         return {};

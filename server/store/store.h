@@ -25,6 +25,7 @@
 #include "core/base/metadata.h"
 #include "core/base/run_context.h"
 #include "core/geometry/point.h"
+#include "server/store/change_log.h"
 #include "server/store/import_request.h"
 #include "server/store/metadata_change.h"
 #include "server/store/quarantine.h"
@@ -176,24 +177,6 @@ struct SignatureRow {
     /// leaves those of the shape as they are. Never read: see getSurface.
     std::string surface{};
     std::string views{};  ///< core/views/views_codec.h; empty: none
-};
-
-/// An entry of the log of a collection's changes (Store::changesAfter).
-struct Change {
-    std::int64_t number = 0;                ///< 1, 2, 3, ... in the order in which they were committed
-    std::optional<std::int64_t> shapeId{};  ///< empty: more than one changed, load the collection again
-};
-
-/// How far the logs of a shared database go.
-struct ChangeLogs {
-    std::int64_t directory = 0;  ///< rises when collections or aliases come, go, or change their names
-    std::map<std::int64_t, std::int64_t> last;  ///< the number of the last change, by collection
-};
-
-/// Where a collection of a shared database stands.
-struct CollectionPosition {
-    std::int64_t lastChange = 0;  ///< number of the last change; 0 where none are kept
-    std::int64_t generation = 0;  ///< of the signatures that serve; 0: not told
 };
 
 /// What verifying a shape needs.
