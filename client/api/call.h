@@ -22,6 +22,8 @@
 
 namespace shapedb::client {
 
+struct PackedPoints;
+
 struct Client::Impl {
     ClientOptions options;  ///< the address includes the port, apiKey what its file holds
     std::shared_ptr<grpc::Channel> channel;
@@ -31,6 +33,8 @@ struct Client::Impl {
     std::unique_ptr<v1::CollectionService::Stub> collections;
     std::unique_ptr<v1::AdminService::Stub> admin;
 
+    [[nodiscard]] Result<AddReply> add(const AddRequest& request, const PackedPoints& packed,
+                                       const RunContext& context);
     [[nodiscard]] Result<std::vector<std::string>> check(
         const v1::CheckRequest& request, const std::function<void(const CheckProgress&)>& onProgress,
         const RunContext& context);

@@ -129,6 +129,12 @@ class Client {
                                                            std::uint32_t mostPoints = 0,
                                                            const RunContext& context = {}) const;
 
+    /// Gives the shape `as` of another server, or of another collection, the points, origin and metadata that
+    /// `shape` has here, bit for bit; it is segmented there. Repeating it changes nothing. Errors: kNotFound,
+    /// kChecksumMismatch, and those of addShape there.
+    [[nodiscard]] Result<AddReply> copyShape(const ShapeRef& shape, const Client& to, const ShapeRef& as,
+                                             const RunContext& context = {}) const;
+
     /// One page. Errors: kNotFound, kMalformedFilter, kMalformedCursor, kInvalidArgument.
     [[nodiscard]] Result<ListPage> listShapes(const ListRequest& request,
                                               const RunContext& context = {}) const;
@@ -288,6 +294,11 @@ class Client {
     /// Errors also those of mergeBackups.
     [[nodiscard]] Result<RestoreReport> restoreFromFiles(const std::vector<std::string>& files,
                                                          const RunContext& context = {}) const;
+
+    /// Replaces everything on another server with what is here, as a backup and its restore would, without a
+    /// file between them: reports the stage "copy" in bytes. Not retried. Errors: those of both.
+    [[nodiscard]] Result<RestoreReport> copyEverything(const Client& to,
+                                                       const RunContext& context = {}) const;
 
     /// Writes a consistent copy of one collection to `path`, as backupToFile. Aliases stay behind. Errors:
     /// kNotFound, and those of backupToFile.

@@ -92,6 +92,8 @@ void fill(const SearchOptions& from, v1::SearchOptions* to) {
     if (from.viewpoint) wire::toProto(*from.viewpoint, to->mutable_viewpoint());
     to->set_group_by(from.groupBy);
     to->set_per_group(from.perGroup);
+    to->set_at_least(from.atLeast);
+    to->set_allow_partial(from.allowPartial);
 }
 
 void fill(const MetadataChange& from, v1::MetadataChange* to) {
@@ -316,6 +318,7 @@ SearchReply fromWire(const v1::SearchResponse& from) {
     to.pending = from.pending();
     to.unit = wire::fromProto(from.unit()).value_or(LengthUnit::kNone);
     to.leftRightUntold = from.left_right_untold();
+    to.covered = from.covered();
     to.query = fromWire(from.query());
     to.secondsSegment = from.seconds_segment();
     to.secondsSearch = from.seconds_search();

@@ -50,6 +50,13 @@ void fill(const ShapeSelection& from, v1::ShapeSelection* to);
 [[nodiscard]] Timestamp fromWire(const google::protobuf::Timestamp& from);
 [[nodiscard]] google::protobuf::Timestamp toWire(Timestamp from);
 [[nodiscard]] Shape fromWire(const v1::Shape& from);
+/// The shape of an answer that says its change: AddShape, GetShape, DeleteShape.
+template <typename Response>
+[[nodiscard]] Shape shapeOf(const Response& from) {
+    Shape to = fromWire(from.shape());
+    to.change = from.change();
+    return to;
+}
 [[nodiscard]] Error fromWire(const v1::Failure& from);
 [[nodiscard]] AddOutcome fromWire(v1::AddShapeResponse::Outcome from);
 [[nodiscard]] IngestEvent fromWire(const v1::IngestEvent& from);

@@ -147,6 +147,23 @@ Result<void> sendChunks(BackupChain& chain, const char* stage, const RunContext&
     return {};
 }
 
+enum class HandedOn { kAll, kBackupEnded, kRestoreEnded };
+
+/// Sends the chunks of a backup, of which `chunk` is the first, to a restore, until all are there or one of
+/// the two ends early.
+HandedOn handOn(grpc::ClientReader<v1::BackupChunk>& backup, grpc::ClientWriter<v1::BackupChunk>& restore,
+                v1::BackupChunk chunk, const RunContext& context) {
+    const std::uint64_t total = chunk.total_bytes();
+    std::uint64_t sent = 0;
+    do {
+        if (!restore.Write(chunk)) return HandedOn::kRestoreEnded;
+        sent += chunk.data().size();
+        context.report("copy", sent, total);
+        if (!chunk.sha256().empty()) return HandedOn::kAll;
+    } while (backup.Read(&chunk));
+    return HandedOn::kBackupEnded;
+}
+
 /// An upload that failed on this side must not look complete.
 template <typename Stream>
 grpc::Status finishUpload(Stream& stream, grpc::ClientContext& rpc, const Result<void>& local) {
@@ -217,6 +234,45 @@ Result<RestoreReport> Client::restoreFromFiles(const std::vector<std::string>& f
                                [&](const v1::BackupChunk& chunk) { return stream->Write(chunk); });
             return finishUpload(*stream, rpc, local);
         });
+    RETURN_IF_ERROR(made);
+    return RestoreReport{response.collections(), response.shapes()};
+}
+
+Result<RestoreReport> Client::copyEverything(const Client& to, const RunContext& context) const {
+    v1::RestoreResponse response;
+    HandedOn handedOn = HandedOn::kBackupEnded;
+    const auto restoreFrom = [&](grpc::ClientReader<v1::BackupChunk>& backup, const v1::BackupChunk& first) {
+        return makeCall(to.impl_->options, context, kOnceUnbounded, nullptr,
+                        [&](grpc::ClientContext& rpc, Result<void>&) {
+                            const auto restore = to.impl_->admin->Restore(&rpc, &response);
+                            handedOn = handOn(backup, *restore, first, context);
+                            if (handedOn == HandedOn::kAll) {
+                                restore->WritesDone();
+                            } else {
+                                rpc.TryCancel();
+                            }
+                            return restore->Finish();
+                        });
+    };
+    const v1::BackupRequest request;
+    const auto made =
+        makeCall(impl_->options, context, kOnceUnbounded, &request,
+                 [&](grpc::ClientContext& rpc, Result<void>& local) {
+                     const auto backup = impl_->admin->Backup(&rpc, request);
+                     v1::BackupChunk chunk;
+                     // Only now: to begin may take long, and a restore that brings nothing would be given up.
+                     const bool begun = backup->Read(&chunk);
+                     const Result<void> restored = begun ? restoreFrom(*backup, chunk) : Result<void>();
+                     if (handedOn == HandedOn::kRestoreEnded) rpc.TryCancel();
+                     const grpc::Status status = backup->Finish();
+                     // A backup that fails has an error of its own, and the restore is cancelled for it.
+                     if (handedOn != HandedOn::kBackupEnded) {
+                         local = restored;
+                     } else if (status.ok()) {
+                         local = fail(ErrorCode::kCountMismatch, "the backup ended before it was complete");
+                     }
+                     return status;
+                 });
     RETURN_IF_ERROR(made);
     return RestoreReport{response.collections(), response.shapes()};
 }

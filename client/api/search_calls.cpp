@@ -8,6 +8,17 @@
 
 namespace shapedb::client {
 
+namespace {
+
+/// Servers from before SearchReply::covered search everything and say 0.
+SearchReply replyTo(const SearchOptions& options, const v1::SearchResponse& response) {
+    SearchReply reply = fromWire(response);
+    if (!options.allowPartial || (reply.covered == 0.0 && reply.candidates > 0)) reply.covered = 1.0;
+    return reply;
+}
+
+}  // namespace
+
 Result<SearchReply> Client::searchByKey(const SearchOptions& options, const std::string& key,
                                         bool includeSelf, const RunContext& context) const {
     v1::SearchByKeyRequest request;
@@ -17,7 +28,7 @@ Result<SearchReply> Client::searchByKey(const SearchOptions& options, const std:
     const auto response = callUnary(impl_->options, context, kIdempotent, *impl_->search,
                                     &v1::SearchService::Stub::SearchByKey, request);
     RETURN_IF_ERROR(response);
-    return fromWire(*response);
+    return replyTo(options, *response);
 }
 
 Result<SearchReply> Client::searchByScan(const SearchOptions& options, const PointCloud& points,
@@ -37,7 +48,7 @@ Result<SearchReply> Client::searchByScan(const SearchOptions& options, const Poi
                                    return stream->Finish();
                                });
     RETURN_IF_ERROR(made);
-    return fromWire(response);
+    return replyTo(options, response);
 }
 
 Result<SearchReply> Client::searchBySignature(const SearchOptions& options,
@@ -49,7 +60,7 @@ Result<SearchReply> Client::searchBySignature(const SearchOptions& options,
     const auto response = callUnary(impl_->options, context, kIdempotent, *impl_->search,
                                     &v1::SearchService::Stub::SearchBySignature, request);
     RETURN_IF_ERROR(response);
-    return fromWire(*response);
+    return replyTo(options, *response);
 }
 
 Result<std::vector<SearchReply>> Client::searchBatch(const SearchOptions& options,
@@ -68,7 +79,9 @@ Result<std::vector<SearchReply>> Client::searchBatch(const SearchOptions& option
                                     &v1::SearchService::Stub::SearchBatch, request);
     RETURN_IF_ERROR(response);
     std::vector<SearchReply> replies;
-    for (const v1::SearchResponse& one : response->responses()) replies.push_back(fromWire(one));
+    for (const v1::SearchResponse& one : response->responses()) {
+        replies.push_back(replyTo(options, one));
+    }
     return replies;
 }
 

@@ -59,18 +59,23 @@ Result<AddReply> Client::addShape(const AddRequest& request, const PointCloud& p
                                   const RunContext& context) const {
     const auto packed = packPoints(points);
     RETURN_IF_ERROR(packed);
-    const v1::AddShapeRequest header = addHeader(request, *packed);
+    return impl_->add(request, *packed, context);
+}
+
+Result<AddReply> Client::Impl::add(const AddRequest& request, const PackedPoints& packed,
+                                   const RunContext& context) {
+    const v1::AddShapeRequest header = addHeader(request, packed);
     const CallTraits traits{!request.expectedVersion.has_value(), !request.wait};
     v1::AddShapeResponse response;
     const auto made =
-        makeCall(impl_->options, context, traits, &header, [&](grpc::ClientContext& rpc, Result<void>&) {
+        makeCall(options, context, traits, &header, [&](grpc::ClientContext& rpc, Result<void>&) {
             response.Clear();
-            const auto stream = impl_->shapes->AddShape(&rpc, &response);
-            writeScan(*stream, header, *packed, context);
+            const auto stream = shapes->AddShape(&rpc, &response);
+            writeScan(*stream, header, packed, context);
             return stream->Finish();
         });
     RETURN_IF_ERROR(made);
-    return AddReply{fromWire(response.outcome()), fromWire(response.shape())};
+    return AddReply{fromWire(response.outcome()), shapeOf(response)};
 }
 
 Result<Shape> Client::getShape(const ShapeRef& shape, const RunContext& context) const {
@@ -79,7 +84,7 @@ Result<Shape> Client::getShape(const ShapeRef& shape, const RunContext& context)
     const auto response = callUnary(impl_->options, context, kIdempotent, *impl_->shapes,
                                     &v1::ShapeService::Stub::GetShape, request);
     RETURN_IF_ERROR(response);
-    return fromWire(response->shape());
+    return shapeOf(*response);
 }
 
 Result<FoundShapes> Client::getShapes(const std::string& collection, const std::vector<std::string>& keys,
@@ -136,51 +141,97 @@ Result<std::vector<Preview>> Client::getPreviews(const std::string& collection,
 
 namespace {
 
-Result<void> readPoints(grpc::ClientReader<v1::StoredPoints>& stream, StoredPoints& scan,
-                        const RunContext& context) {
+/// Of one shape. `take(origin, xyz)` gets the bytes of the points, chunk after chunk.
+template <typename Take>
+Result<Shape> readPoints(grpc::ClientReader<v1::StoredPoints>& stream, const RunContext& context,
+                         Take&& take) {
     Sha256 hash;
+    Shape shape;
+    std::uint64_t count = 0;
     v1::StoredPoints message;
     while (stream.Read(&message)) {
         if (message.has_shape()) {
-            scan.shape = fromWire(message.shape());
+            shape = fromWire(message.shape());
         } else if (message.has_chunk()) {
             const std::string& xyz = message.chunk().xyz();
             hash.update(xyz.data(), xyz.size());
-            RETURN_IF_ERROR(unpackPoints(xyz, scan.shape.origin, scan.points));
-            context.report("download", scan.points.size(), scan.shape.pointCount);
+            count += xyz.size() / kPointBytes;
+            RETURN_IF_ERROR(take(shape.origin, xyz));
+            context.report("download", count, shape.pointCount);
         }
     }
     const Sha256Digest digest = hash.finish();
     // After an error of the call its status says why there is less, or nothing.
-    if (!scan.points.empty() && scan.points.size() == scan.shape.pointCount &&
-        scan.shape.sha256 != std::string(digest.begin(), digest.end())) {
+    if (count != 0 && count == shape.pointCount &&
+        shape.sha256 != std::string(digest.begin(), digest.end())) {
         return fail(ErrorCode::kChecksumMismatch,
-                    "the points of '" + scan.shape.key + "' were damaged in transfer: ask for them again");
+                    "the points of '" + shape.key + "' were damaged in transfer: ask for them again");
     }
-    return {};
+    return shape;
+}
+
+/// Calls GetPoints; before each try `clear()`. Errors: kCountMismatch, those of readPoints and `take`.
+template <typename Clear, typename Take>
+Result<Shape> getStoredPoints(const ClientOptions& options, v1::ShapeService::Stub& stub, const ShapeRef& ref,
+                              const RunContext& context, Clear&& clear, Take&& take) {
+    v1::GetPointsRequest request;
+    fill(ref, request.mutable_shape());
+    Shape shape;
+    std::uint64_t bytes = 0;
+    const auto made =
+        makeCall(options, context, kIdempotent, &request, [&](grpc::ClientContext& rpc, Result<void>& local) {
+            clear();
+            bytes = 0;
+            const auto stream = stub.GetPoints(&rpc, request);
+            auto read = readPoints(*stream, context, [&](const Point3& origin, const std::string& xyz) {
+                bytes += xyz.size();
+                return take(origin, xyz);
+            });
+            if (read) {
+                shape = std::move(*read);
+            } else {
+                local = fail(read.error());
+                rpc.TryCancel();
+            }
+            return stream->Finish();
+        });
+    RETURN_IF_ERROR(made);
+    if (bytes != shape.pointCount * kPointBytes) {
+        return fail(ErrorCode::kCountMismatch, "the server sent " + std::to_string(bytes / kPointBytes) +
+                                                   " of " + std::to_string(shape.pointCount) + " points");
+    }
+    return shape;
 }
 
 }  // namespace
 
 Result<StoredPoints> Client::getPoints(const ShapeRef& shape, const RunContext& context) const {
-    v1::GetPointsRequest request;
-    fill(shape, request.mutable_shape());
     StoredPoints scan;
-    const auto made = makeCall(impl_->options, context, kIdempotent, &request,
-                               [&](grpc::ClientContext& rpc, Result<void>& local) {
-                                   scan = {};
-                                   const auto stream = impl_->shapes->GetPoints(&rpc, request);
-                                   local = readPoints(*stream, scan, context);
-                                   if (!local) rpc.TryCancel();
-                                   return stream->Finish();
-                               });
-    RETURN_IF_ERROR(made);
-    if (scan.points.size() != scan.shape.pointCount) {
-        return fail(ErrorCode::kCountMismatch, "the server sent " + std::to_string(scan.points.size()) +
-                                                   " of " + std::to_string(scan.shape.pointCount) +
-                                                   " points");
-    }
+    auto stored = getStoredPoints(
+        impl_->options, *impl_->shapes, shape, context, [&] { scan.points.clear(); },
+        [&](const Point3& origin, const std::string& xyz) { return unpackPoints(xyz, origin, scan.points); });
+    RETURN_IF_ERROR(stored);
+    scan.shape = std::move(*stored);
     return scan;
+}
+
+Result<AddReply> Client::copyShape(const ShapeRef& shape, const Client& to, const ShapeRef& as,
+                                   const RunContext& context) const {
+    PackedPoints packed;
+    const auto stored = getStoredPoints(
+        impl_->options, *impl_->shapes, shape, context, [&] { packed.bytes.clear(); },
+        [&](const Point3&, const std::string& xyz) {
+            packed.bytes += xyz;
+            return Result<void>();
+        });
+    RETURN_IF_ERROR(stored);
+    packed.count = stored->pointCount;
+    packed.sha256 = stored->sha256;
+    packed.origin = stored->origin;
+    AddRequest request;
+    request.shape = as;
+    request.metadata = stored->metadata;
+    return to.impl_->add(request, packed, context);
 }
 
 Result<ListPage> Client::listShapes(const ListRequest& list, const RunContext& context) const {
@@ -240,7 +291,7 @@ Result<Shape> Client::deleteShape(const ShapeRef& shape, std::optional<std::int6
     const auto response = callUnary(impl_->options, context, kOnce, *impl_->shapes,
                                     &v1::ShapeService::Stub::DeleteShape, request);
     RETURN_IF_ERROR(response);
-    return fromWire(response->shape());
+    return shapeOf(*response);
 }
 
 Result<IngestEvent> Client::watchIngest(const ShapeRef& shape,

@@ -55,6 +55,9 @@ struct Shape {
     std::optional<double> quality;
     /// What the points were sent relative to (see Client::addShape); usually zero.
     Point3 origin;
+    /// Of addShape, getShape and deleteShape, where several servers share a database: with it as
+    /// SearchOptions::atLeast, a search on any of them knows the shape as it is here. Otherwise 0.
+    std::int64_t change = 0;
 };
 
 enum class AddMode {

@@ -136,6 +136,12 @@ struct SearchOptions {
     /// whose best hits are best. Empty: no groups.
     std::string groupBy{};
     std::uint32_t perGroup = 0;  ///< hits of each group, 1 to 100; 0: 1
+    /// A Shape::change that the answer must know, where several servers share a database: kUnavailable if
+    /// the one that is asked does not hear of it in time. 0: whatever it knows.
+    std::int64_t atLeast = 0;
+    /// Where several servers hold parts of the collection and some are missing: answer without them, see
+    /// SearchReply::covered. Otherwise kUnavailable.
+    bool allowPartial = false;
 };
 
 struct CompareOptions {
@@ -242,6 +248,7 @@ struct SearchReply {
     /// Mirror images were to count as different (SearchOptions::reflection), but nothing was laid on the
     /// query: they score nearly alike.
     bool leftRightUntold = false;
+    double covered = 1.0;         ///< share of the collection that was searched; 1 unless allowPartial
     Signature query;              ///< as it was scored
     double secondsSegment = 0.0;  ///< searchByScan only
     double secondsSearch = 0.0;

@@ -220,6 +220,13 @@ void uploadAll(Run& run, const std::vector<Upload>& files) {
         std::move(some.begin(), some.end(), std::back_inserter(run.uploads));
 }
 
+/// The change of the upload says nothing of the signature: takes the one that does.
+void learnChange(const Run& run, client::Shape& shape, const RunContext& context) {
+    if (shape.change == 0) return;
+    const auto now = run.client.getShape({run.flags.collection, shape.key}, context);
+    if (now) shape.change = now->change;
+}
+
 /// Follows the shapes one after the other; the server segments all of them meanwhile.
 void waitForAll(Run& run) {
     const RunContext context = run.context();
@@ -238,6 +245,7 @@ void waitForAll(Run& run) {
                 shape.state = last->state;
                 shape.failure = last->failure;
                 shape.quality = last->quality;
+                learnChange(run, shape, context);
             }
         }
         if (shape.failure) upload.failure = shape.failure;

@@ -92,6 +92,8 @@ class DuplicateFinder {
         options.reflection = options_.score.reflection;
         options.keepScale = options_.score.keepScale;
         options.freeScale = options_.score.freeScale;
+        options.atLeast = options_.cluster.atLeast;
+        options.allowPartial = options_.cluster.allowPartial;
         options.explanation = false;
         options.verify = false;
         return options;
@@ -114,6 +116,7 @@ class DuplicateFinder {
         }
         for (std::size_t i = begin; i < end && i - begin < replies->size(); ++i) {
             const client::SearchReply& reply = (*replies)[i - begin];
+            report_.covered = std::min(report_.covered, reply.covered);
             for (const client::Hit& hit : reply.hits) {
                 const auto other = placeOf_.find(hit.shape.id);
                 if (other != placeOf_.end()) keep(i, other->second, hit.score);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "client/api/client.h"
+#include "client/cli/parameters.h"
 #include "core/base/error.h"
 #include "core/base/run_context.h"
 
@@ -19,6 +20,7 @@ struct DuplicateOptions {
     std::string filter;
     double threshold = 0.9;  ///< of the scores of signatures, [0, 1]
     client::CompareOptions score;
+    ClusterFlags cluster;
     bool compare = true;  ///< whether the shapes of each pair are laid on each other
     unsigned jobs = 4;    ///< pairs compared at the same time
 };
@@ -46,6 +48,7 @@ struct DuplicateReport {
     std::vector<DuplicatePair> pairs;   ///< by score, best first; then by shapes
     /// Shapes that hang together by pairs, by id; groups by their first shapes.
     std::vector<std::vector<std::size_t>> groups;
+    double covered = 1.0;  ///< the least share of the collection that a shape was searched for in
 };
 
 /// Every shape is searched for among the others, many in one call, and what bounds rule out is not scored: as

@@ -108,14 +108,15 @@ std::string duplicatesText(const DuplicatesFlags& flags, const DuplicateReport& 
     std::size_t members = 0;
     for (const auto& group : report.groups) members += group.size();
     const std::string scored = "signatures score " + formatNumber(flags.options.threshold) + " or more";
+    const std::string covered = report.covered < 1.0 ? coveredText(report.covered) : std::string();
     if (report.pairs.empty()) {
-        return "no near-duplicates among " + formatCount(report.shapes.size(), "shape", "shapes") +
+        return covered + "no near-duplicates among " + formatCount(report.shapes.size(), "shape", "shapes") +
                " (no two " + scored + ")\n";
     }
-    std::string text = formatCount(members) + " of " + formatCount(report.shapes.size(), "shape", "shapes") +
-                       " have near-duplicates: " + formatCount(report.pairs.size(), "pair", "pairs") +
-                       " in " + formatCount(report.groups.size(), "group", "groups") + " (" + scored +
-                       ")\n\n";
+    std::string text =
+        covered + formatCount(members) + " of " + formatCount(report.shapes.size(), "shape", "shapes") +
+        " have near-duplicates: " + formatCount(report.pairs.size(), "pair", "pairs") + " in " +
+        formatCount(report.groups.size(), "group", "groups") + " (" + scored + ")\n\n";
     const auto numbers = groupNumbers(report);
     std::map<std::size_t, std::vector<const DuplicatePair*>> pairsOf;  // by group
     for (const DuplicatePair& pair : report.pairs) pairsOf[numbers.at(pair.a)].push_back(&pair);
@@ -168,6 +169,7 @@ CommandResult runDuplicates(Session& session, const DuplicatesFlags& flags) {
     if (!console.lines()) {
         console.document({{"threshold", options.threshold},
                           {"shapes", report->shapes.size()},
+                          {"covered", report->covered},
                           {"pairs", pairs},
                           {"groups", groups}});
     }
@@ -207,6 +209,7 @@ void addDuplicatesCommand(CLI::App& app, Session& session) {
                       "Treat mirror images as different shapes");
     command->add_flag("--keep-scale", flags->score.keepScale, "Compare sizes too");
     addFreeScaleFlag(*command, flags->score);
+    addClusterFlags(*command, flags->options.cluster);
     command->callback(
         [&session, flags] { session.action = [&session, flags] { return runDuplicates(session, *flags); }; });
 }

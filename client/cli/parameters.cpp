@@ -10,6 +10,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "client/cli/checks.h"
 #include "client/cli/text.h"
 #include "core/base/return_if_error.h"
 
@@ -251,6 +252,22 @@ void addVerifyFlags(CLI::App& command, VerifyFlags& flags) {
         ->delimiter(',')
         ->expected(3)
         ->excludes(allSides);
+}
+
+void addClusterFlags(CLI::App& command, ClusterFlags& flags) {
+    command
+        .add_option("--at-least", flags.atLeast,
+                    "With several servers: the answer must know this change, which add, get and delete tell "
+                    "with --json")
+        ->check(atLeastZero())
+        ->type_name("N");
+    command.add_flag("--allow-partial", flags.allowPartial,
+                     "With several servers: answer without the parts of the collection that have no server");
+}
+
+std::string coveredText(double covered) {
+    return "only " + formatPercent(covered) +
+           " of the collection searched: servers that hold other parts of it are missing\n";
 }
 
 nlohmann::json toJson(const ShapeParameters& parameters) {

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <nlohmann/json_fwd.hpp>
@@ -73,6 +74,17 @@ struct VerifyFlags {
 };
 
 void addVerifyFlags(CLI::App& command, VerifyFlags& flags);
+
+/// --at-least and --allow-partial: what several servers with one database may answer.
+struct ClusterFlags {
+    std::int64_t atLeast = 0;
+    bool allowPartial = false;
+};
+
+void addClusterFlags(CLI::App& command, ClusterFlags& flags);
+
+/// The line for SearchReply::covered below 1.
+[[nodiscard]] std::string coveredText(double covered);
 
 /// One member per parameter, by its name in the API.
 [[nodiscard]] nlohmann::json toJson(const ShapeParameters& parameters);

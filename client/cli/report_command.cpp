@@ -77,6 +77,9 @@ std::string aboutText(const ReportFlags& flags, const Answer& answer) {
     std::string text =
         formatCount(answer.reply.filtered, "shape", "shapes") + " of collection " + collection + " searched";
     if (!flags.search.options.filter.empty()) text += ", with " + flags.search.options.filter;
+    if (answer.reply.covered < 1.0) {
+        text += ", which is " + formatPercent(answer.reply.covered) + " of the collection";
+    }
     return text + ", " + timeText(client::currentTime());
 }
 
@@ -129,6 +132,7 @@ CommandResult runReport(Session& session, const ReportFlags& flags) {
     session.console().document(document);
     session.console().text(formatCount(page->hits.size(), "hit", "hits") + " in " + inLine(flags.out) + " (" +
                            formatBytes(html.size()) + "): open it with a browser\n");
+    if (answer->reply.covered < 1.0) session.console().text(coveredText(answer->reply.covered));
     return kOk;
 }
 

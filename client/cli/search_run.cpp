@@ -22,6 +22,8 @@ client::SearchOptions SearchFlags::resolve() const {
     resolved.partial = score.partial;
     resolved.verify = verify.verify;
     resolved.verifyCandidates = verify.candidates;
+    resolved.atLeast = cluster.atLeast;
+    resolved.allowPartial = cluster.allowPartial;
     const VerifyOptions verifyOptions = verify.options();
     resolved.oneSided = verifyOptions.oneSided;
     resolved.viewpoint = verifyOptions.viewpoint;
@@ -38,6 +40,7 @@ void addSearchFlags(CLI::App& command, SearchFlags& flags) {
     addFreeScaleFlag(command, flags.score);
     addUnitFlag(command, flags.unit);
     addVerifyFlags(command, flags.verify);
+    addClusterFlags(command, flags.cluster);
     addScanFlags(command, flags.scan);
     addFormatFlag(command, flags.scan);
 }
@@ -151,6 +154,7 @@ json replyJson(const client::SearchReply& reply) {
                      {"exact", reply.exact},
                      {"pending", reply.pending},
                      {"left_right_untold", reply.leftRightUntold},
+                     {"covered", reply.covered},
                      {"query", toJson(reply.query)},
                      {"seconds_segment", reply.secondsSegment},
                      {"seconds_search", reply.secondsSearch}};
@@ -173,6 +177,7 @@ std::string replyText(const SearchFlags& flags, const Answer& answer, Explained 
     text += ", " + formatCount(reply.scored) + " scored in full";
     if (reply.verified > 0) text += ", " + formatCount(reply.verified) + " laid on the query";
     text += ", in " + formatSeconds(reply.secondsSearch) + "\n";
+    if (reply.covered < 1.0) text += coveredText(reply.covered);
     if (!reply.exact) text += "others might fit as well: --candidates lays more on the query\n";
     if (reply.leftRightUntold) text += kLeftRightUntold;
     if (reply.pending > 0) {

@@ -21,6 +21,7 @@ struct SearchFlags {
     client::SearchOptions options;
     ScoreFlags score;
     VerifyFlags verify;
+    ClusterFlags cluster;
     ScanFlags scan;
     std::optional<LengthUnit> unit;
     bool includeSelf = false;  ///< of a search by key

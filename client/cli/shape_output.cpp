@@ -269,6 +269,7 @@ json toJson(const client::Shape& shape) {
     }
     if (shape.origin != Point3{}) out["origin"] = {shape.origin.x, shape.origin.y, shape.origin.z};
     if (shape.quality) out["quality"] = *shape.quality;
+    if (shape.change != 0) out["change"] = shape.change;
     return out;
 }
 

@@ -4,16 +4,18 @@
 import concurrent.futures
 
 import grpc
+from shapedb.v1 import search_service_pb2_grpc as search_stubs
 from shapedb.v1 import shape_service_pb2 as pb
 from shapedb.v1 import shape_service_pb2_grpc as stubs
 
 
-class Fake(stubs.ShapeServiceServicer):
+class Fake(stubs.ShapeServiceServicer, search_stubs.SearchServiceServicer):
     """`answers`: what becomes of one call after the other: a function that is given the context, or a message."""
 
     def __init__(self, *answers):
         self.answers = list(answers)
         self.uploads = []
+        self.searches = []
         self.metadata = []
         self.deadlines = []
 
@@ -26,7 +28,18 @@ class Fake(stubs.ShapeServiceServicer):
     def CountShapes(self, request, context):
         return self._next(context)
 
+    def GetShape(self, request, context):
+        return self._next(context)
+
     def DeleteShape(self, request, context):
+        return self._next(context)
+
+    def SearchByKey(self, request, context):
+        self.searches.append(request)
+        return self._next(context)
+
+    def SearchBatch(self, request, context):
+        self.searches.append(request)
         return self._next(context)
 
     def AddShape(self, requests, context):
@@ -40,6 +53,7 @@ class Fake(stubs.ShapeServiceServicer):
         # The pool of the server: one thread for each call that may hang.
         self._server = grpc.server(concurrent.futures.ThreadPoolExecutor(4))
         stubs.add_ShapeServiceServicer_to_server(self, self._server)
+        search_stubs.add_SearchServiceServicer_to_server(self, self._server)
         self.port = self._server.add_insecure_port("127.0.0.1:0")
         self.address = f"127.0.0.1:{self.port}"
         self._server.start()

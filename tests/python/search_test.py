@@ -51,6 +51,7 @@ def test_a_scan_finds_its_object(tools):
     assert result.candidates == result.filtered == 5 and result.pending == 0 and result.exact in (True, False)
     assert result[0].verdict in SAME and 0 < result[0].verdict_reliability <= 1
     assert result[0].label == "tool" and result[0].metadata["points"] == "1200"
+    assert result.covered == 1.0
     assert result.report.points == len(query) and result.seconds_search > 0 and result.query.scale > 0
     assert [hit.key for hit in result[:2]] == [hit.key for hit in list(result)[:2]]
 

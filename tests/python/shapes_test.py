@@ -37,6 +37,7 @@ def test_a_shape_and_its_life(collection):
     assert collection.wait("box", timeout=60).state == "ready"
     shape = collection.get("box")
     assert shape.state == "ready" and shape.metadata == {"label": "crate", "weight": "2.5"} and shape.label == "crate"
+    assert added.shape.change == shape.change == 0, "one server"
     assert shape.point_count == 300 and 0 < shape.quality <= 1 and len(shape.sha256) == 32 and shape.failure is None
     assert abs(shape.created - datetime.datetime.now(datetime.timezone.utc)) < datetime.timedelta(minutes=5)
     np.testing.assert_array_equal(collection.points("box"), points.astype(np.float32))

@@ -17,11 +17,13 @@ grpc::Status FakeShapes::GetShape(grpc::ServerContext* context, const v1::GetSha
                                   v1::GetShapeResponse* response) {
     response->mutable_shape()->set_key(request->shape().key());
     response->mutable_shape()->set_collection(request->shape().collection());
+    response->set_change(change);
     return answer(*context, ++calls);
 }
 
 grpc::Status FakeShapes::DeleteShape(grpc::ServerContext* context, const v1::DeleteShapeRequest*,
-                                     v1::DeleteShapeResponse*) {
+                                     v1::DeleteShapeResponse* response) {
+    response->set_change(change);
     return answer(*context, ++calls);
 }
 
@@ -41,6 +43,7 @@ grpc::Status FakeShapes::AddShape(grpc::ServerContext* context,
     response->set_outcome(v1::AddShapeResponse::OUTCOME_CREATED);
     response->mutable_shape()->set_key(header.key());
     response->mutable_shape()->set_state(v1::SHAPE_STATE_PENDING);
+    response->set_change(change);
     return grpc::Status::OK;
 }
 
@@ -58,6 +61,20 @@ grpc::Status FakeShapes::Segment(grpc::ServerContext* context,
     }
     for (const v1::SegmentedPoints& message : segmented) stream->Write(message);
     return answer(*context, ++calls);
+}
+
+grpc::Status FakeSearch::SearchByKey(grpc::ServerContext*, const v1::SearchByKeyRequest* request,
+                                     v1::SearchResponse* response) {
+    options = request->options();
+    *response = answer;
+    return grpc::Status::OK;
+}
+
+grpc::Status FakeSearch::SearchBatch(grpc::ServerContext*, const v1::SearchBatchRequest* request,
+                                     v1::SearchBatchResponse* response) {
+    options = request->options();
+    for (int i = 0; i < request->queries_size(); ++i) *response->add_responses() = answer;
+    return grpc::Status::OK;
 }
 
 grpc::Status FakeAdmin::Backup(grpc::ServerContext*, const v1::BackupRequest* request,
@@ -89,9 +106,9 @@ grpc::Status FakeAdmin::Restore(grpc::ServerContext*, grpc::ServerReader<v1::Bac
                                 v1::RestoreResponse* response) {
     restored.clear();
     v1::BackupChunk chunk;
-    while (reader->Read(&chunk)) restored.push_back(chunk);
+    while (restored.size() < restoreTakes && reader->Read(&chunk)) restored.push_back(chunk);
     response->set_shapes(3);
-    return grpc::Status::OK;
+    return restoreStatus;
 }
 
 FakeServer::FakeServer() {
@@ -99,6 +116,7 @@ FakeServer::FakeServer() {
     int port = 0;
     builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &port);
     builder.RegisterService(&shapes);
+    builder.RegisterService(&search);
     builder.RegisterService(&admin);
     server_ = builder.BuildAndStart();
     EXPECT_NE(server_, nullptr);

@@ -40,6 +40,7 @@ class FakeShapes final : public v1::ShapeService::Service {
     Answer answer = [](grpc::ServerContext&, int) { return grpc::Status::OK; };
     std::atomic<int> calls{0};
 
+    std::int64_t change = 0;  ///< of every answer that has one
     /// Of the last upload.
     v1::AddShapeHeader header;
     std::string points;
@@ -47,6 +48,17 @@ class FakeShapes final : public v1::ShapeService::Service {
     /// What Segment and WatchIngest send.
     std::vector<v1::SegmentedPoints> segmented;
     std::vector<v1::IngestEvent> events;
+};
+
+class FakeSearch final : public v1::SearchService::Service {
+  public:
+    grpc::Status SearchByKey(grpc::ServerContext* context, const v1::SearchByKeyRequest* request,
+                             v1::SearchResponse* response) override;
+    grpc::Status SearchBatch(grpc::ServerContext* context, const v1::SearchBatchRequest* request,
+                             v1::SearchBatchResponse* response) override;
+
+    v1::SearchOptions options;  ///< of the last call
+    v1::SearchResponse answer;  ///< to each query
 };
 
 class FakeAdmin final : public v1::AdminService::Service {
@@ -67,6 +79,8 @@ class FakeAdmin final : public v1::AdminService::Service {
     std::vector<v1::BackupChunk> backup;
     grpc::Status backupStatus;
     std::vector<v1::BackupChunk> restored;
+    std::size_t restoreTakes = 1'000'000;  ///< chunks, before it fails with restoreStatus
+    grpc::Status restoreStatus;
 };
 
 class FakeServer {
@@ -79,6 +93,7 @@ class FakeServer {
     [[nodiscard]] const std::string& address() const { return address_; }
 
     FakeShapes shapes;
+    FakeSearch search;
     FakeAdmin admin;
 
   private:

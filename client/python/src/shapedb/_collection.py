@@ -284,8 +284,9 @@ class Collection:
                      free_scale: bool = False, partial: bool = False, explain: bool = True,
                      verify: Optional[bool] = None, candidates: int = 0, one_sided: Optional[bool] = None,
                      viewpoint: Optional[npt.ArrayLike] = None, group_by: Optional[str] = None, per_group: int = 0,
-                     include_self: bool = False, drop_plane: bool = False, largest_object: bool = False,
-                     progress: Showing = False, timeout: Optional[float] = None) -> SearchResult:
+                     at_least: int = 0, allow_partial: bool = False, include_self: bool = False,
+                     drop_plane: bool = False, largest_object: bool = False, progress: Showing = False,
+                     timeout: Optional[float] = None) -> SearchResult:
         """The k shapes most like a scan (as in `add`; it is not stored), like a `Signature`, or like the stored shape
         that has `key`.
 
@@ -295,13 +296,17 @@ class Collection:
         explain: send motions and explanations. verify: lay the best candidates on the query (by default, but not with
         profile "paper"), `candidates` of them at most (0: as many as the server thinks right). one_sided: a camera saw
         the query from one place (None: judged), which was at `viewpoint`. group_by: a metadata key; the k groups of
-        shapes with the same value whose best hits are best, `per_group` hits of each (0: 1). include_self: with `key`,
-        keep that shape among the hits.
+        shapes with the same value whose best hits are best, `per_group` hits of each (0: 1). at_least: a
+        `Shape.change` that the answer must know, where several servers share a database; raises unavailable if the one
+        that is asked does not hear of it in time. allow_partial: where several servers hold parts of the collection and
+        some are missing, answer without them (`SearchResult.covered`) in place of unavailable. include_self: with
+        `key`, keep that shape among the hits.
         """
         if (query is None) == (key is None):
             raise InvalidInput("invalid_argument", "search for either a scan or signature, or key=...")
         options = search_calls.Options(k, threshold, filter, reflection, keep_scale, free_scale, partial, explain,
-                                       verify, candidates, one_sided, viewpoint, group_by, per_group)
+                                       verify, candidates, one_sided, viewpoint, group_by, per_group, at_least,
+                                       allow_partial)
         if key is not None:
             return self._transport.run(search_calls.by_key(self._name, options, key, include_self), timeout)
         if isinstance(query, types.Signature):
@@ -314,13 +319,13 @@ class Collection:
                            threshold: float = 0.0, filter: str = "", reflection: bool = True, keep_scale: bool = False,
                            free_scale: bool = False, partial: bool = False, explain: bool = False,
                            verify: Optional[bool] = None, candidates: int = 0, group_by: Optional[str] = None,
-                           per_group: int = 0, progress: Showing = False,
-                           timeout: Optional[float] = None) -> Tuple[SearchResult, ...]:
+                           per_group: int = 0, at_least: int = 0, allow_partial: bool = False,
+                           progress: Showing = False, timeout: Optional[float] = None) -> Tuple[SearchResult, ...]:
         """Searches for many stored shapes (by key) and signatures, with the same options, which are those of `search`;
         motions and explanations only with `explain`. The results are in the order of the queries; the first error ends
         it. It takes a call for each 25 of them, which `timeout` is for."""
         options = search_calls.Options(k, threshold, filter, reflection, keep_scale, free_scale, partial, explain,
-                                       verify, candidates, None, None, group_by, per_group)
+                                       verify, candidates, None, None, group_by, per_group, at_least, allow_partial)
         report = reporter(progress, "search")
         results: List[SearchResult] = []
         for batch in search_calls.query_batches(queries):

@@ -44,6 +44,8 @@ class Options:
     viewpoint: Optional[npt.ArrayLike]
     group_by: Optional[str]
     per_group: int
+    at_least: int
+    allow_partial: bool
 
     def message(self, collection: str) -> pb.SearchOptions:
         """As it is sent."""
@@ -53,7 +55,8 @@ class Options:
                 collection=collection, k=self.k, threshold=self.threshold, filter=filter,
                 forbid_reflection=not self.reflection, keep_scale=self.keep_scale, free_scale=self.free_scale,
                 partial=self.partial, no_explanation=not self.explain, verify_candidates=self.candidates,
-                group_by=group_by, per_group=self.per_group)
+                group_by=group_by, per_group=self.per_group, at_least=self.at_least,
+                allow_partial=self.allow_partial)
         except (TypeError, ValueError) as error:
             raise InvalidInput("invalid_argument", f"a search option is not of its type or range: {error}") from None
         if self.verify is not None:
@@ -67,6 +70,11 @@ class Options:
             fill_vector(message.viewpoint, place)
         return message
 
+    def result(self, message: Any) -> types.SearchResult:
+        """Of a `SearchResponse` to such a search. A server from before `covered` says 0 and has searched everything."""
+        whole = not self.allow_partial or (message.covered == 0.0 and message.candidates > 0)
+        return result_of(message, 1.0 if whole else message.covered)
+
 
 def by_scan(collection: str, options: Options, scan: Packed, drop_plane: bool, largest_object: bool,
             progress: Showing) -> Call[types.SearchResult]:
@@ -75,21 +83,21 @@ def by_scan(collection: str, options: Options, scan: Packed, drop_plane: bool, l
     fill_scan(header, scan)
     fill_isolation(header.isolation, drop_plane, largest_object)
     return Call("SearchService/SearchByScan", upload(pb.SearchByScanRequest, header, [scan], progress),
-                result_of)
+                options.result)
 
 
 def by_key(collection: str, options: Options, key: str, include_self: bool) -> Call[types.SearchResult]:
     """SearchByKey."""
     request = pb.SearchByKeyRequest(options=options.message(collection), key=text_of(key, "key"),
                                     include_self=include_self)
-    return Call("SearchService/SearchByKey", request, result_of)
+    return Call("SearchService/SearchByKey", request, options.result)
 
 
 def by_signature(collection: str, options: Options, signature: Signature) -> Call[types.SearchResult]:
     """SearchBySignature."""
     return Call("SearchService/SearchBySignature",
                 pb.SearchBySignatureRequest(options=options.message(collection), signature=signature.encoded),
-                result_of)
+                options.result)
 
 
 def batch(collection: str, options: Options,
@@ -104,7 +112,7 @@ def batch(collection: str, options: Options,
         else:
             raise InvalidInput("invalid_argument",
                                f"a query of a batch is a key or a signature, not a {type(query).__name__}")
-    return Call("SearchService/SearchBatch", request, lambda message: tuple(map(result_of, message.responses)))
+    return Call("SearchService/SearchBatch", request, lambda message: tuple(map(options.result, message.responses)))
 
 
 def query_batches(queries: Sequence[Union[str, Signature]]) -> List[Sequence[Union[str, Signature]]]:

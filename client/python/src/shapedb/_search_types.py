@@ -214,6 +214,8 @@ class SearchResult(Sequence[Hit]):
     """Of all lengths of the query; None or "none" if the collection has no unit."""
     left_right_untold: bool
     """With `reflection=False`: nothing was laid on the query, so mirrored twins may be among the hits."""
+    covered: float
+    """Share of the collection that was searched; 1 unless `allow_partial`."""
     query: Signature = field(repr=False)
     """As it was scored."""
     seconds_segment: float

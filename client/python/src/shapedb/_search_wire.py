@@ -70,8 +70,8 @@ def _hit_of(message: Any, shares: Tuple[float, ...], group: Optional[str]) -> ty
         signature_score=message.signature_score, motion=motion, why=why, fit=fit, group=group)
 
 
-def result_of(message: Any) -> types.SearchResult:
-    """Of a `SearchResponse`."""
+def result_of(message: Any, covered: float) -> types.SearchResult:
+    """Of a `SearchResponse`; `covered` as of `SearchResult`."""
     groups = tuple(types.Group(group.value if group.HasField("value") else None, group.hits)
                    for group in message.groups)
     group_of_hit: List[Optional[str]] = [group.value for group in groups for _ in range(group.hits)]
@@ -82,7 +82,7 @@ def result_of(message: Any) -> types.SearchResult:
         hits=hits, groups=groups, candidates=message.candidates, filtered=message.filtered, scored=message.scored,
         verified=message.candidates_verified, exact=not message.not_exact, pending=message.pending,
         unit=unit_of(message.unit), left_right_untold=message.left_right_untold,
-        query=signature_of(message.query), seconds_segment=message.seconds_segment,
+        covered=covered, query=signature_of(message.query), seconds_segment=message.seconds_segment,
         seconds_search=message.seconds_search,
         report=report_of(message.report) if message.HasField("report") else None)
 

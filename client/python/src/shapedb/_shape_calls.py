@@ -16,8 +16,9 @@ from ._errors import InvalidInput, ShapeDBError
 from ._points import FloatArray, Packed, read_only, text_of, unpack
 from ._progress import Showing, reporter
 from ._vectors import send_origin, vector_of
-from ._wire import (added_of, enum_number, event_of, fill_metadata_change, fill_parameters, metadata_texts,
-                    metadata_update_of, report_of, shape_of, signature_of, state_number, value_counts_of)
+from ._wire import (added_of, answered_shape_of, enum_number, event_of, fill_metadata_change, fill_parameters,
+                    metadata_texts, metadata_update_of, report_of, shape_of, signature_of, state_number,
+                    value_counts_of)
 
 
 def upload(request: Any, header: Any, scans: Sequence[Packed],
@@ -74,8 +75,7 @@ def add(collection: str, key: str, scan: Packed, *, metadata: Optional[types.Met
 
 def get(collection: str, key: str) -> Call[types.Shape]:
     """GetShape."""
-    return Call("ShapeService/GetShape", pb.GetShapeRequest(shape=_ref(collection, key)),
-                lambda message: shape_of(message.shape))
+    return Call("ShapeService/GetShape", pb.GetShapeRequest(shape=_ref(collection, key)), answered_shape_of)
 
 
 def _keys(keys: Sequence[str]) -> List[str]:
@@ -176,7 +176,7 @@ def delete(collection: str, key: str, expected_version: Optional[int]) -> Call[t
     request = pb.DeleteShapeRequest(shape=_ref(collection, key))
     if expected_version is not None:
         request.expected_version = expected_version
-    return Call("ShapeService/DeleteShape", request, lambda message: shape_of(message.shape), idempotent=False)
+    return Call("ShapeService/DeleteShape", request, answered_shape_of, idempotent=False)
 
 
 def _select(selection: Any, keys: Optional[Sequence[str]], filter: Optional[str]) -> None:

@@ -71,6 +71,9 @@ class Shape:
     """Set exactly when the state is "failed"."""
     quality: Optional[float] = None
     """How certain the interior is, [0, 1]; below 0.5 it is a guess. None unless the state is "ready"."""
+    change: int = field(default=0, compare=False)
+    """Of `add`, `get` and `delete`, where several servers share a database: with it as `at_least`, a search on any of
+    them knows the shape as it is here. Otherwise 0."""
 
     @property
     def label(self) -> Optional[str]:

@@ -97,18 +97,23 @@ def state_number(state: Optional[types.State]) -> Any:
     return 0 if state is None else enum_number(types_pb.ShapeState, "SHAPE_STATE_", state, "state")
 
 
-def shape_of(message: Any) -> types.Shape:
-    """Of a `Shape`."""
-    return plain(types.Shape, message, state=state_of(message.state), metadata=dict(sorted(message.metadata.items())),
-                 created=time_of(message.created), updated=time_of(message.updated),
+def shape_of(message: Any, change: int = 0) -> types.Shape:
+    """Of a `Shape`, and the change that the answer names beside it."""
+    return plain(types.Shape, message, change=change, state=state_of(message.state),
+                 metadata=dict(sorted(message.metadata.items())), created=time_of(message.created), updated=time_of(message.updated),
                  failure=failure_of(message.failure) if message.HasField("failure") else None,
                  quality=optional(message, "quality"))
+
+
+def answered_shape_of(message: Any) -> types.Shape:
+    """Of an answer that names its change: to GetShape, AddShape and DeleteShape."""
+    return shape_of(message.shape, message.change)
 
 
 def added_of(message: Any) -> types.Added:
     """Of an `AddShapeResponse`."""
     outcome = enum_name(shape_pb.AddShapeResponse.Outcome, "OUTCOME_", message.outcome)
-    return types.Added(outcome, shape_of(message.shape))
+    return types.Added(outcome, answered_shape_of(message))
 
 
 def event_of(message: Any) -> types.IngestEvent:
