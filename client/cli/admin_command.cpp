@@ -212,6 +212,7 @@ void addAdminCommands(CLI::App& app, Session& session) {
     group->require_subcommand(1);
     addRebuild(*group, session);
     addBackupCommands(*group, session);
+    addCopyCommand(*group, session);
     addCheck(*group, session);
     addPlainCommand(*group, session, "stats", "Show counts and sizes", &runStats);
     addPlainCommand(*group, session, "info", "Show version and limits", &runInfo);

@@ -11,15 +11,12 @@ constexpr std::chrono::hours kHeavyDeadline{1};
 /// Retries until the deadline.
 constexpr int kPatientAttempts = 1'000'000;
 
-}  // namespace
-
-Result<client::Client> connectToServer(const Session& session, Work work) {
-    client::ClientOptions options = client::optionsFromEnvironment();
-    const GlobalOptions& flags = session.options();
+/// Overrides the options with the flags that were given.
+void apply(const ServerFlags& flags, client::ClientOptions& options) {
     const auto prefer = [](std::string& value, const std::string& flag) {
         if (!flag.empty()) value = flag;
     };
-    prefer(options.address, flags.server);
+    prefer(options.address, flags.address);
     if (!flags.keyFile.empty()) options.apiKey.clear();
     prefer(options.apiKeyFile, flags.keyFile);
     prefer(options.tls.caFile, flags.tls.caFile);
@@ -27,6 +24,19 @@ Result<client::Client> connectToServer(const Session& session, Work work) {
     prefer(options.tls.keyFile, flags.tls.keyFile);
     prefer(options.tls.serverName, flags.tls.serverName);
     options.tls.enabled = options.tls.enabled || flags.tls.enabled || !flags.tls.caFile.empty();
+}
+
+}  // namespace
+
+Result<client::Client> connectToServer(const Session& session, Work work) {
+    return connectTo(session, {}, work);
+}
+
+Result<client::Client> connectTo(const Session& session, const ServerFlags& server, Work work) {
+    client::ClientOptions options = client::optionsFromEnvironment();
+    const GlobalOptions& flags = session.options();
+    apply({flags.server, flags.keyFile, flags.tls}, options);
+    apply(server, options);
     if (work == Work::kHeavy) {
         options.deadline = kHeavyDeadline;
         options.retry.maxQueueAttempts = kPatientAttempts;

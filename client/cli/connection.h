@@ -22,6 +22,17 @@ enum class Work {
 /// session's context limits the calls instead of `work`. Errors: kInvalidArgument.
 [[nodiscard]] Result<client::Client> connectToServer(const Session& session, Work work = Work::kLight);
 
+/// What one of two servers has in place of the options of every command.
+struct ServerFlags {
+    std::string address;
+    std::string keyFile;
+    client::TlsOptions tls;
+};
+
+/// The same for this server; what is empty is as for connectToServer.
+[[nodiscard]] Result<client::Client> connectTo(const Session& session, const ServerFlags& server,
+                                               Work work = Work::kLight);
+
 /// --collection; empty for the default one.
 void addCollectionOption(CLI::App& command, std::string& collection);
 

@@ -82,6 +82,7 @@ void addReportCommand(CLI::App& app, Session& session);
 void addHelpCommands(CLI::App& app, Session& session);
 /// Below `shapedb admin`.
 void addBackupCommands(CLI::App& admin, Session& session);
+void addCopyCommand(CLI::App& admin, Session& session);
 void addKeyCommands(CLI::App& admin, Session& session);
 
 /// The whole program without its signal handler: reads the command line, runs the command, prints the result

@@ -49,15 +49,23 @@ class Fields(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.folder = tempfile.TemporaryDirectory(prefix="shapedb-json-")
-        cls.server = subprocess.Popen([SHAPEDBD, "--data", cls.path("data"), "--listen", "127.0.0.1:0", "--unix-socket",
-                                       cls.path("s")], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
-        cls.address = cls.server.stdout.readline().split()[-1]
+        cls.servers = []
+        cls.address = cls.start("data", "--unix-socket", cls.path("s"))
+        cls.other = cls.start("other")
+
+    @classmethod
+    def start(cls, data, *flags):
+        """A server; returns its address."""
+        cls.servers.append(subprocess.Popen([SHAPEDBD, "--data", cls.path(data), "--listen", "127.0.0.1:0", *flags],
+                                            stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True))
+        return cls.servers[-1].stdout.readline().split()[-1]
 
     @classmethod
     def tearDownClass(cls):
-        cls.server.terminate()
-        cls.server.wait()
-        cls.server.stdout.close()
+        for server in cls.servers:
+            server.terminate()
+            server.wait()
+            server.stdout.close()
         cls.folder.cleanup()
 
     @classmethod
@@ -107,11 +115,14 @@ class Fields(unittest.TestCase):
             ("admin", "backup", path("full.db")), ("admin", "backup", path("1.inc"), "--since", path("full.db")),
             ("admin", "merge-backups", path("full.db"), path("1.inc"), "--out", path("all.db")),
             ("admin", "restore", path("full.db"), path("1.inc")), ("get", "none", "--collection", "c"), ("help", "query"),
+            ("admin", "copy", self.address, self.other, "--once"), ("metadata", "human/human_01", "--set", "x=2", "--collection", "c"),
+            ("admin", "copy", self.address, self.other, "--verify"),
             ("completion", "bash"), ("man", "query"), ("man", "--out", path("man")),
         ]
         unknown = {}
         for words in commands:
-            for name in members(self.run_json(*words, codes=EXPECTED.get(words[:2], (0,)))) - known:
+            codes = (1,) if "--verify" in words else EXPECTED.get(words[:2], (0,))
+            for name in members(self.run_json(*words, codes=codes)) - known:
                 unknown.setdefault(name, []).append(" ".join(word for word in words[:2] if "/" not in word))
         key = self.run_json("admin", "key", "create", "--role", "reader", "--name", "n", "--valid-days", "3",
                             "--calls-per-second", "5", server="unix:" + path("s"))

@@ -44,6 +44,7 @@ TEST_F(Interrupt, IsToldInOneLineOfPlainWords) {
         {{"query", path("a/one.xyz")}, "nothing was written"},
         {{"watch", "key"}, "follows it again"},
         {{"admin", "rebuild"}, "follows it again"},
+        {{"admin", "copy", "127.0.0.1:1", "127.0.0.1:2"}, "nothing was written"},
         {{"delete", "key"}, "may have done it"},
         {{"delete", "--filter", "a", "--yes"}, "stays deleted"},
         {{"collection", "create", "c"}, "may have done it"},
