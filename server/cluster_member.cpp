@@ -70,7 +70,12 @@ ClusterMember::ClusterMember(std::unique_ptr<ClusterEntrance> entrance, const co
       holder_({member_, [&catalog](std::int64_t id) { return catalog.surface(id); },
                [&runner](bool background, const std::function<Result<void>()>& work) {
                    return background ? runner.inBackground(work) : runner.inForeground(work);
-               }}) {}
+               }}) {
+    catalog.setTotals([this] {
+        const auto now = member_.state();
+        return index::CollectionIndex::Totals{now.signatures, now.bytes};
+    });
+}
 
 Result<void> ClusterMember::start() {
     RETURN_IF_ERROR(member_.start());

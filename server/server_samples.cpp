@@ -18,10 +18,9 @@ void append(std::vector<Sample>& samples, std::vector<Sample> more) {
     samples.insert(samples.end(), more.begin(), more.end());
 }
 
-std::vector<Sample> sampleContent(const SampleSources& sources) {
-    auto stats = sources.catalog.stats();
+std::vector<Sample> sampleContent(catalog::Catalog& catalog) {
+    const auto stats = catalog.stats();
     if (!stats) return {};
-    if (sources.shards) stats->index = {sources.shards->signatures, sources.shards->bytes};
     const store::StoreStats& stored = stats->store;
     const char* shapes = "Shapes, by state.";
     return {
@@ -114,7 +113,7 @@ std::vector<Sample> sampleDisk(const std::string& directory) {
 }  // namespace
 
 std::vector<Sample> sampleServer(const SampleSources& sources) {
-    std::vector<Sample> samples = sampleContent(sources);
+    std::vector<Sample> samples = sampleContent(sources.catalog);
     if (sources.shards) append(samples, sampleShards(*sources.shards));
     append(samples, sampleCondition(sources.catalog));
     append(samples, sampleCalls(sources));

@@ -344,7 +344,7 @@ Result<CatalogStats> Catalog::stats() {
     CatalogStats stats;
     stats.store = *stored;
     stats.queue = *depth;
-    stats.index = index_.totals();
+    stats.index = totals_ ? totals_() : index_.totals();
     stats.running = workers_.running();
     // Read one after the other: a job may have begun in between.
     stats.queued = depth->jobs - std::min(depth->jobs, stats.running);

@@ -221,6 +221,9 @@ class Catalog {
     };
     [[nodiscard]] Result<Current> current(const index::SnapshotPtr& collection);
     [[nodiscard]] bool holdsSignatures() const { return index_.where() == index::Signatures::kHere; }
+    /// What `stats` tells of the signatures in memory, where they are not in the index. Before calls are
+    /// served.
+    void setTotals(std::function<index::CollectionIndex::Totals()> totals) { totals_ = std::move(totals); }
     /// The ids of all collections.
     [[nodiscard]] std::vector<std::int64_t> collectionIds() const;
     /// Surface points that are kept of these shapes may be old.
@@ -415,7 +418,8 @@ class Catalog {
     ingest::RebuildDriver rebuilds_;
     RestoreGate restores_;
     std::mutex directory_;  ///< held while collections come, go, or change names or aliases
-    bool lost_ = false;     ///< the last content restored could not be loaded; only restores look at it
+    std::function<index::CollectionIndex::Totals()> totals_;
+    bool lost_ = false;  ///< the last content restored could not be loaded; only restores look at it
     SegmentationSlots slots_;
     ChangeFollower follower_;  ///< idle unless the store is shared
 };
