@@ -159,7 +159,9 @@ class Names(unittest.TestCase):
         return set(re.findall(r"\b(?:shapedb|process)_[a-z_]+\b", text))
 
     def known(self):
-        optional = {"shapedb_tls_certificate_expiry_timestamp_seconds"}
+        # Of servers with TLS, and of those that hold shards.
+        optional = {"shapedb_tls_certificate_expiry_timestamp_seconds", "shapedb_shards",
+                    "shapedb_shards_follow_changes"}
         histograms = {n + s for n, kind in self.page.kinds.items() if kind == "histogram" for s in SUFFIXES}
         return set(self.page.kinds) | optional | histograms
 

@@ -200,29 +200,31 @@ TEST_F(Pool, PauseStopsAndResumeGoesOn) {
     EXPECT_EQ(pool->ingested(), 5u);
 }
 
-/// Claims "k", which can be put back again only once `store.fault` is null.
+/// Claims "k", which can be put back again only once the store is not full any more.
 class PoolThatCannotPutBack : public Pool {
   protected:
     PoolThatCannotPutBack() {
         put("k", 1.0f);
         EXPECT_TRUE(*store.claimJob());  // one crash, as every innocent scan may have
         crashes = {{shape("k").id, 1}};
-        start(through(gate), 1);
-        EXPECT_TRUE(eventually([&] { return gate.entered() == 1; }));
-        store.fault = [](const std::string& function) -> std::optional<Error> {
-            if (function == "releaseJob") return Error{ErrorCode::kStorage, "full"};
+        store.fault = [this](const std::string& function) -> std::optional<Error> {
+            if (isFull && function == "releaseJob") return Error{ErrorCode::kStorage, "full"};
             return std::nullopt;
         };
+        start(through(gate), 1);
+        EXPECT_TRUE(eventually([&] { return gate.entered() == 1; }));
+        isFull = true;
     }
     ~PoolThatCannotPutBack() override { pool.reset(); }
 
     Gate gate;
+    std::atomic<bool> isFull{false};
 };
 
 // A restore that failed is no death of the process.
 TEST_F(PoolThatCannotPutBack, AfterAPauseTheJobIsNeitherLostNorSetAside) {
     pool->pause();
-    store.fault = nullptr;
+    isFull = false;
     gate.open();
     ASSERT_TRUE(pool->resume(Content::kSame));
     ASSERT_TRUE(eventually([&] { return settled("k"); }));
@@ -231,7 +233,7 @@ TEST_F(PoolThatCannotPutBack, AfterAPauseTheJobIsNeitherLostNorSetAside) {
 
 TEST_F(PoolThatCannotPutBack, AStopTriesAgainAtItsEnd) {
     pool->pause();
-    store.fault = nullptr;
+    isFull = false;
     pool->stop();
     crashes = {{shape("k").id, shape("k").pointsVersion}};
     EXPECT_TRUE(store.recoverJobs(2, crashes)->empty()) << "the next start sets nothing aside";
