@@ -33,13 +33,14 @@ Client connected(const ServerProcess& server) {
     return *Client::connect(std::move(options));
 }
 
-/// What a copy must bring, by collection and key: points, origin and metadata.
+/// What a copy must bring, by collection and key: points, origin and metadata. A collection that goes while
+/// it is read leaves a mark, with which nothing is equal that has been read whole.
 using Content = std::map<std::string, std::string>;
 
 Content contentOf(const Client& client) {
     Content content;
     const auto collections = client.listCollections();
-    EXPECT_TRUE(collections) << collections.error().message;
+    if (!collections) return {{"unreadable", collections.error().message}};
     for (const client::Collection& collection : *collections) {
         content[collection.name] = collection.description;
         for (const std::string& alias : collection.aliases) content["alias " + alias] = collection.name;
@@ -47,7 +48,7 @@ Content contentOf(const Client& client) {
         request.collection = collection.name;
         do {
             const auto page = client.listShapes(request);
-            EXPECT_TRUE(page) << page.error().message;
+            if (!page) return {{"unreadable", page.error().message}};
             for (const client::Shape& shape : page->shapes) {
                 std::string text = shape.sha256 + " " + std::to_string(shape.origin.x);
                 for (const auto& [name, value] : shape.metadata) text += " " + name + "=" + value;
@@ -151,7 +152,10 @@ class Copy : public CommandTest {
         EXPECT_EQ(verified.exitCode, 0) << verified.out;
         EXPECT_EQ(verified.json()["equal"], true);
     }
-    [[nodiscard]] bool alike() const { return contentOf(there()) == contentOf(here()); }
+    [[nodiscard]] bool alike() const {
+        const Content content = contentOf(here());
+        return content.count("unreadable") == 0 && contentOf(there()) == content;
+    }
     [[nodiscard]] bool soonAlike() const {
         return eventually([&] { return alike(); }, std::chrono::seconds(60), std::chrono::milliseconds(100));
     }
