@@ -2,6 +2,7 @@
 // Fixtures of the store tests: a private folder with a database, small clouds.
 #pragma once
 
+#include <atomic>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -157,7 +158,7 @@ class StoreTest : public ::testing::Test {
     }
 
     Folder folder_;
-    std::unique_ptr<TimestampMs> clock_ = std::make_unique<TimestampMs>(1000);
+    std::unique_ptr<std::atomic<TimestampMs>> clock_ = std::make_unique<std::atomic<TimestampMs>>(1000);
     shapedb::testing::PostgresCluster* cluster_ = nullptr;
     std::string database_;  ///< its URI
     std::unique_ptr<Store> store_;
