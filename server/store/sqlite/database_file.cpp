@@ -107,14 +107,22 @@ void requireBackupFile(const std::string& path, const std::string& livePath) {
     }
 }
 
-/// SQLite opens any file, and speaks of damage then.
+/// SQLite opens any file, and speaks of damage then. And it takes a file whose header names an encoding that
+/// there is not for one in UTF-8, but not on the connections that are open when the file is restored.
 void requireDatabase(const std::string& copyPath, const std::string& path, const FileUse& use) {
     constexpr std::string_view kStart("SQLite format 3\0", 16);
-    std::array<char, kStart.size()> start{};
+    constexpr std::size_t kEncodingAt = 56;
+    constexpr std::string_view kUtf8("\0\0\0\1", 4);
+    std::array<char, kEncodingAt + kUtf8.size()> header{};
     const File copy(copyPath, O_RDONLY);
-    const ssize_t got = copy.get() < 0 ? 0 : ::read(copy.get(), start.data(), start.size());
-    if (got != static_cast<ssize_t>(start.size()) || std::string_view(start.data(), start.size()) != kStart) {
+    const ssize_t got = copy.get() < 0 ? 0 : ::read(copy.get(), header.data(), header.size());
+    const std::string_view text(header.data(), header.size());
+    if (got != static_cast<ssize_t>(header.size()) || text.substr(0, kStart.size()) != kStart) {
         raiseForeign(path, use);
+    }
+    if (text.substr(kEncodingAt) != kUtf8) {
+        raise(ErrorCode::kMalformedFile, quoted(path) + " cannot be " + use.done +
+                                             ": its header names another encoding of texts than UTF-8");
     }
 }
 

@@ -101,6 +101,18 @@ TEST_F(SqliteMaintenanceTest, RefusesAnotherPageSize) {
     expectRefused(changed("PRAGMA page_size=8192; VACUUM"), ErrorCode::kMalformedFile);
 }
 
+// Found by fuzzing: SQLite takes an unknown encoding for UTF-8 where it opens the file anew, and refuses it
+// on connections that are open, so that nothing could be read after such a restore.
+TEST_F(SqliteMaintenanceTest, AnotherEncodingOfTextsIsRefused) {
+    for (const char encoding : {'\0', '\2', '\3', 'd'}) {
+        std::string bytes = slurp(backup_);
+        bytes[59] = encoding;
+        const std::string path = folder_.file("encoded.db");
+        spill(path, bytes);
+        expectRefused(path, ErrorCode::kMalformedFile, "encoding of texts");
+    }
+}
+
 TEST_F(SqliteMaintenanceTest, RestoreReportsHowMuchOfTheFileItHasCopied) {
     for (int i = 0; i < 8; ++i) {
         const auto big = cloud(200 + i, 20000);
