@@ -21,6 +21,9 @@ using Clock = std::chrono::steady_clock;
 // Types of the database, as in its catalogue.
 constexpr Oid kBool = 16, kBytea = 17, kInt8 = 20, kInt2 = 21, kInt4 = 23, kFloat8 = 701;
 
+/// What the database takes for a time.
+constexpr std::int64_t kLongestLockMs = 2'147'483'647;
+
 constexpr int kBinary = 1;
 /// Rows that are in memory at a time, of statements that may find any number.
 constexpr int kRowsAtATime = 256;
@@ -33,6 +36,7 @@ constexpr char kInsertChunk[] = "INSERT INTO point_chunk (shape_id, number, byte
 constexpr char kBeginRead[] = "BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY";
 constexpr char kBeginWrite[] = "BEGIN ISOLATION LEVEL READ COMMITTED READ WRITE";
 constexpr char kConflict[] = "another transaction was in the way (SQLSTATE ";
+constexpr char kLockTimeoutState[] = "55P03";
 
 /// Before the state in the messages of conflicts: see isConflict.
 bool isConflictState(const std::string& state) { return state == "40001" || state == "40P01"; }
@@ -44,6 +48,7 @@ ErrorCode codeOf(const std::string& state) {
     if (state == "XX001" || state == "XX002") return ErrorCode::kDataLoss;
     if (state == "25006") return ErrorCode::kUnavailable;  // a standby
     if (state == "25P03") return ErrorCode::kUnavailable;  // its transaction was idle for too long
+    if (state == kLockTimeoutState) return ErrorCode::kUnavailable;
     const std::string kind = state.substr(0, 2);
     // No connection; too many of them; shut down, or starting.
     if (kind == "08" || kind == "53" || kind == "57" || kind == "40") return ErrorCode::kUnavailable;
@@ -253,17 +258,25 @@ PostgresConnection::PostgresConnection(const PostgresAddress& address, const Sta
     const auto seconds =
         std::max<std::int64_t>(1, std::chrono::duration_cast<std::chrono::seconds>(patience_).count());
     const std::string timeout = std::to_string(seconds);
+    // The database ends a wait for a lock before this side gives up: a transaction of which nobody knows any
+    // more would go on waiting there, and one more for each call that is tried again.
+    const auto lockMs = std::max<std::int64_t>(1, patience_.count() - patience_.count() / 10);
+    // What is read to an end is not worth compiling, and the first rows of a page still less.
+    const std::string session =
+        "-c search_path=public -c timezone=UTC -c extra_float_digits=3 -c jit=off "
+        "-c lock_timeout=" +
+        std::to_string(std::min(lockMs, kLongestLockMs));
     std::vector<std::pair<const char*, const char*>> options = {
-        {"dbname", address.uri.c_str()},
+        // The URI may say otherwise: what comes before it is for what it does not mention.
         {"connect_timeout", timeout.c_str()},
-        {"application_name", address.serverName.c_str()},
-        {"client_encoding", "UTF8"},
         // A host that has gone without a word is noticed while the connection is idle, too.
         {"keepalives_idle", "10"},
         {"keepalives_interval", "5"},
         {"keepalives_count", "3"},
-        // What is read to an end is not worth compiling, and the first rows of a page still less.
-        {"options", "-c search_path=public -c timezone=UTC -c extra_float_digits=3 -c jit=off"},
+        {"dbname", address.uri.c_str()},
+        {"application_name", address.serverName.c_str()},
+        {"client_encoding", "UTF8"},
+        {"options", session.c_str()},
     };
     if (!address.password.empty()) options.emplace_back("password", address.password.c_str());
     std::vector<const char*> names;
@@ -315,6 +328,10 @@ void PostgresConnection::raiseResult(const pg_result* result) const {
     }
     if (isConflictState(state)) throw Failure(ErrorCode::kUnavailable, kConflict + state + ")", false);
     const ErrorCode code = codeOf(state);
+    if (state == kLockTimeoutState) {
+        raise(code, "another transaction has held up this one in the database for too long (SQLSTATE " +
+                        state + ")");
+    }
     throw Failure(code, "the database says: " + primary + " (SQLSTATE " + state + ")", true);
 }
 

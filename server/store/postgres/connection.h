@@ -55,6 +55,8 @@ class PostgresConnection final : public Connection {
     std::string text(const std::string& sql);
 
     [[nodiscard]] bool isBroken() const noexcept;
+    /// Broken because the database did not answer in time.
+    [[nodiscard]] bool hasTimedOut() const noexcept { return timedOut_; }
 
   private:
     class CachedStatement;

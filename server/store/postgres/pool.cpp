@@ -3,23 +3,33 @@
 
 namespace shapedb::store {
 
-PostgresPool::Lease PostgresPool::acquire() {
+PostgresPool::Lease PostgresPool::acquire(Use use) {
+    const bool writes = use == Use::kWrite;
     {
         std::unique_lock<std::mutex> lock(mutex_);
-        freed_.wait(lock, [this] { return !free_.empty() || left_ > 0; });
+        const bool mayHave = freed_.wait_for(lock, address_.patience, [&] {
+            return (!free_.empty() || left_ > 0) && (!writes || writesLeft_ > 0);
+        });
+        if (!mayHave) {
+            raise(ErrorCode::kUnavailable,
+                  std::string("all connections for ") + (writes ? "writing" : "reading") +
+                      " are in use: the database is slow, another transaction holds them up, or "
+                      "postgres.connections is too low");
+        }
+        free_.reserve(free_.size() + 1);
+        if (writes) --writesLeft_;
         if (!free_.empty()) {
             auto connection = std::move(free_.back());
             free_.pop_back();
-            return {*this, std::move(connection)};
+            return {*this, std::move(connection), use};
         }
-        free_.reserve(free_.size() + 1);
         --left_;
     }
     try {
         // Not under the lock: it may take as long as the database likes.
-        return {*this, std::make_unique<PostgresConnection>(address_, texts_)};
+        return {*this, std::make_unique<PostgresConnection>(address_, texts_), use};
     } catch (...) {
-        giveBack(nullptr);
+        giveBack(nullptr, use);
         throw;
     }
 }
@@ -31,9 +41,10 @@ void PostgresPool::closeIdle() {
     left_ += static_cast<int>(closed.size());
 }
 
-void PostgresPool::giveBack(std::unique_ptr<PostgresConnection> connection) noexcept {
+void PostgresPool::giveBack(std::unique_ptr<PostgresConnection> connection, Use use) noexcept {
     {
         const std::lock_guard<std::mutex> lock(mutex_);
+        if (use == Use::kWrite) ++writesLeft_;
         if (connection == nullptr || connection->isBroken()) {
             ++left_;
         } else {
@@ -44,7 +55,8 @@ void PostgresPool::giveBack(std::unique_ptr<PostgresConnection> connection) noex
             }
         }
     }
-    freed_.notify_one();
+    // Some wait for any, some for one that may write.
+    freed_.notify_all();
 }
 
 }  // namespace shapedb::store

@@ -2,6 +2,7 @@
 // Connections to the database, each lent to one thread at a time.
 #pragma once
 
+#include <algorithm>
 #include <condition_variable>
 #include <memory>
 #include <mutex>
@@ -14,15 +15,22 @@ namespace shapedb::store {
 /// Thread-safe. Must outlive its leases.
 class PostgresPool {
   public:
+    /// Writes may wait for another transaction. They never have all connections: a quarter, at least one, is
+    /// for reads, where there is more than one.
+    enum class Use { kRead, kWrite };
+
     /// Opens connections when they are needed, at most `most` of them.
     PostgresPool(const PostgresAddress& address, const StatementTexts& texts, int most)
-        : address_(address), texts_(texts), left_(most) {}
+        : address_(address),
+          texts_(texts),
+          left_(most),
+          writesLeft_(std::max(1, most - std::max(1, most / 4))) {}
 
     class Lease {
       public:
-        Lease(PostgresPool& pool, std::unique_ptr<PostgresConnection> connection)
-            : pool_(pool), connection_(std::move(connection)) {}
-        ~Lease() { pool_.giveBack(std::move(connection_)); }
+        Lease(PostgresPool& pool, std::unique_ptr<PostgresConnection> connection, Use use)
+            : pool_(pool), connection_(std::move(connection)), use_(use) {}
+        ~Lease() { pool_.giveBack(std::move(connection_), use_); }
         Lease(const Lease&) = delete;
         Lease& operator=(const Lease&) = delete;
         PostgresConnection& operator*() const { return *connection_; }
@@ -31,21 +39,24 @@ class PostgresPool {
       private:
         PostgresPool& pool_;
         std::unique_ptr<PostgresConnection> connection_;
+        const Use use_;
     };
 
-    /// Waits until one is free, or there may be another. Throws Failure kUnavailable.
-    Lease acquire();
+    /// Waits until one is free, or there may be another, for as long as the database may take to answer.
+    /// Throws Failure kUnavailable.
+    Lease acquire(Use use);
     /// Closes those that nobody has: after one was found broken the others are, too.
     void closeIdle();
 
   private:
-    void giveBack(std::unique_ptr<PostgresConnection> connection) noexcept;
+    void giveBack(std::unique_ptr<PostgresConnection> connection, Use use) noexcept;
 
     PostgresAddress address_;
     const StatementTexts& texts_;
     std::mutex mutex_;
     std::condition_variable freed_;
-    int left_;  ///< connections that may still be opened
+    int left_;        ///< connections that may still be opened
+    int writesLeft_;  ///< that may be lent to writes now
     std::vector<std::unique_ptr<PostgresConnection>> free_;
 };
 

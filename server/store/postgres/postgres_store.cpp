@@ -130,7 +130,7 @@ PostgresAddress PostgresStore::address(std::chrono::milliseconds patience) const
 }
 
 void PostgresStore::migrateDatabase() {
-    requireServer(*pool_.acquire());
+    requireServer(*pool_.acquire(PostgresPool::Use::kRead));
     // One that writes a large table anew takes its time, and so does another server's.
     const auto connection = patientConnection();
     Transaction transaction(*connection, Transaction::Kind::kWrite);
@@ -283,7 +283,8 @@ Result<std::vector<Shape>> PostgresStore::recoverJobs(int maxAttempts, const std
 
 void PostgresStore::renew(const std::vector<std::int64_t>& jobIds) {
     static_cast<void>(guarded("renew the claims of jobs", [&] {
-        const PostgresPool::Lease connection = pool_.acquire();
+        // Not one of those for writes: these may all wait for another transaction, and this one does not.
+        const PostgresPool::Lease connection = pool_.acquire(PostgresPool::Use::kRead);
         Query(*connection, kQueueLostJobs).run();
         if (jobIds.empty()) return;
         connection->execute("UPDATE job SET lease_end = clock_timestamp() + interval '" +

@@ -8,11 +8,17 @@ namespace {
 /// Times that a write which met another one is done again.
 constexpr int kMostConflicts = 10;
 
+/// A connection that broke while nobody used it is found by the next one who does, and another one is worth a
+/// try. Not where the caller has waited as long as it may already.
+bool wentStale(const PostgresConnection& connection) {
+    return connection.isBroken() && !connection.hasTimedOut();
+}
+
 }  // namespace
 
 void inWriteTransaction(PostgresPool& pool, bool once, const std::function<void(Connection&)>& work) {
     for (int tries = 1;; ++tries) {
-        const PostgresPool::Lease connection = pool.acquire();
+        const PostgresPool::Lease connection = pool.acquire(PostgresPool::Use::kWrite);
         bool mayBeStored = false;
         try {
             Transaction transaction(*connection, Transaction::Kind::kWrite);
@@ -22,9 +28,8 @@ void inWriteTransaction(PostgresPool& pool, bool once, const std::function<void(
             return;
         } catch (const Failure& failure) {
             if (once) throw;
-            // A connection that broke while nobody used it is found by the next one who does.
-            const bool isStale = !mayBeStored && tries == 1 && connection->isBroken();
-            if (isStale) pool.closeIdle();
+            if (connection->isBroken()) pool.closeIdle();
+            const bool isStale = !mayBeStored && tries == 1 && wentStale(*connection);
             if (!isStale && !(isConflict(failure) && tries < kMostConflicts)) throw;
         }
     }
@@ -32,13 +37,13 @@ void inWriteTransaction(PostgresPool& pool, bool once, const std::function<void(
 
 void inReadTransaction(PostgresPool& pool, const std::function<void(Connection&)>& work) {
     for (int tries = 1;; ++tries) {
-        const PostgresPool::Lease connection = pool.acquire();
+        const PostgresPool::Lease connection = pool.acquire(PostgresPool::Use::kRead);
         try {
             const Transaction snapshot(*connection, Transaction::Kind::kRead);
             return work(*connection);
         } catch (const Failure&) {
-            if (tries > 1 || !connection->isBroken()) throw;
-            pool.closeIdle();
+            if (connection->isBroken()) pool.closeIdle();
+            if (tries > 1 || !wentStale(*connection)) throw;
         }
     }
 }

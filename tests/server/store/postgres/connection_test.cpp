@@ -2,6 +2,7 @@
 // The layer over libpq: values keep every bit, rows come in any number, and a database that is lost is told.
 #include "server/store/postgres/connection.h"
 
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -9,6 +10,9 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include "server/store/postgres/statements.h"
 #include "tests/server/support/postgres_cluster.h"
@@ -129,6 +133,50 @@ TEST_F(PostgresConnectionTest, ADatabaseThatDoesNotAnswerEndsTheCall) {
     const auto impatient = connect(std::chrono::milliseconds(1'000));
     EXPECT_EQ(codeOf([&] { Query(*impatient, kSleep).run(); }), ErrorCode::kUnavailable);
     EXPECT_TRUE(impatient->isBroken());
+}
+
+TEST_F(PostgresConnectionTest, AWaitForALockEndsInTheDatabaseFirst) {
+    connection_->execute("INSERT INTO t (i) VALUES (1)");
+    const Transaction holding(*connection_, Transaction::Kind::kWrite);
+    Query(*connection_, kLock, 1).run();
+    const auto impatient = connect(std::chrono::milliseconds(2'000));
+    impatient->beginWrite();
+    const auto waited = guarded("try", [&] { Query(*impatient, kLock, 1).run(); });
+    ASSERT_FALSE(waited);
+    EXPECT_EQ(waited.error().code, ErrorCode::kUnavailable);
+    EXPECT_NE(waited.error().message.find("another transaction"), std::string::npos)
+        << waited.error().message;
+    EXPECT_FALSE(impatient->isBroken());
+    impatient->rollback();
+    EXPECT_EQ(numberOf(Query(*impatient, kCount)), 1) << "it can be used again";
+}
+
+TEST_F(PostgresConnectionTest, NoRoomIsTold) {
+    const auto raise = [&](const std::string& state) {
+        return codeOf([&] { connection_->execute("DO $$ BEGIN RAISE SQLSTATE '" + state + "'; END $$"); });
+    };
+    EXPECT_EQ(raise("53100"), ErrorCode::kStorageFull);
+    EXPECT_EQ(raise("53200"), ErrorCode::kOutOfMemory);
+    EXPECT_EQ(raise("53300"), ErrorCode::kUnavailable);
+}
+
+// A port that takes connections, and never says a word.
+TEST_F(PostgresConnectionTest, TheUriMayGiveUpAHostSooner) {
+    const int silent = ::socket(AF_INET, SOCK_STREAM, 0);
+    ASSERT_GE(silent, 0);
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof address;
+    auto* const place = reinterpret_cast<sockaddr*>(&address);
+    ASSERT_EQ(::bind(silent, place, size), 0);
+    ASSERT_EQ(::listen(silent, 8), 0);
+    ASSERT_EQ(::getsockname(silent, place, &size), 0);
+    uri_ = "host=127.0.0.1 dbname=x connect_timeout=2 port=" + std::to_string(ntohs(address.sin_port));
+    const auto began = std::chrono::steady_clock::now();
+    EXPECT_EQ(codeOf([&] { connect(); }), ErrorCode::kUnavailable);
+    EXPECT_LT(std::chrono::steady_clock::now() - began, std::chrono::seconds(30));
+    ::close(silent);
 }
 
 TEST_F(PostgresConnectionTest, ALostDatabaseIsTold) {
