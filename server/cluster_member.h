@@ -49,7 +49,11 @@ class ClusterMember {
     void stop();
 
     [[nodiscard]] cluster::ShardCandidates::Parts shards() { return {member_, holder_, channels_}; }
-    [[nodiscard]] bool canSearch() const { return member_.state().uncovered == 0; }
+    /// As far as this server knows, and what it knows is not older than leases get.
+    [[nodiscard]] bool canSearch() const {
+        const auto state = member_.state();
+        return state.current && state.uncovered == 0;
+    }
     [[nodiscard]] cluster::Member::State state() const { return member_.state(); }
 
   private:

@@ -55,6 +55,7 @@ Result<void> Member::beatOnce() {
     const std::lock_guard<std::mutex> lock(mutex_);
     keeper_.onView(sentAt, *view);
     routes_ = routesOf(*view);
+    viewedAt_ = sentAt;
     wake_ = true;  // it may want other shards
     ++news_;
     changed_.notify_all();
@@ -227,6 +228,7 @@ Member::State Member::state() const {
     state.wanted = keeper_.wanted(now()).count();
     for (const auto& holders : routes_->holders) state.uncovered += holders.empty() ? 1 : 0;
     state.following = following_;
+    state.current = now() - viewedAt_ < term_;
     for (const auto& [id, content] : contents_) {
         const ShownPtr shown = content->shown();
         if (!shown) continue;

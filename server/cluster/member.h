@@ -71,6 +71,7 @@ class Member {
         std::uint64_t signatures = 0;
         std::uint64_t bytes = 0;  ///< of these, approximate
         bool following = true;    ///< the database could be read lately
+        bool current = true;      ///< the table of leases, too: within the length of one
     };
     [[nodiscard]] State state() const;
 
@@ -94,6 +95,7 @@ class Member {
     std::condition_variable changed_;
     LeaseKeeper keeper_;
     RoutesPtr routes_;
+    Instant viewedAt_{};  ///< when the beat was sent that saw the table of leases last
     ShardSet loaded_;
     std::map<std::int64_t, std::shared_ptr<ShardContent>> contents_;
     std::uint64_t news_ = 0;  ///< rises with each beat, and each pass of the thread that follows
