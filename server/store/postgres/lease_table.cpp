@@ -11,10 +11,12 @@ namespace shapedb::store {
 namespace {
 
 // Whoever changes the tables holds the lock, and whoever waits for it sees what was committed before. Should
-// its holder hang, or be cut off, the database ends its transaction.
+// its holder hang, or be cut off, the database ends its transaction. No beat waits for a standby: without it
+// searches are to go on, and a lease that a promotion forgets is taken anew. What an answer must know is not
+// told by leases, but by the log of changes.
 constexpr char kLockLeases[] =
     "SELECT set_config('idle_in_transaction_session_timeout', '2000', true), "
-    "pg_advisory_xact_lock(1399350341)";
+    "set_config('synchronous_commit', 'local', true), pg_advisory_xact_lock(1399350341)";
 
 #define SHAPEDB_CLOCK "CAST(floor(extract(epoch FROM clock_timestamp()) * 1000) AS BIGINT)"
 constexpr char kClock[] = "SELECT " SHAPEDB_CLOCK;

@@ -58,6 +58,8 @@ constexpr char kQueueLostJobs[] =
     "UPDATE job SET state = 0, attempts = attempts - 1, stops = stops + 1, owner = NULL, lease_end = NULL "
     "WHERE id IN "
     "(SELECT id FROM job WHERE state = 1 AND lease_end < clock_timestamp() FOR UPDATE SKIP LOCKED)";
+// What is not worth waiting for a standby: see the leases of shards.
+constexpr char kCommitHere[] = "SELECT set_config('synchronous_commit', 'local', true)";
 constexpr char kDatabaseBytes[] = "SELECT pg_database_size(current_database())";
 constexpr char kSchemaVersion[] = "SELECT max(number) FROM schema_migration";
 constexpr char kCreateRecord[] =
@@ -285,12 +287,20 @@ void PostgresStore::renew(const std::vector<std::int64_t>& jobIds) {
     static_cast<void>(guarded("renew the claims of jobs", [&] {
         // Not one of those for writes: these may all wait for another transaction, and this one does not.
         const PostgresPool::Lease connection = pool_.acquire(PostgresPool::Use::kRead);
-        Query(*connection, kQueueLostJobs).run();
+        const auto withoutStandby = [&](const std::function<void()>& work) {
+            Transaction transaction(*connection, Transaction::Kind::kWrite);
+            Query(*connection, kCommitHere).run();
+            work();
+            transaction.commit();
+        };
+        withoutStandby([&] { Query(*connection, kQueueLostJobs).run(); });
         if (jobIds.empty()) return;
-        connection->execute("UPDATE job SET lease_end = clock_timestamp() + interval '" +
-                            std::to_string(options_.jobLease.count()) +
-                            " milliseconds' WHERE state = 1 AND owner = " + sqlLiteral(options_.serverName) +
-                            " AND id IN (" + joined(jobIds) + ")");
+        withoutStandby([&] {
+            connection->execute("UPDATE job SET lease_end = clock_timestamp() + interval '" +
+                                std::to_string(options_.jobLease.count()) +
+                                " milliseconds' WHERE state = 1 AND owner = " +
+                                sqlLiteral(options_.serverName) + " AND id IN (" + joined(jobIds) + ")");
+        });
     }));
 }
 

@@ -199,6 +199,24 @@ TEST_F(PostgresLeaseTableTest, ADatabaseThatHasBeenAwayIsAskedAgain) {
     EXPECT_EQ(after->servers, std::vector<std::string>{"a"});
 }
 
+// Of the writes it is said that they are stored or not. Leases are renewed, or no search would go on.
+TEST_F(PostgresLeaseTableTest, NoBeatWaitsForAStandby) {
+    const auto leases = table(1);
+    ASSERT_TRUE(leases->beat(beatOf("a")));
+    static_cast<void>(text("ALTER SYSTEM SET synchronous_standby_names = 'nobody'"));
+    static_cast<void>(text("SELECT pg_reload_conf()"));
+    PostgresConnection impatient({database_, {}, std::chrono::seconds(1), "test"}, {});
+    const auto isWaitedFor = [&] {
+        return !guarded("write", [&] { impatient.execute("CREATE TABLE waits (n bigint)"); });
+    };
+    EXPECT_TRUE(isWaitedFor());
+    const auto beaten = leases->beat(beatOf("b"));
+    static_cast<void>(text("ALTER SYSTEM RESET synchronous_standby_names"));
+    static_cast<void>(text("SELECT pg_reload_conf()"));
+    ASSERT_TRUE(beaten) << beaten.error().message;
+    EXPECT_EQ(beaten->servers, (std::vector<std::string>{"a", "b"}));
+}
+
 // It stops with the lock of the table in its hand.
 TEST_F(PostgresLeaseTableTest, AServerThatHangsHoldsUpNobodyForLong) {
     const StatementTexts none;
