@@ -33,6 +33,7 @@ reliability() {
   scaled 20 shapedb_server_test '*ModelTest*' || return 1
   attack 10 kill || return 1
   attack 20 shared_kill || return 1
+  attack 25 cluster_kill || return 1
   attack 240 soak
 }
 
