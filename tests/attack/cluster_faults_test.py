@@ -7,7 +7,7 @@ import time
 import unittest
 
 from attacker import collections, eventually, grpc, main, reason
-from clusters import LEASE, SEARCH, TIMEOUT, Changes, Cluster, Link, free_port, seconds_until
+from clusters import LEASE, SEARCH, TIMEOUT, Changes, Cluster, Link, free_address, seconds_until
 from kill_test import CLOUDS
 from postgres import Postgres
 
@@ -20,8 +20,9 @@ def setUpModule():
     database = unittest.enterModuleContext(Postgres())
 
 
-def asked_through(link, port):
-    return ("--cluster-listen", f"127.0.0.1:{port}", "--cluster-advertise", f"127.0.0.1:{link.port}")
+def asked_through(link):
+    host, port = link.target
+    return ("--cluster-listen", f"{host}:{port}", "--cluster-advertise", f"127.0.0.1:{link.port}")
 
 
 class CutLinks(unittest.TestCase):
@@ -62,9 +63,8 @@ class CutLinks(unittest.TestCase):
                       f"after it was mended")
 
     def test_a_server_that_the_others_cannot_ask_is_not_needed_with_two_replicas(self):
-        port = free_port()
-        with Link(port) as link:
-            flags = {"three": asked_through(link, port)}
+        with Link(free_address()) as link:
+            flags = {"three": asked_through(link)}
             with Cluster(database, replicas=2, own_flags=flags) as cluster:
                 cluster.fill("one", 6)
                 with cluster.searchers() as searches, Changes(cluster, "one") as changes:
@@ -87,9 +87,8 @@ class CutLinks(unittest.TestCase):
                       f"quick again {back:.1f} s after it was mended")
 
     def test_with_one_replica_its_part_is_refused_until_the_link_is_back(self):
-        port = free_port()
-        with Link(port) as link:
-            flags = {"three": asked_through(link, port)}
+        with Link(free_address()) as link:
+            flags = {"three": asked_through(link)}
             with Cluster(database, own_flags=flags) as cluster:
                 cluster.fill("one", 6)
                 with cluster.searchers() as searches, Changes(cluster, "one") as changes:
@@ -150,7 +149,7 @@ class StalledTransactions(unittest.TestCase):
                 time.sleep(1)
                 self.assertEqual(one.serving(SEARCH), True)
                 began = time.monotonic()
-                one.add("free", CLOUDS[0], collection="other", wait=False, timeout=30)
+                self.assertTrue(eventually(lambda: self.adds_to_other(one), 2 * TIMEOUT + SLACK))
                 other = time.monotonic() - began
                 for thread in threads:
                     thread.join()
@@ -171,6 +170,15 @@ class StalledTransactions(unittest.TestCase):
             # First for a connection, then for the lock.
             self.assertLess(max(o[3] for o in outcomes), 2 * TIMEOUT + SLACK)
             self.assertLess(longest, 2)
+
+    def adds_to_other(self, client):
+        """False: all connections for writes are taken by those that wait, and the client has to try again."""
+        try:
+            client.add("free", CLOUDS[0], collection="other", wait=False, timeout=30)
+            return True
+        except grpc.RpcError as error:
+            self.assertIn("all connections for writing are in use", error.details())
+            return False
 
     def write(self, cluster, number, outcomes):
         began = time.monotonic()

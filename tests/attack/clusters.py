@@ -2,6 +2,7 @@
 """Several servers that hold the shards of one database between them, and what is known of their content."""
 
 import contextlib
+import random
 import select
 import socket
 import threading
@@ -141,8 +142,8 @@ class Changes:
 
 
 class Link:
-    """A port that leads to an address (a Unix socket's path, or a port of this machine), until it is cut: then
-    nothing comes through any more, and nobody is told."""
+    """A port that leads to an address (a Unix socket's path, or a host and a port), until it is cut: then nothing
+    comes through any more, and nobody is told."""
 
     def __init__(self, target):
         self.target = target
@@ -174,7 +175,7 @@ class Link:
             try:
                 far = socket.socket(socket.AF_UNIX if isinstance(self.target, str) else socket.AF_INET)
                 with far:
-                    far.connect(self.target if isinstance(self.target, str) else ("127.0.0.1", self.target))
+                    far.connect(self.target)
                     self.forward(near, far)
             except OSError:
                 pass
@@ -202,9 +203,12 @@ class Link:
         self.thread.join()
 
 
-def free_port():
-    with socket.create_server(("127.0.0.1", 0)) as listener:
-        return listener.getsockname()[1]
+def free_address():
+    """Host and port. The host is one of this machine's that no other test listens at: the port is still free when a
+    server is started there."""
+    host = "127." + ".".join(str(random.randrange(1, 255)) for _ in range(3))
+    with socket.create_server((host, 0)) as listener:
+        return listener.getsockname()
 
 
 def seconds_until(condition, most):
