@@ -228,7 +228,6 @@ class Catalog {
     [[nodiscard]] std::vector<std::int64_t> collectionIds() const;
     /// Surface points that are kept of these shapes may be old.
     void forgetSurfaces(const std::vector<std::int64_t>& shapeIds) { index_.forgetSurfaces(shapeIds); }
-    [[nodiscard]] store::Store& store() { return *store_; }
 
     // Shapes -----------------------------------------------------------------------
 
