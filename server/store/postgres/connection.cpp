@@ -36,6 +36,7 @@ constexpr char kInsertChunk[] = "INSERT INTO point_chunk (shape_id, number, byte
 constexpr char kBeginRead[] = "BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY";
 constexpr char kBeginWrite[] = "BEGIN ISOLATION LEVEL READ COMMITTED READ WRITE";
 constexpr char kConflict[] = "another transaction was in the way (SQLSTATE ";
+constexpr char kHeldUp[] = "another transaction has held up this one in the database for too long (SQLSTATE ";
 constexpr char kLockTimeoutState[] = "55P03";
 
 /// Before the state in the messages of conflicts: see isConflict.
@@ -90,6 +91,8 @@ std::uint64_t fromBigEndian(const char* data, int bytes) {
 }  // namespace
 
 bool isConflict(const Failure& failure) noexcept { return failure.error.message.rfind(kConflict, 0) == 0; }
+
+bool isHeldUp(const Failure& failure) noexcept { return failure.error.message.rfind(kHeldUp, 0) == 0; }
 
 void PostgresConnection::ResultCloser::operator()(pg_result* result) const noexcept { PQclear(result); }
 
@@ -329,8 +332,7 @@ void PostgresConnection::raiseResult(const pg_result* result) const {
     if (isConflictState(state)) throw Failure(ErrorCode::kUnavailable, kConflict + state + ")", false);
     const ErrorCode code = codeOf(state);
     if (state == kLockTimeoutState) {
-        raise(code, "another transaction has held up this one in the database for too long (SQLSTATE " +
-                        state + ")");
+        raise(code, kHeldUp + state + ")");
     }
     throw Failure(code, "the database says: " + primary + " (SQLSTATE " + state + ")", true);
 }
@@ -416,7 +418,12 @@ PreparedStatement& PostgresConnection::prepared(const char* sql) {
 
 void PostgresConnection::beginRead() { execute(kBeginRead); }
 
-void PostgresConnection::beginWrite() { execute(kBeginWrite); }
+void PostgresConnection::beginWrite() {
+    std::string begin = kBeginWrite;
+    if (lockPatience_.count() > 0)
+        begin += "; SET LOCAL lock_timeout = " + std::to_string(lockPatience_.count());
+    execute(begin);
+}
 
 void PostgresConnection::commit() {
     // The database would answer a COMMIT after an error by undoing all, without a word.

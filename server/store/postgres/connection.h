@@ -44,6 +44,9 @@ class PostgresConnection final : public Connection {
     void beginRead() override;
     /// Each statement sees what is committed when it starts: a row is locked before it is read.
     void beginWrite() override;
+    /// How long write transactions from now on wait for a lock that another transaction has; 0: for as long
+    /// as the database may take to answer. Then Failure kUnavailable (isHeldUp).
+    void waitForLocks(std::chrono::milliseconds atMost) noexcept { lockPatience_ = atMost; }
     /// Failure kUnavailable when the connection is lost meanwhile: then nobody knows whether it is stored.
     void commit() override;
     void rollback() noexcept override;
@@ -75,6 +78,7 @@ class PostgresConnection final : public Connection {
     pg_conn* connection_ = nullptr;
     const StatementTexts& texts_;
     std::chrono::milliseconds patience_;
+    std::chrono::milliseconds lockPatience_{0};
     bool timedOut_ = false;
     std::unordered_map<const char*, std::unique_ptr<CachedStatement>> statements_;
 };
@@ -85,5 +89,8 @@ class PostgresConnection final : public Connection {
 
 /// Whether the database undid the transaction because of another one: the work can be done again.
 [[nodiscard]] bool isConflict(const Failure& failure) noexcept;
+
+/// Whether the transaction gave up because another one kept a lock that it needs.
+[[nodiscard]] bool isHeldUp(const Failure& failure) noexcept;
 
 }  // namespace shapedb::store

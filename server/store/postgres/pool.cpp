@@ -3,21 +3,28 @@
 
 namespace shapedb::store {
 
-PostgresPool::Lease PostgresPool::acquire(Use use) {
+void PostgresPool::wait(std::unique_lock<std::mutex>& lock, Use use, Clock::time_point until) {
     const bool writes = use == Use::kWrite;
+    Queue& queue = writes ? writers_ : readers_;
+    const auto me = queue.emplace(queue.end());
+    const bool mayHave = freed_.wait_until(lock, until, [&] {
+        return me == queue.begin() && (!free_.empty() || left_ > 0) && (!writes || writesLeft_ > 0);
+    });
+    queue.erase(me);
+    freed_.notify_all();  // another one is the first now
+    if (mayHave) return;
+    raise(ErrorCode::kUnavailable,
+          std::string("all connections for ") + (writes ? "writing" : "reading") +
+              " are in use: the database is slow, another transaction holds them up, or "
+              "postgres.connections is too low");
+}
+
+PostgresPool::Lease PostgresPool::acquire(Use use, Clock::time_point until) {
     {
         std::unique_lock<std::mutex> lock(mutex_);
-        const bool mayHave = freed_.wait_for(lock, address_.patience, [&] {
-            return (!free_.empty() || left_ > 0) && (!writes || writesLeft_ > 0);
-        });
-        if (!mayHave) {
-            raise(ErrorCode::kUnavailable,
-                  std::string("all connections for ") + (writes ? "writing" : "reading") +
-                      " are in use: the database is slow, another transaction holds them up, or "
-                      "postgres.connections is too low");
-        }
+        wait(lock, use, until);
         free_.reserve(free_.size() + 1);
-        if (writes) --writesLeft_;
+        if (use == Use::kWrite) --writesLeft_;
         if (!free_.empty()) {
             auto connection = std::move(free_.back());
             free_.pop_back();

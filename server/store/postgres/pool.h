@@ -3,9 +3,12 @@
 #pragma once
 
 #include <algorithm>
+#include <chrono>
 #include <condition_variable>
+#include <list>
 #include <memory>
 #include <mutex>
+#include <variant>
 #include <vector>
 
 #include "server/store/postgres/connection.h"
@@ -18,6 +21,8 @@ class PostgresPool {
     /// Writes may wait for another transaction. They never have all connections: a quarter, at least one, is
     /// for reads, where there is more than one.
     enum class Use { kRead, kWrite };
+
+    using Clock = std::chrono::steady_clock;
 
     /// Opens connections when they are needed, at most `most` of them.
     PostgresPool(const PostgresAddress& address, const StatementTexts& texts, int most)
@@ -42,19 +47,27 @@ class PostgresPool {
         const Use use_;
     };
 
-    /// Waits until one is free, or there may be another, for as long as the database may take to answer.
-    /// Throws Failure kUnavailable.
-    Lease acquire(Use use);
+    /// Waits until one is free, or there may be another, for as long as the database may take to answer. Who
+    /// asks first for the same use gets one first. Throws Failure kUnavailable.
+    Lease acquire(Use use) { return acquire(use, Clock::now() + address_.patience); }
+    Lease acquire(Use use, Clock::time_point until);
     /// Closes those that nobody has: after one was found broken the others are, too.
     void closeIdle();
+    /// How long the database may take to answer.
+    [[nodiscard]] std::chrono::milliseconds patience() const noexcept { return address_.patience; }
 
   private:
+    using Queue = std::list<std::monostate>;
+
+    void wait(std::unique_lock<std::mutex>& lock, Use use, Clock::time_point until);
     void giveBack(std::unique_ptr<PostgresConnection> connection, Use use) noexcept;
 
     PostgresAddress address_;
     const StatementTexts& texts_;
     std::mutex mutex_;
     std::condition_variable freed_;
+    Queue readers_;   ///< those who wait, in order
+    Queue writers_;   ///< the same
     int left_;        ///< connections that may still be opened
     int writesLeft_;  ///< that may be lent to writes now
     std::vector<std::unique_ptr<PostgresConnection>> free_;

@@ -9,8 +9,9 @@
 namespace shapedb::store {
 
 /// Commits what `work` does, unless it throws. Where another transaction was in the way, or the connection
-/// had broken while nobody used it, all is done again, unless `once`. Throws Failure and what the work
-/// throws.
+/// had broken while nobody used it, all is done again, unless `once`. While another transaction keeps a lock,
+/// it takes turns with others at the connections, until the pool's patience is over. Throws Failure and what
+/// the work throws.
 void inWriteTransaction(PostgresPool& pool, bool once, const std::function<void(Connection&)>& work);
 
 /// All reads of `work` see one moment. Done again after a connection that had broken while nobody used it.

@@ -2,7 +2,9 @@
 #include "tests/server/cluster/simulated_database.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <iterator>
+#include <set>
 
 namespace shapedb::cluster::sim {
 
@@ -12,15 +14,15 @@ Error unreachable() { return {ErrorCode::kUnavailable, "the database is down"}; 
 
 }  // namespace
 
-Database::Database(int replicas) {
-    for (int shard = 0; shard < kShards; ++shard) {
-        for (int slot = 0; slot < replicas; ++slot) slots_[{shard, slot}];
-    }
-}
+Database::Database(int replicas, std::int64_t lastId)
+    : replicas_(replicas),
+      slots_(static_cast<std::size_t>(kShards * replicas)),
+      shapes_(static_cast<std::size_t>(lastId) + 1),
+      history_(shapes_.size()) {}
 
 /// The row, if its epoch is still the one seen.
 Database::Row* Database::current(const SlotSeen& seen) {
-    Row& row = slots_.at({seen.shard, seen.slot});
+    Row& row = rowAt(seen.shard, seen.slot);
     return row.epoch == seen.epoch ? &row : nullptr;
 }
 
@@ -61,8 +63,11 @@ Result<ClusterView> Database::view() {
 
 ClusterView Database::viewNow() const {
     ClusterView view;
-    for (const auto& [place, row] : slots_) {
-        view.leases.push_back({place.first, place.second, row.holder, row.epoch,
+    view.leases.reserve(slots_.size());
+    for (std::size_t i = 0; i < slots_.size(); ++i) {
+        const Row& row = slots_[i];
+        const auto place = std::div(static_cast<int>(i), replicas_);
+        view.leases.push_back({place.quot, place.rem, row.holder, row.epoch,
                                std::chrono::milliseconds(row.expires - now), row.wantedBy});
     }
     for (const auto& [server, until] : alive_) {
@@ -72,8 +77,8 @@ ClusterView Database::viewNow() const {
 }
 
 bool Database::holds(const std::string& server, int shard, std::int64_t epoch) const {
-    for (auto at = slots_.lower_bound({shard, 0}); at != slots_.end() && at->first.first == shard; ++at) {
-        const Row& row = at->second;
+    for (int slot = 0; slot < replicas_; ++slot) {
+        const Row& row = slots_[static_cast<std::size_t>(shard * replicas_ + slot)];
         if (row.holder == server && row.epoch == epoch && row.expires > now) return true;
     }
     return false;
@@ -84,16 +89,19 @@ void Database::change(std::int64_t shapeId, std::int64_t version) {
     log_.push_back(shapeId);
     times_.push_back(now);
     generations_.push_back(generation_);
-    if (shapeId != 0) history_[shapeId].push_back({number_, version});
+    if (shapeId != 0) history_[static_cast<std::size_t>(shapeId)].push_back({number_, version});
 }
 
 void Database::put(std::int64_t shapeId) {
-    shapes_[shapeId] = ++version_;
+    shapes_[static_cast<std::size_t>(shapeId)] = ++version_;
     change(shapeId, version_);
 }
 
 void Database::remove(std::int64_t shapeId) {
-    if (shapes_.erase(shapeId) > 0) change(shapeId, 0);
+    std::int64_t& version = shapes_[static_cast<std::size_t>(shapeId)];
+    if (version == 0) return;
+    version = 0;
+    change(shapeId, 0);
 }
 
 void Database::switchGeneration() {
@@ -107,7 +115,7 @@ store::IndexRow Database::rowOf(std::int64_t shapeId) const {
     row.shapeId = shapeId;
     row.signature.shapeId = shapeId;
     row.signature.generation = generation_;
-    row.signature.pointsVersion = shapes_.at(shapeId);
+    row.signature.pointsVersion = shapes_[static_cast<std::size_t>(shapeId)];
     return row;
 }
 
@@ -126,7 +134,7 @@ Result<Changes> Database::changes(std::int64_t /*collectionId*/, std::int64_t af
     }
     changes.changed.assign(ids.begin(), ids.end());
     for (const std::int64_t id : ids) {
-        if (shapes_.count(id) > 0) changes.rows.push_back(rowOf(id));
+        if (shapes_[static_cast<std::size_t>(id)] != 0) changes.rows.push_back(rowOf(id));
     }
     return changes;
 }
@@ -137,24 +145,28 @@ Result<Rows> Database::rows(std::int64_t /*collectionId*/, const ShardSet& shard
     Rows rows;
     rows.at = {number_, generation_};
     rows.last = true;
-    for (auto at = shapes_.upper_bound(afterId); at != shapes_.end(); ++at) {
-        if (!shards[static_cast<std::size_t>(shardOf(at->first))]) continue;
+    for (auto id = afterId + 1; id < static_cast<std::int64_t>(shapes_.size()); ++id) {
+        const bool isThere = shapes_[static_cast<std::size_t>(id)] != 0;
+        if (!isThere || !shards[static_cast<std::size_t>(shardOf(id))]) continue;
         if (rows.rows.size() == limit) {
             rows.last = false;
             break;
         }
-        rows.rows.push_back(rowOf(at->first));
+        rows.rows.push_back(rowOf(id));
     }
     return rows;
 }
 
-std::string Database::compare(const std::map<std::int64_t, std::int64_t>& shown, const ShardSet& shards,
-                              std::int64_t number, std::int64_t upper) const {
-    for (const auto& [id, past] : history_) {
-        if (!shards[static_cast<std::size_t>(shardOf(id))]) continue;
-        const auto found = shown.find(id);
-        const std::int64_t version = found == shown.end() ? 0 : found->second;
+std::string Database::compare(const Versions& shown, const ShardSet& shards, std::int64_t number,
+                              std::int64_t upper) const {
+    for (std::size_t id = 1; id < shown.size(); ++id) {
+        const std::int64_t version = shown[id];
+        if (!shards[static_cast<std::size_t>(shardOf(static_cast<std::int64_t>(id)))]) {
+            if (version == 0) continue;
+            return "shape " + std::to_string(id) + " is of a shard that was not asked for";
+        }
         // What it was at `number`, or became until `upper`.
+        const std::vector<Past>& past = history_[id];
         const auto later = std::upper_bound(past.begin(), past.end(), number,
                                             [](std::int64_t n, const Past& one) { return n < one.number; });
         bool had = version == (later == past.begin() ? 0 : std::prev(later)->version);
@@ -165,12 +177,6 @@ std::string Database::compare(const std::map<std::int64_t, std::int64_t>& shown,
                    ", which it did not have between changes " + std::to_string(number) + " and " +
                    std::to_string(upper);
         }
-    }
-    for (const auto& [id, version] : shown) {
-        if (!shards[static_cast<std::size_t>(shardOf(id))]) {
-            return "shape " + std::to_string(id) + " is of a shard that was not asked for";
-        }
-        if (history_.count(id) == 0) return "shape " + std::to_string(id) + " was never stored";
     }
     return {};
 }

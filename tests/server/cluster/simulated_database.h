@@ -4,8 +4,6 @@
 
 #include <cstdint>
 #include <map>
-#include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -22,9 +20,13 @@ struct Past {
     std::int64_t version = 0;
 };
 
+/// The version of each shape, by its id; 0: it is not there.
+using Versions = std::vector<std::int64_t>;
+
 class Database : public LeaseTable, public ReplicaSource {
   public:
-    explicit Database(int replicas);
+    /// Of a collection that never has ids above `lastId`.
+    explicit Database(int replicas, std::int64_t lastId = 0);
 
     // Leases. The clock is `now`.
     Result<ClusterView> beat(const Beat& beat) override;
@@ -47,8 +49,8 @@ class Database : public LeaseTable, public ReplicaSource {
 
     /// What is wrong with an answer made at a moment at which `upper` was the last change: it says that it
     /// knows all up to `number`, and shows these versions of the shapes of some shards. Empty: nothing.
-    std::string compare(const std::map<std::int64_t, std::int64_t>& shown, const ShardSet& shards,
-                        std::int64_t number, std::int64_t upper) const;
+    std::string compare(const Versions& shown, const ShardSet& shards, std::int64_t number,
+                        std::int64_t upper) const;
     std::int64_t number() const { return number_; }
     /// The last change at a time.
     std::int64_t numberAt(Time time) const;
@@ -72,10 +74,13 @@ class Database : public LeaseTable, public ReplicaSource {
     store::IndexRow rowOf(std::int64_t shapeId) const;
     ClusterView viewNow() const;
 
-    std::map<std::pair<int, int>, Row> slots_;
-    std::map<std::string, Time> alive_;            // until
-    std::map<std::int64_t, std::int64_t> shapes_;  // id, version
-    std::map<std::int64_t, std::vector<Past>> history_;
+    Row& rowAt(int shard, int slot) { return slots_[static_cast<std::size_t>(shard * replicas_ + slot)]; }
+
+    int replicas_;
+    std::vector<Row> slots_;             // in order of shard and slot
+    std::map<std::string, Time> alive_;  // until
+    Versions shapes_;
+    std::vector<std::vector<Past>> history_;  // by id
     std::vector<std::int64_t> log_{0};          // by number: the shape, or 0 for a switch
     std::vector<Time> times_{0};                // by number
     std::vector<std::int64_t> generations_{1};  // by number

@@ -6,7 +6,6 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <queue>
 #include <random>
 #include <set>
 #include <tuple>
@@ -27,9 +26,16 @@ constexpr std::int64_t kShapes = 300;
 
 /// What searches of one server see.
 struct Shown : Content {
-    std::map<std::int64_t, std::int64_t> versions;
+    Versions versions = Versions(kShapes + 1);
 };
 using ShownPtr = std::shared_ptr<const Shown>;
+
+/// Takes the shapes of some shards out.
+void clear(Versions& versions, const ShardSet& shards) {
+    for (std::size_t id = 1; id < versions.size(); ++id) {
+        if (shards[static_cast<std::size_t>(shardOf(static_cast<std::int64_t>(id)))]) versions[id] = 0;
+    }
+}
 
 class Shapes : public ReplicaContent {
   public:
@@ -39,18 +45,15 @@ class Shapes : public ReplicaContent {
     }
     Result<void> put(std::vector<store::IndexRow> rows) override {
         Shown& begun = own();
-        for (const store::IndexRow& row : rows) begun.versions[row.shapeId] = row.signature.pointsVersion;
+        for (const store::IndexRow& row : rows) begun.versions[static_cast<std::size_t>(row.shapeId)] = row.signature.pointsVersion;
         return {};
     }
     void remove(const std::vector<std::int64_t>& shapeIds) override {
         Shown& begun = own();
-        for (const std::int64_t id : shapeIds) begun.versions.erase(id);
+        for (const std::int64_t id : shapeIds) begun.versions[static_cast<std::size_t>(id)] = 0;
     }
     void drop(const ShardSet& shards) override {
-        auto& versions = own().versions;
-        for (auto at = versions.begin(); at != versions.end();) {
-            at = shards[static_cast<std::size_t>(shardOf(at->first))] ? versions.erase(at) : ++at;
-        }
+        clear(own().versions, shards);
     }
     void show(const ShardSet& complete, std::int64_t number) override {
         Shown& begun = own();
@@ -70,6 +73,8 @@ class Shapes : public ReplicaContent {
     std::shared_ptr<Shown> shown_ = std::make_shared<Shown>();
 };
 
+struct Search;
+
 struct Server {
     Server(std::string called, const Options& options, Database& database)
         : name(std::move(called)),
@@ -85,15 +90,19 @@ struct Server {
     std::uint64_t beats = 0;  // sent; answers to all but the last are ignored
     Time caughtUp = -1'000'000;
     RoutesPtr routes;
+    std::vector<std::shared_ptr<Search>> waiting;  // for routes
 };
 
 /// What a server found in its shards.
 struct Answer {
     Coverage coverage;
-    std::map<std::int64_t, std::int64_t> versions;
+    Versions versions;
     std::int64_t upper = 0;  // the last change when it was made
     Time madeAt = 0;
 };
+
+using AnswerPtr = std::shared_ptr<const Answer>;
+using AskPtr = std::shared_ptr<const Ask>;
 
 struct Search {
     std::string coordinator;
@@ -101,7 +110,7 @@ struct Search {
     Time started = 0;
     Time deadline = 0;
     std::optional<Gather> gather;
-    std::map<std::uint64_t, Answer> answers;
+    std::map<std::uint64_t, AnswerPtr> answers;
     bool ended = false;
     bool waitsForRoutes = false;
 };
@@ -110,7 +119,7 @@ using SearchPtr = std::shared_ptr<Search>;
 class World {
   public:
     explicit World(const Options& options)
-        : options_(options), random_(options.seed), database_(options.replicas) {}
+        : options_(options), random_(options.seed), database_(options.replicas, kShapes) {}
 
     Outcome run() {
         for (std::int64_t id = 1; id <= kShapes / 2; ++id) database_.put(id);
@@ -119,8 +128,9 @@ class World {
         every(20, 120, [this] { search(); });
         if (options_.faults) every(500, 4'000, [this] { fault(); });
         while (!events_.empty() && database_.now < options_.length && outcome_.difference.empty()) {
-            const Event event = events_.top();
-            events_.pop();
+            std::pop_heap(events_.begin(), events_.end());
+            const Event event = std::move(events_.back());
+            events_.pop_back();
             database_.now = event.at;
             event.what();
         }
@@ -144,7 +154,10 @@ class World {
     }
     bool chance(int percent) { return static_cast<int>(random_() % 100) < percent; }
     Instant now() const { return Instant(database_.now); }
-    void at(Time time, std::function<void()> what) { events_.push({time, ++order_, std::move(what)}); }
+    void at(Time time, std::function<void()> what) { 
+        events_.push_back({time, ++order_, std::move(what)});
+        std::push_heap(events_.begin(), events_.end());
+    }
     void after(Time delay, std::function<void()> what) { at(database_.now + delay, std::move(what)); }
     void every(Time least, Time most, std::function<void()> what) {
         after(between(least, most), [this, least, most, what] {
@@ -219,11 +232,11 @@ class World {
 
     /// What a holder does with an ask: waits for the change, takes what is shown, makes sure of its leases
     /// and answers.
-    void onAsk(const std::string& name, const SearchPtr& search, const Ask& ask, Time givesUp) {
+    void onAsk(const std::string& name, const SearchPtr& search, const AskPtr& ask, Time givesUp) {
         onServer(name, between(0, 3), [this, name, search, ask, givesUp](Server& server) {
             const ShownPtr shown = server.content.shown();
             onServer(name, between(0, 3), [this, name, search, ask, givesUp, shown](Server& me) {
-                switch (answerable(ask, *shown, me.keeper, now())) {
+                switch (answerable(*ask, *shown, me.keeper, now())) {
                     case Answerable::kYes: return answer(name, search, ask, shown);
                     case Answerable::kNo: return refuse(name, search, ask);
                     case Answerable::kBehind: break;
@@ -235,28 +248,27 @@ class World {
         });
     }
 
-    void refuse(const std::string& name, const SearchPtr& search, const Ask& ask) {
-        send(name, search->coordinator, [this, search, ask] { failed(search, ask.id); });
+    void refuse(const std::string& name, const SearchPtr& search, const AskPtr& ask) {
+        send(name, search->coordinator, [this, search, ask] { failed(search, ask->id); });
     }
 
-    void answer(const std::string& name, const SearchPtr& search, const Ask& ask, const ShownPtr& shown) {
-        Answer made;
-        made.coverage = {ask.shards, shown->number, shown->generation};
-        made.upper = database_.number();
-        made.madeAt = database_.now;
-        ShardSet shards;
-        for (const auto& [shard, epoch] : ask.shards) {
-            shards.set(static_cast<std::size_t>(shard));
+    void answer(const std::string& name, const SearchPtr& search, const AskPtr& ask, const ShownPtr& shown) {
+        const auto made = std::make_shared<Answer>();
+        made->coverage = {ask->shards, shown->number, shown->generation};
+        made->upper = database_.number();
+        made->madeAt = database_.now;
+        ShardSet others = ShardSet().set();
+        for (const auto& [shard, epoch] : ask->shards) {
+            others.reset(static_cast<std::size_t>(shard));
             if (!database_.holds(name, shard, epoch)) differ(name + " answers for a shard that it has lost");
         }
-        for (const auto& [id, version] : shown->versions) {
-            if (shards[static_cast<std::size_t>(shardOf(id))]) made.versions[id] = version;
-        }
-        send(name, search->coordinator, [this, search, id = ask.id, made = std::move(made)] {
+        made->versions = shown->versions;
+        clear(made->versions, others);
+        send(name, search->coordinator, [this, search, id = ask->id, made] {
             onServer(search->coordinator, 0, [this, search, id, made](Server&) {
                 if (search->ended) return;
                 search->answers[id] = made;
-                dispatch(search, search->gather->onAnswer(id, made.coverage));
+                dispatch(search, search->gather->onAnswer(id, made->coverage));
             });
         });
     }
@@ -278,15 +290,16 @@ class World {
         dispatch(search, search->gather->start());
     }
 
-    void dispatch(const SearchPtr& search, const std::vector<Ask>& asks) {
+    void dispatch(const SearchPtr& search, std::vector<Ask> asks) {
         if (search->ended) return;
         if (search->gather->complete()) return finish(search);
         if (database_.now >= search->deadline) return giveUp(search);
-        for (const Ask& ask : asks) {
-            send(search->coordinator, ask.server,
-                 [this, search, ask] { onAsk(ask.server, search, ask, database_.now + kAnswerTimeout / 2); });
+        for (Ask& one : asks) {
+            const auto ask = std::make_shared<const Ask>(std::move(one));
+            send(search->coordinator, ask->server,
+                 [this, search, ask] { onAsk(ask->server, search, ask, database_.now + kAnswerTimeout / 2); });
             onServer(search->coordinator, kAnswerTimeout,
-                     [this, search, id = ask.id](Server&) { failed(search, id); });
+                     [this, search, id = ask->id](Server&) { failed(search, id); });
         }
         if (search->gather->needsRoutes() && !search->waitsForRoutes) newRoutes(search);
     }
@@ -297,20 +310,25 @@ class World {
         });
     }
 
+    /// What waits for routes gets them from one read, 50 ms after the first began to wait.
     void newRoutes(const SearchPtr& search) {
         search->waitsForRoutes = true;
-        onServer(search->coordinator, 50, [this, search](Server& server) {
-            search->waitsForRoutes = false;
-            if (search->ended) return;
-            const bool reachable = cut_.count({server.name, "database"}) == 0;
-            const auto view =
-                reachable ? database_.view() : Result<ClusterView>(tl::make_unexpected(Error{}));
-            if (view) {
-                dispatch(search, search->gather->onRoutes(routesOf(*view)));
-            } else {
-                dispatch(search, {});
-            }
+        onServer(search->coordinator, 0, [this, search](Server& server) {
+            server.waiting.push_back(search);
+            if (server.waiting.size() > 1) return;
+            onServer(server.name, 50, [this](Server& me) { readRoutes(me); });
         });
+    }
+
+    void readRoutes(Server& server) {
+        const bool reachable = cut_.count({server.name, "database"}) == 0;
+        const auto view = reachable ? database_.view() : Result<ClusterView>(tl::make_unexpected(Error{}));
+        const RoutesPtr routes = view ? routesOf(*view) : nullptr;
+        for (const SearchPtr& search : std::exchange(server.waiting, {})) {
+            search->waitsForRoutes = false;
+            if (search->ended) continue;
+            dispatch(search, routes != nullptr ? search->gather->onRoutes(routes) : std::vector<Ask>());
+        }
     }
 
     void giveUp(const SearchPtr& search) {
@@ -329,7 +347,7 @@ class World {
         ShardSet covered;
         std::set<std::int64_t> generations;
         for (const std::uint64_t id : search->gather->accepted()) {
-            const Answer& answer = search->answers.at(id);
+            const Answer& answer = *search->answers.at(id);
             ShardSet shards;
             for (const auto& [shard, epoch] : answer.coverage.shards)
                 shards.set(static_cast<std::size_t>(shard));
@@ -426,7 +444,7 @@ class World {
     Database database_;
     std::map<std::string, std::unique_ptr<Server>> servers_;
     std::set<std::pair<std::string, std::string>> cut_;
-    std::priority_queue<Event> events_;
+    std::vector<Event> events_;  // a heap, the next one first
     std::uint64_t order_ = 0;
     int started_ = 0;
     std::optional<Time> outageSince_;

@@ -108,5 +108,52 @@ TEST_F(PostgresPoolTest, AConnectionThatWentStaleIsReplaced) {
     EXPECT_EQ(runs, 3) << "the others have failed at BEGIN";
 }
 
+TEST_F(PostgresPoolTest, WhoWaitsForALockLetsOthersWrite) {
+    address_.patience = 20 * kPatience;
+    PostgresPool pool(address_, none_, 4);
+    PostgresConnection other(address_, none_);
+    other.execute("CREATE TABLE counted (id int PRIMARY KEY, n int NOT NULL)");
+    other.execute("INSERT INTO counted VALUES (1, 0), (2, 0)");
+    const auto add = [&](const std::string& id) {
+        return guarded("add", [&] {
+            inWriteTransaction(pool, false, [&](Connection& connection) {
+                dynamic_cast<PostgresConnection&>(connection).execute(
+                    "UPDATE counted SET n = n + 1 WHERE id = " + id);
+            });
+        });
+    };
+    other.execute("BEGIN; UPDATE counted SET n = n + 1 WHERE id = 1");
+    std::vector<std::thread> waiting;
+    for (int i = 0; i < 12; ++i) waiting.emplace_back([&] { EXPECT_TRUE(add("1")); });
+    // Until all that may write wait for the row.
+    PostgresConnection watching(address_, none_);  // inside a transaction it would see the same for ever
+    while (watching.text("SELECT count(*) FROM pg_stat_activity WHERE wait_event_type = 'Lock'") != "3") {
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    for (int i = 0; i < 5; ++i) EXPECT_TRUE(add("2")) << "another row than the one that is kept";
+    other.execute("COMMIT");
+    for (std::thread& thread : waiting) thread.join();
+    EXPECT_EQ(other.text("SELECT n FROM counted WHERE id = 1"), "13");
+    EXPECT_EQ(other.text("SELECT n FROM counted WHERE id = 2"), "5");
+}
+
+TEST_F(PostgresPoolTest, ALockThatIsNeverGivenUpIsToldAfterAllPatience) {
+    PostgresPool pool(address_, none_, 2);
+    PostgresConnection other(address_, none_);
+    other.execute("CREATE TABLE kept (id int PRIMARY KEY)");
+    other.execute("BEGIN; LOCK TABLE kept");
+    const auto began = Clock::now();
+    const auto done = guarded("write", [&] {
+        inWriteTransaction(pool, false, [](Connection& connection) {
+            dynamic_cast<PostgresConnection&>(connection).execute("INSERT INTO kept VALUES (1)");
+        });
+    });
+    ASSERT_FALSE(done);
+    EXPECT_EQ(done.error().code, ErrorCode::kUnavailable);
+    EXPECT_NE(done.error().message.find("another transaction"), std::string::npos) << done.error().message;
+    EXPECT_GE(Clock::now() - began, kPatience);
+    EXPECT_LT(Clock::now() - began, 2 * kPatience);
+}
+
 }  // namespace
 }  // namespace shapedb::store
