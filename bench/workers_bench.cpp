@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // `shapedb-bench workers`: how many scans do one, two and four workers on one PostgreSQL database take
 // through the queue in a second? Each sleeps in place of segmenting, so that the database is measured and not
-// the processor. The content of the database is left alone but for a collection that is made and deleted.
+// the processor; or segments, on one thread. The content of the database is left alone but for a collection
+// that is made and deleted.
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -16,6 +17,8 @@
 #include "bench/operations.h"
 #include "bench/output.h"
 #include "core/base/return_if_error.h"
+#include "core/synthetic/families.h"
+#include "server/ingest/signature_pipeline.h"
 #include "server/store/postgres/postgres_store.h"
 
 namespace shapedb::bench {
@@ -32,6 +35,7 @@ struct WorkersFlags {
     std::vector<int> workers = {1, 2, 4};
     int scans = 400;
     int sleepMs = 50;
+    int points = 0;  ///< of scans that are segmented; 0: sleep
     int rounds = 3;
 };
 
@@ -45,13 +49,37 @@ Result<std::unique_ptr<store::Store>> openAs(const std::string& name, const Work
     return store::openPostgresStore(options);
 }
 
-Result<void> fillQueue(store::Store& store, std::int64_t collection, int scans) {
+/// Points that are never segmented.
+std::vector<float> anyPoints(int scan) {
     std::vector<float> points(3 * kScanPoints);
-    for (int i = 0; i < scans; ++i) {
-        for (std::size_t k = 0; k < points.size(); ++k) {
-            points[k] = static_cast<float>((k * 7919 + static_cast<std::size_t>(i) * 31) % 1000);
-        }
-        auto scan = store::VerifiedScan::verify(points);
+    for (std::size_t k = 0; k < points.size(); ++k) {
+        points[k] = static_cast<float>((k * 7919 + static_cast<std::size_t>(scan) * 31) % 1000);
+    }
+    return points;
+}
+
+Result<std::vector<float>> syntheticPoints(int scan, int points) {
+    const std::vector<FamilyInfo> families = listFamilies();
+    const auto index = static_cast<std::size_t>(scan);
+    const auto solid = makeMember(families[index % families.size()].name, index / families.size(), 1);
+    RETURN_IF_ERROR(solid);
+    ScanOptions options;
+    options.count = static_cast<std::size_t>(points);
+    options.noise = 0.002;
+    const auto cloud = scanOf(*solid, options);
+    RETURN_IF_ERROR(cloud);
+    std::vector<float> packed;
+    for (const Point3& point : *cloud) {
+        for (const double value : {point.x, point.y, point.z}) packed.push_back(static_cast<float>(value));
+    }
+    return packed;
+}
+
+Result<void> fillQueue(store::Store& store, std::int64_t collection, const WorkersFlags& flags) {
+    for (int i = 0; i < flags.scans; ++i) {
+        const auto points = flags.points > 0 ? syntheticPoints(i, flags.points) : anyPoints(i);
+        RETURN_IF_ERROR(points);
+        auto scan = store::VerifiedScan::verify(*points);
         RETURN_IF_ERROR(scan);
         store::PutRequest put(std::move(*scan));
         put.collectionId = collection;
@@ -61,15 +89,36 @@ Result<void> fillQueue(store::Store& store, std::int64_t collection, int scans) 
     return {};
 }
 
-/// Claims, sleeps and finishes until the queue is empty. Returns how many results counted.
-Result<int> work(store::Store& store, std::chrono::milliseconds sleep) {
+Result<store::SignatureRow> describeJob(store::Store& store, const store::Job& job) {
+    static const ingest::SignaturePipeline pipeline(
+        [](const PointCloud& points, const ShapeParameters& parameters, const RunContext& context) {
+            return shapedb::describe(points, parameters, context);
+        });
+    auto outcome = pipeline.run(store, job.shapeId, parametersOf(Profile::kDefault), {});
+    if (outcome.kind != ingest::PipelineOutcome::Kind::kSignature) return fail(outcome.why);
+    return store::SignatureRow{job.shapeId,
+                               job.pointsVersion,
+                               job.generation,
+                               std::move(outcome.signature),
+                               std::move(outcome.surface),
+                               std::move(outcome.views)};
+}
+
+/// Claims, sleeps or segments, and finishes until the queue is empty. Returns how many results counted.
+Result<int> work(store::Store& store, const WorkersFlags& flags) {
     for (int finished = 0;;) {
         const auto job = store.claimJob();
         RETURN_IF_ERROR(job);
         if (!*job) return finished;
-        std::this_thread::sleep_for(sleep);
-        const auto done = store.finishJob(
-            **job, {(*job)->shapeId, (*job)->pointsVersion, (*job)->generation, std::string(800, 's')});
+        Result<store::SignatureRow> row(store::SignatureRow{(*job)->shapeId, (*job)->pointsVersion,
+                                                            (*job)->generation, std::string(800, 's')});
+        if (flags.points > 0) {
+            row = describeJob(store, **job);
+        } else {
+            std::this_thread::sleep_for(std::chrono::milliseconds(flags.sleepMs));
+        }
+        RETURN_IF_ERROR(row);
+        const auto done = store.finishJob(**job, *row);
         RETURN_IF_ERROR(done);
         if (*done) ++finished;
     }
@@ -80,7 +129,7 @@ Result<int> work(store::Store& store, std::chrono::milliseconds sleep) {
 Result<double> measure(store::Store& store, int workers, const WorkersFlags& flags) {
     const auto collection = store.createCollection(kCollectionName, "", "{}");
     RETURN_IF_ERROR(collection);
-    RETURN_IF_ERROR(fillQueue(store, collection->id, flags.scans));
+    RETURN_IF_ERROR(fillQueue(store, collection->id, flags));
     std::vector<std::unique_ptr<store::Store>> servers;
     for (int i = 0; i < workers; ++i) {
         auto opened = openAs(std::to_string(i), flags);
@@ -93,7 +142,7 @@ Result<double> measure(store::Store& store, int workers, const WorkersFlags& fla
     std::vector<std::thread> threads;
     for (std::size_t i = 0; i < servers.size(); ++i) {
         threads.emplace_back([&, i] {
-            outcomes[i] = work(*servers[i], std::chrono::milliseconds(flags.sleepMs));
+            outcomes[i] = work(*servers[i], flags);
             if (outcomes[i]) finished += *outcomes[i];
         });
     }
@@ -116,9 +165,11 @@ Result<double> measure(store::Store& store, int workers, const WorkersFlags& fla
 Result<int> runWorkers(const WorkersFlags& flags, Bench& bench) {
     const auto store = openAs("main", flags);
     RETURN_IF_ERROR(store);
-    bench.console.text(describe(environment()) + "\n" + bench.command + "\n" + std::to_string(flags.scans) +
-                       " scans, " + std::to_string(flags.sleepMs) + " ms each, best of " +
-                       std::to_string(flags.rounds) + " rounds\n\nworkers  scans/s  beside one\n");
+    bench.console.text(
+        describe(environment()) + "\n" + bench.command + "\n" + std::to_string(flags.scans) + " scans, " +
+        (flags.points > 0 ? "segmented, of " + std::to_string(flags.points) + " points"
+                          : std::to_string(flags.sleepMs) + " ms each") +
+        ", best of " + std::to_string(flags.rounds) + " rounds\n\nworkers  scans/s  beside one\n");
     double alone = 0.0;
     for (const int workers : flags.workers) {
         double best = 0.0;
@@ -146,6 +197,8 @@ void addWorkersOperation(CLI::App& app, Bench& bench) {
     command->add_option("--workers", flags->workers, "How many at a time")->delimiter(',')->type_name("N,N");
     command->add_option("--scans", flags->scans, "In the queue")->check(CLI::Range(1, 1'000'000));
     command->add_option("--sleep-ms", flags->sleepMs, "In place of segmenting")->check(CLI::Range(0, 60'000));
+    command->add_option("--points", flags->points, "Segment scans of so many points instead; 0: sleep")
+        ->check(CLI::Range(0, 1'000'000));
     command->add_option("--rounds", flags->rounds, "The best counts")->check(CLI::Range(1, 100));
     command->callback(
         [&bench, flags] { bench.action = [&bench, flags] { return runWorkers(*flags, bench); }; });

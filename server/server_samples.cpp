@@ -19,7 +19,7 @@ void append(std::vector<Sample>& samples, std::vector<Sample> more) {
 }
 
 std::vector<Sample> sampleContent(catalog::Catalog& catalog) {
-    const auto stats = catalog.stats();
+    const auto stats = catalog.recentStats();
     if (!stats) return {};
     const store::StoreStats& stored = stats->store;
     const char* shapes = "Shapes, by state.";

@@ -339,10 +339,20 @@ Condition Catalog::condition() const {
 Result<CatalogStats> Catalog::stats() {
     const auto stored = store_->stats();
     RETURN_IF_ERROR(stored);
+    return withProgress(*stored);
+}
+
+Result<CatalogStats> Catalog::recentStats() {
+    const auto stored = recentStats_.get();
+    RETURN_IF_ERROR(stored);
+    return withProgress(*stored);
+}
+
+Result<CatalogStats> Catalog::withProgress(const store::StoreStats& stored) {
     const auto depth = store_->queueDepth();
     RETURN_IF_ERROR(depth);
     CatalogStats stats;
-    stats.store = *stored;
+    stats.store = stored;
     stats.queue = *depth;
     stats.index = totals_ ? totals_() : index_.totals();
     stats.running = workers_.running();

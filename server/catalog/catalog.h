@@ -21,6 +21,7 @@
 #include "server/catalog/change_follower.h"
 #include "server/catalog/gates.h"
 #include "server/catalog/parameter_overrides.h"
+#include "server/catalog/recent_stats.h"
 #include "server/index/collection_index.h"
 #include "server/ingest/crash_isolation.h"
 #include "server/ingest/progress_board.h"
@@ -375,6 +376,8 @@ class Catalog {
     /// Rises with each restore: ids read under one epoch may mean other shapes under another.
     [[nodiscard]] std::uint64_t epoch() const { return restores_.epoch(); }
     [[nodiscard]] Result<CatalogStats> stats();
+    /// As `stats`; what would take long to count may be some time old (RecentStats).
+    [[nodiscard]] Result<CatalogStats> recentStats();
     /// Reads no disk.
     [[nodiscard]] Condition condition() const;
 
@@ -416,6 +419,9 @@ class Catalog {
     ingest::WorkerPool workers_;
     ingest::RebuildDriver rebuilds_;
     RestoreGate restores_;
+    Result<CatalogStats> withProgress(const store::StoreStats& stored);
+
+    RecentStats recentStats_{[this] { return store_->stats(); }};
     std::mutex directory_;  ///< held while collections come, go, or change names or aliases
     std::function<index::CollectionIndex::Totals()> totals_;
     bool lost_ = false;  ///< the last content restored could not be loaded; only restores look at it

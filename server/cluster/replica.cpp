@@ -7,6 +7,14 @@
 
 namespace shapedb::cluster {
 
+namespace {
+
+/// Shards that are read in one pass over the shapes of the collection, and shown when it ends. Fewer are
+/// there sooner, and each pass also costs a look at the ids of all others.
+constexpr std::size_t kLoadedTogether = 64;
+
+}  // namespace
+
 void Replica::setWanted(const ShardSet& wanted) {
     const ShardSet surplus = (complete_ | loading_) & ~wanted;
     wanted_ = wanted;
@@ -15,7 +23,16 @@ void Replica::setWanted(const ShardSet& wanted) {
     content_.drop(surplus);
     complete_ &= wanted;
     if ((loading_ & ~wanted).any()) startLoading(loading_ & wanted);
-    if (!replacing_) show();
+    if (!replacing_) static_cast<void>(show());  // after an error the next step begins again
+}
+
+/// The next ones that are not there yet.
+ShardSet Replica::toLoad() const {
+    ShardSet next;
+    for (std::size_t shard = 0; shard < next.size() && next.count() < kLoadedTogether; ++shard) {
+        if (wanted_[shard] && !complete_[shard]) next.set(shard);
+    }
+    return next;
 }
 
 void Replica::startLoading(const ShardSet& shards) {
@@ -25,17 +42,28 @@ void Replica::startLoading(const ShardSet& shards) {
 }
 
 /// Searches see the content that was begun last as soon as it has all that the one before had.
-void Replica::show() {
-    if (replacing_ && (wanted_ & ~complete_).any()) return;
+Result<void> Replica::show() {
+    if (replacing_ && (wanted_ & ~complete_).any()) return {};
+    const auto done = content_.show(complete_, known_);
+    if (!done) {
+        generation_ = 0;
+        return done;
+    }
     replacing_ = false;
     shown_ = complete_;
     number_ = known_;
-    content_.show(complete_, known_);
+    return {};
+}
+
+Result<void> Replica::put(std::vector<store::IndexRow> rows) {
+    auto done = content_.put(std::move(rows));
+    if (!done) generation_ = 0;
+    return done;
 }
 
 Result<bool> Replica::step() {
     if (generation_ == 0) return begin();
-    if (loading_.none() && (wanted_ & ~complete_).any()) startLoading(wanted_ & ~complete_);
+    if (loading_.none() && toLoad().any()) startLoading(toLoad());
     if (loading_.none()) return follow();
     followNext_ = !followNext_;
     return followNext_ ? load() : follow();
@@ -51,7 +79,7 @@ Result<bool> Replica::begin() {
     generation_ = none->at.generation;
     known_ = none->at.number;
     complete_.reset();
-    startLoading(wanted_);
+    startLoading(toLoad());
     return true;
 }
 
@@ -62,13 +90,12 @@ Result<bool> Replica::load() {
         generation_ = 0;
         return true;
     }
-    const std::int64_t last = page->rows.empty() ? loadAfter_ : page->rows.back().shapeId;
-    RETURN_IF_ERROR(content_.put(std::move(page->rows)));
-    loadAfter_ = last;
+    RETURN_IF_ERROR(put(std::move(page->rows)));
+    loadAfter_ = page->upTo;
     if (!page->last) return true;
     complete_ |= loading_;
     loading_.reset();
-    show();
+    RETURN_IF_ERROR(show());
     return true;
 }
 
@@ -83,9 +110,9 @@ Result<bool> Replica::follow() {
     }
     if (changes->upTo > known_) {
         content_.remove(changes->changed);
-        RETURN_IF_ERROR(content_.put(std::move(changes->rows)));
+        RETURN_IF_ERROR(put(std::move(changes->rows)));
         known_ = changes->upTo;
-        if (!replacing_) show();
+        if (!replacing_) RETURN_IF_ERROR(show());
     }
     return loading_.any() || known_ < changes->at.number;
 }

@@ -35,6 +35,7 @@ struct Changes {
 struct Rows {
     Position at;
     std::vector<store::IndexRow> rows;  ///< in ascending order of id
+    std::int64_t upTo = 0;              ///< those with ids up to this one are among them, or have been
     bool last = false;                  ///< there are no more
 };
 
@@ -47,7 +48,7 @@ class ReplicaSource {
     /// left out of `changed`.
     [[nodiscard]] virtual Result<Changes> changes(std::int64_t collectionId, std::int64_t after,
                                                   const ShardSet& shards, std::size_t limit) = 0;
-    /// At most `limit` rows with id > afterId.
+    /// Some of the rows with id > afterId, at most `limit`: the next page.
     [[nodiscard]] virtual Result<Rows> rows(std::int64_t collectionId, const ShardSet& shards,
                                             std::int64_t afterId, std::size_t limit) = 0;
 };
@@ -58,7 +59,9 @@ class ReplicaContent {
     virtual ~ReplicaContent() = default;
     /// Begins a content of this generation without any rows. What serves goes on serving.
     virtual void begin(std::int64_t generation) = 0;
-    /// Rows of the content that was begun last, added or in place of those with the same id.
+    /// Rows of the content that was begun last, added or in place of those with the same id. They may be
+    /// taken in later, but before what is called next takes effect; an error is that of the rows before,
+    /// then, and the content is to be begun again.
     [[nodiscard]] virtual Result<void> put(std::vector<store::IndexRow> rows) = 0;
     /// Removes these shapes, if they are there.
     virtual void remove(const std::vector<std::int64_t>& shapeIds) = 0;
@@ -66,10 +69,11 @@ class ReplicaContent {
     virtual void drop(const ShardSet& shards) = 0;
     /// From now on searches see the content that was begun last, as it is. It is complete in these shards,
     /// and knows all changes up to this one.
-    virtual void show(const ShardSet& complete, std::int64_t number) = 0;
+    /// Errors: as `put`.
+    [[nodiscard]] virtual Result<void> show(const ShardSet& complete, std::int64_t number) = 0;
 };
 
-/// Drives one content. Not thread-safe.
+/// Drives one content. Shards are loaded some at a time, and shown as they are there. Not thread-safe.
 class Replica {
   public:
     /// Neither is owned.
@@ -92,8 +96,10 @@ class Replica {
     Result<bool> begin();
     Result<bool> load();
     Result<bool> follow();
+    [[nodiscard]] ShardSet toLoad() const;
     void startLoading(const ShardSet& shards);
-    void show();
+    Result<void> put(std::vector<store::IndexRow> rows);
+    Result<void> show();
 
     ReplicaSource& source_;
     ReplicaContent& content_;

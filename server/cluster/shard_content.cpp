@@ -20,6 +20,10 @@ constexpr std::size_t kDecodedTogether = 64;
 
 std::size_t placeOf(std::int64_t shapeId) { return static_cast<std::size_t>(shardOf(shapeId)); }
 
+tl::unexpected<Error> outOfMemory() {
+    return fail(ErrorCode::kOutOfMemory, "not enough memory for the cached signatures");
+}
+
 }  // namespace
 
 std::int64_t ShardContent::Shard::lastId() const {
@@ -36,11 +40,13 @@ void ShardContent::Shard::settle() {
 }
 
 void ShardContent::begin(std::int64_t generation) {
+    takeIn();
+    failure_.reset();
     generation_ = generation;
     building_ = {};
 }
 
-Result<void> ShardContent::put(std::vector<store::IndexRow> rows) {
+ShardContent::Decoded ShardContent::decode(std::vector<store::IndexRow> rows) const {
     try {
         std::vector<IndexEntry> entries(rows.size());
         std::vector<char> good(rows.size());
@@ -50,22 +56,57 @@ Result<void> ShardContent::put(std::vector<store::IndexRow> rows) {
                     good[i] = index::toEntry(std::move(rows[i]), entries[i], *log_) ? 1 : 0;
                 }
             }));
+        std::size_t kept = 0;
         for (std::size_t i = 0; i < entries.size(); ++i) {
-            if (good[i] == 0) continue;
-            Shard& shard = building_[placeOf(entries[i].id)];
-            const bool follows = entries[i].id > shard.lastId();
-            if (!follows) shard.settle();
-            shard.waiting.push_back(std::move(entries[i]));
-            if (!follows || shard.waiting.size() >= kWorthABlock) shard.settle();
+            if (good[i] != 0) std::swap(entries[kept++], entries[i]);
         }
-        return {};
+        entries.resize(kept);
+        return entries;
     } catch (const std::bad_alloc&) {
-        return fail(ErrorCode::kOutOfMemory, "not enough memory for the cached signatures");
+        return outOfMemory();
+    }
+}
+
+void ShardContent::append(std::vector<IndexEntry> entries) {
+    for (IndexEntry& entry : entries) {
+        Shard& shard = building_[placeOf(entry.id)];
+        const bool follows = entry.id > shard.lastId();
+        if (!follows) shard.settle();
+        shard.waiting.push_back(std::move(entry));
+        if (!follows || shard.waiting.size() >= kWorthABlock) shard.settle();
+    }
+}
+
+void ShardContent::takeIn() {
+    if (!decoding_.valid()) return;
+    Decoded decoded = decoding_.get();
+    if (!decoded) {
+        failure_ = decoded.error();
+        return;
+    }
+    try {
+        append(std::move(*decoded));
+    } catch (const std::bad_alloc&) {
+        failure_ = outOfMemory().value();
+    }
+}
+
+Result<void> ShardContent::put(std::vector<store::IndexRow> rows) {
+    takeIn();
+    if (failure_) return fail(*failure_);
+    if (rows.empty()) return {};
+    try {
+        decoding_ = std::async(std::launch::async,
+                               [this, rows = std::move(rows)]() mutable { return decode(std::move(rows)); });
+        return {};
+    } catch (const std::exception&) {
+        return outOfMemory();  // also: no thread can be started
     }
 }
 
 void ShardContent::remove(const std::vector<std::int64_t>& shapeIds) {
     if (shapeIds.empty()) return;
+    takeIn();
     onChanged_(shapeIds);
     std::map<std::size_t, std::vector<std::int64_t>> ofShard;
     for (const std::int64_t id : shapeIds) ofShard[placeOf(id)].push_back(id);
@@ -77,12 +118,15 @@ void ShardContent::remove(const std::vector<std::int64_t>& shapeIds) {
 }
 
 void ShardContent::drop(const ShardSet& shards) {
+    takeIn();
     for (std::size_t i = 0; i < building_.size(); ++i) {
         if (shards[i]) building_[i] = {};
     }
 }
 
-void ShardContent::show(const ShardSet& complete, std::int64_t number) {
+Result<void> ShardContent::show(const ShardSet& complete, std::int64_t number) {
+    takeIn();
+    if (failure_) return fail(*failure_);
     auto next = std::make_shared<ShownContent>();
     next->content = {complete, number, generation_};
     for (std::size_t i = 0; i < building_.size(); ++i) {
@@ -92,6 +136,7 @@ void ShardContent::show(const ShardSet& complete, std::int64_t number) {
     }
     const std::lock_guard<std::mutex> lock(mutex_);
     shown_ = std::move(next);
+    return {};
 }
 
 ShownPtr ShardContent::shown() const {

@@ -5,8 +5,10 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <future>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <vector>
 
 #include "core/search/signature_set.h"
@@ -34,7 +36,7 @@ class ShardContent final : public ReplicaContent {
     [[nodiscard]] Result<void> put(std::vector<store::IndexRow> rows) override;
     void remove(const std::vector<std::int64_t>& shapeIds) override;
     void drop(const ShardSet& shards) override;
-    void show(const ShardSet& complete, std::int64_t number) override;
+    [[nodiscard]] Result<void> show(const ShardSet& complete, std::int64_t number) override;
 
     /// Null until something was shown.
     [[nodiscard]] ShownPtr shown() const;
@@ -50,7 +52,16 @@ class ShardContent final : public ReplicaContent {
         void settle();
     };
 
+    using Decoded = Result<std::vector<IndexEntry>>;
+    [[nodiscard]] Decoded decode(std::vector<store::IndexRow> rows) const;
+    /// Takes in what was put last.
+    void takeIn();
+    void append(std::vector<IndexEntry> entries);
+
     std::int64_t generation_ = 0;
+    /// Of what was put last: decoded while the next rows are read.
+    std::future<Decoded> decoding_;
+    std::optional<Error> failure_;  ///< since the content was begun
     std::array<Shard, kShards> building_;
     mutable std::mutex mutex_;
     ShownPtr shown_;

@@ -2,14 +2,17 @@
 #include "server/store/postgres/postgres_store.h"
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <set>
 #include <utility>
 
 #include "core/base/return_if_error.h"
+#include "server/store/postgres/index_page.h"
 #include "server/store/postgres/lease_table.h"
 #include "server/store/postgres/postgres_store_impl.h"
 #include "server/store/postgres/replica_source.h"
+#include "server/store/postgres/statement.h"
 #include "server/store/postgres/statements.h"
 #include "server/store/postgres/transactions.h"
 #include "server/store/sql/migration.h"
@@ -106,12 +109,6 @@ void requireServer(PostgresConnection& connection) {
     }
 }
 
-std::string joined(const std::vector<std::int64_t>& ids) {
-    std::string text;
-    for (const std::int64_t id : ids) text += (text.empty() ? "" : ",") + std::to_string(id);
-    return text;
-}
-
 }  // namespace
 
 PostgresStore::PostgresStore(const PostgresOptions& options)
@@ -177,12 +174,28 @@ void PostgresStore::logAll(Connection& connection, std::int64_t collectionId) {
     Query(connection, kLogAll, collectionId).run();
 }
 
+Result<std::vector<IndexRow>> PostgresStore::loadIndex(std::int64_t collectionId, std::int64_t afterId,
+                                                       std::size_t limit) {
+    return read("load the index", [&](Connection& connection) {
+        std::vector<IndexRow> rows;
+        const std::int64_t generation = requireCollection(connection, collectionId).generation;
+        IndexPage page;
+        page.upTo = afterId;
+        while (rows.size() < limit && !page.last) {
+            page = readIndexPage(connection, collectionId, generation, cluster::ShardSet().set(), page.upTo,
+                                 limit - rows.size());
+            std::move(page.rows.begin(), page.rows.end(), std::back_inserter(rows));
+        }
+        return rows;
+    });
+}
+
 Result<std::vector<std::optional<StoredHit>>> PostgresStore::getHits(
     const std::vector<std::int64_t>& shapeIds, bool withSignatures) {
     std::map<std::int64_t, StoredHit> found;
     const auto done = read("read the hits", [&](Connection& connection) {
         found.clear();  // it may be done a second time
-        const std::string ids = joined(shapeIds);
+        const std::string ids = listed(shapeIds);
         Query shapes(connection, kShapesOfHits, ids);
         forEachShape(shapes, [&](Shape&& shape) {
             const std::int64_t id = shape.id;
@@ -299,7 +312,7 @@ void PostgresStore::renew(const std::vector<std::int64_t>& jobIds) {
             connection->execute("UPDATE job SET lease_end = clock_timestamp() + interval '" +
                                 std::to_string(options_.jobLease.count()) +
                                 " milliseconds' WHERE state = 1 AND owner = " +
-                                sqlLiteral(options_.serverName) + " AND id IN (" + joined(jobIds) + ")");
+                                sqlLiteral(options_.serverName) + " AND id IN (" + listed(jobIds) + ")");
         });
     }));
 }

@@ -29,6 +29,8 @@ class PostgresStore final : public SqlStore {
     Result<void> releaseJob(const Job& job) override;
     Result<std::vector<Shape>> recoverJobs(int maxAttempts, const std::vector<Crash>& crashes) override;
 
+    Result<std::vector<IndexRow>> loadIndex(std::int64_t collectionId, std::int64_t afterId,
+                                            std::size_t limit) override;
     Result<std::vector<std::optional<StoredHit>>> getHits(const std::vector<std::int64_t>& shapeIds,
                                                           bool withSignatures) override;
 

@@ -5,8 +5,10 @@
 #include <limits>
 #include <optional>
 #include <set>
+#include <utility>
 
-#include "server/store/postgres/statements.h"
+#include "server/store/postgres/index_page.h"
+#include "server/store/postgres/statement.h"
 #include "server/store/postgres/transactions.h"
 #include "server/store/sql/rows.h"
 
@@ -18,9 +20,7 @@ constexpr char kLastChange[] = "SELECT last_change FROM collection WHERE id = ?1
 constexpr char kNextChanges[] =
     "SELECT number, shape_id FROM change WHERE collection_id = ?1 AND number > ?2 AND number <= ?3 ORDER BY "
     "number";
-// Columns and parameters as those of kLoadIndex; last a list of shards, or of ids in place of the first id.
-constexpr char kRowsOfShards[] =
-    SHAPEDB_INDEX_PAGE " AND s.shard = ANY(string_to_array(?4, ',')::smallint[]) ORDER BY s.id";
+// Columns as those of kLoadIndex.
 constexpr char kRowsOfShapes[] =
     "SELECT " SHAPEDB_INDEX_COLUMNS
     " FROM shape s JOIN signature g ON g.shape_id = s.id AND g.generation = ?3 LEFT JOIN shape_metadata m ON "
@@ -30,21 +30,6 @@ constexpr char kRowsOfShapes[] =
 constexpr auto kAllRows = std::numeric_limits<std::size_t>::max();
 
 bool contains(const cluster::ShardSet& shards, int shard) { return shards[static_cast<std::size_t>(shard)]; }
-
-template <typename Numbers>
-std::string listed(const Numbers& numbers) {
-    std::string text;
-    for (const auto number : numbers) text += (text.empty() ? "" : ",") + std::to_string(number);
-    return text;
-}
-
-std::string listed(const cluster::ShardSet& shards) {
-    std::vector<int> numbers;
-    for (int shard = 0; shard < cluster::kShards; ++shard) {
-        if (contains(shards, shard)) numbers.push_back(shard);
-    }
-    return listed(numbers);
-}
 
 /// Throws Failure kNotFound.
 cluster::Position positionOf(Connection& connection, std::int64_t collectionId) {
@@ -94,8 +79,10 @@ cluster::Rows readRows(Connection& connection, std::int64_t collectionId, const 
     rows.at = positionOf(connection, collectionId);
     rows.last = shards.none();
     if (limit == 0 || rows.last) return rows;
-    Query query(connection, kRowsOfShards, collectionId, afterId, rows.at.generation, listed(shards));
-    rows.last = !readIndexRows(connection, query, limit, rows.rows);
+    IndexPage page = readIndexPage(connection, collectionId, rows.at.generation, shards, afterId, limit);
+    rows.rows = std::move(page.rows);
+    rows.upTo = page.upTo;
+    rows.last = page.last;
     return rows;
 }
 

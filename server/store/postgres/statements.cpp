@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "server/store/postgres/statements.h"
 
+#include "server/store/postgres/statement.h"
+#include "server/store/sql/sql.h"
+
 namespace shapedb::store {
 
 namespace {
@@ -44,18 +47,7 @@ constexpr char kLoadPoints[] = "SELECT s.key, s.point_count, s.checksum, " SHAPE
 constexpr char kStoredPoints[] =
     "SELECT p.point_bytes, p.stored_bytes, " SHAPEDB_ALL_CHUNKS " FROM shape_points p WHERE p.shape_id = ?1";
 
-constexpr char kLoadIndex[] = SHAPEDB_INDEX_PAGE " ORDER BY s.id";
-
 }  // namespace
-
-std::string sqlLiteral(const std::string& text) {
-    std::string literal = "'";
-    for (const char c : text) {
-        if (c == '\'') literal += c;
-        literal += c;
-    }
-    return literal + "'";
-}
 
 StatementTexts postgresStatements(const std::string& serverName, std::chrono::milliseconds lease) {
     const std::string owner = sqlLiteral(serverName);
@@ -77,7 +69,6 @@ StatementTexts postgresStatements(const std::string& serverName, std::chrono::mi
          "SELECT shape_id, points_version, attempts, stops FROM job WHERE state = 1 AND owner = " + owner},
         {sql::kRememberDeletion, kRememberDeletion},
         {sql::kRememberedDeletion, kRememberedDeletion},
-        {sql::kLoadIndex, kLoadIndex},
         {sql::kLoadPoints, kLoadPoints},
         {sql::kStoredPoints, kStoredPoints},
     };

@@ -153,6 +153,7 @@ Result<Rows> Database::rows(std::int64_t /*collectionId*/, const ShardSet& shard
             break;
         }
         rows.rows.push_back(rowOf(id));
+        rows.upTo = id;
     }
     return rows;
 }

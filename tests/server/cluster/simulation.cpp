@@ -45,21 +45,21 @@ class Shapes : public ReplicaContent {
     }
     Result<void> put(std::vector<store::IndexRow> rows) override {
         Shown& begun = own();
-        for (const store::IndexRow& row : rows) begun.versions[static_cast<std::size_t>(row.shapeId)] = row.signature.pointsVersion;
+        for (const store::IndexRow& row : rows)
+            begun.versions[static_cast<std::size_t>(row.shapeId)] = row.signature.pointsVersion;
         return {};
     }
     void remove(const std::vector<std::int64_t>& shapeIds) override {
         Shown& begun = own();
         for (const std::int64_t id : shapeIds) begun.versions[static_cast<std::size_t>(id)] = 0;
     }
-    void drop(const ShardSet& shards) override {
-        clear(own().versions, shards);
-    }
-    void show(const ShardSet& complete, std::int64_t number) override {
+    void drop(const ShardSet& shards) override { clear(own().versions, shards); }
+    Result<void> show(const ShardSet& complete, std::int64_t number) override {
         Shown& begun = own();
         begun.complete = complete;
         begun.number = number;
         shown_ = begun_;
+        return {};
     }
     ShownPtr shown() const { return shown_; }
 
@@ -154,7 +154,7 @@ class World {
     }
     bool chance(int percent) { return static_cast<int>(random_() % 100) < percent; }
     Instant now() const { return Instant(database_.now); }
-    void at(Time time, std::function<void()> what) { 
+    void at(Time time, std::function<void()> what) {
         events_.push_back({time, ++order_, std::move(what)});
         std::push_heap(events_.begin(), events_.end());
     }
@@ -296,8 +296,9 @@ class World {
         if (database_.now >= search->deadline) return giveUp(search);
         for (Ask& one : asks) {
             const auto ask = std::make_shared<const Ask>(std::move(one));
-            send(search->coordinator, ask->server,
-                 [this, search, ask] { onAsk(ask->server, search, ask, database_.now + kAnswerTimeout / 2); });
+            send(search->coordinator, ask->server, [this, search, ask] {
+                onAsk(ask->server, search, ask, database_.now + kAnswerTimeout / 2);
+            });
             onServer(search->coordinator, kAnswerTimeout,
                      [this, search, id = ask->id](Server&) { failed(search, id); });
         }

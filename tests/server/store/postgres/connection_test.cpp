@@ -14,7 +14,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "server/store/postgres/statements.h"
+#include "server/store/postgres/statement.h"
 #include "tests/server/support/postgres_cluster.h"
 
 namespace shapedb::store {
@@ -23,6 +23,11 @@ namespace {
 constexpr char kInsert[] = "INSERT INTO t (i, r, s, b) VALUES (?1, ?2, ?3, ?4)";
 constexpr char kAll[] = "SELECT i, r, s, b FROM t ORDER BY n";
 constexpr char kCount[] = "SELECT count(*) FROM t";
+constexpr char kCopy[] =
+    "COPY (SELECT i, r, s, b FROM t WHERE n > ?1 AND s IS DISTINCT FROM ?2 ORDER BY n) TO STDOUT (FORMAT "
+    "binary)";
+constexpr char kCopyNone[] = "COPY (SELECT n, s FROM t WHERE false) TO STDOUT (FORMAT binary)";
+constexpr char kCopyFails[] = "COPY (SELECT 1 / (n - 500) FROM t ORDER BY n) TO STDOUT (FORMAT binary)";
 constexpr char kSleep[] = "SELECT pg_sleep(30)";
 constexpr char kFails[] = "INSERT INTO t (n) VALUES (1), (1)";
 constexpr char kLock[] = "SELECT n FROM t WHERE n = ?1 FOR UPDATE";
@@ -110,6 +115,75 @@ TEST_F(PostgresConnectionTest, ManyRowsComeInOrderAndMayBeLeft) {
         // What was left is closed: another may begin.
         EXPECT_EQ(numberOf(Query(*connection_, kCount)), 3000);
     }
+}
+
+TEST_F(PostgresConnectionTest, ACopyKeepsEveryBit) {
+    std::string bytes;
+    for (int i = 0; i < 100'000; ++i) bytes += static_cast<char>(i * 37);
+    insert(-3, 0.1, "it's", bytes);
+    insert(std::numeric_limits<std::int64_t>::max(), -0.0, "", "");
+    insert(0, 0, "left out ' $1 ?2", "x");
+    connection_->execute("INSERT INTO t (i) VALUES (7)");
+    for (int run = 0; run < 2; ++run) {
+        Query query(*connection_, kCopy, -1, std::string("left out ' $1 ?2"));
+        ASSERT_TRUE(query.step());
+        EXPECT_EQ(query.integer(0), -3);
+        EXPECT_EQ(query.real(1), 0.1);
+        EXPECT_EQ(query.text(2), "it's");
+        EXPECT_EQ(bytesOf(query.blob(3)), bytes);
+        ASSERT_TRUE(query.step());
+        EXPECT_EQ(query.integer(0), std::numeric_limits<std::int64_t>::max());
+        EXPECT_TRUE(std::signbit(query.real(1)));
+        EXPECT_FALSE(query.isNull(2));
+        EXPECT_EQ(query.text(2), "");
+        EXPECT_FALSE(query.isNull(3));
+        EXPECT_EQ(query.blob(3).size, 0u);
+        ASSERT_TRUE(query.step());
+        EXPECT_EQ(query.integer(0), 7);
+        for (int column = 1; column < 4; ++column) EXPECT_TRUE(query.isNull(column));
+        EXPECT_FALSE(query.step());
+        EXPECT_FALSE(query.step()) << "it is not started again";
+    }
+    Query none(*connection_, kCopyNone);
+    EXPECT_FALSE(none.step());
+}
+
+TEST_F(PostgresConnectionTest, ACopyMayBeLeftOrInterrupted) {
+    connection_->execute("INSERT INTO t (i) SELECT * FROM generate_series(1, 1000)");
+    {
+        Query query(*connection_, kCopy, 0, std::string());
+        for (int i = 1; i <= 10; ++i) {
+            ASSERT_TRUE(query.step());
+            EXPECT_EQ(query.integer(0), i);
+        }
+    }
+    {
+        Query query(*connection_, kCopy, 10, std::string());
+        ASSERT_TRUE(query.step());
+        EXPECT_EQ(query.integer(0), 11);
+        Query count(*connection_, kCount);
+        ASSERT_TRUE(count.step());
+        EXPECT_EQ(count.integer(0), 1'000);
+        EXPECT_FALSE(query.step()) << "what was left is lost";
+    }
+    Query query(*connection_, kCopy, 998, std::string());
+    ASSERT_TRUE(query.step());
+    ASSERT_TRUE(query.step());
+    EXPECT_EQ(query.integer(0), 1'000);
+    EXPECT_FALSE(query.step());
+}
+
+TEST_F(PostgresConnectionTest, ACopyThatFailsHalfwayIsTold) {
+    connection_->execute("INSERT INTO t (i) SELECT * FROM generate_series(1, 1000)");
+    connection_->beginRead();
+    EXPECT_EQ(codeOf([&] {
+                  Query query(*connection_, kCopyFails);
+                  query.run();
+              }),
+              ErrorCode::kInternal);
+    EXPECT_FALSE(connection_->isBroken());
+    connection_->rollback();
+    EXPECT_EQ(connection_->text("SELECT count(*) FROM t"), "1000");
 }
 
 TEST_F(PostgresConnectionTest, AFailedTransactionIsNeverTakenForCommitted) {

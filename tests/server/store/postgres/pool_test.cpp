@@ -21,7 +21,7 @@ using Clock = std::chrono::steady_clock;
 using Use = PostgresPool::Use;
 
 constexpr std::chrono::milliseconds kPatience{1'000};
-constexpr char kSleep[] = "SELECT pg_sleep(30)";
+constexpr char kLongSleep[] = "SELECT pg_sleep(30)";
 
 class PostgresPoolTest : public ::testing::Test {
   protected:
@@ -81,7 +81,7 @@ TEST_F(PostgresPoolTest, ThoseOfWritesComeBack) {
 
 TEST_F(PostgresPoolTest, ADatabaseThatDoesNotAnswerIsNotAskedTwice) {
     PostgresPool pool(address_, none_, 2);
-    const auto ask = [](Connection& connection) { Query(connection, kSleep).run(); };
+    const auto ask = [](Connection& connection) { Query(connection, kLongSleep).run(); };
     const auto reads = [&] { inReadTransaction(pool, ask); };
     const auto writes = [&] { inWriteTransaction(pool, false, ask); };
     for (const std::function<void()>& once : {std::function<void()>(reads), std::function<void()>(writes)}) {
