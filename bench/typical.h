@@ -19,7 +19,7 @@ struct TypicalSettings {
     std::size_t points = 20000;  ///< of each scan
     double noise = 0.002;        ///< standard deviation as a share of the diagonal
     std::uint64_t seed = 1;
-    std::size_t fitEvery = 7;  ///< only each so-many-th pair is laid on each other; at least 1
+    std::size_t fitEvery = 7;  ///< every n-th pair is aligned; at least 1
 };
 
 struct TypicalResult {

@@ -7,9 +7,13 @@
   scripts/constants.py --update   rewrites the tables; kind and reason of known rows stay
   scripts/constants.py --list     prints what is found in the sources
 
-A constant is a `const` or `constexpr` object named kSomething at any scope, a member of a struct named
-*Options or *Parameters with a numeric default, or a number that core/pipeline.cpp gives such a member in
-the profile `default`. Enumerators are none. A constant that moves, changes its value or is renamed within
+A constant is a `const` or `constexpr` object named kSomething at any scope, any `constexpr` object with a
+number as its value, a macro or an enumerator of an enum without a name with a number, a member of a struct
+named *Options, *Parameters or *Merging with a numeric default, or a number that core/pipeline.cpp gives such a member
+in the profile `default`. Other enumerators are none.
+
+A number with a decimal point or an exponent that is in none of these is an error, too, unless it is one that
+needs no name (PLAIN) or in a file that is a table of numbers (TABLES). Whole numbers are not looked at. A constant that moves, changes its value or is renamed within
 its file keeps its kind and reason with --update. A new one gets the kind "?", which fails the check until
 someone writes both by hand.
 """
@@ -25,7 +29,19 @@ LONGEST_VALUE = 72
 
 DECLARED = re.compile(
     r"\b(?:constexpr|const)\b[^;{}()=]*?[\s&*>](k[A-Z]\w*)\s*((?:\[[^\]]*\]\s*)*)(?=[={])")
-STRUCT = re.compile(r"\bstruct\s+(\w*(?:Options|Parameters))\s*\{")
+PLAIN_DECLARED = re.compile(
+    r"\bconstexpr\s+(?:(?:static|inline)\s+)*[\w:]+\s+([A-Za-z]\w*)\s*(?=(?:=\s*|\{\s*|\(\s*)[-+]?\.?\d)")
+MACRO = re.compile(r"^[ \t]*#[ \t]*define[ \t]+(\w+)[ \t]+(?=[-+(]*\.?\d)", re.M)
+NAMELESS_ENUM = re.compile(r"\benum\s*(?::\s*[\w:]+\s*)?\{([^}]*)\}")
+ENUMERATOR = re.compile(r"(\w+)\s*=\s*([^,}]+)")
+# Whether something is there to be compiled.
+SWITCHES = ("SHAPEDB_HAS_AVX2", "SHAPEDB_DOUBLE2_SSE2", "SHAPEDB_HUGE_PAGES")
+LITERAL = re.compile(r"(?<![\w.])(\d+\.\d*(?:e[-+]?\d+)?|\d+e[-+]?\d+)f?\b")
+# Halves, quarters and small whole numbers; the largest values of 8 and 16 bits; degrees.
+PLAIN = (0, 0.25, 0.5, 1, 1.5, 2, 3, 4, 5, 6, 7, 8, 10, 20, 100, 90, 180, 127, 255, 32767, 1024)
+# Recipes of solids; ranges of histograms (docs/signature.md); units of length.
+TABLES = ("core/synthetic/", "core/signature/statistics.cpp", "core/base/length_unit.h")
+STRUCT = re.compile(r"\bstruct\s+(\w*(?:Options|Parameters|Merging))\s*\{")
 MEMBER = re.compile(
     r"^\s*(?:std::)?(?:u?int\d+_t|size_t|double|float|int|unsigned|long)\s+(\w+)\s*=\s*([^;]+);", re.M)
 
@@ -69,14 +85,50 @@ def value_of(source):
     return value.replace("|", "\\|")
 
 
+def code_of(path):
+    with open(os.path.join(ROOT, path), encoding="utf-8") as file:
+        return without_comments(file.read())
+
+
+def declarations(text):
+    """(start, end, name, value) of each object, macro and enumerator that is a constant, in order."""
+    found = {}
+    for pattern in (DECLARED, PLAIN_DECLARED):
+        for match in pattern.finditer(text):
+            end = end_of_initialiser(text, match.end())
+            value = text[match.end():end]
+            found[match.start(1)] = (match.start(), end, match.group(1), value_of(value))
+    for match in MACRO.finditer(text):
+        end = text.find("\n", match.end())
+        if match.group(1) not in SWITCHES:
+            found[match.start(1)] = (match.start(), end, match.group(1), value_of(text[match.end():end]))
+    for enum in NAMELESS_ENUM.finditer(text):
+        for match in ENUMERATOR.finditer(text, enum.start(1), enum.end(1)):
+            found[match.start(1)] = (match.start(), match.end(), match.group(1), value_of(match.group(2)))
+    return [found[at] for at in sorted(found)]
+
+
+def bare_literals(path):
+    """(line, literal) of numbers that are in no constant."""
+    if path.startswith(TABLES):
+        return
+    text = code_of(path)
+    text = re.sub(r'"(?:\\.|[^"\\\n])*"', lambda match: " " * len(match.group(0)), text)
+    spans = [(start, end) for start, end, _, _ in declarations(text)]
+    for struct in STRUCT.finditer(text):
+        spans.append((struct.start(), end_of_initialiser(text, struct.end() - 1)))
+    if path == PROFILE:
+        spans += [match.span() for match in GIVEN.finditer(text)]
+    for match in LITERAL.finditer(text):
+        if float(match.group(1)) in PLAIN or any(start <= match.start() < end for start, end in spans):
+            continue
+        yield text.count("\n", 0, match.start()) + 1, match.group(0)
+
+
 def constants_of(path):
     """(name, value) of each constant of a file, in order; a member's name is Struct::member."""
-    with open(os.path.join(ROOT, path), encoding="utf-8") as file:
-        text = without_comments(file.read())
-    found = []
-    for match in DECLARED.finditer(text):
-        end = end_of_initialiser(text, match.end())
-        found.append((match.start(), match.group(1), value_of(text[match.end():end])))
+    text = code_of(path)
+    found = [(start, name, value) for start, _, name, value in declarations(text)]
     for struct in STRUCT.finditer(text):
         body = text[struct.end():end_of_initialiser(text, struct.end() - 1)]
         for member in MEMBER.finditer(body):
@@ -94,14 +146,18 @@ def constants_of(path):
     return result
 
 
-def constants_of_core():
-    """{file: [(name, value)]}, files by name."""
+def files_of_core():
     files = []
     for folder, _, names in os.walk(os.path.join(ROOT, "core")):
         for name in names:
             if name.endswith((".h", ".cpp")):
                 files.append(os.path.relpath(os.path.join(folder, name), ROOT))
-    found = {path: constants_of(path) for path in sorted(files)}
+    return sorted(files)
+
+
+def constants_of_core():
+    """{file: [(name, value)]}, files by name."""
+    found = {path: constants_of(path) for path in files_of_core()}
     return {path: rows for path, rows in found.items() if rows}
 
 
@@ -179,6 +235,9 @@ def complaints():
     for path, name in rows:
         if (path, name) not in found:
             yield "%s: %s is listed, but gone" % (path, name)
+    for path in files_of_core():
+        for line, literal in bare_literals(path):
+            yield "%s:%d: %s has no name: make it a constant" % (path, line, literal)
 
 
 def main(arguments):

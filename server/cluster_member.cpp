@@ -54,7 +54,8 @@ Result<std::unique_ptr<ClusterEntrance>> openEntrance(const config::ServerConfig
     entrance->leases = store::leaseTable(store, config.cluster.replicas);
     entrance->source = store::replicaSource(store);
     if (entrance->leases && entrance->source) return entrance;
-    return fail(ErrorCode::kInvalidArgument, "cluster.replicas takes a database that servers can share");
+    return fail(ErrorCode::kInvalidArgument,
+                "cluster.replicas needs a shared database (store.engine = postgres)");
 }
 
 ClusterMember::ClusterMember(std::unique_ptr<ClusterEntrance> entrance, const config::ServerConfig& config,

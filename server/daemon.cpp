@@ -3,11 +3,13 @@
 
 #include <array>
 #include <chrono>
+#include <filesystem>
 #include <fstream>
 #include <utility>
 
 #include <unistd.h>
 
+#include "common/sha256.h"
 #include "core/base/return_if_error.h"
 #include "server/catalog/catalog.h"
 #include "server/catalog/gates.h"
@@ -56,6 +58,14 @@ std::string hostName() {
     return ::gethostname(name.data(), name.size() - 1) == 0 ? std::string(name.data()) : std::string();
 }
 
+/// The same after each start, and another for each data directory of a machine: servers with one name would
+/// take each other's work for what they left when they crashed.
+std::string nameFor(const std::string& dataDirectory) {
+    std::error_code ignored;
+    const std::string path = std::filesystem::weakly_canonical(dataDirectory, ignored).string();
+    return hostName() + "-" + toHex(sha256(path.data(), path.size())).substr(0, 8);
+}
+
 Result<std::unique_ptr<store::Store>> openPostgres(const config::ServerConfig& config) {
     store::PostgresOptions options;
     options.uri = config.postgres.uri;
@@ -64,7 +74,8 @@ Result<std::unique_ptr<store::Store>> openPostgres(const config::ServerConfig& c
         RETURN_IF_ERROR(password);
         options.password = std::move(*password);
     }
-    options.serverName = config.postgres.serverName.empty() ? hostName() : config.postgres.serverName;
+    options.serverName =
+        config.postgres.serverName.empty() ? nameFor(config.data) : config.postgres.serverName;
     options.connections = config.postgres.connections;
     options.pointCompressionLevel = config.store.compressionLevel;
     options.jobLease = std::chrono::seconds(config.postgres.jobLeaseSeconds);

@@ -57,10 +57,12 @@ std::vector<Sample> sampleContent(catalog::Catalog& catalog) {
 std::vector<Sample> sampleCondition(const catalog::Catalog& catalog) {
     const catalog::Condition condition = catalog.condition();
     return {
-        {"shapedb_damaged_collections", "Collections that cannot be searched, for what is stored is damaged.",
-         kGauge, number(condition.damagedCollections)},
-        {"shapedb_segmentation_in_service", "1, or 0 while no scan is taken in, for the queue is damaged.",
-         kGauge, condition.segmentation ? 1.0 : 0.0},
+        {"shapedb_damaged_collections",
+         "Collections that cannot be searched because their stored data is damaged.", kGauge,
+         number(condition.damagedCollections)},
+        {"shapedb_segmentation_in_service",
+         "1, or 0 while scans are refused because the stored queue is damaged.", kGauge,
+         condition.segmentation ? 1.0 : 0.0},
         {"shapedb_content_in_service", "1, or 0 while a restore replaces the collections.", kGauge,
          condition.content ? 1.0 : 0.0},
     };
@@ -70,7 +72,7 @@ std::vector<Sample> sampleCalls(const SampleSources& sources) {
     const catalog::CallCounts running = sources.admission.calls.running();
     const rpc::GrpcServer::State state = sources.grpc.state();
     const http::HttpServer::State http = sources.http.state();
-    const char* calls = "Calls that run, by kind; uploads also count as ordinary.";
+    const char* calls = "Running calls, by kind; uploads also count as ordinary.";
     std::vector<Sample> samples = {
         {"shapedb_calls_running", calls, kGauge, number(running.ordinary), {{"kind", "ordinary"}}},
         {"shapedb_calls_running", calls, kGauge, number(running.uploads), {{"kind", "upload"}}},

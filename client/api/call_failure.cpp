@@ -98,8 +98,8 @@ struct Translation {
 };
 
 constexpr Translation kTranslations[] = {
-    {"DNS resolution failed", "cannot reach a server at {}: this machine knows no host of that name"},
-    {"C-ares", "cannot reach a server at {}: this machine knows no host of that name"},
+    {"DNS resolution failed", "cannot reach a server at {}: its host name cannot be resolved"},
+    {"C-ares", "cannot reach a server at {}: its host name cannot be resolved"},
     {"wrong version number",
      "what answers at {} does not speak TLS: connect without it (no --tls, --tls-ca or SHAPEDB_TLS), or "
      "switch it on at the server; or it is the port of the web page"},
@@ -117,12 +117,12 @@ constexpr Translation kTranslations[] = {
      "what answers at {} is not a ShapeDB server: is it the right port? (that of the web page is another)"},
     {"http1.x",
      "what answers at {} is not a ShapeDB server: is it the right port? (that of the web page is another)"},
-    {"Connection refused", "cannot reach a server at {}: nobody listens there; is shapedbd running?"},
+    {"Connection refused", "cannot reach a server at {}: nothing is listening there; is shapedbd running?"},
     {"No such file or directory",
      "cannot reach a server at {}: there is no such socket; is shapedbd running, and does it listen there?"},
     {"Permission denied", "cannot reach a server at {}: you may not use that socket"},
-    {"No route to host", "cannot reach a server at {}: no way leads there from this machine"},
-    {"Network is unreachable", "cannot reach a server at {}: no way leads there from this machine"},
+    {"No route to host", "cannot reach a server at {}: there is no route to it from this machine"},
+    {"Network is unreachable", "cannot reach a server at {}: there is no route to it from this machine"},
     {"timed out", "cannot reach a server at {}: nothing answers there; is a firewall between?"},
 };
 

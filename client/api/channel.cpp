@@ -137,7 +137,7 @@ bool isPort(const std::string& text) {
 Result<std::string> withPort(const std::string& address, const std::string& host, const std::string& port) {
     if (host.empty() || host == "[]") return refused(address, "it has no host");
     if (port.empty()) return refused(address, "it has no port after the colon");
-    if (!isPort(port)) return refused(address, "'" + port + "' is no port, which are 1 to 65535");
+    if (!isPort(port)) return refused(address, "'" + port + "' is not a port (1 to 65535)");
     return host + ":" + port;
 }
 
@@ -149,7 +149,7 @@ Result<std::string> checkedAddress(const std::string& address) {
     const bool odd =
         std::any_of(address.begin(), address.end(), [](unsigned char c) { return c <= ' ' || c == 0x7f; });
     if (beginsWith(address, "http://") || beginsWith(address, "https://")) {
-        return refused(address, std::string("it begins like that of a web page, whose port is another") +
+        return refused(address, std::string("that is a web address; the API has another port") +
                                     (beginsWith(address, "https") ? " (TLS is switched on apart)" : ""));
     }
     for (const std::string scheme : kSchemes) {

@@ -383,7 +383,7 @@ void addAddCommand(CLI::App& app, Session& session) {
     auto* insertOnly = command->add_flag("--insert-only", flags->insertOnly, "Fail if the key is taken");
     command->add_flag("--update-only", flags->updateOnly, "Fail if no shape has the key")
         ->excludes(insertOnly);
-    command->add_flag("--replace", flags->replace, "Replace other points that have the key")
+    command->add_flag("--replace", flags->replace, "Replace the stored points of a key if they differ")
         ->excludes(insertOnly);
     command->add_flag("--wait", flags->wait, "Wait until all scans are segmented, not only stored");
     command

@@ -147,7 +147,7 @@ void addAlignCommand(CLI::App& app, Session& session) {
         "Lay a scan or a stored shape on a scan: the motion, how well they fit and which other poses fit as "
         "well (two files need no server)");
     command->add_option("QUERY", flags->query, "Scan that stays where it is")->required();
-    command->add_option("OTHER", flags->other, "Scan of a whole object that is laid on it");
+    command->add_option("OTHER", flags->other, "Scan of the whole object to align to QUERY");
     command->add_option("-o,--out", flags->out, "Write OTHER, moved onto QUERY, in double precision")
         ->type_name("FILE.ply")
         ->check(endsIn(".ply"));

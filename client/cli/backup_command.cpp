@@ -46,7 +46,7 @@ std::string chainText(const BackupFlags& flags) {
 CommandResult runIncrement(Session& session, const client::Client& client, const BackupFlags& flags) {
     const std::string& since = *flags.since;
     // A script that found no earlier backup must not get a full one in its place.
-    if (since.empty()) return fail(ErrorCode::kInvalidArgument, "--since names no file");
+    if (since.empty()) return fail(ErrorCode::kInvalidArgument, "--since: the name of a file is missing");
     const auto report = client.incrementToFile(flags.file, since, session.context());
     RETURN_IF_ERROR(report);
     session.console().document({{"file", flags.file},

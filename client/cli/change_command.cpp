@@ -278,8 +278,9 @@ void addChangeCommands(CLI::App& app, Session& session) {
     command->add_flag("--yes", metadata->yes, "Replace the metadata of the shapes of --filter");
 
     const auto retried = std::make_shared<TargetFlags>();
-    addOne(app, session, "retry", "Segment shapes that failed again: these, those of --filter, or all",
-           retried, &runRetry);
+    addOne(app, session, "retry",
+           "Try again to segment shapes that failed: these, those that match --filter, or all", retried,
+           &runRetry);
 }
 
 }  // namespace shapedb::cli

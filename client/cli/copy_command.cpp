@@ -103,7 +103,7 @@ class Copying {
 
     Result<void> copyEverything() {
         if (!flags_.force) RETURN_IF_ERROR(requireEmpty());
-        session_.leftBehind = "the other server is as it was, or has all that was there; copy again";
+        session_.leftBehind = "the other server is either unchanged or fully restored; copy again";
         const auto restored = sides_.from.copyEverything(sides_.to, session_.context());
         RETURN_IF_ERROR(restored);
         restored_ = *restored;

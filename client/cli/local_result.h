@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the command computes itself, in the form of a reply of the server, so that both are shown alike.
+// Results that the command computes itself, in the form of a server reply, so that both print the same.
 #pragma once
 
 #include "client/api/types.h"

@@ -217,9 +217,8 @@ void addMatchCommand(CLI::App& app, Session& session) {
     auto flags = std::make_shared<MatchFlags>();
     CLI::App* command = app.add_subcommand(
         "match", "Find for each scan of folder A its best partner in folder B (needs no server)");
-    command->add_option("FOLDER_A", flags->a, "Scans that a partner is looked for: a folder or one file")
-        ->required();
-    command->add_option("FOLDER_B", flags->b, "Scans that may be one")->required();
+    command->add_option("FOLDER_A", flags->a, "Scans to find partners for: a folder or one file")->required();
+    command->add_option("FOLDER_B", flags->b, "Candidate partners")->required();
     command->add_option("--threshold", flags->threshold, "Below this score there is no partner, 0 to 1")
         ->check(CLI::Range(0.0, 1.0))
         ->capture_default_str();
@@ -227,7 +226,7 @@ void addMatchCommand(CLI::App& app, Session& session) {
     command->add_option("-o,--out", flags->out, "Write them to a file")
         ->type_name("FILE.csv")
         ->check(endsIn(".csv"));
-    command->add_option("--threads", flags->threads, "Changes only the time it takes")
+    command->add_option("--threads", flags->threads, "Number of threads; does not change the result")
         ->check(CLI::Range(1, 1024))
         ->capture_default_str();
     addScoreFlags(*command, flags->score);

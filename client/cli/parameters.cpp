@@ -199,7 +199,7 @@ void addUnitFlag(CLI::App& command, std::optional<LengthUnit>& unit) {
 
 void addFreeScaleFlag(CLI::App& command, ScoreFlags& flags) {
     command
-        .add_flag("--free-scale", flags.freeScale, "Do not compare sizes, although there is a unit of length")
+        .add_flag("--free-scale", flags.freeScale, "Ignore sizes even if the collection has a unit of length")
         ->excludes(command.get_option("--keep-scale"));
 }
 
@@ -236,7 +236,7 @@ void addVerifyFlags(CLI::App& command, VerifyFlags& flags) {
     command.add_flag("--no-verify", set(false), "Rank by the signatures alone")->excludes(on);
     command
         .add_option("--candidates", flags.candidates,
-                    "Verify at most so many candidates [32; open and incomplete queries 64; --partial 128]")
+                    "Verify at most this many candidates [32; open and incomplete queries 64; --partial 128]")
         ->check(CLI::Range(1, 10000));
     auto* allSides = command.add_flag_function(
         "--all-sides", [&flags](std::int64_t) { flags.oneSided = false; },
@@ -248,7 +248,7 @@ void addVerifyFlags(CLI::App& command, VerifyFlags& flags) {
         ->excludes(allSides);
     command
         .add_option("--viewpoint", flags.viewpoint,
-                    "Where that camera stood: X,Y,Z in the coordinates of the query")
+                    "Position of that camera: X,Y,Z in the coordinates of the query")
         ->delimiter(',')
         ->expected(3)
         ->excludes(allSides);
@@ -257,8 +257,8 @@ void addVerifyFlags(CLI::App& command, VerifyFlags& flags) {
 void addClusterFlags(CLI::App& command, ClusterFlags& flags) {
     command
         .add_option("--at-least", flags.atLeast,
-                    "With several servers: the answer must know this change, which add, get and delete tell "
-                    "with --json")
+                    "With several servers: the answer must include this change (add, get and delete print "
+                    "its number with --json)")
         ->check(atLeastZero())
         ->type_name("N");
     command.add_flag("--allow-partial", flags.allowPartial,

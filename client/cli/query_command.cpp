@@ -250,8 +250,8 @@ void addQueryCommand(CLI::App& app, Session& session) {
     command
         ->add_option(
             "--out-aligned", flags->aligned,
-            "Write the query and the hits, laid on it, in its coordinates: PLY files in this folder, "
-            "of several queries in folders below it")
+            "Write the query and the hits aligned to it as PLY files to this folder, those of several "
+            "queries to folders below it")
         ->type_name("DIR");
     command->callback(
         [&session, flags] { session.action = [&session, flags] { return runQuery(session, *flags); }; });

@@ -142,7 +142,7 @@ void addReportCommand(CLI::App& app, Session& session) {
     auto flags = std::make_shared<ReportFlags>();
     CLI::App* command = app.add_subcommand(
         "report",
-        "Write a search as one HTML file: the query and its hits, laid on it and turnable, with the reasons");
+        "Write a search as one HTML page: the query, the hits aligned to it in 3D, and the reasons");
     command->add_option("QUERY", flags->path,
                         "Scan to search with, or - for standard input; it is not stored");
     command->add_option("--key", flags->key, "Search with this stored shape instead")->check(notEmpty());

@@ -26,7 +26,7 @@ constexpr const char* kFooter =
 void addGlobalOptions(CLI::App& app, GlobalOptions& options) {
     auto* json = app.add_flag("--json", options.json, "Print one JSON document instead of text");
     app.add_flag("--json-lines", options.jsonLines,
-                 "Print one line of JSON for each item, as they come, or one for the result")
+                 "Print one line of JSON for each item as it arrives, or one for the whole result")
         ->excludes(json);
     app.add_option("--server", options.server, "Server address")
         ->envname("SHAPEDB_SERVER")
@@ -37,8 +37,8 @@ void addGlobalOptions(CLI::App& app, GlobalOptions& options) {
         ->type_name("FILE");
     app.add_flag("--tls", options.tls.enabled, "Protect the connection with TLS [SHAPEDB_TLS=1]");
     app.add_option("--tls-ca", options.tls.caFile,
-                   "Who signs the server's certificate, PEM; implies --tls [SHAPEDB_TLS_CA; whom this "
-                   "machine trusts]")
+                   "Certificates of the authorities that may have signed the server's certificate, PEM; "
+                   "implies --tls [SHAPEDB_TLS_CA; those of the system]")
         ->type_name("FILE");
     app.add_option("--client-certificate", options.tls.certificateFile,
                    "For servers that ask for one, PEM [SHAPEDB_CLIENT_CERTIFICATE]")

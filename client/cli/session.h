@@ -28,7 +28,7 @@ struct GlobalOptions {
 };
 
 /// Session::leftBehind of commands that ask the server for one change.
-constexpr const char* kPerhapsChanged = "the server may have done it all the same";
+constexpr const char* kPerhapsChanged = "the server may have completed it anyway";
 
 /// The exit code of a finished command, or the error that ended it, which the caller prints.
 using CommandResult = Result<int>;
@@ -78,7 +78,7 @@ void addHealthCommand(CLI::App& app, Session& session);
 void addDuplicatesCommand(CLI::App& app, Session& session);
 void addMatchCommand(CLI::App& app, Session& session);
 void addReportCommand(CLI::App& app, Session& session);
-/// help, completion and man: what is said of all the others, which must have been added before.
+/// help, completion and man: documents the other commands, which must have been added before.
 void addHelpCommands(CLI::App& app, Session& session);
 /// Below `shapedb admin`.
 void addBackupCommands(CLI::App& admin, Session& session);

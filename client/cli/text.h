@@ -47,7 +47,7 @@ namespace shapedb::cli {
 /// A bar of `width` cells filled to `share` of [0, 1], in eighths: "█████▌    ".
 [[nodiscard]] std::string bar(double share, int width);
 
-/// A name or path as a part of a line: what a stranger may have put in it, line ends too, is escaped
+/// A name or path as a part of a line: untrusted characters, line ends too, are escaped
 /// (common/safe_text.h).
 [[nodiscard]] std::string inLine(const std::string& name);
 

@@ -112,7 +112,7 @@ std::string complaint(const CLI::App& app, const CLI::App& command, const CLI::P
     if (!first.empty() && !shownCommands(command).empty()) {
         return "unknown command '" + first + "'" + didYouMean(meantCommand(command, first));
     }
-    if (!first.empty()) return "there is no place for '" + first + "'";
+    if (!first.empty()) return "unexpected argument '" + first + "'";
     std::string message = error.what();
     std::replace(message.begin(), message.end(), '\n', ' ');
     return inPlainWords(message, command);

@@ -199,7 +199,7 @@ class GltfReader {
         RETURN_IF_ERROR(points);
         const VertexRange range = {content_.vertices.size(), points->size()};
         if (tooManyCopies(range.first + range.count, document_.bytesRead())) {
-            return fail(document_.malformed(who + ": so many copies of its meshes are not read"));
+            return fail(document_.malformed(who + ": too many copies of its meshes"));
         }
         for (const Point3& p : *points) {
             const Point3 placed = motion(p);
@@ -215,7 +215,7 @@ class GltfReader {
         fan.begin();
         strip.begin();
         if (tooManyCopies(content_.triangles.size() + corners.size(), document_.bytesRead())) {
-            return fail(document_.malformed(who + ": so many copies of its triangles are not read"));
+            return fail(document_.malformed(who + ": too many copies of its triangles"));
         }
         if (mode == kTriangles && corners.size() % 3 != 0) {
             return fail(document_.malformed(who + " has a triangle without three corners"));

@@ -261,7 +261,7 @@ Result<std::string> GltfDocument::loadBuffer(const json& buffer, std::uint64_t i
         if (index == 0 && binaryChunk_) return *std::move(binaryChunk_);
         return fail(malformed(who + " has no data"));
     }
-    if (!member->is_string()) return fail(malformed(who + ".uri is no text"));
+    if (!member->is_string()) return fail(malformed(who + ".uri is not text"));
     const auto& uri = member->get_ref<const std::string&>();
     if (uri.rfind("data:", 0) != 0) return loadFile(uri, who);
     const std::size_t comma = uri.find(',');

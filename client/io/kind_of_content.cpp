@@ -100,10 +100,10 @@ bool isTextOfPoints(const std::vector<std::string_view>& lines) {
     bool countMayFollow = true;
     bool namesMayFollow = true;
     for (const std::string_view line : lines) {
-        std::string parted(line);
+        std::string separated(line);
         std::replace_if(
-            parted.begin(), parted.end(), [](char c) { return c == ',' || c == ';' || c == '"'; }, ' ');
-        const KindWords words = wordsOf(parted);
+            separated.begin(), separated.end(), [](char c) { return c == ',' || c == ';' || c == '"'; }, ' ');
+        const KindWords words = wordsOf(separated);
         if (words.empty() || isOneOf(words[0].substr(0, 1), {"#", "%", "!"}) ||
             words[0].substr(0, 2) == "//") {
             continue;

@@ -81,7 +81,7 @@ class LasReader {
             shift_[axis] = load<double>(kShiftAt + 8 * axis);
             if (!std::isfinite(scale_[axis]) || !std::isfinite(shift_[axis]) || scale_[axis] == 0.0) {
                 return fail(
-                    file_.malformedByte(kScaleAt, "the scale or offset of the coordinates is no number"));
+                    file_.malformedByte(kScaleAt, "the scale or offset of the coordinates is not a number"));
             }
         }
         const std::uint64_t points = load<std::uint32_t>(kPointsAt);

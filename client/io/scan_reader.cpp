@@ -112,7 +112,7 @@ Result<const Format*> chooseFormat(const std::string& path, const std::string& g
     if (path == "-") {
         return fail(
             ErrorCode::kInvalidArgument,
-            "standard input: has no ending that says its format; name it (--format), one of " + endingList());
+            "standard input: has no file extension; give its format (--format), one of " + endingList());
     }
     if (const Format* format = formatOf(path)) return format;
     return fail(unknownFormat(path));

@@ -134,7 +134,8 @@ class StlReader {
 
     Error notStl() {
         return file_.malformed(
-            "this is no STL file: it does not begin with 'solid' and has not the size of a binary one");
+            "this is not an STL file: it does not begin with 'solid' and does not have the size of a binary "
+            "one");
     }
 
     // The header must be in the buffer.
@@ -151,7 +152,7 @@ class StlReader {
         if (looksLikeText()) {
             return fail(
                 file_.malformed("expected 'solid', found " + inQuotes(firstWord(file_.peek(kSniffedBytes))) +
-                                "; this is no ASCII STL file, and its size is not that of a binary one"));
+                                "; this is not an ASCII STL file, and its size is not that of a binary one"));
         }
         const std::uint64_t count = announcedTriangles();
         file_.consume(static_cast<std::size_t>(kHeaderBytes + 4));

@@ -291,7 +291,7 @@ class ThreeMfReader {
             if (++placements_ > kMostPlacements ||
                 tooManyCopies(content_.vertices.size() + object.vertices.size(), archive_.packedBytes()) ||
                 tooManyCopies(content_.triangles.size() + object.triangles.size(), archive_.packedBytes())) {
-                return fail(file_.malformed(who + ": so many copies of objects are not read"));
+                return fail(file_.malformed(who + ": too many copies of objects"));
             }
             RETURN_IF_ERROR(addMesh(object, here.motion, who));
             for (auto component = object.components.rbegin(); component != object.components.rend();

@@ -33,7 +33,7 @@ Result<ZipArchive> ZipArchive::read(InputFile& file) {
         ::zip_source_free(source);
         const std::string reason = inQuotes(::zip_error_strerror(&error));
         ::zip_error_fini(&error);
-        return fail(file.malformed("this is no ZIP archive, or it is damaged: " + reason));
+        return fail(file.malformed("this is not a ZIP archive, or it is damaged: " + reason));
     }
     ::zip_error_fini(&error);
     return archive;

@@ -32,6 +32,10 @@ constexpr float kLeastWeight = 4.0f;
 
 constexpr double kDamping = 1e-4;
 
+// Radians, pixels' sides: below these there is nothing to divide by.
+constexpr double kNoTurn = 1e-12;
+constexpr float kLeastPixel = 1e-6f;
+
 float reduced(float width) { return 1.0f / (width * width); }
 
 // The upper triangle of the normal equations, all seven unknowns.
@@ -73,7 +77,7 @@ System systemOf(const StepSums& sums) {
 // The rotation about `turn` by its length, in radians.
 Matrix3 rotationBy(const Point3& turn) {
     const double angle = length(turn);
-    if (!(angle > 1e-12)) return Motion{}.rotation;
+    if (!(angle > kNoTurn)) return Motion{}.rotation;
     return rotationAbout((1.0 / angle) * turn, angle);
 }
 
@@ -93,7 +97,7 @@ bool applyStep(const StepSums& sums, bool keepScale, Motion& pose) {
     System s = systemOf(sums);
     const double trace = s.matrix.trace();
     if (!(trace > 0.0) || !std::isfinite(trace)) return false;
-    s.matrix.diagonal().array() += kDamping * trace / 7.0;
+    s.matrix.diagonal().array() += kDamping * trace / static_cast<double>(StepSums::kUnknowns);
     Eigen::Matrix<double, 7, 1> step = Eigen::Matrix<double, 7, 1>::Zero();
     if (keepScale) {
         step.head<6>() = s.matrix.topLeftCorner<6, 6>().ldlt().solve(-s.right.head<6>());
@@ -162,7 +166,7 @@ void Comparison::weighFront(const Motion& pose, const FitView& view, std::size_t
     }
     float pixel = kPixelSpacings * other_.spacingOf(count) * static_cast<float>(pose.scale);
     pixel = std::max({pixel, (highX - lowX) / static_cast<float>(kMostPixels - 1),
-                      (highY - lowY) / static_cast<float>(kMostPixels - 1), 1e-6f});
+                      (highY - lowY) / static_cast<float>(kMostPixels - 1), kLeastPixel});
     const float perPixel = 1.0f / pixel;
     const int columns = static_cast<int>((highX - lowX) * perPixel) + 1;
     const int rows = static_cast<int>((highY - lowY) * perPixel) + 1;

@@ -69,9 +69,9 @@ struct FitResult {
     /// (1 - F - e) / (typicalMisfit(kind) - e) of the best, at least 0, where e = 0.06 is what two scans of
     /// one object differ by at best: 0 if the shapes coincide, about 1 if they are unrelated.
     double misfit = 1.0;
-    /// 1 - F of the best clearly different pose / F of the best: 0 when another is as good, 1 when there is
-    /// no other comes near: poses that fall below 0.85 of the best before the last stage are not followed,
-    /// and count as none. Turns about a free axis are not different poses.
+    /// 1 - F of the best clearly different pose / F of the best: 0 when another is as good, 1 when no other
+    /// pose comes near: poses that fall below 0.85 of the best before the last stage are dropped and do not
+    /// count. Turns about a free axis are not different poses.
     double certainty = 0.0;
     /// Clearly different poses (more than 4 % of the query's diagonal apart) whose score is within 3 % of the
     /// best, best first; at most kMostAlternatives, of however many there are.

@@ -28,6 +28,9 @@ constexpr std::size_t kOutline = 64;
 // One-sided: extent along the view over the smallest extent.
 constexpr double kDeepest = 1.7;
 
+// An outline narrower than this is none to divide by.
+constexpr double kLeastAcross = 1e-6;
+
 // A piece may be as large as the whole or smaller: diagonal of the whole over that of the piece.
 constexpr std::array<double, 5> kPieceScales = {1.0, 1.12, 1.25, 1.4, 1.6};
 
@@ -267,7 +270,8 @@ class Search {
             const double across = reach.high[j] - reach.low[j] + reach.high[k] - reach.low[k];
             Placement p;
             p.axis = axis;
-            p.scale = options_.keepScale ? keptScale_ : 2.0 * (half_[j] + half_[k]) / std::max(across, 1e-6);
+            p.scale = options_.keepScale ? keptScale_
+                                         : 2.0 * (half_[j] + half_[k]) / std::max(across, kLeastAcross);
             p.shift[j] = -0.5 * p.scale * (reach.low[j] + reach.high[j]);
             p.shift[k] = -0.5 * p.scale * (reach.low[k] + reach.high[k]);
             p.shift[axis] = half_[axis] - p.scale * reach.high[axis];

@@ -25,8 +25,8 @@
 
 namespace shapedb {
 
-/// What a scan found out about a row, handed on to `scoreIfReaches`. Only the scorer that wrote it knows
-/// what it is: any value of at most kMostBytes that may be copied as bytes.
+/// Intermediate results of a scan for one row, handed on to `scoreIfReaches`. Only the scorer that wrote them
+/// knows what they are: any value of at most kMostBytes that may be copied as bytes.
 class Findings {
   public:
     /// The largest: the level sums of scorers with attributes, 16 bits for each statistic.

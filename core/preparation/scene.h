@@ -38,7 +38,7 @@ constexpr std::int32_t kOnPlane = -1;
 constexpr std::int32_t kNoObject = -2;
 
 /// Finds both among at least 16 points; among fewer there is one object and no plane. All points must be
-/// finite. Of more than 20,000 points that many decide, and the others join their nearest.
+/// finite. Of larger scans 20,000 points decide, and the others join their nearest neighbour.
 ///
 /// The plane with the most points of 1,500 drawn through three points each (RANSAC, Fischler and Bolles 1981)
 /// is fitted to its points by least squares; if it supports nothing the next is looked at, up to three.

@@ -14,7 +14,7 @@ namespace shapedb {
 
 struct ThinnedPoints {
     PointCloud points;                       ///< a subset of the points given, in their order
-    std::vector<std::uint32_t> siteOfPoint;  ///< input point -> the point of `points` that stands for it
+    std::vector<std::uint32_t> siteOfPoint;  ///< input point -> its representative in `points`
 };
 
 /// Goes through the points by distance from their centroid and keeps each that has no kept point within

@@ -13,6 +13,7 @@ namespace shapedb {
 
 namespace {
 
+constexpr double kSideGrowth = 1.05;  // of voxels, until there are few enough
 constexpr std::uint64_t kSeed = 1969;
 constexpr std::int32_t kGapSteps = 256;  // positions between two centres are counted in such steps
 
@@ -66,7 +67,7 @@ void InteriorGrid::layOut(const InteriorView& view, double side) {
     side_ = side;
     const auto countAlong = [this](double length) { return std::ceil(length / side_) + 3.0; };
     const auto voxels = [&] { return countAlong(extent.x) * countAlong(extent.y) * countAlong(extent.z); };
-    while (voxels() > static_cast<double>(kMostVoxels)) side_ *= 1.05;
+    while (voxels() > static_cast<double>(kMostVoxels)) side_ *= kSideGrowth;
     for (std::size_t axis = 0; axis < 3; ++axis) {
         count_[axis] = static_cast<std::int32_t>(countAlong(along(extent, axis)));
     }

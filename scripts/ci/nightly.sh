@@ -31,6 +31,9 @@ reliability() {
   scaled 40 shapedb_reliability_test '*OutOfMemory*' || return 1
   scaled 20 shapedb_reliability_test '*Failpoint*' || return 1
   scaled 20 shapedb_server_test '*ModelTest*' || return 1
+  scaled 20 shapedb_server_test 'ClusterSimulation.*' || return 1
+  REQUIRE_POSTGRES=1 scaled 10 shapedb_integration_test 'ClusterTest.AnswersAreThose*' || return 1
+  scripts/ci/cluster-mutants.py "$build" || return 1
   attack 10 kill || return 1
   attack 20 shared_kill || return 1
   attack 25 cluster_kill || return 1

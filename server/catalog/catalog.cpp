@@ -155,8 +155,7 @@ Result<void> Catalog::deleteCollection(const std::string& name, bool force) {
     });
     if (deleted || !gone) return deleted;
     log_->error(
-        "the space of a deleted collection is not free yet: the next deletion of one goes on, or the next "
-        "start",
+        "the space of a deleted collection is not freed yet: the next deletion or the next start continues",
         telemetry::fieldsOf(deleted.error()));
     return {};
 }

@@ -373,7 +373,7 @@ class Catalog {
                                        const MayReplace& mayReplace = nullptr);
     /// Calls that wait for a restore to end before they change something.
     [[nodiscard]] int waitingWrites() const { return restores_.waitingWrites(); }
-    /// Rises with each restore: ids read under one epoch may mean other shapes under another.
+    /// Rises with each restore: ids are only valid within one epoch.
     [[nodiscard]] std::uint64_t epoch() const { return restores_.epoch(); }
     [[nodiscard]] Result<CatalogStats> stats();
     /// As `stats`; what would take long to count may be some time old (RecentStats).

@@ -118,7 +118,7 @@ Admission::Admission(std::uint64_t uploadBytes, int uploadCalls)
     : calls({kMaxOrdinaryCalls, uploadCalls, kMaxAdminCalls, kMaxLongAdminCalls}),
       uploads(uploadBytes, "bytes of points that uploads in progress may hold (limits.max_upload_bytes)"),
       followers(kMaxFollowers, "calls that may wait for shapes and rebuilds"),
-      requests(kMaxRequestsBytes, "bytes that large messages may become in memory"),
+      requests(kMaxRequestsBytes, "bytes of memory for decoding large messages"),
       answers(kMaxAnswersBytes, "bytes that large answers may take together"),
       copies(kMaxCopies, "places for a backup or restore in transit") {}
 

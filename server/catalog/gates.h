@@ -25,8 +25,8 @@ struct CallCounts {
     int longAdmin = 0;  ///< among them
 };
 
-/// Counts running calls, and admits none beyond the limits of its kind, so that whoever fills one kind leaves
-/// room for the others; once draining, admits no more. Thread-safe.
+/// Counts running calls, and admits none beyond the limits of its kind, so that one kind of call cannot
+/// starve the others; once draining, admits no more. Thread-safe.
 class CallGate {
   public:
     /// `limits`: the most that may run at a time.
@@ -63,8 +63,7 @@ class RestoreGate {
         std::shared_lock<std::shared_mutex> lock_;
     };
 
-    /// Rises before and after content is replaced: ids read under one epoch may mean other shapes under
-    /// another.
+    /// Rises before and after content is replaced: ids are only valid within one epoch.
     [[nodiscard]] std::uint64_t epoch() const { return epoch_.load(); }
 
     /// Errors: kRejected (a restore is running).

@@ -2,7 +2,7 @@
 // Scatter and gather: which server is asked for which shards of one request, and when its answers together
 // are the answer of the whole.
 //
-// Without threads, clock or network: who drives it sends what it asks, and tells it what came back. That is
+// Without threads, clock or network: the caller sends what it asks for, and reports what came back. That is
 // how a simulation runs it.
 //
 // What holds when it is `complete`: each of the 256 shards is in exactly one of the `accepted` answers; each

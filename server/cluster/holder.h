@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Whether a server may answer what it is asked for, at a moment.
+// Decides whether a server may answer a request now.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace shapedb::cluster {
 
-/// What a search of this server would read. Immutable while it does.
+/// What a search of this server would read. Immutable during the search.
 struct Content {
     ShardSet complete;            ///< shards that are there as a whole
     std::int64_t number = 0;      ///< the last change that it knows of all of them

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a thread needs that has asked several servers at once.
+// Collects the answers of several servers that were asked at once.
 #pragma once
 
 #include <chrono>
@@ -17,7 +17,7 @@
 
 namespace shapedb::cluster {
 
-/// Who waits for answers looks this often at whether it should stop.
+/// How often a wait for answers looks for cancellation.
 constexpr std::chrono::milliseconds kInboxPause{20};
 
 /// Answers in the order in which they come in. Thread-safe.
@@ -34,7 +34,7 @@ class Inbox {
         came_.notify_one();
     }
 
-    /// Nothing if none came in a while.
+    /// Nothing if none has come within kInboxPause.
     std::optional<Entry> take() {
         std::unique_lock<std::mutex> lock(mutex_);
         if (!came_.wait_for(lock, kInboxPause, [this] { return !entries_.empty(); })) return std::nullopt;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The leases of one server: what it asks of the table, and for which shards it may answer at a moment.
 //
-// Without threads, clock or database: who drives it sends `next` to a LeaseTable about three times in the
-// length of a lease, and tells what came of it. That is how a simulation runs it.
+// Without threads, clock or database: the caller sends `next` to a LeaseTable about three times in the length
+// of a lease, and reports the result. That is how a simulation runs it.
 //
 // What holds: the keeper never says that the server may answer for a shard under an epoch that the table has
 // given away or let end. For that it counts a lease from before the beat that renewed it was sent, and lets a

@@ -49,6 +49,8 @@ struct Beat {
 struct ClusterView {
     std::vector<Lease> leases;
     std::vector<std::string> servers;
+    /// This beat made or removed slots because another server has, or had, another number of replicas.
+    bool resized = false;
 };
 
 /// Thread-safe.

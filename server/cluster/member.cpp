@@ -17,6 +17,7 @@ constexpr std::chrono::milliseconds kPause{100};
 constexpr std::chrono::milliseconds kPatience{1'000};
 /// Rows, and changes, that are read together.
 constexpr std::size_t kPageRows = 4'096;
+constexpr std::chrono::minutes kBetweenWarnings{1};
 /// A lease is renewed this often in its length.
 constexpr int kBeatsOfTerm = 3;
 
@@ -56,6 +57,12 @@ Result<void> Member::beatOnce() {
     keeper_.onView(sentAt, *view);
     routes_ = routesOf(*view);
     viewedAt_ = sentAt;
+    if (view->resized && view->servers.size() > 1 && now() >= nextWarning_) {
+        parts_.log->warn(
+            "another server of this database has another cluster.replicas: shards have fewer holders than "
+            "they should until all have the same");
+        nextWarning_ = now() + kBetweenWarnings;
+    }
     wake_ = true;  // it may want other shards
     ++news_;
     changed_.notify_all();

@@ -95,6 +95,7 @@ class Member {
     std::condition_variable changed_;
     LeaseKeeper keeper_;
     RoutesPtr routes_;
+    Instant nextWarning_{};
     Instant viewedAt_{};  ///< when the beat was sent that saw the table of leases last
     ShardSet loaded_;
     std::map<std::int64_t, std::shared_ptr<ShardContent>> contents_;

@@ -26,7 +26,7 @@ struct Position {
 /// The next changes, and what became of their shapes.
 struct Changes {
     Position at;                        ///< of the transaction
-    std::int64_t upTo = 0;              ///< the last change told of; `at.number` if all are
+    std::int64_t upTo = 0;              ///< the last change included; `at.number` if all are
     bool forgotten = false;             ///< some are not kept any more: nothing but `at` is set
     std::vector<std::int64_t> changed;  ///< ids of shapes, without repetition
     std::vector<store::IndexRow> rows;  ///< of those that have a signature that serves, now

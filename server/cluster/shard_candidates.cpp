@@ -84,10 +84,11 @@ class ShardCandidates::Scatter {
         if (!since_) since_ = now;
         if (now - *since_ >= kPatience) {
             if (of_.search_.allowPartial) return false;
-            return fail(ErrorCode::kUnavailable,
-                        std::to_string(kShards - gather_.covered().count()) + " of " +
-                            std::to_string(kShards) +
-                            " shards of the collection have no server that answers for them now: try again");
+            return fail(
+                ErrorCode::kUnavailable,
+                std::to_string(kShards - gather_.covered().count()) + " of " + std::to_string(kShards) +
+                    " shards of the collection have no server that can answer for them now: it is gone, "
+                    "or still reads what has changed; try again");
         }
         if (now < nextLook_) return true;
         nextLook_ = now + kBetweenRoutes;

@@ -170,7 +170,7 @@ Setting optionalAddress(const std::string& key, Field field, std::string help) {
 Setting hostsSetting() {
     Setting setting =
         named("http.hosts", SettingKind::kText, "names or empty",
-              "Names, separated by commas, by which browsers may ask for a server without keys.");
+              "Host names, separated by commas, that browsers may use to reach a server without keys.");
     setting.assign = [](ServerConfig& config, const std::string& text) -> Result<void> {
         for (const std::string& name : splitNames(text)) {
             const bool good = !name.empty() && std::all_of(name.begin(), name.end(), isHostByte);
@@ -230,8 +230,8 @@ std::vector<Setting> makeSettings() {
         dataSetting(),
         choice(
             "role", {"all", "serve", "worker"}, [](C& c) -> std::string& { return c.role; },
-            "What this server does of those that share a database: serve answers calls and leaves "
-            "segmenting to others, worker only segments. SQLite takes all."),
+            "Role among servers that share a database: serve answers calls and leaves segmenting to others, "
+            "worker only segments. With SQLite only all is allowed."),
         optionalPath(
             "unix_socket", [](C& c) -> std::string& { return c.unixSocket; },
             "Unix socket to serve on as well, for the owner of this process and without API key. Empty: "
@@ -251,7 +251,7 @@ std::vector<Setting> makeSettings() {
             "Clients need a certificate signed by one of these (PEM). Empty: they need none."),
         choice(
             "security.keys", {"network", "always"}, [](C& c) -> std::string& { return c.security.keys; },
-            "Who must have an API key: callers of a server beyond loopback, or always everybody."),
+            "Who must have an API key: callers from other machines (network), or every caller (always)."),
         optionalPath(
             "security.audit_file", [](C& c) -> std::string& { return c.security.auditFile; },
             "Log of refused calls and those of administrators (JSON). Empty: audit.log in the data "

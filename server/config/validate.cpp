@@ -38,10 +38,10 @@ Result<void> validateMetrics(const ServerConfig& config) {
 Result<void> validateStore(const ServerConfig& config) {
     const bool postgres = config.store.engine == "postgres";
     if (postgres && config.postgres.uri.empty()) {
-        return fail(ErrorCode::kInvalidArgument, "store.engine = postgres takes postgres.uri");
+        return fail(ErrorCode::kInvalidArgument, "store.engine = postgres requires postgres.uri");
     }
     if (!postgres && !config.postgres.uri.empty()) {
-        return fail(ErrorCode::kInvalidArgument, "postgres.uri takes store.engine = postgres");
+        return fail(ErrorCode::kInvalidArgument, "postgres.uri requires store.engine = postgres");
     }
     return {};
 }
@@ -50,10 +50,11 @@ Result<void> validateCluster(const ServerConfig& config) {
     const ServerConfig::Cluster& cluster = config.cluster;
     const bool shared = config.store.engine == "postgres";
     if (!shared && config.role != "all") {
-        return fail(ErrorCode::kInvalidArgument, "role = " + config.role + " takes store.engine = postgres");
+        return fail(ErrorCode::kInvalidArgument,
+                    "role = " + config.role + " requires store.engine = postgres");
     }
     if (!shared && cluster.replicas > 0) {
-        return fail(ErrorCode::kInvalidArgument, "cluster.replicas takes store.engine = postgres");
+        return fail(ErrorCode::kInvalidArgument, "cluster.replicas requires store.engine = postgres");
     }
     const bool tls = !cluster.certificate.empty();
     if (tls != !cluster.key.empty() || tls != !cluster.ca.empty()) {
@@ -62,20 +63,20 @@ Result<void> validateCluster(const ServerConfig& config) {
     }
     if (cluster.replicas == 0) return {};
     if (cluster.listen.empty()) {
-        return fail(ErrorCode::kInvalidArgument, "cluster.replicas takes cluster.listen");
+        return fail(ErrorCode::kInvalidArgument, "cluster.replicas requires cluster.listen");
     }
     const auto endpoint = parseEndpoint(cluster.listen);
     const bool isAnyAddress = endpoint && (endpoint->host == "0.0.0.0" || endpoint->host == "::");
     if (isAnyAddress && cluster.advertise.empty()) {
         return fail(ErrorCode::kInvalidArgument,
                     "cluster.listen = " + cluster.listen +
-                        " is no address that other servers can ask: name one as cluster.advertise");
+                        " is not an address that other servers can reach: set cluster.advertise");
     }
     if (tls || !isBeyond(cluster.listen) || config.security.anyoneMayDoAll == "yes") return {};
     return fail(ErrorCode::kInvalidArgument,
                 "cluster.listen = " + cluster.listen +
-                    " is beyond this machine, and who connects there reads every collection: it takes "
-                    "cluster.certificate, cluster.key and cluster.ca");
+                    " can be reached from other machines, and whoever connects there can read every "
+                    "collection: it requires cluster.certificate, cluster.key and cluster.ca");
 }
 
 /// What must not be reachable beyond this machine without TLS.
@@ -86,18 +87,18 @@ Result<void> validateSecurity(const ServerConfig& config) {
                     "tls.certificate and tls.key belong together: set both or neither");
     }
     if (!tls && !config.tls.clientCa.empty()) {
-        return fail(ErrorCode::kInvalidArgument, "tls.client_ca takes tls.certificate and tls.key");
+        return fail(ErrorCode::kInvalidArgument, "tls.client_ca requires tls.certificate and tls.key");
     }
     RETURN_IF_ERROR(validateMetrics(config));
     if (tls || config.security.anyoneMayDoAll == "yes") return {};
     const std::string beyond = addressBeyond(config);
     if (beyond.empty()) return {};
-    return fail(
-        ErrorCode::kInvalidArgument,
-        beyond +
-            " is beyond this machine, which takes TLS (tls.certificate, tls.key) and API keys (shapedbd "
-            "key create); see docs/security.md. For a network where everybody may do everything set " +
-            kAnyoneMayDoAll + " = yes");
+    return fail(ErrorCode::kInvalidArgument,
+                beyond +
+                    " can be reached from other machines, which requires TLS (tls.certificate, tls.key) and "
+                    "API keys (shapedbd key create); see docs/security.md. For a network where everybody may "
+                    "do everything set " +
+                    kAnyoneMayDoAll + " = yes");
 }
 
 }  // namespace

@@ -15,8 +15,8 @@
 
 namespace shapedb::http {
 
-/// One read and one write at a time; what they are done with is told on the socket's executor, never before
-/// they return. All functions are called there.
+/// One read and one write at a time; completion handlers run on the socket's executor, never before these
+/// functions return. All functions are called there.
 class ByteStream {
   public:
     using Done = std::function<void(const boost::system::error_code& error, std::size_t bytes)>;

@@ -44,8 +44,9 @@ OrFailure<void> EnvelopeReader::add(std::string_view bytes, std::vector<std::str
 OrFailure<void> EnvelopeReader::readHead() {
     const auto flags = static_cast<std::uint8_t>(head_[0]);
     if (flags == 1) {
-        return refuseWith(0, Code::kUnimplemented,
-                          "a message is marked as compressed: this server takes identity only");
+        return refuseWith(
+            0, Code::kUnimplemented,
+            "a message is marked as compressed: only uncompressed bodies (identity) are supported");
     }
     if (flags != kPlainMessage) {
         return refuse(ErrorCode::kMalformedStream, "a message of the request has the flags " +

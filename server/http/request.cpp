@@ -57,8 +57,9 @@ OrFailure<void> checkOrigin(const Head& head) {
 OrFailure<void> checkEncoding(const Head& head, std::string_view field) {
     const std::string_view coding = head.field(field);
     if (coding.empty() || lower(coding) == "identity") return {};
-    return refuseWith(0, Code::kUnimplemented,
-                      std::string(field) + " is not supported: this server takes identity only");
+    return refuseWith(
+        0, Code::kUnimplemented,
+        std::string(field) + " is not supported: only uncompressed bodies (identity) are supported");
 }
 
 OrFailure<void> readContentType(const Head& head, const Method& method, CallForm& form) {
@@ -81,7 +82,7 @@ OrFailure<void> readTimeout(const Head& head, CallForm& form) {
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), ms);
     if (text.empty() || text.size() > kMostTimeoutDigits || error != std::errc() ||
         end != text.data() + text.size()) {
-        return refuse(ErrorCode::kInvalidArgument, "Connect-Timeout-Ms is no number of at most 10 digits");
+        return refuse(ErrorCode::kInvalidArgument, "Connect-Timeout-Ms is not a number of at most 10 digits");
     }
     form.timeout = std::chrono::milliseconds(ms);
     return {};
@@ -127,7 +128,7 @@ OrFailure<void> checkHead(const Head& head, const Hosts& hosts) {
     }
     const std::string_view length = head.field("content-length");
     if (!std::all_of(length.begin(), length.end(), [](char c) { return c >= '0' && c <= '9'; })) {
-        return refuseWith(400, Code::kInvalidArgument, "Content-Length is no number");
+        return refuseWith(400, Code::kInvalidArgument, "Content-Length is not a number");
     }
     for (const char* single : {"host", "content-length", "transfer-encoding", "content-type",
                                "content-encoding", "connect-content-encoding", "connect-timeout-ms",

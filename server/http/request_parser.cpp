@@ -62,7 +62,7 @@ Head RequestParser::head() const {
 
 Failure RequestParser::problem() const {
     const unsigned status = error_ == beast::http::error::header_limit ? 431 : 400;
-    return refuseWith(status, Code::kInvalidArgument, "this is no HTTP/1.1: " + error_.message()).value();
+    return refuseWith(status, Code::kInvalidArgument, "this is not HTTP/1.1: " + error_.message()).value();
 }
 
 }  // namespace shapedb::http

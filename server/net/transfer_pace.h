@@ -16,9 +16,9 @@ struct PaceLimits {
 
 enum class Pace { kGood, kStalled, kTooSlow };
 
-/// Of one that has been waited for since `now` and for `altogether` (that included), and has moved `bytes`:
-/// it may be silent for `stall` at a time, and needs `leastRate` bytes for each second of waiting, not
-/// counting the first `stall`.
+/// Judges a transfer that has waited for `now` this time, for `altogether` in total (that included), and has
+/// moved `bytes`: it may be silent for `stall` at a time, and needs `leastRate` bytes for each second of
+/// waiting, not counting the first `stall`.
 template <typename Duration>
 Pace paceOf(const PaceLimits& limits, Duration now, Duration altogether, std::uint64_t bytes) {
     const std::chrono::duration<double> beyond = altogether - limits.stall;

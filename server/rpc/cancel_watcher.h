@@ -47,8 +47,8 @@ class CancelWatcher {
         Registration(const Registration&) = delete;
         Registration& operator=(const Registration&) = delete;
 
-        /// The call is cut off, with the status of the error, a second after `stillAllowed` fails: calls that
-        /// ask for themselves can say it better. It is called often, by another thread.
+        /// The call is cut off, with the status of the error, a second after `stillAllowed` fails: so that
+        /// the handler can report the reason itself. It is called often, by another thread.
         void guard(std::function<Result<void>()> stillAllowed);
 
         /// True once the client has gone or cancelled, or the deadline has passed.

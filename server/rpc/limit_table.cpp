@@ -41,8 +41,7 @@ std::vector<LimitRow> limitTable(const config::ServerConfig& config) {
         // Scans and messages.
         {"min_points", kMinPoints, "points", "points of a scan, at least",
          errorCodeName(ErrorCode::kTooFewPoints)},
-        {"limits.max_points", limits.maxPoints, "points",
-         "points of a scan, also of each one that is imported",
+        {"limits.max_points", limits.maxPoints, "points", "points of a scan, imported ones included",
          errorCodeName(ErrorCode::kPointLimitExceeded)},
         {"chunk_bytes", kMaxChunkBytes, "bytes", "one PointChunk or BackupChunk", malformed},
         {"message_bytes", number(kMaxReceiveBytes), "bytes",
@@ -56,8 +55,8 @@ std::vector<LimitRow> limitTable(const config::ServerConfig& config) {
         {"verify_candidates", kMostVerified, "candidates", "candidates that one search verifies", invalid},
         {"answer_bytes", kMaxAnswerBytes, "bytes", "answer to a search, a batch or GetShapes", invalid},
         {"requests_bytes", kMaxRequestsBytes, "bytes",
-         "what messages above 16 KiB may become in memory, 32 bytes for each of theirs, of all calls "
-         "together; blocks of points and backups do not count",
+         "memory for decoding messages above 16 KiB, counted as 32 times their size, of all calls together; "
+         "blocks of points and backups do not count",
          "queue_full"},
         {"answers_bytes", kMaxAnswersBytes, "bytes",
          "large answers until they are written, of all calls together", full},
@@ -69,7 +68,7 @@ std::vector<LimitRow> limitTable(const config::ServerConfig& config) {
         {"different_values", kMaxDifferentValues, "values", "different values that CountByValue counts",
          invalid},
         // Calls at a time.
-        {"calls", number(kMaxOrdinaryCalls), "calls", "calls at a time, but for those of administrators",
+        {"calls", number(kMaxOrdinaryCalls), "calls", "concurrent calls, without those of administrators",
          full},
         {"admin_calls", number(kMaxAdminCalls), "calls", "calls of AdminService at a time", full},
         {"long_admin_calls", number(kMaxLongAdminCalls), "calls",
@@ -92,7 +91,7 @@ std::vector<LimitRow> limitTable(const config::ServerConfig& config) {
          "room",
          kNone},
         {"handshake_milliseconds", ms(kHandshakeTime), "ms",
-         "time for a new connection to say something intelligible; then it is closed", kNone},
+         "time for a new connection to complete its handshake; then it is closed", kNone},
         {"limits.idle_seconds", number(limits.idleSeconds), "s",
          "time of a connection without calls; then it is closed", kNone},
         {"limits.stall_seconds", number(limits.stallSeconds), "s", "time that a stream may stand still", cut},
@@ -100,7 +99,7 @@ std::vector<LimitRow> limitTable(const config::ServerConfig& config) {
          "speed of a stream in the long run, at least; 0: any", cut},
         // The queue.
         {"ingest.max_queued_jobs", config.ingest.maxQueuedJobs, "scans",
-         "scans that wait for segmentation; imports and restores are taken all the same", full},
+         "scans that wait for segmentation; imports and restores are not limited", full},
         {"ingest.max_queued_bytes", config.ingest.maxQueuedBytes, "bytes", "points of these scans", full},
         {"ingest.max_attempts", number(config.ingest.maxAttempts), "crashes",
          "crashes of the server over one scan, which then is FAILED", kNone},

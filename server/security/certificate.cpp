@@ -154,7 +154,7 @@ Result<TlsIdentity> loadTlsIdentity(const TlsFiles& files, UnixMs now) {
     const auto key = parseKey(files.key, *keyPem);
     RETURN_IF_ERROR(key);
     if (X509_check_private_key(certificate->get(), key->get()) != 1) {
-        return malformed(files.key, "this is the key of another certificate than " + files.certificate);
+        return malformed(files.key, "this key does not belong to " + files.certificate);
     }
     RETURN_IF_ERROR(requireValidAt(files.certificate, **certificate, now));
     TlsIdentity identity;

@@ -19,14 +19,14 @@ enum class Role : std::uint8_t {
 enum class CallClass : std::uint8_t {
     kOrdinary,   ///< one request, and an answer as soon as it is computed
     kUpload,     ///< lasts as long as the client sends
-    kAdmin,      ///< has places of its own
-    kAdminLong,  ///< so too, but lasts as long as its work or its client: some places are not for it
+    kAdmin,      ///< has slots of its own
+    kAdminLong,  ///< long-running administration: may not use all of these slots
 };
 
 /// What of the server a call touches: a key may be for some collections only.
 enum class Scope : std::uint8_t {
     kCollections,  ///< the collections it names, of which the key must have each
-    kNone,         ///< none, or only some calls name one, which they must ask for
+    kNone,         ///< none, or optional: the handler asks for the collection
     kServer,       ///< all collections: needs a key of all
     kKeys,         ///< the API keys: as kServer, and never without a key
 };

@@ -27,7 +27,7 @@ struct Crash {
 [[nodiscard]] bool crashed(const std::vector<Crash>& crashes, std::int64_t shapeId,
                            std::int64_t pointsVersion);
 
-/// So many stops are no accident: the scan may exhaust the machine's memory each time.
+/// This many stops are not a coincidence: the scan may exhaust the machine's memory each time.
 constexpr std::int64_t kMostStops = 20;
 
 /// Whether a scan is segmented alone, since it may end the process.

@@ -156,9 +156,8 @@ Error ScanVerifier::withRemedy(Error error) const {
     if (!flat || xyz_.size() < 3 * kFewest) return error;
     const MainPart part = mainPart();
     if (part.outliers > 0 && box().diagonal() * kFlatnessTolerance > part.box.diagonal()) {
-        error.message +=
-            ". All but " + countText(part.outliers, "point") +
-            " are so near to each other that they count as one there: drop those that lie far away";
+        error.message += ". All but " + countText(part.outliers, "point") +
+                         " round to the same point at that distance: drop those that lie far away";
     } else if (maybeFlattened(part)) {
         error.message +=
             std::string(". If the points were other ones before they were written in single precision, ") +

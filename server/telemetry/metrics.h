@@ -36,7 +36,7 @@ class Metrics {
     Metrics(const Metrics&) = delete;
     Metrics& operator=(const Metrics&) = delete;
 
-    /// A call that has ended. `rpc` and `code` are names of ours, so that there are only so many.
+    /// A call that has ended. `rpc` and `code` come from a fixed set.
     void recordCall(const char* rpc, const char* code, double seconds, std::uint64_t pointBytes);
 
     /// Called whenever the numbers are asked for, from another thread, until `stop`. Call once, before

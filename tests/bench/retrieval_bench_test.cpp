@@ -22,7 +22,7 @@ class RetrievalBench : public BenchTest {
     }
 };
 
-TEST_F(RetrievalBench, EveryMethodAtEveryLevel) {
+TEST_F(RetrievalBench, MeasuresEveryMethodAtEveryNoiseLevel) {
     const BenchRun run = retrieval({set(), "--noise", "0,0.01", "--json", path("out.json"), "--plot",
                                     path("out.svg"), "--markdown", path("out.md")});
     ASSERT_EQ(run.exitCode, 0) << run.err;

@@ -50,7 +50,7 @@ INSTANTIATE_TEST_SUITE_P(Kinds, IoErrorTest,
 
 TEST_P(IoErrorTest, LosesNothingAndTheStoreWorksOn) { tryAll(recordWholeScript()); }
 
-TEST_P(IoErrorTest, InMigrationsToo) { tryAll(recordMigrations()); }
+TEST_P(IoErrorTest, MigrationsSurviveIoErrors) { tryAll(recordMigrations()); }
 
 }  // namespace
 }  // namespace shapedb::reliability

@@ -59,8 +59,8 @@ void PostgresConnection::commit() {
     } catch (const Failure& failure) {
         if (!isBroken()) throw;
         raise(ErrorCode::kUnavailable,
-              "the connection to the database was lost while a change was being stored: it is stored or not; "
-              "look before it is sent again (" +
+              "the connection to the database was lost while a change was being stored: it may or may not be "
+              "stored; look before you send it again (" +
                   failure.error.message + ")");
     }
 }

@@ -124,8 +124,7 @@ Result<std::vector<std::string>> PostgresStore::check(const RunContext& context)
         Query sums(*source, kWrongSums);
         while (sums.step()) {
             const std::string row = "table collection, row " + sums.text(0);
-            if (sums.integer(1) != 0)
-                problems.push_back(row + " counts other shapes as waiting than those that are");
+            if (sums.integer(1) != 0) problems.push_back(row + " has a wrong count of waiting shapes");
             if (sums.integer(2) != 0) problems.push_back(row + " has wrong sums of jobs or points");
         }
         return problems;

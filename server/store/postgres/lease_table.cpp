@@ -81,9 +81,15 @@ void changeSlots(Connection& connection, const char* sql, const std::vector<clus
     Query(connection, sql, shards, slots, epochs, replicas, values...).run();
 }
 
-/// Now, by the clock of the database; the rows of slots are those that are counted.
-std::int64_t prepareTables(Connection& connection, int replicas) {
+struct Prepared {
+    std::int64_t now = 0;  ///< by the clock of the database
+    bool resized = false;  ///< there were slots of another number of replicas
+};
+
+/// The rows of slots are those that are counted, then.
+Prepared prepareTables(Connection& connection, int replicas) {
     std::int64_t now = 0;
+    bool wasEmpty = false;
     bool isMissing = false;
     bool isSurplus = false;
     bool isForgotten = false;
@@ -91,6 +97,7 @@ std::int64_t prepareTables(Connection& connection, int replicas) {
         Query state(connection, kState, replicas, kServersKeptMs);
         static_cast<void>(state.step());
         now = state.integer(0);
+        wasEmpty = state.integer(1) == 0;
         isMissing = state.integer(1) < std::int64_t{cluster::kShards} * replicas;
         isSurplus = state.integer(2) > 0;
         isForgotten = state.integer(3) > 0;
@@ -98,7 +105,7 @@ std::int64_t prepareTables(Connection& connection, int replicas) {
     if (isMissing) Query(connection, kAddSlots, cluster::kShards, replicas, now).run();
     if (isSurplus) Query(connection, kDeleteSlots, replicas, now).run();
     if (isForgotten) Query(connection, kDeleteServers, now - kServersKeptMs).run();
-    return now;
+    return {now, (isMissing && !wasEmpty) || isSurplus};
 }
 
 void changeTables(Connection& connection, const cluster::Beat& beat, int replicas, std::int64_t now) {
@@ -146,9 +153,10 @@ Result<cluster::ClusterView> PostgresLeaseTable::beat(const cluster::Beat& beat)
         cluster::ClusterView view;
         inWriteTransaction(pool_, false, [&](Connection& connection) {
             Query(connection, kLockLeases).run();
-            const std::int64_t now = prepareTables(connection, replicas_);
-            changeTables(connection, beat, replicas_, now);
-            view = readTables(connection, replicas_, now);
+            const Prepared prepared = prepareTables(connection, replicas_);
+            changeTables(connection, beat, replicas_, prepared.now);
+            view = readTables(connection, replicas_, prepared.now);
+            view.resized = prepared.resized;
         });
         return view;
     });

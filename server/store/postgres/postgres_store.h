@@ -4,8 +4,8 @@
 // database is set to (synchronous_commit, replicas).
 //
 // Beyond Store: kUnavailable when the database cannot be reached, has not answered for `patience`, or lets
-// itself only be read. When that happens while a change is being stored the message says that it is stored or
-// not.
+// itself only be read. When that happens while a change is being stored the message says that it may or may
+// not be stored.
 #pragma once
 
 #include <chrono>

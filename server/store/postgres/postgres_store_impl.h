@@ -80,7 +80,7 @@ class PostgresStore final : public SqlStore {
     /// One that is removed with what this returns or, should the server die before, at its next start. Throws
     /// Failure.
     files::TemporaryFile temporaryFile() const;
-    /// For what takes as long as it takes; `context` ends it between rows.
+    /// For long operations; `context` cancels them between rows.
     std::unique_ptr<PostgresConnection> patientConnection() const;
     /// All content, as it is now, in a new database file. Throws Failure.
     void copyToFile(const std::string& path, const char* stage, const RunContext& context);

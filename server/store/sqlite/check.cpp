@@ -55,7 +55,7 @@ constexpr Rule kRulesOfOthers[] = {
      "s WHERE s.collection_id = c.id AND s.state = 0 AND NOT EXISTS (SELECT 1 FROM signature g WHERE "
      "g.shape_id "
      "= s.id AND g.generation = c.generation))",
-     "counts other shapes as waiting than those that are"},
+     "has a wrong count of waiting shapes"},
     {"SELECT 'table rebuild, row ' || r.id FROM rebuild r JOIN collection c ON c.id = r.collection_id WHERE "
      "r.state = 0 AND r.target_generation <> c.generation + 1",
      "runs into a generation that is not the next one of its collection"},

@@ -143,10 +143,10 @@ TEST(Status, WordsOfGrpcStayInside) {
         return errorOf(grpc::Status(grpc::StatusCode::UNAVAILABLE, details), {}, {"host:1"}).message;
     };
     EXPECT_EQ(message("DNS resolution failed for host:1: C-ares status is not ARES_SUCCESS qtype=AAAA"),
-              "cannot reach a server at host:1: this machine knows no host of that name");
+              "cannot reach a server at host:1: its host name cannot be resolved");
     EXPECT_EQ(message("failed to connect to all addresses; last error: UNKNOWN: ipv4:127.0.0.1:1: Failed to "
                       "connect to remote host: Connection refused"),
-              "cannot reach a server at host:1: nobody listens there; is shapedbd running?");
+              "cannot reach a server at host:1: nothing is listening there; is shapedbd running?");
     EXPECT_NE(message("failed to connect to all addresses; last error: UNAVAILABLE: Failed parsing HTTP/2")
                   .find("is not a ShapeDB server"),
               std::string::npos);

@@ -18,7 +18,7 @@ TEST(Address, HasAPort) {
     }
 }
 
-TEST(Address, ThatIsWrongIsToldBeforeAnybodyConnects) {
+TEST(Address, AWrongOneIsReportedBeforeConnecting) {
     const std::pair<const char*, const char*> cases[] = {{"", "HOST:PORT"},
                                                          {"http://host:7879", "that of a web page"},
                                                          {"https://host", "TLS is switched on apart"},

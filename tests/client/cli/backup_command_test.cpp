@@ -84,7 +84,7 @@ TEST_F(BackupCommand, MistakesAreExplained) {
         EXPECT_NE(run.err.find(words), std::string::npos) << run.err;
     };
     refused({"admin", "backup", path("1.sdbi"), "--since", full}, 4, "an increment replaces no file");
-    refused({"admin", "backup", path("3.sdbi"), "--since", ""}, 2, "--since names no file");
+    refused({"admin", "backup", path("3.sdbi"), "--since", ""}, 2, "--since: the name of a file is missing");
     refused({"admin", "backup", path("3.sdbi"), "--since", path("none")}, 3, "none");
     refused({"admin", "backup", path("3.sdbi"), "--since", path("a.xyz")}, 3,
             "neither a backup nor an increment");

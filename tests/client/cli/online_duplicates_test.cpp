@@ -42,7 +42,7 @@ PointCloud handed(bool mirrored) {
     return points;
 }
 
-TEST_F(OnlineDuplicates, AreThosePairsThatScoreTheThreshold) {
+TEST_F(OnlineDuplicates, AreThePairsThatScoreAtLeastTheThreshold) {
     onlineJson({"collection", "create", "dup"});
     onlineJson({"add", scans(), "--base", scans(), "--collection", "dup", "--wait"});
     for (int i = 0; i < 3; ++i) {

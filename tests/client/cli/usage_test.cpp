@@ -88,7 +88,7 @@ TEST_F(Usage, WrongValuesAreToldInPlainWords) {
         {{"list", "--state", "redy"},
          "--state: 'redy' is none of pending, ready, failed: did you mean 'ready'?"},
         {{"completion", "tcsh"}, "SHELL: 'tcsh' is none of bash, zsh, fish"},
-        {{"health", "extra"}, "there is no place for 'extra'"},
+        {{"health", "extra"}, "unexpected argument 'extra'"},
         {{"admin"}, "give a command (see 'shapedb admin --help')"},
         {{}, "give a command (see 'shapedb --help')"},
     };

@@ -315,7 +315,7 @@ TEST(Fit, SurvivesDegenerateShapes) {
     EXPECT_GT(fitted(flat, flat, whole).best.score, 0.9);
 }
 
-TEST(Fit, StopsWhenAskedOrLate) {
+TEST(Fit, StopsWhenCancelledOrPastItsDeadline) {
     const SurfacePoints surface = surfaceOf(scanOfMember("fish", 0, 1));
     const FitQuery query(surface);
     const std::atomic<bool> cancel{true};

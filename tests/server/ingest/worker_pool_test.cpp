@@ -165,7 +165,7 @@ TEST_F(Pool, DeletedCollectionStopsItsWorkers) {
     EXPECT_TRUE(eventually([&] { return idle(); }));
 }
 
-TEST_F(Pool, DrainPutsJobsBackUntried) {
+TEST_F(Pool, DrainingPutsStartedJobsBackIntoTheQueue) {
     Gate gate;
     start(through(gate), 1);
     put("k", 1.0f);
@@ -231,7 +231,7 @@ TEST_F(PoolThatCannotPutBack, AfterAPauseTheJobIsNeitherLostNorSetAside) {
     EXPECT_EQ(shape("k").state, store::ShapeState::kReady) << log->all();
 }
 
-TEST_F(PoolThatCannotPutBack, AStopTriesAgainAtItsEnd) {
+TEST_F(PoolThatCannotPutBack, StoppingTriesOnceMoreToPutJobsBack) {
     pool->pause();
     isFull = false;
     pool->stop();

@@ -116,7 +116,7 @@ TEST_P(WaitingTest, AWrongCountIsAProblem) {
     open();
     const auto problems = store_->check({}).value();
     ASSERT_EQ(problems.size(), 1u);
-    EXPECT_EQ(problems[0], "table collection, row 1 counts other shapes as waiting than those that are");
+    EXPECT_EQ(problems[0], "table collection, row 1 has a wrong count of waiting shapes");
 }
 
 SHAPEDB_ON_EACH_ENGINE(WaitingTest);

@@ -65,7 +65,7 @@ class StlReader {
     if (count > room) {
       // Four letters where the number of triangles stands are no number.
       if (/^[\t-~]{4}$/.test(head.slice(kHeaderBytes, kHeaderBytes + 4))) {
-        throw new FileFault("this is no STL file: it does not begin with 'solid' and has not the size of a binary one");
+        throw new FileFault("this is not an STL file: it does not begin with 'solid' and does not have the size of a binary one");
       }
       throw file.atByte(kHeaderBytes, `the header announces ${countText(count, 'triangle')}, but the file has room for ${room}`);
     }

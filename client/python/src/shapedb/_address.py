@@ -16,7 +16,7 @@ def checked_address(address: str) -> str:
         raise InvalidInput("invalid_argument", "the server's address is empty; give HOST:PORT")
     if address.startswith(("http://", "https://")):
         apart = " (TLS is switched on apart)" if address.startswith("https") else ""
-        raise _refused(address, f"it begins like that of a web page, whose port is another{apart}")
+        raise _refused(address, f"that is a web address; the API has another port{apart}")
     for scheme in _SCHEMES:
         if address.startswith(scheme):
             if address == scheme:
@@ -50,7 +50,7 @@ def _with_port(address: str, host: str, port: str) -> str:
     if not port:
         raise _refused(address, "it has no port after the colon")
     if not (port.isascii() and port.isdigit() and len(port) <= 5 and 1 <= int(port) <= 65535):
-        raise _refused(address, f"'{port}' is no port, which are 1 to 65535")
+        raise _refused(address, f"'{port}' is not a port (1 to 65535)")
     return f"{host}:{port}"
 
 

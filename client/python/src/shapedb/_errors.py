@@ -80,8 +80,8 @@ def _texts(metadata: Iterable[Any]) -> dict[str, str]:
 
 
 _PORT = "is it the right port? (that of the web page is another)"
-_NO_WAY = "cannot reach a server at {}: no way leads there from this machine"
-_NO_HOST = "cannot reach a server at {}: this machine knows no host of that name"
+_NO_WAY = "cannot reach a server at {}: there is no route to it from this machine"
+_NO_HOST = "cannot reach a server at {}: its host name cannot be resolved"
 
 # What gRPC and OpenSSL say when there is no connection, and what a user needs to hear; as in client/api/retry.cpp.
 _TRANSLATIONS: Tuple[Tuple[str, str], ...] = (
@@ -98,7 +98,7 @@ _TRANSLATIONS: Tuple[Tuple[str, str], ...] = (
      "not belong together (tls_ca, client_certificate, client_key)"),
     ("Failed parsing HTTP/2", "what answers at {} is not a ShapeDB server: " + _PORT),
     ("http1.x", "what answers at {} is not a ShapeDB server: " + _PORT),
-    ("Connection refused", "cannot reach a server at {}: nobody listens there; is shapedbd running?"),
+    ("Connection refused", "cannot reach a server at {}: nothing is listening there; is shapedbd running?"),
     ("No such file or directory", "cannot reach a server at {}: there is no such socket; is shapedbd running, and does "
      "it listen there?"),
     ("Permission denied", "cannot reach a server at {}: you may not use that socket"),

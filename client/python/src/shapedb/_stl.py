@@ -54,15 +54,14 @@ def _read_binary(file: ScanBytes) -> Content:
             f"expected 'solid' (ASCII STL) or the 84 bytes a binary STL starts with, found {file.remaining} bytes")
     head = file.peek(_SNIFFED_BYTES)
     if not re.search(rb"[\0-\x08\x0e-\x1f\x7f]", head):
-        raise malformed(f"expected 'solid', found {in_quotes(_first_word(head))}; this is no ASCII STL file, and its size is "
-                        "not that of a binary one")
+        raise malformed(f"expected 'solid', found {in_quotes(_first_word(head))}; this is not an ASCII STL file, and its size is not that of a binary one")
     count = _announced(file)
     file.offset += _HEADER_BYTES + 4
     room = file.remaining // _RECORD.itemsize
     if count > room:
         # Four letters where the number of triangles stands are no number.
         if re.fullmatch(rb"[\t-~]{4}", file.data[file.offset - 4:file.offset]):
-            raise malformed("this is no STL file: it does not begin with 'solid' and has not the size of a binary one")
+            raise malformed("this is not an STL file: it does not begin with 'solid' and does not have the size of a binary one")
         raise file.at_byte(_HEADER_BYTES,
                            f"the header announces {count_text(count, 'triangle')}, but the file has room for {room}")
     corners = np.frombuffer(file.data, _RECORD, count, file.offset)["corners"].astype(np.float64).reshape(-1, 3)

@@ -149,10 +149,13 @@ TEST_F(PostgresLeaseTableTest, ServersThatBeatAtTheSameTimeNeverHaveTheSameLease
 TEST_F(PostgresLeaseTableTest, SlotsComeAndGoWithTheirNumber) {
     const auto one = table(1);
     const auto two = table(2);
-    ASSERT_TRUE(one->beat(beatOf("a")));
+    EXPECT_FALSE(one->beat(beatOf("a"))->resized) << "nothing was there before";
+    EXPECT_FALSE(one->beat(beatOf("a"))->resized);
     EXPECT_EQ(text("SELECT count(*) FROM cluster_slot"), "256");
     const ClusterView more = two->beat(beatOf("a")).value();
     ASSERT_EQ(more.leases.size(), 512u);
+    EXPECT_TRUE(more.resized);
+    EXPECT_FALSE(two->beat(beatOf("a"))->resized);
     Beat taking = beatOf("a");
     taking.take = {{7, 0, more.leases[14].epoch}, {7, 1, more.leases[15].epoch}};
     const ClusterView taken = two->beat(taking).value();
@@ -162,6 +165,7 @@ TEST_F(PostgresLeaseTableTest, SlotsComeAndGoWithTheirNumber) {
     // Fewer: what is held is not seen, and goes when its lease has ended.
     const ClusterView fewer = one->beat(beatOf("b")).value();
     ASSERT_EQ(fewer.leases.size(), 256u);
+    EXPECT_TRUE(fewer.resized);
     EXPECT_EQ(fewer.leases[7].holder, "a");
     EXPECT_EQ(text("SELECT count(*) FROM cluster_slot"), "257");
     Beat beyond = beatOf("b");

@@ -69,7 +69,7 @@ TEST_F(PostgresPoolTest, OneConnectionIsForBoth) {
     EXPECT_TRUE(tried(pool, Use::kRead));
 }
 
-TEST_F(PostgresPoolTest, ThoseOfWritesComeBack) {
+TEST_F(PostgresPoolTest, AConnectionForWritingIsGivenBack) {
     PostgresPool pool(address_, none_, 2);
     auto write = take(pool, Use::kWrite, 1);
     const auto read = take(pool, Use::kRead, 1);
