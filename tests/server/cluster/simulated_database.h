@@ -80,7 +80,7 @@ class Database : public LeaseTable, public ReplicaSource {
     std::vector<Row> slots_;             // in order of shard and slot
     std::map<std::string, Time> alive_;  // until
     Versions shapes_;
-    std::vector<std::vector<Past>> history_;  // by id
+    std::vector<std::vector<Past>> history_;    // by id
     std::vector<std::int64_t> log_{0};          // by number: the shape, or 0 for a switch
     std::vector<Time> times_{0};                // by number
     std::vector<std::int64_t> generations_{1};  // by number

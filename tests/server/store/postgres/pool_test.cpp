@@ -117,8 +117,8 @@ TEST_F(PostgresPoolTest, WhoWaitsForALockLetsOthersWrite) {
     const auto add = [&](const std::string& id) {
         return guarded("add", [&] {
             inWriteTransaction(pool, false, [&](Connection& connection) {
-                dynamic_cast<PostgresConnection&>(connection).execute(
-                    "UPDATE counted SET n = n + 1 WHERE id = " + id);
+                dynamic_cast<PostgresConnection&>(connection)
+                    .execute("UPDATE counted SET n = n + 1 WHERE id = " + id);
             });
         });
     };
