@@ -220,7 +220,7 @@ Result<ShownPtr> Member::content(std::int64_t collectionId, const Ask& ask, cons
                         "this server does not hold all shards that it was asked for");
         }
         if (over) {
-            return fail(ErrorCode::kUnavailable, "this server does not know the latest changes yet");
+            return fail(ErrorCode::kNotReady, "this server does not know the latest changes yet");
         }
         (answer == Answerable::kNo ? beatSoon_ : wake_) = true;
         changed_.notify_all();

@@ -60,7 +60,8 @@ class Member {
     [[nodiscard]] Result<RoutesPtr> readRoutes();
 
     /// What a search reads that asks this server: waits a little for changes that it does not know yet.
-    /// Errors: kUnavailable (it may not answer `ask`), those of `context`.
+    /// Errors: kUnavailable (it may not answer `ask`), kNotReady (it still reads what has changed), those of
+    /// `context`.
     [[nodiscard]] Result<ShownPtr> content(std::int64_t collectionId, const Ask& ask,
                                            const RunContext& context);
 

@@ -18,6 +18,8 @@ using Clock = RunContext::Clock;
 
 /// How long a search looks for holders of shards that have none.
 constexpr std::chrono::milliseconds kPatience{1'000};
+/// The same where a holder has said that it still reads changes: after a rebuild, all signatures.
+constexpr std::chrono::milliseconds kPatienceWhileReading{60'000};
 /// Between two looks at who holds what, while some shards have no holder.
 constexpr std::chrono::milliseconds kBetweenRoutes{50};
 
@@ -82,7 +84,8 @@ class ShardCandidates::Scatter {
     Result<bool> lookForHolders() {
         const auto now = Clock::now();
         if (!since_) since_ = now;
-        if (now - *since_ >= kPatience) {
+        const bool waits = isReading_ && !of_.search_.allowPartial;
+        if (now - *since_ >= (waits ? kPatienceWhileReading : kPatience)) {
             if (of_.search_.allowPartial) return false;
             return fail(
                 ErrorCode::kUnavailable,
@@ -101,6 +104,7 @@ class ShardCandidates::Scatter {
         if (!answer) {
             RETURN_IF_ERROR(context_.checkpoint());
             if (isFinal(answer.error().code)) return fail(answer.error());
+            isReading_ |= answer.error().code == ErrorCode::kNotReady;
             send(gather_.onFailure(id));
             return {};
         }
@@ -133,6 +137,7 @@ class ShardCandidates::Scatter {
     std::map<std::uint64_t, Ask> asks_;
     std::map<std::uint64_t, Candidates> answers_;
     std::optional<Clock::time_point> since_;  ///< some shard has no holder
+    bool isReading_ = false;                  ///< some holder did not know all yet
     Clock::time_point nextLook_{};
     Inbox<FindAnswer> inbox_;
     Requests requests_;  ///< last: their answers go to the inbox

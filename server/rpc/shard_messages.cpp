@@ -303,7 +303,7 @@ grpc::Status shardStatus(const Error& error) {
 Error shardError(const grpc::Status& status) {
     for (const ErrorCode code :
          {ErrorCode::kInvalidArgument, ErrorCode::kMalformedFilter, ErrorCode::kMalformedSignature,
-          ErrorCode::kCancelled, ErrorCode::kDeadlineExceeded}) {
+          ErrorCode::kNotReady, ErrorCode::kCancelled, ErrorCode::kDeadlineExceeded}) {
         if (status.error_details() == errorCodeName(code)) return {code, status.error_message()};
     }
     return {ErrorCode::kUnavailable, "another server did not answer: " + status.error_message()};

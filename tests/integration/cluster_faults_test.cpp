@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include "server/store/postgres/connection.h"
 #include "tests/integration/support/cluster_fixture.h"
 
 namespace shapedb::testing {
@@ -61,6 +62,42 @@ TEST_F(ClusterFaultsTest, AServerThatIsStoppedAnswersNothingOldWhenItGoesOn) {
         EXPECT_EQ(found.value.hits_size(), 3) << i;
         EXPECT_EQ(found.value.candidates(), 3u) << i;
     }
+}
+
+TEST_F(ClusterFaultsTest, WhileSignaturesOfARebuildAreReadSearchesWait) {
+    start(1);
+    fill(5);
+    const auto before = searchByKey(client("one"), "k1", searchOptions(kThings, 20));
+    ASSERT_TRUE(before.ok()) << before;
+    pb::SearchBySignatureRequest request;
+    *request.mutable_options() = searchOptions(kThings, 20);
+    request.mutable_options()->set_no_explanation(true);
+    request.set_signature(before.value.query().encoded());
+
+    // A rebuild is put in place, whose signatures take 8 s to be read.
+    const store::StatementTexts none;
+    store::PostgresConnection slow({uri_, {}, 60s, "slow"}, none);
+    store::PostgresConnection rebuild({uri_, {}, 60s, "rebuild"}, none);
+    rebuild.execute(
+        "BEGIN; UPDATE signature SET generation = 2; WITH next AS (UPDATE collection SET generation = 2, "
+        "last_change = last_change + 1 WHERE name "
+        "= 'things' RETURNING id, last_change) INSERT INTO change (collection_id, number) SELECT id, "
+        "last_change FROM next");
+    std::thread done([&] {
+        slow.execute("BEGIN; LOCK TABLE signature");  // waits for the commit, before all who want to read
+        std::this_thread::sleep_for(8s);
+        slow.execute("COMMIT");
+    });
+    EXPECT_TRUE(
+        eventually([&] { return rebuild.text("SELECT count(*) FROM pg_locks WHERE NOT granted") != "0"; }));
+    rebuild.execute("COMMIT");
+    for (const char* name : {"one", "two", "three"}) {
+        const auto found =
+            unary(*client(name).searches, &pb::SearchService::Stub::SearchBySignature, request, 30s);
+        EXPECT_TRUE(found.ok()) << name << ": " << found;
+        EXPECT_EQ(found.value.hits_size(), 5);
+    }
+    done.join();
 }
 
 TEST_F(ClusterFaultsTest, ARollingRestartFailsNoSearch) {
