@@ -47,9 +47,10 @@ class Server:
         self._flags = ["--listen", listen, *(flag.replace("{data}", self.data) for flag in flags)]
         if first_key:
             self.key_command("create", "--name", "first", "--role", "admin")
-        self._prefix = list(prefix)
-        self._limits = [(resource.RLIMIT_NOFILE, open_files), (resource.RLIMIT_AS, memory),
-                        (resource.RLIMIT_FSIZE, file_size)]
+        limits = [f"--{what}={most}" for what, most in (("nofile", open_files), ("as", memory), ("fsize", file_size))
+                  if most is not None]
+        # Not by a preexec_fn: Python would fork, and threads of grpcio that run meanwhile abort at times.
+        self._prefix = [*(["prlimit", *limits] if limits else []), *prefix]
         self.process = None
         try:
             self.start()
@@ -58,15 +59,10 @@ class Server:
             raise
 
     def start(self):
-        def limit():
-            for what, most in self._limits:
-                if most is not None:
-                    resource.setrlimit(what, (most, most))
-
         with open(self.log_path, "a") as log:
             self.process = subprocess.Popen(
                 [*self._prefix, os.environ["SHAPEDBD"], "--data", self.data, *self._flags],
-                stdout=subprocess.PIPE, stderr=log, text=True, preexec_fn=limit)
+                stdout=subprocess.PIPE, stderr=log, text=True)
         banner = self.process.stdout.readline()
         if not banner.startswith("listening on "):
             self.process.wait()

@@ -33,8 +33,8 @@ def test_the_port_is_added(given, meant):
 
 
 @pytest.mark.parametrize("given, why", [
-    ("http://host:7879", "web page"), ("https://host", "TLS is switched on apart"), ("host:99999", "'99999' is no port"),
-    ("host:0", "no port"), ("host:", "no port after the colon"), ("host:http", "'http' is no port"), (":7878", "no host"),
+    ("http://host:7879", "web address"), ("https://host", "TLS is switched on apart"), ("host:99999", "'99999' is not a port"),
+    ("host:0", "not a port"), ("host:", "no port after the colon"), ("host:http", "'http' is not a port"), (":7878", "no host"),
     ("grpc://host:1", "grpc://"), ("host:1/path", "more than a host"), ("a b:1", "blank"), ("[::1", "] is missing"),
     ("[::1]x", "after ]"), ("host:1:2", "more than one colon"), ("unix:", "nothing follows"),
 ])

@@ -20,12 +20,12 @@ TEST(Address, HasAPort) {
 
 TEST(Address, AWrongOneIsReportedBeforeConnecting) {
     const std::pair<const char*, const char*> cases[] = {{"", "HOST:PORT"},
-                                                         {"http://host:7879", "that of a web page"},
+                                                         {"http://host:7879", "a web address"},
                                                          {"https://host", "TLS is switched on apart"},
-                                                         {"host:99999", "'99999' is no port"},
-                                                         {"host:0", "no port"},
+                                                         {"host:99999", "'99999' is not a port"},
+                                                         {"host:0", "not a port"},
                                                          {"host:", "no port after the colon"},
-                                                         {"host:http", "'http' is no port"},
+                                                         {"host:http", "'http' is not a port"},
                                                          {":7878", "no host"},
                                                          {"grpc://host:1", "grpc://"},
                                                          {"host:1/path", "more than a host"},

@@ -45,9 +45,9 @@ TEST_F(Interrupt, IsToldInOneLineOfPlainWords) {
         {{"watch", "key"}, "follows it again"},
         {{"admin", "rebuild"}, "follows it again"},
         {{"admin", "copy", "127.0.0.1:1", "127.0.0.1:2"}, "nothing was written"},
-        {{"delete", "key"}, "may have done it"},
+        {{"delete", "key"}, "may have completed it"},
         {{"delete", "--filter", "a", "--yes"}, "stays deleted"},
-        {{"collection", "create", "c"}, "may have done it"},
+        {{"collection", "create", "c"}, "may have completed it"},
     };
     for (const Case& one : cases) {
         const CommandRun run = interrupted(one.arguments);

@@ -49,7 +49,7 @@ TEST_F(KindOfContent, AFormatThatWasNamedIsNamedOtherwise) {
 
 TEST_F(KindOfContent, LettersAreNoCountOfTrianglesInAPipeEither) {
     const std::string document = "%PDF-1.4 " + std::string(90, 'x') + std::string(400, '\0');
-    const std::string says = "this is no STL file: it does not begin with 'solid'";
+    const std::string says = "this is not an STL file: it does not begin with 'solid'";
     expectError("a.stl", document, kMalformed, {says});
     const std::string pipe = path("pipe.stl");
     ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);

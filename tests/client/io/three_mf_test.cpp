@@ -85,7 +85,7 @@ TEST_F(ThreeMf, DefectsNamePartAndLine) {
     bad(model(object("1", "<components><component objectid=\"1\"/></components>"), item),
         {"component of itself"});
     expectError("b.3mf", zipArchive({{"a.txt", "b"}}), kMalformed, {"no 3D model"});
-    expectError("c.3mf", "<model/>", kMalformed, {"no ZIP archive"});
+    expectError("c.3mf", "<model/>", kMalformed, {"not a ZIP archive"});
     mesh = kMesh;
     expectError("d.3mf",
                 zipArchive({{"3D/3dmodel.model",
@@ -105,7 +105,7 @@ TEST_F(ThreeMf, BombsAndEndlessCopiesAreRefused) {
         const std::string component = "<component objectid=\"" + std::to_string(i - 1) + "\"/>";
         objects += object(std::to_string(i), "<components>" + component + component + "</components>");
     }
-    bad(model(objects, "<item objectid=\"40\"/>"), {"so many copies"});
+    bad(model(objects, "<item objectid=\"40\"/>"), {"too many copies"});
 }
 
 }  // namespace

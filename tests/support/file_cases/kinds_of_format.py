@@ -328,4 +328,4 @@ def wrong_endings():
     for form in ("binary", "binary_compressed"):
         yield refused(f"pcd: {form} that is text", "a.pcd", pcd_header(form, 50) + rows(after=" 255"), "announces binary data, but text follows")
     document = b"%PDF-1.4 " + bytes(range(128, 192)) + b" of some words" + bytes(40)
-    yield refused("stl: letters for a number", "a.stl", document, "this is no STL file: it does not begin with 'solid'")
+    yield refused("stl: letters for a number", "a.stl", document, "this is not an STL file: it does not begin with 'solid'")

@@ -56,7 +56,7 @@ class StlReader {
     }
     const head = file.peek(kSniffedBytes);
     if (!/[\0-\x08\x0e-\x1f\x7f]/.test(head)) {
-      throw new FileFault(`expected 'solid', found ${inQuotes(firstWord(head))}; this is no ASCII STL file, and its size is ` +
+      throw new FileFault(`expected 'solid', found ${inQuotes(firstWord(head))}; this is not an ASCII STL file, and its size is ` +
         'not that of a binary one');
     }
     const count = this.announced();
