@@ -3,7 +3,7 @@
 """Breaks server/cluster on purpose, one place after the other, and says whether the simulation notices.
 
    scripts/ci/cluster-mutants.py [BUILD_DIR]     fails if one fault is not found
-The sources are put back in the end. SHAPEDB_TEST_SCALE: how many times as many histories (1: 1,000).
+The sources are put back in the end. SHAPEDB_TEST_SCALE: how many times as many histories (1: 600).
 """
 import os
 import pathlib

@@ -26,10 +26,12 @@ void Replica::setWanted(const ShardSet& wanted) {
     if (!replacing_) static_cast<void>(show());  // after an error the next step begins again
 }
 
-/// The next ones that are not there yet.
+/// The next ones that are not there yet. Nothing is gained by some of them where an older generation is shown
+/// until all are there.
 ShardSet Replica::toLoad() const {
+    const std::size_t most = replacing_ ? kShards : kLoadedTogether;
     ShardSet next;
-    for (std::size_t shard = 0; shard < next.size() && next.count() < kLoadedTogether; ++shard) {
+    for (std::size_t shard = 0; shard < next.size() && next.count() < most; ++shard) {
         if (wanted_[shard] && !complete_[shard]) next.set(shard);
     }
     return next;

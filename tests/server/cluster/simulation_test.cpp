@@ -34,7 +34,7 @@ TEST(ClusterSimulation, WithoutFaultsEverySearchIsAnswered) {
 
 TEST(ClusterSimulation, NoHistoryShowsAWrongAnswer) {
     const char* scale = std::getenv("SHAPEDB_TEST_SCALE");
-    const std::uint64_t seeds = 1'000 * (scale != nullptr ? static_cast<std::uint64_t>(std::atoi(scale)) : 1);
+    const std::uint64_t seeds = 600 * (scale != nullptr ? static_cast<std::uint64_t>(std::atoi(scale)) : 1);
     Outcome all;
     for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
         Options options;
