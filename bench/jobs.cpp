@@ -147,10 +147,7 @@ Result<void> storeOne(store::Store& store, std::int64_t collection, const std::s
 Result<Work> storeJob(const JobFolder& folder) {
     const auto scan = oneScan(kStoredPoints);
     RETURN_IF_ERROR(scan);
-    std::vector<float> points;
-    for (const Point3& p : *scan) {
-        for (const double v : {p.x, p.y, p.z}) points.push_back(static_cast<float>(v));
-    }
+    const std::vector<float> points = packedPoints(*scan);
     store::SqliteOptions options;
     options.path = folder.path + "/job.sqlite";
     options.now = [] { return store::TimestampMs{1'700'000'000'000}; };  // the same row every time

@@ -75,6 +75,14 @@ Result<std::vector<PointCloud>> makeScans(std::size_t count, std::size_t points,
     return scans;
 }
 
+std::vector<float> packedPoints(const PointCloud& scan) {
+    std::vector<float> points;
+    for (const Point3& p : scan) {
+        for (const double v : {p.x, p.y, p.z}) points.push_back(static_cast<float>(v));
+    }
+    return points;
+}
+
 Result<void> fillDataDirectory(const std::string& data, const SignatureGenerator& generator,
                                std::uint64_t count, const RunContext& context) {
     std::error_code error;

@@ -21,6 +21,9 @@ namespace shapedb::bench {
                                                         std::uint64_t seed, unsigned threads,
                                                         const RunContext& context);
 
+/// x y z of each point, as scans are stored.
+[[nodiscard]] std::vector<float> packedPoints(const PointCloud& scan);
+
 /// The file that a server with the data directory `data` (created here) opens, with `count` shapes in
 /// the collection "default": key, one label and signature each. Errors: those of fillDatabase.
 [[nodiscard]] Result<void> fillDataDirectory(const std::string& data, const SignatureGenerator& generator,

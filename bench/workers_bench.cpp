@@ -16,8 +16,8 @@
 
 #include "bench/operations.h"
 #include "bench/output.h"
+#include "bench/stored_shapes.h"
 #include "core/base/return_if_error.h"
-#include "core/synthetic/families.h"
 #include "server/ingest/signature_pipeline.h"
 #include "server/store/postgres/postgres_store.h"
 
@@ -50,36 +50,33 @@ Result<std::unique_ptr<store::Store>> openAs(const std::string& name, const Work
 }
 
 /// Points that are never segmented.
-std::vector<float> anyPoints(int scan) {
+std::vector<float> anyPoints(std::size_t scan) {
     std::vector<float> points(3 * kScanPoints);
     for (std::size_t k = 0; k < points.size(); ++k) {
-        points[k] = static_cast<float>((k * 7919 + static_cast<std::size_t>(scan) * 31) % 1000);
+        points[k] = static_cast<float>((k * 7919 + scan * 31) % 1000);
     }
     return points;
 }
 
-Result<std::vector<float>> syntheticPoints(int scan, int points) {
-    const std::vector<FamilyInfo> families = listFamilies();
-    const auto index = static_cast<std::size_t>(scan);
-    const auto solid = makeMember(families[index % families.size()].name, index / families.size(), 1);
-    RETURN_IF_ERROR(solid);
-    ScanOptions options;
-    options.count = static_cast<std::size_t>(points);
-    options.noise = 0.002;
-    const auto cloud = scanOf(*solid, options);
-    RETURN_IF_ERROR(cloud);
-    std::vector<float> packed;
-    for (const Point3& point : *cloud) {
-        for (const double value : {point.x, point.y, point.z}) packed.push_back(static_cast<float>(value));
+/// Those of all scans.
+Result<std::vector<std::vector<float>>> pointsOf(const WorkersFlags& flags, const RunContext& context) {
+    const auto count = static_cast<std::size_t>(flags.scans);
+    std::vector<std::vector<float>> all;
+    if (flags.points == 0) {
+        for (std::size_t i = 0; i < count; ++i) all.push_back(anyPoints(i));
+        return all;
     }
-    return packed;
+    const auto scans = makeScans(count, static_cast<std::size_t>(flags.points), 1,
+                                 std::thread::hardware_concurrency(), context);
+    RETURN_IF_ERROR(scans);
+    for (const PointCloud& scan : *scans) all.push_back(packedPoints(scan));
+    return all;
 }
 
-Result<void> fillQueue(store::Store& store, std::int64_t collection, const WorkersFlags& flags) {
-    for (int i = 0; i < flags.scans; ++i) {
-        const auto points = flags.points > 0 ? syntheticPoints(i, flags.points) : anyPoints(i);
-        RETURN_IF_ERROR(points);
-        auto scan = store::VerifiedScan::verify(*points);
+Result<void> fillQueue(store::Store& store, std::int64_t collection,
+                       const std::vector<std::vector<float>>& scans) {
+    for (std::size_t i = 0; i < scans.size(); ++i) {
+        auto scan = store::VerifiedScan::verify(scans[i]);
         RETURN_IF_ERROR(scan);
         store::PutRequest put(std::move(*scan));
         put.collectionId = collection;
@@ -89,19 +86,19 @@ Result<void> fillQueue(store::Store& store, std::int64_t collection, const Worke
     return {};
 }
 
-Result<store::SignatureRow> describeJob(store::Store& store, const store::Job& job) {
-    static const ingest::SignaturePipeline pipeline(
+/// What a worker makes of a job: of its scan, or after a while of nothing.
+Result<store::SignatureRow> resultOf(store::Store& store, const store::Job& job, const WorkersFlags& flags) {
+    if (flags.points == 0) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(flags.sleepMs));
+        return store::SignatureRow{job.shapeId, job.pointsVersion, job.generation, std::string(800, 's')};
+    }
+    const ingest::SignaturePipeline pipeline(
         [](const PointCloud& points, const ShapeParameters& parameters, const RunContext& context) {
             return shapedb::describe(points, parameters, context);
         });
-    auto outcome = pipeline.run(store, job.shapeId, parametersOf(Profile::kDefault), {});
-    if (outcome.kind != ingest::PipelineOutcome::Kind::kSignature) return fail(outcome.why);
-    return store::SignatureRow{job.shapeId,
-                               job.pointsVersion,
-                               job.generation,
-                               std::move(outcome.signature),
-                               std::move(outcome.surface),
-                               std::move(outcome.views)};
+    auto made = pipeline.run(store, job.shapeId, parametersOf(Profile::kDefault), {});
+    if (made.kind != ingest::PipelineOutcome::Kind::kSignature) return fail(made.why);
+    return rowOf(std::move(made), job.shapeId, job.pointsVersion, job.generation);
 }
 
 /// Claims, sleeps or segments, and finishes until the queue is empty. Returns how many results counted.
@@ -110,13 +107,7 @@ Result<int> work(store::Store& store, const WorkersFlags& flags) {
         const auto job = store.claimJob();
         RETURN_IF_ERROR(job);
         if (!*job) return finished;
-        Result<store::SignatureRow> row(store::SignatureRow{(*job)->shapeId, (*job)->pointsVersion,
-                                                            (*job)->generation, std::string(800, 's')});
-        if (flags.points > 0) {
-            row = describeJob(store, **job);
-        } else {
-            std::this_thread::sleep_for(std::chrono::milliseconds(flags.sleepMs));
-        }
+        const auto row = resultOf(store, **job, flags);
         RETURN_IF_ERROR(row);
         const auto done = store.finishJob(**job, *row);
         RETURN_IF_ERROR(done);
@@ -126,10 +117,11 @@ Result<int> work(store::Store& store, const WorkersFlags& flags) {
 
 /// Scans a second of so many workers, each a server of its own. Errors: kInternal (a scan was lost, or
 /// counted twice).
-Result<double> measure(store::Store& store, int workers, const WorkersFlags& flags) {
+Result<double> measure(store::Store& store, int workers, const std::vector<std::vector<float>>& scans,
+                       const WorkersFlags& flags) {
     const auto collection = store.createCollection(kCollectionName, "", "{}");
     RETURN_IF_ERROR(collection);
-    RETURN_IF_ERROR(fillQueue(store, collection->id, flags));
+    RETURN_IF_ERROR(fillQueue(store, collection->id, scans));
     std::vector<std::unique_ptr<store::Store>> servers;
     for (int i = 0; i < workers; ++i) {
         auto opened = openAs(std::to_string(i), flags);
@@ -165,6 +157,8 @@ Result<double> measure(store::Store& store, int workers, const WorkersFlags& fla
 Result<int> runWorkers(const WorkersFlags& flags, Bench& bench) {
     const auto store = openAs("main", flags);
     RETURN_IF_ERROR(store);
+    const auto scans = pointsOf(flags, bench.context());
+    RETURN_IF_ERROR(scans);
     bench.console.text(
         describe(environment()) + "\n" + bench.command + "\n" + std::to_string(flags.scans) + " scans, " +
         (flags.points > 0 ? "segmented, of " + std::to_string(flags.points) + " points"
@@ -175,7 +169,7 @@ Result<int> runWorkers(const WorkersFlags& flags, Bench& bench) {
         double best = 0.0;
         for (int round = 0; round < flags.rounds; ++round) {
             RETURN_IF_ERROR(bench.context().checkpoint());
-            const auto rate = measure(**store, workers, flags);
+            const auto rate = measure(**store, workers, *scans, flags);
             RETURN_IF_ERROR(rate);
             best = std::max(best, *rate);
         }

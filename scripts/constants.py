@@ -9,13 +9,14 @@
 
 A constant is a `const` or `constexpr` object named kSomething at any scope, any `constexpr` object with a
 number as its value, a macro or an enumerator of an enum without a name with a number, a member of a struct
-named *Options, *Parameters or *Merging with a numeric default, or a number that core/pipeline.cpp gives such a member
-in the profile `default`. Other enumerators are none.
+named *Options, *Parameters or *Merging with a numeric default, or a number that core/pipeline.cpp gives such
+a member in the profile `default`. Other enumerators are none.
 
 A number with a decimal point or an exponent that is in none of these is an error, too, unless it is one that
-needs no name (PLAIN) or in a file that is a table of numbers (TABLES). Whole numbers are not looked at. A constant that moves, changes its value or is renamed within
-its file keeps its kind and reason with --update. A new one gets the kind "?", which fails the check until
-someone writes both by hand.
+needs no name (PLAIN) or in a file that is a table of numbers (TABLES). Whole numbers are not looked at.
+
+A constant that moves, changes its value or is renamed within its file keeps its kind and reason with
+--update. A new one gets the kind "?", which fails the check until someone writes both by hand.
 """
 import hashlib
 import os

@@ -405,6 +405,8 @@ class Catalog {
     void refreshOrLog(const std::vector<store::Shape>& shapes, const char* consequence);
     /// By its own name. Errors: kNotFound (also: an alias).
     Result<index::SnapshotPtr> collectionNamed(const std::string& name) const;
+    /// What the store has counted, and what the server does now.
+    Result<CatalogStats> withProgress(const store::StoreStats& stored);
     /// Under the gate of restores. Errors: kUnavailable.
     Result<void> requireEpoch(std::uint64_t epoch) const;
 
@@ -419,8 +421,6 @@ class Catalog {
     ingest::WorkerPool workers_;
     ingest::RebuildDriver rebuilds_;
     RestoreGate restores_;
-    Result<CatalogStats> withProgress(const store::StoreStats& stored);
-
     RecentStats recentStats_{[this] { return store_->stats(); }};
     std::mutex directory_;  ///< held while collections come, go, or change names or aliases
     std::function<index::CollectionIndex::Totals()> totals_;

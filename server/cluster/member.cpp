@@ -17,6 +17,7 @@ constexpr std::chrono::milliseconds kPause{100};
 constexpr std::chrono::milliseconds kPatience{1'000};
 /// Rows, and changes, that are read together.
 constexpr std::size_t kPageRows = 4'096;
+/// The same is not told again before.
 constexpr std::chrono::minutes kBetweenWarnings{1};
 /// A lease is renewed this often in its length.
 constexpr int kBeatsOfTerm = 3;

@@ -96,8 +96,8 @@ class Member {
     std::condition_variable changed_;
     LeaseKeeper keeper_;
     RoutesPtr routes_;
-    Instant nextWarning_{};
-    Instant viewedAt_{};  ///< when the beat was sent that saw the table of leases last
+    Instant nextWarning_{};  ///< about another number of replicas, not before
+    Instant viewedAt_{};     ///< when the beat was sent that saw the table of leases last
     ShardSet loaded_;
     std::map<std::int64_t, std::shared_ptr<ShardContent>> contents_;
     std::uint64_t news_ = 0;  ///< rises with each beat, and each pass of the thread that follows

@@ -353,10 +353,8 @@ Result<void> RebuildDriver::process(Active& active, const store::Shape& shape) {
     PipelineOutcome made = pipeline_.run(store_, shape.id, active.parameters, context);
     switch (made.kind) {
         case PipelineOutcome::Kind::kSignature:
-            return store_.putRebuilt(
-                active.rebuild.id,
-                {shape.id, shape.pointsVersion, active.rebuild.targetGeneration, std::move(made.signature),
-                 std::move(made.surface), std::move(made.views)});
+            return store_.putRebuilt(active.rebuild.id, rowOf(std::move(made), shape.id, shape.pointsVersion,
+                                                              active.rebuild.targetGeneration));
         case PipelineOutcome::Kind::kCancelled: return {};
         case PipelineOutcome::Kind::kStoreFailed: return fail(made.why);
         case PipelineOutcome::Kind::kScanFailed: break;

@@ -36,6 +36,17 @@ struct PipelineOutcome {
     Error why{ErrorCode::kInternal, ""};
 };
 
+/// Of an outcome that is kSignature, for a shape with these points.
+[[nodiscard]] inline store::SignatureRow rowOf(PipelineOutcome made, std::int64_t shapeId,
+                                               std::int64_t pointsVersion, std::int64_t generation) {
+    return {shapeId,
+            pointsVersion,
+            generation,
+            std::move(made.signature),
+            std::move(made.surface),
+            std::move(made.views)};
+}
+
 /// Thread-safe. Copies share nothing.
 class SignaturePipeline {
   public:

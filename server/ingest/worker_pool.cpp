@@ -335,12 +335,8 @@ WorkerPool::Outcome WorkerPool::cancelled(const Running& running) {
 WorkerPool::Outcome WorkerPool::commit(const Running& running, std::int64_t generation,
                                        PipelineOutcome made) {
     const store::Job& job = running.job;
-    const store::SignatureRow row{job.shapeId,
-                                  job.pointsVersion,
-                                  generation,
-                                  std::move(made.signature),
-                                  std::move(made.surface),
-                                  std::move(made.views)};
+    const double seconds = made.seconds;
+    const store::SignatureRow row = rowOf(std::move(made), job.shapeId, job.pointsVersion, generation);
     Result<std::optional<store::Shape>> finished = std::optional<store::Shape>();
     const bool current =
         index_.whileGeneration(job.collectionId, generation, [&] { finished = store_.finishJob(job, row); });
@@ -364,7 +360,7 @@ WorkerPool::Outcome WorkerPool::commit(const Running& running, std::int64_t gene
     log_->debug("segmented", {{"shape", job.shapeId},
                               {"key", (*finished)->key},
                               {"points", (*finished)->pointCount},
-                              {"seconds", made.seconds}});
+                              {"seconds", seconds}});
     return Outcome::kDone;
 }
 

@@ -34,8 +34,6 @@ constexpr char kPageOfAll[] = SHAPEDB_PAGE("");
 constexpr char kEndOfShards[] = SHAPEDB_PAGE_END(SHAPEDB_OF_SHARDS("?4"));
 constexpr char kPageOfShards[] = SHAPEDB_PAGE(SHAPEDB_OF_SHARDS("?5"));
 
-constexpr auto kAllRows = std::numeric_limits<std::size_t>::max();
-
 std::string listOf(const cluster::ShardSet& shards) {
     std::vector<int> numbers;
     for (int shard = 0; shard < cluster::kShards; ++shard) {
@@ -56,9 +54,7 @@ void findEnd(Query end, IndexPage& page, std::size_t limit) {
 IndexPage readIndexPage(Connection& connection, std::int64_t collectionId, std::int64_t generation,
                         const cluster::ShardSet& shards, std::int64_t afterId, std::size_t limit) {
     IndexPage page;
-    const auto read = [&](Query query) {
-        static_cast<void>(readIndexRows(connection, query, kAllRows, page.rows));
-    };
+    const auto read = [&](Query query) { readIndexRows(connection, query, page.rows); };
     if (shards.all()) {
         findEnd({connection, kEndOfAll, collectionId, afterId, limit}, page, limit);
         read({connection, kPageOfAll, collectionId, afterId, page.upTo, generation});

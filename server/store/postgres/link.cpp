@@ -184,6 +184,8 @@ PostgresResult PostgresLink::await() {
         PostgresResult next = nextResult(until);
         if (next == nullptr) break;
         const auto status = PQresultStatus(next.get());
+        isCopying_ = status == PGRES_COPY_OUT;
+        if (isCopying_) return next;
         const bool ok =
             status == PGRES_TUPLES_OK || status == PGRES_COMMAND_OK || status == PGRES_EMPTY_QUERY;
         if (!ok && failed == nullptr) failed = std::move(next);
@@ -221,12 +223,12 @@ PostgresResult PostgresLink::describe(const std::string& name) {
     return sent(PQsendDescribePrepared(connection_, name.c_str()), "prepare");
 }
 
-PostgresResult PostgresLink::execute(const std::string& name, const std::vector<PostgresValue>& values) {
+PostgresResult PostgresLink::execute(const std::string& name, const std::vector<BlobView>& values) {
     endCopy();
     std::vector<const char*> data;
     std::vector<int> sizes;
-    for (const PostgresValue& value : values) {
-        data.push_back(value.data);
+    for (const BlobView& value : values) {
+        data.push_back(static_cast<const char*>(value.data));
         sizes.push_back(static_cast<int>(value.size));
     }
     const std::vector<int> formats(values.size(), kBinary);
@@ -235,21 +237,7 @@ PostgresResult PostgresLink::execute(const std::string& name, const std::vector<
                 "send a statement");
 }
 
-void PostgresLink::startCopy(const std::string& sql) {
-    endCopy();
-    const auto until = Clock::now() + patience_;
-    if (PQsendQuery(connection_, sql.c_str()) == 0) raiseConnection("send a statement");
-    flush(until);
-    PostgresResult first = nextResult(until);
-    if (first != nullptr && PQresultStatus(first.get()) == PGRES_COPY_OUT) {
-        isCopying_ = true;
-        return;
-    }
-    while (nextResult(until) != nullptr) {
-    }
-    if (first == nullptr) raiseConnection("receive");
-    raiseResult(first.get());
-}
+void PostgresLink::startCopy(const std::string& sql) { query(sql); }
 
 bool PostgresLink::nextOfCopy(BlobView& row) {
     if (!isCopying_) return false;

@@ -30,12 +30,6 @@ struct PostgresResultCloser {
 };
 using PostgresResult = std::unique_ptr<pg_result, PostgresResultCloser>;
 
-/// A parameter in binary form. Not owned; null: NULL.
-struct PostgresValue {
-    const char* data = nullptr;
-    std::size_t size = 0;
-};
-
 class PostgresLink {
   public:
     explicit PostgresLink(const PostgresAddress& address);
@@ -51,7 +45,8 @@ class PostgresLink {
     PostgresResult rows(const std::string& sql);
     PostgresResult prepare(const std::string& name, const std::string& sql);
     PostgresResult describe(const std::string& name);
-    PostgresResult execute(const std::string& name, const std::vector<PostgresValue>& values);
+    /// Values in binary form; without data: NULL.
+    PostgresResult execute(const std::string& name, const std::vector<BlobView>& values);
 
     // COPY ... TO STDOUT. Rows come while the database reads on. Whatever is sent before all have been read
     // ends it.

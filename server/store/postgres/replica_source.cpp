@@ -2,7 +2,6 @@
 #include "server/store/postgres/replica_source.h"
 
 #include <algorithm>
-#include <limits>
 #include <optional>
 #include <set>
 #include <utility>
@@ -26,8 +25,6 @@ constexpr char kRowsOfShapes[] =
     " FROM shape s JOIN signature g ON g.shape_id = s.id AND g.generation = ?3 LEFT JOIN shape_metadata m ON "
     "m.shape_id = s.id WHERE s.collection_id = ?1 AND s.id = ANY(string_to_array(?2, ',')::bigint[]) ORDER "
     "BY s.id";
-
-constexpr auto kAllRows = std::numeric_limits<std::size_t>::max();
 
 bool contains(const cluster::ShardSet& shards, int shard) { return shards[static_cast<std::size_t>(shard)]; }
 
@@ -69,7 +66,7 @@ cluster::Changes readChanges(Connection& connection, std::int64_t collectionId, 
     changes.changed.assign(ids->begin(), ids->end());
     if (ids->empty()) return changes;
     Query query(connection, kRowsOfShapes, collectionId, listed(*ids), changes.at.generation);
-    static_cast<void>(readIndexRows(connection, query, kAllRows, changes.rows));
+    readIndexRows(connection, query, changes.rows);
     return changes;
 }
 

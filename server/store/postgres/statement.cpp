@@ -12,7 +12,7 @@ namespace shapedb::store {
 namespace {
 
 // Types of the database, as in its catalogue.
-constexpr Oid kBool = 16, kBytea = 17, kInt8 = 20, kInt2 = 21, kInt4 = 23, kText = 25, kFloat8 = 701;
+constexpr Oid kBool = 16, kInt8 = 20, kInt2 = 21, kInt4 = 23, kText = 25, kFloat8 = 701;
 
 /// Rows that are in memory at a time, of statements that may find any number.
 constexpr int kRowsAtATime = 256;
@@ -196,12 +196,9 @@ class CachedStatement final : public TypedStatement {
     int rowCount() const { return rows_ == nullptr ? 0 : PQntuples(rows_.get()); }
 
     void start() {
-        std::vector<PostgresValue> parameters;
+        std::vector<BlobView> parameters;
         for (const Value& value : values()) {
-            const BlobView bytes = value.bytes();
-            parameters.push_back(value.isBound
-                                     ? PostgresValue{static_cast<const char*>(bytes.data), bytes.size}
-                                     : PostgresValue());
+            parameters.push_back(value.isBound ? value.bytes() : BlobView());
         }
         rows_ = link_.execute(name_, parameters);
         row_ = 0;

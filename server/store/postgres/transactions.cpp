@@ -27,7 +27,7 @@ std::chrono::milliseconds lockTurn(const PostgresPool& pool) {
 
 void inWriteTransaction(PostgresPool& pool, bool once, const std::function<void(Connection&)>& work) {
     const auto until = PostgresPool::Clock::now() + pool.patience();
-    for (int tries = 1;; ++tries) {
+    for (int tries = 1;;) {
         const PostgresPool::Lease connection = pool.acquire(PostgresPool::Use::kWrite, until);
         connection->waitForLocks(once ? std::chrono::milliseconds(0) : lockTurn(pool));
         bool mayBeStored = false;
@@ -40,12 +40,10 @@ void inWriteTransaction(PostgresPool& pool, bool once, const std::function<void(
         } catch (const Failure& failure) {
             if (once) throw;
             if (connection->isBroken()) pool.closeIdle();
-            if (isHeldUp(failure) && PostgresPool::Clock::now() < until) {
-                --tries;  // no fault of anybody
-                continue;
-            }
+            if (isHeldUp(failure) && PostgresPool::Clock::now() < until) continue;
             const bool isStale = !mayBeStored && tries == 1 && wentStale(*connection);
             if (!isStale && !(isConflict(failure) && tries < kMostConflicts)) throw;
+            ++tries;
         }
     }
 }

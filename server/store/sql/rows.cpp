@@ -142,7 +142,7 @@ SignatureRow readSignature(Connection& connection, const Query& query, int colum
     return row;
 }
 
-bool readIndexRows(Connection& connection, Query& query, std::size_t limit, std::vector<IndexRow>& rows) {
+void readIndexRows(Connection& connection, Query& query, std::vector<IndexRow>& rows, std::size_t limit) {
     bool more = query.step();
     while (more && rows.size() < limit) {
         IndexRow& row = rows.emplace_back();
@@ -154,7 +154,6 @@ bool readIndexRows(Connection& connection, Query& query, std::size_t limit, std:
             more = query.step();
         } while (more && query.integer(0) == row.shapeId);
     }
-    return more;
 }
 
 void putSignature(Connection& connection, const SignatureRow& signature) {

@@ -2,6 +2,7 @@
 // From rows to the structs of store.h, and small reads that several files share.
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <string>
 
@@ -52,9 +53,10 @@ Collection readCollection(const Query& query);
 /// Failure kDataLoss, naming the shape.
 SignatureRow readSignature(Connection& connection, const Query& query, int column, std::int64_t shapeId);
 
-/// Appends shapes of a SHAPEDB_INDEX_COLUMNS statement until there are `limit`; returns whether it has found
-/// more. Throws Failure kDataLoss, naming the shape.
-bool readIndexRows(Connection& connection, Query& query, std::size_t limit, std::vector<IndexRow>& rows);
+/// Appends shapes of a SHAPEDB_INDEX_COLUMNS statement, all or until there are `limit`. Throws Failure
+/// kDataLoss, naming the shape.
+void readIndexRows(Connection& connection, Query& query, std::vector<IndexRow>& rows,
+                   std::size_t limit = std::numeric_limits<std::size_t>::max());
 
 /// Replaces the shape's signature of that generation, and its surface points if the row brings some.
 void putSignature(Connection& connection, const SignatureRow& signature);

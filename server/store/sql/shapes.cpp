@@ -285,7 +285,7 @@ Result<std::vector<IndexRow>> SqlStore::loadIndex(std::int64_t collectionId, std
         const Collection collection = requireCollection(connection, collectionId);
         Query query(connection, sql::kLoadIndex, collectionId, afterId, collection.generation);
         rows.reserve(std::min(limit, kMostReserved));
-        readIndexRows(connection, query, limit, rows);
+        readIndexRows(connection, query, rows, limit);
         return rows;
     });
 }

@@ -30,7 +30,7 @@ std::vector<IndexRow> indexRowsWithoutIndices(Connection& connection, const Coll
     std::vector<IndexRow> rows;
     for (const std::int64_t place : places) {
         Query query(connection, kIndexRow, place);
-        readIndexRows(connection, query, rows.size() + 1, rows);
+        readIndexRows(connection, query, rows, rows.size() + 1);
     }
     return rows;
 }
